@@ -1,0 +1,1 @@
+"""Human skin, physically based, in real time, checked against the truth."""
