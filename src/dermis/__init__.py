@@ -1,1 +1,76 @@
-"""Human skin, physically based, in real time, checked against the truth."""
+"""Human skin, physically based, in real time, checked against the truth.
+
+>>> import dermis
+>>> head = dermis.load_head("lee_perry_smith")
+>>> scene = dermis.Scene(head, lights=dermis.studio(), camera=dermis.portrait(head))
+>>> image = dermis.render(scene, size=(1024, 1024))  # (1024, 1024, 3) float32, linear Rec. 709
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from dermis.assets.head import Head, load_head
+    from dermis.errors import DermisError
+    from dermis.images.io import write_image
+    from dermis.rendering.renderer import Renderer, render
+    from dermis.scene.camera import Camera, portrait, profile, three_quarter
+    from dermis.scene.files import load_scene
+    from dermis.scene.lights import DirectionalLight, PointLight, SpotLight, studio
+    from dermis.scene.model import Scene
+    from dermis.scene.settings import Settings
+    from dermis.scene.skin import Skin
+
+_HOME = {
+    "Head": "assets.head",
+    "load_head": "assets.head",
+    "DermisError": "errors",
+    "write_image": "images.io",
+    "Renderer": "rendering.renderer",
+    "render": "rendering.renderer",
+    "Camera": "scene.camera",
+    "portrait": "scene.camera",
+    "profile": "scene.camera",
+    "three_quarter": "scene.camera",
+    "load_scene": "scene.files",
+    "DirectionalLight": "scene.lights",
+    "PointLight": "scene.lights",
+    "SpotLight": "scene.lights",
+    "studio": "scene.lights",
+    "Scene": "scene.model",
+    "Settings": "scene.settings",
+    "Skin": "scene.skin",
+}
+
+__all__ = [
+    "Camera",
+    "DermisError",
+    "DirectionalLight",
+    "Head",
+    "PointLight",
+    "Renderer",
+    "Scene",
+    "Settings",
+    "Skin",
+    "SpotLight",
+    "load_head",
+    "load_scene",
+    "portrait",
+    "profile",
+    "render",
+    "studio",
+    "three_quarter",
+    "write_image",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Public names on first use, so that `import dermis` stays quick."""
+    from importlib import import_module
+
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value

@@ -1,0 +1,33 @@
+# Two commands are enough: `make demo` shows the package, `make test` checks it.
+.DEFAULT_GOAL := help
+.PHONY: help setup demo lint test lock clean
+
+PY := .venv/bin/python
+ARGS ?=
+
+help: ## this list
+	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | while IFS="$$(printf '\t')" read -r name what; do \
+		printf '  make %-6s %s\n' "$$name" "$$what"; done
+
+setup: ## an environment in .venv from requirements.lock, and a Vulkan driver
+	@sh tools/setup.sh
+
+demo: setup ## render the sample head into out/demo.png
+	@mkdir -p out
+	@.venv/bin/dermis render lee_perry_smith -o out/demo.png
+
+lint: setup ## style, types and floors
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+	$(PY) -m mypy
+	.venv/bin/lint-imports
+
+test: lint ## lint and every test (ARGS="-k blur" chooses some)
+	$(PY) -m pytest -n 2 --dist loadfile $(ARGS)
+
+lock: ## write requirements.lock anew from pyproject.toml (ARGS=--upgrade for newer versions)
+	@sh tools/lock.sh $(ARGS)
+
+clean: ## remove what was built and cached here, except .venv
+	rm -rf out dist build .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	find src tests gallery benchmarks tools -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,206 @@
+"""The surface atlas: which point of the surface each texel of the uv map stands for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.assets.mesh import Mesh
+from dermis.assets.uv import charts, usable
+from dermis.errors import refuse
+
+GUTTER = 3  # texels around each chart, so that interpolation at its edge finds light
+_SMALLEST = 64
+_LEAST_TEXELS = 4.0  # a chart with less uv area than this holds nothing that could be blurred
+
+
+@dataclass(frozen=True)
+class Atlas:
+    """Texel -> surface, once per mesh and size. Row 0 is the top of the maps (v = 0).
+
+    triangle : (n, n) int32 triangle at the texel's centre, nearest one in the gutter, -1 elsewhere
+    barycentric : (n, n, 2) uint16 weights of the triangle's second and third corner [1/65535]
+    stretch : (n, n, 2) float16 texels per mm along u and v [1/mm]
+    reach : (n, n, 4) uint8 texels to the left, right, up and down that are on the same chart
+    mapped : (f,) triangles that own texels here; the others (collapsed or overlapped in uv) are lit directly
+    """
+
+    triangle: NDArray[np.int32]
+    barycentric: NDArray[np.uint16]
+    stretch: NDArray[np.float16]
+    reach: NDArray[np.uint8]
+    mapped: NDArray[np.bool_]
+
+    @property
+    def size(self) -> int:
+        """Texels along each side."""
+        return len(self.triangle)
+
+    @property
+    def coverage(self) -> NDArray[np.bool_]:
+        """(n, n) texels that hold surface, gutter included."""
+        covered: NDArray[np.bool_] = self.triangle >= 0
+        return covered
+
+    def weights(self) -> NDArray[np.float64]:
+        """(n, n, 3) barycentric weights of the three corners."""
+        bc = self.barycentric / 65535.0
+        return np.concatenate([1.0 - bc.sum(axis=-1, keepdims=True), bc], axis=-1)
+
+    def interpolate(self, mesh: Mesh, values: NDArray[np.floating]) -> NDArray[np.float64]:
+        """(n, n, c) of a (v, c) corner attribute; undefined outside the coverage."""
+        corners = mesh.triangles[np.maximum(self.triangle, 0)]
+        total: NDArray[np.float64] = np.einsum("yxk,yxkc->yxc", self.weights(), values[corners].astype(float))
+        return total
+
+
+def build_atlas(mesh: Mesh, size: int) -> Atlas:
+    """The atlas of `size` x `size` texels.
+
+    Raises DermisError when the size is under 64.
+    """
+    if size < _SMALLEST:
+        refuse(
+            "atlas", f"a size of {_SMALLEST} texels or more", f"it is {size}", "Choose --atlas 1024 or 2048"
+        )
+    chart = charts(mesh)
+    fit = usable(mesh, size, _LEAST_TEXELS)
+    texel, triangle = _rasterise(mesh, size, np.flatnonzero(fit))
+    mapped = fit & ~_overlapped(chart, texel, triangle, size)
+    keep = mapped[triangle]
+    owner = np.full(size * size, -1, dtype=np.int32)
+    owner[texel[keep]] = triangle[keep]
+    owner = owner.reshape(size, size)
+    for _ in range(GUTTER):
+        owner = _dilate(owner)
+    barycentric = _barycentric(mesh, size, owner)
+    chart_map = np.where(owner >= 0, chart[np.maximum(owner, 0)], -1)
+    stretch = _stretch(mesh, size, owner, barycentric)
+    return Atlas(owner, barycentric, stretch, _reach(chart_map), mapped)
+
+
+def _corners(mesh: Mesh, size: int, triangle: NDArray[np.integer]) -> NDArray[np.float64]:
+    """(t, 3, 2) uv corners in texels, whole numbers at texel centres."""
+    return mesh.uv[mesh.triangles[triangle]].astype(np.float64) * size - 0.5
+
+
+def _rasterise(
+    mesh: Mesh, size: int, triangle: NDArray[np.integer]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Texels whose centre lies in a triangle, as (flat texel index, triangle), by spans of rows."""
+    p = _corners(mesh, size, triangle)
+    top = np.clip(np.ceil(p[:, :, 1].min(axis=1)), 0, size).astype(np.int64)
+    bottom = np.clip(np.floor(p[:, :, 1].max(axis=1)), -1, size - 1).astype(np.int64)
+    which, y = _expand(top, np.maximum(bottom - top + 1, 0))
+    left, right = _span(p[which], y)
+    left = np.clip(np.ceil(left - 1e-6), 0, size).astype(np.int64)
+    right = np.clip(np.floor(right + 1e-6), -1, size - 1).astype(np.int64)
+    span, x = _expand(left, np.maximum(right - left + 1, 0))
+    return y[span] * size + x, triangle[which[span]].astype(np.int64)
+
+
+def _expand(
+    first: NDArray[np.int64], count: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Each run first, first + 1, ... of `count` numbers, with the index of the run it belongs to."""
+    which = np.repeat(np.arange(len(count)), count)
+    start = np.repeat(np.cumsum(count) - count, count)
+    return which, np.arange(len(which)) - start + first[which]
+
+
+def _span(p: NDArray[np.float64], y: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where row y enters and leaves each triangle."""
+    lowest = np.full(len(y), -np.inf)
+    highest = np.full(len(y), np.inf)
+    area = _cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    sign = np.where(area >= 0, 1.0, -1.0)
+    for k in range(3):
+        a, edge = p[:, k], p[:, (k + 1) % 3] - p[:, k]
+        # inside: cross(edge, q - a) * sign >= 0, linear in q.x with slope -edge.y * sign
+        slope = -edge[:, 1] * sign
+        level = (edge[:, 0] * (y - a[:, 1]) + edge[:, 1] * a[:, 0]) * sign
+        crossing = -level / np.where(slope == 0, 1.0, slope)
+        lowest = np.where(slope > 0, np.maximum(lowest, crossing), lowest)
+        highest = np.where(slope < 0, np.minimum(highest, crossing), highest)
+        highest = np.where((slope == 0) & (level < 0), -np.inf, highest)
+    return np.where(np.isfinite(lowest), lowest, 1.0), np.where(np.isfinite(highest), highest, 0.0)
+
+
+def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def _overlapped(
+    chart: NDArray[np.integer], texel: NDArray[np.int64], triangle: NDArray[np.int64], size: int
+) -> NDArray[np.bool_]:
+    """Triangles of charts that lie mostly on texels which a larger chart needs."""
+    count = int(chart.max()) + 1
+    area = np.bincount(chart[triangle], minlength=count)
+    order = np.argsort(area[chart[triangle]], kind="stable")  # the largest chart writes last and wins
+    winner = np.full(size * size, -1, dtype=np.int64)
+    winner[texel[order]] = chart[triangle[order]]
+    own = np.bincount(chart[triangle][winner[texel] == chart[triangle]], minlength=count)
+    lost = own < 0.5 * np.maximum(area, 1)
+    return lost[chart]
+
+
+def _dilate(owner: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Empty texels take the owner of one of their eight neighbours, straight ones first."""
+    grown = owner.copy()
+    padded = np.pad(owner, 1, constant_values=-1)
+    n = len(owner)
+    for dy, dx in ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1)):
+        neighbour = padded[1 + dy : 1 + dy + n, 1 + dx : 1 + dx + n]
+        np.copyto(grown, neighbour, where=(grown < 0) & (neighbour >= 0))
+    return grown
+
+
+def _barycentric(mesh: Mesh, size: int, owner: NDArray[np.int32]) -> NDArray[np.uint16]:
+    """Weights at each texel's centre; in the gutter those of the nearest place in the triangle."""
+    y, x = np.nonzero(owner >= 0)
+    p = _corners(mesh, size, owner[y, x])
+    q = np.stack([x, y], axis=-1) - p[:, 0]
+    e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
+    area = _cross(e1, e2)
+    area = np.where(area == 0, 1.0, area)
+    b = np.clip(np.stack([_cross(q, e2) / area, _cross(e1, q) / area], axis=-1), 0.0, 1.0)
+    b /= np.maximum(b.sum(axis=-1, keepdims=True), 1.0)
+    whole = np.zeros((size, size, 2), dtype=np.uint16)
+    whole[y, x] = np.floor(b * 65535.0).astype(np.uint16)
+    return whole
+
+
+def _stretch(
+    mesh: Mesh, size: int, owner: NDArray[np.int32], barycentric: NDArray[np.uint16]
+) -> NDArray[np.float16]:
+    """Texels per mm along u and v from the interpolated derivatives."""
+    y, x = np.nonzero(owner >= 0)
+    corners = mesh.triangles[owner[y, x]]
+    b = barycentric[y, x] / np.float32(65535)
+    weights = np.stack([1 - b[:, 0] - b[:, 1], b[:, 0], b[:, 1]])
+    mm = np.stack([np.linalg.norm(mesh.dpdu, axis=1), np.linalg.norm(mesh.dpdv, axis=1)], axis=-1)
+    interpolated = sum(weights[k][:, None] * mm[corners[:, k]] for k in range(3))
+    whole = np.zeros((size, size, 2), dtype=np.float16)
+    whole[y, x] = np.clip(size / np.maximum(interpolated, 1e-3), 0.0, 6e4)
+    return whole
+
+
+def _reach(chart: NDArray[np.integer]) -> NDArray[np.uint8]:
+    """Run lengths of equal chart to the left, right, up and down of each texel."""
+
+    def before(rows: NDArray[np.integer]) -> NDArray[np.int64]:
+        index = np.arange(rows.shape[1])[None, :]
+        breaks = np.ones(rows.shape, dtype=bool)
+        breaks[:, 1:] = rows[:, 1:] != rows[:, :-1]
+        start: NDArray[np.int64] = np.maximum.accumulate(np.where(breaks, index, 0), axis=1)
+        return index - start
+
+    runs = (
+        before(chart),
+        before(chart[:, ::-1])[:, ::-1],
+        before(chart.T).T,
+        before(chart.T[:, ::-1])[:, ::-1].T,
+    )
+    return np.stack([np.minimum(run, 255) for run in runs], axis=-1).astype(np.uint8)

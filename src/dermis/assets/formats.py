@@ -1,0 +1,248 @@
+"""Mesh files as they lie on disk: groups of triangles in file units, with uv untouched.
+
+trimesh parses; what it would lose or change is marked in the file's text first: it flips v of glTF, drops
+uv of primitives without material and of integer uv, and names groups after itself.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import struct
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.errors import refuse
+
+Colour = tuple[float, float, float]
+Array = NDArray[np.float64]
+
+GREY: Colour = (0.8, 0.8, 0.8)
+
+
+def is_gltf(path: str | Path) -> bool:
+    """Whether the file is glTF by its suffix."""
+    return Path(path).suffix.lower() in (".glb", ".gltf")
+
+
+def default_unit_mm(path: str | Path) -> float:
+    """Length of the file's unit if nothing else is said [mm]: 1000 for glTF, which is in metres, else 1."""
+    return 1000.0 if is_gltf(path) else 1.0
+
+
+@dataclass(frozen=True)
+class Group:
+    """Name of the material (or mesh) first, then all other names; diffuse colour, linear [-]."""
+
+    names: tuple[str, ...]
+    colour: Colour = GREY
+
+
+@dataclass(frozen=True)
+class Part:
+    """One group's triangles in the file's units and the file's v direction.
+
+    positions (v, 3), uv (v, 2) or None, normals (v, 3) or None, triangles (f, 3)
+    """
+
+    group: Group
+    positions: Array
+    uv: Array | None
+    normals: Array | None
+    triangles: NDArray[np.int64]
+
+
+def read_gltf(path: Path) -> list[Part]:
+    """Parts of a .glb or .gltf file, each node's transform applied."""
+    from trimesh.resolvers import FilePathResolver
+
+    data, binary = path.read_bytes(), path.suffix.lower() == ".glb"
+    chunk = struct.unpack_from("<I", data, 12)[0] if binary else len(data)
+    start = 20 if binary else 0
+    tree = json.loads(data[start : start + chunk])
+    groups = _mark_gltf(tree, path)
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    if binary:
+        rest = data[20 + chunk :]
+        text = (
+            data[:8] + struct.pack("<II", 20 + len(text) + len(rest), len(text)) + data[16:20] + text + rest
+        )
+    return list(_parts(text, path.suffix[1:].lower(), groups, resolver=FilePathResolver(str(path))))
+
+
+def _mark_gltf(tree: dict[str, Any], path: Path) -> list[Group]:
+    """Give each primitive a group of its own and keep its raw uv and normals where trimesh leaves them be."""
+    _refuse_extensions(tree, path)
+    groups: list[Group] = []
+    wanted: set[int] = set()
+    for mesh in tree.get("meshes", []):
+        for primitive in mesh["primitives"]:
+            given = primitive["attributes"]
+            kept = {"POSITION": "POSITION", "NORMAL": "_NORMAL", "TEXCOORD_0": "_UV"}
+            primitive["attributes"] = {mark: given[name] for name, mark in kept.items() if name in given}
+            wanted.update(
+                primitive["attributes"].values(), [primitive[k] for k in ("indices",) if k in primitive]
+            )
+            groups.append(_gltf_group(tree, mesh, primitive))
+            primitive["material"] = len(groups) - 1
+    # pictures are none of our business here, and unused accessors may ask for any amount of memory
+    for key in ("textures", "images", "samplers", "cameras", "animations", "skins"):
+        tree.pop(key, None)
+    tree["materials"] = [{"name": str(k)} for k in range(len(groups))]
+    for index, accessor in enumerate(tree.get("accessors", [])):
+        if index not in wanted:
+            tree["accessors"][index] = {"componentType": 5126, "count": 0, "type": "SCALAR"}
+        elif "sparse" in accessor or "bufferView" not in accessor:
+            refuse(
+                path,
+                "plain glTF accessors",
+                f"accessor {index} is sparse or empty",
+                "Export without morph targets",
+            )
+    return groups
+
+
+def _refuse_extensions(tree: dict[str, Any], path: Path) -> None:
+    """Refuse geometry in an encoding that would be read wrongly."""
+    harmless = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_")
+    foreign = [name for name in tree.get("extensionsRequired", []) if not str(name).startswith(harmless)]
+    if foreign:
+        refuse(
+            path,
+            "plain glTF geometry",
+            f"the file requires {', '.join(map(str, foreign))}",
+            "Export without compression and quantisation",
+        )
+
+
+def _gltf_group(tree: dict[str, Any], mesh: dict[str, Any], primitive: dict[str, Any]) -> Group:
+    material = tree["materials"][primitive["material"]] if "material" in primitive else {}
+    names = tuple(str(thing["name"]) for thing in (material, mesh) if thing.get("name"))
+    factor = material.get("pbrMetallicRoughness", {}).get("baseColorFactor")
+    return Group(names, _colour(factor) if factor else GREY)
+
+
+def read_obj(path: Path) -> list[Part]:
+    """Parts of a .obj file by `usemtl` and `g`; colours are Kd of its .mtl, taken as linear."""
+    text = path.read_bytes().decode("utf-8", errors="replace").replace("\r\n", "\n").replace("\\\n", " ")
+    text = re.sub(r"^((?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", r"\1", text, flags=re.MULTILINE)
+    if re.search(r"^f[^\n]*[ /]-\d", text, re.MULTILINE):
+        refuse(
+            path, "faces by absolute index", "it has relative (negative) ones", "Export it again, in Blender"
+        )
+    libraries = re.findall(r"^[ \t]*mtllib[ \t]+(.*?)[ \t]*$", text, re.MULTILINE)
+    colours: dict[str, Colour] = {}
+    for library in libraries:
+        colours.update(_mtl_colours(path.parent / library))
+    text, groups = _mark_obj(text, colours)
+    materials = "\n".join(f"newmtl {k}" for k in range(len(groups)))
+    parts = list(_parts(text.encode(), "obj", groups, resolver={"marked.mtl": materials.encode()}))
+    return parts[::-1]  # trimesh pops groups from the end: file order again
+
+
+def _mark_obj(text: str, colours: dict[str, Colour]) -> tuple[str, list[Group]]:
+    """Replace each `usemtl` and `g` by `usemtl` of a number, one for each pair of names."""
+    current = {"usemtl": "", "g": ""}
+    numbers: dict[tuple[str, str], int] = {("", ""): 0}
+
+    def number(match: re.Match[str]) -> str:
+        current[match[1]] = match[2] or ""
+        key = (current["usemtl"], current["g"])
+        return f"usemtl {numbers.setdefault(key, len(numbers))}"
+
+    marked = re.sub(r"^[ \t]*(usemtl|g)(?:[ \t]+([^\n]*?))?[ \t]*$", number, text, flags=re.MULTILINE)
+    names = [tuple(dict.fromkeys(name for name in key if name)) for key in numbers]
+    groups = [Group(name, colours.get(key[0], GREY)) for name, key in zip(names, numbers, strict=True)]
+    return f"mtllib marked.mtl\nusemtl 0\n{marked}", groups
+
+
+def _mtl_colours(path: Path) -> dict[str, Colour]:
+    """Kd of each material; nothing when there is no such file, as is common."""
+    if not path.is_file():
+        return {}
+    colours, name = {}, ""
+    for line in path.read_bytes().decode("utf-8", errors="replace").splitlines():
+        key, _, value = line.strip().partition(" ")
+        if key == "newmtl":
+            name = value.strip()
+        elif key == "Kd":
+            colours[name] = _colour(value.split())
+    return colours
+
+
+def read_ply(path: Path) -> list[Part]:
+    """The one part of a .ply file; uv from the vertex properties s, t or u, v or texture_u, texture_v."""
+    data = path.read_bytes()
+    header = data[: data.find(b"end_header")]
+    # uv by face corner need vertices split, after which normals need not fit them any more; uv by vertex
+    # do not, and splitting would drop the normals as soon as one vertex is unused
+    by_corner = b"texcoord" in header
+    parts = list(_parts(data, "ply", [Group((path.stem,))], fix_texture=by_corner, skip_materials=True))
+    return [Part(p.group, p.positions, p.uv, None, p.triangles) for p in parts] if by_corner else parts
+
+
+READERS: dict[str, Callable[[Path], list[Part]]] = {
+    ".glb": read_gltf,
+    ".gltf": read_gltf,
+    ".obj": read_obj,
+    ".ply": read_ply,
+}
+
+
+def _parts(data: bytes, kind: str, groups: list[Group], **options: Any) -> Iterator[Part]:
+    """What trimesh reads from `data`, in the world's frame, each under the group its material numbers."""
+    from io import BytesIO
+
+    import trimesh
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        # text that breaks off in the middle must not pass as a shorter mesh
+        warnings.filterwarnings("error", message="string or file could not be read")
+        scene = trimesh.load_scene(BytesIO(data), file_type=kind, process=False, **options)
+    nodes = [scene.graph[node] for node in scene.graph.nodes_geometry]
+    for transform, name in nodes or [(np.eye(4), name) for name in scene.geometry]:
+        mesh = scene.geometry[name]
+        if isinstance(mesh, trimesh.Trimesh):
+            tag = getattr(getattr(mesh.visual, "material", None), "name", None)
+            yield _placed(mesh, np.asarray(transform), groups[int(tag or 0) if len(groups) > 1 else 0])
+
+
+def _placed(mesh: Any, transform: Array, group: Group) -> Part:
+    """A trimesh's arrays, moved by `transform` (4, 4)."""
+    uv = mesh.vertex_attributes.get("_UV", getattr(mesh.visual, "uv", None))
+    normals = mesh.vertex_attributes.get("_NORMAL")
+    if normals is None and "vertex_normals" in mesh._cache:
+        normals = mesh.vertex_normals
+    linear = transform[:3, :3]
+    # normals turn with the cofactors, which exist for flat transforms too; mirrors turn triangles round
+    cofactors = np.array([np.cross(linear[(i + 1) % 3], linear[(i + 2) % 3]) for i in range(3)])
+    mirror = np.sign(np.linalg.det(linear)) or 1.0
+    triangles = np.array(mesh.faces, dtype=np.int64).reshape(-1, 3)
+    return Part(
+        group,
+        np.asarray(mesh.vertices, dtype=np.float64) @ linear.T + transform[:3, 3],
+        None if uv is None else _real(uv),
+        None if normals is None else _real(normals) @ (mirror * cofactors).T,
+        triangles[:, ::-1] if mirror < 0 else triangles,
+    )
+
+
+def _real(values: Any) -> Array:
+    """Floating numbers; integers are fractions of their type's largest, as glTF has it."""
+    array = np.asarray(values)
+    scale = np.iinfo(array.dtype).max if array.dtype.kind in "iu" else 1
+    return np.asarray(array / scale, dtype=np.float64)
+
+
+def _colour(numbers: Any) -> Colour:
+    """Three numbers in [0, 1]."""
+    r, g, b = (min(max(float(x), 0.0), 1.0) for x in list(numbers)[:3])
+    return (r, g, b)

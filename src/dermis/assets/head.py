@@ -1,0 +1,108 @@
+"""A head to render: mesh and maps in one, from a sample or from files."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from dermis.assets.check import check_head_height
+from dermis.assets.load import load_mesh
+from dermis.assets.maps import Maps, load_maps
+from dermis.assets.mesh import Mesh
+from dermis.assets.samples import SAMPLES, fetch
+from dermis.assets.subdivide import subdivide as subdivided
+from dermis.errors import refuse
+
+MapFile = str | os.PathLike[str] | None
+_CROWN_TO_CENTRE_MM = 120.0  # half the height of an adult head
+
+
+@dataclass(frozen=True)
+class Head:
+    """A mesh in mm with its maps.
+
+    name : sample or file
+    attribution : whom to name when a picture of it is shown, empty when nobody asks for it
+    """
+
+    name: str
+    mesh: Mesh
+    maps: Maps
+    attribution: str = ""
+
+    @cached_property
+    def centre_mm(self) -> tuple[float, float, float]:
+        """The middle of the head itself, without neck and shoulders: scenes are placed around it [mm]."""
+        p = self.mesh.positions
+        top = float(p[:, 1].max())
+        skull = p[p[:, 1] > top - 2 * _CROWN_TO_CENTRE_MM]
+        low, high = skull.min(axis=0), skull.max(axis=0)
+        return float(low[0] + high[0]) / 2, top - _CROWN_TO_CENTRE_MM, float(low[2] + high[2]) / 2
+
+    def frontmost(self, x_mm: float, y_mm: float) -> tuple[float, float, float]:
+        """The point of the surface in front of (x, y), relative to the centre [mm]."""
+        p = self.mesh.positions - np.array(self.centre_mm, dtype=np.float32)
+        off = np.hypot(p[:, 0] - x_mm, p[:, 1] - y_mm)
+        near = off <= max(6.0, float(off.min()) + 1.0)
+        x, y, z = p[near][np.argmax(p[near][:, 2])]
+        return float(x), float(y), float(z)
+
+
+def load_head(
+    head: str | os.PathLike[str],
+    *,
+    colour: MapFile = None,
+    normal: MapFile = None,
+    height: MapFile = None,
+    height_mm: float | None = None,
+    specular: MapFile = None,
+    roughness: MapFile = None,
+    unit_mm: float | None = None,
+    v_origin: Literal["auto", "top", "bottom"] = "auto",
+    up: Literal["y", "z"] = "y",
+    subdivide: int = 0,
+) -> Head:
+    """A sample ("lee_perry_smith") or a mesh file (.glb, .gltf, .obj, .ply) with the given maps.
+
+    Options given for a sample replace its own.
+
+    colour, normal, height, specular, roughness : image files; see `load_maps`
+    height_mm : relief of one grey level of an 8-bit height map [mm]
+    unit_mm : length of the file's unit [mm]; metres for glTF and mm otherwise when left out
+    v_origin : which row of the maps v = 0 is; the format's rule when "auto"
+    up : the file's upward axis
+    subdivide : levels of Loop subdivision, 0 to 3
+
+    Raises DermisError for files that cannot be rendered as a head.
+    """
+    name, path = str(head), Path(head)
+    sample, files = SAMPLES.get(name), {}
+    if sample is not None:
+        if sample.kind != "head":
+            refuse(
+                name, "a head", f"this sample is an {sample.kind}", f"Use one of {', '.join(_head_names())}"
+            )
+        files = fetch(name)
+        path = files["mesh"]
+        unit_mm = unit_mm or sample.unit_mm
+        v_origin = sample.v_origin if v_origin == "auto" else v_origin
+        height_mm = height_mm or sample.height_mm
+    elif not path.exists():
+        known = ", ".join(_head_names())
+        refuse(name, f"a mesh file or a sample ({known})", "there is neither", "Check the name")
+    mesh = load_mesh(path, unit_mm=unit_mm, v_origin=v_origin, up=up)
+    check_head_height(mesh, name, unit_mm)
+    own: dict[str, Any] = {"colour": colour, "normal": normal, "height": height}
+    own |= {"specular": specular, "roughness": roughness}
+    given = {role: file if file is not None else files.get(role) for role, file in own.items()}
+    maps = load_maps(**given, height_mm=height_mm)
+    return Head(name, subdivided(mesh, subdivide), maps, sample.attribution if sample else "")
+
+
+def _head_names() -> list[str]:
+    return [name for name, sample in SAMPLES.items() if sample.kind == "head"]

@@ -1,0 +1,57 @@
+"""The one mesh type of the package: triangles with uv, in millimetres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float32]
+Ints = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Material:
+    """What a group of triangles is made of.
+
+    name : the group's name in the file
+    kind : "skin" gets the whole technique, "opaque" plain diffuse and specular (eyeballs, teeth)
+    colour : diffuse albedo where no map gives one, linear Rec. 709 [-]
+    """
+
+    name: str
+    kind: str = "skin"
+    colour: tuple[float, float, float] = (0.8, 0.8, 0.8)
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Triangles with attributes at corner vertices; Y up, face towards +Z, counter-clockwise is outside.
+
+    A place on a uv seam has one corner vertex for each of its uvs; `point` tells that they are one place.
+
+    positions : (v, 3) [mm]
+    normals : (v, 3) unit vectors
+    uv : (v, 2) u to the right, v DOWN: (0, 0) is the top-left corner of every map, in [0, 1]
+    dpdu, dpdv : (v, 3) change of position with uv, averaged over the faces around [mm per unit of uv]
+    point : (v,) index of the unique position
+    triangles : (f, 3) corner vertices
+    material : (f,) index into `materials`
+    """
+
+    positions: Floats
+    normals: Floats
+    uv: Floats
+    dpdu: Floats
+    dpdv: Floats
+    point: Ints
+    triangles: Ints
+    material: Ints
+    materials: tuple[Material, ...]
+
+    @property
+    def size_mm(self) -> NDArray[np.float32]:
+        """Extent along x, y and z [mm]."""
+        extent: Floats = self.positions.max(axis=0) - self.positions.min(axis=0)
+        return extent

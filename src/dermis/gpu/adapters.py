@@ -1,0 +1,100 @@
+"""Which adapters this machine has, and which one is best for the frame."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from dermis.errors import refuse
+
+# Not needed to render; each makes something better: half-size tables, timings, half arithmetic.
+WANTED_FEATURES = ("float32-filterable", "timestamp-query", "shader-f16")
+
+_KINDS = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", "CPU")
+INSTALL_HINT = "On Debian or Ubuntu: sudo apt-get install mesa-vulkan-drivers"
+
+
+@dataclass(frozen=True)
+class Adapter:
+    """One way to reach a graphics processor (or a software one).
+
+    name, driver : as the driver spells them
+    kind : "DiscreteGPU" | "IntegratedGPU" | "VirtualGPU" | "CPU" | "Unknown"
+    backend : "Vulkan" | "Metal" | "D3D12" | "OpenGL"
+    features : the wanted features that it has
+    handle : wgpu's own object
+    """
+
+    name: str
+    driver: str
+    kind: str
+    backend: str
+    features: tuple[str, ...]
+    handle: Any
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Wanted features that it lacks."""
+        return tuple(f for f in WANTED_FEATURES if f not in self.features)
+
+
+def list_adapters() -> list[Adapter]:
+    """Every adapter, the best first: real GPUs before software, then the one with more features."""
+    import wgpu
+
+    with _quiet_drivers():
+        found = [_describe(handle) for handle in wgpu.gpu.enumerate_adapters_sync()]
+    return sorted(found, key=lambda a: (_rank(a.kind), len(a.missing), a.backend == "OpenGL"))
+
+
+def choose_adapter(wanted: str) -> tuple[Adapter, str]:
+    """The adapter for `wanted` ("auto", "cpu" or part of a name) and the reason for the choice."""
+    adapters = list_adapters()
+    if not adapters:
+        refuse("adapter", "a Vulkan, Metal or DX12 adapter", "this machine shows none", INSTALL_HINT)
+    if wanted == "auto":
+        return adapters[0], "the fastest kind, with the most features"
+    if wanted == "cpu":
+        fitting, reason = [a for a in adapters if a.kind == "CPU"], "software was asked for"
+    else:
+        fitting = [a for a in adapters if wanted.lower() in f"{a.name} {a.driver} {a.backend}".lower()]
+        reason = f"its name contains {wanted!r}"
+    if not fitting:
+        names = ", ".join(f"{a.name} ({a.backend})" for a in adapters)
+        hint = INSTALL_HINT if wanted == "cpu" else "Choose auto, cpu or a part of one of those names"
+        refuse(f"adapter {wanted!r}", "one of this machine's adapters", f"it has {names}", hint)
+    return fitting[0], reason
+
+
+def _describe(handle: Any) -> Adapter:
+    info = handle.info
+    return Adapter(
+        name=info["device"],
+        driver=info["description"],
+        kind=info["adapter_type"],
+        backend=info["backend_type"],
+        features=tuple(f for f in WANTED_FEATURES if f in handle.features),
+        handle=handle,
+    )
+
+
+def _rank(kind: str) -> int:
+    return _KINDS.index(kind) if kind in _KINDS else _KINDS.index("Unknown")
+
+
+@contextlib.contextmanager
+def _quiet_drivers() -> Iterator[None]:
+    """Drivers without a display write warnings to the process's stderr; they would spoil ours."""
+    sys.stderr.flush()
+    saved, sink = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(sink, 2)
+        yield
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+        os.close(sink)

@@ -1,0 +1,103 @@
+"""One frame's command list: passes in order, each timed under the name of its stage."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dermis.gpu.device import Device
+from dermis.gpu.program import ComputeProgram, RasterProgram, Resources
+
+
+class Frame:
+    """Records passes, submits them together, then knows how long each stage took."""
+
+    def __init__(self, device: Device) -> None:
+        self.device = device
+        self._encoder = device.handle.create_command_encoder()
+        self._stages: list[str] = []
+        self._queries: Any = None
+        self._resolved: Any = None
+        if device.has_timestamps:
+            self._queries, self._resolved = device.timestamp_pool()
+
+    def compute(
+        self, stage: str, program: ComputeProgram, resources: Resources, size: tuple[int, int], tile: int = 8
+    ) -> None:
+        """Run `program` once for each of size[0] x size[1] invocations, in tiles of `tile` squared."""
+        one = self._encoder.begin_compute_pass(label=stage, timestamp_writes=self._timing(stage))
+        one.set_pipeline(program.pipeline)
+        for index, group in enumerate(program.bind_groups(resources)):
+            one.set_bind_group(index, group)
+        one.dispatch_workgroups(*program.groups_for(size, tile))
+        one.end()
+
+    def draw(
+        self,
+        stage: str,
+        program: RasterProgram,
+        resources: Resources,
+        vertices: int,
+        *,
+        depth: Any,
+        far: float,
+        target: Any = None,
+    ) -> None:
+        """Rasterise `vertices` / 3 triangles into cleared targets; `far` is the depth they start at."""
+        colour = [{"view": target, "load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 0)}]
+        one = self._encoder.begin_render_pass(
+            label=stage,
+            color_attachments=colour if target is not None else [],
+            depth_stencil_attachment={
+                "view": depth,
+                "depth_load_op": "clear",
+                "depth_store_op": "store",
+                "depth_clear_value": far,
+            },
+            timestamp_writes=self._timing(stage),
+        )
+        one.set_pipeline(program.pipeline)
+        for index, group in enumerate(program.bind_groups(resources)):
+            one.set_bind_group(index, group)
+        one.draw(vertices)
+        one.end()
+
+    def submit(self) -> None:
+        """Hand the passes to the device."""
+        if self._queries is not None and self._stages:
+            self._encoder.resolve_query_set(self._queries, 0, 2 * len(self._stages), self._resolved, 0)
+        self.device.handle.queue.submit([self._encoder.finish()])
+
+    def wait(self) -> None:
+        """Return when the device has done all that was submitted."""
+        # wgpu 0.32's own wait for submitted work raises TypeError; a read waits for all that came before it.
+        self.device.handle.queue.read_buffer(self.device.fence)
+
+    def stage_ms(self) -> dict[str, float] | None:
+        """Device time of each stage after `submit` [ms], with "total"; None without timestamps.
+
+        A stage's time is the sum of its passes; the total is from the first pass's start to the last's end.
+        """
+        if self._queries is None or not self._stages:
+            return None
+        raw = self.device.handle.queue.read_buffer(self._resolved, 0, 16 * len(self._stages))
+        ticks = np.frombuffer(raw, dtype=np.uint64).astype(np.int64).reshape(-1, 2)
+        times: dict[str, float] = {}
+        for stage, (start, end) in zip(self._stages, ticks, strict=True):
+            times[stage] = times.get(stage, 0.0) + float(end - start) * 1e-6
+        times["total"] = float(ticks[:, 1].max() - ticks[:, 0].min()) * 1e-6
+        return times
+
+    def _timing(self, stage: str) -> dict[str, Any] | None:
+        if self._queries is None:
+            return None
+        index = 2 * len(self._stages)
+        if index >= self._queries.count:
+            return None
+        self._stages.append(stage)
+        return {
+            "query_set": self._queries,
+            "beginning_of_pass_write_index": index,
+            "end_of_pass_write_index": index + 1,
+        }

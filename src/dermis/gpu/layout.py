@@ -1,0 +1,132 @@
+"""What a WGSL text declares: struct layouts as numpy dtypes, and bindings by name.
+
+The shader is the only place where a struct or a binding is written down; Python reads it from there,
+so the two cannot drift apart. Alignment rules: WGSL specification, section "Memory Layout".
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dermis.errors import DermisError
+
+_COMMENT = re.compile(r"//[^\n]*")
+_STRUCT = re.compile(r"struct\s+(\w+)\s*\{([^}]*)\}")
+_MEMBER = re.compile(r"(\w+)\s*:\s*(array<\s*\w+\s*,\s*\d+\s*>|\w+(?:<\w+>)?)")
+_BINDING = re.compile(
+    r"@group\((\d+)\)\s*@binding\((\d+)\)\s*var(?:<([\w, ]+)>)?\s+(\w+)\s*:\s*([\w<>, ]+?)\s*;([^\n]*)"
+)
+
+# name -> (numpy base, shape, alignment, size) in bytes
+_TYPES: dict[str, tuple[str, tuple[int, ...], int, int]] = {
+    "f32": ("<f4", (), 4, 4),
+    "i32": ("<i4", (), 4, 4),
+    "u32": ("<u4", (), 4, 4),
+    "vec2f": ("<f4", (2,), 8, 8),
+    "vec3f": ("<f4", (3,), 16, 12),
+    "vec4f": ("<f4", (4,), 16, 16),
+    "vec2u": ("<u4", (2,), 8, 8),
+    "vec2i": ("<i4", (2,), 8, 8),
+    "vec4u": ("<u4", (4,), 16, 16),
+    "mat4x4f": ("<f4", (4, 4), 16, 64),
+}
+
+
+@dataclass(frozen=True)
+class Binding:
+    """One resource of a shader: where it is bound and what wgpu's layout entry for it holds."""
+
+    group: int
+    index: int
+    name: str
+    entry: dict[str, Any]
+
+
+def struct_dtype(text: str, name: str) -> np.dtype[np.void]:
+    """The numpy dtype of a WGSL struct, with the offsets that the shader uses.
+
+    A mat4x4f is written as its transpose (WGSL stores columns); arrays of structs nest.
+    """
+    dtype, _ = _struct(dict(_STRUCT.findall(_COMMENT.sub("", text))), name)
+    return dtype
+
+
+def _struct(bodies: dict[str, str], name: str) -> tuple[np.dtype[np.void], int]:
+    if name not in bodies:
+        raise DermisError(f"struct {name}: expected the shader to declare it, but it does not.")
+    names: list[str] = []
+    formats: list[Any] = []
+    offsets: list[int] = []
+    end, align = 0, 4
+    for member, kind in _MEMBER.findall(bodies[name]):
+        base, member_align, size = _member(bodies, kind)
+        end = _round_up(end, member_align)
+        names.append(member)
+        formats.append(base)
+        offsets.append(end)
+        end += size
+        align = max(align, member_align)
+    size = _round_up(end, align)
+    return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size}), align
+
+
+def _member(bodies: dict[str, str], kind: str) -> tuple[Any, int, int]:
+    if array := re.match(r"array<\s*(\w+)\s*,\s*(\d+)\s*>", kind):
+        base, align, size = _member(bodies, array[1])
+        count = int(array[2])
+        if _round_up(size, align) != np.dtype(base).itemsize:
+            raise DermisError(f"{kind}: expected array elements without padding between them.")
+        return (base, (count,)), align, count * size
+    if kind in _TYPES:
+        scalar, shape, align, size = _TYPES[kind]
+        return (scalar, shape), align, size
+    dtype, align = _struct(bodies, kind)
+    return dtype, align, dtype.itemsize
+
+
+def _round_up(value: int, step: int) -> int:
+    return -(-value // step) * step
+
+
+def bindings(text: str) -> tuple[Binding, ...]:
+    """Every resource that the shader declares, in order of group and index.
+
+    A float texture is taken as one that is only loaded; `// filtered` after its declaration says that a
+    sampler filters it. `// non-filtering` after a sampler says that it does not filter.
+    """
+    found = [
+        Binding(
+            int(group), int(index), name, _entry((space or "").replace(" ", ""), kind.replace(" ", ""), note)
+        )
+        for group, index, space, name, kind, note in _BINDING.findall(text)
+    ]
+    return tuple(sorted(found, key=lambda b: (b.group, b.index)))
+
+
+def _entry(space: str, kind: str, note: str) -> dict[str, Any]:
+    if space.startswith("uniform"):
+        return {"buffer": {"type": "uniform"}}
+    if space.startswith("storage"):
+        return {"buffer": {"type": "storage" if "read_write" in space else "read-only-storage"}}
+    if kind == "sampler_comparison":
+        return {"sampler": {"type": "comparison"}}
+    if kind == "sampler":
+        return {"sampler": {"type": "non-filtering" if "non-filtering" in note else "filtering"}}
+    if storage := re.match(r"texture_storage_2d(_array)?<(\w+),(\w+)>", kind):
+        dimension = "2d-array" if storage[1] else "2d"
+        access = {"write": "write-only", "read": "read-only", "read_write": "read-write"}[storage[3]]
+        return {"storage_texture": {"format": storage[2], "access": access, "view_dimension": dimension}}
+    return {"texture": _texture_entry(kind, note)}
+
+
+def _texture_entry(kind: str, note: str) -> dict[str, Any]:
+    dimension = "2d-array" if "_array" in kind else "2d"
+    if kind.startswith("texture_depth"):
+        return {"sample_type": "depth", "view_dimension": dimension}
+    element = kind[kind.index("<") + 1 : -1]
+    loaded = {"f32": "unfilterable-float", "u32": "uint", "i32": "sint"}[element]
+    return {"sample_type": "float" if "// filtered" in note else loaded, "view_dimension": dimension}

@@ -1,0 +1,99 @@
+"""Textures from arrays and back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.errors import DermisError
+from dermis.gpu.device import Device
+
+_FORMATS: dict[str, tuple[type[np.generic], int]] = {
+    "r8unorm": (np.uint8, 1),
+    "rgba8unorm": (np.uint8, 4),
+    "rgba8unorm-srgb": (np.uint8, 4),
+    "rgba8uint": (np.uint8, 4),
+    "r16float": (np.float16, 1),
+    "rg16float": (np.float16, 2),
+    "rgba16float": (np.float16, 4),
+    "r32float": (np.float32, 1),
+    "rg32float": (np.float32, 2),
+    "rgba32float": (np.float32, 4),
+    "r32uint": (np.uint32, 1),
+    "rg32uint": (np.uint32, 2),
+    "rgba32uint": (np.uint32, 4),
+    "rgba16uint": (np.uint16, 4),
+    "depth32float": (np.float32, 1),
+}
+
+
+def make_texture(
+    device: Device,
+    size: tuple[int, int],
+    texel: str,
+    *,
+    layers: int = 1,
+    mips: int = 1,
+    use: str = "compute",
+) -> Any:
+    """An empty 2-D texture (an array when `layers` > 1).
+
+    size : (width, height) [texel]
+    texel : wgpu's format name
+    use : "compute" (stored to and read), "raster" (drawn to and read), "map" (uploaded and read)
+    """
+    import wgpu
+
+    if max(size) > device.max_texture_size or min(size) < 1:
+        raise DermisError(
+            f"texture of {size[0]}x{size[1]}: expected sides from 1 to {device.max_texture_size} "
+            f"(the limit of {device.adapter.name}), but that is outside. Choose a smaller size."
+        )
+    usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_SRC
+    usage |= {
+        "compute": wgpu.TextureUsage.STORAGE_BINDING | wgpu.TextureUsage.COPY_DST,
+        "raster": wgpu.TextureUsage.RENDER_ATTACHMENT,
+        "map": wgpu.TextureUsage.COPY_DST,
+    }[use]
+    return device.handle.create_texture(
+        size=(*size, layers), format=texel, usage=usage, mip_level_count=mips, dimension="2d"
+    )
+
+
+def upload(device: Device, texture: Any, array: NDArray[Any], *, mip: int = 0, layer: int = 0) -> None:
+    """Fill one mip level of one layer with an (h, w) or (h, w, c) array of the texture's own type."""
+    kind, channels = _FORMATS[texture.format]
+    data = np.ascontiguousarray(array, dtype=kind)
+    height, width = data.shape[:2]
+    device.handle.queue.write_texture(
+        {"texture": texture, "mip_level": mip, "origin": (0, 0, layer)},
+        data,
+        {"bytes_per_row": width * channels * data.itemsize, "rows_per_image": height},
+        (width, height, 1),
+    )
+
+
+def texture_from(device: Device, array: NDArray[Any], texel: str) -> Any:
+    """A texture for reading that holds the (h, w) or (h, w, c) array."""
+    texture = make_texture(device, (array.shape[1], array.shape[0]), texel, use="map")
+    upload(device, texture, array)
+    return texture
+
+
+def download(device: Device, texture: Any, *, mip: int = 0, layer: int = 0) -> NDArray[Any]:
+    """One mip level of one layer as an (h, w, c) array, or (h, w) for one channel."""
+    kind, channels = _FORMATS[texture.format]
+    width, height = max(1, texture.size[0] >> mip), max(1, texture.size[1] >> mip)
+    pitch = width * channels * np.dtype(kind).itemsize
+    aligned = -(-pitch // 256) * 256  # WebGPU copies rows at multiples of 256 bytes
+    data = device.handle.queue.read_texture(
+        {"texture": texture, "mip_level": mip, "origin": (0, 0, layer)},
+        {"bytes_per_row": aligned, "rows_per_image": height},
+        (width, height, 1),
+    )
+    rows = np.frombuffer(data, dtype=np.uint8)
+    rows = rows.reshape(height, -1)[:, :pitch]
+    texels = np.ascontiguousarray(rows).view(kind)
+    return texels.reshape((height, width, channels) if channels > 1 else (height, width))

@@ -1,0 +1,122 @@
+"""Pixels from the bytes of picture files and back, by the libraries that keep every bit."""
+
+from __future__ import annotations
+
+import io
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Pixels = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32]
+
+MAX_PIXELS = 16384**2
+_PNG_START = b"\x89PNG\r\n\x1a\n"
+EXR_START = b"\x76\x2f\x31\x01"
+PILLOW_STARTS = (_PNG_START, b"\xff\xd8\xff", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+
+_PILLOW_LOCK = threading.Lock()
+
+
+def decode_exr(path: Path) -> NDArray[np.float32]:
+    """(H, W, 1, 3 or 4) of the channels Y, RGB or RGBA of an OpenEXR file.
+
+    path : the file; the library reads no bytes
+    ValueError : there are no such channels, or the data are damaged
+    """
+    import OpenEXR
+
+    file = OpenEXR.File(str(path), separate_channels=True)
+    if not file.parts:
+        raise ValueError("its pixels are cut off or damaged")
+    channels = file.channels()
+    names = next((names for names in ("RGBA", "RGB", "Y") if set(names) <= channels.keys()), None)
+    if names is None:
+        raise ValueError(f"it has channels {', '.join(sorted(channels))}, not R, G, B or Y")
+    return np.stack([channels[name].pixels for name in names], axis=-1).astype(np.float32)
+
+
+def decode_with_pillow(data: bytes) -> Pixels:
+    """(H, W) or (H, W, 3 or 4) of a PNG, JPEG or TIFF file, with all bits of its pixels.
+
+    data : the whole file
+    ValueError, OSError and others : the data are damaged or hold pixels of another kind
+    """
+    picture = _open(data)
+    layout = _layout_of_16_bit(data, picture)
+    if layout:
+        return _decode_16_bit(data, layout)
+    if picture.mode in ("P", "PA", "LA", "La"):
+        alpha = picture.mode != "P" or "transparency" in picture.info
+        picture = picture.convert("RGBA" if alpha else "RGB")
+    picture = picture.convert("L") if picture.mode == "1" else picture
+    if picture.mode not in ("L", "RGB", "RGBA", "I;16", "I;16B", "F"):
+        raise ValueError(f"its pixels are of kind {picture.mode}, not 8 or 16 bit grey, RGB or RGBA")
+    array = np.array(picture)
+    return array.astype(np.uint16) if picture.mode.startswith("I;16") else array
+
+
+def _open(data: bytes) -> Any:
+    """The picture by Pillow, its header read and its size found bearable."""
+    picture = _open_header(data)
+    if picture.width * picture.height > MAX_PIXELS:
+        raise ValueError(f"it has {picture.width} x {picture.height} pixels, more than 16384 x 16384")
+    if picture.format == "PNG":
+        _open_header(data).verify()  # the checksums, which Pillow leaves out when it decodes
+    return picture
+
+
+def _open_header(data: bytes) -> Any:
+    import PIL.Image
+
+    with _PILLOW_LOCK:  # Pillow's own limit is a global, and lower than a large height map
+        limit, PIL.Image.MAX_IMAGE_PIXELS = PIL.Image.MAX_IMAGE_PIXELS, None
+        try:
+            return PIL.Image.open(io.BytesIO(data), formats=("PNG", "JPEG", "TIFF"))
+        except PIL.UnidentifiedImageError as fault:
+            raise ValueError("its header makes no sense") from fault
+        finally:
+            PIL.Image.MAX_IMAGE_PIXELS = limit
+
+
+def _layout_of_16_bit(data: bytes, picture: Any) -> str | None:
+    """FFmpeg's name of the pixels where Pillow would drop the lower 8 of 16 bits, else None."""
+    if data.startswith(_PNG_START):
+        depth, kind = data[24], data[25]
+        return {0: "gray16le", 2: "rgb48le", 4: "ya16le", 6: "rgba64le"}[kind] if depth == 16 else None
+    bits = picture.tag_v2.get(258, ()) if picture.format == "TIFF" else ()
+    return {3: "rgb48le", 4: "rgba64le"}.get(len(bits)) if 16 in bits else None
+
+
+def _decode_16_bit(data: bytes, layout: str) -> NDArray[np.uint16]:
+    import imageio.v3
+
+    # Bytes, not the path: FFmpeg would read a percent sign in a name as a numbered sequence.
+    image: NDArray[np.uint16] = imageio.v3.imread(data, plugin="pyav", format=layout, index=0)
+    return image[..., [0, 0, 0, 1]] if layout == "ya16le" else image
+
+
+def encode_png8(levels: NDArray[Any]) -> bytes:
+    """A PNG file of (H, W, 1, 3 or 4) uint8."""
+    import PIL.Image
+
+    data = io.BytesIO()
+    PIL.Image.fromarray(levels[..., 0] if levels.shape[2] == 1 else levels).save(data, "PNG")
+    return data.getvalue()
+
+
+def encode_png16(levels: NDArray[Any]) -> bytes:
+    """A PNG file of (H, W, 1, 3 or 4) uint16, by FFmpeg: Pillow writes no 16-bit colour."""
+    from fractions import Fraction
+
+    import av
+
+    layout = {1: "gray16", 3: "rgb48", 4: "rgba64"}[levels.shape[2]]
+    pixels = np.ascontiguousarray(levels[..., 0] if levels.shape[2] == 1 else levels)
+    encoder = av.CodecContext.create("png", "w")
+    encoder.height, encoder.width = pixels.shape[:2]
+    encoder.pix_fmt, encoder.time_base = f"{layout}be", Fraction(1, 1)
+    frame = av.VideoFrame.from_ndarray(pixels, format=f"{layout}le").reformat(format=f"{layout}be")
+    return b"".join(bytes(packet) for packet in [*encoder.encode(frame), *encoder.encode(None)])

@@ -1,0 +1,171 @@
+"""Reading and writing of picture files: PNG, JPEG, TIFF, OpenEXR and Radiance."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.errors import DermisError, refuse
+from dermis.images.codecs import (
+    EXR_START,
+    PILLOW_STARTS,
+    Pixels,
+    decode_exr,
+    decode_with_pillow,
+    encode_png8,
+    encode_png16,
+)
+from dermis.images.colour import encode_srgb8
+from dermis.images.radiance import RADIANCE_START, decode_radiance
+
+OUTPUT_SUFFIXES = (".png", ".exr")
+_READABLE = "a picture (PNG, JPEG, TIFF, EXR or HDR)"
+
+
+def read_image(path: str | Path) -> Pixels:
+    """The picture (H, W, C) as it is stored, row 0 at the top; C is 1 (grey), 3 (RGB) or 4 (RGBA).
+
+    path : PNG, JPEG or TIFF, which give uint8 or uint16 (a float TIFF float32), or EXR or HDR, which
+        give linear float32; told apart by content, not by suffix
+    DermisError : the file is missing, is no picture, is cut off, or holds pixels of another kind
+
+    Grey with alpha becomes RGBA. Colour profiles and camera orientation are left aside, as for any texture.
+    """
+    data = _read_bytes(path)
+    try:
+        if data.startswith(EXR_START):
+            image: Pixels = decode_exr(Path(path))
+        elif data.startswith(RADIANCE_START):
+            image = decode_radiance(data)
+        elif data.startswith(PILLOW_STARTS):
+            image = decode_with_pillow(data)
+        else:
+            refuse(path, _READABLE, "its first bytes are those of none", "Convert it to PNG")
+    except DermisError:
+        raise
+    except Exception as fault:  # decoders raise whatever they like for damaged data
+        raise DermisError(
+            f"{path}: expected {_READABLE}, but it cannot be decoded ({_reason(fault)}). "
+            "It is cut off, damaged or of an unusual kind: fetch or export it again."
+        ) from fault
+    return image[..., None] if image.ndim == 2 else image
+
+
+def check_output(path: str | Path) -> Path:
+    """The path, after a trial that a picture can be written there: call it before a long rendering.
+
+    DermisError : the suffix is none of `OUTPUT_SUFFIXES`, or the folder is missing or not writable
+    """
+    target = Path(path)
+    if target.suffix.lower() not in OUTPUT_SUFFIXES:
+        came = f"its suffix is {target.suffix!r}" if target.suffix else "it has no suffix"
+        refuse(path, "a name that ends in .png or .exr", came, "Choose .png to look at, .exr to go on with")
+    if not target.parent.is_dir():
+        refuse(path, "a folder that exists", f"there is no folder {target.parent}", "Make it first")
+    if target.exists() and not target.is_file():
+        refuse(path, "a file or a free name", "something else has this name", "Choose another name")
+    trial = _temporary_name(target)
+    try:
+        trial.touch()
+        trial.unlink()
+    except OSError as fault:
+        _refuse_output(path, fault)
+    return target
+
+
+def write_image(path: str | Path, linear: NDArray[np.floating[Any]]) -> None:
+    """Write a linear picture: .png as 8-bit sRGB rounded to nearest, .exr as linear float32.
+
+    linear : (H, W, 3) or (H, W, 4), Rec. 709; alpha is stored as it is, not through the sRGB curve
+    DermisError : as for `check_output`, or the disk is full; nothing half-written stays behind
+    """
+    if check_output(path).suffix.lower() == ".exr":
+        write_exr(path, linear)
+        return
+    levels = encode_srgb8(linear)
+    if linear.shape[-1] == 4:
+        levels[..., 3] = np.rint(np.clip(linear[..., 3], 0, 1) * 255)
+    write_png(path, levels)
+
+
+def write_png(path: str | Path, levels: NDArray[np.uint8] | NDArray[np.uint16]) -> None:
+    """Write grey levels as they are to an 8- or 16-bit PNG, by dtype.
+
+    levels : (H, W), or (H, W, C) with C of 1, 3 or 4; uint8 or uint16
+    """
+    image = levels[..., None] if levels.ndim == 2 else levels
+    if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or image.dtype not in (np.uint8, np.uint16):
+        came = f"they have shape {levels.shape} and type {levels.dtype}"
+        refuse(path, "pixels (H, W, 1, 3 or 4) of uint8 or uint16", came, "Convert them first")
+    data = encode_png8(image) if image.dtype == np.uint8 else encode_png16(image)
+    with _replacing(path) as temporary:
+        temporary.write_bytes(data)
+
+
+def write_exr(
+    path: str | Path,
+    linear: NDArray[np.floating[Any]],
+    layers: Mapping[str, NDArray[np.floating[Any]]] | None = None,
+) -> None:
+    """Write a linear float32 OpenEXR file, compressed without loss.
+
+    linear : (H, W, 3) or (H, W, 4), Rec. 709, stored as channels R, G, B (and A)
+    layers : further pictures by name, (H, W) as one channel, (H, W, 3) as name.R, name.G, name.B
+    """
+    import OpenEXR
+
+    if linear.ndim != 3 or linear.shape[2] not in (3, 4):
+        refuse(path, "pixels (H, W, 3 or 4)", f"they have shape {linear.shape}", "Stack them first")
+    pictures = {"RGB" if linear.shape[2] == 3 else "RGBA": linear} | dict(layers or {})
+    channels = {name: np.ascontiguousarray(picture, np.float32) for name, picture in pictures.items()}
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with _replacing(path) as temporary:
+        OpenEXR.File(header, channels).write(str(temporary))
+
+
+def _read_bytes(path: str | Path) -> bytes:
+    try:
+        return Path(path).read_bytes()
+    except OSError as fault:
+        raise DermisError(
+            f"{path}: expected {_READABLE}, but it cannot be read ({_reason(fault)}). Check the path."
+        ) from fault
+
+
+@contextmanager
+def _replacing(path: str | Path) -> Iterator[Path]:
+    """A name in the same folder, moved to `path` when all went well and removed when not."""
+    target = Path(os.path.realpath(path))
+    temporary = _temporary_name(target)
+    try:
+        yield temporary
+        temporary.replace(target)
+    except (OSError, RuntimeError) as fault:  # OpenEXR reports a full disk as a RuntimeError
+        _refuse_output(path, fault)
+    finally:
+        with suppress(OSError):  # moved already, or never made
+            temporary.unlink()
+
+
+def _temporary_name(target: Path) -> Path:
+    return target.with_name(f".dermis-{secrets.token_hex(6)}{target.suffix}")
+
+
+def _refuse_output(path: str | Path, fault: Exception) -> NoReturn:
+    raise DermisError(
+        f"{path}: expected a place to write a picture to, but it cannot be written ({_reason(fault)}). "
+        "Choose a writable folder with space left."
+    ) from fault
+
+
+def _reason(fault: Exception) -> str:
+    """The fault in one line, without the path that an OSError repeats."""
+    text = getattr(fault, "strerror", None) or str(fault) or type(fault).__name__
+    return text.splitlines()[0].rstrip(".")

@@ -1,0 +1,137 @@
+"""The head's geometry and maps as textures; made once for a head."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.assets.atlas import Atlas
+from dermis.assets.head import Head
+from dermis.assets.maps import Maps
+from dermis.assets.mesh import Mesh
+from dermis.gpu import Device, make_texture, upload
+from dermis.gpu.textures import texture_from
+from dermis.images.filters import derivatives, mip_chain
+from dermis.specular.albedo import albedo_table
+from dermis.specular.beckmann import beckmann_table
+
+_TRIANGLES_PER_ROW = 2048
+_VERTICES_PER_ROW = 512
+_NO_BAND = 32.0
+
+
+@dataclass(frozen=True)
+class HeadTextures:
+    """What the shaders read of a head, by the names they use.
+
+    resources : name in geometry.wgsl and skin.wgsl -> texture or sampler
+    relief_band : mip of the height map from which on the normal map knows the relief
+    triangles : count
+    """
+
+    resources: dict[str, Any]
+    relief_band: float
+    triangles: int
+
+
+def upload_head(device: Device, head: Head, atlas: Atlas, use_colour: bool) -> HeadTextures:
+    """All textures of a head except its atlas.
+
+    use_colour : False leaves the colour map white, for profiles that carry the colour
+    """
+    mesh, maps = head.mesh, head.maps
+    white = np.ones((1, 1, 3), np.float32)
+    colour = maps.colour if use_colour and maps.colour is not None else white * (0.8 if use_colour else 1.0)
+    resources = {
+        "triangle_table": texture_from(device, _triangle_table(mesh, atlas.mapped), "rgba32uint"),
+        "vertex_table": texture_from(device, _vertex_table(mesh), "rgba32float"),
+        "map_sampler": device.sampler(mag_filter="linear", min_filter="linear", mipmap_filter="linear"),
+        "colour_map": _mipped(
+            device, np.dstack([colour, np.ones(colour.shape[:2], np.float32)]), "rgba16float"
+        ),
+        "slope_map": _mipped(device, _moments(maps.normal), "rgba16float"),
+        "relief_map": _mipped(device, _moments(_relief(maps)), "rgba16float"),
+        "specular_map": _mipped(device, _factor(maps.specular, atlas), "r16float"),
+        "roughness_map": _mipped(device, _plain(maps.roughness), "r16float"),
+        "beckmann_table": texture_from(device, beckmann_table(), "r32float"),
+        "albedo_table": texture_from(device, albedo_table(), "r32float"),
+    }
+    return HeadTextures(resources, _relief_band(maps), len(mesh.triangles))
+
+
+def upload_atlas(device: Device, atlas: Atlas) -> dict[str, Any]:
+    """The atlas as the shaders read it: texel -> triangle and weights, stretch, reach."""
+    packed = atlas.barycentric[..., 0].astype(np.uint32) | (atlas.barycentric[..., 1].astype(np.uint32) << 16)
+    texels = np.stack([(atlas.triangle + 1).astype(np.uint32), packed], axis=-1)
+    return {
+        "atlas": texture_from(device, texels, "rg32uint"),
+        "stretch_map": texture_from(device, atlas.stretch, "rg16float"),
+        "reach_map": texture_from(device, atlas.reach, "rgba8uint"),
+    }
+
+
+def _triangle_table(mesh: Mesh, mapped: NDArray[np.bool_]) -> NDArray[np.uint32]:
+    opaque = np.array([material.kind == "opaque" for material in mesh.materials])
+    table = np.zeros((len(mesh.triangles), 4), dtype=np.uint32)
+    table[:, :3] = mesh.triangles
+    table[:, 3] = mapped | (opaque[mesh.material] << 1) | (mesh.material.astype(np.uint32) << 8)
+    return _rows(table, _TRIANGLES_PER_ROW)
+
+
+def _vertex_table(mesh: Mesh) -> NDArray[np.float32]:
+    table = np.zeros((len(mesh.positions), 4, 4), dtype=np.float32)
+    for k, attribute in enumerate((mesh.positions, mesh.normals, mesh.dpdu, mesh.dpdv)):
+        table[:, k, :3] = attribute
+    table[:, :2, 3] = mesh.uv
+    return _rows(table.reshape(len(table), 16), _VERTICES_PER_ROW).reshape(-1, 4 * _VERTICES_PER_ROW, 4)
+
+
+def _rows(table: NDArray[Any], per_row: int) -> NDArray[Any]:
+    rows = -(-len(table) // per_row)
+    padded = np.zeros((rows * per_row, table.shape[1]), dtype=table.dtype)
+    padded[: len(table)] = table
+    return padded.reshape(rows, per_row, -1)
+
+
+def _plain(values: NDArray[np.float32] | None) -> NDArray[np.float32]:
+    return np.ones((1, 1, 1), np.float32) if values is None else values[..., None]
+
+
+def _factor(values: NDArray[np.float32] | None, atlas: Atlas) -> NDArray[np.float32]:
+    """A map as a factor of the skin's own value: its mean over the surface is 1."""
+    if values is None:
+        return _plain(None)
+    y, x = np.nonzero(atlas.coverage)
+    height, width = values.shape
+    mean = float(values[y * height // atlas.size, x * width // atlas.size].mean()) if y.size else 0.0
+    return _plain(values / mean if mean > 0 else np.ones_like(values))
+
+
+def _relief(maps: Maps) -> NDArray[np.float32] | None:
+    if maps.height is None:
+        return None
+    return np.stack(derivatives(maps.height), axis=-1)
+
+
+def _moments(slopes: NDArray[np.float32] | None) -> NDArray[np.float32]:
+    """Slopes and their squares: their means over a footprint give its normal and roughness [OlanoBaker2010]."""
+    if slopes is None:
+        return np.zeros((1, 1, 4), np.float32)
+    return np.concatenate([slopes, slopes**2], axis=-1)
+
+
+def _relief_band(maps: Maps) -> float:
+    if maps.normal is None or maps.height is None:
+        return _NO_BAND
+    return max(0.0, float(np.log2(max(maps.height.shape[:2]) / max(maps.normal.shape[:2]))))
+
+
+def _mipped(device: Device, image: NDArray[np.float32], texel: str) -> Any:
+    chain = mip_chain(image)
+    texture = make_texture(device, (image.shape[1], image.shape[0]), texel, mips=len(chain), use="map")
+    for level, part in enumerate(chain):
+        upload(device, texture, part, mip=level)
+    return texture

@@ -1,0 +1,191 @@
+"""The renderer: a device with all that it keeps from frame to frame."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.assets.atlas import Atlas
+from dermis.assets.cache import cached_atlas
+from dermis.assets.head import Head
+from dermis.errors import refuse
+from dermis.gpu import Device, Frame, download, make_texture, open_device
+from dermis.gpu.device import gpu_failures
+from dermis.optics.gaussians import load_profile
+from dermis.rendering import inputs as made
+from dermis.rendering.frame import Stages, draw_frame
+from dermis.rendering.inputs import Inputs
+from dermis.rendering.maps import HeadTextures, upload_atlas, upload_head
+from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """A finished image, still on the device.
+
+    gpu_ms : device time of each stage and "total" [ms]; None when the adapter has no timestamps
+    frame_ms : from recording the frame to its end [ms]
+    setup_ms : what was made for this scene before: loading to the device, atlas, shaders [ms]
+    gaussians : levels of the profile
+    """
+
+    device: Device
+    picture: Any
+    gpu_ms: dict[str, float] | None
+    frame_ms: float
+    setup_ms: float
+    gaussians: int
+
+    def linear(self) -> NDArray[np.float32]:
+        """(h, w, 3) linear Rec. 709 after exposure, float32."""
+        with gpu_failures(self.device):
+            return np.ascontiguousarray(download(self.device, self.picture.exposed)[..., :3])
+
+    def srgb8(self) -> NDArray[np.uint8]:
+        """(h, w, 3) sRGB bytes, encoded on the device."""
+        with gpu_failures(self.device):
+            return np.ascontiguousarray(download(self.device, self.picture.bytes)[..., :3])
+
+
+class Renderer:
+    """Renders scenes on one device; what does not change between two frames is not made again.
+
+    adapter : "auto", "cpu" or part of an adapter's name
+    """
+
+    def __init__(self, adapter: str = "auto") -> None:
+        started = time.perf_counter()
+        self.device = open_device(adapter)
+        with gpu_failures(self.device):
+            self._stages = Stages(self.device)
+        self._kept: dict[str, tuple[Any, Any]] = {}
+        self._opening_ms = 1e3 * (time.perf_counter() - started)
+
+    def draw(self, scene: Scene, settings: Settings | None = None, *, keep_shadows: bool = True) -> Rendered:
+        """Render one frame and leave the image on the device.
+
+        keep_shadows : False draws the shadow maps again even when no light moved
+
+        Raises DermisError for sizes over the device's limits and when the device fails.
+        """
+        settings = settings or Settings()
+        with gpu_failures(self.device):
+            started = time.perf_counter()
+            inputs, gaussians = self._inputs(scene, settings)
+            if not keep_shadows:
+                inputs.shadow_maps.drawn = b""
+            ready = time.perf_counter()
+            frame = Frame(self.device)
+            draw_frame(frame, self._stages, inputs)
+            frame.submit()
+            frame.wait()
+            done = time.perf_counter()
+            times = frame.stage_ms()
+        setup_ms = 1e3 * (ready - started) + self._opening_ms
+        self._opening_ms = 0.0
+        return Rendered(self.device, inputs.picture, times, 1e3 * (done - ready), setup_ms, gaussians)
+
+    def render(self, scene: Scene, **settings: Any) -> NDArray[np.float32]:
+        """(h, w, 3) float32 linear Rec. 709 image; `settings` are those of `Settings`."""
+        return self.draw(scene, Settings(**settings)).linear()
+
+    def _inputs(self, scene: Scene, settings: Settings) -> tuple[Inputs, int]:
+        self._check(settings)
+        profile = load_profile(scene.skin.profile)
+        white = scene.skin.albedo == "map"
+        split = made.split_profile(profile, settings, white)
+        atlas, atlas_textures = self._atlas(scene.head, settings.atlas)
+        head = self._head(scene.head, atlas, white)
+        views = made.light_views(scene, settings.shadow_size)
+        clips = [view.clip for view in views if view]
+        stages = self._stages
+        size = settings.shadow_size if clips else 1
+        shadow_maps = self._keep(
+            "shadows", (len(clips), size), lambda: stages.shadows.make_maps(len(clips), size)
+        )
+        lit = {
+            **head.resources,
+            "skin": made.skin_record(stages.shade.program, scene, head),
+            "lights": made.light_records(stages.irradiance.program, scene, views),
+            "shadow_maps": shadow_maps.texture,
+            "shadow_sampler": self.device.sampler(compare="less", mag_filter="linear", min_filter="linear"),
+        }
+        count = len(split.blurred_mm2)
+        space = settings.atlas if count else 1
+        return Inputs(
+            head=head,
+            atlas=atlas_textures,
+            lit=lit,
+            shadow_maps=shadow_maps,
+            light_clips=clips,
+            shadow_key=repr((id(scene.head), size)).encode() + np.array(clips).tobytes(),
+            scatters=count > 0,
+            levels=self._keep("levels", (space, count), lambda: stages.diffuse.make_levels(space, count)),
+            blurred_mm2=split.blurred_mm2,
+            level_weight=split.weight,
+            scattered=self._keep(
+                "scattered", space, lambda: make_texture(self.device, (space, space), "rgba32float")
+            ),
+            seen=self._keep(
+                "seen",
+                (settings.size, settings.samples),
+                lambda: stages.visibility.make_seen(settings.size, settings.samples),
+            ),
+            camera_clips=made.camera_clips(scene.camera, scene.head, settings),
+            view=made.view_record(stages.shade.program, scene, settings, split),
+            picture=self._keep("picture", settings.size, lambda: stages.post.make_picture(settings.size)),
+            exposure=settings.exposure,
+        ), len(profile.variance_mm2)
+
+    def _check(self, settings: Settings) -> None:
+        limit, name = self.device.max_texture_size, self.device.adapter.name
+        sides = {"size": max(settings.size), "atlas": settings.atlas, "shadow_size": settings.shadow_size}
+        for option, side in sides.items():
+            if side > limit:
+                refuse(
+                    option, f"at most {limit} (the limit of {name})", f"it is {side}", "Choose a smaller one"
+                )
+
+    def _atlas(self, head: Head, size: int) -> tuple[Atlas, dict[str, Any]]:
+        def make() -> tuple[Atlas, dict[str, Any]]:
+            atlas = cached_atlas(head.mesh, size)
+            return atlas, upload_atlas(self.device, atlas)
+
+        return self._keep("atlas", (head, size), make)
+
+    def _head(self, head: Head, atlas: Atlas, use_colour: bool) -> HeadTextures:
+        return self._keep(
+            "head", (head, atlas, use_colour), lambda: upload_head(self.device, head, atlas, use_colour)
+        )
+
+    def _keep(self, role: str, key: Any, make: Callable[[], T]) -> T:
+        """The last thing made for this role while its key stays the same."""
+        old, value = self._kept.get(role, (None, None))
+        if value is None or not _same(old, key):
+            self._kept.pop(role, None)
+            value = make()
+            self._kept[role] = (key, value)
+        return value  # type: ignore[no-any-return]
+
+
+def _same(a: Any, b: Any) -> bool:
+    """Equality that compares heads and atlases by identity, without touching their arrays."""
+    if isinstance(a, tuple) and isinstance(b, tuple):
+        return len(a) == len(b) and all(_same(x, y) for x, y in zip(a, b, strict=True))
+    return a is b or (isinstance(a, int | str | bytes | bool) and a == b)
+
+
+def render(scene: Scene, adapter: str = "auto", **settings: Any) -> NDArray[np.float32]:
+    """(h, w, 3) float32 linear Rec. 709 image of a scene; for many images keep a `Renderer`.
+
+    settings : those of `Settings`: size, atlas, samples, technique, exposure, ...
+    """
+    return Renderer(adapter).render(scene, **settings)

@@ -1,0 +1,17 @@
+"""Where in a pixel its samples lie."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def pixel_samples(count: int) -> NDArray[np.float64]:
+    """(count, 2) places in the unit square: Hammersley's set, even in both axes for any count."""
+    index = np.arange(count)
+    y, digit, rest = np.zeros(count), 0.5, index.copy()
+    while rest.any():
+        y += digit * (rest & 1)
+        rest >>= 1
+        digit /= 2
+    return np.stack([(index + 0.5) / count, y + 0.5 / count], axis=-1) % 1.0

@@ -1,0 +1,23 @@
+// The weighted sum of the blurred levels: all the light that left the skin after spreading.
+
+struct Weights {
+    first: u32,
+    count: u32,
+    weight: array<vec4f, 16>,
+}
+
+@group(0) @binding(0) var<uniform> weights: Weights;
+@group(0) @binding(1) var levels: texture_2d_array<f32>;
+@group(0) @binding(2) var combined: texture_storage_2d<rgba32float, write>;
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if (any(id.xy >= textureDimensions(levels))) {
+        return;
+    }
+    var sum = vec4f(0.0);
+    for (var k = 0u; k < weights.count; k++) {
+        sum += weights.weight[k] * textureLoad(levels, id.xy, weights.first + k, 0);
+    }
+    textureStore(combined, id.xy, sum);
+}

@@ -1,0 +1,23 @@
+// From radiance to the display's bytes: exposure and sRGB encoding.
+//#include "srgb.wgsl"
+
+struct Post {
+    exposure: f32,
+}
+
+@group(0) @binding(0) var<uniform> settings: Post;
+@group(0) @binding(1) var image: texture_2d<f32>;
+@group(0) @binding(2) var exposed: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(3) var bytes: texture_storage_2d<rgba8uint, write>;
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if (any(id.xy >= textureDimensions(image))) {
+        return;
+    }
+    let texel = textureLoad(image, id.xy, 0);
+    let linear = texel.rgb * settings.exposure;
+    textureStore(exposed, id.xy, vec4f(linear, texel.a));
+    // Integers, because a store to a normalised format may round either way.
+    textureStore(bytes, id.xy, vec4u(vec3u(round(255.0 * encode_srgb(linear))), u32(round(255.0 * texel.a))));
+}

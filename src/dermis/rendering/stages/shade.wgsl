@@ -1,0 +1,126 @@
+// The image: per sample the light that scattered below, relit at its finest level, under the white surface lobe.
+//#include "geometry.wgsl"
+//#include "bilinear.wgsl"
+//#include "skin.wgsl"
+//#include "lobe.wgsl"
+//#include "lights.wgsl"
+
+const EYE_ROUGHNESS: f32 = 0.1; // plain materials are wet: eyeballs, teeth
+const FINEST_RATIO: f32 = 4.0; // longest over shortest side of a footprint that one map sample may stand for
+
+struct Shade {
+    eye: vec3f,
+    samples: u32,
+    forward: vec3f,
+    right: vec3f, // scaled so that forward + x right + y up spans the image for x, y in -1..1
+    up: vec3f,
+    relit: vec3f, // weight of the level that is not blurred
+    total: vec3f, // weight of all levels
+    background: vec3f,
+    material_colour: array<vec4f, 16>,
+    jitter: array<vec4f, 64>, // sample places in the pixel, 0..1
+}
+
+@group(1) @binding(0) var<uniform> shade: Shade;
+@group(1) @binding(1) var seen: texture_2d_array<u32>;
+@group(1) @binding(2) var scattered: texture_2d<f32>; // blurred and combined, per texel of the atlas
+@group(1) @binding(3) var image: texture_storage_2d<rgba32float, write>;
+
+struct Lit {
+    entered: vec3f, // irradiance that enters the skin
+    reflected: vec3f, // radiance off the surface
+}
+
+fn light_up(point: Point, surface: Surface, v: vec3f) -> Lit {
+    var lit = Lit(vec3f(0.0), vec3f(0.0));
+    for (var i = 0u; i < skin.light_count; i++) {
+        let light = lights.light[i];
+        let arriving = incident(light, point.position);
+        let cosine = dot(surface.normal, arriving.direction);
+        if (cosine > 0.0) {
+            let e = arriving.irradiance * (cosine * visibility(light, point, arriving.direction));
+            lit.entered += e * passes(cosine, surface.roughness, surface.rho_s);
+            lit.reflected += e * surface.rho_s * kelemen(surface.normal, arriving.direction, v, surface.roughness, skin.f0);
+        }
+    }
+    return lit;
+}
+
+fn skin_radiance(point: Point, v: vec3f, footprint: f32) -> vec3f {
+    let surface = surface_at(point, footprint);
+    let lit = light_up(point, surface, v);
+    var below = lit.entered * pow(surface.colour, vec3f(skin.mix));
+    if ((point.flags & MAPPED) != 0u) {
+        below = shade.relit * below + load_bilinear(scattered, point.uv).rgb;
+    } else {
+        below *= shade.total;
+    }
+    let leaves = passes(dot(surface.normal, v), surface.roughness, surface.rho_s);
+    return below * pow(surface.colour, vec3f(1.0 - skin.mix)) * leaves / PI + lit.reflected;
+}
+
+fn opaque_radiance(point: Point, v: vec3f) -> vec3f {
+    let colour = shade.material_colour[point.flags >> 8u].rgb;
+    let lit = light_up(point, Surface(point.normal, colour, EYE_ROUGHNESS, 1.0), v);
+    return lit.entered * colour / PI + lit.reflected;
+}
+
+// Barycentric weights of where a ray from the eye meets a triangle's plane are linear in the ray, up to scale.
+fn ray_to_weights(a: vec3f, b: vec3f, c: vec3f) -> mat3x3f {
+    let ea = a - shade.eye;
+    let eb = b - shade.eye;
+    let ec = c - shade.eye;
+    return transpose(mat3x3f(cross(eb, ec), cross(ec, ea), cross(ea, eb)));
+}
+
+fn meet(weights: mat3x3f, ray: vec3f) -> vec3f {
+    let w = weights * ray;
+    return w / (w.x + w.y + w.z);
+}
+
+fn ray_through(place: vec2f, size: vec2f) -> vec3f {
+    let ndc = vec2f(2.0, -2.0) * place / size + vec2f(-1.0, 1.0);
+    return shade.forward + ndc.x * shade.right + ndc.y * shade.up;
+}
+
+fn radiance(triangle: u32, place: vec2f, size: vec2f) -> vec3f {
+    let t = triangle_at(triangle);
+    let a = corner_at(t.x);
+    let b = corner_at(t.y);
+    let c = corner_at(t.z);
+    let weights = ray_to_weights(a.position, b.position, c.position);
+    let w = meet(weights, ray_through(place, size));
+    // A sample on an edge may lie a little outside: stay on the triangle.
+    let inside = max(w, vec3f(0.0));
+    let point = interpolate(a, b, c, inside / (inside.x + inside.y + inside.z), t.w);
+    let v = normalize(shade.eye - point.position);
+    if ((t.w & OPAQUE) != 0u) {
+        return opaque_radiance(point, v);
+    }
+    let spacing = inverseSqrt(f32(shade.samples));
+    let wx = meet(weights, ray_through(place + vec2f(spacing, 0.0), size)) - w;
+    let wy = meet(weights, ray_through(place + vec2f(0.0, spacing), size)) - w;
+    let x = length(wx.x * a.uv + wx.y * b.uv + wx.z * c.uv);
+    let y = length(wy.x * a.uv + wy.y * b.uv + wy.z * c.uv);
+    return skin_radiance(point, v, max(min(x, y), max(x, y) / FINEST_RATIO));
+}
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    let size = textureDimensions(image);
+    if (any(id.xy >= size)) {
+        return;
+    }
+    var sum = vec3f(0.0);
+    var hits = 0.0;
+    for (var s = 0u; s < shade.samples; s++) {
+        let triangle = textureLoad(seen, id.xy, s, 0).x;
+        if (triangle > 0u) {
+            sum += radiance(triangle - 1u, vec2f(id.xy) + shade.jitter[s].xy, vec2f(size));
+            hits += 1.0;
+        }
+    }
+    let covered = hits / f32(shade.samples);
+    let mean = sum / f32(shade.samples) + (1.0 - covered) * shade.background;
+    textureStore(image, id.xy, vec4f(mean, covered));
+}

@@ -1,0 +1,68 @@
+// The mesh as two textures, and points of its surface by triangle and barycentric weights.
+
+const TRIANGLES_PER_ROW: u32 = 2048u;
+const VERTICES_PER_ROW: u32 = 512u;
+
+const MAPPED: u32 = 1u; // the triangle has texels in the atlas
+const OPAQUE: u32 = 2u; // plain material, no scattering
+
+@group(0) @binding(0) var triangle_table: texture_2d<u32>; // corners a, b, c and flags | material << 8
+@group(0) @binding(1) var vertex_table: texture_2d<f32>; // four texels: position u, normal v, dpdu, dpdv
+
+struct Corner {
+    position: vec3f,
+    normal: vec3f,
+    uv: vec2f,
+    dpdu: vec3f,
+    dpdv: vec3f,
+}
+
+struct Point {
+    position: vec3f, // [mm]
+    lit_position: vec3f, // moved onto the smooth surface, for shadow rays
+    normal: vec3f, // interpolated, unit
+    uv: vec2f,
+    dpdu: vec3f, // [mm per unit of uv]
+    dpdv: vec3f,
+    flags: u32,
+}
+
+fn triangle_at(index: u32) -> vec4u {
+    return textureLoad(triangle_table, vec2u(index % TRIANGLES_PER_ROW, index / TRIANGLES_PER_ROW), 0);
+}
+
+fn vertex_texel(index: u32) -> vec2u {
+    return vec2u(4u * (index % VERTICES_PER_ROW), index / VERTICES_PER_ROW);
+}
+
+fn position_of(index: u32) -> vec3f {
+    return textureLoad(vertex_table, vertex_texel(index), 0).xyz;
+}
+
+fn corner_at(index: u32) -> Corner {
+    let at = vertex_texel(index);
+    let p = textureLoad(vertex_table, at, 0);
+    let n = textureLoad(vertex_table, at + vec2u(1u, 0u), 0);
+    let du = textureLoad(vertex_table, at + vec2u(2u, 0u), 0);
+    let dv = textureLoad(vertex_table, at + vec2u(3u, 0u), 0);
+    return Corner(p.xyz, n.xyz, vec2f(p.w, n.w), du.xyz, dv.xyz);
+}
+
+fn lifted(p: vec3f, corner: Corner) -> vec3f {
+    return p - min(0.0, dot(p - corner.position, corner.normal)) * corner.normal;
+}
+
+fn interpolate(a: Corner, b: Corner, c: Corner, w: vec3f, flags: u32) -> Point {
+    let p = w.x * a.position + w.y * b.position + w.z * c.position;
+    var point: Point;
+    point.position = p;
+    // Facets shade themselves where the smooth normal still sees the light: shadow rays start on the
+    // curved surface that the corner normals suggest [Hanika2021].
+    point.lit_position = w.x * lifted(p, a) + w.y * lifted(p, b) + w.z * lifted(p, c);
+    point.normal = normalize(w.x * a.normal + w.y * b.normal + w.z * c.normal);
+    point.uv = w.x * a.uv + w.y * b.uv + w.z * c.uv;
+    point.dpdu = w.x * a.dpdu + w.y * b.dpdu + w.z * c.dpdu;
+    point.dpdv = w.x * a.dpdv + w.y * b.dpdv + w.z * c.dpdv;
+    point.flags = flags;
+    return point;
+}

@@ -1,0 +1,69 @@
+// The skin's own parameters and its maps: colour, relief as a surface gradient, gloss.
+
+const PI: f32 = 3.14159265358979;
+
+struct Skin {
+    roughness: f32,
+    rho_s: f32,
+    f0: f32,
+    mix: f32, // share of the colour map applied before scattering
+    relief_band: f32, // mip of the height map from which on the normal map knows the relief
+    light_count: u32,
+}
+
+@group(0) @binding(2) var<uniform> skin: Skin;
+@group(0) @binding(3) var map_sampler: sampler;
+@group(0) @binding(4) var colour_map: texture_2d<f32>; // filtered
+@group(0) @binding(5) var slope_map: texture_2d<f32>; // filtered: mean slopes along +u, +v-up; their squares
+@group(0) @binding(6) var relief_map: texture_2d<f32>; // filtered: mean mm per texel along u, v; their squares
+@group(0) @binding(7) var specular_map: texture_2d<f32>; // filtered: factor of rho_s
+@group(0) @binding(8) var roughness_map: texture_2d<f32>; // filtered: factor of the roughness
+@group(0) @binding(9) var beckmann_table: texture_2d<f32>;
+@group(0) @binding(10) var albedo_table: texture_2d<f32>;
+
+struct Surface {
+    normal: vec3f, // with the relief
+    colour: vec3f,
+    roughness: f32,
+    rho_s: f32,
+}
+
+fn mip_for(image: texture_2d<f32>, footprint: f32) -> f32 {
+    let size = vec2f(textureDimensions(image));
+    return max(0.0, log2(footprint * max(size.x, size.y)));
+}
+
+// How the skin looks at a point when one sample stands for `footprint` of the uv square's side.
+// Relief too fine for it widens the lobe by its slope variance [OlanoBaker2010].
+fn surface_at(point: Point, footprint: f32) -> Surface {
+    let length_u = length(point.dpdu);
+    let length_v = length(point.dpdv);
+    let s = textureSampleLevel(slope_map, map_sampler, point.uv, mip_for(slope_map, footprint));
+    // The height map adds only what is finer than the normal map: both usually come from one relief.
+    let size = vec2f(textureDimensions(relief_map));
+    let mip = min(mip_for(relief_map, footprint), skin.relief_band);
+    let fine = textureSampleLevel(relief_map, map_sampler, point.uv, mip);
+    let coarse = textureSampleLevel(relief_map, map_sampler, point.uv, skin.relief_band);
+    let gradient = (fine.xy - coarse.xy) * size + vec2f(s.x * length_u, -s.y * length_v);
+    let per_mm = size / max(vec2f(length_u, length_v), vec2f(1e-3));
+    let spread = max(s.zw - s.xy * s.xy, vec2f(0.0)) + max(fine.zw - fine.xy * fine.xy, vec2f(0.0)) * per_mm * per_mm;
+    let m = skin.roughness * textureSampleLevel(roughness_map, map_sampler, point.uv, mip_for(roughness_map, footprint)).x;
+    var out: Surface;
+    out.normal = bend(point, gradient);
+    out.colour = textureSampleLevel(colour_map, map_sampler, point.uv, mip_for(colour_map, footprint)).rgb;
+    out.roughness = clamp(sqrt(m * m + spread.x + spread.y), 0.05, 1.0);
+    out.rho_s = skin.rho_s * textureSampleLevel(specular_map, map_sampler, point.uv, mip_for(specular_map, footprint)).x;
+    return out;
+}
+
+// The normal of the surface raised by a height whose change with uv is `gradient` [mm]. Source: [Mikkelsen2010].
+fn bend(point: Point, gradient: vec2f) -> vec3f {
+    let n = point.normal;
+    let across = cross(point.dpdv, n);
+    let det = dot(point.dpdu, across);
+    if (abs(det) < 1e-6) {
+        return n;
+    }
+    let slope = (gradient.x * across + gradient.y * cross(n, point.dpdu)) / det;
+    return normalize(n - slope);
+}

@@ -1,0 +1,87 @@
+"""Pinhole cameras; places are in mm from the head's centre, +X to the head's left, +Z to its front."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from dermis.assets.head import Head
+from dermis.errors import refuse
+from dermis.scene.plain import Direction, Plain, Vector
+
+_DISTANCE_MM = 1100.0  # a portrait lens' distance: closer makes noses large
+
+
+class Camera(Plain):
+    """Where the picture is taken from.
+
+    position, target : eye, and the point in the middle of the image [mm]
+    up : the direction that is upwards in the image
+    frame_mm : height of what the image shows at the target's distance [mm]
+    """
+
+    position: Vector
+    target: Vector = (0.0, 0.0, 0.0)
+    up: Direction = (0.0, 1.0, 0.0)
+    frame_mm: Annotated[float, Field(gt=0, le=1e5)] = 340.0
+
+    @model_validator(mode="after")
+    def _looks_somewhere(self) -> Camera:
+        view = np.subtract(self.target, self.position)
+        if np.linalg.norm(np.cross(view, self.up)) < 1e-6 * np.linalg.norm(self.up):
+            raise ValueError("the line from position to target must exist and differ from up")
+        return self
+
+
+def portrait(head: Head) -> Camera:
+    """Head and shoulders from the front."""
+    return _around(head, 0.0)
+
+
+def three_quarter(head: Head) -> Camera:
+    """From the head's left front."""
+    return _around(head, 40.0)
+
+
+def profile(head: Head) -> Camera:
+    """From the head's left side."""
+    return _around(head, 90.0)
+
+
+def cheek(head: Head) -> Camera:
+    """Close to the left cheek, where pores show."""
+    spot = head.frontmost(38.0, -42.0)
+    away = _turned(28.0)
+    return Camera(position=_add(spot, away, 300.0), target=spot, frame_mm=62.0)
+
+
+PRESETS = {"portrait": portrait, "three-quarter": three_quarter, "profile": profile, "cheek": cheek}
+
+
+def preset(name: str, head: Head) -> Camera:
+    """The camera preset of that name.
+
+    Raises DermisError for a name that is none of `PRESETS`.
+    """
+    if name not in PRESETS:
+        refuse(
+            f"camera {name}", f"one of {', '.join(PRESETS)} or a TOML file", "it is neither", "Check the name"
+        )
+    return PRESETS[name](head)
+
+
+def _around(head: Head, degrees: float) -> Camera:
+    middle = (0.0, -25.0, 0.0)
+    return Camera(position=_add(middle, _turned(degrees), _DISTANCE_MM), target=middle)
+
+
+def _turned(degrees: float) -> Vector:
+    return (math.sin(math.radians(degrees)), 0.0, math.cos(math.radians(degrees)))
+
+
+def _add(point: Vector, direction: Vector, length: float) -> Vector:
+    x, y, z = (p + length * d for p, d in zip(point, direction, strict=True))
+    return (x, y, z)

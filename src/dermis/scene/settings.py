@@ -1,0 +1,39 @@
+"""How a picture is computed and encoded."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from dermis.scene.plain import Colour, Plain, Positive
+
+_Side = Annotated[int, Field(ge=1, le=16384)]
+_MOST_SAMPLES = 64
+
+
+class Settings(Plain):
+    """Sizes, quality, and what leaves linear light.
+
+    size : width and height of the image [pixel]
+    atlas : side of the irradiance map [texel]
+    samples : samples of each pixel
+    technique : "texture-space" scatters light over the atlas; "none" is the dry, unscattered skin
+    shadow_size : side of each shadow map [texel]
+    exposure : factor from radiance to the image [-]
+    background : linear Rec. 709
+    """
+
+    size: tuple[_Side, _Side] = (1024, 1024)
+    atlas: Annotated[int, Field(ge=64)] = 2048
+    samples: Annotated[int, Field(ge=1, le=_MOST_SAMPLES)] = 4
+    technique: Literal["texture-space", "none"] = "texture-space"
+    shadow_size: Annotated[int, Field(ge=64, le=8192)] = 2048
+    exposure: Positive = 1.0
+    background: Colour = (0.0, 0.0, 0.0)
+
+    @model_validator(mode="after")
+    def _fits_in_memory(self) -> Settings:
+        if self.size[0] * self.size[1] * self.samples > 2**28:
+            raise ValueError("size times samples must stay under 268 million: lower one of them")
+        return self

@@ -1,0 +1,161 @@
+"""What each map file becomes, and which files are refused by name."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dermis.assets.maps import Maps, load_maps
+from dermis.errors import DermisError
+from dermis.images.filters import derivatives, mip_chain
+from dermis.images.io import write_exr, write_png
+
+SHAPE = (24, 32)
+
+
+def _png(path: Path, pixels: np.ndarray) -> Path:
+    write_png(path, pixels)
+    return path
+
+
+def _encoded(normals: np.ndarray, full: int = 255) -> np.ndarray:
+    unit = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+    dtype = np.uint8 if full == 255 else np.uint16
+    return np.rint((unit + 1) / 2 * full).astype(dtype)
+
+
+def test_no_files_are_no_maps() -> None:
+    assert load_maps() == Maps()
+
+
+def test_colour_is_decoded_from_srgb_at_both_depths(tmp_path: Path) -> None:
+    grey = np.full((*SHAPE, 4), 188, np.uint8)
+    for name, pixels in (("8.png", grey), ("16.png", grey.astype(np.uint16) * 257)):
+        colour = load_maps(colour=_png(tmp_path / name, pixels)).colour
+        assert colour is not None
+        assert colour.shape == (*SHAPE, 3)
+        np.testing.assert_allclose(colour, 0.502887, atol=1e-6)
+
+
+def test_float_colour_is_linear_already(tmp_path: Path) -> None:
+    write_exr(tmp_path / "c.exr", np.full((*SHAPE, 3), 0.25, np.float32))
+    colour = load_maps(colour=tmp_path / "c.exr").colour
+    np.testing.assert_array_equal(colour, np.full((*SHAPE, 3), 0.25, np.float32))
+
+
+def test_height_is_one_relief_at_every_depth(tmp_path: Path) -> None:
+    levels = np.random.default_rng(0).integers(0, 256, SHAPE).astype(np.uint8)
+    write_exr(tmp_path / "h.exr", np.repeat(levels[..., None] / 255, 3, axis=2))
+    deep = _png(tmp_path / "16.png", levels.astype(np.uint16) * 257)
+    for path in (_png(tmp_path / "8.png", levels), deep, tmp_path / "h.exr"):
+        height = load_maps(height=path, height_mm=0.025).height
+        np.testing.assert_allclose(height, levels * 0.025, atol=1e-6)
+
+
+def test_normals_become_slopes(tmp_path: Path) -> None:
+    slope_u, slope_up = 0.3, -0.2
+    normals = np.broadcast_to([-slope_u, -slope_up, 1.0], (*SHAPE, 3))
+    for full, error in ((255, 0.01), (65535, 4e-5)):
+        path = _png(tmp_path / f"{full}.png", _encoded(normals, full))
+        up, down = load_maps(normal=path).normal, load_maps(normal=path, normal_y="down").normal
+        np.testing.assert_allclose(up, np.broadcast_to([slope_u, slope_up], (*SHAPE, 2)), atol=error)
+        np.testing.assert_allclose(down, np.broadcast_to([slope_u, -slope_up], (*SHAPE, 2)), atol=error)
+
+
+def test_signed_float_normals_are_seen_to_be_signed(tmp_path: Path) -> None:
+    unit = np.array([-0.6, 0.0, 0.8], np.float32)
+    write_exr(tmp_path / "n.exr", np.tile(unit, (*SHAPE, 1)))
+    write_exr(tmp_path / "m.exr", np.tile((unit + 1) / 2, (*SHAPE, 1)))
+    for name in ("n.exr", "m.exr"):
+        slopes = load_maps(normal=tmp_path / name).normal
+        np.testing.assert_allclose(slopes, np.broadcast_to([0.75, 0], (*SHAPE, 2)), atol=1e-5)
+
+
+def test_empty_space_of_a_normal_map_is_flat(tmp_path: Path) -> None:
+    pixels = np.zeros((*SHAPE, 3), np.uint8)
+    pixels[:12] = (128, 128, 255)
+    slopes = load_maps(normal=_png(tmp_path / "n.png", pixels)).normal
+    assert slopes is not None
+    assert np.abs(slopes[12:]).max() == 0
+    assert np.abs(slopes).max() < 0.005
+
+
+def test_grey_maps_are_plain_numbers(tmp_path: Path) -> None:
+    path = _png(tmp_path / "g.png", np.full((*SHAPE, 3), 51, np.uint8))
+    maps = load_maps(specular=path, roughness=path)
+    np.testing.assert_allclose(maps.specular, np.full(SHAPE, 0.2), atol=1e-7)
+    np.testing.assert_allclose(maps.roughness, np.full(SHAPE, 0.2), atol=1e-7)
+
+
+def _refused(folder: Path) -> dict[str, tuple[str, np.ndarray, str]]:
+    """By file name: role, pixels, what the message must say."""
+    rng = np.random.default_rng(1)
+    colour = rng.integers(0, 256, (*SHAPE, 3)).astype(np.uint8)
+    skin = np.broadcast_to(np.array([193, 153, 140], np.uint8), (*SHAPE, 3)).copy()
+    return {
+        "coloured_height.png": ("height", colour, "grey"),
+        "coloured_specular.png": ("specular", skin, "grey"),
+        "grey_colour.png": ("colour", colour[..., :1], "RGB"),
+        "grey_normal.png": ("normal", colour[..., :1], "grey"),
+        "skin_normal.png": ("normal", skin, "normal map"),
+        "white_normal.png": ("normal", np.full((*SHAPE, 3), 255, np.uint8), "normal map"),
+        "light_grey_normal.png": ("normal", np.full((*SHAPE, 3), 200, np.uint8), "normal map"),
+        "tiny_colour.png": ("colour", colour[:8], "32 x 8"),
+    }
+
+
+def test_wrong_maps_are_refused_by_name(tmp_path: Path) -> None:
+    for name, (role, pixels, says) in _refused(tmp_path).items():
+        path = _png(tmp_path / name, pixels)
+        with pytest.raises(DermisError, match=name) as caught:
+            load_maps(**{role: path}, height_mm=0.025)  # type: ignore[arg-type]
+        assert says in str(caught.value)
+
+
+@pytest.mark.parametrize("height_mm", [None, 0.0, -1.0, float("nan")])
+def test_height_needs_its_scale(tmp_path: Path, height_mm: float | None) -> None:
+    path = _png(tmp_path / "h.png", np.zeros(SHAPE, np.uint8))
+    with pytest.raises(DermisError, match=r"h\.png.*height_mm"):
+        load_maps(height=path, height_mm=height_mm)
+
+
+@pytest.mark.parametrize(("value", "says"), [(np.nan, "finite"), (3.0, "0 to 1")])
+def test_float_colours_are_checked(tmp_path: Path, value: float, says: str) -> None:
+    pixels = np.full((*SHAPE, 3), 0.5, np.float32)
+    pixels[3, 4, 1] = value
+    write_exr(tmp_path / "c.exr", pixels)
+    with pytest.raises(DermisError, match=rf"c\.exr.*{says}"):
+        load_maps(colour=tmp_path / "c.exr")
+
+
+def test_unknown_direction_of_green_is_refused(tmp_path: Path) -> None:
+    path = _png(tmp_path / "n.png", np.full((*SHAPE, 3), (128, 128, 255), np.uint8))
+    with pytest.raises(DermisError, match="normal_y"):
+        load_maps(normal=path, normal_y="left")  # type: ignore[arg-type]
+
+
+@pytest.mark.skipif(not os.environ.get("DERMIS_DATA"), reason="needs DERMIS_DATA")
+def test_head_scan_normals_lean_as_its_heights_do() -> None:
+    from dermis.assets.samples import SAMPLES, fetch
+
+    files, height_mm = fetch("lee_perry_smith"), SAMPLES["lee_perry_smith"].height_mm
+    maps = load_maps(normal=files["normal"], height=files["height"], height_mm=height_mm)
+    assert maps.height is not None
+    assert maps.normal is not None
+    dx, dy = derivatives(mip_chain(maps.height)[2])
+    assert np.corrcoef(maps.normal[..., 0].ravel(), dx.ravel())[0, 1] > 0.2
+    # Rows go down, slopes go up.
+    assert np.corrcoef(maps.normal[..., 1].ravel(), -dy.ravel())[0, 1] > 0.2
+
+
+@pytest.mark.skipif(not os.environ.get("DERMIS_DATA"), reason="needs DERMIS_DATA")
+def test_head_scan_has_no_other_normal_map() -> None:
+    from dermis.assets.samples import fetch
+
+    files = fetch("lee_perry_smith")
+    for role in ("colour", "specular"):
+        with pytest.raises(DermisError, match=files[role].name):
+            load_maps(normal=files[role])

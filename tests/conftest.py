@@ -1,0 +1,81 @@
+"""What every test relies on: a private cache, strict floating point, sample data and a device when asked for.
+
+`DERMIS_DATA` names the folder of sample data; tests that need it (the fixture `sample_folder` or the mark
+`samples`) are skipped without it and counted at the end. `DERMIS_TEST_ADAPTER` names another adapter than
+"cpu".
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+if TYPE_CHECKING:
+    from dermis.gpu.device import Device
+
+_UNSET = "DERMIS_DATA is not set"
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "samples: needs the sample data that DERMIS_DATA names")
+    if os.environ.get("DERMIS_DATA"):  # a relative path must survive a test that changes folder
+        os.environ["DERMIS_DATA"] = str(Path(os.environ["DERMIS_DATA"]).expanduser().resolve())
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    if item.get_closest_marker("samples"):
+        _find_samples()
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    skipped = terminalreporter.stats.get("skipped", [])
+    count = sum(_UNSET in str(report.longrepr) for report in skipped)
+    if count:
+        tests = "test" if count == 1 else "tests"
+        terminalreporter.write_line(f"sample data: {count} {tests} skipped because {_UNSET}", yellow=True)
+
+
+@pytest.fixture(scope="session")
+def sample_folder() -> Path:
+    """The folder of sample data; skips the test when DERMIS_DATA is unset."""
+    return _find_samples()
+
+
+@pytest.fixture(scope="session")
+def device() -> Device:
+    """The software adapter, opened once; a machine without one fails the test, it does not skip it."""
+    from dermis.gpu.device import open_device
+
+    return open_device(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def private_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """No test reads or writes the user's own cache."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("DERMIS_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.fixture(autouse=True)
+def strict_floating_point() -> Iterator[None]:
+    """A division by zero, an overflow or a NaN is an error; underflow to zero is what exp(-large) is for."""
+    before = np.seterr(divide="raise", over="raise", invalid="raise")
+    yield
+    np.seterr(**before)
+
+
+def _find_samples() -> Path:
+    named = os.environ.get("DERMIS_DATA")
+    if not named:
+        pytest.skip(_UNSET)
+    if not Path(named).is_dir():
+        pytest.fail(
+            f"DERMIS_DATA: expected a folder, but {named} is none. Correct it or unset it.", pytrace=False
+        )
+    return Path(named)

@@ -1,0 +1,161 @@
+"""The house rules that a machine can hold."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import dermis
+
+ROOT = Path(__file__).resolve().parents[1]
+SOURCE = Path(dermis.__file__).resolve().parent
+
+FILE_LINES = 250
+BODY_LINES = 40
+VAGUE_NAMES = {"util", "utils", "helper", "helpers", "common", "misc"}
+ENTRY_POINT = re.compile(r"@(compute|fragment|vertex)\b")
+# A folder of one person's machine; the same words inside a URL or a longer path do not count.
+MACHINE_PATH = re.compile(r"(?<![\w.:~/])/(?:work|home|root|Users|opt)/\w")
+IMAGES = {".png", ".jpg", ".jpeg", ".gif", ".webp", ".exr", ".hdr", ".tif", ".tiff", ".bmp", ".ppm"}
+IMAGE_BYTES = 10_000_000
+
+
+def python_files() -> list[Path]:
+    return sorted(SOURCE.rglob("*.py"))
+
+
+def shader_files() -> list[Path]:
+    return sorted(SOURCE.rglob("*.wgsl"))
+
+
+def name(path: Path) -> str:
+    return path.relative_to(SOURCE).as_posix()
+
+
+def functions(tree: ast.AST) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            yield node
+
+
+def body_lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    """Lines of a function's body, from the end of its docstring (or its first statement) to its end."""
+    end = function.end_lineno or 0
+    if ast.get_docstring(function) is not None:
+        return end - (function.body[0].end_lineno or 0)
+    return end - function.body[0].lineno + 1
+
+
+def tracked_files() -> list[Path]:
+    """Files that git tracks or would add; skips the test outside a checkout."""
+    git = shutil.which("git")
+    if git is None:
+        pytest.skip("git is missing")
+    # A checkout may belong to another user than the one who runs the tests.
+    command = [git, "-c", "safe.directory=*", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    listing = subprocess.run(command, cwd=ROOT, capture_output=True, check=False)
+    if listing.returncode != 0:
+        pytest.skip("not a git checkout")
+    paths = [ROOT / os.fsdecode(line) for line in listing.stdout.split(b"\0") if line]
+    return [path for path in paths if path.is_file()]
+
+
+def read_text(path: Path) -> str:
+    """The file's text; nothing for a binary file."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        return ""
+
+
+def test_files_are_short() -> None:
+    sizes = {name(p): len(read_text(p).splitlines()) for p in [*python_files(), *shader_files()]}
+    assert sizes
+    assert {file: lines for file, lines in sizes.items() if lines > FILE_LINES} == {}
+
+
+def test_functions_are_short() -> None:
+    long = [
+        f"{name(path)}:{function.lineno} {function.name}: {body_lines(function)} lines"
+        for path in python_files()
+        for function in functions(ast.parse(read_text(path)))
+        if body_lines(function) > BODY_LINES
+    ]
+    assert long == []
+
+
+def test_body_is_counted_without_its_docstring() -> None:
+    lines = ["def f(", "    a,", "):", '    """One.', "", "    Two.", '    """', "    b = a", "    return b"]
+    source = "\n".join([*lines, "def g():", "    return 1"])
+    assert [body_lines(function) for function in functions(ast.parse(source))] == [2, 1]
+
+
+def test_no_module_has_a_vague_name() -> None:
+    assert [name(p) for p in SOURCE.rglob("*") if p.stem.lower().strip("_") in VAGUE_NAMES] == []
+
+
+def test_shaders_begin_with_what_they_compute() -> None:
+    first = {name(p): next(iter(read_text(p).splitlines()), "") for p in shader_files()}
+    silent = [file for file, line in first.items() if not re.match(r"//\s*[^#\s/]", line)]
+    assert silent == []
+
+
+def test_no_shader_text_in_python() -> None:
+    guilty = [
+        f"{name(path)}:{node.lineno}"
+        for path in python_files()
+        for node in ast.walk(ast.parse(read_text(path)))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and ENTRY_POINT.search(node.value)
+    ]
+    assert guilty == []
+
+
+def test_no_path_of_a_machine_is_tracked() -> None:
+    found = [
+        f"{path.relative_to(ROOT)}:{number} {line.strip()[:80]}"
+        for path in tracked_files()
+        for number, line in enumerate(read_text(path).splitlines(), start=1)
+        if MACHINE_PATH.search(line)
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize(
+    ("line", "caught"),
+    [
+        ("see /" + "home/ann/heads", True),
+        ('path = "/' + 'work/shared"', True),
+        ("https://example.org/" + "home/ann", False),
+        ("docs/" + "work/plan", False),
+    ],
+)
+def test_machine_paths_are_told_from_others(line: str, caught: bool) -> None:
+    assert bool(MACHINE_PATH.search(line)) is caught
+
+
+def test_tracked_images_are_small() -> None:
+    sizes = {p.relative_to(ROOT): p.stat().st_size for p in tracked_files() if p.suffix.lower() in IMAGES}
+    assert sum(sizes.values()) < IMAGE_BYTES, sorted(sizes.items(), key=lambda item: -item[1])[:5]
+
+
+def test_lock_names_no_package_index() -> None:
+    lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+    assert "numpy==" in lock and "--hash=sha256:" in lock
+    assert not re.search(r"://|--(extra-)?index-url|--find-links", lock)
+
+
+def test_importing_dermis_is_light() -> None:
+    code = "import dermis, sys; print([m for m in ('wgpu', 'trimesh', 'scipy') if m in sys.modules])"
+    environment = {**os.environ, "PYTHONPATH": str(SOURCE.parent)}
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True
+    )
+    assert run.stdout.strip() == "[]"

@@ -1,0 +1,139 @@
+#!/bin/sh
+# Make .venv from requirements.lock and see to a Vulkan driver. Run again, it does only what is missing.
+# PYTHON=... names the interpreter to use instead of the first one that is new enough.
+set -eu
+cd "$(dirname "$0")/.."
+
+# What was installed, for which pins and in which folder (an environment does not survive a move).
+installed_stamp=.venv/.installed
+# The Vulkan drivers among which an adapter was found.
+adapter_stamp=.venv/.adapter
+
+say() { echo "setup: $*"; }
+
+fail() {
+    echo "setup: $*" >&2
+    exit 1
+}
+
+new_enough() { "$1" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; }
+
+find_python() {
+    for name in ${PYTHON:-python3 python3.14 python3.13 python3.12 python3.11}; do
+        if new_enough "$name"; then
+            command -v "$name"
+            return
+        fi
+    done
+    fail "expected Python 3.11 or newer as ${PYTHON:-python3 or python3.11 to python3.14}, but found none." \
+        "Install it, or name one: make setup PYTHON=/path/to/python3.12"
+}
+
+# Run a command in silence; if it fails, show what it said.
+quietly() {
+    if ! said=$("$@" 2>&1); then
+        printf '%s\n' "$said" >&2
+        return 1
+    fi
+}
+
+# Install Debian packages where that needs no password; else return 1.
+install_packages() {
+    command -v apt-get >/dev/null 2>&1 || return 1
+    sudo=
+    if [ "$(id -u)" -ne 0 ]; then
+        sudo -n true 2>/dev/null || return 1
+        sudo=sudo
+    fi
+    say "installing $* with apt-get"
+    # A stale list of packages is worth a try, so a failing update is not the end.
+    quietly $sudo apt-get -qq update || true
+    quietly $sudo env DEBIAN_FRONTEND=noninteractive \
+        apt-get -qq -y -o DPkg::Lock::Timeout=120 install --no-install-recommends "$@"
+}
+
+# Three ways to an environment with pip; Debian's bare python3 has neither venv nor pip.
+create_venv() {
+    "$1" -m venv .venv >/dev/null 2>&1 && return
+    rm -rf .venv
+    install_packages "python$2-venv" && "$1" -m venv .venv && return
+    rm -rf .venv
+    "$1" -m pip --version >/dev/null 2>&1 &&
+        "$1" -m venv --without-pip .venv >/dev/null 2>&1 &&
+        quietly "$1" -m pip --python .venv/bin/python install --quiet pip
+}
+
+make_venv() {
+    python=$(find_python)
+    version=$("$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+    trap 'rm -rf .venv' EXIT
+    trap 'exit 130' INT TERM
+    create_venv "$python" "$version" ||
+        fail "$python cannot make an environment. Run: sudo apt-get install -y python$version-venv $drivers"
+    trap - EXIT INT TERM
+    say "made .venv with Python $version ($python)"
+}
+
+# Does .venv run, with pip, in the folder it was made in?
+venv_works() {
+    new_enough .venv/bin/python || return 1
+    [ ! -f $installed_stamp ] || [ "$(head -n 1 $installed_stamp)" = "$PWD" ] || return 1
+    .venv/bin/python -c 'import pip' 2>/dev/null || .venv/bin/python -m ensurepip >/dev/null 2>&1
+}
+
+wanted_stamp() {
+    echo "$PWD"
+    cksum requirements.lock pyproject.toml
+}
+
+pip_install() { quietly .venv/bin/python -m pip install --quiet --no-input --disable-pip-version-check "$@"; }
+
+install_locked() {
+    if [ -f $installed_stamp ] && [ "$(wanted_stamp)" = "$(cat $installed_stamp)" ]; then
+        say ".venv is up to date"
+        return
+    fi
+    say "installing $(grep -c '==' requirements.lock) locked packages (minutes, once)"
+    pip_install --require-hashes -r requirements.lock || fail "could not install the locked packages (see above)."
+    pip_install --no-deps --no-build-isolation -e . || fail "could not install dermis itself (see above)."
+    wanted_stamp >$installed_stamp
+}
+
+# Which drivers the Vulkan loader would find; asking wgpu takes a second, this does not.
+list_drivers() {
+    echo "${VK_DRIVER_FILES:-} ${VK_ICD_FILENAMES:-}"
+    ls -l /usr/share/vulkan/icd.d /usr/local/share/vulkan/icd.d /etc/vulkan/icd.d 2>/dev/null || true
+}
+
+# Name of the first Vulkan adapter; nothing when there is none. (Drivers chatter on stderr.)
+find_adapter() {
+    .venv/bin/python - 2>/dev/null <<'PYTHON' || true
+import wgpu
+
+infos = [adapter.info for adapter in wgpu.gpu.enumerate_adapters_sync()]
+print(next((info["device"] for info in infos if info["backend_type"] == "Vulkan"), ""))
+PYTHON
+}
+
+ensure_adapter() {
+    [ "$(uname -s)" = Linux ] || return 0
+    if [ -f $adapter_stamp ] && [ "$(list_drivers)" = "$(cat $adapter_stamp)" ]; then
+        return
+    fi
+    adapter=$(find_adapter)
+    if [ -z "$adapter" ]; then
+        # shellcheck disable=SC2086  # two package names
+        install_packages $drivers && adapter=$(find_adapter)
+    fi
+    [ -n "$adapter" ] || fail "found no Vulkan adapter. Run: sudo apt-get install -y $drivers"
+    list_drivers >$adapter_stamp
+    say "Vulkan adapter: $adapter"
+}
+
+drivers="libvulkan1 mesa-vulkan-drivers"
+if ! venv_works; then
+    rm -rf .venv
+    make_venv
+fi
+install_locked
+ensure_adapter
