@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.assets.atlas_raster import cross, rasterise, texel_corners
 from dermis.assets.mesh import Mesh
 from dermis.assets.uv import charts, usable
 from dermis.errors import refuse
@@ -67,69 +68,17 @@ def build_atlas(mesh: Mesh, size: int) -> Atlas:
         )
     chart = charts(mesh)
     fit = usable(mesh, size, _LEAST_TEXELS)
-    texel, triangle = _rasterise(mesh, size, np.flatnonzero(fit))
+    texel, triangle = rasterise(mesh, size, np.flatnonzero(fit))
     mapped = fit & ~_overlapped(chart, texel, triangle, size)
     keep = mapped[triangle]
-    owner = np.full(size * size, -1, dtype=np.int32)
-    owner[texel[keep]] = triangle[keep]
-    owner = owner.reshape(size, size)
+    owner: NDArray[np.int32] = np.full((size, size), -1, dtype=np.int32)
+    owner.ravel()[texel[keep]] = triangle[keep]
     for _ in range(GUTTER):
         owner = _dilate(owner)
     barycentric = _barycentric(mesh, size, owner)
     chart_map = np.where(owner >= 0, chart[np.maximum(owner, 0)], -1)
     stretch = _stretch(mesh, size, owner, barycentric)
     return Atlas(owner, barycentric, stretch, _reach(chart_map), mapped)
-
-
-def _corners(mesh: Mesh, size: int, triangle: NDArray[np.integer]) -> NDArray[np.float64]:
-    """(t, 3, 2) uv corners in texels, whole numbers at texel centres."""
-    return mesh.uv[mesh.triangles[triangle]].astype(np.float64) * size - 0.5
-
-
-def _rasterise(
-    mesh: Mesh, size: int, triangle: NDArray[np.integer]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Texels whose centre lies in a triangle, as (flat texel index, triangle), by spans of rows."""
-    p = _corners(mesh, size, triangle)
-    top = np.clip(np.ceil(p[:, :, 1].min(axis=1)), 0, size).astype(np.int64)
-    bottom = np.clip(np.floor(p[:, :, 1].max(axis=1)), -1, size - 1).astype(np.int64)
-    which, y = _expand(top, np.maximum(bottom - top + 1, 0))
-    left, right = _span(p[which], y)
-    left = np.clip(np.ceil(left - 1e-6), 0, size).astype(np.int64)
-    right = np.clip(np.floor(right + 1e-6), -1, size - 1).astype(np.int64)
-    span, x = _expand(left, np.maximum(right - left + 1, 0))
-    return y[span] * size + x, triangle[which[span]].astype(np.int64)
-
-
-def _expand(
-    first: NDArray[np.int64], count: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Each run first, first + 1, ... of `count` numbers, with the index of the run it belongs to."""
-    which = np.repeat(np.arange(len(count)), count)
-    start = np.repeat(np.cumsum(count) - count, count)
-    return which, np.arange(len(which)) - start + first[which]
-
-
-def _span(p: NDArray[np.float64], y: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where row y enters and leaves each triangle."""
-    lowest = np.full(len(y), -np.inf)
-    highest = np.full(len(y), np.inf)
-    area = _cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    sign = np.where(area >= 0, 1.0, -1.0)
-    for k in range(3):
-        a, edge = p[:, k], p[:, (k + 1) % 3] - p[:, k]
-        # inside: cross(edge, q - a) * sign >= 0, linear in q.x with slope -edge.y * sign
-        slope = -edge[:, 1] * sign
-        level = (edge[:, 0] * (y - a[:, 1]) + edge[:, 1] * a[:, 0]) * sign
-        crossing = -level / np.where(slope == 0, 1.0, slope)
-        lowest = np.where(slope > 0, np.maximum(lowest, crossing), lowest)
-        highest = np.where(slope < 0, np.minimum(highest, crossing), highest)
-        highest = np.where((slope == 0) & (level < 0), -np.inf, highest)
-    return np.where(np.isfinite(lowest), lowest, 1.0), np.where(np.isfinite(highest), highest, 0.0)
-
-
-def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
 def _overlapped(
@@ -142,8 +91,8 @@ def _overlapped(
     winner = np.full(size * size, -1, dtype=np.int64)
     winner[texel[order]] = chart[triangle[order]]
     own = np.bincount(chart[triangle][winner[texel] == chart[triangle]], minlength=count)
-    lost = own < 0.5 * np.maximum(area, 1)
-    return lost[chart]
+    lost: NDArray[np.bool_] = own < 0.5 * np.maximum(area, 1)
+    return np.asarray(lost[chart])
 
 
 def _dilate(owner: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -160,12 +109,12 @@ def _dilate(owner: NDArray[np.int32]) -> NDArray[np.int32]:
 def _barycentric(mesh: Mesh, size: int, owner: NDArray[np.int32]) -> NDArray[np.uint16]:
     """Weights at each texel's centre; in the gutter those of the nearest place in the triangle."""
     y, x = np.nonzero(owner >= 0)
-    p = _corners(mesh, size, owner[y, x])
+    p = texel_corners(mesh, size, owner[y, x])
     q = np.stack([x, y], axis=-1) - p[:, 0]
     e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    area = _cross(e1, e2)
+    area = cross(e1, e2)
     area = np.where(area == 0, 1.0, area)
-    b = np.clip(np.stack([_cross(q, e2) / area, _cross(e1, q) / area], axis=-1), 0.0, 1.0)
+    b = np.clip(np.stack([cross(q, e2) / area, cross(e1, q) / area], axis=-1), 0.0, 1.0)
     b /= np.maximum(b.sum(axis=-1, keepdims=True), 1.0)
     whole = np.zeros((size, size, 2), dtype=np.uint16)
     whole[y, x] = np.floor(b * 65535.0).astype(np.uint16)

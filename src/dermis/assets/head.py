@@ -90,18 +90,25 @@ def load_head(
         files = fetch(name)
         path = files["mesh"]
         unit_mm = unit_mm or sample.unit_mm
-        v_origin = sample.v_origin if v_origin == "auto" else v_origin
+        v_origin = sample.v_origin or v_origin if v_origin == "auto" else v_origin
         height_mm = height_mm or sample.height_mm
     elif not path.exists():
         known = ", ".join(_head_names())
         refuse(name, f"a mesh file or a sample ({known})", "there is neither", "Check the name")
     mesh = load_mesh(path, unit_mm=unit_mm, v_origin=v_origin, up=up)
     check_head_height(mesh, name, unit_mm)
-    own: dict[str, Any] = {"colour": colour, "normal": normal, "height": height}
+    own = {"colour": colour, "normal": normal, "height": height}
     own |= {"specular": specular, "roughness": roughness}
-    given = {role: file if file is not None else files.get(role) for role, file in own.items()}
+    given: dict[str, Any] = {
+        role: file if file is not None else files.get(role) for role, file in own.items()
+    }
     maps = load_maps(**given, height_mm=height_mm)
     return Head(name, subdivided(mesh, subdivide), maps, sample.attribution if sample else "")
+
+
+def _chosen(given: dict[str, MapFile], sample: dict[str, Path]) -> dict[str, Any]:
+    """For each role the file given, else the sample's."""
+    return {role: sample.get(role) if file is None else file for role, file in given.items()}
 
 
 def _head_names() -> list[str]:

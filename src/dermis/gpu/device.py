@@ -14,7 +14,7 @@ from dermis.errors import DermisError
 from dermis.gpu.adapters import Adapter, choose_adapter
 
 _POOLED_UNIFORMS = 512
-_TIMED_PASSES = 1024
+_TIMED_PASSES = 2048
 
 
 def open_device(adapter: str = "auto") -> Device:
@@ -86,9 +86,9 @@ class Device:
         import wgpu
 
         if self._timestamps is None:
-            queries = self.handle.create_query_set(type="timestamp", count=2 * _TIMED_PASSES)
+            queries = self.handle.create_query_set(type="timestamp", count=_TIMED_PASSES)
             usage = wgpu.BufferUsage.QUERY_RESOLVE | wgpu.BufferUsage.COPY_SRC
-            self._timestamps = queries, self.handle.create_buffer(size=16 * _TIMED_PASSES, usage=usage)
+            self._timestamps = queries, self.handle.create_buffer(size=8 * _TIMED_PASSES, usage=usage)
         return self._timestamps
 
 

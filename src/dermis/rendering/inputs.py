@@ -39,7 +39,7 @@ class Inputs:
     head, atlas, lit : resources by the shaders' names: geometry and maps; atlas; those, lights and shadows
     light_clips, shadow_key : a matrix for each shadow map, and what the maps would show
     scatters : whether light spreads below the surface
-    blurred_mm2, level_weight, scattered : variances and weights of the blurred levels, and their sum's texture
+    blurred_mm2, level_weight, scattered : variances and weights of the blurred levels; texture of their sum
     view : record of the shading pass
     """
 

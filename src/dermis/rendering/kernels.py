@@ -21,7 +21,7 @@ def taps(variance: float) -> int:
 
 
 def kernel_table() -> NDArray[np.float32]:
-    """q = w(1) / w(0) of the kernel w(n) = q^(n^2), by variance (rows, 1/64 step^2) and taps a side (columns).
+    """q = w(1) / w(0) of the kernel w(n) = q^(n^2): rows by variance (1/64 step^2), columns by taps a side.
 
     A Gaussian sampled at whole steps and cut off does not have the Gaussian's variance: narrow ones lose
     most of theirs. So the width of the sampled curve is solved for, with the number of taps it is cut to.
@@ -43,8 +43,8 @@ def kernel(variance: float) -> Floats:
     row = variance * ROWS_PER_UNIT
     low, high = kernel_table().astype(np.float64)[[int(row), int(row) + 1], reach]
     n = np.arange(-reach, reach + 1)
-    weights: Floats = (low + (high - low) * (row % 1.0)) ** (n**2)
-    return weights / weights.sum()
+    weights = (low + (high - low) * (row % 1.0)) ** (n**2)
+    return np.asarray(weights / weights.sum())
 
 
 def _variance(q: Floats, inside: NDArray[np.bool_]) -> Floats:

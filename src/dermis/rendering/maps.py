@@ -117,7 +117,7 @@ def _relief(maps: Maps) -> NDArray[np.float32] | None:
 
 
 def _moments(slopes: NDArray[np.float32] | None) -> NDArray[np.float32]:
-    """Slopes and their squares: their means over a footprint give its normal and roughness [OlanoBaker2010]."""
+    """Slopes and their squares: a footprint's means give its normal and roughness [OlanoBaker2010]."""
     if slopes is None:
         return np.zeros((1, 1, 4), np.float32)
     return np.concatenate([slopes, slopes**2], axis=-1)

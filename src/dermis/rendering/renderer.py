@@ -21,6 +21,8 @@ from dermis.rendering import inputs as made
 from dermis.rendering.frame import Stages, draw_frame
 from dermis.rendering.inputs import Inputs
 from dermis.rendering.maps import HeadTextures, upload_atlas, upload_head
+from dermis.rendering.projection import ShadowView
+from dermis.rendering.stages.shadows import ShadowMaps
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
@@ -100,50 +102,54 @@ class Renderer:
     def _inputs(self, scene: Scene, settings: Settings) -> tuple[Inputs, int]:
         self._check(settings)
         profile = load_profile(scene.skin.profile)
-        white = scene.skin.albedo == "map"
-        split = made.split_profile(profile, settings, white)
+        split = made.split_profile(profile, settings, white=scene.skin.albedo == "map")
         atlas, atlas_textures = self._atlas(scene.head, settings.atlas)
-        head = self._head(scene.head, atlas, white)
+        head = self._head(scene.head, atlas, scene.skin.albedo == "map")
         views = made.light_views(scene, settings.shadow_size)
         clips = [view.clip for view in views if view]
-        stages = self._stages
-        size = settings.shadow_size if clips else 1
-        shadow_maps = self._keep(
-            "shadows", (len(clips), size), lambda: stages.shadows.make_maps(len(clips), size)
-        )
-        lit = {
-            **head.resources,
-            "skin": made.skin_record(stages.shade.program, scene, head),
-            "lights": made.light_records(stages.irradiance.program, scene, views),
-            "shadow_maps": shadow_maps.texture,
-            "shadow_sampler": self.device.sampler(compare="less", mag_filter="linear", min_filter="linear"),
-        }
-        count = len(split.blurred_mm2)
-        space = settings.atlas if count else 1
-        return Inputs(
+        shadow_maps = self._shadow_maps(len(clips), settings.shadow_size if clips else 1)
+        stages, count, size = self._stages, len(split.blurred_mm2), settings.size
+        side = settings.atlas if count else 1
+        inputs = Inputs(
             head=head,
             atlas=atlas_textures,
-            lit=lit,
+            lit=self._lit(scene, head, views, shadow_maps),
             shadow_maps=shadow_maps,
             light_clips=clips,
-            shadow_key=repr((id(scene.head), size)).encode() + np.array(clips).tobytes(),
+            shadow_key=np.array(clips).tobytes(),
             scatters=count > 0,
-            levels=self._keep("levels", (space, count), lambda: stages.diffuse.make_levels(space, count)),
+            levels=self._keep("levels", (side, count), lambda: stages.diffuse.make_levels(side, count)),
             blurred_mm2=split.blurred_mm2,
             level_weight=split.weight,
-            scattered=self._keep(
-                "scattered", space, lambda: make_texture(self.device, (space, space), "rgba32float")
-            ),
+            scattered=self._keep("scattered", side, lambda: self._plain((side, side))),
             seen=self._keep(
-                "seen",
-                (settings.size, settings.samples),
-                lambda: stages.visibility.make_seen(settings.size, settings.samples),
+                "seen", (size, settings.samples), lambda: stages.visibility.make_seen(size, settings.samples)
             ),
             camera_clips=made.camera_clips(scene.camera, scene.head, settings),
             view=made.view_record(stages.shade.program, scene, settings, split),
-            picture=self._keep("picture", settings.size, lambda: stages.post.make_picture(settings.size)),
+            picture=self._keep("picture", size, lambda: stages.post.make_picture(size)),
             exposure=settings.exposure,
-        ), len(profile.variance_mm2)
+        )
+        return inputs, len(profile.variance_mm2)
+
+    def _lit(
+        self, scene: Scene, head: HeadTextures, views: list[ShadowView | None], shadow_maps: ShadowMaps
+    ) -> dict[str, Any]:
+        """What both lighting passes read: the head, its skin, the lights and their shadows."""
+        program = self._stages.shade.program
+        return {
+            **head.resources,
+            "skin": made.skin_record(program, scene, head),
+            "lights": made.light_records(program, scene, views),
+            "shadow_maps": shadow_maps.texture,
+            "shadow_sampler": self.device.sampler(compare="less", mag_filter="linear", min_filter="linear"),
+        }
+
+    def _shadow_maps(self, layers: int, size: int) -> ShadowMaps:
+        return self._keep("shadows", (layers, size), lambda: self._stages.shadows.make_maps(layers, size))
+
+    def _plain(self, size: tuple[int, int]) -> Any:
+        return make_texture(self.device, size, "rgba32float")
 
     def _check(self, settings: Settings) -> None:
         limit, name = self.device.max_texture_size, self.device.adapter.name
@@ -162,9 +168,11 @@ class Renderer:
         return self._keep("atlas", (head, size), make)
 
     def _head(self, head: Head, atlas: Atlas, use_colour: bool) -> HeadTextures:
-        return self._keep(
-            "head", (head, atlas, use_colour), lambda: upload_head(self.device, head, atlas, use_colour)
-        )
+        def make() -> HeadTextures:
+            self._kept.pop("shadows", None)  # they show another head
+            return upload_head(self.device, head, atlas, use_colour)
+
+        return self._keep("head", (head, atlas, use_colour), make)
 
     def _keep(self, role: str, key: Any, make: Callable[[], T]) -> T:
         """The last thing made for this role while its key stays the same."""

@@ -4,6 +4,7 @@ override AXIS: u32 = 0u; // 0 along u, 1 along v
 
 const ROWS_PER_UNIT: f32 = 64.0; // rows of the kernel table per unit of variance
 const WIDEST: f32 = 9.0; // variance of the table's last row [step^2]
+const SMOOTH: f32 = 1.6; // widest step over the source's width: its ripple stays under 0.1 %
 const TRUNCATION: f32 = 3.3; // taps reach this many standard deviations
 
 struct Spread {
@@ -20,7 +21,7 @@ struct Spread {
 
 // Texels between taps. A source that is already smooth at the step's scale may be read sparsely.
 fn tap_step(sigma: f32, sigma_before: f32) -> f32 {
-    let sparse = floor(min(1.4 * sigma_before, sigma));
+    let sparse = floor(min(SMOOTH * sigma_before, sigma));
     return max(max(1.0, sparse), ceil(sigma / sqrt(WIDEST)));
 }
 
@@ -32,6 +33,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let here = vec2i(id.xy);
     let reach = vec4i(textureLoad(reach_map, here, 0));
     let texels_per_mm = textureLoad(stretch_map, here, 0)[AXIS];
+    if (texels_per_mm == 0.0) {
+        return; // no surface here, and textures start black
+    }
     let centre = textureLoad(source, here, 0);
     let sigma = sqrt(spread.variance_mm2) * texels_per_mm;
     let step = tap_step(sigma, sqrt(spread.before_mm2) * texels_per_mm);

@@ -1,4 +1,4 @@
-// The image: per sample the light that scattered below, relit at its finest level, under the white surface lobe.
+// The image: light that scattered below, relit at its finest level, under the white lobe of the surface.
 //#include "geometry.wgsl"
 //#include "bilinear.wgsl"
 //#include "skin.wgsl"
@@ -83,7 +83,8 @@ fn ray_through(place: vec2f, size: vec2f) -> vec3f {
     return shade.forward + ndc.x * shade.right + ndc.y * shade.up;
 }
 
-fn radiance(triangle: u32, place: vec2f, size: vec2f) -> vec3f {
+// share: part of the pixel that this shading stands for; maps are filtered over it.
+fn radiance(triangle: u32, place: vec2f, share: f32, size: vec2f) -> vec3f {
     let t = triangle_at(triangle);
     let a = corner_at(t.x);
     let b = corner_at(t.y);
@@ -97,7 +98,7 @@ fn radiance(triangle: u32, place: vec2f, size: vec2f) -> vec3f {
     if ((t.w & OPAQUE) != 0u) {
         return opaque_radiance(point, v);
     }
-    let spacing = inverseSqrt(f32(shade.samples));
+    let spacing = sqrt(share);
     let wx = meet(weights, ray_through(place + vec2f(spacing, 0.0), size)) - w;
     let wy = meet(weights, ray_through(place + vec2f(0.0, spacing), size)) - w;
     let x = length(wx.x * a.uv + wx.y * b.uv + wx.z * c.uv);
@@ -111,16 +112,22 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if (any(id.xy >= size)) {
         return;
     }
-    var sum = vec3f(0.0);
-    var hits = 0.0;
-    for (var s = 0u; s < shade.samples; s++) {
+    let pixel = vec2f(id.xy);
+    var sum = vec4f(0.0);
+    // Samples are shaded together while they see one triangle: its maps are filtered over their part of the pixel.
+    for (var s = 0u; s < shade.samples;) {
         let triangle = textureLoad(seen, id.xy, s, 0).x;
-        if (triangle > 0u) {
-            sum += radiance(triangle - 1u, vec2f(id.xy) + shade.jitter[s].xy, vec2f(size));
-            hits += 1.0;
+        var place = shade.jitter[s].xy;
+        var n = 1u;
+        while (s + n < shade.samples && textureLoad(seen, id.xy, s + n, 0).x == triangle) {
+            place += shade.jitter[s + n].xy;
+            n++;
         }
+        let share = f32(n) / f32(shade.samples);
+        if (triangle > 0u) {
+            sum += share * vec4f(radiance(triangle - 1u, pixel + place / f32(n), share, vec2f(size)), 1.0);
+        }
+        s += n;
     }
-    let covered = hits / f32(shade.samples);
-    let mean = sum / f32(shade.samples) + (1.0 - covered) * shade.background;
-    textureStore(image, id.xy, vec4f(mean, covered));
+    textureStore(image, id.xy, vec4f(sum.rgb + (1.0 - sum.a) * shade.background, sum.a));
 }

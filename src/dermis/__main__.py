@@ -1,0 +1,5 @@
+"""`python -m dermis`."""
+
+from dermis.cli import main
+
+main()

@@ -1,0 +1,125 @@
+"""`dermis doctor`: what this machine can do."""
+
+from __future__ import annotations
+
+import platform
+from importlib.metadata import version
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from dermis.cli.console import print_json, print_lines
+from dermis.errors import DermisError
+
+_LIBRARIES = ("dermis", "wgpu", "numpy", "scipy", "trimesh", "pydantic", "imageio", "OpenEXR", "pillow")
+Json = Annotated[bool, Parameter(name="--json", negative="")]
+
+
+def doctor(*, adapter: str = "auto", as_json: Json = False) -> int:
+    """Show the adapters, the one that is used and why, versions and sample data, and render a test frame.
+
+    Exits with 0 when everything works and with 2 when not.
+
+    Examples:
+
+        dermis doctor
+
+        dermis doctor --adapter cpu --json
+
+    Parameters
+    ----------
+    adapter:
+        auto (the best), cpu (software), or a part of an adapter's name.
+    as_json:
+        Print one JSON object.
+    """
+    report = examine(adapter)
+    if as_json:
+        print_json(report)
+    else:
+        print_lines(*_lines(report))
+    return 0 if report["healthy"] else 2
+
+
+def examine(wanted: str) -> dict[str, Any]:
+    """All findings as one JSON-ready object."""
+    from dermis.assets.cache import cache_folder
+    from dermis.assets.samples import SAMPLES, cached
+    from dermis.gpu.adapters import WANTED_FEATURES, list_adapters
+
+    found = [
+        {"name": a.name, "driver": a.driver, "kind": a.kind, "backend": a.backend}
+        | {"features": {feature: feature in a.features for feature in WANTED_FEATURES}}
+        for a in list_adapters()
+    ]
+    return {
+        **_try_out(wanted),
+        "adapters": found,
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "libraries": {name: version(name) for name in _LIBRARIES},
+        "cache": str(cache_folder()),
+        "samples": {name: cached(name) for name in SAMPLES},
+    }
+
+
+def _try_out(wanted: str) -> dict[str, Any]:
+    """Open the adapter and use it."""
+    from dermis.gpu.probe import half_store_rounding
+    from dermis.rendering.renderer import Renderer
+
+    try:
+        renderer = Renderer(wanted)
+        rounding = half_store_rounding(renderer.device)
+        test = _self_test(renderer)
+    except DermisError as error:
+        return {"healthy": False, "used": None, "problem": str(error)}
+    used = {
+        "name": renderer.device.adapter.name,
+        "backend": renderer.device.adapter.backend,
+        "reason": renderer.device.reason,
+        "half_store_rounding": rounding,
+    }
+    problem = None if test["passed"] else "the test frame is not lit as it should be"
+    return {"healthy": test["passed"], "used": used, "self_test": test, "problem": problem}
+
+
+def _self_test(renderer: Any) -> dict[str, Any]:
+    """A white sphere, lit from the camera: its middle must reflect what the light sends, no pixel more."""
+    from dermis.assets.head import Head
+    from dermis.assets.maps import Maps
+    from dermis.assets.primitives import uv_sphere
+    from dermis.scene import Camera, DirectionalLight, Scene, Settings, Skin
+
+    lamp = DirectionalLight(direction=(0.0, 0.0, -1.0), irradiance=(3.14159, 3.14159, 3.14159))
+    scene = Scene(
+        Head("sphere", uv_sphere(100.0), Maps()),
+        lights=(lamp,),
+        camera=Camera(position=(0.0, 20.0, 1000.0), target=(0.0, 20.0, 0.0), frame_mm=240.0),
+        skin=Skin(rho_s=0.0, albedo="profile"),
+    )
+    rendered = renderer.draw(scene, Settings(size=(128, 128), atlas=256, samples=1, shadow_size=256))
+    image = rendered.linear()
+    centre = float(image[60:68, 60:68].mean())
+    passed = abs(centre - 1.0) < 0.02 and float(image.max()) < 1.02 and float(image[0, 0].max()) == 0.0
+    return {"passed": passed, "centre": centre, "frame_ms": rendered.frame_ms}
+
+
+def _lines(report: dict[str, Any]) -> list[str]:
+    mark = {True: "yes", False: "no"}
+    lines = ["adapters:"]
+    for one in report["adapters"]:
+        features = ", ".join(f"{name} {mark[has]}" for name, has in one["features"].items())
+        lines.append(f"  {one['name']}, {one['backend']} ({one['kind']}): {features}")
+    if used := report["used"]:
+        test = report["self_test"]
+        lines.append(f"used: {used['name']}, {used['backend']}, because it is {used['reason']}")
+        lines.append(f"half-float stores round: {used['half_store_rounding']}")
+        result = "passed" if test["passed"] else "FAILED"
+        lines.append(f"test frame: {result} in {test['frame_ms']:.0f} ms, centre {test['centre']:.3f} of 1")
+    libraries = ", ".join(f"{name} {number}" for name, number in report["libraries"].items())
+    lines.append(f"python {report['python']} on {report['platform']}; {libraries}")
+    state = {True: "here", False: "not here"}
+    samples = ", ".join(f"{name} {state[here]}" for name, here in report["samples"].items())
+    lines += [f"cache: {report['cache']}", f"samples: {samples}"]
+    return [*lines, "healthy" if report["healthy"] else f"NOT healthy: {report['problem']}"]

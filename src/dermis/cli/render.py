@@ -1,0 +1,211 @@
+"""`dermis render`: an image of a head."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from dermis.cli.console import print_json, print_lines, working_on
+from dermis.errors import refuse
+
+_MAP_OPTIONS = ("colour", "normal", "height", "height_mm", "specular", "roughness_map")
+_HEAD_OPTIONS = (*_MAP_OPTIONS, "unit_mm", "v_origin", "up", "subdivide")
+_SKIN_OPTIONS = ("profile", "albedo", "mix", "roughness", "rho_s")
+_SETTINGS = ("size", "atlas", "samples", "technique", "exposure", "background")
+
+Output = Annotated[Path, Parameter(name=("--output", "-o"))]
+Json = Annotated[bool, Parameter(name="--json", negative="")]
+
+
+def render(
+    head: str,
+    /,
+    *,
+    output: Output = Path("dermis.png"),
+    size: str | None = None,
+    atlas: int | None = None,
+    samples: int | None = None,
+    technique: Literal["texture-space", "none"] | None = None,
+    profile: str | None = None,
+    albedo: Literal["map", "profile"] | None = None,
+    mix: float | None = None,
+    roughness: float | None = None,
+    rho_s: float | None = None,
+    lights: str | None = None,
+    camera: str | None = None,
+    exposure: float | None = None,
+    background: str | None = None,
+    colour: Path | None = None,
+    normal: Path | None = None,
+    height: Path | None = None,
+    height_mm: float | None = None,
+    specular: Path | None = None,
+    roughness_map: Path | None = None,
+    unit_mm: float | None = None,
+    v_origin: Literal["auto", "top", "bottom"] | None = None,
+    up: Literal["y", "z"] | None = None,
+    subdivide: int | None = None,
+    adapter: str = "auto",
+    as_json: Json = False,
+) -> int:
+    """Render a head to a PNG (sRGB) or EXR (linear float) image.
+
+    Examples:
+
+        dermis render lee_perry_smith -o face.png
+
+        dermis render lee_perry_smith --camera cheek --technique none -o dry.exr
+
+        dermis render head.obj --unit-mm 100 --colour skin.png --subdivide 1
+
+        dermis render scene.toml --size 1920x1080 --json
+
+    Parameters
+    ----------
+    head:
+        A sample (lee_perry_smith), a mesh (.glb .gltf .obj .ply) or a scene (.toml).
+    output:
+        Image to write: .png (sRGB, 8 bit) or .exr (linear Rec. 709, float).
+    size:
+        Width x height in pixels [1024x1024].
+    atlas:
+        Side of the irradiance map in texels [2048].
+    samples:
+        Samples of each pixel's edges [4].
+    technique:
+        texture-space scatters light below the surface; none is dry skin.
+    profile:
+        Diffusion profile: gpu-gems-3, or a CSV file with variance_mm2,red,green,blue.
+    albedo:
+        map: profile made white, colour from the map (the deck). profile: the profile's own colour, no map.
+    mix:
+        Share of the colour map applied before scattering, 0 to 1 [0.5].
+    roughness:
+        Beckmann roughness m of the surface [0.3]; a roughness map replaces it.
+    rho_s:
+        Strength of the surface reflection [0.18].
+    lights:
+        studio, or a TOML file with [[lights]].
+    camera:
+        portrait, three-quarter, profile, cheek, or a TOML file with [camera].
+    exposure:
+        Factor from radiance to the image [1].
+    background:
+        Linear red,green,blue [0,0,0].
+    colour:
+        Colour map (sRGB).
+    normal:
+        Tangent-space normal map, green up.
+    height:
+        Height map; needs --height-mm.
+    height_mm:
+        Relief of one grey level of an 8-bit height map [mm].
+    specular:
+        Map of the surface reflection's strength, scaled to a mean of --rho-s.
+    roughness_map:
+        Map of the roughness m, 0 to 1.
+    unit_mm:
+        Length of the file's unit [mm]; 1000 for glTF and 1 for others when left out.
+    v_origin:
+        Which row of the maps v = 0 is; the format's rule when left out.
+    up:
+        The file's upward axis [y].
+    subdivide:
+        Levels of Loop subdivision, 0 to 3 [0].
+    adapter:
+        auto (the best), cpu (software), or a part of an adapter's name.
+    as_json:
+        Print one JSON object with the timings of a warm frame.
+    """
+    given = {name: value for name, value in locals().items() if value is not None}
+    from dermis.images.io import check_output
+
+    check_output(output)
+    given |= {"size": _size(size)} if size is not None else {}
+    given |= {"background": _triple(background)} if background is not None else {}
+    with working_on("loading"):
+        scene, settings = _scene(head, given)
+    return _draw_and_report(scene, settings, output, adapter, as_json)
+
+
+def _draw_and_report(scene: Any, settings: Any, output: Path, adapter: str, as_json: bool) -> int:
+    from dermis.images.io import write_image, write_png
+    from dermis.rendering.renderer import Renderer
+
+    with working_on("rendering"):
+        renderer = Renderer(adapter)
+        rendered = renderer.draw(scene, settings)
+        setup_ms = rendered.setup_ms
+        if as_json:  # the first frame warms caches and clocks; the second one is timed
+            rendered = renderer.draw(scene, settings, keep_shadows=False)
+    if output.suffix.lower() == ".png":
+        write_png(output, rendered.srgb8())
+    else:
+        write_image(output, rendered.linear())
+    report = {
+        "image": str(output),
+        "adapter": renderer.device.adapter.name,
+        "size": list(settings.size),
+        "atlas": settings.atlas,
+        "gaussians": rendered.gaussians,
+        "gpu_ms": rendered.gpu_ms,
+        "frame_ms": rendered.frame_ms,
+        "setup_ms": setup_ms,
+    }
+    if as_json:
+        print_json(report)
+    else:
+        seconds = (setup_ms + rendered.frame_ms) / 1e3
+        print_lines(f"{output}  {seconds:.1f} s on {report['adapter']}", *_thanks(scene.head.attribution))
+    return 0
+
+
+def _thanks(attribution: str) -> list[str]:
+    return [attribution] if attribution else []
+
+
+def _scene(head: str, given: dict[str, Any]) -> tuple[Any, Any]:
+    """The scene and its settings: the head's, or the file's, with the options given on top."""
+    from dermis.assets.head import load_head
+    from dermis.scene import Scene, Settings, Skin, load_camera, load_lights, load_scene
+
+    own = {name: given[name] for name in _HEAD_OPTIONS if name in given}
+    skin = {name: given[name] for name in _SKIN_OPTIONS if name in given}
+    chosen = {name: given[name] for name in _SETTINGS if name in given}
+    if Path(head).suffix.lower() == ".toml":
+        if own:
+            option = "--" + next(iter(own)).replace("_", "-")
+            refuse(option, "no such option with a scene file", "it came", "Write it into the file's [head]")
+        scene, settings = load_scene(Path(head))
+    else:
+        Skin(**skin), Settings(**chosen)  # refuse bad numbers before the head is loaded
+        if "roughness_map" in own:
+            own["roughness"] = own.pop("roughness_map")
+        scene, settings = Scene(load_head(head, **own)), Settings()
+    body = scene.head
+    return Scene(
+        body,
+        lights=load_lights(given["lights"]) if "lights" in given else scene.lights,
+        camera=load_camera(given["camera"], body) if "camera" in given else scene.camera,
+        skin=Skin(**(scene.skin.model_dump() | skin)),
+    ), Settings(**(settings.model_dump() | chosen))
+
+
+def _size(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(\d{1,9})x(\d{1,9})", text)
+    if not match:
+        refuse(
+            "--size", "WIDTHxHEIGHT, such as 1024x1024", f"{text!r} came", "Write two whole numbers with an x"
+        )
+    return int(match[1]), int(match[2])
+
+
+def _triple(text: str) -> tuple[float, float, float]:
+    try:
+        red, green, blue = (float(part) for part in text.split(","))
+    except ValueError:
+        refuse("--background", "red,green,blue, such as 0,0,0", f"{text!r} came", "Write three numbers")
+    return red, green, blue
