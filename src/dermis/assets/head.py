@@ -99,10 +99,7 @@ def load_head(
     check_head_height(mesh, name, unit_mm)
     own = {"colour": colour, "normal": normal, "height": height}
     own |= {"specular": specular, "roughness": roughness}
-    given: dict[str, Any] = {
-        role: file if file is not None else files.get(role) for role, file in own.items()
-    }
-    maps = load_maps(**given, height_mm=height_mm)
+    maps = load_maps(**_chosen(own, files), height_mm=height_mm)
     return Head(name, subdivided(mesh, subdivide), maps, sample.attribution if sample else "")
 
 
