@@ -89,12 +89,12 @@ def load_head(
             )
         files = fetch(name)
         path = files["mesh"]
-        unit_mm = unit_mm or sample.unit_mm
+        unit_mm = sample.unit_mm if unit_mm is None else unit_mm
         v_origin = sample.v_origin or v_origin if v_origin == "auto" else v_origin
-        height_mm = height_mm or sample.height_mm
-    elif not path.exists():
+        height_mm = sample.height_mm if height_mm is None else height_mm
+    elif not path.is_file():
         known = ", ".join(_head_names())
-        refuse(name, f"a mesh file or a sample ({known})", "there is neither", "Check the name")
+        refuse(name or "head", f"a mesh file or a sample ({known})", f"{name!r} is neither", "Check the name")
     mesh = load_mesh(path, unit_mm=unit_mm, v_origin=v_origin, up=up)
     check_head_height(mesh, name, unit_mm)
     own = {"colour": colour, "normal": normal, "height": height}

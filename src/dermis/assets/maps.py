@@ -59,6 +59,9 @@ def load_maps(
     normal_y : "up" when green points to row 0 (OpenGL, Blender), "down" when away from it (DirectX)
     DermisError : a file is not what its role asks for; the message names it
     """
+    if height is None and height_mm is not None:
+        came = f"{height_mm} came without a height map"
+        refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
     return Maps(
         colour=None if colour is None else load_colour(colour),
         normal=None if normal is None else load_normal(normal, normal_y),

@@ -26,12 +26,31 @@ class Frame:
         self, stage: str, program: ComputeProgram, resources: Resources, size: tuple[int, int], tile: int = 8
     ) -> None:
         """Run `program` once for each of size[0] x size[1] invocations, in tiles of `tile` squared."""
+        self.dispatch(stage, program, resources, (*program.groups_for(size, tile), 1))
+
+    def dispatch(
+        self, stage: str, program: ComputeProgram, resources: Resources, groups: tuple[int, int, int]
+    ) -> None:
+        """Run `program` for a number of workgroups along each axis."""
         one = self._encoder.begin_compute_pass(label=stage, timestamp_writes=self._timing(stage))
         one.set_pipeline(program.pipeline)
         for index, group in enumerate(program.bind_groups(resources)):
             one.set_bind_group(index, group)
-        one.dispatch_workgroups(*program.groups_for(size, tile))
+        one.dispatch_workgroups(*groups)
         one.end()
+
+    def clear(self, buffer: Any) -> None:
+        """Fill a buffer with zeros."""
+        self._encoder.clear_buffer(buffer, 0, buffer.size)
+
+    def copy(self, buffer: Any, texture: Any, *, pitch: int, layers: int) -> None:
+        """Copy rows of `pitch` 4-byte pixels, layer after layer, from a buffer into a texture."""
+        width, height = texture.size[:2]
+        self._encoder.copy_buffer_to_texture(
+            {"buffer": buffer, "offset": 0, "bytes_per_row": 4 * pitch, "rows_per_image": height},
+            {"texture": texture, "mip_level": 0, "origin": (0, 0, 0)},
+            (width, height, layers),
+        )
 
     def draw(
         self,
@@ -40,11 +59,16 @@ class Frame:
         resources: Resources,
         vertices: int,
         *,
+        layer: int = 0,
         depth: Any,
         far: float,
         target: Any = None,
     ) -> None:
-        """Rasterise `vertices` / 3 triangles into cleared targets; `far` is the depth they start at."""
+        """Rasterise `vertices` / 3 triangles into cleared targets.
+
+        layer : the instance index that the shader sees
+        far : the depth that the attachment starts at
+        """
         colour = [{"view": target, "load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 0)}]
         one = self._encoder.begin_render_pass(
             label=stage,
@@ -60,7 +84,7 @@ class Frame:
         one.set_pipeline(program.pipeline)
         for index, group in enumerate(program.bind_groups(resources)):
             one.set_bind_group(index, group)
-        one.draw(vertices)
+        one.draw(vertices, 1, 0, layer)
         one.end()
 
     def submit(self) -> None:

@@ -16,9 +16,9 @@ from dermis.rendering.maps import HeadTextures
 from dermis.rendering.projection import Matrix, ShadowView, depth_range, frame_of, perspective, shadow_view
 from dermis.rendering.samples import pixel_samples
 from dermis.rendering.stages.diffuse import Levels
+from dermis.rendering.stages.nearest import Layers
 from dermis.rendering.stages.post import Picture
 from dermis.rendering.stages.shadows import ShadowMaps
-from dermis.rendering.stages.visibility import Seen
 from dermis.scene.camera import Camera
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
 from dermis.scene.model import Scene
@@ -54,7 +54,7 @@ class Inputs:
     blurred_mm2: Floats
     level_weight: Floats
     scattered: Any
-    seen: Seen
+    seen: Layers
     camera_clips: list[Matrix]
     view: Any
     picture: Picture

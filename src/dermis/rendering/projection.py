@@ -1,4 +1,4 @@
-"""Matrices from world to clip space for cameras and shadow maps; column vectors, depth in 0..1."""
+"""Matrices from world to clip space for cameras and shadow maps; column vectors, depth 1 near to 0 far."""
 
 from __future__ import annotations
 
@@ -41,11 +41,14 @@ def frame_of(forward: Vec, up: Vec) -> tuple[Vec, Vec, Vec]:
 def perspective(
     eye: Vec, axes: tuple[Vec, Vec, Vec], half: tuple[float, float], near: float, far: float
 ) -> Matrix:
-    """Looking along axes[2] with the tangents `half` of the half angles; depth 0 at near, 1 at far."""
+    """Looking along axes[2] with the tangents `half` of the half angles; depth 1 at near, 0 at far.
+
+    Floats are densest at 0: depths turned round are even over the whole range.
+    """
     view = _view(eye, axes)
     clip = np.zeros((4, 4))
     clip[0, 0], clip[1, 1] = 1.0 / half[0], 1.0 / half[1]
-    clip[2, 2], clip[2, 3] = far / (far - near), -far * near / (far - near)
+    clip[2, 2], clip[2, 3] = -near / (far - near), far * near / (far - near)
     clip[3, 2] = 1.0
     return clip @ view
 
@@ -90,9 +93,9 @@ def _parallel(direction: Vec, mesh: Mesh, size: int) -> ShadowView:
     half = 0.51 * float(max(high[0] - low[0], high[1] - low[1]))
     clip = np.eye(4)
     clip[0, :3], clip[1, :3] = axes[0] / half, axes[1] / half
-    clip[2, :3] = axes[2] / (high[2] - low[2])
+    clip[2, :3] = -axes[2] / (high[2] - low[2])
     clip[0, 3], clip[1, 3] = -0.5 * (low[0] + high[0]) / half, -0.5 * (low[1] + high[1]) / half
-    clip[2, 3] = -low[2] / (high[2] - low[2])
+    clip[2, 3] = high[2] / (high[2] - low[2])
     return ShadowView(clip, 2.0 * half / size)
 
 

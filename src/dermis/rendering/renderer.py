@@ -142,7 +142,7 @@ class Renderer:
             "skin": made.skin_record(program, scene, head),
             "lights": made.light_records(program, scene, views),
             "shadow_maps": shadow_maps.texture,
-            "shadow_sampler": self.device.sampler(compare="less", mag_filter="linear", min_filter="linear"),
+            "shadow_sampler": self.device.sampler(),
         }
 
     def _shadow_maps(self, layers: int, size: int) -> ShadowMaps:

@@ -26,13 +26,13 @@ class Camera(Plain):
     position: Vector
     target: Vector = (0.0, 0.0, 0.0)
     up: Direction = (0.0, 1.0, 0.0)
-    frame_mm: Annotated[float, Field(gt=0, le=1e5)] = 340.0
+    frame_mm: Annotated[float, Field(ge=0.01, le=1e5)] = 340.0
 
     @model_validator(mode="after")
     def _looks_somewhere(self) -> Camera:
         view = np.subtract(self.target, self.position)
         if np.linalg.norm(np.cross(view, self.up)) < 1e-6 * np.linalg.norm(self.up):
-            raise ValueError("the line from position to target must exist and differ from up")
+            raise ValueError("a position away from the target, and not along up from it")
         return self
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
-from dermis.scene.plain import Colour, Direction, Plain, Positive, Vector
+from dermis.scene.plain import Colour, Direction, Plain, Vector
 
 _Degrees = Annotated[float, Field(gt=0, lt=89)]
 
@@ -21,10 +22,10 @@ class _Source(Plain):
 
     irradiance: Colour = (3.14, 3.14, 3.14)
     shadows: bool = True
-    softness_mm: Positive = 1.5
+    softness_mm: Annotated[float, Field(gt=0, le=1000)] = 1.5
 
 
-class PointLight(_Source):
+class PointLight(_Source, title="point light"):
     """Light from a point in all directions; falls off with the square of the distance."""
 
     kind: Literal["point"] = "point"
@@ -33,12 +34,12 @@ class PointLight(_Source):
 
     @model_validator(mode="after")
     def _apart(self) -> PointLight:
-        if self.position == self.target:
-            raise ValueError("a light's position and target must differ")
+        if np.linalg.norm(np.subtract(self.target, self.position)) < 1e-3:
+            raise ValueError("a position away from the target")
         return self
 
 
-class SpotLight(PointLight):
+class SpotLight(PointLight, title="spot light"):
     """A point light within a cone around the line to the target.
 
     inner_degrees, outer_degrees : half angles where the cone begins and ends to fade
@@ -51,11 +52,11 @@ class SpotLight(PointLight):
     @model_validator(mode="after")
     def _fades(self) -> SpotLight:
         if self.inner_degrees >= self.outer_degrees:
-            raise ValueError("inner_degrees must be less than outer_degrees")
+            raise ValueError("inner_degrees less than outer_degrees")
         return self
 
 
-class DirectionalLight(_Source):
+class DirectionalLight(_Source, title="directional light"):
     """Parallel light, as from the sun.
 
     direction : the way the light travels

@@ -2,29 +2,41 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import ErrorDetails
 
 from dermis.errors import DermisError
 
-
-def _length(v: tuple[float, float, float]) -> float:
-    return float(sum(c * c for c in v) ** 0.5)
+FARTHEST_MM = 1e6
 
 
 def _direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
-    if _length(v) < 1e-9:
-        raise ValueError("a direction must not be (0, 0, 0)")
+    if sum(abs(c) for c in v) < 1e-6:
+        raise ValueError("a direction other than (0, 0, 0)")
     return v
 
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Vector = tuple[Finite, Finite, Finite]
+# The bounds are far beyond any use; they keep single precision on the device from overflowing.
+Coordinate = Annotated[float, Field(ge=-FARTHEST_MM, le=FARTHEST_MM)]
+Vector = tuple[Coordinate, Coordinate, Coordinate]
 Direction = Annotated[Vector, AfterValidator(_direction)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Colour = tuple[NonNegative, NonNegative, NonNegative]
+Intensity = Annotated[float, Field(ge=0, le=1e6)]
+Colour = tuple[Intensity, Intensity, Intensity]
+
+
+class Impossible(DermisError):
+    """Values that cannot be.
+
+    findings : by field: what was expected and what came
+    """
+
+    def __init__(self, owner: str, findings: dict[str, str]) -> None:
+        said = "; ".join(f"{field}: {finding}" if field else finding for field, finding in findings.items())
+        super().__init__(f"{owner}: {said}. Correct it.")
+        self.findings = findings
 
 
 class Plain(BaseModel):
@@ -36,13 +48,23 @@ class Plain(BaseModel):
         try:
             super().__init__(**data)
         except ValidationError as error:
-            raise DermisError(explain(type(self).__name__.lower(), error)) from None
+            model = type(self)
+            owner = model.model_config.get("title") or model.__name__.lower()
+            findings = {_place(one): _finding(one, list(model.model_fields)) for one in error.errors()}
+            raise Impossible(owner, findings) from None
 
 
-def explain(culprit: str, error: ValidationError) -> str:
-    """Pydantic's findings as sentences: what was expected, what came."""
-    findings = []
-    for one in error.errors():
-        place = ".".join(str(part) for part in one["loc"])
-        findings.append(f"{place}: {one['msg']}, but {one['input']!r} came" if place else one["msg"])
-    return f"{culprit}: {'; '.join(findings)}. Correct the value."
+def _place(one: ErrorDetails) -> str:
+    return ".".join(str(part) for part in one["loc"])
+
+
+def _finding(one: ErrorDetails, known: list[str]) -> str:
+    """One of pydantic's findings as what was expected and what came."""
+    if one["type"] == "extra_forbidden":
+        return f"expected one of {', '.join(known)}, but this name is unknown"
+    if one["type"] == "missing":
+        return "expected a value, but there is none"
+    expected = re.sub("^(Input should be|Value error,) ", "", one["msg"])
+    if expected.startswith(("greater", "less")):
+        expected = f"a number {expected}"
+    return f"expected {expected}, but {one['input']!r} came"

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from dermis.scene.plain import Colour, Plain, Positive
+from dermis.scene.plain import Colour, Plain
 
 _Side = Annotated[int, Field(ge=1, le=16384)]
 _MOST_SAMPLES = 64
@@ -29,11 +29,11 @@ class Settings(Plain):
     samples: Annotated[int, Field(ge=1, le=_MOST_SAMPLES)] = 4
     technique: Literal["texture-space", "none"] = "texture-space"
     shadow_size: Annotated[int, Field(ge=64, le=8192)] = 2048
-    exposure: Positive = 1.0
+    exposure: Annotated[float, Field(ge=1e-6, le=1e6)] = 1.0
     background: Colour = (0.0, 0.0, 0.0)
 
     @model_validator(mode="after")
     def _fits_in_memory(self) -> Settings:
         if self.size[0] * self.size[1] * self.samples > 2**28:
-            raise ValueError("size times samples must stay under 268 million: lower one of them")
+            raise ValueError("width times height times samples of at most 268 million")
         return self

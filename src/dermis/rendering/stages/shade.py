@@ -7,7 +7,7 @@ from typing import Any
 from dermis.gpu import ComputeProgram, Device, Frame
 from dermis.gpu.program import Resources
 from dermis.rendering.stages import SHARED_SHADERS, STAGES
-from dermis.rendering.stages.visibility import Seen
+from dermis.rendering.stages.nearest import Layers
 
 
 class Shade:
@@ -21,7 +21,7 @@ class Shade:
         frame: Frame,
         lit: Resources,
         view: Any,
-        seen: Seen,
+        seen: Layers,
         scattered: Any,
         into: Any,
         size: tuple[int, int],

@@ -1,11 +1,6 @@
-// Which triangle each sample of the image sees: its index plus one, 0 for the background.
+// The rasteriser's way to the nearest surface: depth, and the triangle where a colour target asks for it.
 //#include "geometry.wgsl"
-
-struct View {
-    clip: mat4x4f,
-}
-
-@group(1) @binding(0) var<uniform> view: View;
+//#include "views.wgsl"
 
 struct Seen {
     @builtin(position) position: vec4f,
@@ -13,9 +8,9 @@ struct Seen {
 }
 
 @vertex
-fn vertex(@builtin(vertex_index) index: u32) -> Seen {
+fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) layer: u32) -> Seen {
     let corner = position_of(triangle_at(index / 3u)[index % 3u]);
-    return Seen(view.clip * vec4f(corner, 1.0), index / 3u);
+    return Seen(views.clip[layer] * vec4f(corner, 1.0), index / 3u);
 }
 
 @fragment

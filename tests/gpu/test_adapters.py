@@ -1,0 +1,104 @@
+"""Which adapter is taken, and what is said when none fits."""
+
+from __future__ import annotations
+
+import sys
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from dermis.errors import DermisError
+from dermis.gpu import adapters as module
+from dermis.gpu import list_adapters, open_device
+from dermis.gpu.adapters import INSTALL_HINT, WANTED_FEATURES, choose_adapter
+
+
+def fake(name: str, kind: str, backend: str = "Vulkan", features: tuple[str, ...] = WANTED_FEATURES) -> Any:
+    info = {"device": name, "description": f"{name} driver", "adapter_type": kind, "backend_type": backend}
+    return SimpleNamespace(info=info, features=set(features))
+
+
+@pytest.fixture
+def machine(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Give this machine other adapters: machine(handle, ...)."""
+
+    def pretend(*handles: Any) -> None:
+        source = SimpleNamespace(enumerate_adapters_sync=lambda: list(handles))
+        monkeypatch.setitem(sys.modules, "wgpu", SimpleNamespace(gpu=source))
+
+    return pretend
+
+
+CPU = fake("llvmpipe", "CPU")
+GPU = fake("GeForce", "DiscreteGPU")
+PLAIN_GPU = fake("Old", "DiscreteGPU", features=())
+
+
+@pytest.mark.parametrize(
+    ("handles", "chosen"),
+    [
+        ((CPU, GPU), "GeForce"),
+        ((CPU, fake("Iris", "IntegratedGPU"), GPU), "GeForce"),
+        ((CPU, fake("Iris", "IntegratedGPU")), "Iris"),
+        ((fake("softpipe", "CPU", features=WANTED_FEATURES[:1]), CPU), "llvmpipe"),
+        ((CPU, PLAIN_GPU), "Old"),
+        ((fake("GL", "DiscreteGPU", "OpenGL"), GPU), "GeForce"),
+        ((CPU, fake("Odd", "SomethingNew")), "Odd"),
+    ],
+)
+def test_auto_takes_the_best(machine: Any, handles: tuple[Any, ...], chosen: str) -> None:
+    machine(*handles)
+    assert choose_adapter("auto")[0].name == chosen
+
+
+def test_cpu_takes_the_software_adapter_with_all_features(machine: Any) -> None:
+    machine(GPU, fake("softpipe", "CPU", features=()), CPU)
+    adapter, reason = choose_adapter("cpu")
+    assert (adapter.name, adapter.missing) == ("llvmpipe", ())
+    assert "software" in reason
+
+
+@pytest.mark.parametrize("wanted", ["gefo", "GEFORCE", "GeForce driver"])
+def test_part_of_a_name_is_enough(machine: Any, wanted: str) -> None:
+    machine(CPU, GPU)
+    assert choose_adapter(wanted)[0].name == "GeForce"
+
+
+def test_missing_features_are_told() -> None:
+    assert module._describe(fake("x", "CPU", features=("shader-f16",))).missing == WANTED_FEATURES[:2]
+
+
+@pytest.mark.parametrize("wanted", ["auto", "cpu", "GeForce"])
+def test_no_adapter_at_all(machine: Any, wanted: str) -> None:
+    machine()
+    with pytest.raises(DermisError, match="Vulkan") as caught:
+        choose_adapter(wanted)
+    assert INSTALL_HINT in str(caught.value)
+
+
+def test_no_software_adapter(machine: Any) -> None:
+    machine(GPU)
+    with pytest.raises(DermisError, match="GeForce") as caught:
+        choose_adapter("cpu")
+    assert INSTALL_HINT in str(caught.value)
+
+
+def test_a_name_that_is_none_lists_those_that_are() -> None:
+    with pytest.raises(DermisError, match="nonsense") as caught:
+        open_device("nonsense")
+    assert all(adapter.name in str(caught.value) for adapter in list_adapters())
+
+
+def test_a_driver_that_fails_to_open_is_told(machine: Any) -> None:
+    def fail(**_: Any) -> None:
+        raise RuntimeError("out of everything")
+
+    broken = fake("GeForce", "DiscreteGPU")
+    broken.limits = dict.fromkeys(
+        ("max-texture-dimension-2d", "max-storage-buffer-binding-size", "max-buffer-size"), 1
+    )
+    broken.request_device_sync = fail
+    machine(broken)
+    with pytest.raises(DermisError, match=r"GeForce.*out of everything.*--adapter cpu"):
+        open_device("auto")

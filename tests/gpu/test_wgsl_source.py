@@ -1,0 +1,70 @@
+"""Includes: each file once, and errors that name the file and line they come from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dermis.errors import DermisError
+from dermis.gpu import ComputeProgram, Device
+from dermis.gpu.wgsl_source import compose
+
+
+def write(folder: Path, **files: str) -> Path:
+    for stem, text in files.items():
+        (folder / f"{stem}.wgsl").write_text(text)
+    return folder
+
+
+def test_each_line_knows_its_file(tmp_path: Path) -> None:
+    write(tmp_path, main='// a\n//#include "part.wgsl"\n// b', part="// one\n// two")
+    source = compose(tmp_path / "main.wgsl", ())
+    assert source.text.splitlines() == ["// a", "// one", "// two", "// b"]
+    assert source.origin == (("main.wgsl", 1), ("part.wgsl", 1), ("part.wgsl", 2), ("main.wgsl", 3))
+
+
+def test_an_include_comes_once_even_in_a_circle(tmp_path: Path) -> None:
+    circle = '//#include "a.wgsl"\n//#include "b.wgsl"\n// '
+    write(tmp_path, a=f"{circle}a", b=f"{circle}b", main=f"{circle}main")
+    assert compose(tmp_path / "main.wgsl", ()).text.splitlines() == ["// b", "// a", "// main"]
+
+
+def test_beside_the_asker_comes_before_the_folders(tmp_path: Path) -> None:
+    for name in ("near", "far"):
+        (tmp_path / name).mkdir()
+        write(tmp_path / name, part=f"// {name}")
+    write(tmp_path / "far", other="// other")
+    near = write(tmp_path / "near", main='//#include "part.wgsl"\n//#include "other.wgsl"') / "main.wgsl"
+    assert compose(near, (tmp_path / "far",)).text.splitlines() == ["// near", "// other"]
+
+
+def test_missing_include_is_named(tmp_path: Path) -> None:
+    write(tmp_path, main='//#include "gone.wgsl"')
+    with pytest.raises(DermisError, match=r'main\.wgsl.*"gone\.wgsl"'):
+        compose(tmp_path / "main.wgsl", ())
+
+
+def test_only_whole_lines_include(tmp_path: Path) -> None:
+    text = '// as in: //#include "gone.wgsl"'
+    write(tmp_path, main=text)
+    assert compose(tmp_path / "main.wgsl", ()).text == text
+
+
+@pytest.mark.parametrize("broken", ["let a: u32 = 1.5;", "let a = unknown;", "let = ;"])
+def test_compile_error_names_file_and_line_of_an_include(
+    device: Device, tmp_path: Path, broken: str
+) -> None:
+    write(
+        tmp_path,
+        main='// one\n// two\n//#include "part.wgsl"\n@compute @workgroup_size(1) fn main() { f(); }',
+        part=f"// fine\nfn f() {{\n    {broken}\n}}",
+    )
+    with pytest.raises(DermisError, match=r"main\.wgsl: the shader did not compile(?s:.*)part\.wgsl:3:"):
+        ComputeProgram(device, tmp_path / "main.wgsl")
+
+
+def test_lines_of_other_files_stay_as_they_are(tmp_path: Path) -> None:
+    write(tmp_path, main="// only")
+    source = compose(tmp_path / "main.wgsl", ())
+    assert source.locate("wgsl:1:4 and wgsl:99:1") == "main.wgsl:1:4 and wgsl:99:1"
