@@ -14,7 +14,7 @@ setup: ## an environment in .venv from requirements.lock, and a Vulkan driver
 
 demo: setup ## render the sample head into out/demo.png
 	@mkdir -p out
-	@.venv/bin/dermis render lee_perry_smith -o out/demo.png
+	@.venv/bin/dermis render lee_perry_smith --subdivide 1 -o out/demo.png
 
 lint: setup ## style, types and floors
 	$(PY) -m ruff check .

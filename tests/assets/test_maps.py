@@ -10,7 +10,7 @@ import pytest
 
 from dermis.assets.maps import Maps, load_maps
 from dermis.errors import DermisError
-from dermis.images.filters import derivatives, mip_chain
+from dermis.images.filters import derivatives, mip_chain, without_steps
 from dermis.images.io import write_exr, write_png
 
 SHAPE = (24, 32)
@@ -50,9 +50,19 @@ def test_height_is_one_relief_at_every_depth(tmp_path: Path) -> None:
     levels = np.random.default_rng(0).integers(0, 256, SHAPE).astype(np.uint8)
     write_exr(tmp_path / "h.exr", np.repeat(levels[..., None] / 255, 3, axis=2))
     deep = _png(tmp_path / "16.png", levels.astype(np.uint16) * 257)
-    for path in (_png(tmp_path / "8.png", levels), deep, tmp_path / "h.exr"):
-        height = load_maps(height=path, height_mm=0.025).height
-        np.testing.assert_allclose(height, levels * 0.025, atol=1e-6)
+    relief = levels * 0.025
+    for path in (deep, tmp_path / "h.exr"):
+        np.testing.assert_allclose(load_maps(height=path, height_mm=0.025).height, relief, atol=1e-6)
+    eight = load_maps(height=_png(tmp_path / "8.png", levels), height_mm=0.025).height
+    np.testing.assert_allclose(eight, without_steps(relief), atol=1e-6)
+
+
+def test_steps_of_8_bits_go_and_slopes_stay() -> None:
+    ramp = np.arange(64)[None, :] * 0.13 + np.arange(48)[:, None] * 0.07
+    inside = (slice(4, -4), slice(4, -4))
+    np.testing.assert_allclose(without_steps(ramp)[inside], ramp[inside], atol=1e-5)
+    across = np.diff(without_steps(np.round(ramp))[inside], axis=1)
+    assert across.std() < np.diff(np.round(ramp)[inside], axis=1).std() / 3
 
 
 def test_normals_become_slopes(tmp_path: Path) -> None:

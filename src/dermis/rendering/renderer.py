@@ -71,10 +71,18 @@ class Renderer:
         self._kept: dict[str, tuple[Any, Any]] = {}
         self._opening_ms = 1e3 * (time.perf_counter() - started)
 
-    def draw(self, scene: Scene, settings: Settings | None = None, *, keep_shadows: bool = True) -> Rendered:
+    def draw(
+        self,
+        scene: Scene,
+        settings: Settings | None = None,
+        *,
+        keep_shadows: bool = True,
+        timed: bool = True,
+    ) -> Rendered:
         """Render one frame and leave the image on the device.
 
         keep_shadows : False draws the shadow maps again even when no light moved
+        timed : False returns as soon as the frame is submitted, so that the device never waits for Python
 
         Raises DermisError for sizes over the device's limits and when the device fails.
         """
@@ -88,9 +96,10 @@ class Renderer:
             frame = Frame(self.device)
             draw_frame(frame, self._stages, inputs)
             frame.submit()
-            frame.wait()
+            if timed:
+                frame.wait()
             done = time.perf_counter()
-            times = frame.stage_ms()
+            times = frame.stage_ms() if timed else None
         setup_ms = 1e3 * (ready - started) + self._opening_ms
         self._opening_ms = 0.0
         return Rendered(self.device, inputs.picture, times, 1e3 * (done - ready), setup_ms, gaussians)

@@ -1,0 +1,97 @@
+"""Measures the approximations of the frame, writes docs/accuracy.md: python tools/accuracy.py [ADAPTER]."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import RegularGridInterpolator
+
+from dermis.assets.atlas import build_atlas
+from dermis.assets.primitives import plane, uv_sphere
+from dermis.gpu import Device, Frame, download, open_device, upload
+from dermis.gpu.probe import half_store_rounding
+from dermis.optics.gaussians import load_profile
+from dermis.rendering.maps import upload_atlas
+from dermis.rendering.stages.diffuse import Diffuse
+from dermis.specular.albedo import albedo_table, directional_albedo
+from dermis.specular.beckmann import beckmann, beckmann_table
+
+PAGE = Path(__file__).parent.parent / "docs" / "accuracy.md"
+SIZE = 256
+
+
+def spread(device: Device, mesh: object, light: np.ndarray) -> list[np.ndarray]:
+    """The blurred levels of light (n, n) on a mesh's atlas."""
+    stage = Diffuse(device)
+    variance = load_profile("gpu-gems-3").variance_mm2[1:]
+    levels = stage.make_levels(len(light), len(variance))
+    upload(device, levels.stack, np.repeat(light[..., None], 4, axis=2))
+    frame = Frame(device)
+    stage.draw(frame, levels, upload_atlas(device, build_atlas(mesh, len(light))), variance)  # type: ignore[arg-type]
+    frame.submit()
+    return [download(device, levels.stack, layer=k + 1)[..., 0] for k in range(len(variance))]
+
+
+def point_of_light(device: Device, texels_per_mm: float) -> str:
+    """Errors of a point of light on a flat patch against the analytic sum of Gaussians."""
+    profile = load_profile("gpu-gems-3")
+    light = np.zeros((SIZE, SIZE), np.float32)
+    middle = SIZE // 2
+    light[middle, middle] = 1.0
+    levels = spread(device, plane(SIZE / texels_per_mm), light)
+    y, x = np.mgrid[:SIZE, :SIZE] - middle
+    r2 = (x**2 + y**2) / texels_per_mm**2
+    total, exact = np.zeros((SIZE, SIZE)), np.zeros((SIZE, SIZE))
+    for level, v, weight in zip(levels, profile.variance_mm2[1:], profile.weight[1:, 0], strict=True):
+        total += weight * level
+        exact += weight * np.exp(-r2 / (2 * v)) / (2 * np.pi * v) / texels_per_mm**2
+    beyond = x**2 + y**2 > 1.5**2
+    shape = np.abs(total - exact)[beyond].max() / exact.max()
+    energy = total.sum() / profile.weight[1:, 0].sum() - 1
+    return f"| {texels_per_mm:g} | {100 * shape:.2f} % | {100 * energy:+.4f} % |"
+
+
+def constant_light(device: Device) -> float:
+    """Largest deviation of a constant light on a sphere's atlas after all levels."""
+    atlas = build_atlas(uv_sphere(100.0), SIZE)
+    levels = spread(device, uv_sphere(100.0), atlas.coverage.astype(np.float32))
+    return max(float(np.abs(level[atlas.coverage] - 1).max()) for level in levels)
+
+
+def table_errors() -> tuple[float, float]:
+    """Largest relative errors of the two lookup tables, interpolated, over m 0.1-0.5 and cos 0.05-1."""
+    m, c = np.meshgrid(np.linspace(0.1, 0.5, 23), np.linspace(0.05, 0.992, 61), indexing="ij")
+    places = np.stack([m, c], axis=-1)
+    axes = [(np.arange(n) + 0.5) / n for n in albedo_table().shape]
+    albedo = RegularGridInterpolator(axes, albedo_table())(places)
+    exact = directional_albedo(c, m, nodes=(256, 128))
+    axes = [(np.arange(n) + 0.5) / n for n in beckmann_table().shape]
+    peak = (2 * RegularGridInterpolator(axes, beckmann_table())(places)) ** 10
+    truth = beckmann(c, m)
+    seen = truth > 1e-3  # below that the lobe adds nothing that could be seen
+    return float(np.abs(albedo / exact - 1).max()), float(np.abs(peak[seen] / truth[seen] - 1).max())
+
+
+def main() -> None:
+    """Measure and write the page."""
+    device = open_device(sys.argv[1] if len(sys.argv) > 1 else "auto")
+    albedo, peak = table_errors()
+    text = (PAGE.parent / "accuracy.in.md").read_text(encoding="utf-8")
+    rows = "\n".join(point_of_light(device, density) for density in (0.75, 1.0, 1.5, 3.0, 6.0, 12.0))
+    PAGE.write_text(
+        text.format(
+            adapter=f"{device.adapter.name}, {device.adapter.backend}",
+            rows=rows,
+            constant=f"{constant_light(device):.1e}",
+            albedo=f"{100 * albedo:.2f} %",
+            peak=f"{100 * peak:.1f} %",
+            rounding=half_store_rounding(device),
+        ),
+        encoding="utf-8",
+    )
+
+
+if __name__ == "__main__":
+    main()
