@@ -43,11 +43,11 @@ def table(report: dict[str, Any]) -> str:
     """The report as Markdown."""
     again, kept = report["shadows drawn"], report["shadows kept"]
     rows = [f"| {stage} | {ms:.2f} | {kept.get(stage, 0.0):.2f} |" for stage, ms in again.items()]
-    head = [
-        f"{report['adapter']}, {report['size']}, atlas {report['atlas']}, {report['samples']} samples:",
-        "",
-    ]
-    return "\n".join([*head, "| stage | shadows drawn [ms] | shadows kept [ms] |", "|---|---|---|", *rows])
+    place = f"{report['adapter']}, {report['size']}"
+    title = f"{place}, atlas {report['atlas']}, {report['samples']} samples:"
+    return "\n".join(
+        [title, "", "| stage | shadows drawn [ms] | shadows kept [ms] |", "|---|---|---|", *rows]
+    )
 
 
 def main(

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
-
-import numpy as np
 
 from dermis.gpu.device import Device
 from dermis.gpu.program import ComputeProgram, RasterProgram, Resources
+from dermis.gpu.timing import Timestamps, WallClock
 
 
 class Frame:
-    """Records passes, submits them together, then knows how long each stage took."""
+    """Records passes, submits them together, then knows how long each stage took.
+
+    On software adapters each stage is submitted and waited for by itself, to time it.
+    """
 
     def __init__(self, device: Device) -> None:
         self.device = device
         self._encoder = device.handle.create_command_encoder()
-        self._stages: list[str] = []
-        self._queries: Any = None
-        self._resolved: Any = None
-        if device.has_timestamps:
-            self._queries, self._resolved = device.timestamp_pool()
+        self._stage = ""
+        self._wall = WallClock() if device.adapter.kind == "CPU" else None
+        self._stamps = Timestamps(device) if device.has_timestamps and not self._wall else None
 
     def compute(
         self, stage: str, program: ComputeProgram, resources: Resources, size: tuple[int, int], tile: int = 8
@@ -32,7 +33,8 @@ class Frame:
         self, stage: str, program: ComputeProgram, resources: Resources, groups: tuple[int, int, int]
     ) -> None:
         """Run `program` for a number of workgroups along each axis."""
-        one = self._encoder.begin_compute_pass(label=stage, timestamp_writes=self._timing(stage))
+        stamps = self._begin(stage)
+        one = self._encoder.begin_compute_pass(label=stage, timestamp_writes=stamps)
         one.set_pipeline(program.pipeline)
         for index, group in enumerate(program.bind_groups(resources)):
             one.set_bind_group(index, group)
@@ -70,6 +72,7 @@ class Frame:
         far : the depth that the attachment starts at
         """
         colour = [{"view": target, "load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 0)}]
+        stamps = self._begin(stage)
         one = self._encoder.begin_render_pass(
             label=stage,
             color_attachments=colour if target is not None else [],
@@ -79,7 +82,7 @@ class Frame:
                 "depth_store_op": "store",
                 "depth_clear_value": far,
             },
-            timestamp_writes=self._timing(stage),
+            timestamp_writes=stamps,
         )
         one.set_pipeline(program.pipeline)
         for index, group in enumerate(program.bind_groups(resources)):
@@ -89,11 +92,13 @@ class Frame:
 
     def submit(self) -> None:
         """Hand the passes to the device."""
-        if self._queries is not None and self._stages:
-            end = self._encoder.begin_compute_pass(label="end", timestamp_writes=self._timing("end"))
-            end.end()
-            self._encoder.resolve_query_set(self._queries, 0, len(self._stages), self._resolved, 0)
-        self.device.handle.queue.submit([self._encoder.finish()])
+        if self._wall and self._stage:
+            self._finish_stage(self._wall)
+        elif self._stamps:
+            self._stamps.end(self._encoder)
+            self._flush()
+        else:
+            self._flush()
 
     def wait(self) -> None:
         """Return when the device has done all that was submitted."""
@@ -101,23 +106,23 @@ class Frame:
         self.device.handle.queue.read_buffer(self.device.fence)
 
     def stage_ms(self) -> dict[str, float] | None:
-        """Device time of each stage after `submit` [ms], with "total"; None without timestamps.
+        """Time of each stage after `submit` [ms], with "total"; None when the device cannot tell."""
+        clock = self._wall or self._stamps
+        return clock.stage_ms() if clock else None
 
-        A pass lasts until the next one begins, so the stages add up to the total. (Mesa's software adapter
-        stamps the end of a compute pass before its work is done; the next pass' start is right everywhere.)
-        """
-        if self._queries is None or not self._stages:
-            return None
-        raw = self.device.handle.queue.read_buffer(self._resolved, 0, 8 * len(self._stages))
-        ticks = np.frombuffer(raw, dtype=np.uint64).astype(np.int64)
-        times: dict[str, float] = {}
-        for stage, lasted in zip(self._stages, np.diff(ticks), strict=False):
-            times[stage] = times.get(stage, 0.0) + float(lasted) * 1e-6
-        times["total"] = float(ticks[-1] - ticks[0]) * 1e-6
-        return times
+    def _begin(self, stage: str) -> dict[str, Any] | None:
+        """Enter a stage; returns what its pass writes as timestamps."""
+        if self._wall and self._stage not in ("", stage):
+            self._finish_stage(self._wall)
+        self._stage = stage
+        return self._stamps.begin(stage) if self._stamps else None
 
-    def _timing(self, stage: str) -> dict[str, Any] | None:
-        if self._queries is None or len(self._stages) >= self._queries.count:
-            return None
-        self._stages.append(stage)
-        return {"query_set": self._queries, "beginning_of_pass_write_index": len(self._stages) - 1}
+    def _finish_stage(self, wall: WallClock) -> None:
+        started = time.perf_counter()
+        self._flush()
+        self.wait()
+        wall.measure(self._stage, started)
+
+    def _flush(self) -> None:
+        self.device.handle.queue.submit([self._encoder.finish()])
+        self._encoder = self.device.handle.create_command_encoder()

@@ -1,0 +1,62 @@
+"""How long each stage of a frame took: by the device's timestamps, or by the clock on the wall."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from dermis.gpu.device import Device
+
+
+class Timestamps:
+    """A timestamp at the start of each pass; a pass lasts until the next one begins, so stages add up."""
+
+    def __init__(self, device: Device) -> None:
+        self._device = device
+        self._queries, self._resolved = device.timestamp_pool()
+        self._stages: list[str] = []
+
+    def begin(self, stage: str) -> dict[str, Any] | None:
+        """What a pass descriptor takes as timestamp_writes."""
+        if len(self._stages) >= self._queries.count:
+            return None
+        self._stages.append(stage)
+        return {"query_set": self._queries, "beginning_of_pass_write_index": len(self._stages) - 1}
+
+    def end(self, encoder: Any) -> None:
+        """Mark the end of the last pass and fetch the timestamps."""
+        if self._stages:
+            encoder.begin_compute_pass(label="end", timestamp_writes=self.begin("end")).end()
+            encoder.resolve_query_set(self._queries, 0, len(self._stages), self._resolved, 0)
+
+    def stage_ms(self) -> dict[str, float]:
+        """Time of each stage, and "total" [ms]."""
+        if not self._stages:
+            return {"total": 0.0}
+        raw = self._device.handle.queue.read_buffer(self._resolved, 0, 8 * len(self._stages))
+        ticks = np.frombuffer(raw, dtype=np.uint64).astype(np.int64)
+        times: dict[str, float] = {}
+        for stage, lasted in zip(self._stages, np.diff(ticks), strict=False):
+            times[stage] = times.get(stage, 0.0) + float(lasted) * 1e-6
+        times["total"] = float(ticks[-1] - ticks[0]) * 1e-6
+        return times
+
+
+class WallClock:
+    """The time from submitting a stage to its end.
+
+    For software adapters: Mesa stamps compute passes before their work is done, and waiting costs them nothing.
+    """
+
+    def __init__(self) -> None:
+        self._times: dict[str, float] = {}
+
+    def measure(self, stage: str, started: float) -> None:
+        """Add the time since `started` (time.perf_counter) to the stage."""
+        self._times[stage] = self._times.get(stage, 0.0) + 1e3 * (time.perf_counter() - started)
+
+    def stage_ms(self) -> dict[str, float]:
+        """Time of each stage, and "total" [ms]."""
+        return self._times | {"total": sum(self._times.values())}
