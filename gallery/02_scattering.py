@@ -1,6 +1,6 @@
 """With and without light below the surface, from three sides: python gallery/02_scattering.py OUTPUT.
 
-Left: the whole technique. Right: the same light, none of it scattered; shadows are grey and hard, skin is dry.
+Left: the whole technique. Right: the same light, none of it scattered; shadows are hard, skin is dry.
 """
 
 import sys

@@ -47,7 +47,7 @@ class Timestamps:
 class WallClock:
     """The time from submitting a stage to its end.
 
-    For software adapters: Mesa stamps compute passes before their work is done, and waiting costs them nothing.
+    For software adapters: Mesa stamps compute passes before their work is done; waiting costs nothing there.
     """
 
     def __init__(self) -> None:

@@ -1,0 +1,32 @@
+"""Runs gallery scripts and puts their pictures, as WebP, where the documentation shows them.
+
+python tools/pictures.py
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from PIL import Image
+
+ROOT = Path(__file__).parent.parent
+PICTURES = {"01_portrait": "portrait", "02_scattering": "scattering", "03_pores": "pores"}
+QUALITY = 88
+
+
+def main() -> None:
+    """Make every picture anew."""
+    folder = ROOT / "docs" / "images"
+    folder.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory() as temporary:
+        for script, name in PICTURES.items():
+            png = Path(temporary) / f"{name}.png"
+            subprocess.run([sys.executable, ROOT / "gallery" / f"{script}.py", png], check=True)
+            Image.open(png).save(folder / f"{name}.webp", quality=QUALITY, method=6)
+
+
+if __name__ == "__main__":
+    main()
