@@ -25,7 +25,7 @@ class Atlas:
     barycentric : (n, n, 2) uint16 weights of the triangle's second and third corner [1/65535]
     stretch : (n, n, 2) float16 texels per mm along u and v [1/mm]
     reach : (n, n, 4) uint8 texels to the left, right, up and down that are on the same chart
-    mapped : (f,) triangles that own texels here; the others (collapsed or overlapped in uv) are lit directly
+    mapped : (f,) triangles that own texels; the others (opaque, collapsed, overlapped in uv) are lit directly
     """
 
     triangle: NDArray[np.int32]
@@ -67,7 +67,8 @@ def build_atlas(mesh: Mesh, size: int) -> Atlas:
             "atlas", f"a size of {_SMALLEST} texels or more", f"it is {size}", "Choose --atlas 1024 or 2048"
         )
     chart = charts(mesh)
-    fit = usable(mesh, size, _LEAST_TEXELS)
+    skin = np.array([material.kind == "skin" for material in mesh.materials])
+    fit = usable(mesh, size, _LEAST_TEXELS) & skin[mesh.material]
     texel, triangle = rasterise(mesh, size, np.flatnonzero(fit))
     mapped = fit & ~_overlapped(chart, texel, triangle, size)
     keep = mapped[triangle]

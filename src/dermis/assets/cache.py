@@ -42,7 +42,8 @@ def cached_atlas(mesh: Mesh, size: int) -> Atlas:
 
 def _key(mesh: Mesh, size: int) -> str:
     digest = hashlib.sha256(f"{_FORM} {GUTTER} {size}".encode())
-    for array in (mesh.uv, mesh.triangles, mesh.dpdu, mesh.dpdv):
+    digest.update(repr([material.kind for material in mesh.materials]).encode())
+    for array in (mesh.material, mesh.uv, mesh.triangles, mesh.dpdu, mesh.dpdv):
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()[:40]
 

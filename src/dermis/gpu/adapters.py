@@ -44,8 +44,10 @@ class Adapter:
 
 def list_adapters() -> list[Adapter]:
     """Every adapter, the best first: real GPUs before software, then the one with more features."""
-    import wgpu
-
+    try:
+        import wgpu
+    except (ImportError, OSError) as error:
+        refuse("wgpu", "its native library to load", f"it does not: {error}", "Install the package again")
     with _quiet_drivers():
         found = [_describe(handle) for handle in wgpu.gpu.enumerate_adapters_sync()]
     return sorted(found, key=lambda a: (_rank(a.kind), len(a.missing), a.backend == "OpenGL"))

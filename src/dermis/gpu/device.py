@@ -50,6 +50,7 @@ class Device:
                 "Close other programs that use the GPU or choose --adapter cpu."
             ) from error
         self.max_texture_size: int = limit
+        self.max_storage_bytes: int = buffer
         self.has_timestamps = "timestamp-query" in adapter.features
         self._timestamps: tuple[Any, Any] | None = None
         self._uniforms: OrderedDict[bytes, Any] = OrderedDict()

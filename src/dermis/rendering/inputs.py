@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 _RELIT_MM2 = (
     0.1**2
 )  # a Gaussian narrower than this is finer than texels and pores: it is lit again, not blurred
-_MOST_MATERIALS = 16
+_MOST_MATERIALS = 64
 _WIDEST_SHADOW_FILTER = 6
 
 
@@ -108,7 +108,11 @@ def view_record(shade: ComputeProgram, scene: Scene, settings: Settings, split: 
     jitter = np.zeros((64, 4), np.float32)
     jitter[: settings.samples, :2] = pixel_samples(settings.samples)
     colours = np.zeros((_MOST_MATERIALS, 4), np.float32)
-    for index, material in enumerate(scene.head.mesh.materials[:_MOST_MATERIALS]):
+    materials = scene.head.mesh.materials
+    if len(materials) > _MOST_MATERIALS:
+        count = f"it has {len(materials)}"
+        refuse(scene.head.name, f"at most {_MOST_MATERIALS} materials", count, "Join some groups")
+    for index, material in enumerate(materials):
         colours[index, :3] = material.colour
     return shade.record(
         "Shade",

@@ -34,6 +34,6 @@ class Settings(Plain):
 
     @model_validator(mode="after")
     def _fits_in_memory(self) -> Settings:
-        if self.size[0] * self.size[1] * self.samples > 2**28:
+        if self.size[0] * self.size[1] * self.samples > 2**27:
             raise ValueError("width times height times samples of at most 268 million")
         return self

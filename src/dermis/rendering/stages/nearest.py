@@ -54,19 +54,20 @@ class Nearest:
         if self._compute:
             path = STAGES / "nearest.wgsl"
             self._finders = [ComputeProgram(device, path, shared, {"FIND_TRIANGLE": find}) for find in (0, 1)]
-        else:
-            target = "r32uint" if triangles else None
-            self._raster = RasterProgram(
-                device, STAGES / "nearest_raster.wgsl", shared, target=target, depth_compare="greater"
-            )
+        target = "r32uint" if triangles else None
+        self._raster = RasterProgram(
+            device, STAGES / "nearest_raster.wgsl", shared, target=target, depth_compare="greater"
+        )
 
     def make_layers(self, size: tuple[int, int], count: int) -> Layers:
-        """Space for `count` views of size (width, height)."""
-        return self._compute_layers(size, count) if self._compute else self._raster_layers(size, count)
+        """Space for `count` views of size (width, height); those too large for a buffer are rasterised."""
+        fits = 4 * _pitch(size) * size[1] * count <= self._device.max_storage_bytes
+        make = self._compute_layers if self._compute and fits else self._raster_layers
+        return make(size, max(1, count))
 
     def draw(self, frame: Frame, stage: str, layers: Layers, clips: list[Matrix], head: HeadTextures) -> None:
         """Fill a layer for each matrix; depth 1 is near and 0 far."""
-        if self._compute:
+        if layers.nearness is not None:
             self._draw_compute(frame, stage, layers, clips, head)
         else:
             self._draw_raster(frame, stage, layers, clips, head)

@@ -17,7 +17,7 @@ struct Shade {
     relit: vec3f, // weight of the level that is not blurred
     total: vec3f, // weight of all levels
     background: vec3f,
-    material_colour: array<vec4f, 16>,
+    material_colour: array<vec4f, 64>,
     jitter: array<vec4f, 64>, // sample places in the pixel, 0..1
 }
 
