@@ -14,5 +14,26 @@ PUBLISHED = 1e-9
 TABLE_ALBEDO = 0.01
 """The shader's 64 x 32 table of the surface albedo, read between its texels, relative."""
 
-TABLE_LOBE = 0.002
+TABLE_LOBE = 0.005
 """The shader's 512 x 512 Beckmann table, read between its texels, of the lobe's peak."""
+
+KERNEL_VARIANCE = 2e-4
+"""Variance of a sampled kernel, in steps squared: linear steps of 1/64 between the table's rows."""
+
+FLAT = 1e-4
+"""Constant light stays constant under every blur, relative."""
+
+SPREAD_PEAK = 0.01
+"""A point of light beyond 1.5 texels against the analytic sum of Gaussians, of the peak."""
+
+SPREAD_ENERGY = 0.002
+"""Light that a blur loses or invents, relative."""
+
+SPREAD_VARIANCE = 0.002
+"""Second moment of a blurred point against the one asked for, relative: the stretch map holds halves."""
+
+MAP_NORMAL = 1e-3
+"""Normals from slopes stored as halves, between texels that a sampler weighs in 1/256."""
+
+LIT = 1e-3
+"""Visibility of what nothing hides, and of what is wholly hidden."""

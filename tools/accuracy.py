@@ -62,12 +62,14 @@ def constant_light(device: Device) -> float:
 
 def table_errors() -> tuple[float, float]:
     """Largest relative errors of the two lookup tables, interpolated, over m 0.1-0.5 and cos 0.05-1."""
-    m, c = np.meshgrid(np.linspace(0.1, 0.5, 23), np.linspace(0.05, 0.992, 61), indexing="ij")
+    m, c = np.meshgrid(np.linspace(0.1, 0.5, 23), np.linspace(0.05, 1.0, 61), indexing="ij")
     places = np.stack([m, c], axis=-1)
     axes = [(np.arange(n) + 0.5) / n for n in albedo_table().shape]
-    albedo = RegularGridInterpolator(axes, albedo_table())(places)
+    inside = np.minimum(places, [1.0, axes[1][-1]])  # the shader clamps there
+    albedo = RegularGridInterpolator(axes, albedo_table())(inside)
     exact = directional_albedo(c, m, nodes=(256, 128))
-    axes = [(np.arange(n) + 0.5) / n for n in beckmann_table().shape]
+    rows, columns = beckmann_table().shape
+    axes = [(np.arange(rows) + 0.5) / rows, np.arange(columns) / (columns - 1)]
     peak = (2 * RegularGridInterpolator(axes, beckmann_table())(places)) ** 10
     truth = beckmann(c, m)
     seen = truth > 1e-3  # below that the lobe adds nothing that could be seen

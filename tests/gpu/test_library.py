@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
+from tolerances import TWIN
 
 from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture
 from dermis.gpu.textures import texture_from
 from dermis.images.colour import encode_srgb
-from tolerances import TWIN
 
 Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
 

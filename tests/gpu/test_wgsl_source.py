@@ -52,9 +52,7 @@ def test_only_whole_lines_include(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("broken", ["let a: u32 = 1.5;", "let a = unknown;", "let = ;"])
-def test_compile_error_names_file_and_line_of_an_include(
-    device: Device, tmp_path: Path, broken: str
-) -> None:
+def test_compile_error_names_file_and_line_of_an_include(device: Device, tmp_path: Path, broken: str) -> None:
     write(
         tmp_path,
         main='// one\n// two\n//#include "part.wgsl"\n@compute @workgroup_size(1) fn main() { f(); }',

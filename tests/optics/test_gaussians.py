@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tolerances import PUBLISHED
 
 from dermis.errors import DermisError
 from dermis.optics.gaussians import GaussianSum, load_profile, preset_names
-from tolerances import PUBLISHED
 
 HEADER = "variance_mm2,red,green,blue\n"
 

@@ -76,6 +76,7 @@ def build_atlas(mesh: Mesh, size: int) -> Atlas:
     owner.ravel()[texel[keep]] = triangle[keep]
     for _ in range(GUTTER):
         owner = _dilate(owner)
+    mapped &= _readable(mesh, size, owner)
     barycentric = _barycentric(mesh, size, owner)
     chart_map = np.where(owner >= 0, chart[np.maximum(owner, 0)], -1)
     stretch = _stretch(mesh, size, owner, barycentric)
@@ -105,6 +106,16 @@ def _dilate(owner: NDArray[np.int32]) -> NDArray[np.int32]:
         neighbour = padded[1 + dy : 1 + dy + n, 1 + dx : 1 + dx + n]
         np.copyto(grown, neighbour, where=(grown < 0) & (neighbour >= 0))
     return grown
+
+
+def _readable(mesh: Mesh, size: int, owner: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Triangles at whose corners interpolation finds surface; slivers thinner than a texel may have none."""
+    low = np.floor(texel_corners(mesh, size, np.arange(len(mesh.triangles)))).astype(np.int64)
+    found = np.ones(len(low), dtype=bool)
+    for offset in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        x, y = np.moveaxis(np.clip(low + offset, 0, size - 1), -1, 0)
+        found &= (owner[y, x] >= 0).all(axis=1)
+    return found
 
 
 def _barycentric(mesh: Mesh, size: int, owner: NDArray[np.int32]) -> NDArray[np.uint16]:

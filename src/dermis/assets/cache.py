@@ -29,7 +29,7 @@ def cached_atlas(mesh: Mesh, size: int) -> Atlas:
     """`build_atlas`, read back from disk when it was made before; the disk may fail without harm."""
     path = cache_folder() / "atlas" / f"{_key(mesh, size)}.npz"
     with contextlib.suppress(OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-        with np.load(path) as stored:
+        with path.open("rb") as file, np.load(file) as stored:
             atlas = Atlas(**{field.name: stored[field.name] for field in fields(Atlas)})
         path.touch()
         return atlas

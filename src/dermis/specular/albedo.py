@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -42,6 +44,7 @@ def directional_albedo(
     return albedo
 
 
+@cache
 def albedo_table() -> NDArray[np.float32]:
     """(roughness, cosine) table of `directional_albedo` for the shader, at texel centres in 0..1."""
     cosine = (np.arange(TABLE_COSINES) + 0.5) / TABLE_COSINES

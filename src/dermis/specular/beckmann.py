@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -24,13 +26,17 @@ def beckmann(cos_h: ArrayLike, m: ArrayLike) -> NDArray[np.float64]:
     return value
 
 
+@cache
 def beckmann_table(size: int = TABLE_SIZE) -> NDArray[np.float32]:
-    """(size, size) of beckmann(x, y)^0.1 / 2: columns cos_h and rows m, at texel centres in 0..1.
+    """(size, size) of beckmann(x, y)^0.1 / 2: columns cos_h from 0 to 1, rows m at texel centres.
+
+    The last column is cos_h = 1 itself: a table of texel centres would cut the highlight's peak off.
 
     The power flattens the peak so that interpolation between texels stays close; decoded as (2 t)^10.
     Source: [dEonLuebke2007] section 14.3.
     """
-    centres = (np.arange(size) + 0.5) / size
+    cos_h = np.arange(size) / (size - 1)
+    m = (np.arange(size) + 0.5) / size
     with np.errstate(under="ignore"):
-        table = 0.5 * beckmann(centres[None, :], centres[:, None]) ** _EXPONENT
+        table = 0.5 * beckmann(cos_h[None, :], m[:, None]) ** _EXPONENT
     return table.astype(np.float32)

@@ -34,7 +34,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let reach = vec4i(textureLoad(reach_map, here, 0));
     let texels_per_mm = textureLoad(stretch_map, here, 0)[AXIS];
     if (texels_per_mm == 0.0) {
-        return; // no surface here, and textures start black
+        textureStore(blurred, here, vec4f(0.0)); // no surface here
+        return;
     }
     let centre = textureLoad(source, here, 0);
     let sigma = sqrt(spread.variance_mm2) * texels_per_mm;

@@ -9,24 +9,38 @@ const LANES: u32 = 64u;
 const SLACK: f32 = 1e-5; // covers rounding, so that no pixel falls between two triangles
 const GROUPS_PER_ROW: u32 = 32768u;
 
-@group(1) @binding(1) var<storage, read_write> nearness: array<atomic<u32>>; // bits of the depth: 1 near, 0 empty
-@group(1) @binding(2) var<storage, read_write> found: array<u32>; // triangle + 1
+@group(1) @binding(1) var<storage, read_write> nearness: array<atomic<u32>>; // bits of the depth, 0 empty
+@group(1) @binding(2) var<storage, read_write> found: array<atomic<u32>>; // triangle + 1
 
-struct Corner2 {
-    place: vec2f, // [pixel]
-    nearness: f32,
-    behind: bool,
+// Corner in homogeneous pixels: place times w, w; and its clip depth.
+struct Projected {
+    place: vec3f,
+    z: f32,
 }
 
-fn project(vertex: u32, layer: u32) -> Corner2 {
+struct Box {
+    low: vec2f,
+    size: vec2u,
+}
+
+fn project(vertex: u32, layer: u32) -> Projected {
     let clip = views.clip[layer] * vec4f(position_of(vertex), 1.0);
     let size = vec2f(f32(views.width), f32(views.height));
-    let ndc = clip.xyz / clip.w;
-    return Corner2((vec2f(0.5, -0.5) * ndc.xy + 0.5) * size, ndc.z, clip.w <= 0.0);
+    return Projected(vec3f((vec2f(0.5, -0.5) * clip.xy + 0.5 * clip.w) * size, clip.w), clip.z);
 }
 
-fn cross2(a: vec2f, b: vec2f) -> f32 {
-    return a.x * b.y - a.y * b.x;
+// Pixels whose centre may lie in the triangle: all of them where it reaches behind the eye.
+fn bounds(a: vec3f, b: vec3f, c: vec3f) -> Box {
+    let last = vec2f(f32(views.width), f32(views.height)) - 1.0;
+    if (min(min(a.z, b.z), c.z) <= 0.0) {
+        return Box(vec2f(0.0), vec2u(last) + 1u);
+    }
+    let pa = a.xy / a.z;
+    let pb = b.xy / b.z;
+    let pc = c.xy / c.z;
+    let low = clamp(ceil(min(min(pa, pb), pc) - 0.5), vec2f(0.0), last + 1.0);
+    let high = clamp(floor(max(max(pa, pb), pc) - 0.5), vec2f(-1.0), last);
+    return Box(low, vec2u(max(high - low + 1.0, vec2f(0.0))));
 }
 
 @compute @workgroup_size(64)
@@ -39,26 +53,25 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     let a = project(t.x, group.z);
     let b = project(t.y, group.z);
     let c = project(t.z, group.z);
-    let area = cross2(b.place - a.place, c.place - a.place);
-    if (a.behind || b.behind || c.behind || area == 0.0) {
+    let w = vec3f(a.place.z, b.place.z, c.place.z);
+    let box = bounds(a.place, b.place, c.place);
+    // Seen from the box's corner, for precision: weights that combine the corners into a pixel, linear in it
+    // [OlanoGreer1997].
+    let pa = a.place - vec3f(box.low * w.x, 0.0);
+    let pb = b.place - vec3f(box.low * w.y, 0.0);
+    let pc = c.place - vec3f(box.low * w.z, 0.0);
+    let weights = transpose(mat3x3f(cross(pb, pc), cross(pc, pa), cross(pa, pb)));
+    let volume = dot(pa, cross(pb, pc));
+    if (volume == 0.0) {
         return;
     }
-    // Pixels whose centre lies in the bounding box.
-    let last = vec2f(f32(views.width), f32(views.height)) - 1.0;
-    let low = clamp(ceil(min(min(a.place, b.place), c.place) - 0.5), vec2f(0.0), last + 1.0);
-    let high = clamp(floor(max(max(a.place, b.place), c.place) - 0.5), vec2f(-1.0), last);
-    let box = vec2u(max(high - low + 1.0, vec2f(0.0)));
-    for (var i = lane; i < box.x * box.y; i += LANES) {
-        let pixel = vec2u(low) + vec2u(i % box.x, i / box.x);
-        let p = vec2f(pixel) + 0.5;
-        let w = vec3f(
-            cross2(c.place - b.place, p - b.place),
-            cross2(a.place - c.place, p - c.place),
-            cross2(b.place - a.place, p - a.place),
-        ) / area;
-        let near = dot(w, vec3f(a.nearness, b.nearness, c.nearness));
-        if (all(w >= vec3f(-SLACK)) && near > 0.0 && near <= 1.0) {
-            record(index, (group.z * views.height + pixel.y) * views.pitch + pixel.x, bitcast<u32>(near));
+    for (var i = lane; i < box.size.x * box.size.y; i += LANES) {
+        let pixel = vec2u(i % box.size.x, i / box.size.x);
+        let part = weights * vec3f(vec2f(pixel) + 0.5, 1.0) / volume;
+        let near = dot(part, vec3f(a.z, b.z, c.z));
+        if (all(part * abs(w) >= vec3f(-SLACK)) && near > 0.0 && near <= 1.0) {
+            let place = vec2u(box.low) + pixel;
+            record(index, (group.z * views.height + place.y) * views.pitch + place.x, bitcast<u32>(near));
         }
     }
 }
@@ -67,6 +80,6 @@ fn record(index: u32, at: u32, near: u32) {
     if (!FIND_TRIANGLE) {
         atomicMax(&nearness[at], near); // positive floats sort like their bits
     } else if (atomicLoad(&nearness[at]) == near) {
-        found[at] = index + 1u;
+        atomicMax(&found[at], index + 1u); // of two triangles at one depth the later one, always
     }
 }

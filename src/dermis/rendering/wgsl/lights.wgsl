@@ -60,7 +60,7 @@ fn visibility(light: Light, point: Point, l: vec3f) -> f32 {
     }
     let cosine = clamp(dot(point.normal, l), 0.0, 1.0);
     let reach = texel * f32(light.half_width);
-    let lifted = point.lit_position + point.normal * (reach * sqrt(1.0 - cosine * cosine)) + l * (0.5 * reach);
+    let lifted = point.lit_position + point.normal * (reach * sqrt(1.0 - cosine * cosine)) + l * (0.75 * reach);
     let clip = light.to_map * vec4f(lifted, 1.0);
     if (clip.w <= 0.0) {
         return 1.0;

@@ -8,7 +8,8 @@ fn schlick(cos_theta: f32, f0: f32) -> f32 {
 
 // exp(-tan^2 / m^2) / (m^2 cos^4), from the table that holds half its tenth root.
 fn beckmann(cos_h: f32, m: f32) -> f32 {
-    let t = 2.0 * load_bilinear(beckmann_table, vec2f(cos_h, m)).x;
+    let columns = f32(textureDimensions(beckmann_table).x); // the first is cos_h = 0, the last 1
+    let t = 2.0 * load_bilinear(beckmann_table, vec2f((cos_h * (columns - 1.0) + 0.5) / columns, m)).x;
     let t2 = t * t;
     let t4 = t2 * t2;
     return t4 * t4 * t2;

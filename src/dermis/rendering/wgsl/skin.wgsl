@@ -1,5 +1,6 @@
 // The skin's own parameters and its maps: colour, relief as a surface gradient, gloss.
 
+const NO_BAND: f32 = 32.0; // no normal map: the height map knows all
 const PI: f32 = 3.14159265358979;
 
 struct Skin {
@@ -43,7 +44,10 @@ fn surface_at(point: Point, footprint: f32) -> Surface {
     let size = vec2f(textureDimensions(relief_map));
     let mip = min(mip_for(relief_map, footprint), skin.relief_band);
     let fine = textureSampleLevel(relief_map, map_sampler, point.uv, mip);
-    let coarse = textureSampleLevel(relief_map, map_sampler, point.uv, skin.relief_band);
+    var coarse = vec4f(0.0);
+    if (skin.relief_band < NO_BAND) {
+        coarse = textureSampleLevel(relief_map, map_sampler, point.uv, skin.relief_band);
+    }
     let gradient = (fine.xy - coarse.xy) * size + vec2f(s.x * length_u, -s.y * length_v);
     let per_mm = size / max(vec2f(length_u, length_v), vec2f(1e-3));
     let spread = max(s.zw - s.xy * s.xy, vec2f(0.0)) + max(fine.zw - fine.xy * fine.xy, vec2f(0.0)) * per_mm * per_mm;

@@ -1,0 +1,135 @@
+"""Atlases on disk: found again, and harmless when the disk is not as it should be."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dermis.assets import cache
+from dermis.assets.atlas import Atlas
+from dermis.assets.cache import cached_atlas
+from dermis.assets.mesh import Mesh
+from dermis.assets.primitives import plane, uv_sphere
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    return tmp_path / "atlas"
+
+
+@pytest.fixture
+def built(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Sizes of the atlases that were computed and not read."""
+    sizes: list[int] = []
+    build = cache.build_atlas
+
+    def counted(mesh: Mesh, size: int) -> Atlas:
+        sizes.append(size)
+        return build(mesh, size)
+
+    monkeypatch.setattr(cache, "build_atlas", counted)
+    return sizes
+
+
+def same(a: Atlas, b: Atlas) -> bool:
+    pairs = [(getattr(a, f.name), getattr(b, f.name)) for f in fields(Atlas)]
+    return all(x.dtype == y.dtype and np.array_equal(x, y) for x, y in pairs)
+
+
+def only(folder: Path) -> Path:
+    (path,) = folder.iterdir()
+    assert path.suffix == ".npz"
+    return path
+
+
+def test_a_hit_is_the_same(folder: Path, built: list[int]) -> None:
+    first, second = (cached_atlas(uv_sphere(40.0, 12, 6), 64) for _ in range(2))
+    assert same(first, second)
+    assert built == [64]
+    assert only(folder)
+
+
+def test_mesh_and_size_are_told_apart(folder: Path, built: list[int]) -> None:
+    for mesh, size in ((plane(10.0), 64), (plane(20.0), 64), (plane(10.0), 65), (plane(10.0, 2), 64)):
+        cached_atlas(mesh, size)
+    assert len(built) == 4 and len(list(folder.iterdir())) == 4
+
+
+@pytest.mark.parametrize(
+    "garbage",
+    [b"", b"no archive at all", b"PK\x03\x04 half an archive", "cut", "flipped", "other arrays"],
+)
+def test_a_broken_file_is_made_again(folder: Path, built: list[int], garbage: bytes | str) -> None:
+    first = cached_atlas(plane(10.0), 64)
+    path = only(folder)
+    whole = path.read_bytes()
+    if garbage == "cut":
+        path.write_bytes(whole[: len(whole) // 2])
+    elif garbage == "flipped":
+        path.write_bytes(whole[:3000] + bytes(b ^ 0xFF for b in whole[3000:3100]) + whole[3100:])
+    elif garbage == "other arrays":
+        np.savez(path, triangle=np.zeros(3))
+    else:
+        path.write_bytes(garbage if isinstance(garbage, bytes) else b"")
+    assert same(cached_atlas(plane(10.0), 64), first)
+    assert built == [64, 64]
+    assert same(cached_atlas(plane(10.0), 64), first)
+    assert built == [64, 64]
+    assert only(folder) == path
+
+
+def test_a_file_with_pickled_objects_is_not_opened(folder: Path, built: list[int]) -> None:
+    first = cached_atlas(plane(10.0), 64)
+    objects = np.array([{"any": "object"}], dtype=object)
+    np.savez(only(folder), **{f.name: objects for f in fields(Atlas)})
+    assert same(cached_atlas(plane(10.0), 64), first)
+
+
+@pytest.mark.parametrize("blocked", ["a file", "a folder in the file's place", "nothing may be written"])
+def test_a_folder_that_cannot_be_used_does_no_harm(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, blocked: str
+) -> None:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path / "here"))
+    if blocked == "a file":
+        (tmp_path / "here").write_text("")
+    elif blocked == "a folder in the file's place":
+        (tmp_path / "here" / "atlas" / f"{cache._key(plane(10.0), 64)}.npz").mkdir(parents=True)
+    else:
+        monkeypatch.setattr(Path, "mkdir", _refuse)
+    assert cached_atlas(plane(10.0), 64).size == 64
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def _refuse(*_: object, **__: object) -> None:
+    raise PermissionError("read-only file system")
+
+
+def test_a_full_disk_leaves_no_part_file(
+    folder: Path, built: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(file: object, **_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(np, "savez", full)
+    assert cached_atlas(plane(10.0), 64).size == 64
+    assert list(folder.iterdir()) == []
+
+
+def test_the_longest_unused_are_forgotten(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cached_atlas(plane(10.0), 64)
+    one = only(folder).stat().st_size
+    monkeypatch.setattr(cache, "_MOST_BYTES", int(2.5 * one))
+    first = only(folder)
+    os.utime(first, (1, 1))
+    cached_atlas(plane(11.0), 64)
+    (second,) = set(folder.iterdir()) - {first}
+    os.utime(second, (2, 2))
+    cached_atlas(plane(10.0), 64)  # used again: now the second is the oldest
+    cached_atlas(plane(12.0), 64)
+    left = set(folder.iterdir())
+    assert first in left and second not in left and len(left) == 2

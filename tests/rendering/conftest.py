@@ -1,0 +1,26 @@
+"""One renderer for all tests of the frame: compiling its shaders takes seconds."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from dermis.gpu import Device
+from dermis.rendering.frame import Stages
+from dermis.rendering.renderer import Renderer
+
+
+@pytest.fixture(scope="session")
+def renderer() -> Renderer:
+    return Renderer(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
+
+
+@pytest.fixture(scope="session")
+def device(renderer: Renderer) -> Device:
+    return renderer.device
+
+
+@pytest.fixture(scope="session")
+def stages(renderer: Renderer) -> Stages:
+    return renderer._stages

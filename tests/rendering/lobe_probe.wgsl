@@ -1,0 +1,25 @@
+// The lobe's functions one by one, for given directions and roughness about the normal +Z.
+//#include "geometry.wgsl"
+//#include "bilinear.wgsl"
+//#include "skin.wgsl"
+//#include "lobe.wgsl"
+
+@group(1) @binding(0) var to_light: texture_2d<f32>; // and the roughness
+@group(1) @binding(1) var to_eye: texture_2d<f32>; // and rho_s
+@group(1) @binding(2) var lobe: texture_storage_2d<rgba32float, write>;
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if (any(id.xy >= textureDimensions(to_light))) {
+        return;
+    }
+    let l = textureLoad(to_light, id.xy, 0);
+    let v = textureLoad(to_eye, id.xy, 0);
+    let up = vec3f(0.0, 0.0, 1.0);
+    textureStore(lobe, id.xy, vec4f(
+        schlick(l.z, skin.f0),
+        beckmann(l.z, l.w),
+        kelemen(up, l.xyz, v.xyz, l.w, skin.f0),
+        passes(l.z, l.w, v.w),
+    ));
+}

@@ -1,0 +1,157 @@
+"""Spreading below the surface: twin, analytic answers, and constants that stay constant."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import twins
+from numpy.typing import NDArray
+from setups import bent_plane
+from tolerances import FLAT, SPREAD_ENERGY, SPREAD_PEAK, SPREAD_VARIANCE, TWIN
+
+from dermis.assets.atlas import Atlas, build_atlas
+from dermis.assets.primitives import plane, uv_sphere
+from dermis.gpu import Device, Frame, download, make_texture, upload
+from dermis.gpu.textures import texture_from
+from dermis.optics.gaussians import load_profile
+from dermis.rendering.frame import Stages
+from dermis.rendering.maps import upload_atlas
+from dermis.rendering.stages.diffuse import Diffuse
+
+Floats = NDArray[np.float64]
+PROFILE = load_profile("gpu-gems-3")
+BLURRED = PROFILE.variance_mm2[1:]
+
+
+def blur(
+    device: Device, diffuse: Diffuse, source: Floats, resources: Any, variances: Floats = BLURRED
+) -> list[Floats]:
+    """Levels of the stage over an (n, n, 3) source."""
+    size = len(source)
+    space = diffuse.make_levels(size, len(variances))
+    upload(device, space.stack, np.dstack([source, np.ones((size, size))]))
+    frame = Frame(device)
+    diffuse.draw(frame, space, resources, variances)
+    frame.submit()
+    return [download(device, space.stack, layer=k + 1)[..., :3].astype(float) for k in range(len(variances))]
+
+
+def random_layout(size: int) -> tuple[NDArray[np.float16], NDArray[np.uint8]]:
+    """Stretch from coarse to fine, with some texels empty, and charts that end anywhere in the map."""
+    rng = np.random.default_rng(11)
+    stretch = np.exp(rng.uniform(np.log(0.2), np.log(12.0), (size, size, 2))).astype(np.float16)
+    stretch[rng.random((size, size)) < 0.05] = 0
+    y, x = np.indices((size, size))
+    room = np.stack([x, size - 1 - x, y, size - 1 - y], axis=-1)
+    return stretch, np.minimum(room, rng.integers(0, 40, room.shape)).astype(np.uint8)
+
+
+def test_twin(device: Device, stages: Stages) -> None:
+    stretch, reach = random_layout(64)
+    source = np.random.default_rng(2).random((64, 64, 3)).astype(np.float32).astype(float)
+    resources = {
+        "stretch_map": texture_from(device, stretch, "rg16float"),
+        "reach_map": texture_from(device, reach, "rgba8uint"),
+    }
+    made = blur(device, stages.diffuse, source, resources)
+    expected = twins.levels(source, stretch.astype(float), reach, BLURRED)
+    for level, twin in zip(made, expected, strict=True):
+        assert np.abs(level - twin).max() < TWIN
+
+
+def test_combined_twin(device: Device, stages: Stages) -> None:
+    rng = np.random.default_rng(4)
+    space = stages.diffuse.make_levels(64, 5)
+    values = rng.random((5, 64, 64, 4)).astype(np.float32)
+    for k, value in enumerate(values):
+        upload(device, space.stack, value, layer=k + 1)
+    weight = rng.random((5, 3))
+    into, frame = make_texture(device, (64, 64), "rgba32float"), Frame(device)
+    stages.combine.draw(frame, space, weight, into)
+    frame.submit()
+    twin = np.einsum("kyxc,kc->yxc", values[..., :3].astype(float), weight)
+    assert np.abs(download(device, into)[..., :3] - twin).max() < TWIN * twin.max()
+
+
+UNIFORM = {"1 texel per mm": (256.0, 1.0), "2": (128.0, 1.0), "3": (256 / 3, 1.0), "6": (128 / 3, 1.0)}
+UNEVEN = {"2 : 1": (128.0, 0.5), "4 : 1": (64.0, 0.25)}  # v takes that part of the map
+# At 4 : 1 texels are 1 mm high: the narrow levels are finer than that, and only their moments mean something.
+
+
+def patch(size_mm: float, v_scale: float) -> Atlas:
+    return build_atlas(bent_plane(size_mm, [[1, 0, 0], [0, v_scale, 0]]), 256)
+
+
+def point_of_light(atlas: Atlas) -> tuple[Floats, tuple[int, int], Floats, float]:
+    """Unit power in a texel in the patch's middle; its place; squared distances and texel area in mm."""
+    y, x = int(np.argwhere(atlas.coverage[:, 128])[:, 0].max()) // 2, 128
+    source = np.zeros((256, 256, 3))
+    source[y, x] = 1.0
+    per_mm = atlas.stretch[y, x].astype(float)
+    rows, columns = np.indices((256, 256))
+    r2 = ((columns - x) / per_mm[0]) ** 2 + ((rows - y) / per_mm[1]) ** 2
+    return source, (y, x), r2, 1.0 / float(per_mm.prod())
+
+
+@pytest.mark.parametrize("name", [*UNIFORM, "2 : 1"])
+def test_point_of_light_is_the_sum_of_gaussians(device: Device, stages: Stages, name: str) -> None:
+    """A lit texel of power 1 receives R(r) times a texel's area from itself; the unblurred level aside."""
+    atlas = patch(*(UNIFORM | UNEVEN)[name])
+    source, (y, x), r2, area = point_of_light(atlas)
+    parts = blur(device, stages.diffuse, source, upload_atlas(device, atlas))
+    image = sum(weight * part for weight, part in zip(PROFILE.weight[1:], parts, strict=True))
+    exact = twins.gaussian_sum(PROFILE, 1, r2) * area
+    rows, columns = np.indices((256, 256))
+    outside = (np.hypot(rows - y, columns - x) > 1.5) & (atlas.triangle >= 0)
+    peak = np.minimum(exact[y, x], image[y, x])
+    assert (np.abs(image - exact)[outside].max(axis=0) < SPREAD_PEAK * peak).all()
+    assert np.allclose(image[atlas.coverage].sum(axis=0), PROFILE.weight[1:].sum(axis=0), rtol=SPREAD_ENERGY)
+
+
+@pytest.mark.parametrize("name", UNIFORM | UNEVEN)
+def test_blurred_point_is_round_and_as_wide_as_asked(device: Device, stages: Stages, name: str) -> None:
+    """Second moments in mm2, along x and along y, at every level."""
+    atlas = patch(*(UNIFORM | UNEVEN)[name])
+    source, (y, x), _, _ = point_of_light(atlas)
+    per_mm = atlas.stretch[y, x].astype(float)
+    rows, columns = np.indices((256, 256))
+    parts = blur(device, stages.diffuse, source, upload_atlas(device, atlas))
+    for variance, part in zip(BLURRED, parts, strict=True):
+        image = np.where(atlas.coverage, part[..., 0], 0.0)
+        along_x = (image * (columns - x) ** 2).sum() / per_mm[0] ** 2
+        along_y = (image * (rows - y) ** 2).sum() / per_mm[1] ** 2
+        assert along_x == pytest.approx(variance, rel=SPREAD_VARIANCE)
+        assert along_y == pytest.approx(variance, rel=SPREAD_VARIANCE)
+
+
+@pytest.mark.parametrize("size", [64, 200])
+@pytest.mark.parametrize("mesh", [uv_sphere(40.0, 24, 12), plane(60.0, 2, uv_scale=0.7)])
+def test_constant_light_stays_constant(device: Device, stages: Stages, mesh: Any, size: int) -> None:
+    """Up to the edges of charts and beyond, in the gutter."""
+    atlas = build_atlas(mesh, size)
+    colour = np.array([1.0, 0.3, 2.7])
+    source = atlas.coverage[..., None] * colour
+    for level in blur(device, stages.diffuse, source, upload_atlas(device, atlas)):
+        assert np.abs(level[atlas.coverage] / colour - 1).max() < FLAT
+        assert not level[~atlas.coverage].any()
+
+
+def test_the_order_of_the_axes_does_not_matter(device: Device, stages: Stages) -> None:
+    """Where the stretch is the same everywhere, first along v and then along u is the same blur."""
+    atlas = build_atlas(plane(40.0), 64)
+    source = np.random.default_rng(9).random((64, 64, 3))
+    other = Diffuse(device)
+    other._along.reverse()
+    resources = upload_atlas(device, atlas)
+    first, swapped = (blur(device, stage, source, resources) for stage in (stages.diffuse, other))
+    assert max(np.abs(a - b).max() for a, b in zip(first, swapped, strict=True)) < TWIN
+
+
+def test_a_symmetric_patch_stays_symmetric(device: Device, stages: Stages) -> None:
+    atlas = build_atlas(plane(40.0), 64)
+    source = np.random.default_rng(9).random((64, 64, 3))
+    source = source + source.transpose(1, 0, 2)
+    for level in blur(device, stages.diffuse, source, upload_atlas(device, atlas)):
+        assert np.abs(level - level.transpose(1, 0, 2)).max() < TWIN * level.max()

@@ -1,0 +1,158 @@
+"""What a renderer keeps from frame to frame never shows in the image."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from setups import bent_plane, front_camera, frontal, head_of, scene_of, settings_of
+
+from dermis.assets.head import Head
+from dermis.assets.primitives import uv_sphere
+from dermis.errors import DermisError
+from dermis.rendering.renderer import Renderer, render
+from dermis.scene.lights import DirectionalLight
+from dermis.scene.model import Scene
+
+Image = NDArray[np.float32]
+BALL = head_of(uv_sphere(30.0, 24, 12))
+SLAB = head_of(
+    bent_plane(50.0, [[0.5, 0, 0.2], [0, 0.9, 0]], 2), colour=np.random.default_rng(0).random((16, 16, 3))
+)
+LIGHT = DirectionalLight(direction=(1, -0.4, -1), irradiance=(2.0, 1.5, 1.0))
+
+
+def scene(head: Head = BALL, *lights: DirectionalLight, **skin: Any) -> Scene:
+    return scene_of(head, *(lights or (LIGHT,)), camera=front_camera(head, frame_mm=70.0), **skin)
+
+
+def drawn(renderer: Renderer, what: Scene, **settings: Any) -> Image:
+    return renderer.draw(what, settings_of(**settings)).linear()
+
+
+def test_the_same_scene_gives_the_same_bytes(renderer: Renderer) -> None:
+    first, second = (renderer.draw(scene(), settings_of(samples=3)) for _ in range(2))
+    assert first.linear().tobytes() == second.linear().tobytes()
+    assert first.srgb8().tobytes() == second.srgb8().tobytes()
+    assert first.linear().max() > 0.1
+
+
+CHANGES: dict[str, tuple[Callable[[], Scene], dict[str, Any]]] = {
+    "head": (lambda: scene(SLAB), {}),
+    "head back": (scene, {}),
+    "size": (scene, {"size": (31, 57)}),
+    "atlas": (scene, {"atlas": 100}),
+    "lights": (lambda: scene(BALL, DirectionalLight(direction=(-1, 0, -1)), frontal(shadows=True)), {}),
+    "brightness": (lambda: scene(BALL, LIGHT.model_copy(update={"irradiance": (9.0, 0.0, 3.0)})), {}),
+    "softness": (lambda: scene(BALL, LIGHT.model_copy(update={"softness_mm": 6.0})), {}),
+    "shadow size": (scene, {"shadow_size": 200}),
+    "no shadows": (lambda: scene(BALL, frontal()), {}),
+    "samples": (scene, {"samples": 4}),
+    "technique": (scene, {"technique": "none"}),
+    "skin": (lambda: scene(BALL, roughness=0.6, rho_s=0.9, mix=0.1), {}),
+    "albedo": (lambda: scene(SLAB, albedo="profile"), {}),
+    "albedo back": (lambda: scene(SLAB), {}),
+    "background": (scene, {"background": (0.5, 0.0, 0.1), "exposure": 2.0}),
+}
+
+
+@pytest.fixture(scope="module")
+def other(renderer: Renderer) -> Renderer:
+    """A second renderer, made to forget all before each of its frames."""
+    return Renderer(renderer.device.adapter.name)
+
+
+def fresh(other: Renderer, what: Scene, **settings: Any) -> Image:
+    other._kept.clear()
+    return drawn(other, what, **settings)
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_no_change_leaves_a_trace(renderer: Renderer, other: Renderer, name: str) -> None:
+    """After a plain frame, and after whatever came before: the image of a renderer without a past."""
+    make, settings = CHANGES[name]
+    what = make()
+    made = drawn(renderer, what, **settings)
+    assert made.tobytes() == fresh(other, what, **settings).tobytes()
+    plain = drawn(renderer, scene())
+    assert plain.tobytes() == drawn(renderer, scene()).tobytes()
+
+
+def test_changes_are_changes(renderer: Renderer) -> None:
+    """The list above would prove nothing if all of its images were one."""
+    images = [drawn(renderer, make(), **settings).tobytes() for make, settings in CHANGES.values()]
+    assert len(set(images)) == len(images) - 1  # "albedo back" is "head" once more
+
+
+def test_light_of_another_head_does_not_linger(renderer: Renderer, other: Renderer) -> None:
+    """Texels that the second head leaves empty hold the first one's light no more."""
+    from test_shade import tailed
+
+    full = head_of(bent_plane(50.0, [[1, 0, 0], [0, 1, 0]]))
+    drawn(renderer, scene(full, frontal(9.0)))
+    made = drawn(renderer, scene(tailed(), frontal(1.0)))
+    assert np.array_equal(made, fresh(other, scene(tailed(), frontal(1.0))))
+
+
+@pytest.mark.parametrize("samples", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("size", [(1, 1), (1, 9), (130, 3), (17, 40)])
+def test_any_size_and_samples(renderer: Renderer, size: tuple[int, int], samples: int) -> None:
+    rendered = renderer.draw(scene(), settings_of(size=size, samples=samples))
+    linear, encoded = rendered.linear(), rendered.srgb8()
+    assert linear.shape == (size[1], size[0], 3) and linear.dtype == np.float32
+    assert encoded.shape == linear.shape and encoded.dtype == np.uint8
+    assert np.isfinite(linear).all() and linear.max() > 0.01
+
+
+def test_the_image_does_not_depend_on_its_width(renderer: Renderer) -> None:
+    """The frame's height is given: a wider image shows more at its sides and the same in its middle."""
+    narrow, wide = (drawn(renderer, scene(), size=(w, 40)) for w in (20, 60))
+    assert np.abs(wide[:, 20:40] - narrow).max() < 0.01 * narrow.max()
+
+
+@pytest.mark.parametrize("option", ["atlas", "size"])
+def test_sizes_over_the_devices_limit(
+    renderer: Renderer, option: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(renderer.device, "max_texture_size", 100)
+    over: dict[str, Any] = {"atlas": {"atlas": 101}, "size": {"size": (8, 101)}}[option]
+    with pytest.raises(DermisError, match=rf"{option}: expected at most 100 .*101"):
+        renderer.draw(scene(), settings_of(**over))
+
+
+def test_too_many_lights(renderer: Renderer) -> None:
+    assert drawn(renderer, scene(BALL, *[frontal(0.1)] * 64)).max() > 0.1
+    with pytest.raises(DermisError, match=r"lights: expected at most 64.*65"):
+        drawn(renderer, scene(BALL, *[frontal()] * 65))
+
+
+def test_more_lights_are_more_light(renderer: Renderer) -> None:
+    """Light adds up: an image under two lights is the sum of the images under each."""
+    one, two = LIGHT, DirectionalLight(direction=(-1, 1, -2), irradiance=(0.5, 1.0, 1.5))
+    parts = [drawn(renderer, scene(BALL, light)) for light in (one, two)]
+    both = drawn(renderer, scene(BALL, one, two))
+    assert np.abs(both - parts[0] - parts[1]).max() < 1e-5 * both.max()
+
+
+def test_exposure_scales_the_image(renderer: Renderer) -> None:
+    plain, bright = (drawn(renderer, scene(), exposure=e) for e in (1.0, 2.5))
+    assert np.allclose(bright, 2.5 * plain, rtol=1e-6)
+
+
+def test_what_a_frame_reports(renderer: Renderer) -> None:
+    rendered = renderer.draw(scene(), settings_of())
+    assert rendered.gaussians == 6
+    assert rendered.frame_ms > 0 and rendered.setup_ms > 0
+    if rendered.gpu_ms is not None:
+        stages = {"irradiance", "diffuse", "combine", "visibility", "shade", "post"}
+        assert stages <= set(rendered.gpu_ms) <= stages | {"shadows", "total"}
+
+
+def test_one_call_is_enough(renderer: Renderer) -> None:
+    image = render(
+        scene(), adapter=renderer.device.adapter.name, size=(24, 16), atlas=64, samples=1, shadow_size=64
+    )
+    assert image.shape == (16, 24, 3) and image.max() > 0.1

@@ -1,0 +1,118 @@
+"""The frame's shaders once more in numpy float64, as plainly as their equations."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import map_coordinates
+
+from dermis.assets.atlas import Atlas
+from dermis.assets.head import Head
+from dermis.optics.gaussians import GaussianSum
+from dermis.rendering.kernels import ROWS_PER_UNIT, TRUNCATION, WIDEST, kernel_table
+from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
+from dermis.scene.model import Scene
+from dermis.specular.albedo import albedo_table
+
+Floats = NDArray[np.float64]
+SMOOTH = 1.6
+DEFAULT_COLOUR = float(np.float16(0.8))  # maps are stored as halves
+
+
+def spread(
+    source: Floats, stretch: Floats, reach: NDArray[np.uint8], variance: float, before: float, axis: int
+) -> Floats:
+    """One axis of one Gaussian of variance [mm2] added to a source that has `before` already.
+
+    source : (n, n, c) light, stretch : (n, n, 2) [texel/mm], reach : (n, n, 4) left, right, up, down
+    """
+    scale = stretch[..., axis].astype(np.float64)
+    sigma, sigma_before = np.sqrt(variance) * scale, np.sqrt(before) * scale
+    step = np.maximum(1, np.floor(np.minimum(SMOOTH * sigma_before, sigma)))
+    step = np.maximum(step, np.ceil(sigma / np.sqrt(WIDEST)))
+    relative = np.minimum((sigma / step) ** 2, WIDEST)
+    taps = np.ceil(TRUNCATION * np.sqrt(relative)).astype(int)
+    row = relative * ROWS_PER_UNIT
+    table = kernel_table().astype(np.float64)
+    low, high = table[row.astype(int), taps], table[row.astype(int) + 1, taps]
+    q = low + (high - low) * (row % 1)
+    y, x = np.indices(scale.shape)
+    behind, ahead = reach[..., 2 * axis].astype(int), reach[..., 2 * axis + 1].astype(int)
+    total, weights = source.copy(), np.ones(scale.shape)
+    for n in range(1, taps.max() + 1):
+        weight = np.where(n <= taps, q ** (n * n), 0.0)
+        for sign, limit in ((-1, behind), (1, ahead)):
+            move = sign * np.minimum(n * step.astype(int), limit)
+            there = source[y + move, x] if axis else source[y, x + move]
+            total += weight[..., None] * there
+        weights += 2 * weight
+    return np.asarray(np.where(scale[..., None] > 0, total / weights[..., None], 0.0))
+
+
+def levels(source: Floats, stretch: Floats, reach: NDArray[np.uint8], variances: ArrayLike) -> list[Floats]:
+    """The blurred levels, each from the one before."""
+    made, before = [source], 0.0
+    for variance in np.asarray(variances, float):
+        along_u = spread(made[-1], stretch, reach, variance - before, before, 0)
+        made.append(spread(along_u, stretch, reach, variance - before, before, 1))
+        before = float(variance)
+    return made[1:]
+
+
+def gaussian_sum(profile: GaussianSum, first: int, r2_mm2: Floats) -> Floats:
+    """(..., 3) sum of the profile's Gaussians from `first` on at squared distances [1/mm2]."""
+    total = np.zeros((*r2_mm2.shape, 3))
+    for variance, weight in zip(profile.variance_mm2[first:], profile.weight[first:], strict=True):
+        total += (np.exp(-r2_mm2 / (2 * variance)) / (2 * np.pi * variance))[..., None] * weight
+    return total
+
+
+def passes(cosine: ArrayLike, m: float, rho_s: float) -> Floats:
+    """Share of light that passes the surface, by the shader's table."""
+    table = albedo_table().astype(np.float64)
+    c = np.clip(np.asarray(cosine, float), 0, None)
+    rows, columns = table.shape
+    where = [np.full(c.shape, m * rows - 0.5), c * columns - 0.5]
+    read = map_coordinates(table, where, order=1, mode="nearest")
+    return np.asarray(np.maximum(0.0, 1.0 - rho_s * read))
+
+
+def incident(
+    light: PointLight | SpotLight | DirectionalLight, centre: ArrayLike, points: Floats
+) -> tuple[Floats, Floats]:
+    """(..., 3) unit vectors to the light and (..., 3) irradiance on a surface that faces it."""
+    colour = np.array(light.irradiance)
+    if isinstance(light, DirectionalLight):
+        way = np.array(light.direction) / np.linalg.norm(light.direction)
+        return np.broadcast_to(-way, points.shape), np.broadcast_to(colour, points.shape)
+    path = np.subtract(light.target, light.position)
+    towards = np.add(light.position, centre) - points
+    distance = np.linalg.norm(towards, axis=-1, keepdims=True)
+    to_light = towards / distance
+    arriving = colour * (path @ path) / distance**2
+    if isinstance(light, SpotLight):
+        outer, inner = np.cos(np.radians([light.outer_degrees, light.inner_degrees]))
+        cosine = -to_light @ (path / np.linalg.norm(path))
+        t = np.clip((cosine - outer) / (inner - outer), 0, 1)
+        arriving = arriving * (t * t * (3 - 2 * t))[..., None]
+    return to_light, arriving
+
+
+def entering(scene: Scene, points: Floats, normals: Floats) -> Floats:
+    """(..., 3) irradiance that passes the surface, without shadows, relief and colour."""
+    total = np.zeros(points.shape)
+    for light in scene.lights:
+        to_light, arriving = incident(light, scene.head.centre_mm, points)
+        cosine = np.maximum((to_light * normals).sum(-1), 0.0)
+        share = cosine * passes(cosine, scene.skin.roughness, scene.skin.rho_s)
+        total += arriving * share[..., None]
+    return total
+
+
+def surface(atlas: Atlas, head: Head) -> tuple[Floats, Floats]:
+    """Position and unit normal of each texel, 0 outside the coverage."""
+    point = atlas.interpolate(head.mesh, head.mesh.positions)
+    normal = atlas.interpolate(head.mesh, head.mesh.normals)
+    length = np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
+    covered = atlas.coverage[..., None]
+    return np.where(covered, point, 0.0), np.where(covered, normal / length, 0.0)
