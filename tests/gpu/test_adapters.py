@@ -11,7 +11,7 @@ import pytest
 from dermis.errors import DermisError
 from dermis.gpu import adapters as module
 from dermis.gpu import list_adapters, open_device
-from dermis.gpu.adapters import INSTALL_HINT, WANTED_FEATURES, choose_adapter
+from dermis.gpu.adapters import INSTALL_HINT, WANTED_FEATURES, fitting_adapters
 
 
 def fake(name: str, kind: str, backend: str = "Vulkan", features: tuple[str, ...] = WANTED_FEATURES) -> Any:
@@ -49,12 +49,12 @@ PLAIN_GPU = fake("Old", "DiscreteGPU", features=())
 )
 def test_auto_takes_the_best(machine: Any, handles: tuple[Any, ...], chosen: str) -> None:
     machine(*handles)
-    assert choose_adapter("auto")[0].name == chosen
+    assert fitting_adapters("auto")[0][0].name == chosen
 
 
 def test_cpu_takes_the_software_adapter_with_all_features(machine: Any) -> None:
     machine(GPU, fake("softpipe", "CPU", features=()), CPU)
-    adapter, reason = choose_adapter("cpu")
+    (adapter, *_), reason = fitting_adapters("cpu")
     assert (adapter.name, adapter.missing) == ("llvmpipe", ())
     assert "software" in reason
 
@@ -62,7 +62,7 @@ def test_cpu_takes_the_software_adapter_with_all_features(machine: Any) -> None:
 @pytest.mark.parametrize("wanted", ["gefo", "GEFORCE", "GeForce driver"])
 def test_part_of_a_name_is_enough(machine: Any, wanted: str) -> None:
     machine(CPU, GPU)
-    assert choose_adapter(wanted)[0].name == "GeForce"
+    assert fitting_adapters(wanted)[0][0].name == "GeForce"
 
 
 def test_missing_features_are_told() -> None:
@@ -73,14 +73,14 @@ def test_missing_features_are_told() -> None:
 def test_no_adapter_at_all(machine: Any, wanted: str) -> None:
     machine()
     with pytest.raises(DermisError, match="Vulkan") as caught:
-        choose_adapter(wanted)
+        fitting_adapters(wanted)
     assert INSTALL_HINT in str(caught.value)
 
 
 def test_no_software_adapter(machine: Any) -> None:
     machine(GPU)
     with pytest.raises(DermisError, match="GeForce") as caught:
-        choose_adapter("cpu")
+        fitting_adapters("cpu")
     assert INSTALL_HINT in str(caught.value)
 
 

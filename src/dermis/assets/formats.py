@@ -143,8 +143,10 @@ def read_obj(path: Path) -> list[Part]:
         colours.update(_mtl_colours(path.parent / library))
     text, groups = _mark_obj(text, colours)
     materials = "\n".join(f"newmtl {k}" for k in range(len(groups)))
-    parts = list(_parts(text.encode(), "obj", groups, resolver={"marked.mtl": materials.encode()}))
-    return parts[::-1]  # trimesh pops groups from the end: file order again
+    # trimesh pops groups from the end: file order again
+    parts = list(_parts(text.encode(), "obj", groups, resolver={"marked.mtl": materials.encode()}))[::-1]
+    full, none = [part.group for part in parts], np.empty((0, 3))
+    return parts + [Part(g, none, None, None, none.astype(int)) for g in groups if g.names and g not in full]
 
 
 def _mark_obj(text: str, colours: dict[str, Colour]) -> tuple[str, list[Group]]:

@@ -99,8 +99,12 @@ def load_head(
     check_head_height(mesh, name, unit_mm)
     own = {"colour": colour, "normal": normal, "height": height}
     own |= {"specular": specular, "roughness": roughness}
-    maps = load_maps(**_chosen(own, files), height_mm=height_mm)
-    return Head(name, subdivided(mesh, subdivide), maps, sample.attribution if sample else "")
+    chosen = _chosen(own, files)
+    if height_mm is not None and chosen["height"] is None:
+        came = f"{height_mm} came without a height map"
+        refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
+    mesh = subdivided(mesh, subdivide)
+    return Head(name, mesh, load_maps(**chosen, height_mm=height_mm), sample.attribution if sample else "")
 
 
 def _chosen(given: dict[str, MapFile], sample: dict[str, Path]) -> dict[str, Any]:

@@ -96,10 +96,14 @@ def _read(source: Path) -> list[Part]:
             f"it cannot be read ({detail})",
             "The file is damaged or cut short: export it again",
         )
-    parts = [part for part in parts if len(part.triangles)]
-    if not parts:
+    full = [part for part in parts if len(part.triangles)]
+    if not full:
         refuse(source, "a mesh of triangles", "it has none", "Export the head as a polygon mesh")
-    return parts
+    skins = [part for part in parts if _has(part.group, "skin")]
+    if skins and not any(len(part.triangles) for part in skins):
+        came = f"skin group {skins[0].group.names[0]!r} has no triangles"
+        refuse(source, "a group of triangles that is skin", came, "Assign its faces to it, or rename it")
+    return full
 
 
 def _joined(parts: list[Part], source: Path) -> tuple[Array, Array, Array, NDArray[np.int64]]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.errors import refuse
 from dermis.images.colour import decode_srgb8, decode_srgb16
+from dermis.images.filters import without_steps
 from dermis.images.io import read_image
 
 Floats = NDArray[np.float32]
@@ -59,9 +60,6 @@ def load_maps(
     normal_y : "up" when green points to row 0 (OpenGL, Blender), "down" when away from it (DirectX)
     DermisError : a file is not what its role asks for; the message names it
     """
-    if height is None and height_mm is not None:
-        came = f"{height_mm} came without a height map"
-        refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
     return Maps(
         colour=None if colour is None else load_colour(colour),
         normal=None if normal is None else load_normal(normal, normal_y),
@@ -85,12 +83,15 @@ def load_colour(path: PathLike) -> Floats:
 
 
 def load_height(path: PathLike, height_mm: float | None) -> Floats:
-    """(H, W) height [mm] of a grey map; see `load_maps`."""
+    """(H, W) height [mm] of a grey map; see `load_maps`. 8-bit steps are smoothed away, finer ones stay."""
     if height_mm is None or not (np.isfinite(height_mm) and height_mm > 0):
         came = "none was given" if height_mm is None else f"it is {height_mm}"
         remedy = "Skin maps have about 0.02 to 0.03; the map's author knows"
         refuse(path, "a height map with height_mm, the mm per grey level, above 0", came, remedy)
-    grey = _grey(path, "a height map", _read(path, "a height map"))
+    image = _read(path, "a height map")
+    grey = _grey(path, "a height map", image)
+    if image.dtype == np.uint8:
+        grey = without_steps(grey)
     return grey * np.float32(255 * height_mm)
 
 

@@ -4,27 +4,40 @@ from __future__ import annotations
 
 import sys
 
+COMMANDS = {
+    "render": "Render a head to a PNG (sRGB) or EXR (linear float) image.",
+    "doctor": "Show what this machine can do and render a test frame.",
+    "cite": "Print BibTeX entries of the works behind a picture.",
+}
+
 
 def main() -> None:
     """Run the command line; exit with 2 when the caller can mend what went wrong."""
     from cyclopts import App, CycloptsError
 
+    from dermis.cli.misuse import explain
     from dermis.errors import DermisError
 
     app = App(
         name="dermis",
         help="Human skin: physically based, in real time, checked against the truth.",
+        help_format="plaintext",
         result_action="return_value",
     )
-    app.command("dermis.cli.render:render", name="render")
-    app.command("dermis.cli.doctor:doctor", name="doctor")
-    app.command("dermis.cli.cite:cite", name="cite")
+    for name, summary in COMMANDS.items():
+        # The list of commands must not import them; a command's own help is its docstring.
+        shown = None if sys.argv[1:2] == [name] else summary
+        app.command(f"dermis.cli.{name}:{name}", name=name, help=shown, version_flags=())
     try:
-        sys.exit(app(exit_on_error=False) or 0)
+        sys.exit(app(sys.argv[1:], exit_on_error=False, print_error=False) or 0)
     except DermisError as error:
-        print(f"dermis: {error}", file=sys.stderr)  # noqa: T201
-        sys.exit(2)
-    except CycloptsError:  # cyclopts has printed what was wrong with the words
-        sys.exit(2)
+        _fail(str(error))
+    except CycloptsError as error:
+        _fail(explain(error))
     except KeyboardInterrupt:
         sys.exit(130)
+
+
+def _fail(message: str) -> None:
+    sys.stderr.write(f"dermis: {message}\n")
+    sys.exit(2)

@@ -8,7 +8,7 @@ from dermis.cli.console import print_lines
 def cite(*keys: str) -> int:
     """Print BibTeX entries: of the given keys, or of the technique itself.
 
-    Examples:
+    For example:
 
         dermis cite
 

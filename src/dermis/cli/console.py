@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from dermis.errors import refuse
+
 
 def print_json(value: Any) -> None:
     """One JSON value and nothing else on stdout."""
-    sys.stdout.write(json.dumps(value, indent=2) + "\n")
+    print_lines(json.dumps(value, indent=2))
 
 
 def print_lines(*lines: str) -> None:
-    """Lines of a result on stdout."""
-    sys.stdout.write("\n".join(lines) + "\n")
+    """Lines of a result on stdout; a reader that leaves early, as `head` does, is no fault."""
+    try:
+        sys.stdout.write("\n".join(lines) + "\n")
+        sys.stdout.flush()
+    except OSError as fault:
+        # What is left over goes nowhere, or Python would try again as it ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if not isinstance(fault, BrokenPipeError):
+            refuse("stdout", "a place to write to", f"it fails ({fault.strerror})", "Write it elsewhere")
 
 
 @contextmanager

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
 from dermis.cli.console import print_json, print_lines, working_on
+from dermis.cli.options import Whole, check, parse_colour, parse_size
 from dermis.errors import refuse
 
 _MAP_OPTIONS = ("colour", "normal", "height", "height_mm", "specular", "roughness_map")
@@ -26,8 +26,8 @@ def render(
     *,
     output: Output = Path("dermis.png"),
     size: str | None = None,
-    atlas: int | None = None,
-    samples: int | None = None,
+    atlas: Whole = None,
+    samples: Whole = None,
     technique: Literal["texture-space", "none"] | None = None,
     profile: str | None = None,
     albedo: Literal["map", "profile"] | None = None,
@@ -47,7 +47,7 @@ def render(
     unit_mm: float | None = None,
     v_origin: Literal["auto", "top", "bottom"] | None = None,
     up: Literal["y", "z"] | None = None,
-    subdivide: int | None = None,
+    subdivide: Whole = None,
     adapter: str = "auto",
     as_json: Json = False,
 ) -> int:
@@ -124,8 +124,8 @@ def render(
     from dermis.images.io import check_output
 
     check_output(output)
-    given |= {"size": _size(size)} if size is not None else {}
-    given |= {"background": _triple(background)} if background is not None else {}
+    given |= {"size": parse_size(size)} if size is not None else {}
+    given |= {"background": parse_colour(background)} if background is not None else {}
     with working_on("loading"):
         scene, settings = _scene(head, given)
     return _draw_and_report(scene, settings, output, adapter, as_json)
@@ -170,18 +170,22 @@ def _thanks(attribution: str) -> list[str]:
 def _scene(head: str, given: dict[str, Any]) -> tuple[Any, Any]:
     """The scene and its settings: the head's, or the file's, with the options given on top."""
     from dermis.assets.head import load_head
+    from dermis.optics.gaussians import load_profile
     from dermis.scene import Scene, Settings, Skin, load_camera, load_lights, load_scene
 
     own = {name: given[name] for name in _HEAD_OPTIONS if name in given}
     skin = {name: given[name] for name in _SKIN_OPTIONS if name in given}
     chosen = {name: given[name] for name in _SETTINGS if name in given}
+    check(Skin, skin)  # before the head is loaded
+    check(Settings, chosen)
+    if "profile" in skin:
+        load_profile(skin["profile"])
     if Path(head).suffix.lower() == ".toml":
         if own:
             option = "--" + next(iter(own)).replace("_", "-")
             refuse(option, "no such option with a scene file", "it came", "Write it into the file's [head]")
         scene, settings = load_scene(Path(head))
     else:
-        Skin(**skin), Settings(**chosen)  # refuse bad numbers before the head is loaded
         if "roughness_map" in own:
             own["roughness"] = own.pop("roughness_map")
         scene, settings = Scene(load_head(head, **own)), Settings()
@@ -192,20 +196,3 @@ def _scene(head: str, given: dict[str, Any]) -> tuple[Any, Any]:
         camera=load_camera(given["camera"], body) if "camera" in given else scene.camera,
         skin=Skin(**(scene.skin.model_dump() | skin)),
     ), Settings(**(settings.model_dump() | chosen))
-
-
-def _size(text: str) -> tuple[int, int]:
-    match = re.fullmatch(r"(\d{1,9})x(\d{1,9})", text)
-    if not match:
-        refuse(
-            "--size", "WIDTHxHEIGHT, such as 1024x1024", f"{text!r} came", "Write two whole numbers with an x"
-        )
-    return int(match[1]), int(match[2])
-
-
-def _triple(text: str) -> tuple[float, float, float]:
-    try:
-        red, green, blue = (float(part) for part in text.split(","))
-    except ValueError:
-        refuse("--background", "red,green,blue, such as 0,0,0", f"{text!r} came", "Write three numbers")
-    return red, green, blue

@@ -48,18 +48,24 @@ def list_adapters() -> list[Adapter]:
         import wgpu
     except (ImportError, OSError) as error:
         refuse("wgpu", "its native library to load", f"it does not: {error}", "Install the package again")
-    with _quiet_drivers():
-        found = [_describe(handle) for handle in wgpu.gpu.enumerate_adapters_sync()]
+    try:
+        with _quiet_drivers():
+            found = [_describe(handle) for handle in wgpu.gpu.enumerate_adapters_sync()]
+    except Exception as error:  # whatever a broken driver makes of it
+        refuse("graphics drivers", "a list of adapters", f"they fail: {error}", INSTALL_HINT)
     return sorted(found, key=lambda a: (_rank(a.kind), len(a.missing), a.backend == "OpenGL"))
 
 
-def choose_adapter(wanted: str) -> tuple[Adapter, str]:
-    """The adapter for `wanted` ("auto", "cpu" or part of a name) and the reason for the choice."""
+def fitting_adapters(wanted: str) -> tuple[list[Adapter], str]:
+    """Adapters for `wanted` ("auto", "cpu" or part of a name), the best first, and the reason for the choice.
+
+    Raises DermisError when there is none.
+    """
     adapters = list_adapters()
     if not adapters:
         refuse("adapter", "a Vulkan, Metal or DX12 adapter", "this machine shows none", INSTALL_HINT)
     if wanted == "auto":
-        return adapters[0], "the fastest kind, with the most features"
+        return adapters, "the fastest kind, with the most features"
     if wanted == "cpu":
         fitting, reason = [a for a in adapters if a.kind == "CPU"], "software was asked for"
     else:
@@ -69,7 +75,7 @@ def choose_adapter(wanted: str) -> tuple[Adapter, str]:
         names = ", ".join(f"{a.name} ({a.backend})" for a in adapters)
         hint = INSTALL_HINT if wanted == "cpu" else "Choose auto, cpu or a part of one of those names"
         refuse(f"adapter {wanted!r}", "one of this machine's adapters", f"it has {names}", hint)
-    return fitting[0], reason
+    return fitting, reason
 
 
 def _describe(handle: Any) -> Adapter:

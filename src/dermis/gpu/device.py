@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import DermisError
-from dermis.gpu.adapters import Adapter, choose_adapter
+from dermis.gpu.adapters import Adapter, fitting_adapters
 
 _POOLED_UNIFORMS = 512
 _TIMED_PASSES = 2048
+_RAISED_LIMITS = ("max-texture-dimension-2d", "max-storage-buffer-binding-size", "max-buffer-size")
 
 
 def open_device(adapter: str = "auto") -> Device:
@@ -22,8 +23,11 @@ def open_device(adapter: str = "auto") -> Device:
 
     Raises DermisError when there is no such adapter or when it does not open.
     """
-    chosen, reason = choose_adapter(adapter)
-    return Device(chosen, reason)
+    (*others, last), reason = fitting_adapters(adapter)
+    for one in others:
+        with contextlib.suppress(DermisError):  # listed, but it does not open
+            return Device(one, reason)
+    return Device(last, reason)
 
 
 class Device:
@@ -32,25 +36,17 @@ class Device:
     def __init__(self, adapter: Adapter, reason: str) -> None:
         self.adapter = adapter
         self.reason = reason
-        limit = adapter.handle.limits["max-texture-dimension-2d"]
-        buffer = adapter.handle.limits["max-storage-buffer-binding-size"]
         try:
+            limits = {name: adapter.handle.limits[name] for name in _RAISED_LIMITS}
             self.handle: Any = adapter.handle.request_device_sync(
-                label="dermis",
-                required_features=list(adapter.features),
-                required_limits={
-                    "max-texture-dimension-2d": limit,
-                    "max-storage-buffer-binding-size": buffer,
-                    "max-buffer-size": adapter.handle.limits["max-buffer-size"],
-                },
+                label="dermis", required_features=list(adapter.features), required_limits=limits
             )
         except Exception as error:
             raise DermisError(
                 f"adapter {adapter.name}: expected it to open, but its driver says: {error}. "
                 "Close other programs that use the GPU or choose --adapter cpu."
             ) from error
-        self.max_texture_size: int = limit
-        self.max_storage_bytes: int = buffer
+        self.max_texture_size, self.max_storage_bytes = (int(limits[name]) for name in _RAISED_LIMITS[:2])
         self.has_timestamps = "timestamp-query" in adapter.features
         self._timestamps: tuple[Any, Any] | None = None
         self._uniforms: OrderedDict[bytes, Any] = OrderedDict()

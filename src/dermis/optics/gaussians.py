@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.errors import DermisError, refuse
+from dermis.errors import refuse
 
 Floats = NDArray[np.float64]
 _HEADER = ["variance_mm2", "red", "green", "blue"]
@@ -81,10 +81,9 @@ def load_profile(name: str | Path) -> GaussianSum:
     try:
         return _parse(str(path), path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
-        known = ", ".join(preset_names())
-        raise DermisError(
-            f"profile {name}: expected a preset ({known}) or {_FILE_FORM}, but {error}. Check the name."
-        ) from error
+        came = getattr(error, "strerror", None) or "it is not text"
+        expected = f"a preset ({', '.join(preset_names())}) or {_FILE_FORM}"
+        refuse(f"profile {name}", expected, f"it cannot be read: {came}", "Check the name")
 
 
 def _parse(name: str, text: str) -> GaussianSum:

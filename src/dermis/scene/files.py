@@ -5,37 +5,51 @@ from __future__ import annotations
 import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic import Field
 
 from dermis.assets.head import Head, load_head
-from dermis.errors import DermisError, refuse
+from dermis.errors import refuse
 from dermis.scene.camera import PRESETS, Camera, preset
 from dermis.scene.lights import DirectionalLight, Light, PointLight, SpotLight
 from dermis.scene.model import Scene
-from dermis.scene.plain import explain
+from dermis.scene.plain import ImpossibleError, Plain
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 
-Lights = tuple[PointLight | SpotLight | DirectionalLight, ...]
-_LIGHTS: TypeAdapter[Lights] = TypeAdapter(tuple[Light, ...], config=ConfigDict(frozen=True))
+P = TypeVar("P", bound=Plain)
+_KINDS: dict[str, type[Light]] = {"point": PointLight, "spot": SpotLight, "directional": DirectionalLight}
 _PARTS = {"head", "skin", "lights", "camera", "render"}
-_PATHS = ("colour", "normal", "height", "specular", "roughness")
+_MAPS = ("colour", "normal", "height", "specular", "roughness")
+_Length = Annotated[float | None, Field(gt=0, allow_inf_nan=False)]
 
 
-def preset_lights(name: str) -> Lights:
+class _HeadTable(Plain):
+    """The [head] of a scene: what `load_head` takes."""
+
+    name: str
+    colour: str | None = None
+    normal: str | None = None
+    height: str | None = None
+    height_mm: _Length = None
+    specular: str | None = None
+    roughness: str | None = None
+    unit_mm: _Length = None
+    v_origin: Literal["auto", "top", "bottom"] = "auto"
+    up: Literal["y", "z"] = "y"
+    subdivide: Annotated[int, Field(ge=0, le=3)] = 0
+
+
+def preset_lights(name: str) -> tuple[Light, ...]:
     """The lights of a preset of the package."""
     text = (resources.files("dermis.scene") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
     return _lights(f"preset {name}", tomllib.loads(text).get("lights"))
 
 
-def load_lights(name: str) -> Lights:
+def load_lights(name: str) -> tuple[Light, ...]:
     """The lights of a preset ("studio") or of a TOML file with [[lights]] tables."""
-    folder = resources.files("dermis.scene") / "presets"
-    known = sorted(
-        entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")
-    )
+    known = _light_presets()
     if name in known:
         return preset_lights(name)
     return _lights(name, _read(Path(name), f"a preset ({', '.join(known)}) or a TOML file").get("lights"))
@@ -46,7 +60,7 @@ def load_camera(name: str, head: Head) -> Camera:
     if name in PRESETS:
         return preset(name, head)
     table = _read(Path(name), f"a preset ({', '.join(PRESETS)}) or a TOML file").get("camera")
-    return _camera(name, table, head)
+    return _made(Camera, name, "camera", table)
 
 
 def load_scene(path: Path) -> tuple[Scene, Settings]:
@@ -57,82 +71,67 @@ def load_scene(path: Path) -> tuple[Scene, Settings]:
     """
     table = _read(path, "a scene in TOML")
     for part in table.keys() - _PARTS:
-        refuse(
-            f"{path}: {part}",
-            f"only the parts {', '.join(sorted(_PARTS))}",
-            "this one is unknown",
-            "Check it",
-        )
-    head = _head(path, table.get("head"))
-    lights = table.get("lights", "studio")
+        refuse(path, f"only the parts {', '.join(sorted(_PARTS))}", f"{part!r} came", "Correct its name")
+    skin = _made(Skin, path, "skin", table.get("skin", {}))
+    settings = _made(Settings, path, "render", table.get("render", {}))
+    head = _head(path, _made(_HeadTable, path, "head", table.get("head")))
+    lights, camera = table.get("lights", "studio"), table.get("camera", "portrait")
     return Scene(
         head,
-        lights=load_lights(lights) if isinstance(lights, str) else _lights(str(path), lights),
-        camera=_camera(str(path), table.get("camera", "portrait"), head),
-        skin=_made(Skin, path, "skin", table),
-    ), _made(Settings, path, "render", table)
+        lights=load_lights(_beside(path, lights)) if isinstance(lights, str) else _lights(path, lights),
+        camera=load_camera(_beside(path, camera), head)
+        if isinstance(camera, str)
+        else _made(Camera, path, "camera", camera),
+        skin=skin.model_copy(update={"profile": _beside(path, skin.profile)}),
+    ), settings
 
 
-def _head(path: Path, table: Any) -> Head:
-    if not isinstance(table, dict) or not isinstance(table.get("name"), str):
-        refuse(
-            f"{path}: head",
-            "a table with the head's `name`",
-            f"{table!r} came",
-            'Write [head] and name = "..."',
-        )
-    options = {key: value for key, value in table.items() if key != "name"}
-    for key in _PATHS:
-        if isinstance(options.get(key), str):
-            options[key] = path.parent / options[key]
-    beside = path.parent / table["name"]
-    try:
-        return load_head(str(beside) if beside.exists() else table["name"], **options)
-    except TypeError as error:
-        raise DermisError(f"{path}: head: {error}. See the options of dermis.load_head.") from None
+def _head(path: Path, table: _HeadTable) -> Head:
+    options = table.model_dump(exclude={"name"}, exclude_none=True)
+    options |= {role: path.parent / options[role] for role in _MAPS if role in options}
+    return load_head(_beside(path, table.name), **options)
 
 
-def _made(kind: Any, path: Path, part: str, table: dict[str, Any]) -> Any:
-    values = table.get(part, {})
-    if not isinstance(values, dict):
-        refuse(f"{path}: {part}", "a table", f"{values!r} came", f"Write [{part}]")
-    try:
-        return kind(**values)
-    except DermisError as error:
-        raise DermisError(f"{path}: {error}") from None
+def _beside(path: Path, name: str) -> str:
+    """The file of that name in the scene's folder if there is one, else the name, of a preset mostly."""
+    file = path.parent / name
+    return str(file) if file.is_file() else name
 
 
-def _lights(culprit: str, tables: Any) -> Lights:
+def _light_presets() -> list[str]:
+    names = [entry.name for entry in (resources.files("dermis.scene") / "presets").iterdir()]
+    return sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml"))
+
+
+def _lights(culprit: object, tables: Any) -> tuple[Light, ...]:
     if not isinstance(tables, list) or not tables:
-        refuse(
-            culprit,
-            "at least one [[lights]] table",
-            "none came",
-            "Add one with kind, position and irradiance",
-        )
-    try:
-        return _LIGHTS.validate_python(
-            tuple({"kind": "point", **t} if isinstance(t, dict) else t for t in tables)
-        )
-    except ValidationError as error:
-        raise DermisError(explain(f"{culprit}: lights", error)) from None
+        came = "none came" if not tables else f"{tables!r} came"
+        refuse(culprit, "at least one [[lights]] table", came, "Add one with kind, position and irradiance")
+    return tuple(_light(culprit, f"light {k}", table) for k, table in enumerate(tables, start=1))
 
 
-def _camera(culprit: str, value: Any, head: Head) -> Camera:
-    if isinstance(value, str):
-        return preset(value, head)
-    if not isinstance(value, dict):
-        refuse(culprit, "a [camera] table", f"{value!r} came", "Add one with position, target and frame_mm")
+def _light(culprit: object, which: str, table: Any) -> Light:
+    kind = table.get("kind", "point") if isinstance(table, dict) else "point"
+    if not isinstance(kind, str) or kind not in _KINDS:
+        refuse(f"{culprit}: {which}", f"a kind of {', '.join(_KINDS)}", f"{kind!r} came", "Correct it")
+    return _made(_KINDS[kind], culprit, which, table)
+
+
+def _made(kind: type[P], culprit: object, part: str, table: Any) -> P:
+    """`kind` from a table of a file; the file and the part are named when it cannot be."""
+    if not isinstance(table, dict):
+        came = "there is none" if table is None else f"{table!r} came"
+        refuse(f"{culprit}: {part}", f"a table with {', '.join(kind.model_fields)}", came, "Add one")
     try:
-        return Camera(**value)
-    except DermisError as error:
-        raise DermisError(f"{culprit}: {error}") from None
+        return kind(**table)
+    except ImpossibleError as error:
+        raise ImpossibleError(f"{culprit}: {part}", error.findings) from None
 
 
 def _read(path: Path, expected: str) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise DermisError(
-            f"{path}: expected {expected}, but {error}. Check the name and the file."
-        ) from error
+    except OSError as error:
+        refuse(path, expected, f"it cannot be read ({error.strerror})", "Check the name")
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        refuse(path, expected, f"its text is not TOML ({error})", "Correct it there")

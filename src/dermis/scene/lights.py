@@ -25,7 +25,7 @@ class _Source(Plain):
     softness_mm: Annotated[float, Field(gt=0, le=1000)] = 1.5
 
 
-class PointLight(_Source, title="point light"):
+class PointLight(_Source):
     """Light from a point in all directions; falls off with the square of the distance."""
 
     kind: Literal["point"] = "point"
@@ -39,7 +39,7 @@ class PointLight(_Source, title="point light"):
         return self
 
 
-class SpotLight(PointLight, title="spot light"):
+class SpotLight(PointLight):
     """A point light within a cone around the line to the target.
 
     inner_degrees, outer_degrees : half angles where the cone begins and ends to fade
@@ -56,7 +56,7 @@ class SpotLight(PointLight, title="spot light"):
         return self
 
 
-class DirectionalLight(_Source, title="directional light"):
+class DirectionalLight(_Source):
     """Parallel light, as from the sun.
 
     direction : the way the light travels
@@ -66,10 +66,10 @@ class DirectionalLight(_Source, title="directional light"):
     direction: Direction
 
 
-Light = Annotated[PointLight | SpotLight | DirectionalLight, Field(discriminator="kind")]
+Light = PointLight | SpotLight | DirectionalLight
 
 
-def studio() -> tuple[PointLight | SpotLight | DirectionalLight, ...]:
+def studio() -> tuple[Light, ...]:
     """Three shadowed spots: a warm key from the upper left, a weak fill, a cool rim from behind."""
     from dermis.scene.files import preset_lights
 

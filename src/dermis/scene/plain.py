@@ -27,7 +27,7 @@ Intensity = Annotated[float, Field(ge=0, le=1e6)]
 Colour = tuple[Intensity, Intensity, Intensity]
 
 
-class Impossible(DermisError):
+class ImpossibleError(DermisError):
     """Values that cannot be.
 
     findings : by field: what was expected and what came
@@ -49,9 +49,8 @@ class Plain(BaseModel):
             super().__init__(**data)
         except ValidationError as error:
             model = type(self)
-            owner = model.model_config.get("title") or model.__name__.lower()
             findings = {_place(one): _finding(one, list(model.model_fields)) for one in error.errors()}
-            raise Impossible(owner, findings) from None
+            raise ImpossibleError(model.__name__, findings) from None
 
 
 def _place(one: ErrorDetails) -> str:
@@ -64,7 +63,8 @@ def _finding(one: ErrorDetails, known: list[str]) -> str:
         return f"expected one of {', '.join(known)}, but this name is unknown"
     if one["type"] == "missing":
         return "expected a value, but there is none"
-    expected = re.sub("^(Input should be|Value error,) ", "", one["msg"])
+    expected = re.sub("^(Input should be|Tuple should have|Value error,) |, unable to .*", "", one["msg"])
+    expected = expected.replace("a valid tuple", "a list")
     if expected.startswith(("greater", "less")):
         expected = f"a number {expected}"
     return f"expected {expected}, but {one['input']!r} came"

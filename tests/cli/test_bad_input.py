@@ -1,0 +1,129 @@
+"""Bad meshes, maps, numbers and names: each is refused with the culprit first, as `refused` checks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import pytest
+
+Run = Callable[..., Any]
+
+
+class Bad(NamedTuple):
+    """The words of a command; its culprit as the message begins; a part of what came."""
+
+    words: str
+    culprit: str
+    came: str
+
+
+MESHES = {
+    "nobody.obj": Bad("nobody.obj", "nobody.obj", "neither"),
+    "an unknown sample": Bad("lee_perry", "lee_perry", "neither"),
+    "a sample that is no head": Bad("lebombo", "lebombo", "environment"),
+    "an empty name": Bad("''", "head", "''"),
+    "a folder": Bad("inputs", "inputs", "neither"),
+    "not a mesh": Bad("text.obj", "text.obj", "none"),
+    "another format": Bad("head.fbx", "head.fbx", "'.fbx'"),
+    "cut short": Bad("short.obj", "short.obj", "cannot be read"),
+    "no uv": Bad("no_uv.obj", "no_uv.obj", "'skin' has none"),
+    "uv outside": Bad("far_uv.obj", "far_uv.obj", "to 1.5"),
+    "zero area": Bad("flat.obj", "flat.obj", "zero area"),
+    "non-manifold": Bad("fin.obj", "fin.obj", "non-manifold"),
+    "NaN position": Bad("nan.obj", "nan.obj", "NaN"),
+    "no triangles in skin": Bad("empty.obj", "empty.obj", "'skin' has no triangles"),
+    "too small": Bad("head.obj --unit-mm 0.1", "head.obj", "it is 24 mm high"),
+    "too large": Bad("head.obj --unit-mm 10", "head.obj", "it is 2400 mm high"),
+    "metres": Bad("metres.obj", "metres.obj", "it is 0.24 mm high"),
+    "unit of 0": Bad("head.obj --unit-mm 0", "head.obj", "0.0 came"),
+    "unit of 0 for a sample": Bad("lee_perry_smith --unit-mm 0", "LeePerrySmith.glb", "0.0 came"),
+    "unit NaN": Bad("head.obj --unit-mm nan", "head.obj", "nan came"),
+    "subdivided too often": Bad("head.obj --subdivide 4", "subdivide", "4 came"),
+    "unknown axis": Bad("head.obj --up x", "--up", "'x' came"),
+}
+MAPS = {
+    "no such map": Bad("head.obj --colour none.png", "none.png", "No such file"),
+    "not a picture": Bad("head.obj --colour text.obj", "text.obj", "first bytes"),
+    "truncated JPEG": Bad("head.obj --colour short.jpg", "short.jpg", "cannot be decoded"),
+    "truncated PNG": Bad("head.obj --specular short.png", "short.png", "cannot be decoded"),
+    "too few texels": Bad("head.obj --colour tiny.png", "tiny.png", "8 x 8"),
+    "bit depth": Bad("head.obj --height deep.tif --height-mm 0.02", "deep.tif", "kind I"),
+    "a float out of range": Bad("head.obj --colour bright.exr", "bright.exr", "to 9"),
+    "grey for colour": Bad("head.obj --colour grey.png", "grey.png", "grey"),
+    "colour for grey": Bad("head.obj --specular red.png", "red.png", "differ"),
+    "colour for normals": Bad("head.obj --normal red.png", "red.png", "no unit vectors"),
+    "height without mm": Bad("head.obj --height grey.png", "grey.png", "none was given"),
+    "mm without height": Bad("head.obj --height-mm 0.02", "height_mm", "without a height map"),
+    "negative mm": Bad("head.obj --height grey.png --height-mm -1", "grey.png", "-1"),
+    "NaN mm": Bad("head.obj --height grey.png --height-mm nan", "grey.png", "nan"),
+}
+NUMBERS = {
+    "size of nothing": Bad("head.obj --size 0x0", "--size", "0 came"),
+    "size beyond all": Bad("head.obj --size 100000x100000", "--size", "100000 came"),
+    "size of too much memory": Bad("head.obj --size 16384x16384 --samples 64", "--size", "16384"),
+    "size in words": Bad("head.obj --size large", "--size", "'large' came"),
+    "atlas under 64": Bad("head.obj --atlas 63", "--atlas", "63 came"),
+    "atlas over the device's limit": Bad("head.obj --atlas 1000000", "atlas", "it is 1000000"),
+    "atlas of a half": Bad("head.obj --atlas 64.5", "--atlas", "'64.5' came"),
+    "samples 0": Bad("head.obj --samples 0", "--samples", "0 came"),
+    "samples 65": Bad("head.obj --samples 65", "--samples", "65 came"),
+    "negative roughness": Bad("head.obj --roughness -0.1", "--roughness", "-0.1 came"),
+    "roughness NaN": Bad("head.obj --roughness nan", "--roughness", "nan came"),
+    "negative rho_s": Bad("head.obj --rho-s -1", "--rho-s", "-1.0 came"),
+    "mix below 0": Bad("head.obj --mix -0.01", "--mix", "-0.01 came"),
+    "mix above 1": Bad("head.obj --mix 1.01", "--mix", "1.01 came"),
+    "mix NaN": Bad("head.obj --mix nan", "--mix", "nan came"),
+    "mix in words": Bad("head.obj --mix half", "--mix", "'half' came"),
+    "negative exposure": Bad("head.obj --exposure -1", "--exposure", "-1.0 came"),
+    "exposure NaN": Bad("head.obj --exposure nan", "--exposure", "nan came"),
+    "exposure infinite": Bad("head.obj --exposure inf", "--exposure", "inf came"),
+    "background of two": Bad("head.obj --background 0,0", "--background", "'0,0' came"),
+    "background NaN": Bad("head.obj --background 0,nan,0", "--background", "nan came"),
+}
+NAMES = {
+    "unknown option": Bad("head.obj --colors red.png", "--colors", "Did you mean --colour"),
+    "option without value": Bad("head.obj --colour", "--colour", "none"),
+    "option given twice": Bad("head.obj --mix 0 --mix 1", "--mix", "twice"),
+    "two heads": Bad("head.obj head.obj", "head.obj", "this word came"),
+    "unknown technique": Bad("head.obj --technique wet", "--technique", "'wet' came"),
+    "unknown profile": Bad("head.obj --profile milk", "profile milk", "No such file"),
+    "profile of words": Bad("head.obj --profile words.csv", "profile words.csv", "rows"),
+    "profile that decreases": Bad("head.obj --profile falling.csv", "profile falling.csv", "they are"),
+    "profile without header": Bad("head.obj --profile red.toml", "profile red.toml", "first line"),
+    "unknown lights": Bad("head.obj --lights disco", "disco", "No such file"),
+    "unknown camera": Bad("head.obj --camera selfie", "selfie", "No such file"),
+    "camera file without one": Bad("head.obj --camera red.toml", "red.toml: camera", "none"),
+    "lights file without any": Bad("head.obj --lights red.toml", "red.toml", "none"),
+    "head option with a scene": Bad("red.toml --unit-mm 5", "--unit-mm", "it came"),
+}
+CASES = {**MESHES, **MAPS, **NUMBERS, **NAMES}
+
+
+@pytest.mark.parametrize("bad", CASES.values(), ids=CASES)
+def test_input_is_refused(refused: Run, opened: None, bad: Bad, request: pytest.FixtureRequest) -> None:
+    if "lee_perry_smith" in bad.words:
+        request.getfixturevalue("sample_folder")
+    message = refused(*(word.strip("'") for word in bad.words.split()))
+    assert message["culprit"].endswith(bad.culprit) and bad.came in message[0]
+
+
+def test_height_names_a_unit_that_would_fit(refused: Run) -> None:
+    assert "--unit-mm: 1000 would make it 240 mm high" in refused("metres.obj")[0]
+
+
+def test_unknown_adapter(refused: Run) -> None:
+    message = refused("head.obj", "--adapter", "voodoo")
+    assert message["culprit"] == "adapter 'voodoo'" and "auto, cpu" in message[0]
+
+
+def test_no_adapter(refused: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dermis.gpu.adapters.list_adapters", list)
+    message = refused("head.obj")
+    assert message["culprit"] == "adapter" and "mesa-vulkan-drivers" in message[0]
+
+
+def test_unknown_command(run: Run) -> None:
+    ended = run("paint", "head.obj")
+    assert (ended.code, ended.stdout) == (2, "")
+    assert ended.stderr.startswith("dermis: paint: expected a command of dermis, but ")

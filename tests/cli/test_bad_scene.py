@@ -1,0 +1,78 @@
+"""Bad scene files: the message names the file and the part of it that is at fault."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+Run = Callable[..., Any]
+SCENE = '[head]\nname = "head.obj"\n'
+SCENES = {
+    "no scene": (None, "scene.toml", "No such file"),
+    "not TOML": ("head == 5", "scene.toml", "line 1"),
+    "not text": ("\udcff", "scene.toml", "not TOML"),
+    "no head": ("[skin]\n", "scene.toml: head", "there is none"),
+    "head without name": ("[head]\n", "scene.toml: head", "there is none"),
+    "head's name a number": ("[head]\nname = 5", "scene.toml: head", "5 came"),
+    "head that is not there": ('[head]\nname = "x.obj"', "x.obj", "neither"),
+    "unknown part": (SCENE + "[lamp]\n", "scene.toml", "'lamp' came"),
+    "unknown key of head": (SCENE + "units = 1", "scene.toml: head", "unknown"),
+    "unknown key of skin": (SCENE + "[skin]\nrough = 1", "scene.toml: skin", "unknown"),
+    "unknown key of render": (SCENE + "[render]\nwidth = 1", "scene.toml: render", "unknown"),
+    "unknown key of camera": (
+        SCENE + "[camera]\nposition = [0, 0, 900]\nfov = 1",
+        "scene.toml: camera",
+        "unknown",
+    ),
+    "unknown key of a light": (
+        SCENE + "[[lights]]\nposition = [0, 0, 900]\nwatt = 1",
+        "scene.toml: light 1",
+        "unknown",
+    ),
+    "unit in words": (SCENE + 'unit_mm = "inch"', "scene.toml: head", "'inch' came"),
+    "skin a number": ("skin = 5\n" + SCENE, "scene.toml: skin", "5 came"),
+    "mix too large": (SCENE + "[skin]\nmix = 2", "scene.toml: skin", "2 came"),
+    "size in words": (SCENE + '[render]\nsize = "64x64"', "scene.toml: render", "'64x64' came"),
+    "light at its target": (SCENE + "[[lights]]\nposition = [0, 0, 0]", "scene.toml: light 1", "[0, 0, 0]"),
+    "light of no kind": (SCENE + '[[lights]]\nkind = "moon"', "scene.toml: light 1", "'moon' came"),
+    "light nowhere": (SCENE + "[[lights]]\nposition = [0, 0, nan]", "scene.toml: light 1", "nan came"),
+    "light too far": (SCENE + "[[lights]]\nposition = [0, 0, 1e30]", "scene.toml: light 1", "1e+30 came"),
+    "light without direction": (
+        SCENE + '[[lights]]\nkind = "directional"\ndirection = [0, 0, 0]',
+        "scene.toml: light 1",
+        "[0, 0, 0] came",
+    ),
+    "negative light": (
+        SCENE + "[[lights]]\nposition = [0, 0, 900]\nirradiance = [-1, 0, 0]",
+        "scene.toml: light 1",
+        "-1 came",
+    ),
+    "light inside the head": (SCENE + "[[lights]]\nposition = [0, 0, 10]", "light 1", "[0, 0, 10]"),
+    "cone inside out": (
+        SCENE + '[[lights]]\nkind = "spot"\nposition = [0, 0, 900]\ninner_degrees = 50',
+        "scene.toml: light 1",
+        "50",
+    ),
+    "no lights": ("lights = []\n" + SCENE, "scene.toml", "none came"),
+    "camera at its target": (SCENE + "[camera]\nposition = [0, 0, 0]", "scene.toml: camera", "[0, 0, 0]"),
+    "camera along up": (SCENE + "[camera]\nposition = [0, 900, 0]", "scene.toml: camera", "[0, 900, 0]"),
+    "camera of no size": (
+        SCENE + "[camera]\nposition = [0, 0, 900]\nframe_mm = 0",
+        "scene.toml: camera",
+        "0 came",
+    ),
+    "camera of a number": ("camera = 5\n" + SCENE, "scene.toml: camera", "5 came"),
+}
+
+
+@pytest.mark.parametrize("bad", SCENES.values(), ids=SCENES)
+def test_scene_is_refused(refused: Run, opened: None, inputs: Path, bad: tuple[str | None, str, str]) -> None:
+    text, culprit, came = bad
+    (inputs / "scene.toml").unlink(missing_ok=True)
+    if text is not None:
+        (inputs / "scene.toml").write_bytes(text.encode("utf-8", "surrogateescape"))
+    message = refused("scene.toml")
+    assert message["culprit"].startswith(culprit) and came in message[0]

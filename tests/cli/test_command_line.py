@@ -1,0 +1,126 @@
+"""The command as a program: help, start-up, exit codes, and the two small commands' words."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import dermis.cite
+from dermis.cli.cite import TECHNIQUE
+
+Run = Callable[..., Any]
+
+
+def _process(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "dermis", *words]
+    return subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False)
+
+
+def test_a_process_ends_with_2_and_leaves_nothing(tmp_path: Path) -> None:
+    ended = _process("render", "nobody.obj", "-o", "a.png", folder=tmp_path)
+    assert (ended.returncode, ended.stdout) == (2, "")
+    assert ended.stderr.startswith("dermis: nobody.obj: expected ") and ended.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_process_renders(folder: Path) -> None:
+    ended = _process(
+        "render",
+        "head.obj",
+        "-o",
+        "a.png",
+        "--size",
+        "64x64",
+        "--atlas",
+        "64",
+        "--adapter",
+        "cpu",
+        "--json",
+        folder=folder,
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert json.loads(ended.stdout)["image"] == "a.png"
+    assert (folder / "a.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+def test_a_full_disk_behind_stdout_is_told() -> None:
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "dermis", "cite"]
+        ended = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert ended.returncode == 2
+    assert ended.stderr.startswith("dermis: stdout: expected ") and "No space left" in ended.stderr
+
+
+def test_a_reader_that_leaves_early_is_no_fault() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-m", "dermis", "cite"]
+    ended = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writing)
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("words", [["--help"], ["render", "--help"], ["--version"]])
+def test_help_loads_nothing_heavy(words: list[str]) -> None:
+    code = (
+        f"import sys, dermis.cli; sys.argv = ['dermis', *{words}]\n"
+        "try: dermis.cli.main()\n"
+        "except SystemExit: heavy = {'numpy', 'wgpu', 'trimesh', 'scipy', 'pydantic'} & set(sys.modules)\n"
+        "print(heavy or 'light', file=sys.stderr)"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ended.stderr.strip() == "light"
+    assert ended.stdout
+
+
+def test_help_of_the_whole_names_each_command(run: Run) -> None:
+    ended = run("--help")
+    assert (ended.code, ended.stderr) == (0, "")
+    for command in ("render", "doctor", "cite"):
+        line = next(line for line in ended.stdout.splitlines() if f" {command} " in line)
+        assert len(line.split()) > 5  # with a sentence of what it does
+
+
+@pytest.mark.parametrize("command", ["render", "doctor", "cite"])
+def test_help_of_each_command_shows_examples(run: Run, command: str) -> None:
+    ended = run(command, "--help")
+    assert (ended.code, ended.stderr) == (0, "")
+    assert ended.stdout.count(f"    dermis {command}") >= 2
+
+
+def test_help_of_render_explains_every_option(run: Run) -> None:
+    text = run("render", "--help").stdout
+    for line in text.splitlines():
+        option = line.removeprefix("│ ").split(" ")[0]
+        assert not (option.startswith("--") and len(line.strip(" │").split()) < 4), line
+    assert text.count("│ --") >= 24
+
+
+def test_version(run: Run) -> None:
+    assert run("--version").stdout == f"{version('dermis')}\n"
+
+
+def test_cite_prints_the_works_behind_the_technique(run: Run) -> None:
+    ended = run("cite")
+    assert (ended.code, ended.stderr) == (0, "")
+    assert list(dermis.cite.parse_bibtex(ended.stdout)) == list(TECHNIQUE)
+
+
+def test_cite_prints_the_works_asked_for(run: Run) -> None:
+    ended = run("cite", "Kelemen2001", "Donner2008")
+    assert list(dermis.cite.parse_bibtex(ended.stdout)) == ["Kelemen2001", "Donner2008"]
+
+
+def test_cite_refuses_an_unknown_key(run: Run) -> None:
+    ended = run("cite", "Nobody1900")
+    assert (ended.code, ended.stdout) == (2, "")
+    assert "'Nobody1900'" in ended.stderr and "Kelemen2001" in ended.stderr

@@ -1,0 +1,69 @@
+"""Scene data are frozen, checked, and say in one form what is wrong."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from dermis.errors import DermisError
+from dermis.scene import Camera, DirectionalLight, PointLight, Settings, Skin, SpotLight
+from dermis.scene.plain import ImpossibleError
+
+FORM = re.compile(r"\w+: (\S+: )?expected .+, but .+\. Correct it\.")
+BAD = [
+    (Skin, {"mix": 1.5}, "1.5 came"),
+    (Skin, {"mix": float("nan")}, "nan came"),
+    (Skin, {"roughness": 0.0}, "0.05"),
+    (Skin, {"rho_s": -0.1}, "-0.1 came"),
+    (Skin, {"albedo": "both"}, "'map' or 'profile'"),
+    (Skin, {"colour": 1}, "one of profile, albedo, mix"),
+    (Settings, {"size": (0, 64)}, "size.0: expected a number greater than or equal to 1"),
+    (Settings, {"size": (64,)}, "size.1"),
+    (Settings, {"size": (64, 64, 64)}, "2 items"),
+    (Settings, {"size": (16384, 16384), "samples": 2}, "268 million"),
+    (Settings, {"atlas": 63}, "63 came"),
+    (Settings, {"shadow_size": 0}, "0 came"),
+    (Settings, {"samples": 65}, "65 came"),
+    (Settings, {"exposure": 0}, "0 came"),
+    (Settings, {"exposure": float("inf")}, "inf came"),
+    (Settings, {"background": (0, 0, -1)}, "background.2"),
+    (Settings, {"technique": "wet"}, "'wet' came"),
+    (Camera, {}, "position: expected a value, but there is none"),
+    (Camera, {"position": (0, 0, 0)}, "away from the target"),
+    (Camera, {"position": (0, 900, 0)}, "along up"),
+    (Camera, {"position": (0, 0, 1e30)}, "1000000"),
+    (Camera, {"position": (0, 0, 900), "up": (0, 0, 0)}, "a direction other than"),
+    (Camera, {"position": (0, 0, 900), "frame_mm": float("nan")}, "nan came"),
+    (PointLight, {"position": (1, 2, 3), "target": (1, 2, 3)}, "away from the target"),
+    (PointLight, {"position": (0, 0, 900), "irradiance": (1, 1, float("inf"))}, "irradiance.2"),
+    (PointLight, {"position": (0, 0, 900), "softness_mm": 1e300}, "softness_mm"),
+    (SpotLight, {"position": (0, 0, 900), "inner_degrees": 35}, "inner_degrees less than outer_degrees"),
+    (SpotLight, {"position": (0, 0, 900), "outer_degrees": 90}, "90 came"),
+    (DirectionalLight, {"direction": (0, 0, 0)}, "a direction other than"),
+]
+
+
+@pytest.mark.parametrize(("kind", "values", "says"), BAD)
+def test_impossible_values_are_refused(kind: type, values: dict, says: str) -> None:
+    with pytest.raises(DermisError) as caught:
+        kind(**values)
+    message = str(caught.value)
+    assert message.startswith(f"{kind.__name__}: ") and says in message
+    assert FORM.fullmatch(message), message
+
+
+def test_all_that_is_wrong_is_told_at_once() -> None:
+    with pytest.raises(ImpossibleError) as caught:
+        Skin(mix=2, roughness=-1)
+    assert list(caught.value.findings) == ["mix", "roughness"]
+
+
+def test_edges_of_the_ranges_are_allowed() -> None:
+    Skin(mix=0, roughness=0.05, rho_s=0), Skin(mix=1, roughness=1, rho_s=1)
+    Settings(size=(1, 1), atlas=64, samples=1), Settings(size=(16384, 1), samples=64)
+
+
+def test_scene_data_are_frozen() -> None:
+    with pytest.raises(ValueError, match="frozen"):
+        Skin().mix = 0.1  # type: ignore[misc]

@@ -1,0 +1,24 @@
+"""A head small enough to render in a moment: an ellipsoid as the text of an OBJ file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from dermis.assets.primitives import uv_sphere
+
+HEIGHT_MM = 240.0
+SIZE = (160.0, HEIGHT_MM, 190.0)
+
+
+def obj_text() -> str:
+    """Vertices, uv (v upwards, as OBJ has it) and faces in the group `skin`; millimetres, face to +Z."""
+    ball = uv_sphere(0.5, 24, 12)
+    places = [f"v {x:.6g} {y:.6g} {z:.6g}" for x, y, z in ball.positions * SIZE]
+    uv = [f"vt {u:.6g} {1 - v:.6g}" for u, v in ball.uv]
+    faces = [f"f {a}/{a} {b}/{b} {c}/{c}" for a, b, c in ball.triangles + 1]
+    return "\n".join([*places, *uv, "usemtl skin", *faces, ""])
+
+
+def write_head(path: Path) -> Path:
+    path.write_text(obj_text())
+    return path
