@@ -147,7 +147,7 @@ def test_unknown_direction_of_green_is_refused(tmp_path: Path) -> None:
         load_maps(normal=path, normal_y="left")  # type: ignore[arg-type]
 
 
-@pytest.mark.skipif(not os.environ.get("DERMIS_DATA"), reason="needs DERMIS_DATA")
+@pytest.mark.skipif(not os.environ.get("DERMIS_DATA"), reason="DERMIS_DATA is not set")
 def test_head_scan_normals_lean_as_its_heights_do() -> None:
     from dermis.assets.samples import SAMPLES, fetch
 
@@ -161,7 +161,7 @@ def test_head_scan_normals_lean_as_its_heights_do() -> None:
     assert np.corrcoef(maps.normal[..., 1].ravel(), -dy.ravel())[0, 1] > 0.2
 
 
-@pytest.mark.skipif(not os.environ.get("DERMIS_DATA"), reason="needs DERMIS_DATA")
+@pytest.mark.skipif(not os.environ.get("DERMIS_DATA"), reason="DERMIS_DATA is not set")
 def test_head_scan_has_no_other_normal_map() -> None:
     from dermis.assets.samples import fetch
 

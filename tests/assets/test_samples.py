@@ -172,7 +172,7 @@ def test_file_gone_from_home_is_refused(cache: Path, home: str, monkeypatch: pyt
         fetch("tiny")
 
 
-@pytest.mark.skipif(not os.environ.get("DERMIS_DATA"), reason="needs DERMIS_DATA")
+@pytest.mark.skipif(not os.environ.get("DERMIS_DATA"), reason="DERMIS_DATA is not set")
 @pytest.mark.parametrize("name", SAMPLES)
 def test_data_folder_has_every_sample(name: str) -> None:
     assert cached(name)
