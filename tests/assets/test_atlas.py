@@ -159,9 +159,20 @@ def test_reach_by_brute_force() -> None:
             assert atlas.reach[y, x, k] == n - 1
 
 
-def test_reach_saturates() -> None:
+def test_reach_goes_all_the_way() -> None:
     reach = build_atlas(plane(100.0), 300).reach
-    assert reach[10, 299].tolist() == [255, 0, 10, 255]
+    assert reach[10, 299].tolist() == [299, 0, 10, 289]
+
+
+def test_of_mirrored_halves_one_is_mapped() -> None:
+    """Two halves on the same uv, joined at their centre line: one chart; the turned half is lit directly."""
+    positions = np.array([[x, y, 0] for x in (-50, 0, 50) for y in (-50, 50)], np.float32)
+    uv = np.array([[u, v] for u in (0.9, 0.1, 0.9) for v in (0.9, 0.1)], np.float32)
+    triangles = np.array([[0, 2, 1], [1, 2, 3], [2, 4, 3], [3, 4, 5]], np.int32)
+    mesh = build_mesh(positions, uv, triangles, np.zeros(4, np.int32), (SKIN,))
+    atlas = build_atlas(mesh, 64)
+    assert atlas.mapped.tolist() in ([True] * 2 + [False] * 2, [False] * 2 + [True] * 2)
+    assert set(np.unique(atlas.triangle)) - {-1} == set(np.flatnonzero(atlas.mapped))
 
 
 def test_a_collapsed_chart_is_left_out() -> None:

@@ -24,10 +24,8 @@ CONTENT = b"a small environment"
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty cache, and no DERMIS_DATA."""
-    import platformdirs
-
     monkeypatch.delenv("DERMIS_DATA", raising=False)
-    monkeypatch.setattr(platformdirs, "user_cache_dir", lambda name: str(tmp_path / "cache" / name))
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path / "cache" / "dermis"))
     return tmp_path / "cache" / "dermis" / "samples"
 
 

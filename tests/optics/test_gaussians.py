@@ -111,3 +111,10 @@ def test_unknown_names_list_the_presets(tmp_path: Path) -> None:
         load_profile("no-such-skin")
     with pytest.raises(DermisError, match="preset"):
         load_profile(tmp_path)
+
+
+def test_more_gaussians_than_the_frame_takes_are_refused(tmp_path: Path) -> None:
+    rows = "\n".join(f"{0.1 * k},0.1,0.1,0.1" for k in range(1, 18))
+    (tmp_path / "many.csv").write_text(f"variance_mm2,red,green,blue\n{rows}\n", encoding="utf-8")
+    with pytest.raises(DermisError, match="at most 16 Gaussians"):
+        load_profile(tmp_path / "many.csv")

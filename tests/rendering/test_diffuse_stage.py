@@ -155,3 +155,14 @@ def test_a_symmetric_patch_stays_symmetric(device: Device, stages: Stages) -> No
     source = source + source.transpose(1, 0, 2)
     for level in blur(device, stages.diffuse, source, upload_atlas(device, atlas)):
         assert np.abs(level - level.transpose(1, 0, 2)).max() < TWIN * level.max()
+
+
+@pytest.mark.parametrize("texels_per_mm", [1.0, 3.0, 6.0])
+def test_one_wide_gaussian_alone_is_smooth(device: Device, stages: Stages, texels_per_mm: float) -> None:
+    """No narrower level prepares the source: it must not be read sparsely."""
+    atlas = build_atlas(plane(256 / texels_per_mm), 256)
+    source, _, r2, area = point_of_light(atlas)
+    (image,) = blur(device, stages.diffuse, source, upload_atlas(device, atlas), np.array([7.41]))
+    exact = np.exp(-r2 / (2 * 7.41)) / (2 * np.pi * 7.41) * area
+    assert np.abs(image[..., 0] - exact).max() < SPREAD_PEAK * exact.max()
+    assert image[..., 0].sum() == pytest.approx(1.0, rel=SPREAD_ENERGY)

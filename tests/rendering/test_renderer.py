@@ -34,10 +34,32 @@ def drawn(renderer: Renderer, what: Scene, **settings: Any) -> Image:
 
 
 def test_the_same_scene_gives_the_same_bytes(renderer: Renderer) -> None:
-    first, second = (renderer.draw(scene(), settings_of(samples=3)) for _ in range(2))
-    assert first.linear().tobytes() == second.linear().tobytes()
-    assert first.srgb8().tobytes() == second.srgb8().tobytes()
-    assert first.linear().max() > 0.1
+    images = []
+    for _ in range(2):
+        one = renderer.draw(scene(), settings_of(samples=3))
+        images.append((one.linear().tobytes(), one.srgb8().tobytes()))
+    assert images[0] == images[1]
+    assert one.linear().max() > 0.1
+
+
+def test_an_older_image_is_not_mistaken_for_the_newest(renderer: Renderer) -> None:
+    older = renderer.draw(scene(), settings_of())
+    renderer.draw(scene(), settings_of(exposure=2.0))
+    with pytest.raises(RuntimeError, match="newer frame"):
+        older.linear()
+
+
+def test_a_failed_frame_leaves_no_half_drawn_shadows(monkeypatch: pytest.MonkeyPatch) -> None:
+    renderer = Renderer("cpu")
+
+    def fail(*_: Any) -> None:
+        raise ValueError
+
+    with monkeypatch.context() as patch:
+        patch.setattr(renderer._stages.shade, "draw", fail)
+        with pytest.raises(ValueError):
+            renderer.draw(scene(), settings_of())
+    assert drawn(renderer, scene()).tobytes() == drawn(Renderer("cpu"), scene()).tobytes()
 
 
 CHANGES: dict[str, tuple[Callable[[], Scene], dict[str, Any]]] = {

@@ -16,7 +16,17 @@ from dermis.specular.albedo import albedo_table
 
 Floats = NDArray[np.float64]
 SMOOTH = 1.6
+WIDE_TRUNCATION = 4.0
 DEFAULT_COLOUR = float(np.float16(0.8))  # maps are stored as halves
+
+
+def _table_ratio(relative: Floats) -> Floats:
+    """The kernel table between its rows."""
+    taps = np.ceil(TRUNCATION * np.sqrt(relative)).astype(int)
+    row = relative * ROWS_PER_UNIT
+    table = kernel_table().astype(np.float64)
+    low, high = table[row.astype(int), taps], table[row.astype(int) + 1, taps]
+    return np.asarray(low + (high - low) * (row % 1))
 
 
 def spread(
@@ -29,13 +39,10 @@ def spread(
     scale = stretch[..., axis].astype(np.float64)
     sigma, sigma_before = np.sqrt(variance) * scale, np.sqrt(before) * scale
     step = np.maximum(1, np.floor(np.minimum(SMOOTH * sigma_before, sigma)))
-    step = np.maximum(step, np.ceil(sigma / np.sqrt(WIDEST)))
-    relative = np.minimum((sigma / step) ** 2, WIDEST)
-    taps = np.ceil(TRUNCATION * np.sqrt(relative)).astype(int)
-    row = relative * ROWS_PER_UNIT
-    table = kernel_table().astype(np.float64)
-    low, high = table[row.astype(int), taps], table[row.astype(int) + 1, taps]
-    q = low + (high - low) * (row % 1)
+    relative = (sigma / step) ** 2
+    wide = relative > WIDEST
+    taps = np.ceil(np.where(wide, WIDE_TRUNCATION, TRUNCATION) * np.sqrt(relative)).astype(int)
+    q = np.where(wide, np.exp(-0.5 / np.maximum(relative, 1)), _table_ratio(np.minimum(relative, WIDEST)))
     y, x = np.indices(scale.shape)
     behind, ahead = reach[..., 2 * axis].astype(int), reach[..., 2 * axis + 1].astype(int)
     total, weights = source.copy(), np.ones(scale.shape)

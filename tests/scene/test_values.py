@@ -21,7 +21,7 @@ BAD = [
     (Settings, {"size": (0, 64)}, "size.0: expected a number greater than or equal to 1"),
     (Settings, {"size": (64,)}, "size.1"),
     (Settings, {"size": (64, 64, 64)}, "2 items"),
-    (Settings, {"size": (16384, 16384), "samples": 2}, "268 million"),
+    (Settings, {"size": (16384, 16384), "samples": 2}, "134 million"),
     (Settings, {"atlas": 63}, "63 came"),
     (Settings, {"shadow_size": 0}, "0 came"),
     (Settings, {"samples": 65}, "65 came"),

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.assets.atlas_raster import cross, rasterise, texel_corners
+from dermis.assets.geometry import uv_cross
 from dermis.assets.mesh import Mesh
 from dermis.assets.uv import charts, usable
 from dermis.errors import refuse
@@ -24,14 +25,14 @@ class Atlas:
     triangle : (n, n) int32 triangle at the texel's centre, nearest one in the gutter, -1 elsewhere
     barycentric : (n, n, 2) uint16 weights of the triangle's second and third corner [1/65535]
     stretch : (n, n, 2) float16 texels per mm along u and v [1/mm]
-    reach : (n, n, 4) uint8 texels to the left, right, up and down that are on the same chart
+    reach : (n, n, 4) uint16 texels to the left, right, up and down that are on the same chart
     mapped : (f,) triangles that own texels; the others (opaque, collapsed, overlapped in uv) are lit directly
     """
 
     triangle: NDArray[np.int32]
     barycentric: NDArray[np.uint16]
     stretch: NDArray[np.float16]
-    reach: NDArray[np.uint8]
+    reach: NDArray[np.uint16]
     mapped: NDArray[np.bool_]
 
     @property
@@ -71,9 +72,8 @@ def build_atlas(mesh: Mesh, size: int) -> Atlas:
     fit = usable(mesh, size, _LEAST_TEXELS) & skin[mesh.material]
     texel, triangle = rasterise(mesh, size, np.flatnonzero(fit))
     mapped = fit & ~_overlapped(chart, texel, triangle, size)
-    keep = mapped[triangle]
-    owner: NDArray[np.int32] = np.full((size, size), -1, dtype=np.int32)
-    owner.ravel()[texel[keep]] = triangle[keep]
+    owner, lost = _owners(mesh, mapped, texel, triangle, size)
+    mapped &= ~lost
     for _ in range(GUTTER):
         owner = _dilate(owner)
     mapped &= _readable(mesh, size, owner)
@@ -95,6 +95,24 @@ def _overlapped(
     own = np.bincount(chart[triangle][winner[texel] == chart[triangle]], minlength=count)
     lost: NDArray[np.bool_] = own < 0.5 * np.maximum(area, 1)
     return np.asarray(lost[chart])
+
+
+def _owners(
+    mesh: Mesh, mapped: NDArray[np.bool_], texel: NDArray[np.int64], triangle: NDArray[np.int64], size: int
+) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    """The triangle of each texel, and the triangles that lose most of theirs to others of their own chart.
+
+    Two mirrored halves folded onto each other are one chart: the half that is not mirrored in uv wins.
+    """
+    keep = mapped[triangle]
+    texel, triangle = texel[keep], triangle[keep]
+    order = np.argsort(uv_cross(mesh.uv[mesh.triangles])[triangle] < 0, kind="stable")
+    owner: NDArray[np.int32] = np.full((size, size), -1, dtype=np.int32)
+    owner.ravel()[texel[order]] = triangle[order]
+    count = len(mapped)
+    area = np.bincount(triangle, minlength=count)
+    own = np.bincount(triangle[owner.ravel()[texel] == triangle], minlength=count)
+    return owner, own < 0.5 * area
 
 
 def _dilate(owner: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -148,7 +166,7 @@ def _stretch(
     return whole
 
 
-def _reach(chart: NDArray[np.integer]) -> NDArray[np.uint8]:
+def _reach(chart: NDArray[np.integer]) -> NDArray[np.uint16]:
     """Run lengths of equal chart to the left, right, up and down of each texel."""
 
     def before(rows: NDArray[np.integer]) -> NDArray[np.int64]:
@@ -164,4 +182,4 @@ def _reach(chart: NDArray[np.integer]) -> NDArray[np.uint8]:
         before(chart.T).T,
         before(chart.T[:, ::-1])[:, ::-1].T,
     )
-    return np.stack([np.minimum(run, 255) for run in runs], axis=-1).astype(np.uint8)
+    return np.stack(runs, axis=-1).astype(np.uint16)

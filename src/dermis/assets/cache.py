@@ -12,17 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from dermis.assets.atlas import GUTTER, Atlas, build_atlas
+from dermis.assets.folders import cache_folder
 from dermis.assets.mesh import Mesh
 
-_FORM = 1  # raise when `build_atlas` gives other results for the same mesh
+_FORM = 2  # raise when `build_atlas` gives other results for the same mesh
 _MOST_BYTES = 2 << 30
-
-
-def cache_folder() -> Path:
-    """Where the package keeps what can be made again: DERMIS_CACHE, else the user's cache folder."""
-    import platformdirs
-
-    return Path(os.environ.get("DERMIS_CACHE") or platformdirs.user_cache_dir("dermis"))
 
 
 def cached_atlas(mesh: Mesh, size: int) -> Atlas:

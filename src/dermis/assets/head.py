@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -65,6 +66,8 @@ def load_head(
     unit_mm: float | None = None,
     v_origin: Literal["auto", "top", "bottom"] = "auto",
     up: Literal["y", "z"] = "y",
+    normal_y: Literal["up", "down"] = "up",
+    opaque: Sequence[str] = (),
     subdivide: int = 0,
 ) -> Head:
     """A sample ("lee_perry_smith") or a mesh file (.glb, .gltf, .obj, .ply) with the given maps.
@@ -76,6 +79,8 @@ def load_head(
     unit_mm : length of the file's unit [mm]; metres for glTF and mm otherwise when left out
     v_origin : which row of the maps v = 0 is; the format's rule when "auto"
     up : the file's upward axis
+    normal_y : way in which green points in the normal map: "up" (OpenGL) or "down" (DirectX)
+    opaque : groups of the file that are not skin, whatever they are called
     subdivide : levels of Loop subdivision, 0 to 3
 
     Raises DermisError for files that cannot be rendered as a head.
@@ -95,7 +100,7 @@ def load_head(
     elif not path.is_file():
         known = ", ".join(_head_names())
         refuse(name or "head", f"a mesh file or a sample ({known})", f"{name!r} is neither", "Check the name")
-    mesh = load_mesh(path, unit_mm=unit_mm, v_origin=v_origin, up=up)
+    mesh = load_mesh(path, unit_mm=unit_mm, v_origin=v_origin, up=up, opaque=tuple(opaque))
     check_head_height(mesh, name, unit_mm)
     own = {"colour": colour, "normal": normal, "height": height}
     own |= {"specular": specular, "roughness": roughness}
@@ -103,8 +108,8 @@ def load_head(
     if height_mm is not None and chosen["height"] is None:
         came = f"{height_mm} came without a height map"
         refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
-    mesh = subdivided(mesh, subdivide)
-    return Head(name, mesh, load_maps(**chosen, height_mm=height_mm), sample.attribution if sample else "")
+    maps = load_maps(**chosen, height_mm=height_mm, normal_y=normal_y)
+    return Head(name, subdivided(mesh, subdivide), maps, sample.attribution if sample else "")
 
 
 def _chosen(given: dict[str, MapFile], sample: dict[str, Path]) -> dict[str, Any]:

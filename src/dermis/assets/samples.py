@@ -13,6 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, NoReturn
 
+from dermis.assets.folders import cache_folder
 from dermis.errors import DermisError, refuse
 
 DATA_VARIABLE = "DERMIS_DATA"
@@ -102,9 +103,7 @@ def _data_folder() -> str:
 
 
 def _folder(sample: Sample) -> Path:
-    import platformdirs
-
-    base = _data_folder() or Path(platformdirs.user_cache_dir("dermis")) / "samples"
+    base = _data_folder() or cache_folder() / "samples"
     return Path(base) / sample.folder
 
 

@@ -43,7 +43,7 @@ def doctor(*, adapter: str = "auto", as_json: Json = False) -> int:
 
 def examine(wanted: str) -> dict[str, Any]:
     """All findings as one JSON-ready object."""
-    from dermis.assets.cache import cache_folder
+    from dermis.assets.folders import cache_folder
     from dermis.assets.samples import SAMPLES, cached
     from dermis.gpu.adapters import WANTED_FEATURES, list_adapters
 
@@ -113,7 +113,7 @@ def _lines(report: dict[str, Any]) -> list[str]:
         lines.append(f"  {one['name']}, {one['backend']} ({one['kind']}): {features}")
     if used := report["used"]:
         test = report["self_test"]
-        lines.append(f"used: {used['name']}, {used['backend']}, because it is {used['reason']}")
+        lines.append(f"used: {used['name']}, {used['backend']}, because {used['reason']}")
         lines.append(f"half-float stores round: {used['half_store_rounding']}")
         result = "passed" if test["passed"] else "FAILED"
         lines.append(f"test frame: {result} in {test['frame_ms']:.0f} ms, centre {test['centre']:.3f} of 1")

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import os
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from dermis.errors import refuse
 
-# Not needed to render; each makes something better: half-size tables, timings, half arithmetic.
+# None is needed to render; timestamps give stage times, the others tell what more an adapter could do.
 WANTED_FEATURES = ("float32-filterable", "timestamp-query", "shader-f16")
 
 _KINDS = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", "CPU")
@@ -65,7 +64,7 @@ def fitting_adapters(wanted: str) -> tuple[list[Adapter], str]:
     if not adapters:
         refuse("adapter", "a Vulkan, Metal or DX12 adapter", "this machine shows none", INSTALL_HINT)
     if wanted == "auto":
-        return adapters, "the fastest kind, with the most features"
+        return adapters, "it is the fastest kind, with the most features"
     if wanted == "cpu":
         fitting, reason = [a for a in adapters if a.kind == "CPU"], "software was asked for"
     else:
@@ -97,8 +96,12 @@ def _rank(kind: str) -> int:
 @contextlib.contextmanager
 def _quiet_drivers() -> Iterator[None]:
     """Drivers without a display write warnings to the process's stderr; they would spoil ours."""
-    sys.stderr.flush()
-    saved, sink = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        saved = os.dup(2)
+    except OSError:  # no stderr to spoil
+        yield
+        return
+    sink = os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(sink, 2)
         yield

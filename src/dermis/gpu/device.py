@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections import OrderedDict
 from collections.abc import Iterator
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -52,6 +53,13 @@ class Device:
         self._uniforms: OrderedDict[bytes, Any] = OrderedDict()
         self.fence = self.buffer(np.zeros(1, np.uint32), "UNIFORM")
         self._samplers: dict[tuple[tuple[str, str], ...], Any] = {}
+
+    @cached_property
+    def timestamp_period_ns(self) -> float:
+        """Length of a timestamp's tick [ns]; wgpu hands out the native API's ticks."""
+        from wgpu.backends.wgpu_native import lib
+
+        return float(lib.wgpuQueueGetTimestampPeriod(self.handle.queue._internal))
 
     def uniform(self, record: NDArray[Any]) -> Any:
         """A uniform buffer that holds `record`; the same bytes give the same buffer."""

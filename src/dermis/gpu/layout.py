@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,7 @@ class Binding:
     entry: dict[str, Any]
 
 
+@cache
 def struct_dtype(text: str, name: str) -> np.dtype[np.void]:
     """The numpy dtype of a WGSL struct, with the offsets that the shader uses.
 

@@ -37,10 +37,11 @@ class Timestamps:
             return {"total": 0.0}
         raw = self._device.handle.queue.read_buffer(self._resolved, 0, 8 * len(self._stages))
         ticks = np.frombuffer(raw, dtype=np.uint64).astype(np.int64)
+        ms = 1e-6 * self._device.timestamp_period_ns
         times: dict[str, float] = {}
         for stage, lasted in zip(self._stages, np.diff(ticks), strict=False):
-            times[stage] = times.get(stage, 0.0) + float(lasted) * 1e-6
-        times["total"] = float(ticks[-1] - ticks[0]) * 1e-6
+            times[stage] = times.get(stage, 0.0) + float(lasted) * ms
+        times["total"] = float(ticks[-1] - ticks[0]) * ms
         return times
 
 

@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.errors import refuse
 
 Floats = NDArray[np.float64]
+MOST_GAUSSIANS = 16
+_WIDEST_MM2 = 1e4
 _HEADER = ["variance_mm2", "red", "green", "blue"]
 _FILE_FORM = "a CSV file with the columns " + ",".join(_HEADER)
 
@@ -39,6 +41,9 @@ class GaussianSum:
             )
         if not (np.isfinite(variance).all() and np.isfinite(weight).all()):
             refuse(self.name, "finite numbers", "NaN or infinity came", _MEND)
+        if len(variance) > MOST_GAUSSIANS or variance.max() > _WIDEST_MM2:
+            limit = f"at most {MOST_GAUSSIANS} Gaussians of up to {_WIDEST_MM2:g} mm2"
+            refuse(self.name, limit, f"{len(variance)} up to {variance.max():g} came", _MEND)
         if (variance <= 0).any() or (np.diff(variance) <= 0).any():
             refuse(self.name, "variances above 0 that increase", f"they are {variance.tolist()}", _MEND)
         if (weight < 0).any() or (weight.sum(axis=0) <= 0).any():

@@ -23,6 +23,7 @@ from dermis.scene.camera import Camera
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
+from dermis.specular.fresnel import SKIN_F0
 
 Floats = NDArray[np.float64]
 _RELIT_MM2 = (
@@ -136,7 +137,7 @@ def skin_record(program: ComputeProgram, scene: Scene, head: HeadTextures) -> An
         "Skin",
         roughness=1.0 if scene.head.maps.roughness is not None else skin.roughness,
         rho_s=skin.rho_s,
-        f0=0.028,
+        f0=SKIN_F0,
         mix=skin.mix,
         relief_band=head.relief_band,
         light_count=len(scene.lights),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ def taps(variance: float) -> int:
     return math.ceil(TRUNCATION * math.sqrt(variance))
 
 
+@cache
 def kernel_table() -> NDArray[np.float32]:
     """q = w(1) / w(0) of the kernel w(n) = q^(n^2): rows by variance (1/64 step^2), columns by taps a side.
 

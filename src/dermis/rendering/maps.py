@@ -18,9 +18,9 @@ from dermis.images.filters import derivatives, mip_chain
 from dermis.specular.albedo import albedo_table
 from dermis.specular.beckmann import beckmann_table
 
-_TRIANGLES_PER_ROW = 2048
+_TRIANGLES_PER_ROW = 2048  # the shaders take it from the texture's width
 _VERTICES_PER_ROW = 512
-_NO_BAND = 32.0
+_NO_BAND = -1.0
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class HeadTextures:
     """What the shaders read of a head, by the names they use.
 
     resources : name in geometry.wgsl and skin.wgsl -> texture or sampler
-    relief_band : mip of the height map from which on the normal map knows the relief
+    relief_band : mip of the height map from which on the normal map knows the relief, -1 without one
     triangles : count
     """
 
@@ -69,7 +69,7 @@ def upload_atlas(device: Device, atlas: Atlas) -> dict[str, Any]:
     return {
         "atlas": texture_from(device, texels, "rg32uint"),
         "stretch_map": texture_from(device, atlas.stretch, "rg16float"),
-        "reach_map": texture_from(device, atlas.reach, "rgba8uint"),
+        "reach_map": texture_from(device, atlas.reach, "rgba16uint"),
     }
 
 
@@ -124,9 +124,11 @@ def _moments(slopes: NDArray[np.float32] | None) -> NDArray[np.float32]:
 
 
 def _relief_band(maps: Maps) -> float:
+    """Where both maps exist, a larger height map adds what is finer than the normal map; else all of it."""
     if maps.normal is None or maps.height is None:
         return _NO_BAND
-    return max(0.0, float(np.log2(max(maps.height.shape[:2]) / max(maps.normal.shape[:2]))))
+    finer = max(maps.height.shape[:2]) / max(maps.normal.shape[:2])
+    return float(np.log2(finer)) if finer > 1 else _NO_BAND
 
 
 def _mipped(device: Device, image: NDArray[np.float32], texel: str) -> Any:

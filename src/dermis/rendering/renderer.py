@@ -24,6 +24,7 @@ from dermis.rendering.maps import HeadTextures, upload_atlas, upload_head
 from dermis.rendering.projection import ShadowView
 from dermis.rendering.stages.shadows import ShadowMaps
 from dermis.scene.model import Scene
+from dermis.scene.plain import Plain
 from dermis.scene.settings import Settings
 
 T = TypeVar("T")
@@ -31,7 +32,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Rendered:
-    """A finished image, still on the device.
+    """An image, still on the device, until its renderer draws the next one.
 
     gpu_ms : device time of each stage and "total" [ms]; None when the adapter has no timestamps
     frame_ms : from recording the frame to its end [ms]
@@ -45,16 +46,23 @@ class Rendered:
     frame_ms: float
     setup_ms: float
     gaussians: int
+    is_current: Callable[[], bool]
 
     def linear(self) -> NDArray[np.float32]:
         """(h, w, 3) linear Rec. 709 after exposure, float32."""
-        with gpu_failures(self.device):
-            return np.ascontiguousarray(download(self.device, self.picture.exposed)[..., :3])
+        return np.ascontiguousarray(self._read(self.picture.exposed)[..., :3])
 
     def srgb8(self) -> NDArray[np.uint8]:
         """(h, w, 3) sRGB bytes, encoded on the device."""
+        return np.ascontiguousarray(self._read(self.picture.bytes)[..., :3])
+
+    def _read(self, texture: Any) -> NDArray[Any]:
+        if not self.is_current():
+            raise RuntimeError(
+                "a newer frame has taken this image's place: read each before drawing the next"
+            )
         with gpu_failures(self.device):
-            return np.ascontiguousarray(download(self.device, self.picture.bytes)[..., :3])
+            return download(self.device, texture)
 
 
 class Renderer:
@@ -69,6 +77,7 @@ class Renderer:
         with gpu_failures(self.device):
             self._stages = Stages(self.device)
         self._kept: dict[str, tuple[Any, Any]] = {}
+        self._frames = 0
         self._opening_ms = 1e3 * (time.perf_counter() - started)
 
     def draw(
@@ -90,19 +99,37 @@ class Renderer:
         with gpu_failures(self.device):
             started = time.perf_counter()
             inputs, gaussians = self._inputs(scene, settings)
-            if not keep_shadows:
-                inputs.shadow_maps.drawn = b""
             ready = time.perf_counter()
             frame = Frame(self.device)
-            draw_frame(frame, self._stages, inputs)
-            frame.submit()
+            self._submit(frame, inputs, keep_shadows)
             if timed:
                 frame.wait()
             done = time.perf_counter()
             times = frame.stage_ms() if timed else None
         setup_ms = 1e3 * (ready - started) + self._opening_ms
         self._opening_ms = 0.0
-        return Rendered(self.device, inputs.picture, times, 1e3 * (done - ready), setup_ms, gaussians)
+        self._frames += 1
+        number, frame_ms = self._frames, 1e3 * (done - ready)
+        return Rendered(
+            self.device,
+            inputs.picture,
+            times,
+            frame_ms,
+            setup_ms,
+            gaussians,
+            is_current=lambda: number == self._frames,
+        )
+
+    def _submit(self, frame: Frame, inputs: Inputs, keep_shadows: bool) -> None:
+        """Record and submit; after a failure nobody knows what the shadow maps hold."""
+        if not keep_shadows:
+            inputs.shadow_maps.drawn = b""
+        try:
+            draw_frame(frame, self._stages, inputs)
+            frame.submit()
+        except Exception:
+            inputs.shadow_maps.drawn = b""
+            raise
 
     def render(self, scene: Scene, **settings: Any) -> NDArray[np.float32]:
         """(h, w, 3) float32 linear Rec. 709 image; `settings` are those of `Settings`."""
@@ -114,7 +141,11 @@ class Renderer:
         split = made.split_profile(profile, settings, white=scene.skin.albedo == "map")
         atlas, atlas_textures = self._atlas(scene.head, settings.atlas)
         head = self._head(scene.head, atlas, scene.skin.albedo == "map")
-        views = made.light_views(scene, settings.shadow_size)
+        views = self._keep(
+            "views",
+            (scene.head, tuple(scene.lights), settings.shadow_size),
+            lambda: made.light_views(scene, settings.shadow_size),
+        )
         clips = [view.clip for view in views if view]
         shadow_maps = self._shadow_maps(len(clips), settings.shadow_size if clips else 1)
         stages, count, size = self._stages, len(split.blurred_mm2), settings.size
@@ -197,7 +228,7 @@ def _same(a: Any, b: Any) -> bool:
     """Equality that compares heads and atlases by identity, without touching their arrays."""
     if isinstance(a, tuple) and isinstance(b, tuple):
         return len(a) == len(b) and all(_same(x, y) for x, y in zip(a, b, strict=True))
-    return a is b or (isinstance(a, int | str | bytes | bool) and a == b)
+    return a is b or (isinstance(a, int | str | bytes | bool | Plain) and a == b)
 
 
 def render(scene: Scene, adapter: str = "auto", **settings: Any) -> NDArray[np.float32]:

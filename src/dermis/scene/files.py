@@ -38,6 +38,8 @@ class _HeadTable(Plain):
     unit_mm: _Length = None
     v_origin: Literal["auto", "top", "bottom"] = "auto"
     up: Literal["y", "z"] = "y"
+    normal_y: Literal["up", "down"] = "up"
+    opaque: tuple[str, ...] = ()
     subdivide: Annotated[int, Field(ge=0, le=3)] = 0
 
 

@@ -10,6 +10,7 @@ from dermis.scene.plain import Colour, Plain
 
 _Side = Annotated[int, Field(ge=1, le=16384)]
 _MOST_SAMPLES = 64
+_MOST_WORK = 2**27
 
 
 class Settings(Plain):
@@ -34,6 +35,6 @@ class Settings(Plain):
 
     @model_validator(mode="after")
     def _fits_in_memory(self) -> Settings:
-        if self.size[0] * self.size[1] * self.samples > 2**27:
-            raise ValueError("width times height times samples of at most 268 million")
+        if self.size[0] * self.size[1] * self.samples > _MOST_WORK:
+            raise ValueError(f"width times height times samples of at most {_MOST_WORK // 10**6} million")
         return self

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.gpu import ComputeProgram, Device, Frame
+from dermis.optics.gaussians import MOST_GAUSSIANS
 from dermis.rendering.stages import STAGES
 from dermis.rendering.stages.diffuse import Levels
-
-MOST_LEVELS = 16
 
 
 class Combine:
@@ -25,7 +24,7 @@ class Combine:
 
         weight : (k, 3) per layer and channel
         """
-        padded = np.zeros((MOST_LEVELS, 4), np.float32)
+        padded = np.zeros((MOST_GAUSSIANS, 4), np.float32)
         padded[: len(weight), :3] = weight
         record = self._program.record("Weights", first=1, count=len(weight), weight=padded)
         bound = {"weights": record, "levels": levels.stack, "combined": into}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.gpu import ComputeProgram, Device, Frame, make_texture
 from dermis.gpu.program import Resources
 from dermis.gpu.textures import texture_from
-from dermis.rendering.kernels import kernel_table
+from dermis.rendering.kernels import ROWS_PER_UNIT, TRUNCATION, WIDEST, kernel_table
 from dermis.rendering.stages import STAGES
 
 
@@ -31,7 +31,8 @@ class Diffuse:
     def __init__(self, device: Device) -> None:
         self._device = device
         path = STAGES / "diffuse.wgsl"
-        self._along = [ComputeProgram(device, path, constants={"AXIS": axis}) for axis in (0, 1)]
+        table = {"ROWS_PER_UNIT": ROWS_PER_UNIT, "WIDEST": WIDEST, "TRUNCATION": TRUNCATION}
+        self._along = [ComputeProgram(device, path, constants={"AXIS": axis, **table}) for axis in (0, 1)]
         self._kernels = texture_from(device, kernel_table(), "r32float")
 
     def make_levels(self, size: int, count: int) -> Levels:

@@ -2,10 +2,12 @@
 
 override AXIS: u32 = 0u; // 0 along u, 1 along v
 
-const ROWS_PER_UNIT: f32 = 64.0; // rows of the kernel table per unit of variance
-const WIDEST: f32 = 9.0; // variance of the table's last row [step^2]
+override ROWS_PER_UNIT: f32; // rows of the kernel table per unit of variance
+override WIDEST: f32; // variance of the table's last row [step^2]
+override TRUNCATION: f32; // taps reach this many standard deviations
+
+const WIDE_TRUNCATION: f32 = 4.0; // beyond the table, where the sampled Gaussian needs no correction
 const SMOOTH: f32 = 1.6; // widest step over the source's width: its ripple stays under 0.1 %
-const TRUNCATION: f32 = 3.3; // taps reach this many standard deviations
 
 struct Spread {
     variance_mm2: f32, // to be added
@@ -19,10 +21,9 @@ struct Spread {
 @group(0) @binding(4) var kernel_table: texture_2d<f32>; // row: variance, column: taps on each side
 @group(0) @binding(5) var blurred: texture_storage_2d<rgba32float, write>;
 
-// Texels between taps. A source that is already smooth at the step's scale may be read sparsely.
+// Texels between taps. Only a source that is already smooth at the step's scale may be read sparsely.
 fn tap_step(sigma: f32, sigma_before: f32) -> f32 {
-    let sparse = floor(min(SMOOTH * sigma_before, sigma));
-    return max(max(1.0, sparse), ceil(sigma / sqrt(WIDEST)));
+    return max(1.0, floor(min(SMOOTH * sigma_before, sigma)));
 }
 
 @compute @workgroup_size(8, 8)
@@ -40,8 +41,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let centre = textureLoad(source, here, 0);
     let sigma = sqrt(spread.variance_mm2) * texels_per_mm;
     let step = tap_step(sigma, sqrt(spread.before_mm2) * texels_per_mm);
-    let variance = min(sigma * sigma / (step * step), WIDEST);
-    let taps = i32(ceil(TRUNCATION * sqrt(variance)));
+    let variance = sigma * sigma / (step * step);
+    let taps = i32(ceil(select(TRUNCATION, WIDE_TRUNCATION, variance > WIDEST) * sqrt(variance)));
     let axis = select(vec2i(0, 1), vec2i(1, 0), AXIS == 0u);
     let behind = select(reach.z, reach.x, AXIS == 0u);
     let ahead = select(reach.w, reach.y, AXIS == 0u);
@@ -66,6 +67,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 
 // Weight of the first tap over the centre's, such that the kernel of `taps` has the variance.
 fn first_ratio(taps: i32, variance: f32) -> f32 {
+    if (variance > WIDEST) {
+        return exp(-0.5 / variance);
+    }
     let row = variance * ROWS_PER_UNIT;
     let low = textureLoad(kernel_table, vec2i(taps, i32(row)), 0).x;
     let high = textureLoad(kernel_table, vec2i(taps, i32(row) + 1), 0).x;

@@ -33,5 +33,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             sum += arriving.irradiance * share * passes(cosine, surface.roughness, surface.rho_s);
         }
     }
-    textureStore(entered, id.xy, vec4f(sum * pow(surface.colour, vec3f(skin.mix)), 1.0));
+    textureStore(entered, id.xy, vec4f(sum * share_of(surface.colour, skin.mix), 1.0));
 }

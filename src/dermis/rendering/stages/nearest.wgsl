@@ -5,9 +5,9 @@
 
 override FIND_TRIANGLE: bool = false; // false: write depths; true: write indices where the depth is theirs
 
+const ROUNDING: u32 = 4u; // the two passes may round differently
 const LANES: u32 = 64u;
 const SLACK: f32 = 1e-5; // covers rounding, so that no pixel falls between two triangles
-const GROUPS_PER_ROW: u32 = 32768u;
 
 @group(1) @binding(1) var<storage, read_write> nearness: array<atomic<u32>>; // bits of the depth, 0 empty
 @group(1) @binding(2) var<storage, read_write> found: array<atomic<u32>>; // triangle + 1
@@ -44,8 +44,12 @@ fn bounds(a: vec3f, b: vec3f, c: vec3f) -> Box {
 }
 
 @compute @workgroup_size(64)
-fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
-    let index = group.y * GROUPS_PER_ROW + group.x;
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let index = group.y * groups.x + group.x;
     if (index >= views.triangles) {
         return;
     }
@@ -79,7 +83,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
 fn record(index: u32, at: u32, near: u32) {
     if (!FIND_TRIANGLE) {
         atomicMax(&nearness[at], near); // positive floats sort like their bits
-    } else if (atomicLoad(&nearness[at]) == near) {
+    } else if (near + ROUNDING >= atomicLoad(&nearness[at])) {
         atomicMax(&found[at], index + 1u); // of two triangles at one depth the later one, always
     }
 }

@@ -49,14 +49,14 @@ fn light_up(point: Point, surface: Surface, v: vec3f) -> Lit {
 fn skin_radiance(point: Point, v: vec3f, footprint: f32) -> vec3f {
     let surface = surface_at(point, footprint);
     let lit = light_up(point, surface, v);
-    var below = lit.entered * pow(surface.colour, vec3f(skin.mix));
+    var below = lit.entered * share_of(surface.colour, skin.mix);
     if ((point.flags & MAPPED) != 0u) {
         below = shade.relit * below + load_bilinear(scattered, point.uv).rgb;
     } else {
         below *= shade.total;
     }
     let leaves = passes(dot(surface.normal, v), surface.roughness, surface.rho_s);
-    return below * pow(surface.colour, vec3f(1.0 - skin.mix)) * leaves / PI + lit.reflected;
+    return below * share_of(surface.colour, 1.0 - skin.mix) * leaves / PI + lit.reflected;
 }
 
 fn opaque_radiance(point: Point, v: vec3f) -> vec3f {

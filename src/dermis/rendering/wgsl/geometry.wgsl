@@ -1,8 +1,5 @@
 // The mesh as two textures, and points of its surface by triangle and barycentric weights.
 
-const TRIANGLES_PER_ROW: u32 = 2048u;
-const VERTICES_PER_ROW: u32 = 512u;
-
 const MAPPED: u32 = 1u; // the triangle has texels in the atlas
 const OPAQUE: u32 = 2u; // plain material, no scattering
 
@@ -28,11 +25,13 @@ struct Point {
 }
 
 fn triangle_at(index: u32) -> vec4u {
-    return textureLoad(triangle_table, vec2u(index % TRIANGLES_PER_ROW, index / TRIANGLES_PER_ROW), 0);
+    let per_row = textureDimensions(triangle_table).x;
+    return textureLoad(triangle_table, vec2u(index % per_row, index / per_row), 0);
 }
 
 fn vertex_texel(index: u32) -> vec2u {
-    return vec2u(4u * (index % VERTICES_PER_ROW), index / VERTICES_PER_ROW);
+    let per_row = textureDimensions(vertex_table).x / 4u;
+    return vec2u(4u * (index % per_row), index / per_row);
 }
 
 fn position_of(index: u32) -> vec3f {

@@ -1,6 +1,5 @@
 // The skin's own parameters and its maps: colour, relief as a surface gradient, gloss.
 
-const NO_BAND: f32 = 32.0; // no normal map: the height map knows all
 const PI: f32 = 3.14159265358979;
 
 struct Skin {
@@ -8,7 +7,7 @@ struct Skin {
     rho_s: f32,
     f0: f32,
     mix: f32, // share of the colour map applied before scattering
-    relief_band: f32, // mip of the height map from which on the normal map knows the relief
+    relief_band: f32, // mip of the height map from which on the normal map knows the relief, -1 without one
     light_count: u32,
 }
 
@@ -42,12 +41,13 @@ fn surface_at(point: Point, footprint: f32) -> Surface {
     let s = textureSampleLevel(slope_map, map_sampler, point.uv, mip_for(slope_map, footprint));
     // The height map adds only what is finer than the normal map: both usually come from one relief.
     let size = vec2f(textureDimensions(relief_map));
-    let mip = min(mip_for(relief_map, footprint), skin.relief_band);
-    let fine = textureSampleLevel(relief_map, map_sampler, point.uv, mip);
+    var mip = mip_for(relief_map, footprint);
     var coarse = vec4f(0.0);
-    if (skin.relief_band < NO_BAND) {
+    if (skin.relief_band >= 0.0) {
+        mip = min(mip, skin.relief_band);
         coarse = textureSampleLevel(relief_map, map_sampler, point.uv, skin.relief_band);
     }
+    let fine = textureSampleLevel(relief_map, map_sampler, point.uv, mip);
     let gradient = (fine.xy - coarse.xy) * size + vec2f(s.x * length_u, -s.y * length_v);
     let per_mm = size / max(vec2f(length_u, length_v), vec2f(1e-3));
     let spread = max(s.zw - s.xy * s.xy, vec2f(0.0)) + max(fine.zw - fine.xy * fine.xy, vec2f(0.0)) * per_mm * per_mm;
@@ -58,6 +58,11 @@ fn surface_at(point: Point, footprint: f32) -> Surface {
     out.roughness = clamp(sqrt(m * m + spread.x + spread.y), 0.05, 1.0);
     out.rho_s = skin.rho_s * textureSampleLevel(specular_map, map_sampler, point.uv, mip_for(specular_map, footprint)).x;
     return out;
+}
+
+// The colour map's part before (mix) or after (1 - mix) scattering; pow(0, 0) is undefined, so black is nearly black.
+fn share_of(colour: vec3f, exponent: f32) -> vec3f {
+    return pow(max(colour, vec3f(1e-8)), vec3f(exponent));
 }
 
 // The normal of the surface raised by a height whose change with uv is `gradient` [mm]. Source: [Mikkelsen2010].

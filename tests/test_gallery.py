@@ -1,0 +1,39 @@
+"""Every gallery script runs; small, since only the documentation needs its picture large."""
+
+from __future__ import annotations
+
+import os
+import runpy
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dermis.images.io import read_image
+from dermis.rendering.renderer import Renderer
+
+SCRIPTS = sorted((Path(__file__).parent.parent / "gallery").glob("[0-9]*.py"))
+SMALL = {"size": (48, 48), "atlas": 128, "samples": 1}
+
+
+def test_there_are_scripts() -> None:
+    assert len(SCRIPTS) >= 4
+
+
+@pytest.mark.samples
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
+def test_script(script: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = Renderer.render
+
+    def small(self: Renderer, scene: Any, **settings: Any) -> Any:
+        return whole(self, scene, **(settings | SMALL))
+
+    output = tmp_path / "picture.png"
+    makehuman = Path(os.environ["DERMIS_DATA"]) / "heads" / "makehuman"
+    monkeypatch.setattr(Renderer, "render", small)
+    monkeypatch.setattr(sys, "argv", [str(script), str(output), str(makehuman)])
+    runpy.run_path(str(script), run_name="__main__")
+    picture = read_image(output)
+    assert picture.max() > 60
+    assert len(script.read_text(encoding="utf-8").splitlines()) <= 40
