@@ -169,7 +169,7 @@ def test_of_mirrored_halves_one_is_mapped() -> None:
     positions = np.array([[x, y, 0] for x in (-50, 0, 50) for y in (-50, 50)], np.float32)
     uv = np.array([[u, v] for u in (0.9, 0.1, 0.9) for v in (0.9, 0.1)], np.float32)
     triangles = np.array([[0, 2, 1], [1, 2, 3], [2, 4, 3], [3, 4, 5]], np.int32)
-    mesh = build_mesh(positions, uv, triangles, np.zeros(4, np.int32), (SKIN,))
+    mesh = build_mesh(positions, uv, triangles, np.zeros(4, np.int32), SKIN)
     atlas = build_atlas(mesh, 64)
     assert atlas.mapped.tolist() in ([True] * 2 + [False] * 2, [False] * 2 + [True] * 2)
     assert set(np.unique(atlas.triangle)) - {-1} == set(np.flatnonzero(atlas.mapped))
