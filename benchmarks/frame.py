@@ -8,35 +8,27 @@ from __future__ import annotations
 import json
 import statistics
 import sys
+import time
 from typing import Annotated, Any
 
 from cyclopts import Parameter, run
 
 import dermis
 
-IN_FLIGHT = 4
-
-
-def median(frames: list[Any]) -> dict[str, float]:
-    """Medians over frames of every stage and of the wall clock [ms]."""
-    stages = frames[0].gpu_ms or {}
-    times = {stage: statistics.median((f.gpu_ms or {}).get(stage, 0.0) for f in frames) for stage in stages}
-    return times | {"frame": statistics.median(f.frame_ms for f in frames)}
+REPEATS = 9
 
 
 def measure(renderer: Any, scene: Any, settings: Any, frames: int, keep: bool) -> dict[str, float]:
-    """Medians over `frames` warm frames.
-
-    A GPU gets untimed frames in between: it never waits for Python, so that its clocks stay up.
-    """
-    between = 1 if renderer.device.adapter.kind == "CPU" else IN_FLIGHT
-    renderer.draw(scene, settings)
-    drawn = []
-    for number in range(frames):
-        timed = number % between == between - 1
-        one = renderer.draw(scene, settings, keep_shadows=keep, timed=timed)
-        drawn += [one] if timed else []
-    return median(drawn)
+    """Medians of each stage of warm frames, and the wall clock of a frame in a row of `frames` [ms]."""
+    renderer.draw_warm(scene, settings, keep_shadows=keep)
+    started = time.perf_counter()
+    for _ in range(frames):
+        renderer.draw(scene, settings, keep_shadows=keep, timed=False)
+    renderer.device.wait()
+    frame_ms = 1e3 * (time.perf_counter() - started) / frames
+    drawn = [renderer.draw_warm(scene, settings, keep_shadows=keep).gpu_ms or {} for _ in range(REPEATS)]
+    times = {stage: statistics.median(one.get(stage, 0.0) for one in drawn) for stage in drawn[0]}
+    return times | {"frame": frame_ms}
 
 
 def table(report: dict[str, Any]) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
 from dermis.assets.atlas import build_atlas
+from dermis.assets.geometry import build_mesh
 from dermis.assets.primitives import plane, uv_sphere
 from dermis.gpu import Device, Frame, download, open_device, upload
 from dermis.gpu.probe import half_store_rounding
@@ -53,6 +54,25 @@ def point_of_light(device: Device, texels_per_mm: float) -> str:
     return f"| {texels_per_mm:g} | {100 * shape:.2f} % | {100 * energy:+.4f} % |"
 
 
+def sheared(device: Device, degrees: float) -> str:
+    """Principal widths of a point of light where uv axes meet at `degrees`, over the width wanted."""
+    flat = plane(SIZE / 3.0)
+    lean = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    positions = flat.positions.copy()
+    positions[:, 0] += lean[0] * positions[:, 1]
+    positions[:, 1] *= lean[1]
+    mesh = build_mesh(positions, flat.uv, flat.triangles, flat.material, flat.materials)
+    light = np.zeros((SIZE, SIZE), np.float32)
+    light[SIZE // 2, SIZE // 2] = 1.0
+    spot = spread(device, mesh, light)[-1].astype(float)
+    y, x = np.mgrid[:SIZE, :SIZE] - SIZE // 2
+    place = np.stack([x - lean[0] * y, -lean[1] * y]) / 3.0  # v points down
+    covariance = np.einsum("iyx,jyx,yx->ij", place, place, spot) / spot.sum()
+    wanted = load_profile("gpu-gems-3").variance_mm2[-1]
+    narrow, wide = np.sqrt(np.linalg.eigvalsh(covariance) / wanted)
+    return f"| {degrees:g}° | {narrow:.2f} | {wide:.2f} |"
+
+
 def constant_light(device: Device) -> float:
     """Largest deviation of a constant light on a sphere's atlas after all levels."""
     atlas = build_atlas(uv_sphere(100.0), SIZE)
@@ -82,10 +102,12 @@ def main() -> None:
     albedo, peak = table_errors()
     text = (PAGE.parent / "accuracy.in.md").read_text(encoding="utf-8")
     rows = "\n".join(point_of_light(device, density) for density in (0.75, 1.0, 1.5, 3.0, 6.0, 12.0))
+    leaning = "\n".join(sheared(device, degrees) for degrees in (90, 80, 60, 45))
     PAGE.write_text(
         text.format(
             adapter=f"{device.adapter.name}, {device.adapter.backend}",
             rows=rows,
+            leaning=leaning,
             constant=f"{constant_light(device):.1e}",
             albedo=f"{100 * albedo:.2f} %",
             peak=f"{100 * peak:.1f} %",

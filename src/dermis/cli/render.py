@@ -149,8 +149,8 @@ def _draw_and_report(
         renderer = Renderer(adapter)
         rendered = renderer.draw(scene, settings)
         setup_ms = rendered.setup_ms
-        if as_json:  # the first frame warms caches and clocks; the second one is timed
-            rendered = renderer.draw(scene, settings, keep_shadows=False)
+        if as_json:  # the first frame fills caches; a warm one is timed
+            rendered = renderer.draw_warm(scene, settings)
     if output.suffix.lower() == ".png":
         write_png(output, rendered.srgb8())
     else:

@@ -51,8 +51,13 @@ class Device:
         self.has_timestamps = "timestamp-query" in adapter.features
         self._timestamps: tuple[Any, Any] | None = None
         self._uniforms: OrderedDict[bytes, Any] = OrderedDict()
-        self.fence = self.buffer(np.zeros(1, np.uint32), "UNIFORM")
+        self._fence = self.buffer(np.zeros(1, np.uint32), "UNIFORM")
         self._samplers: dict[tuple[tuple[str, str], ...], Any] = {}
+
+    def wait(self) -> None:
+        """Return when the device has done all that was submitted."""
+        # wgpu 0.32's own wait for submitted work raises TypeError; a read waits for all that came before it.
+        self.handle.queue.read_buffer(self._fence)
 
     @cached_property
     def timestamp_period_ns(self) -> float:

@@ -102,8 +102,7 @@ class Frame:
 
     def wait(self) -> None:
         """Return when the device has done all that was submitted."""
-        # wgpu 0.32's own wait for submitted work raises TypeError; a read waits for all that came before it.
-        self.device.handle.queue.read_buffer(self.device.fence)
+        self.device.wait()
 
     def stage_ms(self) -> dict[str, float] | None:
         """Time of each stage after `submit` [ms], with "total"; None when the device cannot tell."""
