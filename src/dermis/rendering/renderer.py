@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -14,7 +13,7 @@ from dermis.assets.atlas import Atlas
 from dermis.assets.cache import cached_atlas
 from dermis.assets.head import Head
 from dermis.errors import refuse
-from dermis.gpu import Device, Frame, download, make_texture, open_device
+from dermis.gpu import Frame, make_texture, open_device
 from dermis.gpu.device import gpu_failures
 from dermis.optics.gaussians import load_profile
 from dermis.rendering import inputs as made
@@ -22,6 +21,7 @@ from dermis.rendering.frame import Stages, draw_frame
 from dermis.rendering.inputs import Inputs
 from dermis.rendering.maps import HeadTextures, upload_atlas, upload_head
 from dermis.rendering.projection import ShadowView
+from dermis.rendering.rendered import Rendered
 from dermis.rendering.stages.shadows import ShadowMaps
 from dermis.scene.model import Scene
 from dermis.scene.plain import Plain
@@ -29,41 +29,6 @@ from dermis.scene.settings import Settings
 
 T = TypeVar("T")
 _WARMING_FRAMES = 100
-
-
-@dataclass(frozen=True)
-class Rendered:
-    """An image, still on the device, until its renderer draws the next one.
-
-    gpu_ms : device time of each stage and "total" [ms]; None when the adapter has no timestamps
-    frame_ms : from recording the frame to its end [ms]
-    setup_ms : what was made for this scene before: loading to the device, atlas, shaders [ms]
-    gaussians : levels of the profile
-    """
-
-    device: Device
-    picture: Any
-    gpu_ms: dict[str, float] | None
-    frame_ms: float
-    setup_ms: float
-    gaussians: int
-    is_current: Callable[[], bool]
-
-    def linear(self) -> NDArray[np.float32]:
-        """(h, w, 3) linear Rec. 709 after exposure, float32."""
-        return np.ascontiguousarray(self._read(self.picture.exposed)[..., :3])
-
-    def srgb8(self) -> NDArray[np.uint8]:
-        """(h, w, 3) sRGB bytes, encoded on the device."""
-        return np.ascontiguousarray(self._read(self.picture.bytes)[..., :3])
-
-    def _read(self, texture: Any) -> NDArray[Any]:
-        if not self.is_current():
-            raise RuntimeError(
-                "a newer frame has taken this image's place: read each before drawing the next"
-            )
-        with gpu_failures(self.device):
-            return download(self.device, texture)
 
 
 class Renderer:
