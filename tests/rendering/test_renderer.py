@@ -180,3 +180,11 @@ def test_one_call_is_enough(renderer: Renderer) -> None:
         scene(), adapter=renderer.device.adapter.name, size=(24, 16), atlas=64, samples=1, shadow_size=64
     )
     assert image.shape == (16, 24, 3) and image.max() > 0.1
+
+
+def test_more_than_the_memory_is_refused(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    if renderer.device.adapter.kind != "CPU":
+        pytest.skip("a GPU's driver tells by itself")
+    monkeypatch.setattr("os.sysconf", lambda name: 100)
+    with pytest.raises(DermisError, match="GB"):
+        renderer.draw(scene(), settings_of())

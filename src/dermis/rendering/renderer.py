@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -29,6 +30,7 @@ from dermis.scene.settings import Settings
 
 T = TypeVar("T")
 _WARMING_FRAMES = 100
+_ATLAS_BYTES = 9 * 16  # a texel of six levels, their sum, the space between passes, and its geometry
 
 
 class Renderer:
@@ -174,9 +176,20 @@ class Renderer:
         sides = {"size": max(settings.size), "atlas": settings.atlas, "shadow_size": settings.shadow_size}
         for option, side in sides.items():
             if side > limit:
-                refuse(
-                    option, f"at most {limit} (the limit of {name})", f"it is {side}", "Choose a smaller one"
-                )
+                name_limit = f"at most {limit} (the limit of {name})"
+                refuse(option, name_limit, f"it is {side}", "Choose a smaller one")
+        self._check_memory(settings)
+
+    def _check_memory(self, settings: Settings) -> None:
+        """A software adapter takes textures from main memory, and the system ends who takes too much."""
+        if self.device.adapter.kind != "CPU" or not hasattr(os, "sysconf"):
+            return
+        width, height = settings.size
+        needed = _ATLAS_BYTES * settings.atlas**2 + (36 + 8 * settings.samples) * width * height
+        here = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+        if needed > here:
+            sizes = f"{settings.atlas} texels and {width}x{height} pixels need {needed / 1e9:.0f} GB"
+            refuse("atlas and size", f"a frame within {here / 1e9:.0f} GB", sizes, "Choose smaller ones")
 
     def _atlas(self, head: Head, size: int) -> tuple[Atlas, dict[str, Any]]:
         def make() -> tuple[Atlas, dict[str, Any]]:
