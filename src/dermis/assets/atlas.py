@@ -46,6 +46,11 @@ class Atlas:
         covered: NDArray[np.bool_] = self.triangle >= 0
         return covered
 
+    def unscattered(self, mesh: Mesh) -> float:
+        """Share of the skin's triangles that own no texels [0..1]."""
+        skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
+        return float(1.0 - self.mapped[skin].mean()) if skin.any() else 0.0
+
     def weights(self) -> NDArray[np.float64]:
         """(n, n, 3) barycentric weights of the three corners."""
         bc = self.barycentric / 65535.0

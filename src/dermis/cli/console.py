@@ -29,6 +29,11 @@ def print_lines(*lines: str) -> None:
             refuse("stdout", "a place to write to", f"it fails ({fault.strerror})", "Write it elsewhere")
 
 
+def note(text: str) -> None:
+    """A remark on stderr."""
+    sys.stderr.write(text + "\n")
+
+
 @contextmanager
 def working_on(what: str) -> Iterator[None]:
     """A spinner on stderr while something takes its time; silent when stderr is not a terminal."""

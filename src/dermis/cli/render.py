@@ -8,10 +8,11 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from dermis.cli.console import print_json, print_lines, working_on
+from dermis.cli.console import note, print_json, print_lines, working_on
 from dermis.cli.options import Whole, check, parse_colour, parse_size
 from dermis.errors import refuse
 
+_MOST_UNSCATTERED = 0.05  # closed eyes and other collapsed charts of real scans stay under it
 _MAP_OPTIONS = ("colour", "normal", "height", "height_mm", "specular", "roughness_map")
 _HEAD_OPTIONS = (*_MAP_OPTIONS, "unit_mm", "v_origin", "up", "normal_y", "opaque", "subdivide")
 _SKIN_OPTIONS = ("profile", "albedo", "mix", "roughness", "rho_s")
@@ -151,6 +152,10 @@ def _draw_and_report(
         setup_ms = rendered.setup_ms
         if as_json:  # the first frame fills caches; a warm one is timed
             rendered = renderer.draw_warm(scene, settings)
+    if settings.technique == "texture-space" and rendered.unscattered > _MOST_UNSCATTERED:
+        share = f"{rendered.unscattered:.0%} of the skin's triangles"
+        why = "their uv is collapsed, mirrored onto other skin, or thinner than a texel of the atlas"
+        note(f"note: {share} are lit without scattering: {why}")
     if output.suffix.lower() == ".png":
         write_png(output, rendered.srgb8())
     else:

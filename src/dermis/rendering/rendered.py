@@ -21,6 +21,7 @@ class Rendered:
     frame_ms : from recording the frame to its end [ms]
     setup_ms : what was made for this scene before: loading to the device, atlas, shaders [ms]
     gaussians : levels of the profile
+    unscattered : share of the skin's triangles that the atlas cannot hold; they are lit directly
     """
 
     device: Device
@@ -29,6 +30,7 @@ class Rendered:
     frame_ms: float
     setup_ms: float
     gaussians: int
+    unscattered: float
     is_current: Callable[[], bool]
 
     def linear(self) -> NDArray[np.float32]:
