@@ -13,7 +13,7 @@ from dermis.assets.geometry import build_mesh
 from dermis.assets.primitives import plane, uv_sphere
 from dermis.gpu import Device, Frame, download, open_device, upload
 from dermis.gpu.probe import half_store_rounding
-from dermis.optics.gaussians import load_profile
+from dermis.optics.gaussians import GaussianSum, load_profile
 from dermis.rendering.maps import upload_atlas
 from dermis.rendering.stages.diffuse import Diffuse
 from dermis.specular.albedo import albedo_table, directional_albedo
@@ -44,13 +44,12 @@ def point_of_light(device: Device, texels_per_mm: float) -> str:
     levels = spread(device, plane(SIZE / texels_per_mm), light)
     y, x = np.mgrid[:SIZE, :SIZE] - middle
     r2 = (x**2 + y**2) / texels_per_mm**2
-    total, exact = np.zeros((SIZE, SIZE)), np.zeros((SIZE, SIZE))
-    for level, v, weight in zip(levels, profile.variance_mm2[1:], profile.weight[1:, 0], strict=True):
-        total += weight * level
-        exact += weight * np.exp(-r2 / (2 * v)) / (2 * np.pi * v) / texels_per_mm**2
+    blurred = GaussianSum("blurred levels", profile.variance_mm2[1:], profile.weight[1:])
+    exact = blurred.radiant_exitance(np.sqrt(r2))[..., 0] / texels_per_mm**2
+    total = np.tensordot(blurred.weight[:, 0], levels, axes=1)
     beyond = x**2 + y**2 > 1.5**2
     shape = np.abs(total - exact)[beyond].max() / exact.max()
-    energy = total.sum() / profile.weight[1:, 0].sum() - 1
+    energy = total.sum() / blurred.albedo[0] - 1
     return f"| {texels_per_mm:g} | {100 * shape:.2f} % | {100 * energy:+.4f} % |"
 
 

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import platform
 from importlib.metadata import version
-from typing import Annotated, Any
-
-from cyclopts import Parameter
+from typing import Any
 
 from dermis.cli.console import print_json, print_lines
+from dermis.cli.options import Json
 from dermis.errors import DermisError
 
 _LIBRARIES = ("dermis", "wgpu", "numpy", "scipy", "trimesh", "pydantic", "imageio", "OpenEXR", "pillow")
-Json = Annotated[bool, Parameter(name="--json", negative="")]
 
 
 def doctor(*, adapter: str = "auto", as_json: Json = False) -> int:

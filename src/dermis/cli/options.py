@@ -18,6 +18,7 @@ def _whole(_: type, tokens: Sequence[Token]) -> int:
     return int(tokens[0].value)
 
 
+Json = Annotated[bool, Parameter(name="--json", negative="")]
 # cyclopts itself would round 64.5.
 Whole = Annotated[int | None, Parameter(converter=_whole)]
 

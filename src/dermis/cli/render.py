@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from dermis.cli.console import note, print_json, print_lines, working_on
-from dermis.cli.options import Whole, check, parse_colour, parse_size
+from dermis.cli.options import Json, Whole, check, parse_colour, parse_size
 from dermis.errors import refuse
 
 _MOST_UNSCATTERED = 0.05  # closed eyes and other collapsed charts of real scans stay under it
@@ -19,7 +19,6 @@ _SKIN_OPTIONS = ("profile", "albedo", "mix", "roughness", "rho_s")
 _SETTINGS = ("size", "atlas", "samples", "technique", "exposure", "background")
 
 Output = Annotated[Path, Parameter(name=("--output", "-o"))]
-Json = Annotated[bool, Parameter(name="--json", negative="")]
 
 
 def render(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from importlib import resources
 from pathlib import Path
 
@@ -66,12 +67,12 @@ class GaussianSum:
 _MEND = "Mend the profile's table"
 
 
-def preset_names() -> list[str]:
+@cache
+def preset_names() -> tuple[str, ...]:
     """Names that `load_profile` knows without a file."""
     folder = resources.files("dermis.optics") / "data"
-    return sorted(
-        entry.name.removesuffix(".csv") for entry in folder.iterdir() if entry.name.endswith(".csv")
-    )
+    names = (entry.name for entry in folder.iterdir())
+    return tuple(sorted(name.removesuffix(".csv") for name in names if name.endswith(".csv")))
 
 
 def load_profile(name: str | Path) -> GaussianSum:
@@ -80,8 +81,7 @@ def load_profile(name: str | Path) -> GaussianSum:
     Raises DermisError when there is no such preset or file, or when its numbers cannot be a profile.
     """
     if str(name) in preset_names():
-        text = (resources.files("dermis.optics") / "data" / f"{name}.csv").read_text(encoding="utf-8")
-        return _parse(str(name), text)
+        return _preset(str(name))
     path = Path(name)
     try:
         return _parse(str(path), path.read_text(encoding="utf-8"))
@@ -89,6 +89,12 @@ def load_profile(name: str | Path) -> GaussianSum:
         came = getattr(error, "strerror", None) or "it is not text"
         expected = f"a preset ({', '.join(preset_names())}) or {_FILE_FORM}"
         refuse(f"profile {name}", expected, f"it cannot be read: {came}", "Check the name")
+
+
+@cache
+def _preset(name: str) -> GaussianSum:
+    text = (resources.files("dermis.optics") / "data" / f"{name}.csv").read_text(encoding="utf-8")
+    return _parse(name, text)
 
 
 def _parse(name: str, text: str) -> GaussianSum:

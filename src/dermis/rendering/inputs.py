@@ -26,9 +26,8 @@ from dermis.scene.settings import Settings
 from dermis.specular.fresnel import SKIN_F0
 
 Floats = NDArray[np.float64]
-_RELIT_MM2 = (
-    0.1**2
-)  # a Gaussian narrower than this is finer than texels and pores: it is lit again, not blurred
+# A Gaussian narrower than this is finer than texels and pores: it is lit again, not blurred.
+_RELIT_MM2 = 0.1**2
 _MOST_MATERIALS = 64
 _WIDEST_SHADOW_FILTER = 6
 

@@ -30,11 +30,13 @@ class HeadTextures:
     resources : name in geometry.wgsl and skin.wgsl -> texture or sampler
     relief_band : mip of the height map from which on the normal map knows the relief, -1 without one
     triangles : count
+    unscattered : share of the skin's triangles that the atlas cannot hold
     """
 
     resources: dict[str, Any]
     relief_band: float
     triangles: int
+    unscattered: float
 
 
 def upload_head(device: Device, head: Head, atlas: Atlas, use_colour: bool) -> HeadTextures:
@@ -59,7 +61,7 @@ def upload_head(device: Device, head: Head, atlas: Atlas, use_colour: bool) -> H
         "beckmann_table": texture_from(device, beckmann_table(), "r32float"),
         "albedo_table": texture_from(device, albedo_table(), "r32float"),
     }
-    return HeadTextures(resources, _relief_band(maps), len(mesh.triangles))
+    return HeadTextures(resources, _relief_band(maps), len(mesh.triangles), atlas.unscattered(mesh))
 
 
 def upload_atlas(device: Device, atlas: Atlas) -> dict[str, Any]:

@@ -66,7 +66,7 @@ class Renderer:
         settings = settings or Settings()
         with gpu_failures(self.device):
             started = time.perf_counter()
-            inputs, gaussians, unscattered = self._inputs(scene, settings)
+            inputs, gaussians = self._inputs(scene, settings)
             ready = time.perf_counter()
             frame = Frame(self.device)
             self._submit(frame, inputs, keep_shadows)
@@ -85,7 +85,7 @@ class Renderer:
             frame_ms,
             setup_ms,
             gaussians,
-            unscattered,
+            inputs.head.unscattered,
             is_current=lambda: number == self._frames,
         )
 
@@ -116,7 +116,7 @@ class Renderer:
         """(h, w, 3) float32 linear Rec. 709 image; `settings` are those of `Settings`."""
         return self.draw(scene, Settings(**settings)).linear()
 
-    def _inputs(self, scene: Scene, settings: Settings) -> tuple[Inputs, int, float]:
+    def _inputs(self, scene: Scene, settings: Settings) -> tuple[Inputs, int]:
         self._check(settings)
         profile = load_profile(scene.skin.profile)
         split = made.split_profile(profile, settings, white=scene.skin.albedo == "map")
@@ -151,7 +151,7 @@ class Renderer:
             picture=self._keep("picture", size, lambda: stages.post.make_picture(size)),
             exposure=settings.exposure,
         )
-        return inputs, len(profile.variance_mm2), atlas.unscattered(scene.head.mesh)
+        return inputs, len(profile.variance_mm2)
 
     def _lit(
         self, scene: Scene, head: HeadTextures, views: list[ShadowView | None], shadow_maps: ShadowMaps

@@ -24,6 +24,8 @@ _PITCH = 64  # rows of a copied buffer start at multiples of 256 bytes
 class Layers:
     """A texture array with a layer for each view, and what it takes to fill it.
 
+    Even one view gets two layers: OpenGL takes a texture of one layer for no array.
+
     texture : depth (1 near, 0 nothing) as float, or triangle + 1 as uint
     depth : the rasteriser's depth attachments, one a layer, or one for all when triangles are wanted
     targets : the rasteriser's colour targets, one a layer

@@ -18,13 +18,10 @@ struct Light {
     layer: i32, // in the shadow maps, -1 casts none
 }
 
-const MOST_LIGHTS: u32 = 64u;
-
 struct Lights {
     light: array<Light, 64>,
 }
 
-// Uniform, not storage: software adapters read uniforms ten times faster.
 @group(0) @binding(11) var<uniform> lights: Lights;
 @group(0) @binding(12) var shadow_maps: texture_2d_array<f32>; // depth: 1 near, 0 nothing
 @group(0) @binding(13) var shadow_sampler: sampler; // non-filtering

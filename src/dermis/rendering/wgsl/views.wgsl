@@ -1,7 +1,5 @@
 // Where cameras and lights stand, for the passes that find the nearest surface.
 
-const MOST_VIEWS: u32 = 64u;
-
 struct Views {
     clip: array<mat4x4f, 64>, // world to clip space, depth 0 near to 1 far
     triangles: u32,
