@@ -1,0 +1,72 @@
+"""A radial profile as numbers: R(r) at radii, and the light that leaves through rings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dermis.optics.media import Floats
+
+NARROWEST_MM, WIDEST_MM = 1e-4, 60.0
+"""The radii that a profile covers and an error is integrated over [mm]."""
+
+
+@dataclass(frozen=True)
+class RadialProfile:
+    """How light that enters at a point leaves around it, in c channels.
+
+    name : of the medium
+    model : how it was computed
+    radius_mm : (n,) increasing [mm]
+    reflectance : (n, c) R(r) [1/mm2]
+    total : (c,) integral of 2 pi r R(r) [-]
+    edges_mm : (k + 1,) of rings, the first at 0 [mm]
+    ring_energy : (k, c) light that leaves through each ring [-]
+    standard_error : (n, c) of R(r) where it was counted, else None [1/mm2]
+    incident : whether per power that arrives (surface reflection excluded) or that enters
+    warnings : what makes these numbers doubtful
+    sources : citation keys
+    """
+
+    name: str
+    model: str
+    radius_mm: Floats
+    reflectance: Floats
+    total: Floats
+    edges_mm: Floats
+    ring_energy: Floats
+    standard_error: Floats | None = None
+    incident: bool = False
+    warnings: tuple[str, ...] = ()
+    sources: tuple[str, ...] = ()
+
+
+def ring_edges(rings: int = 120) -> Floats:
+    """Edges of a disc and log-spaced rings around it, (rings + 1,) [mm]."""
+    return np.concatenate([[0.0], np.geomspace(1e-3, WIDEST_MM, rings)])
+
+
+def radius_grid(count: int = 600) -> Floats:
+    """Log-spaced radii, (count,) [mm]."""
+    return np.geomspace(NARROWEST_MM, WIDEST_MM, count)
+
+
+def resample(radius_mm: Floats, grid_mm: Floats, values: Floats) -> Floats:
+    """Values (m, c) on a log-spaced grid, read at other radii with a cubic spline in log r, (n, c)."""
+    from scipy.interpolate import CubicSpline
+
+    read: Floats = CubicSpline(np.log(grid_mm), values)(np.log(radius_mm))
+    return read
+
+
+def enclosed(radius_mm: Floats, grid_mm: Floats, reflectance: Floats) -> Floats:
+    """Light that leaves within each radius, (n, c), of R(r) on a log-spaced grid that starts near 0 [-]."""
+    from scipy.integrate import cumulative_simpson
+
+    rate = 2.0 * np.pi * grid_mm[:, None] ** 2 * reflectance  # per unit of log r
+    inner = 0.5 * rate[:1]  # R is about constant within the grid's first radius
+    within = inner + cumulative_simpson(rate, x=np.log(grid_mm), axis=0, initial=0.0)
+    return np.where(
+        radius_mm[:, None] > 0.0, resample(np.maximum(radius_mm, grid_mm[0]), grid_mm, within), 0.0
+    )
