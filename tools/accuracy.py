@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import accuracy_optics as optics
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
@@ -13,7 +14,8 @@ from dermis.assets.geometry import build_mesh
 from dermis.assets.primitives import plane, uv_sphere
 from dermis.gpu import Device, Frame, download, open_device, upload
 from dermis.gpu.probe import half_store_rounding
-from dermis.optics.gaussians import GaussianSum, load_profile
+from dermis.optics.gaussians import GaussianSum
+from dermis.optics.profiles import load_profile
 from dermis.rendering.maps import upload_atlas
 from dermis.rendering.stages.diffuse import Diffuse
 from dermis.specular.albedo import albedo_table, directional_albedo
@@ -111,6 +113,7 @@ def main() -> None:
             albedo=f"{100 * albedo:.2f} %",
             peak=f"{100 * peak:.1f} %",
             rounding=half_store_rounding(device),
+            **optics.tables(),
         ),
         encoding="utf-8",
     )

@@ -13,7 +13,13 @@ from pathlib import Path
 from PIL import Image
 
 ROOT = Path(__file__).parent.parent
-PICTURES = {"01_portrait": "portrait", "02_scattering": "scattering", "03_pores": "pores"}
+PICTURES = {
+    "01_portrait": "portrait",
+    "02_scattering": "scattering",
+    "03_pores": "pores",
+    "05_skin_colours": "skin-colours",
+    "06_layers": "layers",
+}
 QUALITY = 88
 
 

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from dermis.assets.head import Head, load_head
     from dermis.errors import DermisError
     from dermis.images.io import write_image
+    from dermis.optics.profiles import load_profile
+    from dermis.optics.tissue import Tissue, load_tissue
     from dermis.rendering.renderer import Renderer, render
     from dermis.scene.camera import Camera, portrait, profile, three_quarter
     from dermis.scene.files import load_scene
@@ -27,6 +29,9 @@ _HOME = {
     "load_head": "assets.head",
     "DermisError": "errors",
     "write_image": "images.io",
+    "load_profile": "optics.profiles",
+    "Tissue": "optics.tissue",
+    "load_tissue": "optics.tissue",
     "Renderer": "rendering.renderer",
     "render": "rendering.renderer",
     "Camera": "scene.camera",
@@ -54,8 +59,11 @@ __all__ = [
     "Settings",
     "Skin",
     "SpotLight",
+    "Tissue",
     "load_head",
+    "load_profile",
     "load_scene",
+    "load_tissue",
     "portrait",
     "profile",
     "render",

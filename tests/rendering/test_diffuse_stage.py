@@ -15,7 +15,7 @@ from dermis.assets.atlas import Atlas, build_atlas
 from dermis.assets.primitives import plane, uv_sphere
 from dermis.gpu import Device, Frame, download, make_texture, upload
 from dermis.gpu.textures import texture_from
-from dermis.optics.gaussians import load_profile
+from dermis.optics.profiles import load_profile
 from dermis.rendering.frame import Stages
 from dermis.rendering.maps import upload_atlas
 from dermis.rendering.stages.diffuse import Diffuse

@@ -15,7 +15,7 @@ from dermis.assets.geometry import build_mesh
 from dermis.assets.head import Head
 from dermis.assets.primitives import SKIN, plane, uv_sphere
 from dermis.gpu import download
-from dermis.optics.gaussians import load_profile
+from dermis.optics.profiles import load_profile
 from dermis.rendering.renderer import Renderer
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
 from dermis.scene.model import Scene

@@ -54,3 +54,14 @@ def parse_colour(text: str) -> tuple[float, float, float]:
     except ValueError:
         refuse("--background", "red,green,blue, such as 0,0,0", f"{text!r} came", "Write three numbers")
     return red, green, blue
+
+
+def parse_lengths(option: str, text: str) -> tuple[float, ...]:
+    """Lengths [mm] of "0.5,1,2"."""
+    try:
+        lengths = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        refuse(option, "lengths in mm, such as 0.5,1,2", f"{text!r} came", "Write numbers with commas")
+    if not all(0.0 < length < 1e6 for length in lengths):
+        refuse(option, "lengths above 0 mm", f"{text!r} came", "Correct them")
+    return lengths

@@ -184,7 +184,7 @@ def _thanks(attribution: str) -> list[str]:
 def _scene(head: str, given: dict[str, Any]) -> tuple[Any, Any]:
     """The scene and its settings: the head's, or the file's, with the options given on top."""
     from dermis.assets.head import load_head
-    from dermis.optics.gaussians import load_profile
+    from dermis.optics.profiles import load_profile
     from dermis.scene import Scene, Settings, Skin, load_camera, load_lights, load_scene
 
     own = {name: given[name] for name in _HEAD_OPTIONS if name in given}

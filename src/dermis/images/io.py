@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
-import secrets
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis import outputs
 from dermis.errors import DermisError, refuse
 from dermis.images.codecs import (
     EXR_START,
@@ -52,7 +50,7 @@ def read_image(path: str | Path) -> Pixels:
         raise
     except Exception as fault:  # decoders raise whatever they like for damaged data
         raise DermisError(
-            f"{path}: expected {_READABLE}, but it cannot be decoded ({_reason(fault)}). "
+            f"{path}: expected {_READABLE}, but it cannot be decoded ({outputs.reason(fault)}). "
             "It is cut off, damaged or of an unusual kind: fetch or export it again."
         ) from fault
     return image[..., None] if image.ndim == 2 else image
@@ -63,21 +61,7 @@ def check_output(path: str | Path) -> Path:
 
     DermisError : the suffix is none of `OUTPUT_SUFFIXES`, or the folder is missing or not writable
     """
-    target = Path(path)
-    if target.suffix.lower() not in OUTPUT_SUFFIXES:
-        came = f"its suffix is {target.suffix!r}" if target.suffix else "it has no suffix"
-        refuse(path, "a name that ends in .png or .exr", came, "Choose .png to look at, .exr to go on with")
-    if not target.parent.is_dir():
-        refuse(path, "a folder that exists", f"there is no folder {target.parent}", "Make it first")
-    if target.exists() and not target.is_file():
-        refuse(path, "a file or a free name", "something else has this name", "Choose another name")
-    trial = _temporary_name(target)
-    try:
-        trial.touch()
-        trial.unlink()
-    except OSError as fault:
-        _refuse_output(path, fault)
-    return target
+    return outputs.check_output(path, OUTPUT_SUFFIXES, "Choose .png to look at, .exr to go on with")
 
 
 def write_image(path: str | Path, linear: NDArray[np.floating[Any]]) -> None:
@@ -105,7 +89,7 @@ def write_png(path: str | Path, levels: NDArray[np.uint8] | NDArray[np.uint16]) 
         came = f"they have shape {levels.shape} and type {levels.dtype}"
         refuse(path, "pixels (H, W, 1, 3 or 4) of uint8 or uint16", came, "Convert them first")
     data = encode_png8(image) if image.dtype == np.uint8 else encode_png16(image)
-    with _replacing(path) as temporary:
+    with outputs.replacing(path) as temporary:
         temporary.write_bytes(data)
 
 
@@ -126,7 +110,7 @@ def write_exr(
     pictures = {"RGB" if linear.shape[2] == 3 else "RGBA": linear} | dict(layers or {})
     channels = {name: np.ascontiguousarray(picture, np.float32) for name, picture in pictures.items()}
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    with _replacing(path) as temporary:
+    with outputs.replacing(path) as temporary:
         OpenEXR.File(header, channels).write(str(temporary))
 
 
@@ -135,37 +119,5 @@ def _read_bytes(path: str | Path) -> bytes:
         return Path(path).read_bytes()
     except OSError as fault:
         raise DermisError(
-            f"{path}: expected {_READABLE}, but it cannot be read ({_reason(fault)}). Check the path."
+            f"{path}: expected {_READABLE}, but it cannot be read ({outputs.reason(fault)}). Check the path."
         ) from fault
-
-
-@contextmanager
-def _replacing(path: str | Path) -> Iterator[Path]:
-    """A name in the same folder, moved to `path` when all went well and removed when not."""
-    target = Path(os.path.realpath(path))
-    temporary = _temporary_name(target)
-    try:
-        yield temporary
-        temporary.replace(target)
-    except (OSError, RuntimeError) as fault:  # OpenEXR reports a full disk as a RuntimeError
-        _refuse_output(path, fault)
-    finally:
-        with suppress(OSError):  # moved already, or never made
-            temporary.unlink()
-
-
-def _temporary_name(target: Path) -> Path:
-    return target.with_name(f".dermis-{secrets.token_hex(6)}{target.suffix}")
-
-
-def _refuse_output(path: str | Path, fault: Exception) -> NoReturn:
-    raise DermisError(
-        f"{path}: expected a place to write a picture to, but it cannot be written ({_reason(fault)}). "
-        "Choose a writable folder with space left."
-    ) from fault
-
-
-def _reason(fault: Exception) -> str:
-    """The fault in one line, without the path that an OSError repeats."""
-    text = getattr(fault, "strerror", None) or str(fault) or type(fault).__name__
-    return text.splitlines()[0].rstrip(".")

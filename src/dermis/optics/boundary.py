@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -32,7 +33,8 @@ def fresnel(cosine: ArrayLike, eta: float) -> Floats:
     return np.asarray(np.where(sine2 < 1.0, 0.5 * (across**2 + along**2), 1.0))
 
 
-def internal_moment(order: int, eta: float, nodes: int = 256) -> float:
+@cache
+def internal_moment(order: int, eta: float, nodes: int = 64) -> float:
     """Moment of the internal reflectance: integral of F(mu) mu^order over cosines 0 to 1 [-].
 
     Source: [dEonIrving2011] section 3.

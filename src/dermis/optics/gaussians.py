@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
-from importlib import resources
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,10 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.errors import refuse
 
 Floats = NDArray[np.float64]
-MOST_GAUSSIANS = 16
-_WIDEST_MM2 = 1e4
-_HEADER = ["variance_mm2", "red", "green", "blue"]
-_FILE_FORM = "a CSV file with the columns " + ",".join(_HEADER)
+MOST_GAUSSIANS = 24
+"""As many as the frame adds up: eight for each of three channels."""
+
+WIDEST_MM2 = 1e4
+_MEND = "Mend the profile's table"
 
 
 @dataclass(frozen=True)
@@ -25,7 +23,8 @@ class GaussianSum:
 
     name : preset or file
     variance_mm2 : (k,) increasing [mm2]
-    weight : (k, 3) share of the light that each Gaussian spreads, linear Rec. 709 [-]
+    weight : (k, c) share of the light that each Gaussian spreads in c channels; a frame takes three, linear
+        Rec. 709 [-]
 
     Source: [dEonLuebke2007] section 14.4.
     """
@@ -36,14 +35,13 @@ class GaussianSum:
 
     def __post_init__(self) -> None:
         variance, weight = self.variance_mm2, self.weight
-        if variance.ndim != 1 or weight.shape != (len(variance), 3) or len(variance) == 0:
-            refuse(
-                self.name, "k variances and k x 3 weights", f"shapes {variance.shape}, {weight.shape}", _MEND
-            )
+        if variance.ndim != 1 or weight.ndim != 2 or len(variance) != len(weight) or weight.size == 0:
+            came = f"shapes {variance.shape}, {weight.shape}"
+            refuse(self.name, "k variances and k x c weights", came, _MEND)
         if not (np.isfinite(variance).all() and np.isfinite(weight).all()):
             refuse(self.name, "finite numbers", "NaN or infinity came", _MEND)
-        if len(variance) > MOST_GAUSSIANS or variance.max() > _WIDEST_MM2:
-            limit = f"at most {MOST_GAUSSIANS} Gaussians of up to {_WIDEST_MM2:g} mm2"
+        if len(variance) > MOST_GAUSSIANS or variance.max() > WIDEST_MM2:
+            limit = f"at most {MOST_GAUSSIANS} Gaussians of up to {WIDEST_MM2:g} mm2"
             refuse(self.name, limit, f"{len(variance)} up to {variance.max():g} came", _MEND)
         if (variance <= 0).any() or (np.diff(variance) <= 0).any():
             refuse(self.name, "variances above 0 that increase", f"they are {variance.tolist()}", _MEND)
@@ -57,56 +55,38 @@ class GaussianSum:
         return total
 
     def radiant_exitance(self, radius_mm: ArrayLike) -> Floats:
-        """R at distances r from a pencil of unit power, shape (..., 3) [1/mm2]."""
+        """R at distances r from a pencil of unit power, shape (..., c) [1/mm2]."""
         r = np.asarray(radius_mm, dtype=np.float64)[..., None]
         bells = np.exp(-(r**2) / (2 * self.variance_mm2)) / (2 * np.pi * self.variance_mm2)
         profile: Floats = bells @ self.weight
         return profile
 
+    def within(self, radius_mm: ArrayLike) -> Floats:
+        """Share of the light that leaves within distances r, shape (..., c) [-]."""
+        r = np.asarray(radius_mm, dtype=np.float64)[..., None]
+        return np.asarray(-np.expm1(-(r**2) / (2 * self.variance_mm2)) @ self.weight)
 
-_MEND = "Mend the profile's table"
+    def hankel(self, frequency: ArrayLike) -> Floats:
+        """Integral of 2 pi r R(r) J0(s r) by frequency s [1/mm], shape (..., c) [-]."""
+        s = np.asarray(frequency, dtype=np.float64)[..., None]
+        return np.asarray(np.exp(-self.variance_mm2 * s**2 / 2) @ self.weight)
 
+    def widened(self, variance_mm2: float) -> GaussianSum:
+        """The profile after a Gaussian blur of this variance."""
+        return GaussianSum(self.name, self.variance_mm2 + variance_mm2, self.weight)
 
-@cache
-def preset_names() -> tuple[str, ...]:
-    """Names that `load_profile` knows without a file."""
-    folder = resources.files("dermis.optics") / "data"
-    names = (entry.name for entry in folder.iterdir())
-    return tuple(sorted(name.removesuffix(".csv") for name in names if name.endswith(".csv")))
+    def convolved(self, other: GaussianSum) -> GaussianSum:
+        """The profile of light that spreads by this one and then by the other, channel by channel.
 
+        Raises DermisError when that takes more than `MOST_GAUSSIANS`.
+        """
+        sums = np.add.outer(self.variance_mm2, other.variance_mm2).ravel()
+        variance, place = np.unique(sums, return_inverse=True)
+        weight = np.zeros((len(variance), self.weight.shape[1]))
+        np.add.at(weight, place, (self.weight[:, None] * other.weight).reshape(len(sums), -1))
+        return GaussianSum(f"{self.name} * {other.name}", variance, weight)
 
-def load_profile(name: str | Path) -> GaussianSum:
-    """The profile of a preset's name ("gpu-gems-3") or of a CSV file: variance_mm2,red,green,blue.
-
-    Raises DermisError when there is no such preset or file, or when its numbers cannot be a profile.
-    """
-    if str(name) in preset_names():
-        return _preset(str(name))
-    path = Path(name)
-    try:
-        return _parse(str(path), path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        came = getattr(error, "strerror", None) or "it is not text"
-        expected = f"a preset ({', '.join(preset_names())}) or {_FILE_FORM}"
-        refuse(f"profile {name}", expected, f"it cannot be read: {came}", "Check the name")
-
-
-@cache
-def _preset(name: str) -> GaussianSum:
-    text = (resources.files("dermis.optics") / "data" / f"{name}.csv").read_text(encoding="utf-8")
-    return _parse(name, text)
-
-
-def _parse(name: str, text: str) -> GaussianSum:
-    lines = [line.strip() for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    if not lines or [cell.strip() for cell in lines[0].split(",")] != _HEADER:
-        refuse(
-            f"profile {name}", _FILE_FORM, f"its first line is {lines[0] if lines else 'missing'!r}", _MEND
-        )
-    try:
-        table = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]], dtype=np.float64)
-    except ValueError:
-        table = np.empty((0, 4))
-    if table.ndim != 2 or table.shape[1:] != (4,) or len(table) == 0:
-        refuse(f"profile {name}", "rows of four numbers", "other rows came", _MEND)
-    return GaussianSum(f"profile {name}", table[:, 0], table[:, 1:])
+    def inner(self, other: GaussianSum) -> Floats:
+        """Integral of r R(r) S(r) with another profile S, (c,) [1/mm2]."""
+        gram = 1 / (4 * np.pi**2 * np.add.outer(self.variance_mm2, other.variance_mm2))
+        return np.asarray(np.einsum("ic,ij,jc->c", self.weight, gram, other.weight))

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats
+from dermis.optics.targets import Points, Rings
 
 NARROWEST_MM, WIDEST_MM = 1e-4, 60.0
 """The radii that a profile covers and an error is integrated over [mm]."""
@@ -24,6 +26,7 @@ class RadialProfile:
     edges_mm : (k + 1,) of rings, the first at 0 [mm]
     ring_energy : (k, c) light that leaves through each ring [-]
     standard_error : (n, c) of R(r) where it was counted, else None [1/mm2]
+    total_error : (c,) of the total, likewise [-]
     incident : whether per power that arrives (surface reflection excluded) or that enters
     warnings : what makes these numbers doubtful
     sources : citation keys
@@ -37,9 +40,23 @@ class RadialProfile:
     edges_mm: Floats
     ring_energy: Floats
     standard_error: Floats | None = None
+    total_error: Floats | None = None
     incident: bool = False
     warnings: tuple[str, ...] = ()
     sources: tuple[str, ...] = ()
+
+    @property
+    def finite(self) -> bool:
+        """Whether R(r) has a value at the point of entry: a beam's does not."""
+        return self.model not in ("layered", "montecarlo")
+
+    def points(self) -> Points:
+        """What a fit of R(r) itself is judged by."""
+        return Points(self.radius_mm, self.reflectance, self.total)
+
+    def rings(self) -> Rings:
+        """What any fit is judged by, whatever R(r) does at its centre."""
+        return Rings(self.edges_mm, self.ring_energy, self.total)
 
 
 def ring_edges(rings: int = 120) -> Floats:
@@ -69,4 +86,18 @@ def enclosed(radius_mm: Floats, grid_mm: Floats, reflectance: Floats) -> Floats:
     within = inner + cumulative_simpson(rate, x=np.log(grid_mm), axis=0, initial=0.0)
     return np.where(
         radius_mm[:, None] > 0.0, resample(np.maximum(radius_mm, grid_mm[0]), grid_mm, within), 0.0
+    )
+
+
+def profile_of_table(table: GaussianSum) -> RadialProfile:
+    """The radial profile that a sum of Gaussians itself is."""
+    radius, edges = radius_grid(), ring_edges()
+    return RadialProfile(
+        name=table.name,
+        model="table",
+        radius_mm=radius,
+        reflectance=table.radiant_exitance(radius),
+        total=table.albedo,
+        edges_mm=edges,
+        ring_energy=np.diff(table.within(edges), axis=0),
     )

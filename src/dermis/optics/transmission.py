@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.errors import refuse
 from dermis.optics import hankel, layered_diffusion, layers
-from dermis.optics.boundary import mismatch
+from dermis.optics.boundary import mismatch, normal_reflectance
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats, Medium
-from dermis.optics.multipole import Clamp
 
 
 def through_gaussians(profile: GaussianSum, thickness_mm: ArrayLike) -> Floats:
@@ -28,23 +28,26 @@ def through_gaussians(profile: GaussianSum, thickness_mm: ArrayLike) -> Floats:
 
 
 def through_slab(
-    medium: Medium, thickness_mm: ArrayLike, model: str = "multipole", clamp: Clamp = "layer"
+    medium: Medium, thickness_mm: ArrayLike, model: Literal["layered", "multipole"] = "layered"
 ) -> Floats:
-    """Diffuse transmittance of the medium cut at each thickness, per power that enters, (n, c) [-].
+    """Transmittance of the medium cut at each thickness, per power that enters, (n, c) [-].
 
-    model : "multipole", or "layered" for layered diffusion. Light that never scatters comes on top of both:
-        exp(-thickness / mean free path)
+    model : the multipole errs where a cut leaves a layer thinner than a mean free path
 
-    Source: [DonnerJensen2005] eq. 7, 8.
+    Light that passes without an event, by the reduced extinction, is counted in.
+
+    Source: [DonnerJensen2005] eq. 7, 8 for the multipole.
     """
     found = []
     for thickness in np.atleast_1d(np.asarray(thickness_mm, dtype=np.float64)):
         slab = cut(medium, float(thickness))
+        depth = sum(layer.sigma_t_prime * layer.thickness_mm for layer in slab.layers)
+        straight = (1.0 - normal_reflectance(medium.eta)) * np.exp(-depth)
         if model == "layered":
             T = layered_diffusion.respond(hankel.STILL, slab, mismatch(medium.eta, "exact"))[1]
         else:
-            T = layers.respond(hankel.STILL, slab, mismatch(medium.eta), clamp).T_down
-        found.append(T[0])
+            T = layers.respond(hankel.STILL, slab, mismatch(medium.eta)).T_down
+        found.append(T[0] + straight)
     return np.stack(found)
 
 

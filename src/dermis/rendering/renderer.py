@@ -16,7 +16,7 @@ from dermis.assets.head import Head
 from dermis.errors import refuse
 from dermis.gpu import Frame, make_texture, open_device
 from dermis.gpu.device import gpu_failures
-from dermis.optics.gaussians import load_profile
+from dermis.optics.profiles import load_profile
 from dermis.rendering import inputs as made
 from dermis.rendering.frame import Stages, draw_frame
 from dermis.rendering.inputs import Inputs

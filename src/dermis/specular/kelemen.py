@@ -11,7 +11,7 @@ from dermis.specular.fresnel import SKIN_F0, schlick
 Floats = NDArray[np.float64]
 
 
-def kelemen(n: Floats, l: Floats, v: Floats, m: float, f0: float = SKIN_F0) -> Floats:  # noqa: E741
+def kelemen(n: Floats, l: Floats, v: Floats, m: float, f0: float = SKIN_F0) -> Floats:
     """BRDF of the rough surface for rho_s = 1, without the cosine [1/sr].
 
     n, l, v : (..., 3) unit vectors: normal, to the light, to the eye

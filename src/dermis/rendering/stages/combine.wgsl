@@ -3,7 +3,7 @@
 struct Weights {
     first: u32,
     count: u32,
-    weight: array<vec4f, 16>,
+    weight: array<vec4f, 24>,
 }
 
 @group(0) @binding(0) var<uniform> weights: Weights;

@@ -1,0 +1,49 @@
+"""Median time from tissue to six shared Gaussians, on one core: python benchmarks/profile.py."""
+
+from __future__ import annotations
+
+import os
+
+os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1")
+
+import statistics
+import sys
+import time
+from collections.abc import Callable
+
+import dermis
+from dermis.optics.fit import fit_gaussians
+
+REPEATS = 15
+
+
+def median_ms(work: Callable[[], object]) -> float:
+    """Of repeated runs, after one that loads what is loaded once [ms]."""
+    work()
+    times = []
+    for _ in range(REPEATS):
+        started = time.perf_counter()
+        work()
+        times.append(1e3 * (time.perf_counter() - started))
+    return statistics.median(times)
+
+
+def main() -> None:
+    """Print a Markdown table."""
+    rows = ["| tissue | layers -> profile [ms] | profile -> six Gaussians [ms] | warm start [ms] |", "|---|---|---|---|"]
+    for name in ("dj3", "skin1", "light"):
+        tissue = dermis.load_tissue(name)
+        rings = tissue.profile().rings()
+        near = fit_gaussians(rings, 6).profile
+        moved = dermis.load_tissue("light", pigments={"melanin": 0.006}).profile().rings() if name == "light" else rings
+        cells = (
+            median_ms(tissue.profile),
+            median_ms(lambda rings=rings: fit_gaussians(rings, 6)),
+            median_ms(lambda moved=moved, near=near: fit_gaussians(moved, 6, near=near)),
+        )
+        rows.append(f"| {name} | {' | '.join(f'{ms:.1f}' for ms in cells)} |")
+    sys.stdout.write("\n".join(rows) + "\n")
+
+
+if __name__ == "__main__":
+    main()

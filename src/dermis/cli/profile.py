@@ -1,0 +1,187 @@
+"""`dermis profile`: how light spreads below a skin, and the Gaussians that stand for it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from dermis.cli.console import note, print_json, print_lines, progress
+from dermis.cli.options import Json, Whole, parse_lengths
+from dermis.errors import refuse
+
+if TYPE_CHECKING:
+    from dermis.optics.radial import RadialProfile
+    from dermis.optics.tissue import Tissue
+
+Model = Literal["dipole", "better-dipole", "multipole", "layered", "layered-point", "montecarlo"]
+Flag = Annotated[bool, Parameter(negative="")]
+
+_PIGMENTS = ("melanin", "eumelanin", "blood", "oxygen", "epidermis_mm", "epidermal_blood", "oiliness")
+_TERMS, _PHOTONS = 6, 1_000_000
+
+
+def profile(
+    name: str,
+    /,
+    *,
+    model: Model | None = None,
+    clamp: Literal["layer", "none"] = "layer",
+    eta: float | None = None,
+    photons: Whole = None,
+    seed: Whole = None,
+    anisotropy: float = 0.0,
+    skin: Literal["dj2006", "donner2008", "biospec"] | None = None,
+    melanin: float | None = None,
+    eumelanin: float | None = None,
+    blood: float | None = None,
+    oxygen: float | None = None,
+    epidermis_mm: float | None = None,
+    epidermal_blood: float | None = None,
+    oiliness: float | None = None,
+    fit: Whole = None,
+    fit_kind: Literal["gaussian", "burley", "separable"] = "gaussian",
+    variances: Literal["shared", "per-channel"] = "shared",
+    keep_energy: Flag = False,
+    through: str | None = None,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    plot: Path | None = None,
+    check: Flag = False,
+    as_json: Json = False,
+) -> int:
+    """Compute how light spreads below a skin, and fit Gaussians to it.
+
+    Examples:
+
+        dermis profile dj3 --model multipole --plot dj3.png
+
+        dermis profile spectral --melanin 0.02 --blood 0.01 -o mine.toml
+
+        dermis render lee_perry_smith --profile mine.toml
+
+        dermis profile skin1 --model montecarlo --photons 1000000 --eta 1.3 --json
+
+    Parameters
+    ----------
+    name:
+        A medium (dj3, skin1, skin2, marble ...), a skin of pigments (spectral, light, medium, dark), the
+        published table gpu-gems-3, or a .toml file: [[layers]], a table [skin], or what -o wrote.
+    model:
+        dipole and better-dipole take one endless layer; multipole is the deck's; layered is diffusion with
+        continuous flux [the default]; layered-point is finite at its centre; montecarlo is the truth.
+    clamp:
+        Where the multipole puts the source of a layer thinner than a mean free path: inside it (layer), or
+        below it as printed (none).
+    eta:
+        Index of refraction of the layers; 1 for a matched surface [1.4].
+    photons:
+        Monte Carlo photons for each channel or wavelength [1000000].
+    seed:
+        Of the photons' random numbers [0].
+    anisotropy:
+        Mean cosine g of the photons' scattering; the reduced scattering stays what it is.
+    skin:
+        Layers of a skin of pigments: two (dj2006, the default), two and a thin sheet of melanin (donner2008),
+        four (biospec).
+    melanin:
+        Share of melanosomes in the epidermis, 0 to 1.
+    eumelanin:
+        Share of them that is eumelanin, the rest is pheomelanin.
+    blood:
+        Share of blood in the dermis.
+    oxygen:
+        Share of the haemoglobin that carries oxygen.
+    epidermis_mm:
+        Thickness of the epidermis [mm].
+    epidermal_blood:
+        Share of blood in the epidermis, of donner2008.
+    oiliness:
+        Strength of the surface reflection; nothing below depends on it.
+    fit:
+        How many Gaussians to fit, 1 to 8 [6].
+    fit_kind:
+        Also fit the normalised profile of Burley, or a separable kernel, and state their errors.
+    variances:
+        One set of widths for all channels, as a renderer wants it, or a set for each.
+    keep_energy:
+        Have the weights sum to the total reflectance.
+    through:
+        Also give the colour that comes through these thicknesses, such as 0.5,1,2 [mm].
+    output:
+        Profile to write (.toml), for --profile of render.
+    plot:
+        Picture to write (.png, .svg or .pdf): r R(r) of each channel with its fit.
+    check:
+        Add Monte Carlo points with error bars to the plot.
+    as_json:
+        Print one JSON object.
+    """
+    given = {key: value for key, value in locals().items() if key in _PIGMENTS and value is not None}
+    from dermis.cli.profile_report import Report, Request
+    from dermis.optics.profiles import find_table
+    from dermis.optics.radial import profile_of_table
+
+    _check_outputs(output, plot, check)
+    request = Request(_TERMS if fit is None else fit, fit_kind, variances == "shared", keep_energy)
+    thicknesses = () if through is None else parse_lengths("--through", through)
+    light = {"photons": _PHOTONS if photons is None else photons, "seed": seed or 0, "g": anisotropy}
+    table = find_table(name)
+    if table is not None:
+        _refuse_tissue_options(name, given | {"model": model, "skin": skin, "eta": eta})
+        tissue, radial = None, replace(profile_of_table(table), name=name)
+    else:
+        tissue = _tissue(name, skin, given, eta)
+        radial = _profile(tissue, model or "layered", clamp, light)
+    found = Report.of(radial, tissue, request, None if fit is not None else table, thicknesses)
+    if output is not None:
+        found.save(output)
+    if plot is not None:
+        from dermis.cli.profile_plot import draw
+
+        counted = _profile(tissue, "montecarlo", clamp, light) if check and tissue else None
+        draw(plot, found, counted)
+    if as_json:
+        print_json(found.as_json())
+    else:
+        print_lines(*found.lines())
+        for warning in radial.warnings:
+            note(f"warning: {warning}")
+    return 0
+
+
+def _check_outputs(output: Path | None, plot: Path | None, check: bool) -> None:
+    from dermis.outputs import check_output
+
+    if output is not None:
+        check_output(output, (".toml",), "Name it something.toml")
+    if plot is not None:
+        check_output(plot, (".png", ".svg", ".pdf"))
+    elif check:
+        refuse("--check", "a plot to add photons to", "no --plot came", "Add --plot picture.png")
+
+
+def _refuse_tissue_options(name: str, given: dict[str, Any]) -> None:
+    for option, value in given.items():
+        if value is not None:
+            expected, came = "a medium or a skin of pigments", f"{name} is a table of Gaussians"
+            refuse(f"--{option.replace('_', '-')}", expected, came, "Leave it out")
+
+
+def _tissue(name: str, skin: Any, pigments: dict[str, Any], eta: float | None) -> Tissue:
+    from dermis.optics.tissue import load_tissue
+
+    tissue = load_tissue(name, skin or "dj2006", pigments)
+    if skin is not None and tissue.parameters is None:
+        refuse("--skin", "a skin made of pigments", f"{name} is a medium", "Leave it out")
+    return tissue if eta is None else replace(tissue, medium=tissue.medium.with_eta(eta))
+
+
+def _profile(tissue: Tissue, model: Model, clamp: Any, light: dict[str, Any]) -> RadialProfile:
+    if model != "montecarlo":
+        return tissue.profile(model, clamp)
+    from dermis.reference.counted import counted_profile
+
+    with progress("tracing photons") as report:
+        return counted_profile(tissue.medium, tissue.rgb, report=report, **light)

@@ -1,0 +1,82 @@
+"""The figure of `dermis profile --plot`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dermis.optics.burley import BurleyFit
+from dermis.outputs import replacing
+
+if TYPE_CHECKING:
+    from dermis.cli.profile_report import Report
+    from dermis.optics.media import Floats
+    from dermis.optics.radial import RadialProfile
+
+_INK = ("#c0392b", "#2e8b57", "#2a62b0")
+_NAMES = ("red", "green", "blue")
+_FAINTEST = 1e-5  # of the peak of r R(r): below that numbers are noise and eyes see nothing
+_LEAST_COUNT = 0.3  # relative standard error beyond which a ring of photons is left out
+
+
+def draw(path: Path, found: Report, counted: RadialProfile | None) -> None:
+    """Write r R(r) of each channel: the model, its Gaussians, and counted photons with error bars.
+
+    path : .png, .svg or .pdf
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.2, 4.6), dpi=160, layout="constrained")
+    axes = figure.subplots()
+    peak = _curves(axes, found)
+    if counted is not None:
+        peak = max(peak, _photons(axes, counted))
+    axes.set(xscale="log", yscale="log", xlabel="r [mm]", ylabel="r R(r) [1/mm]")
+    axes.set(xlim=(1e-3, 30.0), ylim=(_FAINTEST * peak, 2.0 * peak))
+    axes.set_title(_title(found), fontsize=10, loc="left")
+    axes.grid(which="major", alpha=0.25, linewidth=0.6)
+    axes.legend(frameon=False, fontsize=8, loc="lower left")
+    with replacing(path) as trial:
+        figure.savefig(trial, metadata=_undated(path))
+
+
+def _curves(axes: Any, found: Report) -> float:
+    radial, fit = found.radial, found.fit.profile
+    r = radial.radius_mm
+    fitted = fit.radiant_exitance(r)
+    for channel, (ink, name) in enumerate(zip(_INK, _NAMES, strict=True)):
+        label = f"{name}, {radial.model}"
+        axes.plot(r, r * radial.reflectance[:, channel], color=ink, linewidth=1.4, label=label)
+        label = f"{len(fit.variance_mm2)} Gaussians, error {found.fit.error[channel]:.2%}"
+        axes.plot(r, r * fitted[:, channel], color=ink, linewidth=1.1, linestyle=(0, (4, 3)), label=label)
+        if isinstance(found.other, BurleyFit):
+            other = r * found.other.profile.radiant_exitance(r)[:, channel]
+            axes.plot(r, other, color=ink, linewidth=1.0, linestyle=":", label="Burley")
+    return float((r[:, None] * radial.reflectance).max())
+
+
+def _photons(axes: Any, counted: RadialProfile) -> float:
+    r, peak = counted.radius_mm, 0.0
+    error: Floats = counted.standard_error if counted.standard_error is not None else np.zeros((len(r), 3))
+    for channel, ink in enumerate(_INK):
+        R, se = counted.reflectance[:, channel], error[:, channel]
+        sure = (R > 0.0) & (se < _LEAST_COUNT * np.abs(R)) & (r > 1e-3)
+        peak = max(peak, float((r * R)[sure].max(initial=0.0)))
+        label = "Monte Carlo" if channel == 0 else None
+        bars = {"markersize": 2.2, "elinewidth": 0.8, "color": ink, "alpha": 0.7, "label": label}
+        axes.errorbar(r[sure], (r * R)[sure], (r * se)[sure], fmt="o", **bars)
+    return peak
+
+
+def _title(found: Report) -> str:
+    radial = found.radial
+    total = ", ".join(f"{value:.3f}" for value in radial.total)
+    eta = f", index {found.tissue.medium.eta:g}" if found.tissue is not None else ""
+    return f"{radial.name}{eta}: total reflectance {total}"
+
+
+def _undated(path: Path) -> dict[str, Any]:
+    """What keeps the same plot the same file."""
+    return {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix.lower(), {})

@@ -1,0 +1,223 @@
+"""What `dermis profile` has to say, as JSON, as lines, and as a file."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from dermis.optics.fit import GaussianFit, fit_gaussians
+from dermis.optics.transmission import through_gaussians, through_slab
+
+if TYPE_CHECKING:
+    from dermis.optics.burley import BurleyFit
+    from dermis.optics.gaussians import GaussianSum
+    from dermis.optics.media import Floats
+    from dermis.optics.radial import RadialProfile
+    from dermis.optics.separable import SeparableFit
+    from dermis.optics.tissue import Tissue
+
+
+@dataclass(frozen=True)
+class Request:
+    """How to fit.
+
+    terms : Gaussians, 1 to 8
+    kind : what to fit besides Gaussians
+    shared : one set of widths for all channels
+    keep_energy : weights sum to the total
+    """
+
+    terms: int
+    kind: Literal["gaussian", "burley", "separable"]
+    shared: bool
+    keep_energy: bool
+
+
+@dataclass(frozen=True)
+class Report:
+    """A profile with its fits.
+
+    radial : the profile
+    tissue : what it belongs to, None for a table of Gaussians
+    fit : Gaussians and their error
+    ring_error : (3,) of the Gaussians in the light through rings, to compare all kinds of fit by [-]
+    other : a fit of another kind
+    through_mm : thicknesses that light is to come through [mm]
+    """
+
+    radial: RadialProfile
+    tissue: Tissue | None
+    fit: GaussianFit
+    ring_error: Floats
+    other: BurleyFit | SeparableFit | None
+    through_mm: tuple[float, ...]
+
+    @classmethod
+    def of(
+        cls,
+        radial: RadialProfile,
+        tissue: Tissue | None,
+        request: Request,
+        table: GaussianSum | None,
+        through_mm: tuple[float, ...],
+    ) -> Report:
+        """The report of a profile; a table that is given is taken as its own fit."""
+        target = radial.points() if radial.finite else radial.rings()
+        if table is None:
+            shared, keep_energy = request.shared, request.keep_energy
+            fit = fit_gaussians(
+                target, request.terms, shared=shared, keep_energy=keep_energy, name=radial.name
+            )
+        else:
+            fit = GaussianFit(table, np.zeros(3), np.zeros(3), "pointwise", shared=True)
+        rings = radial.rings()
+        ring_error = rings.error(fit.profile.variance_mm2, fit.profile.weight)
+        return cls(radial, tissue, fit, ring_error, _other(radial, request.kind), through_mm)
+
+    def as_json(self) -> dict[str, Any]:
+        """Everything, in plain lists."""
+        radial, sum_ = self.radial, self.fit.profile
+        found: dict[str, Any] = _plain(
+            {
+                "name": radial.name,
+                "model": radial.model,
+                **self._tissue_json(),
+                "per": self._per(),
+                "radius_mm": radial.radius_mm,
+                "reflectance_per_mm2": radial.reflectance,
+                "standard_error_per_mm2": radial.standard_error,
+                "total": radial.total,
+                "total_standard_error": radial.total_error,
+                "gaussians": {
+                    "variances_mm2": sum_.variance_mm2,
+                    "weights": sum_.weight,
+                    "error": self.fit.error,
+                    "error_kind": self.fit.kind,
+                    "ring_error": self.ring_error,
+                    "energy_error": self.fit.energy_error,
+                    "shared": self.fit.shared,
+                },
+                **self._other_json(),
+                **self._through_json(),
+                "warnings": radial.warnings,
+                "notes": self.tissue.medium.notes if self.tissue else (),
+                "sources": radial.sources,
+            }
+        )
+        return found
+
+    def lines(self) -> list[str]:
+        """The report to read."""
+        radial, fit = self.radial, self.fit
+        lines = [f"{radial.name}, model {radial.model}", f"total      {_row(radial.total)}  {self._per()}"]
+        if self.tissue is not None and self.tissue.rgb is None:
+            for layer in self.tissue.medium.layers:
+                lines.append(f"mean free  {_row(layer.mean_free_path_mm)}  mm in {layer.name}")
+        lines += ["", "variance mm2     red   green    blue"]
+        for variance, weight in zip(fit.profile.variance_mm2, fit.profile.weight, strict=True):
+            lines.append(f"{variance:12.5g} {_row(weight)}")
+        kind = "R(r)" if fit.kind == "pointwise" else "rings"
+        lines.append(f"error      {_row(fit.error)}  of {kind}, relative")
+        lines.append(f"energy     {_row(fit.energy_error)}  too much or too little, relative")
+        if self.other is not None:
+            lines.append(f"rings      {_row(self.ring_error)}  Gaussians' error in the light through rings")
+            lines.append(f"rings      {_row(self.other.error)}  the other fit's")
+        for thickness, colour in zip(self.through_mm, self._through(), strict=True):
+            lines.append(f"through    {_row(colour)}  {thickness:g} mm")
+        lines += [f"note: {note}" for note in (self.tissue.medium.notes if self.tissue else ())]
+        return lines
+
+    def save(self, path: Path) -> None:
+        """Write the Gaussians for the renderer."""
+        from dermis.optics.profiles import write_profile
+
+        remarks: dict[str, Any] = {"name": self.radial.name, "model": self.radial.model}
+        if self.tissue is not None:
+            remarks["eta"] = self.tissue.medium.eta
+            if self.tissue.parameters is not None:
+                fields = asdict(self.tissue.parameters)
+                remarks |= {key: value for key, value in fields.items() if value is not None}
+        remarks |= {"total": self.radial.total, "per": self._per(), "error": self.fit.error}
+        remarks |= {"error_kind": self.fit.kind, "energy_error": self.fit.energy_error}
+        write_profile(path, self.fit.profile, remarks)
+
+    def _per(self) -> str:
+        if self.radial.model == "table":
+            return "as the table has it"
+        return (
+            "of incident light, surface reflection apart" if self.radial.incident else "of light that enters"
+        )
+
+    def _tissue_json(self) -> dict[str, Any]:
+        if self.tissue is None:
+            return {}
+        medium, parameters = self.tissue.medium, self.tissue.parameters
+        found: dict[str, Any] = {
+            "eta": medium.eta,
+            "layers": [layer.name for layer in medium.layers],
+            "thickness_mm": [_finite(layer.thickness_mm) for layer in medium.layers],
+            "mean_free_path_mm": [layer.mean_free_path_mm for layer in medium.layers],
+        }
+        if parameters is not None:
+            from dermis.optics.spectra import WAVELENGTHS_NM
+
+            found |= {"skin": asdict(parameters), "wavelength_nm": WAVELENGTHS_NM}
+        return found
+
+    def _other_json(self) -> dict[str, Any]:
+        from dermis.optics.burley import BurleyFit, unity_parameters, unreal_parameters
+
+        if self.other is None:
+            return {}
+        found = asdict(self.other)
+        if not isinstance(self.other, BurleyFit):
+            return {"separable": found}
+        engines = {
+            f"{f.__name__}": asdict(f(self.other.profile)) for f in (unity_parameters, unreal_parameters)
+        }
+        return {"burley": found | engines}
+
+    def _through(self) -> Floats:
+        return through_gaussians(self.fit.profile, self.through_mm)
+
+    def _through_json(self) -> dict[str, Any]:
+        if not self.through_mm:
+            return {}
+        found: dict[str, Any] = {"thickness_mm": self.through_mm, "gaussians": self._through()}
+        if self.tissue is not None:
+            slab = through_slab(self.tissue.medium, self.through_mm)
+            found["slab"] = slab if self.tissue.rgb is None else slab @ self.tissue.rgb.T
+        return {"transmission": found}
+
+
+def _other(radial: RadialProfile, kind: str) -> BurleyFit | SeparableFit | None:
+    if kind == "burley":
+        from dermis.optics.burley import fit_burley
+
+        return fit_burley(radial.rings())
+    if kind == "separable":
+        from dermis.optics.separable import fit_separable
+
+        return fit_separable(radial.rings())
+    return None
+
+
+def _row(values: Floats) -> str:
+    return " ".join(f"{value:7.4f}" for value in values)
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items() if one is not None}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    return value

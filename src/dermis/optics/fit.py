@@ -1,0 +1,146 @@
+"""Fits of sums of Gaussians to a diffusion profile."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from dermis.errors import refuse
+from dermis.optics.gaussians import WIDEST_MM2, GaussianSum
+from dermis.optics.media import Floats
+from dermis.optics.targets import Points, Rings
+from dermis.optics.variable_projection import Design, Fit, descend
+
+Target = Points | Rings
+MOST_TERMS = 8
+# Shares of the light within the narrowest and the widest Gaussian: from one of these every profile tried so
+# far reached the least error that any start leads to.
+_STARTS = ((0.02, 0.99), (0.1, 0.999), (0.02, 0.9), (0.1, 0.6), (0.001, 0.99))
+_STIFFNESS = 1e4  # of the energy's equation against the others'; squared, it bounds the energy's error
+
+
+@dataclass(frozen=True)
+class GaussianFit:
+    """A sum of Gaussians and how well it fits.
+
+    profile : the sum
+    error : (c,) relative root mean square error, pointwise E or E_b over rings [-]
+    energy_error : (c,) total reflectance of the sum over the target's, less 1 [-]
+    kind : which error it is
+    shared : whether all channels use the same Gaussians
+    """
+
+    profile: GaussianSum
+    error: Floats
+    energy_error: Floats
+    kind: Literal["pointwise", "annulus"]
+    shared: bool
+
+
+def fit_gaussians(
+    target: Target,
+    terms: int,
+    *,
+    shared: bool = True,
+    keep_energy: bool = False,
+    near: GaussianSum | None = None,
+    name: str = "fit",
+) -> GaussianFit:
+    """The sum of Gaussians that fits a profile best.
+
+    target : R(r) at points, or light through rings
+    terms : Gaussians in each channel, 1 to 8
+    shared : the same variances in all channels, chosen for the root mean square of their errors; else
+        each channel has its own, and weights of 0 for the others'
+    keep_energy : make the weights sum to the target's total
+    near : the fit of a similar profile to start from, an order of magnitude faster
+    name : of the resulting profile
+
+    Raises DermisError when the terms are too few or many, or when Gaussians cannot follow the profile.
+
+    Source: [dEonLuebke2007] section 14.4 for the error that is minimised.
+    """
+    if not 1 <= terms <= MOST_TERMS:
+        refuse("terms of a fit", f"1 to {MOST_TERMS} Gaussians", f"{terms} came", "Choose another number")
+    groups = [target] if shared else [target.channel(i) for i in range(len(target.total))]
+    fits = [
+        _fit_group(group, terms, keep_energy, _variances(near, None if shared else i, terms))
+        for i, group in enumerate(groups)
+    ]
+    profile = _union(fits, name)
+    return GaussianFit(
+        profile=profile,
+        error=target.error(profile.variance_mm2, profile.weight),
+        energy_error=profile.albedo / target.total - 1.0,
+        kind=target.kind,
+        shared=shared,
+    )
+
+
+def _fit_group(target: Target, terms: int, keep_energy: bool, near: Floats | None) -> tuple[Floats, Floats]:
+    """Variances (k,) and weights (k, c) that all channels of the target share."""
+    norm = np.linalg.norm(target.samples, axis=0)
+    design, samples = _conserve(target) if keep_energy else (target.design, target.samples)
+    bounds = _bounds(target)
+
+    def run(start: Floats) -> Fit:
+        return descend(design, samples / norm, np.clip(start, *bounds), bounds)
+
+    best = None if near is None else run(np.log(near))
+    if best is None or not best.weight.any(axis=1).all():  # a Gaussian that died may live from elsewhere
+        best = min((run(start) for start in _starts(target, terms)), key=lambda fit: fit.cost)
+    weight = best.weight * norm
+    if not weight.any(axis=0).all():
+        came = "no weights of 0 or more come near it"
+        refuse(f"{target.kind} target", "a profile that Gaussians can follow", came, "Look at its numbers")
+    if keep_energy:
+        weight *= target.total / weight.sum(axis=0)
+    alive = weight.any(axis=1)
+    return np.exp(best.log_variance[alive]), weight[alive]
+
+
+def _starts(target: Target, terms: int) -> list[Floats]:
+    ends = [np.log(target.radius_of(shares) ** 2 / 2.0) for shares in _STARTS]
+    return [np.linspace(low, high, terms) for low, high in ends]
+
+
+def _bounds(target: Target) -> tuple[float, float]:
+    """Of log variances: half the first radius, to the last."""
+    radius = target.radius_mm if isinstance(target, Points) else target.edges_mm[1:]
+    return float(2.0 * np.log(radius[0] / 2.0)), float(np.log(min(radius[-1] ** 2, WIDEST_MM2)))
+
+
+def _conserve(target: Target) -> tuple[Design, Floats]:
+    """The design and samples with one more equation, a stiff one: the weights sum to the total."""
+    width = target.radius_of([0.5]) ** 2 / 2.0
+    stiffness = _STIFFNESS * float(np.linalg.norm(target.design(width)[0]))
+
+    def design(variance_mm2: Floats) -> tuple[Floats, Floats]:
+        columns, slopes = target.design(variance_mm2)
+        row = np.ones((1, len(variance_mm2)))
+        return np.vstack([stiffness * row, columns]), np.vstack([0.0 * row, slopes])
+
+    return design, np.vstack([stiffness * target.total, target.samples])
+
+
+def _variances(near: GaussianSum | None, channel: int | None, terms: int) -> Floats | None:
+    """The variances to start from, when they are as many as wanted."""
+    if near is None:
+        return None
+    used = near.weight.any(axis=1) if channel is None else near.weight[:, channel] > 0.0
+    return near.variance_mm2[used] if used.sum() == terms else None
+
+
+def _union(fits: list[tuple[Floats, Floats]], name: str) -> GaussianSum:
+    """One sum of all the groups' Gaussians, equal variances merged."""
+    variance, place = np.unique(np.concatenate([v for v, _ in fits]), return_inverse=True)
+    channels = sum(w.shape[1] for _, w in fits)
+    weight = np.zeros((len(variance), channels))
+    row = channel = 0
+    for v, w in fits:
+        rows = place[row : row + len(v)]
+        np.add.at(weight[:, channel : channel + w.shape[1]], rows, w)
+        row, channel = row + len(v), channel + w.shape[1]
+    return GaussianSum(name, variance, weight)

@@ -1,0 +1,141 @@
+"""Profiles that a renderer can use: the published table, tables and fits in files, and tissue by name."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dermis.errors import refuse
+from dermis.optics.fit import fit_gaussians
+from dermis.optics.gaussians import GaussianSum
+from dermis.optics.media import Floats
+from dermis.optics.presets import read_toml
+from dermis.optics.tissue import load_tissue, names
+from dermis.outputs import replacing
+
+PUBLISHED = "gpu-gems-3"
+TERMS = 6
+_HEADER = ["variance_mm2", "red", "green", "blue"]
+_FILE_FORM = "a CSV file with the columns " + ",".join(_HEADER)
+_MEND = "Mend the profile's table"
+
+
+def preset_names() -> tuple[str, ...]:
+    """Names that `load_profile` knows without a file."""
+    return (PUBLISHED, *names())
+
+
+def load_profile(name: str | Path) -> GaussianSum:
+    """The Gaussians of a name ("gpu-gems-3", "dj3" ...) or of a file: .csv, or .toml of `dermis profile`.
+
+    Tissue without Gaussians of its own is computed by layered diffusion and fitted with six.
+
+    Raises DermisError when there is no such preset or file, or when its numbers cannot be a profile.
+    """
+    table = find_table(name)
+    if table is not None:
+        return table
+    if str(name) in names():
+        return _fitted(str(name))
+    path = Path(name)
+    if path.suffix.lower() != ".toml":
+        expected = f"a preset ({', '.join(preset_names())}), a .toml file of a tissue, or {_FILE_FORM}"
+        refuse(f"profile {name}", expected, "there is no such file", "Check the name")
+    return _fit(path)
+
+
+def find_table(name: str | Path) -> GaussianSum | None:
+    """The Gaussians that a name or file holds as they are; None when it is tissue, or nothing."""
+    if str(name) == PUBLISHED:
+        return _published()
+    path = Path(name)
+    if str(name) in names():
+        return None
+    if path.suffix.lower() == ".toml":
+        document = read_toml(path)
+        return _from_toml(path, document) if "variances_mm2" in document else None
+    return _from_csv(path) if path.exists() else None
+
+
+def write_profile(path: Path, profile: GaussianSum, remarks: Mapping[str, Any]) -> None:
+    """Write Gaussians to a .toml file, whole or not at all.
+
+    remarks : further entries: text, numbers, and lists of them
+
+    Raises DermisError when that is not possible.
+    """
+    lines = ["# Written by dermis profile. Lengths in mm; red, green, blue are linear Rec. 709."]
+    lines += [f"{key} = {_toml(value)}" for key, value in remarks.items()]
+    lines += [f"variances_mm2 = {_toml(profile.variance_mm2)}", "weights = ["]
+    lines += [f"    {_toml(row)}," for row in profile.weight]
+    with replacing(path) as trial:
+        trial.write_text("\n".join([*lines, "]", ""]), encoding="utf-8")
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, np.ndarray):
+        return _toml(value.tolist())
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return f"[{', '.join(map(_toml, value))}]"
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+
+
+@cache
+def _fitted(name: str) -> GaussianSum:
+    return _fit(name)
+
+
+def _fit(name: str | Path) -> GaussianSum:
+    return fit_gaussians(load_tissue(name).profile().rings(), TERMS, name=f"profile {name}").profile
+
+
+@cache
+def _published() -> GaussianSum:
+    text = (resources.files("dermis.optics") / "data" / f"{PUBLISHED}.csv").read_text(encoding="utf-8")
+    return _parse(PUBLISHED, text)
+
+
+def _from_csv(path: Path) -> GaussianSum:
+    try:
+        return _parse(str(path), path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        came = getattr(error, "strerror", None) or "it is not text"
+        refuse(f"profile {path}", _FILE_FORM, f"it cannot be read: {came}", "Check the name")
+
+
+def _from_toml(path: Path, document: Mapping[str, Any]) -> GaussianSum:
+    try:
+        variances = np.array(document["variances_mm2"], dtype=np.float64)
+        weights = np.array(document["weights"], dtype=np.float64)
+    except (KeyError, ValueError, TypeError):
+        expected = "lists of numbers variances_mm2 and weights"
+        refuse(f"profile {path}", expected, "something else came", _MEND)
+    return _three(path, variances, weights)
+
+
+def _parse(name: str, text: str) -> GaussianSum:
+    lines = [line.strip() for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    if not lines or [cell.strip() for cell in lines[0].split(",")] != _HEADER:
+        came = f"its first line is {lines[0] if lines else 'missing'!r}"
+        refuse(f"profile {name}", _FILE_FORM, came, _MEND)
+    try:
+        table = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]], dtype=np.float64)
+    except ValueError:
+        table = np.empty((0, 4))
+    if table.ndim != 2 or table.shape[1:] != (4,) or len(table) == 0:
+        refuse(f"profile {name}", "rows of four numbers", "other rows came", _MEND)
+    return _three(name, table[:, 0], table[:, 1:])
+
+
+def _three(name: object, variance_mm2: Floats, weight: Floats) -> GaussianSum:
+    if weight.ndim != 2 or weight.shape[1:] != (3,):
+        refuse(f"profile {name}", "weights in red, green and blue", f"shape {weight.shape} came", _MEND)
+    return GaussianSum(f"profile {name}", variance_mm2, weight)

@@ -1,0 +1,175 @@
+"""Skin from a handful of parameters: structures of layers with an absorption and scattering spectrum each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Final, Literal, get_args
+
+from dermis.errors import refuse
+from dermis.optics.chromophores import baseline, blood, melanosome
+from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium
+from dermis.optics.scattering import DERMIS_SHARE, ScatteringLaw, donner_jensen_2006
+from dermis.optics.spectra import WAVELENGTHS_NM, visible
+
+Structure = Literal["dj2006", "donner2008", "biospec"]
+
+LEAKED_MELANIN: Final = 0.175
+"""Absorption of the sheet under the epidermis over that of the epidermis' melanin, after [Donner2008] [-]."""
+
+_SHEET_MM = 0.001
+_CORNEUM_MM, _PAPILLARY_MM = 0.01, 0.2
+_RETICULAR_BLOOD = 0.0091 / 0.012
+_THICKEST_EPIDERMIS_MM = 2.0
+
+
+@dataclass(frozen=True)
+class SkinParameters:
+    """What a skin is made of.
+
+    melanin : share of the epidermis' volume that is melanosomes, 0 to 1 [-]
+    eumelanin : share of the melanosomes that hold eumelanin, the rest holds pheomelanin, 0 to 1 [-]
+    blood : share of the dermis' volume that is blood, 0 to 1 [-]
+    oxygen : share of the haemoglobin that carries oxygen, 0 to 1 [-]
+    epidermis_mm : thickness of the epidermis; 0.25 is a scene's of public code, others take 0.05 to 0.2 [mm]
+    epidermal_blood : share of the epidermis' volume that is blood, in "donner2008" only, 0 to 1 [-]
+    oiliness : gain of the surface's reflection (rho_s), 0 to 1; nothing below the surface depends on it [-]
+
+    Source: [DonnerJensen2006, DonnerJensen2006a]; [Donner2008] for blood in the epidermis.
+    """
+
+    melanin: float = 0.005
+    eumelanin: float = 0.7
+    blood: float = 0.005
+    oxygen: float = 0.75
+    epidermis_mm: float = 0.25
+    epidermal_blood: float = 0.0
+    oiliness: float = 0.3
+
+    def __post_init__(self) -> None:
+        for name in ("melanin", "eumelanin", "blood", "oxygen", "epidermal_blood", "oiliness"):
+            value = getattr(self, name)
+            if not 0.0 <= value <= 1.0:
+                refuse(_option(name), "a share from 0 to 1", f"{value:g} came", "Correct it")
+        if not 0.0 < self.epidermis_mm <= _THICKEST_EPIDERMIS_MM:
+            expected = f"more than 0 and up to {_THICKEST_EPIDERMIS_MM:g} mm"
+            refuse(_option("epidermis_mm"), expected, f"{self.epidermis_mm:g} mm came", "Correct it")
+        if self.melanin + self.epidermal_blood > 1.0:
+            both = f"{_option('melanin')} and {_option('epidermal_blood')}"
+            refuse(
+                both, "at most 1 together", f"{self.melanin:g} and {self.epidermal_blood:g} came", "Lower one"
+            )
+
+
+EXAMPLES: Final[Mapping[str, SkinParameters]] = MappingProxyType(
+    {
+        "light": SkinParameters(melanin=0.005, eumelanin=0.7, blood=0.005),
+        "medium": SkinParameters(melanin=0.15, eumelanin=0.0, blood=0.01),
+        "dark": SkinParameters(melanin=0.5, eumelanin=0.7, blood=0.05),
+    }
+)
+"""The three skins that [DonnerJensen2006a] tabulates; of light that meets the last, 2 % return."""
+
+
+def spectral_medium(
+    structure: Structure,
+    parameters: SkinParameters,
+    wavelength_nm: Floats = WAVELENGTHS_NM,
+    scattering: ScatteringLaw = donner_jensen_2006,
+) -> Medium:
+    """The layers of a skin, with a channel for each wavelength.
+
+    structure : "dj2006" is an epidermis on a dermis without end; "donner2008" has a thin sheet of melanin
+        between them and blood in both; "biospec" has a stratum corneum, an epidermis and two layers of dermis
+    parameters : what they are made of
+    wavelength_nm : (n,) from 380 to 780 [nm]
+    scattering : law of the epidermis
+
+    All layers share one index of refraction. The thin layers of the last two structures need the model
+    "layered": the multipole misjudges them.
+
+    Raises DermisError for another structure or wavelength.
+
+    Source: [DonnerJensen2006], [Donner2008], [KrishnaswamyBaranoski2004].
+    """
+    if structure not in _STRUCTURES:
+        refuse("structure", ", ".join(get_args(Structure)), f"{structure!r} came", "Take one of them")
+    wavelengths = visible(wavelength_nm)
+    layers, note, sources = _STRUCTURES[structure]
+    stack = layers(parameters, wavelengths, scattering(wavelengths))
+    return Medium(structure, stack, SKIN_ETA, (note, _ONE_INDEX), sources)
+
+
+def _dj2006(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats) -> tuple[Layer, ...]:
+    """Source: [DonnerJensen2006]."""
+    return _epidermis(p, wavelength_nm, sigma_s_prime), _dermis(p, wavelength_nm, sigma_s_prime)
+
+
+def _donner2008(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats) -> tuple[Layer, ...]:
+    """Source: [Donner2008] equations 11 and 12 for the two layers."""
+    melanin = p.melanin * melanosome(wavelength_nm, p.eumelanin)
+    sheet_sigma_a = LEAKED_MELANIN * melanin * p.epidermis_mm / _SHEET_MM
+    return (
+        _epidermis(p, wavelength_nm, sigma_s_prime, p.epidermal_blood),
+        # Diffusion needs scattering everywhere; that of so thin a sheet does not show.
+        Layer(sheet_sigma_a, sigma_s_prime, _SHEET_MM, "melanin sheet"),
+        _dermis(p, wavelength_nm, sigma_s_prime),
+    )
+
+
+def _biospec(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats) -> tuple[Layer, ...]:
+    """Source: [KrishnaswamyBaranoski2004], numbers as public code of its first author starts from."""
+    deep = replace(p, blood=_RETICULAR_BLOOD * p.blood)
+    return (
+        Layer(baseline(wavelength_nm), sigma_s_prime, _CORNEUM_MM, "stratum corneum"),
+        _epidermis(p, wavelength_nm, sigma_s_prime),
+        replace(_dermis(p, wavelength_nm, sigma_s_prime, "papillary dermis"), thickness_mm=_PAPILLARY_MM),
+        _dermis(deep, wavelength_nm, sigma_s_prime, "reticular dermis"),
+    )
+
+
+def _epidermis(
+    p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, perfused: float = 0.0
+) -> Layer:
+    """Melanosomes, blood in a share of the volume, and tissue in the rest."""
+    melanin = p.melanin * melanosome(wavelength_nm, p.eumelanin)
+    rest = (1.0 - p.melanin - perfused) * baseline(wavelength_nm)
+    sigma_a = melanin + perfused * blood(wavelength_nm, p.oxygen) + rest
+    return Layer(sigma_a, sigma_s_prime, p.epidermis_mm, "epidermis")
+
+
+def _dermis(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, name: str = "dermis") -> Layer:
+    """Blood, and tissue in the rest of the volume; without end."""
+    sigma_a = p.blood * blood(wavelength_nm, p.oxygen) + (1.0 - p.blood) * baseline(wavelength_nm)
+    return Layer(sigma_a, DERMIS_SHARE * sigma_s_prime, name=name)
+
+
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
+
+
+_Build = Callable[[SkinParameters, Floats, Floats], tuple[Layer, ...]]
+
+_ONE_INDEX = f"all layers have the index {SKIN_ETA:g}: light meets no surface between them"
+_THIN = "the multipole misjudges so thin a layer: take layered diffusion"
+_STRUCTURES: dict[str, tuple[_Build, str, tuple[str, ...]]] = {
+    "dj2006": (
+        _dj2006,
+        "formulae as quoted by public code; the thickness of the epidermis is not known to be the paper's",
+        ("DonnerJensen2006", "Jacques1998", "Prahl1999"),
+    ),
+    "donner2008": (
+        _donner2008,
+        f"the sheet adds {LEAKED_MELANIN:.1%} of what the melanin above it absorbs, as public code reads the "
+        f"paper; carotene is left out; {_THIN}",
+        ("Donner2008", "DonnerJensen2006", "Jacques1998", "Prahl1999"),
+    ),
+    "biospec": (
+        _biospec,
+        "BioSpec follows rays and has no reduced scattering: the law of dj2006 stands in; its epidermis is "
+        "0.1 mm thick, its reticular dermis 1.8 mm on a mirror, which has no end here; carotene and "
+        f"bilirubin are left out; {_THIN}",
+        ("KrishnaswamyBaranoski2004", "DonnerJensen2006", "Jacques1998", "Prahl1999"),
+    ),
+}

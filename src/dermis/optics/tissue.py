@@ -1,0 +1,100 @@
+"""Tissue by name: media in three channels, and skins of pigments in wavelengths."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, get_args
+
+from dermis.errors import refuse
+from dermis.optics.media import Floats, Medium
+from dermis.optics.models import Model, diffusion_profile
+from dermis.optics.multipole import Clamp
+from dermis.optics.presets import media, medium_from_toml, read_toml
+from dermis.optics.radial import RadialProfile
+from dermis.optics.skin import EXAMPLES, SkinParameters, Structure, spectral_medium
+from dermis.optics.spectra import WAVELENGTHS_NM, rgb_weights
+
+SPECTRAL = "spectral"
+
+
+@dataclass(frozen=True)
+class Tissue:
+    """A medium, and how its channels become red, green and blue.
+
+    medium : layers with three channels, or with one for each wavelength
+    rgb : (3, c) weights of the wavelengths, None when the channels are colours already [-]
+    parameters : of the skin, when it is made of pigments
+    """
+
+    medium: Medium
+    rgb: Floats | None = None
+    parameters: SkinParameters | None = field(default=None)
+
+    def profile(self, model: Model = "layered", clamp: Clamp = "layer") -> RadialProfile:
+        """R(r) in linear Rec. 709: per power that enters, or per incident power for wavelengths."""
+        return diffusion_profile(self.medium, model, clamp, self.rgb)
+
+
+def names() -> tuple[str, ...]:
+    """What `load_tissue` knows without a file."""
+    return (*media(), SPECTRAL, *EXAMPLES)
+
+
+def load_tissue(
+    name: str | Path, structure: Structure = "dj2006", pigments: Mapping[str, Any] | None = None
+) -> Tissue:
+    """The tissue of a name or of a TOML file with layers or with a table [skin].
+
+    structure : layers of a skin of pigments
+    pigments : fields of `SkinParameters` that replace those of the name
+
+    Raises DermisError for what is neither, and for pigments that a medium without them cannot have.
+    """
+    given = dict(pigments or {})
+    if str(name) == SPECTRAL or str(name) in EXAMPLES:
+        example = EXAMPLES.get(str(name), SkinParameters())
+        return _spectral(str(name), structure, example, given)
+    if str(name) not in media() and Path(name).suffix.lower() != ".toml":
+        known = ", ".join(names())
+        refuse(f"tissue {name}", f"one of {known}, or a .toml file", "it is none of these", "Check the name")
+    document = {} if str(name) in media() else read_toml(Path(name))
+    if "skin" in document:
+        return _from_skin_table(Path(name), document, given)
+    if given:
+        option = "--" + next(iter(given)).replace("_", "-")
+        skins = ", ".join((SPECTRAL, *EXAMPLES))
+        refuse(option, f"a skin made of pigments ({skins})", f"{name} came", "Leave it out, or take a skin")
+    medium = media()[str(name)] if str(name) in media() else medium_from_toml(Path(name), document)
+    return Tissue(medium)
+
+
+def _spectral(name: str, structure: Structure, example: SkinParameters, given: dict[str, Any]) -> Tissue:
+    from dataclasses import replace
+
+    parameters = replace(example, **given)
+    medium = replace(spectral_medium(structure, parameters), name=name)
+    return Tissue(medium, rgb_weights(WAVELENGTHS_NM), parameters)
+
+
+def _from_skin_table(path: Path, document: Mapping[str, Any], given: dict[str, Any]) -> Tissue:
+    table = document["skin"]
+    fields = set(SkinParameters.__dataclass_fields__)
+    if not isinstance(table, dict) or set(document) - {"skin", "name"}:
+        refuse(path, "a table [skin] and a name only", "it holds something else", "Take the rest out")
+    own = dict(table)
+    structure = own.pop("structure", "dj2006")
+    unknown = sorted(set(own) - fields)
+    if unknown:
+        known = ", ".join(sorted({"structure", *fields}))
+        refuse(path, f"in [skin]: {known}", f"{', '.join(unknown)} came", "Correct the names")
+    wrong = [
+        key for key, value in own.items() if isinstance(value, bool) or not isinstance(value, int | float)
+    ]
+    if wrong or structure not in get_args(Structure):
+        what = f"{wrong[0]} = {own[wrong[0]]!r}" if wrong else f"structure = {structure!r}"
+        refuse(
+            path, f"numbers, and a structure of {', '.join(get_args(Structure))}", f"{what} came", "Mend it"
+        )
+    return _spectral(str(document.get("name", path.stem)), structure, SkinParameters(**own), given)

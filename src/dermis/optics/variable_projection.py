@@ -1,0 +1,96 @@
+"""Least squares in the variances of Gaussians, the best weights being found anew for each guess.
+
+Source: [GolubPereyra1973] with the slopes of [Kaufman1975], steps after [Marquardt1963].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from dermis.optics.media import Floats
+
+Design = Callable[[Floats], tuple[Floats, Floats]]
+_MOST_STEPS = 100
+_LONGEST_STEP = 1.0
+_STILL = 1e-7  # of the cost, a step
+_HOPELESS = 1e8
+_BLOCK = 512
+
+
+class Fit(NamedTuple):
+    """Log variances (k,), weights (k, c), the sum of squared residuals, and what the next step needs."""
+
+    log_variance: Floats
+    weight: Floats
+    cost: float
+    gradient: Floats
+    curvature: Floats
+
+
+def descend(design: Design, samples: Floats, log_variance: Floats, bounds: tuple[float, float]) -> Fit:
+    """The fit at the bottom of the valley that the start lies in.
+
+    design : what a unit Gaussian of each variance adds to the samples, and its slope by log variance
+    samples : (n, c)
+    log_variance : (k,) start
+    bounds : of the log variances
+    """
+    fit = _project(design, samples, log_variance)
+    damping = 1e-2
+    for _ in range(_MOST_STEPS):
+        scale = fit.curvature.diagonal()
+        damped = fit.curvature + np.diag(damping * (scale + 1e-12 * scale.max()))
+        step = -np.linalg.lstsq(damped, fit.gradient, rcond=None)[0]
+        step = np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
+        trial = _project(design, samples, np.clip(fit.log_variance + step, *bounds))
+        if trial.cost < fit.cost:
+            settled = fit.cost - trial.cost < _STILL * fit.cost
+            fit, damping = trial, max(damping / 5.0, 1e-12)
+            if settled:
+                break
+        else:
+            damping = max(4.0 * damping, 1e-6)
+            if damping > _HOPELESS:
+                break
+    return fit
+
+
+def _project(design: Design, samples: Floats, log_variance: Floats) -> Fit:
+    """The best weights of 0 or more for these variances."""
+    columns, slopes = design(np.exp(log_variance))
+    k = len(log_variance)
+    size = np.linalg.norm(columns, axis=0)
+    # All that follows lives in the space of these few columns: one factorisation serves every channel.
+    small = _triangle(np.hstack([columns / size, slopes / size, samples]))
+    weight = np.zeros((k, samples.shape[1]))
+    cost, gradient, curvature = 0.0, np.zeros(k), np.zeros((k, k))
+    for i, sample in enumerate(small.T[2 * k :]):
+        weight[:, i], residual, jacobian = _solve_channel(small[:, :k], small[:, k : 2 * k], sample)
+        cost += float(residual @ residual)
+        gradient += jacobian.T @ residual
+        curvature += jacobian.T @ jacobian
+    return Fit(log_variance, weight / size[:, None], cost, gradient, curvature)
+
+
+def _triangle(tall: Floats) -> Floats:
+    """The factor R of a QR factorisation, by blocks of rows.
+
+    For a whole tall matrix BLAS starts threads that wait longer than they work.
+    """
+    blocks = np.array_split(tall, -(-len(tall) // _BLOCK))
+    factors = [np.asarray(np.linalg.qr(block, mode="r")) for block in blocks]
+    return factors[0] if len(factors) == 1 else np.asarray(np.linalg.qr(np.vstack(factors), mode="r"))
+
+
+def _solve_channel(columns: Floats, slopes: Floats, sample: Floats) -> tuple[Floats, Floats, Floats]:
+    from scipy.optimize import nnls
+
+    weight: Floats = nnls(columns, sample)[0]
+    lit = weight > 0.0
+    Q, R = np.linalg.qr(columns[:, lit])
+    weight[lit] = np.linalg.solve(R, Q.T @ sample)  # some versions of nnls square the condition number
+    jacobian = slopes * weight
+    return weight, columns @ weight - sample, jacobian - Q @ (Q.T @ jacobian)

@@ -1,0 +1,179 @@
+"""Monte Carlo transport of a thin beam's light through a stack of scattering layers: no diffusion assumed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dermis.errors import refuse
+from dermis.optics.media import Floats, Layer, Medium
+from dermis.reference.slab import ScatteringLayer, SlabResult, check_mean_cosine
+
+if TYPE_CHECKING:
+    from dermis.reference.photon import Counts, Stack, Tally
+
+__all__ = ["ScatteringLayer", "SlabResult", "default_edges", "trace_medium", "trace_slab"]
+
+Report = Callable[[int, int], None]
+
+BATCHES = 64
+"""Each has random numbers of its own, so that the result does not depend on how many run at once."""
+
+MAX_PHOTONS = 10**10
+
+
+def default_edges() -> Floats:
+    """Edges of a disc of 0.001 mm and of 92 rings, each 12 % wider than the last, out to 40 mm [mm]."""
+    return np.concatenate([[0.0], np.geomspace(1e-3, 40.0, 93)])
+
+
+def trace_slab(
+    layers: Sequence[ScatteringLayer],
+    photons: int = 1_000_000,
+    seed: int = 0,
+    edges_mm: Floats | None = None,
+    report: Report | None = None,
+) -> SlabResult:
+    """Light of a thin beam that falls straight on a stack of layers with air above and below.
+
+    layers : topmost first; faces between unequal indices of refraction mirror and refract
+    photons : how many to trace; the standard errors fall with the square root of it
+    seed : the same one gives the same result on any number of processors
+    edges_mm : of the rings, from 0; as of `default_edges` when left out [mm]
+    report : called with how many parts are done, and of how many
+
+    Source: [Wang1995].
+    """
+    _check(layers, photons, seed)
+    edges = default_edges() if edges_mm is None else _checked_edges(edges_mm)
+    tally = _trace(_stack(layers), photons, seed, edges, report)
+    return _shares(tally, photons, edges, layers[0].eta)
+
+
+def trace_medium(
+    medium: Medium,
+    photons: int = 1_000_000,
+    seed: int = 0,
+    g: float = 0.0,
+    edges_mm: Floats | None = None,
+    report: Report | None = None,
+) -> list[SlabResult]:
+    """`trace_slab` for each channel of a medium; the channels' random numbers are independent.
+
+    g : mean cosine that all layers are given; scattering is the reduced one over 1 - g [-]
+    """
+    check_mean_cosine(g)
+    results = []
+    for i in range(medium.channels):
+        layers = [_layer(layer, i, g, medium.eta) for layer in medium.layers]
+        part = None if report is None else partial(_report_channel, report, i, medium.channels)
+        results.append(trace_slab(layers, photons, seed + i, edges_mm, part))
+    return results
+
+
+def _layer(layer: Layer, channel: int, g: float, eta: float) -> ScatteringLayer:
+    sigma_s = float(layer.sigma_s_prime[channel]) / (1.0 - g)
+    return ScatteringLayer(float(layer.sigma_a[channel]), sigma_s, layer.thickness_mm, g, eta)
+
+
+def _report_channel(report: Report, channel: int, channels: int, done: int, of: int) -> None:
+    report(channel * of + done, channels * of)
+
+
+def _check(layers: Sequence[ScatteringLayer], photons: int, seed: int) -> None:
+    if not layers:
+        refuse("slab", "at least one layer", "none came", "Add one")
+    if np.isinf([layer.thickness_mm for layer in layers[:-1]]).any():
+        refuse("slab", "an infinite thickness in the last layer only", "another has it", "Correct it")
+    if not (isinstance(photons, int | np.integer) and 1 <= photons <= MAX_PHOTONS):
+        refuse("photons", f"a whole number from 1 to {MAX_PHOTONS:.0e}", f"{photons} came", "Correct it")
+    if not (isinstance(seed, int | np.integer) and seed >= 0):
+        refuse("seed", "a whole number of 0 or more", f"{seed} came", "Correct it")
+
+
+def _checked_edges(edges_mm: ArrayLike) -> Floats:
+    edges = np.asarray(edges_mm, dtype=np.float64)
+    one_row = edges.ndim == 1 and len(edges) > 1
+    if not (one_row and edges[0] == 0.0 and np.isfinite(edges).all() and (np.diff(edges) > 0.0).all()):
+        expected = "edges of rings that begin with 0 and increase [mm]"
+        refuse("edges_mm", expected, f"{np.array2string(edges, threshold=8)} came", "Correct them")
+    return edges
+
+
+def _stack(layers: Sequence[ScatteringLayer]) -> Stack:
+    from dermis.reference.photon import Stack
+
+    def with_air(air: float, values: list[float]) -> Floats:
+        return np.array([air, *values, air])
+
+    return Stack(
+        eta=with_air(1.0, [layer.eta for layer in layers]),
+        sigma_t=with_air(0.0, [layer.sigma_t for layer in layers]),
+        albedo=with_air(0.0, [layer.albedo for layer in layers]),
+        g=with_air(0.0, [layer.g for layer in layers]),
+        face_mm=np.cumsum([0.0, *(layer.thickness_mm for layer in layers)]),
+    )
+
+
+def _trace(stack: Stack, photons: int, seed: int, edges: Floats, report: Report | None) -> Tally:
+    from numba import config
+
+    from dermis.reference.photon import Tally, walk_batch
+
+    def trace(size: int, seeds: np.random.SeedSequence) -> Tally:
+        lengths = (len(edges), len(edges), 2, len(stack.eta) - 2, 1)
+        tally = Tally(*(np.zeros(length, np.int64) for length in lengths))
+        rng = seeds.generate_state(4, np.uint64).astype(np.uint64)
+        walk_batch(size, stack, edges**2, rng, tally)
+        return tally
+
+    sizes = [photons * (i + 1) // BATCHES - photons * i // BATCHES for i in range(BATCHES)]
+    tallies = []
+    # The compiled walk releases the interpreter, so that threads share the work.
+    with ThreadPoolExecutor(config.NUMBA_NUM_THREADS) as pool:
+        for tally in pool.map(trace, sizes, np.random.SeedSequence(seed).spawn(BATCHES)):
+            tallies.append(tally)
+            if report is not None:
+                report(len(tallies), BATCHES)
+    return Tally(*(np.sum(parts, axis=0) for parts in zip(*tallies, strict=True)))
+
+
+def _shares(tally: Tally, photons: int, edges: Floats, eta: float) -> SlabResult:
+    from dermis.reference.photon import refract
+
+    specular = refract(1.0, 1.0 / eta)[0]
+    areas = np.pi * np.diff(edges**2)
+
+    def share(count: Counts) -> Floats:
+        return (1.0 - specular) * count / photons
+
+    def error(count: Counts) -> Floats:
+        p = count / photons
+        return (1.0 - specular) * np.sqrt(p * (1.0 - p) / photons)
+
+    R, T = tally.reflected, tally.transmitted
+    return SlabResult(
+        photons=photons,
+        edges_mm=edges,
+        specular=specular,
+        reflectance=share(R[:-1]) / areas,
+        reflectance_se=error(R[:-1]) / areas,
+        transmittance=share(T[:-1]) / areas,
+        transmittance_se=error(T[:-1]) / areas,
+        total_reflectance=float(share(R.sum())),
+        total_reflectance_se=float(error(R.sum())),
+        total_transmittance=float(share(T.sum())),
+        total_transmittance_se=float(error(T.sum())),
+        overflow_reflectance=float(share(R[-1])),
+        overflow_transmittance=float(share(T[-1])),
+        unscattered_reflectance=float(share(tally.unscattered[0])),
+        unscattered_transmittance=float(share(tally.unscattered[1])),
+        absorbed=share(tally.absorbed),
+        absorbed_se=error(tally.absorbed),
+        unfinished=float(share(tally.unfinished[0])),
+    )

@@ -1,0 +1,87 @@
+"""Spectra to colour: the observer's table, white, an independent computation, gamut, and bad grids."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dermis.errors import DermisError
+from dermis.optics.spectra import WAVELENGTHS_NM, outside_gamut, rgb_weights, tabulated
+
+FINE_NM = np.arange(380.0, 781.0, 5.0)
+COLOUR = 3e-5
+"""Linear colour, absolute: another quadrature, and a printed white point for the tabulated D65."""
+
+
+def skins(sample_folder: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Reflectance spectra by 5 nm, (63, 81), and the colours that an independent computation gave them."""
+    folder = sample_folder / "reference" / "data"
+    spectra = np.load(folder / "spectral_diffusion.npz")["R"].reshape(63, 81)
+    table = np.genfromtxt(
+        folder / "spectral_srgb_diffusion.csv", delimiter=",", names=True, dtype=None, encoding="utf-8"
+    )
+    assert (table["model"] == "layered_diffusion").all()
+    return spectra, np.array([table["lin_R"], table["lin_G"], table["lin_B"]]).T
+
+
+@pytest.mark.parametrize(
+    "grid", [WAVELENGTHS_NM, FINE_NM, np.array([550.0]), np.array([420.0, 600.0, 601.0])]
+)
+def test_the_spectrum_one_is_white(grid: np.ndarray) -> None:
+    white = rgb_weights(grid) @ np.ones(len(grid))
+    assert np.allclose(white, 1.0, rtol=0.0, atol=1e-14)
+
+
+def test_observer_and_illuminant_are_the_published_tables(sample_folder: Path) -> None:
+    path = sample_folder / "reference" / "data" / "spectral_coefficients.csv"
+    table = np.genfromtxt(path, delimiter=",", names=True)
+    for ours, theirs in [("x_bar", "xbar"), ("y_bar", "ybar"), ("z_bar", "zbar"), ("d65", "D65")]:
+        column = tabulated("cie-1931-d65", ours, table["lambda_nm"])
+        assert np.allclose(column, table[theirs], rtol=1e-9, atol=1e-12), ours
+
+
+def test_colours_of_skins(sample_folder: Path) -> None:
+    spectra, colours = skins(sample_folder)
+    assert np.abs(spectra @ rgb_weights(FINE_NM).T - colours).max() < COLOUR
+
+
+def test_the_coarse_grid_is_enough(sample_folder: Path) -> None:
+    spectra, colours = skins(sample_folder)
+    coarse = np.array([np.interp(WAVELENGTHS_NM, FINE_NM, spectrum) for spectrum in spectra])
+    assert np.abs(coarse @ rgb_weights().T - colours).max() < 1e-3
+
+
+def test_weights_are_those_of_the_srgb_standard() -> None:
+    """Its printed matrix, of four digits and so 0.0002 off white, on the XYZ of five spectra."""
+    printed = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
+    observer = np.array([tabulated("cie-1931-d65", f"{axis}_bar", FINE_NM) for axis in "xyz"])
+    light = observer * tabulated("cie-1931-d65", "d65", FINE_NM)
+    spectra = np.array([np.interp(FINE_NM, [380.0, 450.0, 550.0, 650.0, 780.0], one) for one in np.eye(5)])
+    xyz = spectra @ light.T / light[1].sum()
+    assert np.allclose(spectra @ rgb_weights(FINE_NM).T, xyz @ printed.T, rtol=0.0, atol=3e-4)
+
+
+def test_a_pure_wavelength_is_outside_the_gamut() -> None:
+    weights = rgb_weights()
+    green = np.where(WAVELENGTHS_NM == 520.0, 1.0, 0.0)
+    colours = np.array([weights @ green, weights @ (0.5 + 0.0 * green), [0.0, 0.0, 0.0]])
+    assert outside_gamut(colours).tolist() == [True, False, False]
+    assert outside_gamut([0.3, 0.1, -1e-6])
+
+
+@pytest.mark.parametrize(
+    ("grid", "said"),
+    [
+        ([], "increases"),
+        ([500.0, 500.0], "increases"),
+        ([600.0, 500.0], "increases"),
+        ([[500.0], [600.0]], "increases"),
+        ([300.0, 500.0], "380 to 780"),
+        ([500.0, np.nan], "380 to 780"),
+    ],
+)
+def test_bad_grids_are_refused(grid: list[float], said: str) -> None:
+    with pytest.raises(DermisError, match=said):
+        rgb_weights(np.array(grid))

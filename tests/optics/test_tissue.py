@@ -1,0 +1,108 @@
+"""Tissue by name and file, and the Gaussians that the renderer gets for it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dermis.errors import DermisError
+from dermis.optics.profiles import find_table, load_profile, preset_names
+from dermis.optics.spectra import WAVELENGTHS_NM
+from dermis.optics.tissue import load_tissue, names
+
+SKIN = "[skin]\nstructure = 'biospec'\nmelanin = 0.03\n"
+
+
+def test_names_cover_media_and_skins() -> None:
+    assert {"dj3", "skin1", "spectral", "light", "medium", "dark"} <= set(names())
+    assert preset_names()[0] == "gpu-gems-3"
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_name_gives_a_profile_of_skin_like_size(name: str) -> None:
+    profile = load_profile(name)
+    assert profile.weight.shape == (6, 3)
+    assert load_profile(name) is profile  # computed once
+    total = load_tissue(name).profile().total
+    assert profile.albedo == pytest.approx(total, rel=0.1)
+
+
+def test_spectra_become_colour() -> None:
+    tissue = load_tissue("light")
+    assert tissue.medium.channels == len(WAVELENGTHS_NM) and tissue.rgb is not None
+    profile = tissue.profile()
+    assert profile.incident and profile.reflectance.shape[1] == 3
+    per_wavelength = [load_tissue("light").medium.channel(i) for i in (0, 15, 30)]
+    assert [one.channels for one in per_wavelength] == [1, 1, 1]
+
+
+def test_pigments_replace_those_of_the_name() -> None:
+    plain, blushed = (load_tissue("light", pigments=p).profile().total for p in ({}, {"blood": 0.03}))
+    assert blushed[1] < 0.9 * plain[1] and blushed[0] > 0.8 * plain[0]
+
+
+def test_skin_of_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(SKIN)
+    tissue = load_tissue(path, pigments={"blood": 0.02})
+    assert tissue.medium.name == "own" and tissue.medium.layers[0].name == "stratum corneum"
+    assert tissue.parameters is not None
+    assert (tissue.parameters.melanin, tissue.parameters.blood) == (0.03, 0.02)
+    assert find_table(path) is None
+    assert load_profile(path).weight.shape == (6, 3)
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        (SKIN + "colour = 1\n", "colour came"),
+        (SKIN + "blood = 'red'\n", "blood = 'red'"),
+        (SKIN + "oxygen = true\n", "oxygen = True"),
+        (SKIN.replace("biospec", "bark"), "structure = 'bark'"),
+        (SKIN.replace("0.03", "3"), "--melanin"),
+        ("eta = 1\n" + SKIN, "a table .skin. and a name only"),
+        ("skin = 4", "a table .skin."),
+    ],
+)
+def test_skin_files_that_are_refused(tmp_path: Path, text: str, complaint: str) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(text)
+    with pytest.raises(DermisError, match=complaint):
+        load_tissue(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("variances_mm2 = [1.0]\n", "lists of numbers"),
+        ("variances_mm2 = [1.0]\nweights = 'x'\n", "lists of numbers"),
+        ("variances_mm2 = [1.0]\nweights = [[1, 1]]\n", "red, green and blue"),
+        ("variances_mm2 = [1.0, 0.5]\nweights = [[1, 1, 1], [1, 1, 1]]\n", "that increase"),
+        ("variances_mm2 = [nan]\nweights = [[1, 1, 1]]\n", "finite"),
+    ],
+)
+def test_saved_profiles_that_are_refused(tmp_path: Path, text: str, complaint: str) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(text)
+    with pytest.raises(DermisError, match=complaint):
+        load_profile(path)
+
+
+def test_pigments_need_a_skin() -> None:
+    with pytest.raises(DermisError, match=r"--blood: .*dj3 came"):
+        load_tissue("dj3", pigments={"blood": 0.1})
+
+
+def test_wavelengths_add_up_to_the_total() -> None:
+    """The colour of the sum is the sum of the colours."""
+    tissue = load_tissue("medium")
+    assert tissue.rgb is not None
+    each = np.array([tissue.medium.channel(i) for i in range(tissue.medium.channels)], dtype=object)
+    from dermis.optics.boundary import normal_reflectance
+    from dermis.optics.models import diffusion_profile
+
+    spectrum = np.array([diffusion_profile(one).total[0] for one in each])
+    entering = 1.0 - normal_reflectance(1.4)
+    assert tissue.profile().total == pytest.approx(entering * tissue.rgb @ spectrum, rel=1e-9)

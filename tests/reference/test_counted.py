@@ -1,0 +1,33 @@
+"""Counted profiles in the form of the models'."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dermis.optics.presets import media
+from dermis.optics.tissue import load_tissue
+from dermis.reference.counted import counted_profile
+
+
+def test_per_entering_light_in_rings() -> None:
+    seen: list[tuple[int, int]] = []
+    profile = counted_profile(
+        media()["dj3"], photons=40_000, seed=3, report=lambda done, of: seen.append((done, of))
+    )
+    assert profile.total_error is not None and profile.standard_error is not None
+    truth = np.array([0.47244, 0.38236, 0.28576])  # 12 million photons, per power that entered
+    assert (np.abs(profile.total - truth) < 4.0 * profile.total_error).all()
+    assert profile.ring_energy.sum(axis=0) == pytest.approx(profile.total, rel=0.01)
+    assert profile.reflectance.shape == profile.standard_error.shape == (len(profile.radius_mm), 3)
+    assert (np.diff(profile.radius_mm) > 0.0).all() and not profile.finite
+    assert seen and seen[-1][0] == seen[-1][1]
+
+
+def test_spectra_become_colour_with_errors() -> None:
+    tissue = load_tissue("light")
+    profile = counted_profile(tissue.medium, tissue.rgb, photons=4_000, seed=3)
+    assert profile.incident and profile.total.shape == (3,)
+    assert profile.total_error is not None
+    model = tissue.profile().total
+    assert (np.abs(profile.total - model) < 4.0 * profile.total_error + 0.02 * model).all()

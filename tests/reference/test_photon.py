@@ -1,0 +1,86 @@
+"""The compiled parts of a photon's walk, each against what is known of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+
+from dermis.optics.boundary import fresnel
+from dermis.reference import photon
+
+DIRECTIONS = [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (0.6, 0.0, -0.8), (-0.48, 0.64, 0.6), (1.0, 0.0, 0.0)]
+DEFLECTIONS = 20_000
+
+
+def generator() -> photon.Words:
+    return np.random.SeedSequence(0).generate_state(4, np.uint64)
+
+
+def test_random_words_are_those_of_the_published_generator() -> None:
+    """The first words from the state (1, 2, 3, 4), as the authors' own program prints them."""
+    rng = np.array([1, 2, 3, 4], np.uint64)
+    published = [
+        41943041,
+        58720359,
+        3588806011781223,
+        3591011842654386,
+        9228616714210784205,
+        9973669472204895162,
+        14011001112246962877,
+        12406186145184390807,
+        15849039046786891736,
+        10450023813501588000,
+    ]
+    assert [int(photon.next_word(rng)) for _ in published] == published
+
+
+@pytest.mark.parametrize(("word", "expected"), [(0, 2.0**-53), (2**64 - 1, 1.0 - 2.0**-53)])
+def test_uniform_number_is_never_0_or_1(word: int, expected: float) -> None:
+    rng = np.array([word, 0, 0, 0], np.uint64)  # from here the generator gives its least and greatest words
+    assert photon.uniform(rng) == expected
+
+
+@pytest.mark.parametrize("eta", [0.7, 1.0 / 1.4, 1.0, 1.05, 1.5])
+def test_refraction_is_that_of_the_closed_form(eta: float) -> None:
+    cosines = np.linspace(0.01, 1.0, 200)
+    computed = np.array([photon.refract(cosine, eta) for cosine in cosines])
+    assert np.allclose(computed[:, 0], fresnel(cosines, 1.0 / eta), atol=1e-12)
+    sine2 = eta**2 * (1.0 - cosines**2)
+    assert np.allclose(computed[:, 1] ** 2, np.maximum(1.0 - sine2, 0.0), atol=1e-12)
+
+
+@pytest.mark.parametrize("g", [-0.5, 0.0, 1e-9, 0.8, 0.98])
+@pytest.mark.parametrize("direction", DIRECTIONS)
+def test_deflections_have_the_moments_of_henyey_and_greenstein(
+    direction: tuple[float, float, float], g: float
+) -> None:
+    """Legendre moments g and g^2 of the cosine, none across; lengths stay 1."""
+    rng = generator()
+    after = np.array([photon.deflect(*direction, g, rng) for _ in range(DEFLECTIONS)])
+    assert np.allclose(np.linalg.norm(after, axis=1), 1.0, atol=1e-12)
+    cosine = after @ direction
+    for moment, expected in ((cosine, g), (1.5 * cosine**2 - 0.5, g**2)):
+        assert abs(moment.mean() - expected) < 4.0 * moment.std() / np.sqrt(DEFLECTIONS)
+    across = after - np.outer(cosine, direction)
+    assert (np.abs(across.mean(axis=0)) < 4.0 / np.sqrt(2.0 * DEFLECTIONS)).all()
+
+
+def test_machine_without_a_folder_for_compiled_code_compiles_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """numba says so with a RuntimeError as soon as it is asked to keep a function."""
+    compiles = numba.njit
+
+    def no_folder(*, cache: bool = False, **options: Any) -> Callable[..., Any]:
+        if cache:
+            raise RuntimeError("cannot cache function: no locator available")
+        return compiles(**options)
+
+    monkeypatch.setattr(numba, "njit", no_folder)
+    assert photon._compiled(_double)(2) == 4
+
+
+def _double(number: int) -> int:
+    return 2 * number
