@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 
 import dermis
-from dermis.optics.fit import fit_gaussians
+from dermis.optics.fits.gaussian import fit_gaussians
 
 REPEATS = 15
 
@@ -30,12 +30,14 @@ def median_ms(work: Callable[[], object]) -> float:
 
 def main() -> None:
     """Print a Markdown table."""
-    rows = ["| tissue | layers -> profile [ms] | profile -> six Gaussians [ms] | warm start [ms] |", "|---|---|---|---|"]
+    columns = ("layers -> profile [ms]", "profile -> six Gaussians [ms]", "warm start [ms]")
+    rows = [f"| tissue | {' | '.join(columns)} |", "|---|---|---|---|"]
     for name in ("dj3", "skin1", "light"):
         tissue = dermis.load_tissue(name)
         rings = tissue.profile().rings()
         near = fit_gaussians(rings, 6).profile
-        moved = dermis.load_tissue("light", pigments={"melanin": 0.006}).profile().rings() if name == "light" else rings
+        pigments = {"melanin": 0.006} if name == "light" else {}  # a slider that moves
+        moved = dermis.load_tissue(name, pigments=pigments).profile().rings()
         cells = (
             median_ms(tissue.profile),
             median_ms(lambda rings=rings: fit_gaussians(rings, 6)),

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 import dermis
 from dermis.images.colour import encode_srgb8
-from dermis.optics.spectra import outside_gamut
+from dermis.optics.pigments.spectra import outside_gamut
 
 MELANIN = [0.0, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32]
 BLOOD = [0.002, 0.005, 0.01, 0.02, 0.035, 0.06]

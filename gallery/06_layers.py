@@ -1,12 +1,11 @@
 """One layer, three layers and the published six Gaussians: python gallery/06_layers.py OUTPUT.
 
-Each profile is divided by its total. The three-layer coefficients as they are printed do not give the published sum, in
-whatever unit they are read.
+Each profile is divided by its total. The three-layer coefficients as they are printed do not give the
+published sum, in whatever unit they are read.
 """
 
 import sys
 
-import numpy as np
 from matplotlib.figure import Figure
 
 import dermis

@@ -42,7 +42,7 @@ CLOSED_FORM = 1e-6
 """The same closed form coded twice, or transformed and interpolated, relative."""
 
 LAYERED_TOTAL = 0.014
-"""Layered diffusion's total against Monte Carlo for three-layer skin, relative: a known bias, not an error of ours."""
+"""Layered diffusion's total against Monte Carlo for three-layer skin, relative: a known bias of the model."""
 
 STANDARD_ERRORS = 3.0
 """How far a count may lie from the truth: further happens to 1 in 370, and the seeds are fixed."""

@@ -6,16 +6,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from dermis.optics.burley import fit_burley
-from dermis.optics.fit import fit_gaussians
-from dermis.optics.models import Model
-from dermis.optics.multipole import Clamp
+from dermis.optics.diffusion.models import Model
+from dermis.optics.diffusion.multipole import Clamp
+from dermis.optics.diffusion.transmission import cut, through_gaussians, through_slab
+from dermis.optics.fits.burley import fit_burley
+from dermis.optics.fits.gaussian import fit_gaussians
+from dermis.optics.fits.separable import fit_separable
+from dermis.optics.fits.targets import ring_error
 from dermis.optics.presets import media
+from dermis.optics.profiles import load_profile
 from dermis.optics.radial import RadialProfile
-from dermis.optics.separable import fit_separable
-from dermis.optics.targets import ring_error
 from dermis.optics.tissue import Tissue, load_tissue
-from dermis.optics.transmission import cut, through_gaussians, through_slab
 from dermis.reference.counted import counted_profile
 from dermis.reference.slab_mc import trace_medium
 
@@ -58,9 +59,11 @@ def _rows(name: str, tissue: Tissue) -> Iterator[str]:
         if model == "multipole" and clamp == "none" and not thin:
             continue
         profile = tissue.profile(model, clamp)
-        label = f"{model}, source {'as printed' if clamp == 'none' else 'clamped'}" if model == "multipole" else model
+        source = {"none": ", source as printed", "layer": ", source clamped"}[clamp]
+        label = model + (source if model == "multipole" else "")
         total = _percent(profile.total / truth.total - 1.0)
-        yield f"| | {label} | {total} | {_percent(ring_error(truth.rings(), profile.ring_energy), sign=False)} |"
+        rings = _percent(ring_error(truth.rings(), profile.ring_energy), sign=False)
+        yield f"| | {label} | {total} | {rings} |"
 
 
 def fits_table() -> str:
@@ -88,7 +91,11 @@ def pointwise_table() -> str:
         profile = named(name).profile(model, clamp)  # type: ignore[arg-type]
         free, kept = (fit_gaussians(profile.points(), 6, keep_energy=keep) for keep in (False, True))
         label = f"{name}, {model}" + (", source as printed" if clamp == "none" else "")
-        cells = [_percent(free.error, sign=False), _percent(free.energy_error), _percent(kept.error, sign=False)]
+        cells = [
+            _percent(free.error, sign=False),
+            _percent(free.energy_error),
+            _percent(kept.error, sign=False),
+        ]
         rows.append(f"| {label} | {' | '.join(cells)} |")
     return "\n".join(rows)
 
@@ -116,12 +123,10 @@ def transmission_table() -> str:
 
 def shape_against_the_table(profile: RadialProfile) -> np.ndarray:
     """E between a white-normalised profile and the published six Gaussians, per channel."""
-    from dermis.optics.profiles import load_profile
-
-    r = profile.radius_mm[:, None]
+    r, log_r = profile.radius_mm[:, None], np.log(profile.radius_mm)
     table = load_profile("gpu-gems-3").radiant_exitance(profile.radius_mm)
-    miss = np.trapezoid((r * (profile.reflectance / profile.total - table)) ** 2, np.log(profile.radius_mm), axis=0)
-    return np.sqrt(miss / np.trapezoid((r * table) ** 2, np.log(profile.radius_mm), axis=0))
+    miss = np.trapezoid((r * (profile.reflectance / profile.total - table)) ** 2, log_r, axis=0)
+    return np.sqrt(miss / np.trapezoid((r * table) ** 2, log_r, axis=0))
 
 
 def table_note() -> str:
@@ -132,7 +137,9 @@ def table_note() -> str:
         ("layered diffusion of a point source", "layered-point", "layer"),
     )
     errors = [shape_against_the_table(load_tissue("dj3").profile(model, clamp)) for _, model, clamp in ways]
-    return ", ".join(f"{way[0]} {_percent(error, sign=False)}" for way, error in zip(ways, errors, strict=True))
+    return ", ".join(
+        f"{way[0]} {_percent(error, sign=False)}" for way, error in zip(ways, errors, strict=True)
+    )
 
 
 def tables() -> dict[str, str]:

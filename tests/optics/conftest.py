@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.optics.targets import Rings
+from dermis.optics.fits.targets import Rings
 
 
 @pytest.fixture(scope="session")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dermis.errors import DermisError
+from dermis.optics.pigments.spectra import WAVELENGTHS_NM
 from dermis.optics.profiles import find_table, load_profile, preset_names
-from dermis.optics.spectra import WAVELENGTHS_NM
 from dermis.optics.tissue import load_tissue, names
 
 SKIN = "[skin]\nstructure = 'biospec'\nmelanin = 0.03\n"
@@ -100,8 +100,8 @@ def test_wavelengths_add_up_to_the_total() -> None:
     tissue = load_tissue("medium")
     assert tissue.rgb is not None
     each = np.array([tissue.medium.channel(i) for i in range(tissue.medium.channels)], dtype=object)
-    from dermis.optics.boundary import normal_reflectance
-    from dermis.optics.models import diffusion_profile
+    from dermis.optics.diffusion.boundary import normal_reflectance
+    from dermis.optics.diffusion.models import diffusion_profile
 
     spectrum = np.array([diffusion_profile(one).total[0] for one in each])
     entering = 1.0 - normal_reflectance(1.4)

@@ -9,7 +9,7 @@ import numba
 import numpy as np
 import pytest
 
-from dermis.optics.boundary import fresnel
+from dermis.optics.diffusion.boundary import fresnel
 from dermis.reference import photon
 
 DIRECTIONS = [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (0.6, 0.0, -0.8), (-0.48, 0.64, 0.6), (1.0, 0.0, 0.0)]

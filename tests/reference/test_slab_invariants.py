@@ -14,7 +14,7 @@ from scipy.stats import chi2
 from tolerances import CHANCE, STANDARD_ERRORS
 
 from dermis.errors import DermisError
-from dermis.optics.boundary import fresnel, normal_reflectance
+from dermis.optics.diffusion.boundary import fresnel, normal_reflectance
 from dermis.optics.media import Layer, Medium
 from dermis.reference.slab_mc import ScatteringLayer, SlabResult, default_edges, trace_medium, trace_slab
 

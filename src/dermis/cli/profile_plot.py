@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dermis.optics.burley import BurleyFit
+from dermis.optics.fits.burley import BurleyFit
 from dermis.outputs import replacing
 
 if TYPE_CHECKING:

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from dermis.optics.fit import GaussianFit, fit_gaussians
-from dermis.optics.transmission import through_gaussians, through_slab
+from dermis.optics.diffusion.transmission import through_gaussians, through_slab
+from dermis.optics.fits.gaussian import GaussianFit, fit_gaussians
 
 if TYPE_CHECKING:
-    from dermis.optics.burley import BurleyFit
+    from dermis.optics.fits.burley import BurleyFit
+    from dermis.optics.fits.separable import SeparableFit
     from dermis.optics.gaussians import GaussianSum
     from dermis.optics.media import Floats
     from dermis.optics.radial import RadialProfile
-    from dermis.optics.separable import SeparableFit
     from dermis.optics.tissue import Tissue
 
 
@@ -162,13 +162,13 @@ class Report:
             "mean_free_path_mm": [layer.mean_free_path_mm for layer in medium.layers],
         }
         if parameters is not None:
-            from dermis.optics.spectra import WAVELENGTHS_NM
+            from dermis.optics.pigments.spectra import WAVELENGTHS_NM
 
             found |= {"skin": asdict(parameters), "wavelength_nm": WAVELENGTHS_NM}
         return found
 
     def _other_json(self) -> dict[str, Any]:
-        from dermis.optics.burley import BurleyFit, unity_parameters, unreal_parameters
+        from dermis.optics.fits.burley import BurleyFit, unity_parameters, unreal_parameters
 
         if self.other is None:
             return {}
@@ -195,11 +195,11 @@ class Report:
 
 def _other(radial: RadialProfile, kind: str) -> BurleyFit | SeparableFit | None:
     if kind == "burley":
-        from dermis.optics.burley import fit_burley
+        from dermis.optics.fits.burley import fit_burley
 
         return fit_burley(radial.rings())
     if kind == "separable":
-        from dermis.optics.separable import fit_separable
+        from dermis.optics.fits.separable import fit_separable
 
         return fit_separable(radial.rings())
     return None

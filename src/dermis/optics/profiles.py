@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from dermis.errors import refuse
-from dermis.optics.fit import fit_gaussians
+from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats
 from dermis.optics.presets import read_toml

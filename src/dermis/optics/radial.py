@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dermis.optics.fits.targets import Points, Rings
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats
-from dermis.optics.targets import Points, Rings
 
 NARROWEST_MM, WIDEST_MM = 1e-4, 60.0
 """The radii that a profile covers and an error is integrated over [mm]."""

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any, get_args
 
 from dermis.errors import refuse
+from dermis.optics.diffusion.models import Model, diffusion_profile
+from dermis.optics.diffusion.multipole import Clamp
 from dermis.optics.media import Floats, Medium
-from dermis.optics.models import Model, diffusion_profile
-from dermis.optics.multipole import Clamp
+from dermis.optics.pigments.skin import EXAMPLES, SkinParameters, Structure, spectral_medium
+from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.presets import media, medium_from_toml, read_toml
 from dermis.optics.radial import RadialProfile
-from dermis.optics.skin import EXAMPLES, SkinParameters, Structure, spectral_medium
-from dermis.optics.spectra import WAVELENGTHS_NM, rgb_weights
 
 SPECTRAL = "spectral"
 

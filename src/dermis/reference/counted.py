@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dermis.optics.boundary import normal_reflectance
+from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.media import Floats, Medium
 from dermis.optics.radial import RadialProfile, ring_edges
 from dermis.reference.slab_mc import trace_medium

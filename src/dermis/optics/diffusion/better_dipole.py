@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.optics.boundary import internal_moment
-from dermis.optics.dipole import flux
+from dermis.optics.diffusion.boundary import internal_moment
+from dermis.optics.diffusion.dipole import flux
 from dermis.optics.media import Floats, Layer
 
 

@@ -14,10 +14,10 @@ import pytest
 from numpy.typing import NDArray
 
 from dermis.errors import DermisError
-from dermis.optics import fit as fit_module
-from dermis.optics.fit import GaussianFit, fit_gaussians
+from dermis.optics.fits import gaussian as fit_module
+from dermis.optics.fits.gaussian import GaussianFit, fit_gaussians
+from dermis.optics.fits.targets import Points, Rings, ring_error
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.targets import Points, Rings, ring_error
 
 Floats = NDArray[np.float64]
 Counted = Callable[[str], Rings]

@@ -7,11 +7,11 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import ndtr
 
-from dermis.optics.burley import fit_burley
-from dermis.optics.fit import fit_gaussians
+from dermis.optics.fits.burley import fit_burley
+from dermis.optics.fits.gaussian import fit_gaussians
+from dermis.optics.fits.separable import SECTORS, SeparableKernel, fit_separable, judge, preintegrate
+from dermis.optics.fits.targets import Rings
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.separable import SECTORS, SeparableKernel, fit_separable, judge, preintegrate
-from dermis.optics.targets import Rings
 
 EDGES = np.append(0.0, np.geomspace(1e-3, 60.0, 120))
 CROSS = SeparableKernel(np.array([0.8]), np.array([[0.04], [4.0]]), np.array([[0.5], [0.5]]))

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.optics import multipole
+from dermis.optics.diffusion import multipole
+from dermis.optics.diffusion.multipole import Clamp, Slab
 from dermis.optics.media import Floats, Medium
-from dermis.optics.multipole import Clamp, Slab
 
 
 @dataclass(frozen=True)

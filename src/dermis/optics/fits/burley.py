@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.errors import refuse
+from dermis.optics.fits.targets import Rings, ring_error
 from dermis.optics.media import Floats
-from dermis.optics.targets import Rings, ring_error
 
 _HALF = 1.58  # s r within which half of the light leaves
 _UNITY_SHARE = 0.997

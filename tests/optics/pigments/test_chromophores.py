@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from tolerances import PUBLISHED
 
 from dermis.errors import DermisError
-from dermis.optics import chromophores, scattering
 from dermis.optics.media import Floats
+from dermis.optics.pigments import chromophores, scattering
 
 VISIBLE_NM = np.arange(380.0, 781.0)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dermis.errors import DermisError
-from dermis.optics.spectra import WAVELENGTHS_NM, outside_gamut, rgb_weights, tabulated
+from dermis.optics.pigments.spectra import WAVELENGTHS_NM, outside_gamut, rgb_weights, tabulated
 
 FINE_NM = np.arange(380.0, 781.0, 5.0)
 COLOUR = 3e-5

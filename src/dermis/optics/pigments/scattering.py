@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.optics.media import Floats
-from dermis.optics.spectra import visible
+from dermis.optics.pigments.spectra import visible
 
 ScatteringLaw = Callable[[ArrayLike], Floats]
 """From wavelengths [nm] to the reduced scattering of the epidermis [1/mm]."""

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.optics import dipole
+from dermis.optics.diffusion import dipole
 from dermis.optics.media import Floats, Layer
 
 Clamp = Literal["none", "layer"]

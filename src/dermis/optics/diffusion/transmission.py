@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.errors import refuse
-from dermis.optics import hankel, layered_diffusion, layers
-from dermis.optics.boundary import mismatch, normal_reflectance
+from dermis.optics.diffusion import hankel, layered_diffusion, layers
+from dermis.optics.diffusion.boundary import mismatch, normal_reflectance
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats, Medium
 

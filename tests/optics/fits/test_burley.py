@@ -12,7 +12,7 @@ from scipy.special import j0
 from tolerances import CLOSED_FORM
 
 from dermis.errors import DermisError
-from dermis.optics.burley import (
+from dermis.optics.fits.burley import (
     BurleyProfile,
     fit_burley,
     shape_factor,
@@ -20,7 +20,7 @@ from dermis.optics.burley import (
     unity_parameters,
     unreal_parameters,
 )
-from dermis.optics.targets import Rings
+from dermis.optics.fits.targets import Rings
 
 EDGES = np.append(0.0, np.geomspace(1e-3, 60.0, 120))
 PROFILE = BurleyProfile(np.array([0.6, 0.4, 0.2]), np.array([0.8, 2.0, 4.5]))

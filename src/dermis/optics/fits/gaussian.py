@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 
 from dermis.errors import refuse
+from dermis.optics.fits.targets import Points, Rings
+from dermis.optics.fits.variable_projection import Design, Fit, descend
 from dermis.optics.gaussians import WIDEST_MM2, GaussianSum
 from dermis.optics.media import Floats
-from dermis.optics.targets import Points, Rings
-from dermis.optics.variable_projection import Design, Fit, descend
 
 Target = Points | Rings
 MOST_TERMS = 8

@@ -9,10 +9,10 @@ import pytest
 from slabs import slab, table
 from tolerances import CLOSED_FORM
 
-from dermis.optics import dipole, hankel, multipole
-from dermis.optics.boundary import mismatch
+from dermis.optics.diffusion import dipole, hankel, multipole
+from dermis.optics.diffusion.boundary import mismatch
+from dermis.optics.diffusion.multipole import Slab
 from dermis.optics.media import Layer, Medium
-from dermis.optics.multipole import Slab
 from dermis.optics.radial import enclosed, resample
 
 A = mismatch(1.4, "exact")

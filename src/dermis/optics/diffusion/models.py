@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 
 from dermis.errors import refuse
-from dermis.optics import better_dipole, dipole, hankel, layered_diffusion, layers, multipole
-from dermis.optics.boundary import mismatch, normal_reflectance
+from dermis.optics.diffusion import better_dipole, dipole, hankel, layered_diffusion, layers, multipole
+from dermis.optics.diffusion.boundary import mismatch, normal_reflectance
+from dermis.optics.diffusion.multipole import Clamp
 from dermis.optics.media import Floats, Medium
-from dermis.optics.multipole import Clamp
 from dermis.optics.radial import RadialProfile, enclosed, radius_grid, resample, ring_edges
 
 Model = Literal["dipole", "better-dipole", "multipole", "layered", "layered-point"]

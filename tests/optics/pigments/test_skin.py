@@ -10,12 +10,12 @@ import pytest
 
 from dermis import cite
 from dermis.errors import DermisError
-from dermis.optics.boundary import mismatch
-from dermis.optics.chromophores import baseline, blood, melanosome
+from dermis.optics.diffusion.boundary import mismatch
 from dermis.optics.media import Floats, Layer
-from dermis.optics.scattering import donner_jensen_2006, jacques_1998
-from dermis.optics.skin import EXAMPLES, LEAKED_MELANIN, SkinParameters, Structure, spectral_medium
-from dermis.optics.spectra import WAVELENGTHS_NM, rgb_weights
+from dermis.optics.pigments.chromophores import baseline, blood, melanosome
+from dermis.optics.pigments.scattering import donner_jensen_2006, jacques_1998
+from dermis.optics.pigments.skin import EXAMPLES, LEAKED_MELANIN, SkinParameters, Structure, spectral_medium
+from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
 STRUCTURES: tuple[Structure, ...] = get_args(Structure)
 SKIN = SkinParameters(melanin=0.02, eumelanin=0.6, blood=0.01, oxygen=0.8, epidermis_mm=0.1)

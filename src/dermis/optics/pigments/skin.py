@@ -8,10 +8,10 @@ from types import MappingProxyType
 from typing import Final, Literal, get_args
 
 from dermis.errors import refuse
-from dermis.optics.chromophores import baseline, blood, melanosome
 from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium
-from dermis.optics.scattering import DERMIS_SHARE, ScatteringLaw, donner_jensen_2006
-from dermis.optics.spectra import WAVELENGTHS_NM, visible
+from dermis.optics.pigments.chromophores import baseline, blood, melanosome
+from dermis.optics.pigments.scattering import DERMIS_SHARE, ScatteringLaw, donner_jensen_2006
+from dermis.optics.pigments.spectra import WAVELENGTHS_NM, visible
 
 Structure = Literal["dj2006", "donner2008", "biospec"]
 

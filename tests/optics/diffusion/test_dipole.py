@@ -10,9 +10,9 @@ from slabs import case, slab, table
 from tolerances import CLOSED_FORM
 
 from dermis.errors import DermisError
-from dermis.optics import better_dipole, dipole
-from dermis.optics.boundary import mismatch
-from dermis.optics.models import diffusion_profile
+from dermis.optics.diffusion import better_dipole, dipole
+from dermis.optics.diffusion.boundary import mismatch
+from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.presets import media
 from dermis.optics.radial import enclosed
 
@@ -84,7 +84,7 @@ def test_better_dipole_nears_the_exact_total_with_single_scattering(alpha_prime:
 
 def _leaves_after_one_event(eta: float) -> float:
     """Share of light, scattered once in a half-space, that then meets no other event and gets out."""
-    from dermis.optics.boundary import fresnel
+    from dermis.optics.diffusion.boundary import fresnel
 
     mu = (np.arange(20_000) + 0.5) / 20_000
     return float(0.5 * np.mean((1.0 - fresnel(mu, 1.0 / eta)) * mu / (1.0 + mu)))

@@ -9,7 +9,13 @@ import pytest
 from slabs import table
 from tolerances import PUBLISHED
 
-from dermis.optics.boundary import diffuse_reflectance, fresnel, internal_moment, mismatch, normal_reflectance
+from dermis.optics.diffusion.boundary import (
+    diffuse_reflectance,
+    fresnel,
+    internal_moment,
+    mismatch,
+    normal_reflectance,
+)
 
 
 def test_fresnel_of_the_table(sample_folder: Path) -> None:

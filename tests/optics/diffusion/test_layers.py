@@ -10,10 +10,10 @@ from scipy.special import j0, jn_zeros
 from slabs import TWO_LAYER, case, ring_means, slab, table
 from tolerances import CLOSED_FORM, LAYERED_TOTAL
 
-from dermis.optics import dipole, hankel, layered_diffusion, layers
-from dermis.optics.boundary import mismatch
+from dermis.optics.diffusion import dipole, hankel, layered_diffusion, layers
+from dermis.optics.diffusion.boundary import mismatch
+from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.media import Layer, Medium
-from dermis.optics.models import diffusion_profile
 from dermis.optics.presets import media
 from dermis.optics.radial import enclosed, resample
 

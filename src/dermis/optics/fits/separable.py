@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dermis.optics.fits.targets import Rings, ring_error
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats
-from dermis.optics.targets import Rings, ring_error
 
 SECTORS = 16
 """Equal sectors of a quarter turn, the cells of each ring."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.optics.media import Floats
-from dermis.optics.spectra import tabulated, visible
+from dermis.optics.pigments.spectra import tabulated, visible
 
 _NM_PER_MM = 1e6
 _MM_PER_CM = 10.0
