@@ -112,7 +112,13 @@ def test_version(run: Run) -> None:
 def test_cite_prints_the_works_behind_the_technique(run: Run) -> None:
     ended = run("cite")
     assert (ended.code, ended.stderr) == (0, "")
-    assert list(dermis.cite.parse_bibtex(ended.stdout)) == list(TECHNIQUE)
+    assert list(dermis.cite.parse_bibtex(ended.stdout)) == [*TECHNIQUE, "DonnerJensen2005"]
+
+
+def test_cite_adds_the_works_behind_a_profile(run: Run) -> None:
+    keys = list(dermis.cite.parse_bibtex(run("cite", "--profile", "light").stdout))
+    assert keys[: len(TECHNIQUE)] == list(TECHNIQUE)
+    assert {"DonnerJensen2006", "Kienle1998"} <= set(keys)
 
 
 def test_cite_prints_the_works_asked_for(run: Run) -> None:

@@ -188,8 +188,7 @@ class Report:
             return {}
         found: dict[str, Any] = {"thickness_mm": self.through_mm, "gaussians": self._through()}
         if self.tissue is not None:
-            slab = through_slab(self.tissue.medium, self.through_mm)
-            found["slab"] = slab if self.tissue.rgb is None else slab @ self.tissue.rgb.T
+            found["slab"] = self.tissue.through(self.through_mm)
         return {"transmission": found}
 
 

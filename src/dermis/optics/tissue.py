@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
 
+from numpy.typing import ArrayLike
+
 from dermis.errors import refuse
+from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.models import Model, diffusion_profile
 from dermis.optics.diffusion.multipole import Clamp
+from dermis.optics.diffusion.transmission import through_slab
 from dermis.optics.media import Floats, Medium
 from dermis.optics.pigments.skin import EXAMPLES, SkinParameters, Structure, spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
@@ -30,11 +34,19 @@ class Tissue:
 
     medium: Medium
     rgb: Floats | None = None
-    parameters: SkinParameters | None = field(default=None)
+    parameters: SkinParameters | None = None
 
     def profile(self, model: Model = "layered", clamp: Clamp = "layer") -> RadialProfile:
         """R(r) in linear Rec. 709: per power that enters, or per incident power for wavelengths."""
         return diffusion_profile(self.medium, model, clamp, self.rgb)
+
+
+    def through(self, thickness_mm: ArrayLike) -> Floats:
+        """Light that comes through the tissue cut at each thickness, (n, 3), per the same power [-]."""
+        slab = through_slab(self.medium, thickness_mm)
+        if self.rgb is None:
+            return slab
+        return (1.0 - normal_reflectance(self.medium.eta)) * slab @ self.rgb.T
 
 
 def names() -> tuple[str, ...]:
@@ -71,8 +83,6 @@ def load_tissue(
 
 
 def _spectral(name: str, structure: Structure, example: SkinParameters, given: dict[str, Any]) -> Tissue:
-    from dataclasses import replace
-
     parameters = replace(example, **given)
     medium = replace(spectral_medium(structure, parameters), name=name)
     return Tissue(medium, rgb_weights(WAVELENGTHS_NM), parameters)

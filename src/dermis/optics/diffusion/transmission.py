@@ -32,22 +32,21 @@ def through_slab(
 ) -> Floats:
     """Transmittance of the medium cut at each thickness, per power that enters, (n, c) [-].
 
-    model : the multipole errs where a cut leaves a layer thinner than a mean free path
-
-    Light that passes without an event, by the reduced extinction, is counted in.
+    model : layered diffusion lets what meets no event pass, by the reduced extinction; the multipole scatters all
+        light at one depth, and errs where a cut leaves a layer thinner than a mean free path
 
     Source: [DonnerJensen2005] eq. 7, 8 for the multipole.
     """
     found = []
     for thickness in np.atleast_1d(np.asarray(thickness_mm, dtype=np.float64)):
         slab = cut(medium, float(thickness))
-        depth = sum(layer.sigma_t_prime * layer.thickness_mm for layer in slab.layers)
-        straight = (1.0 - normal_reflectance(medium.eta)) * np.exp(-depth)
         if model == "layered":
-            T = layered_diffusion.respond(hankel.STILL, slab, mismatch(medium.eta, "exact"))[1]
+            depth = sum(layer.sigma_t_prime * layer.thickness_mm for layer in slab.layers)
+            straight = (1.0 - normal_reflectance(medium.eta)) * np.exp(-depth)
+            diffuse = layered_diffusion.respond(hankel.STILL, slab, mismatch(medium.eta, "exact"))[1][0]
+            found.append(diffuse + straight)
         else:
-            T = layers.respond(hankel.STILL, slab, mismatch(medium.eta)).T_down
-        found.append(T[0] + straight)
+            found.append(layers.respond(hankel.STILL, slab, mismatch(medium.eta)).T_down[0])
     return np.stack(found)
 
 
