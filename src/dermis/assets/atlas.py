@@ -13,6 +13,7 @@ from dermis.assets.mesh import Mesh
 from dermis.assets.uv import charts, usable
 from dermis.errors import refuse
 
+ALL_ROWS = slice(None)
 GUTTER = 3  # texels around each chart, so that interpolation at its edge finds light
 _SMALLEST = 64
 _LEAST_TEXELS = 4.0  # a chart with less uv area than this holds nothing that could be blurred
@@ -51,15 +52,17 @@ class Atlas:
         skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
         return float(1.0 - self.mapped[skin].mean()) if skin.any() else 0.0
 
-    def weights(self) -> NDArray[np.float64]:
-        """(n, n, 3) barycentric weights of the three corners."""
-        bc = self.barycentric / 65535.0
+    def weights(self, rows: slice = ALL_ROWS) -> NDArray[np.float64]:
+        """(n, n, 3) barycentric weights of the three corners, or those of some rows."""
+        bc = self.barycentric[rows] / 65535.0
         return np.concatenate([1.0 - bc.sum(axis=-1, keepdims=True), bc], axis=-1)
 
-    def interpolate(self, mesh: Mesh, values: NDArray[np.floating]) -> NDArray[np.float64]:
-        """(n, n, c) of a (v, c) corner attribute; undefined outside the coverage."""
-        corners = mesh.triangles[np.maximum(self.triangle, 0)]
-        total: NDArray[np.float64] = np.einsum("yxk,yxkc->yxc", self.weights(), values[corners].astype(float))
+    def interpolate(
+        self, mesh: Mesh, values: NDArray[np.floating], rows: slice = ALL_ROWS
+    ) -> NDArray[np.float64]:
+        """(n, n, c) of a (v, c) corner attribute, or those of some rows; undefined outside the coverage."""
+        corners = values[mesh.triangles[np.maximum(self.triangle[rows], 0)]].astype(float)
+        total: NDArray[np.float64] = np.einsum("yxk,yxkc->yxc", self.weights(rows), corners)
         return total
 
 

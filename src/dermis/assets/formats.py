@@ -224,15 +224,15 @@ def _placed(mesh: Any, transform: Array, group: Group) -> Part:
     if normals is None and "vertex_normals" in mesh._cache:
         normals = mesh.vertex_normals
     linear = transform[:3, :3]
-    # normals turn with the cofactors, which exist for flat transforms too; mirrors turn triangles round
+    # normals turn with the cofactors, for flat transforms too, and keep their length; mirrors turn triangles
     cofactors = np.array([np.cross(linear[(i + 1) % 3], linear[(i + 2) % 3]) for i in range(3)])
-    mirror = np.sign(np.linalg.det(linear)) or 1.0
+    mirror, size = np.sign(det := np.linalg.det(linear)) or 1.0, abs(det) ** (2 / 3) or 1.0
     triangles = np.array(mesh.faces, dtype=np.int64).reshape(-1, 3)
     return Part(
         group,
         np.asarray(mesh.vertices, dtype=np.float64) @ linear.T + transform[:3, 3],
         None if uv is None else _real(uv),
-        None if normals is None else _real(normals) @ (mirror * cofactors).T,
+        None if normals is None else _real(normals) @ (mirror / size * cofactors).T,
         triangles[:, ::-1] if mirror < 0 else triangles,
     )
 

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from dermis.errors import refuse
 from dermis.images.colour import decode_srgb8, decode_srgb16
 from dermis.images.filters import without_steps
-from dermis.images.io import read_image
+from dermis.images.io import Picture, read_image
 
 Floats = NDArray[np.float32]
-PathLike = str | Path
+PathLike = str | Path | Picture
 
 MIN_SIZE, MAX_SIZE = 16, 16384
 # A normal this far off its surface (87 degrees) has its slope capped; nothing real leans further.
@@ -31,6 +31,7 @@ class Maps:
     height : (H, W) outwards, from an arbitrary zero [mm]
     specular : (H, W) plain grey 0..1, to be scaled to a mean by whoever knows which texels are skin [-]
     roughness : (H, W) plain grey 0..1 [-]
+    region : (H, W) uint8 part of the face, by its place in the list of the head that has it
     """
 
     colour: Floats | None = None
@@ -38,6 +39,7 @@ class Maps:
     height: Floats | None = None
     specular: Floats | None = None
     roughness: Floats | None = None
+    region: NDArray[np.uint8] | None = None
 
 
 def load_maps(
@@ -47,6 +49,7 @@ def load_maps(
     height_mm: float | None = None,
     specular: PathLike | None = None,
     roughness: PathLike | None = None,
+    region: PathLike | None = None,
     normal_y: Literal["up", "down"] = "up",
 ) -> Maps:
     """The maps of these picture files.
@@ -57,6 +60,7 @@ def load_maps(
     height_mm : relief of one grey level of an 8-bit map, 1/255 of the full scale at any depth, so that
         the same picture gives the same relief in 8 bits, 16 bits or floats of 0..1 [mm]
     specular, roughness : grey, taken as plain numbers and not through the sRGB curve
+    region : grey of 8 bits, the labels themselves
     normal_y : "up" when green points to row 0 (OpenGL, Blender), "down" when away from it (DirectX)
     DermisError : a file is not what its role asks for; the message names it
     """
@@ -66,6 +70,7 @@ def load_maps(
         height=None if height is None else load_height(height, height_mm),
         specular=None if specular is None else load_grey(specular, "a specular map"),
         roughness=None if roughness is None else load_grey(roughness, "a roughness map"),
+        region=None if region is None else load_labels(region),
     )
 
 
@@ -101,6 +106,14 @@ def load_grey(path: PathLike, role: str) -> Floats:
     role : what the map should be, for the message
     """
     return _within_unit(path, role, _grey(path, role, _read(path, role)))
+
+
+def load_labels(path: PathLike) -> NDArray[np.uint8]:
+    """(H, W) labels of a grey picture of 8 bits."""
+    image = _read(path, "a map of labels")
+    if image.dtype != np.uint8 or image.shape[2] != 1:
+        refuse(path, "labels in 8-bit grey", f"{image.dtype} x {image.shape[2]} came", "Save it as such")
+    return image[..., 0]
 
 
 def load_normal(path: PathLike, normal_y: Literal["up", "down"] = "up") -> Floats:

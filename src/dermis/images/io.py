@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,22 @@ OUTPUT_SUFFIXES = (".png", ".exr")
 _READABLE = "a picture (PNG, JPEG, TIFF, EXR or HDR)"
 
 
-def read_image(path: str | Path) -> Pixels:
+@dataclass(frozen=True)
+class Picture:
+    """A picture file that lies inside another file.
+
+    name : for messages
+    data : its bytes, PNG, JPEG or TIFF
+    """
+
+    name: str
+    data: bytes = field(repr=False)
+
+    def __str__(self) -> str:
+        return self.name
+
+
+def read_image(path: str | Path | Picture) -> Pixels:
     """The picture (H, W, C) as it is stored, row 0 at the top; C is 1 (grey), 3 (RGB) or 4 (RGBA).
 
     path : PNG, JPEG or TIFF, which give uint8 or uint16 (a float TIFF float32), or EXR or HDR, which
@@ -38,7 +54,7 @@ def read_image(path: str | Path) -> Pixels:
     """
     data = _read_bytes(path)
     try:
-        if data.startswith(EXR_START):
+        if data.startswith(EXR_START) and not isinstance(path, Picture):
             image: Pixels = decode_exr(Path(path))
         elif data.startswith(RADIANCE_START):
             image = decode_radiance(data)
@@ -114,7 +130,9 @@ def write_exr(
         OpenEXR.File(header, channels).write(str(temporary))
 
 
-def _read_bytes(path: str | Path) -> bytes:
+def _read_bytes(path: str | Path | Picture) -> bytes:
+    if isinstance(path, Picture):
+        return path.data
     try:
         return Path(path).read_bytes()
     except OSError as fault:
