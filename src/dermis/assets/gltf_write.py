@@ -104,10 +104,5 @@ def _glb(tree: Mapping[str, Any], binary: bytes | bytearray) -> bytes:
     text += b" " * (-len(text) % 4)
     body = bytes(binary) + b"\0" * (-len(binary) % 4)
     head = struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(body))
-    return (
-        head
-        + struct.pack("<I4s", len(text), b"JSON")
-        + text
-        + struct.pack("<I4s", len(body), b"BIN\0")
-        + body
-    )
+    chunks = ((b"JSON", text), (b"BIN\0", body))
+    return head + b"".join(struct.pack("<I4s", len(data), kind) + data for kind, data in chunks)
