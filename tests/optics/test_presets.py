@@ -113,6 +113,23 @@ def test_warnings_name_the_reason() -> None:
     assert any("negative" in text for text in printed.warnings)
 
 
+def test_absorption_is_told_where_the_beam_meets_it() -> None:
+    """Under a thin clear layer, and not below the first mean free path."""
+    clear, dark = Layer(0.01 * ONE, 2.0 * ONE, 0.05), Layer(2.0 * ONE, 2.0 * ONE)
+    for top, told in ((0.05, True), (2.0, False)):
+        medium = Medium("skin", (Layer(clear.sigma_a, clear.sigma_s_prime, top), dark))
+        assert any("absorbs" in text for text in diffusion_profile(medium).warnings) is told
+
+
+def test_light_below_zero_and_finer_than_its_numbers_is_told() -> None:
+    corneum = Layer(0.02 * ONE, 5.0 * ONE, 0.01)
+    medium = Medium("skin", (corneum, Layer(0.5 * ONE, 2.5 * ONE)))
+    assert any("negative at some radii" in text for text in diffusion_profile(medium, "multipole").warnings)
+    assert not diffusion_profile(Medium("skin", medium.layers[1:]), "multipole").warnings[1:]
+    foil = Medium("foil", (Layer(0.02 * ONE, 5.0 * ONE, 1e-6), medium.layers[1]))
+    assert any("more light than the total" in text for text in diffusion_profile(foil, "multipole").warnings)
+
+
 def _thin() -> Medium:
     thin = Layer(0.02 * ONE, 0.98 * ONE, 0.1)
     return Medium("cut", (thin, Layer(0.02 * ONE, 0.98 * ONE)))

@@ -9,7 +9,8 @@ import pytest
 
 from dermis.errors import DermisError
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM
-from dermis.optics.profiles import find_table, load_profile, preset_names
+from dermis.optics.presets import read_toml
+from dermis.optics.profiles import find_table, load_profile, preset_names, write_profile
 from dermis.optics.tissue import load_tissue, names
 
 SKIN = "[skin]\nstructure = 'biospec'\nmelanin = 0.03\n"
@@ -88,6 +89,14 @@ def test_saved_profiles_that_are_refused(tmp_path: Path, text: str, complaint: s
     path.write_text(text)
     with pytest.raises(DermisError, match=complaint):
         load_profile(path)
+
+
+def test_numbers_of_numpy_are_written_as_numbers(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    profile = load_profile("gpu-gems-3")
+    write_profile(path, profile, {"eta": np.float64(1.4), "total": profile.albedo, "layers": ["a 'b'"]})
+    assert read_toml(path)["eta"] == 1.4 and read_toml(path)["layers"] == ["a 'b'"]
+    assert load_profile(path).weight.tolist() == profile.weight.tolist()
 
 
 def test_pigments_need_a_skin() -> None:

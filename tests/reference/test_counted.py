@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dermis.optics.media import Layer, Medium
 from dermis.optics.presets import media
 from dermis.optics.tissue import load_tissue
 from dermis.reference.counted import counted_profile
@@ -22,6 +23,18 @@ def test_per_entering_light_in_rings() -> None:
     assert profile.reflectance.shape == profile.standard_error.shape == (len(profile.radius_mm), 3)
     assert (np.diff(profile.radius_mm) > 0.0).all() and not profile.finite
     assert seen and seen[-1][0] == seen[-1][1]
+
+
+def test_light_that_was_given_up_is_told() -> None:
+    """Without absorption some photons would walk for ever."""
+    lost = counted_profile(media()["spectralon"].channel(1), photons=2_000)
+    assert any("given up" in text for text in lost.warnings)
+    assert not counted_profile(media()["skin1"].channel(0), photons=2_000).warnings
+
+
+def test_light_beyond_the_rings_is_told() -> None:
+    wide = Medium("thin air", (Layer(np.array([1e-3]), np.array([0.05])),))
+    assert any("beyond the widest radius" in text for text in counted_profile(wide, photons=2_000).warnings)
 
 
 def test_spectra_become_colour_with_errors() -> None:

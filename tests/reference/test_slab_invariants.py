@@ -218,6 +218,18 @@ def test_bad_input_is_refused(wrong: Callable[[], object], said: str) -> None:
         wrong()
 
 
+def test_keys_stop_photons_of_many_hours() -> None:
+    code = """
+import os, signal, threading
+from dermis.reference.slab_mc import ScatteringLayer, trace_slab
+trace_slab([ScatteringLayer(0.01, 0.99)], 1)  # compiles
+threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+trace_slab([ScatteringLayer(0.01, 0.99)], 10**10)
+"""
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert run.returncode != 0 and "KeyboardInterrupt" in run.stderr
+
+
 def test_importing_the_module_leaves_the_compiler_alone() -> None:
     code = "import sys, dermis.reference.slab_mc; print('numba' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -126,21 +126,23 @@ def profile(
     _check_outputs(output, plot, check)
     request = Request(_TERMS if fit is None else fit, fit_kind, variances == "shared", keep_energy)
     thicknesses = () if through is None else parse_lengths("--through", through)
-    light = {"photons": _PHOTONS if photons is None else photons, "seed": seed or 0, "g": anisotropy}
+    light = _light(photons, seed, anisotropy, check or model == "montecarlo")
     table = find_table(name)
     if table is not None:
-        _refuse_tissue_options(name, given | {"model": model, "skin": skin, "eta": eta})
-        tissue, radial = None, replace(profile_of_table(table), name=name)
+        _refuse_tissue_options(
+            name, given | {"model": model, "skin": skin, "eta": eta, "check": check or None}
+        )
+        tissue, radial, counted = None, replace(profile_of_table(table), name=name), None
     else:
         tissue = _tissue(name, skin, given, eta)
         radial = _profile(tissue, model or "layered", clamp, light)
+        counted = _profile(tissue, "montecarlo", clamp, light) if check and model != "montecarlo" else None
     found = Report.of(radial, tissue, request, None if fit is not None else table, thicknesses)
     if output is not None:
         found.save(output)
     if plot is not None:
         from dermis.cli.profile_plot import draw
 
-        counted = _profile(tissue, "montecarlo", clamp, light) if check and tissue else None
         draw(plot, found, counted)
     if as_json:
         print_json(found.as_json())
@@ -162,6 +164,13 @@ def _check_outputs(output: Path | None, plot: Path | None, check: bool) -> None:
         refuse("--check", "a plot to add photons to", "no --plot came", "Add --plot picture.png")
 
 
+def _light(photons: int | None, seed: int | None, anisotropy: float, traced: bool) -> dict[str, Any]:
+    """What to trace, with a note when nothing is going to be traced."""
+    if not traced and (photons, seed, anisotropy) != (None, None, 0.0):
+        note("note: no photons are traced without --model montecarlo or --check")
+    return {"photons": _PHOTONS if photons is None else photons, "seed": seed or 0, "g": anisotropy}
+
+
 def _refuse_tissue_options(name: str, given: dict[str, Any]) -> None:
     for option, value in given.items():
         if value is not None:
@@ -172,7 +181,7 @@ def _refuse_tissue_options(name: str, given: dict[str, Any]) -> None:
 def _tissue(name: str, skin: Any, pigments: dict[str, Any], eta: float | None) -> Tissue:
     from dermis.optics.tissue import load_tissue
 
-    tissue = load_tissue(name, skin or "dj2006", pigments)
+    tissue = load_tissue(name, skin, pigments)
     if skin is not None and tissue.parameters is None:
         refuse("--skin", "a skin made of pigments", f"{name} is a medium", "Leave it out")
     return tissue if eta is None else replace(tissue, medium=tissue.medium.with_eta(eta))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 _INK = ("#c0392b", "#2e8b57", "#2a62b0")
 _NAMES = ("red", "green", "blue")
 _FAINTEST = 1e-5  # of the peak of r R(r): below that numbers are noise and eyes see nothing
+_UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+"""What keeps the same plot the same file."""
 _LEAST_COUNT = 0.3  # relative standard error beyond which a ring of photons is left out
 
 
@@ -26,9 +29,10 @@ def draw(path: Path, found: Report, counted: RadialProfile | None) -> None:
 
     path : .png, .svg or .pdf
     """
+    from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7.2, 4.6), dpi=160, layout="constrained")
+    figure = Figure(figsize=(7.2, 5.2), dpi=160, layout="constrained")
     axes = figure.subplots()
     peak = _curves(axes, found)
     if counted is not None:
@@ -37,24 +41,43 @@ def draw(path: Path, found: Report, counted: RadialProfile | None) -> None:
     axes.set(xlim=(1e-3, 30.0), ylim=(_FAINTEST * peak, 2.0 * peak))
     axes.set_title(_title(found), fontsize=10, loc="left")
     axes.grid(which="major", alpha=0.25, linewidth=0.6)
-    axes.legend(frameon=False, fontsize=8, loc="lower left")
-    with replacing(path) as trial:
-        figure.savefig(trial, metadata=_undated(path))
+    _legend(figure, axes)
+    drawn, form = BytesIO(), path.suffix.lower()[1:]
+    with rc_context({"svg.hashsalt": "dermis"}):
+        figure.savefig(drawn, format=form, metadata=_UNDATED.get(form))
+    with replacing(path) as trial:  # matplotlib itself has no clean end on a full disk
+        trial.write_bytes(drawn.getvalue())
+
+
+def _legend(figure: Any, axes: Any) -> None:
+    """A column for each channel, below the curves."""
+    entries = zip(*axes.get_legend_handles_labels(), strict=True)
+    by_channel = sorted(entries, key=lambda entry: _NAMES.index(entry[1].partition(",")[0]))
+    figure.legend(
+        *zip(*by_channel, strict=True), loc="outside lower center", ncols=3, frameon=False, fontsize=8
+    )
 
 
 def _curves(axes: Any, found: Report) -> float:
     radial, fit = found.radial, found.fit.profile
     r = radial.radius_mm
     fitted = fit.radiant_exitance(r)
+    peak = float((r[:, None] * fitted).max())
+    if radial.standard_error is not None:
+        peak = max(peak, _photons(axes, radial))
     for channel, (ink, name) in enumerate(zip(_INK, _NAMES, strict=True)):
-        label = f"{name}, {radial.model}"
-        axes.plot(r, r * radial.reflectance[:, channel], color=ink, linewidth=1.4, label=label)
-        label = f"{len(fit.variance_mm2)} Gaussians, error {found.fit.error[channel]:.2%}"
+        if radial.standard_error is None:
+            label = f"{name}, {radial.model}"
+            axes.plot(r, r * radial.reflectance[:, channel], color=ink, linewidth=1.4, label=label)
+            peak = max(peak, float((r * radial.reflectance[:, channel]).max()))
+        terms = len(fit.weight) if found.fit.shared else np.count_nonzero(fit.weight[:, channel])
+        label = f"{name}, {terms} Gaussians, error {found.fit.error[channel]:.2%}"
         axes.plot(r, r * fitted[:, channel], color=ink, linewidth=1.1, linestyle=(0, (4, 3)), label=label)
         if isinstance(found.other, BurleyFit):
             other = r * found.other.profile.radiant_exitance(r)[:, channel]
-            axes.plot(r, other, color=ink, linewidth=1.0, linestyle=":", label="Burley")
-    return float((r[:, None] * radial.reflectance).max())
+            label = f"{name}, Burley, error {found.other.error[channel]:.1%} of rings"
+            axes.plot(r, other, color=ink, linewidth=1.0, linestyle=":", label=label)
+    return peak
 
 
 def _photons(axes: Any, counted: RadialProfile) -> float:
@@ -64,7 +87,7 @@ def _photons(axes: Any, counted: RadialProfile) -> float:
         R, se = counted.reflectance[:, channel], error[:, channel]
         sure = (R > 0.0) & (se < _LEAST_COUNT * np.abs(R)) & (r > 1e-3)
         peak = max(peak, float((r * R)[sure].max(initial=0.0)))
-        label = "Monte Carlo" if channel == 0 else None
+        label = f"{_NAMES[channel]}, Monte Carlo"
         bars = {"markersize": 2.2, "elinewidth": 0.8, "color": ink, "alpha": 0.7, "label": label}
         axes.errorbar(r[sure], (r * R)[sure], (r * se)[sure], fmt="o", **bars)
     return peak
@@ -75,8 +98,3 @@ def _title(found: Report) -> str:
     total = ", ".join(f"{value:.3f}" for value in radial.total)
     eta = f", index {found.tissue.medium.eta:g}" if found.tissue is not None else ""
     return f"{radial.name}{eta}: total reflectance {total}"
-
-
-def _undated(path: Path) -> dict[str, Any]:
-    """What keeps the same plot the same file."""
-    return {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix.lower(), {})

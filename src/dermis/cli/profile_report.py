@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from dermis.optics.diffusion.transmission import through_gaussians, through_slab
+from dermis.optics.diffusion.transmission import through_gaussians
 from dermis.optics.fits.gaussian import GaussianFit, fit_gaussians
 
 if TYPE_CHECKING:
@@ -122,13 +122,26 @@ class Report:
         kind = "R(r)" if fit.kind == "pointwise" else "rings"
         lines.append(f"error      {_row(fit.error)}  of {kind}, relative")
         lines.append(f"energy     {_row(fit.energy_error)}  too much or too little, relative")
-        if self.other is not None:
-            lines.append(f"rings      {_row(self.ring_error)}  Gaussians' error in the light through rings")
-            lines.append(f"rings      {_row(self.other.error)}  the other fit's")
-        for thickness, colour in zip(self.through_mm, self._through(), strict=True):
-            lines.append(f"through    {_row(colour)}  {thickness:g} mm")
+        lines += self._other_lines()
+        for way, colours in self._through().items():
+            for thickness, colour in zip(self.through_mm, colours, strict=True):
+                lines.append(f"through    {_row(colour)}  {thickness:g} mm, by its {way}")
         lines += [f"note: {note}" for note in (self.tissue.medium.notes if self.tissue else ())]
         return lines
+
+    def _other_lines(self) -> list[str]:
+        from dermis.optics.fits.burley import BurleyFit
+
+        if self.other is None:
+            return []
+        if isinstance(self.other, BurleyFit):
+            lines = [f"Burley     {_row(self.other.profile.shape)}  s [1/mm]"]
+        else:
+            kernel = self.other.kernel
+            pairs = zip(kernel.variance_mm2, kernel.weight, strict=True)
+            lines = [f"separable  {_row(v)}  mm2, weights {_row(w)}" for v, w in pairs]
+        mine = f"rings      {_row(self.other.error)}  its error in the light through rings"
+        return [*lines, mine, f"rings      {_row(self.ring_error)}  the Gaussians'"]
 
     def save(self, path: Path) -> None:
         """Write the Gaussians for the renderer."""
@@ -136,10 +149,10 @@ class Report:
 
         remarks: dict[str, Any] = {"name": self.radial.name, "model": self.radial.model}
         if self.tissue is not None:
-            remarks["eta"] = self.tissue.medium.eta
+            medium = self.tissue.medium
+            remarks |= {"eta": medium.eta, "layers": [layer.name for layer in medium.layers]}
             if self.tissue.parameters is not None:
-                fields = asdict(self.tissue.parameters)
-                remarks |= {key: value for key, value in fields.items() if value is not None}
+                remarks |= asdict(self.tissue.parameters)
         remarks |= {"total": self.radial.total, "per": self._per(), "error": self.fit.error}
         remarks |= {"error_kind": self.fit.kind, "energy_error": self.fit.energy_error}
         write_profile(path, self.fit.profile, remarks)
@@ -175,21 +188,19 @@ class Report:
         found = asdict(self.other)
         if not isinstance(self.other, BurleyFit):
             return {"separable": found}
-        engines = {
-            f"{f.__name__}": asdict(f(self.other.profile)) for f in (unity_parameters, unreal_parameters)
-        }
+        engines = {f.__name__: asdict(f(self.other.profile)) for f in (unity_parameters, unreal_parameters)}
         return {"burley": found | engines}
 
-    def _through(self) -> Floats:
-        return through_gaussians(self.fit.profile, self.through_mm)
-
-    def _through_json(self) -> dict[str, Any]:
+    def _through(self) -> dict[str, Floats]:
+        """Light through the thicknesses, (n, 3), by each way to know it [-]."""
         if not self.through_mm:
             return {}
-        found: dict[str, Any] = {"thickness_mm": self.through_mm, "gaussians": self._through()}
-        if self.tissue is not None:
-            found["slab"] = self.tissue.through(self.through_mm)
-        return {"transmission": found}
+        ways = {"gaussians": through_gaussians(self.fit.profile, self.through_mm)}
+        return ways if self.tissue is None else ways | {"slab": self.tissue.through(self.through_mm)}
+
+    def _through_json(self) -> dict[str, Any]:
+        ways = self._through()
+        return {"transmission": {"thickness_mm": self.through_mm, **ways}} if ways else {}
 
 
 def _other(radial: RadialProfile, kind: str) -> BurleyFit | SeparableFit | None:

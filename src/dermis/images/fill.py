@@ -21,13 +21,15 @@ def fill_empty(image: NDArray[np.floating[Any]], known: NDArray[np.bool_]) -> Fl
     Source: [Gortler1996] section 3.6.
     """
     weight = known[..., None].astype(np.float32)
-    levels = [(np.where(known[..., None], image, 0.0).astype(np.float32), weight)]
+    levels: list[tuple[Floats, Floats]] = [(np.where(known[..., None], image, 0).astype(np.float32), weight)]
     while len(levels[-1][0]) > 1:
-        total, weight = (_halved(part) for part in levels[-1])
-        levels.append((total / np.maximum(weight, 1e-6) * np.minimum(weight, 1.0), np.minimum(weight, 1.0)))
+        total, count = (_halved(part) for part in levels[-1])
+        share: Floats = np.minimum(count, np.float32(1.0))
+        mean = np.asarray(total / np.maximum(count, np.float32(1e-6)), np.float32)
+        levels.append((mean * share, share))
     filled = levels[-1][0]
-    for total, weight in reversed(levels[:-1]):
-        filled = total + (1.0 - weight) * _doubled(filled)
+    for total, share in reversed(levels[:-1]):
+        filled = total + (1.0 - share) * _doubled(filled)
     return filled
 
 

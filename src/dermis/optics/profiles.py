@@ -15,7 +15,7 @@ from dermis.errors import refuse
 from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats
-from dermis.optics.presets import read_toml
+from dermis.optics.presets import read_text, read_toml
 from dermis.optics.tissue import load_tissue, names
 from dermis.outputs import replacing
 
@@ -43,15 +43,14 @@ def load_profile(name: str | Path) -> GaussianSum:
         return table
     if str(name) in names():
         return _fitted(str(name))
-    path = Path(name)
-    if path.suffix.lower() != ".toml":
-        expected = f"a preset ({', '.join(preset_names())}), a .toml file of a tissue, or {_FILE_FORM}"
-        refuse(f"profile {name}", expected, "there is no such file", "Check the name")
-    return _fit(path)
+    return _fit(Path(name))
 
 
 def find_table(name: str | Path) -> GaussianSum | None:
-    """The Gaussians that a name or file holds as they are; None when it is tissue, or nothing."""
+    """The Gaussians that a name or file holds as they are; None when it is tissue.
+
+    Raises DermisError when it is neither, or when its numbers cannot be a profile.
+    """
     if str(name) == PUBLISHED:
         return _published()
     path = Path(name)
@@ -60,7 +59,17 @@ def find_table(name: str | Path) -> GaussianSum | None:
     if path.suffix.lower() == ".toml":
         document = read_toml(path)
         return _from_toml(path, document) if "variances_mm2" in document else None
-    return _from_csv(path) if path.exists() else None
+    if not _exists(path):
+        expected = f"a preset ({', '.join(preset_names())}), a .toml file of a tissue, or {_FILE_FORM}"
+        refuse(f"profile {name}", expected, "there is no such file", "Check the name")
+    return _parse(str(path), read_text(path, _FILE_FORM))
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except OSError:  # a name too long, or a folder that is not ours
+        return False
 
 
 def write_profile(path: Path, profile: GaussianSum, remarks: Mapping[str, Any]) -> None:
@@ -85,6 +94,8 @@ def _toml(value: Any) -> str:
         return _toml(value.tolist())
     if isinstance(value, Sequence) and not isinstance(value, str):
         return f"[{', '.join(map(_toml, value))}]"
+    if isinstance(value, float):
+        return repr(float(value))  # NumPy's own numbers print their type
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
 
 
@@ -101,14 +112,6 @@ def _fit(name: str | Path) -> GaussianSum:
 def _published() -> GaussianSum:
     text = (resources.files("dermis.optics") / "data" / f"{PUBLISHED}.csv").read_text(encoding="utf-8")
     return _parse(PUBLISHED, text)
-
-
-def _from_csv(path: Path) -> GaussianSum:
-    try:
-        return _parse(str(path), path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        came = getattr(error, "strerror", None) or "it is not text"
-        refuse(f"profile {path}", _FILE_FORM, f"it cannot be read: {came}", "Check the name")
 
 
 def _from_toml(path: Path, document: Mapping[str, Any]) -> GaussianSum:

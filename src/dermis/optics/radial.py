@@ -10,6 +10,7 @@ from dermis.optics.fits.targets import Points, Rings
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats
 
+NOTABLE_SHARE, TINY = 0.01, float(np.finfo(np.float64).tiny)
 NARROWEST_MM, WIDEST_MM = 1e-4, 60.0
 """The radii that a profile covers and an error is integrated over [mm]."""
 
@@ -87,6 +88,14 @@ def enclosed(radius_mm: Floats, grid_mm: Floats, reflectance: Floats) -> Floats:
     return np.where(
         radius_mm[:, None] > 0.0, resample(np.maximum(radius_mm, grid_mm[0]), grid_mm, within), 0.0
     )
+
+
+def light_beyond(total: Floats, ring_energy: Floats) -> list[str]:
+    """A warning when rings (k, c) lack a notable share of the total (c,), else nothing."""
+    share = float(((total - ring_energy.sum(axis=0)) / np.maximum(np.abs(total), TINY)).max())
+    if share < NOTABLE_SHARE:
+        return []
+    return [f"{share:.0%} of the light leaves beyond the widest radius and is in the total only"]
 
 
 def profile_of_table(table: GaussianSum) -> RadialProfile:

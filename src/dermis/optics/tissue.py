@@ -21,6 +21,7 @@ from dermis.optics.presets import media, medium_from_toml, read_toml
 from dermis.optics.radial import RadialProfile
 
 SPECTRAL = "spectral"
+_STRUCTURE: Structure = "dj2006"
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,6 @@ class Tissue:
         """R(r) in linear Rec. 709: per power that enters, or per incident power for wavelengths."""
         return diffusion_profile(self.medium, model, clamp, self.rgb)
 
-
     def through(self, thickness_mm: ArrayLike) -> Floats:
         """Light that comes through the tissue cut at each thickness, (n, 3), per the same power [-]."""
         slab = through_slab(self.medium, thickness_mm)
@@ -55,11 +55,11 @@ def names() -> tuple[str, ...]:
 
 
 def load_tissue(
-    name: str | Path, structure: Structure = "dj2006", pigments: Mapping[str, Any] | None = None
+    name: str | Path, structure: Structure | None = None, pigments: Mapping[str, Any] | None = None
 ) -> Tissue:
     """The tissue of a name or of a TOML file with layers or with a table [skin].
 
-    structure : layers of a skin of pigments
+    structure : layers of a skin of pigments; by default the file's own, or else "dj2006"
     pigments : fields of `SkinParameters` that replace those of the name
 
     Raises DermisError for what is neither, and for pigments that a medium without them cannot have.
@@ -67,13 +67,13 @@ def load_tissue(
     given = dict(pigments or {})
     if str(name) == SPECTRAL or str(name) in EXAMPLES:
         example = EXAMPLES.get(str(name), SkinParameters())
-        return _spectral(str(name), structure, example, given)
+        return _spectral(str(name), structure or _STRUCTURE, example, given)
     if str(name) not in media() and Path(name).suffix.lower() != ".toml":
         known = ", ".join(names())
         refuse(f"tissue {name}", f"one of {known}, or a .toml file", "it is none of these", "Check the name")
     document = {} if str(name) in media() else read_toml(Path(name))
     if "skin" in document:
-        return _from_skin_table(Path(name), document, given)
+        return _from_skin_table(Path(name), document, structure, given)
     if given:
         option = "--" + next(iter(given)).replace("_", "-")
         skins = ", ".join((SPECTRAL, *EXAMPLES))
@@ -88,13 +88,15 @@ def _spectral(name: str, structure: Structure, example: SkinParameters, given: d
     return Tissue(medium, rgb_weights(WAVELENGTHS_NM), parameters)
 
 
-def _from_skin_table(path: Path, document: Mapping[str, Any], given: dict[str, Any]) -> Tissue:
+def _from_skin_table(
+    path: Path, document: Mapping[str, Any], wanted: Structure | None, given: dict[str, Any]
+) -> Tissue:
     table = document["skin"]
     fields = set(SkinParameters.__dataclass_fields__)
     if not isinstance(table, dict) or set(document) - {"skin", "name"}:
         refuse(path, "a table [skin] and a name only", "it holds something else", "Take the rest out")
     own = dict(table)
-    structure = own.pop("structure", "dj2006")
+    structure = own.pop("structure", _STRUCTURE)
     unknown = sorted(set(own) - fields)
     if unknown:
         known = ", ".join(sorted({"structure", *fields}))
@@ -107,4 +109,4 @@ def _from_skin_table(path: Path, document: Mapping[str, Any], given: dict[str, A
         refuse(
             path, f"numbers, and a structure of {', '.join(get_args(Structure))}", f"{what} came", "Mend it"
         )
-    return _spectral(str(document.get("name", path.stem)), structure, SkinParameters(**own), given)
+    return _spectral(str(document.get("name", path.stem)), wanted or structure, SkinParameters(**own), given)

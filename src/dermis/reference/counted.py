@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.media import Floats, Medium
-from dermis.optics.radial import RadialProfile, ring_edges
-from dermis.reference.slab_mc import trace_medium
+from dermis.optics.radial import RadialProfile, light_beyond, ring_edges
+from dermis.reference.slab_mc import SlabResult, trace_medium
+
+_NOTABLE_LOSS = 1e-3
 
 
 def counted_profile(
@@ -37,7 +39,7 @@ def counted_profile(
         for name in ("reflectance", "reflectance_se", "total_reflectance", "total_reflectance_se")
     )
     reflectance = (weights @ R).T
-    areas = np.pi * np.diff(edges**2)
+    ring_energy = reflectance * np.pi * np.diff(edges**2)[:, None]
     return RadialProfile(
         name=medium.name,
         model="montecarlo",
@@ -45,9 +47,17 @@ def counted_profile(
         reflectance=reflectance,
         total=weights @ totals,
         edges_mm=edges,
-        ring_energy=reflectance * areas[:, None],
+        ring_energy=ring_energy,
         standard_error=np.sqrt(weights**2 @ error**2).T,
         total_error=np.sqrt(weights**2 @ total_error**2),
         incident=rgb is not None,
+        warnings=(*light_beyond(weights @ totals, ring_energy), *_losses(runs)),
         sources=(*medium.sources, "Wang1995"),
     )
+
+
+def _losses(runs: Sequence[SlabResult]) -> list[str]:
+    lost = max(run.per_entering.unfinished for run in runs)
+    if lost < _NOTABLE_LOSS:
+        return []
+    return [f"{lost:.1%} of the light was given up after very many scatterings: the total lacks it"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from threading import Event
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +26,8 @@ BATCHES = 64
 """Each has random numbers of its own, so that the result does not depend on how many run at once."""
 
 MAX_PHOTONS = 10**10
+
+_AT_ONCE = 20_000  # photons between two looks at whether someone pressed Ctrl-C
 
 
 def default_edges() -> Floats:
@@ -125,21 +128,29 @@ def _trace(stack: Stack, photons: int, seed: int, edges: Floats, report: Report 
 
     from dermis.reference.photon import Tally, walk_batch
 
+    stop = Event()
+
     def trace(size: int, seeds: np.random.SeedSequence) -> Tally:
         lengths = (len(edges), len(edges), 2, len(stack.eta) - 2, 1)
         tally = Tally(*(np.zeros(length, np.int64) for length in lengths))
         rng = seeds.generate_state(4, np.uint64).astype(np.uint64)
-        walk_batch(size, stack, edges**2, rng, tally)
+        for done in range(0, size, _AT_ONCE):
+            if stop.is_set():
+                break
+            walk_batch(min(_AT_ONCE, size - done), stack, edges**2, rng, tally)
         return tally
 
     sizes = [photons * (i + 1) // BATCHES - photons * i // BATCHES for i in range(BATCHES)]
     tallies = []
     # The compiled walk releases the interpreter, so that threads share the work.
     with ThreadPoolExecutor(config.NUMBA_NUM_THREADS) as pool:
-        for tally in pool.map(trace, sizes, np.random.SeedSequence(seed).spawn(BATCHES)):
-            tallies.append(tally)
-            if report is not None:
-                report(len(tallies), BATCHES)
+        try:
+            for tally in pool.map(trace, sizes, np.random.SeedSequence(seed).spawn(BATCHES)):
+                tallies.append(tally)
+                if report is not None:
+                    report(len(tallies), BATCHES)
+        finally:
+            stop.set()  # or the pool would wait for batches that nobody wants any more
     return Tally(*(np.sum(parts, axis=0) for parts in zip(*tallies, strict=True)))
 
 

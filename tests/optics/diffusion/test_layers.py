@@ -152,6 +152,14 @@ def test_point_in_a_thin_slab_is_inside_it() -> None:
     assert 0.0 < R[0, 0] < 1.0 and 0.0 < T[0, 0] < 1.0 and R[0, 0] + T[0, 0] < 1.0
 
 
+@pytest.mark.parametrize("thickness", [0.2, 5.0])
+def test_point_of_a_slab_thinner_than_a_mean_free_path_lies_in_its_middle(thickness: float) -> None:
+    """So that as much of its light leaves above as below, when both faces are alike."""
+    thin = Medium("thin", (Layer(np.zeros(1), np.array([0.01]), thickness),))
+    R, T = layered_diffusion.respond(hankel.STILL, thin, A, "point")
+    assert R[0, 0] == pytest.approx(T[0, 0], rel=1e-6)
+
+
 def test_channels_are_independent() -> None:
     together = diffusion_profile(media()["dj3"], "layered")
     for channel in range(3):

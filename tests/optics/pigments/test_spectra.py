@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from dermis.errors import DermisError
+from dermis.optics.diffusion.models import diffusion_profile
+from dermis.optics.media import Medium
+from dermis.optics.pigments.scattering import jacques_1998
+from dermis.optics.pigments.skin import SkinParameters, spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, outside_gamut, rgb_weights, tabulated
 
 FINE_NM = np.arange(380.0, 781.0, 5.0)
@@ -51,6 +56,24 @@ def test_the_coarse_grid_is_enough(sample_folder: Path) -> None:
     spectra, colours = skins(sample_folder)
     coarse = np.array([np.interp(WAVELENGTHS_NM, FINE_NM, spectrum) for spectrum in spectra])
     assert np.abs(coarse @ rgb_weights().T - colours).max() < 1e-3
+
+
+def test_whole_chain_from_pigments_to_the_colours_of_another_program(sample_folder: Path) -> None:
+    """Its skins: eumelanin alone, 0.06 mm, and scattering after Jacques in both layers."""
+    table = np.genfromtxt(
+        sample_folder / "reference" / "data" / "spectral_srgb_diffusion.csv",
+        delimiter=",",
+        names=True,
+        dtype=None,
+        encoding="utf-8",
+    )
+    sigma_s_prime = jacques_1998(WAVELENGTHS_NM)
+    for row in table[::6]:
+        skin = SkinParameters(melanin=row["f_mel"], eumelanin=1.0, blood=row["f_blood"], epidermis_mm=0.06)
+        epidermis, dermis = spectral_medium("dj2006", skin, scattering=jacques_1998).layers
+        medium = Medium("skin", (epidermis, replace(dermis, sigma_s_prime=sigma_s_prime)))
+        total = diffusion_profile(medium, rgb=rgb_weights()).total
+        assert total == pytest.approx([row["lin_R"], row["lin_G"], row["lin_B"]], abs=6e-4)
 
 
 def test_weights_are_those_of_the_srgb_standard() -> None:

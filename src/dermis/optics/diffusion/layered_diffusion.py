@@ -102,7 +102,8 @@ def _split(medium: Medium) -> Iterator[_Sheet]:
         deep = depth + sigma_t * d >= 1.0
         # A slab thinner than that has its source in the middle of its last layer, rather than nowhere.
         here = (depth < 1.0) & (deep | (i == len(medium.layers) - 1))
-        above = np.where(here & deep, (1.0 - depth) / sigma_t, 0.5 * min(d, 1.0))
+        middle = 0.5 * d if np.isfinite(d) else 1.0
+        above = np.where(here & deep, (1.0 - depth) / sigma_t, middle)
         yield _Sheet(layer, above, nothing, np.where(here, layer.alpha_prime, 0.0))
         yield _Sheet(layer, d - above, nothing, nothing)
         depth = depth + sigma_t * d

@@ -32,8 +32,8 @@ def through_slab(
 ) -> Floats:
     """Transmittance of the medium cut at each thickness, per power that enters, (n, c) [-].
 
-    model : layered diffusion lets what meets no event pass, by the reduced extinction; the multipole scatters all
-        light at one depth, and errs where a cut leaves a layer thinner than a mean free path
+    model : layered diffusion lets what meets no event pass, by the reduced extinction; the multipole
+        scatters all light at one depth, and errs where a cut leaves a layer thinner than a mean free path
 
     Source: [DonnerJensen2005] eq. 7, 8 for the multipole.
     """
@@ -51,7 +51,7 @@ def through_slab(
 
 
 def cut(medium: Medium, thickness_mm: float) -> Medium:
-    """The medium's upper part, with air below [mm]."""
+    """The medium's upper part, or all of it if it is thinner, with air below [mm]."""
     if not 0.0 < thickness_mm < np.inf:
         refuse("thickness", "a length above 0 mm", f"{thickness_mm:g} came", "Correct it")
     kept, left = [], thickness_mm

@@ -55,7 +55,7 @@ def fit_gaussians(
     shared : the same variances in all channels, chosen for the root mean square of their errors; else
         each channel has its own, and weights of 0 for the others'
     keep_energy : make the weights sum to the target's total
-    near : the fit of a similar profile to start from, an order of magnitude faster
+    near : the fit of a similar profile to start from: several times faster, but not always the best fit
     name : of the resulting profile
 
     Raises DermisError when the terms are too few or many, or when Gaussians cannot follow the profile.

@@ -77,14 +77,11 @@ class Rings:
     edges_mm : (n + 1,) increasing, best 0 and then log-spaced [mm]
     energy : (n, c) light through each ring in c channels [-]
     total : (c,) light that leaves at all radii together [-]
-    standard_error : (n, c) of counted energies; a fit of Gaussians then trusts rings by them, in all
-        channels alike, while errors are stated as ever [-]
     """
 
     edges_mm: Floats
     energy: Floats
     total: Floats
-    standard_error: Floats | None = None
 
     kind: ClassVar[Literal["annulus"]] = "annulus"
 
@@ -92,34 +89,21 @@ class Rings:
         _check(self.kind, self.edges_mm[1:], self.energy, self.total)
         if not 0.0 <= self.edges_mm[0] < self.edges_mm[1]:
             refuse("edges of rings", "numbers that increase from 0", f"{self.edges_mm[:2]} came", "Sort them")
-        error = self.standard_error
-        if error is not None and not (error.shape == self.energy.shape and (error > 0.0).any(axis=0).all()):
-            expected = "one for each ring and channel, some above 0 in each channel"
-            refuse("standard errors", expected, f"shape {error.shape} came", "Leave them out")
 
-    @cached_property
-    def _trust(self) -> Floats:
-        if self.standard_error is None:
-            return np.ones(len(self.energy))
-        relative = (self.standard_error / np.linalg.norm(self.energy, axis=0)).max(axis=1)
-        counted = relative > 0.0  # a ring that no photon met has no error, yet is not certain
-        return np.asarray(1.0 / np.where(counted, relative, relative[counted].min()))
-
-    @cached_property
+    @property
     def samples(self) -> Floats:
-        """Energies as the fit weighs them, (n, c)."""
-        return self._trust[:, None] * self.energy
+        """Values whose squares the error sums, (n, c)."""
+        return self.energy
 
     def design(self, variance_mm2: Floats) -> tuple[Floats, Floats]:
         """What a unit Gaussian adds to the samples, and its slope by the log of its variance, (n, k) each."""
         u = self.edges_mm[:, None] ** 2 / (2.0 * variance_mm2)
         fall = np.exp(-u)
-        trust = self._trust[:, None]
-        return -trust * np.diff(fall, axis=0), -trust * np.diff(u * fall, axis=0)
+        return -np.diff(fall, axis=0), -np.diff(u * fall, axis=0)
 
     def error(self, variance_mm2: Floats, weight: Floats) -> Floats:
         """`ring_error` of a sum of Gaussians, (c,) [-]."""
-        return ring_error(self, self.design(variance_mm2)[0] @ weight / self._trust[:, None])
+        return ring_error(self, self.design(variance_mm2)[0] @ weight)
 
     def radius_of(self, share: Sequence[float]) -> Floats:
         """Radii within which the channels' mean share of the light leaves, increasing [mm]."""
@@ -128,8 +112,7 @@ class Rings:
     def channel(self, index: int) -> Rings:
         """One channel alone."""
         keep = slice(index, index + 1)
-        spread = None if self.standard_error is None else self.standard_error[:, keep]
-        return Rings(self.edges_mm, self.energy[:, keep], self.total[keep], spread)
+        return Rings(self.edges_mm, self.energy[:, keep], self.total[keep])
 
 
 def ring_error(target: Rings, energy: Floats) -> Floats:
@@ -160,4 +143,8 @@ def _check(kind: str, radius_mm: Floats, values: Floats, total: Floats) -> None:
         refuse(place, "two radii or more that increase", "they do not", "Sort them")
     dark = [i for i in range(values.shape[1]) if not (values[:, i].any() and total[i] > 0.0)]
     if dark:
-        refuse(place, "light in every channel", f"channel {dark[0]} has none", "Leave that channel out")
+        peak, sum_ = values[:, dark[0]].max(), total[dark[0]]
+        came = f"channel {dark[0]} holds {peak:.3g} at most and {sum_:.3g} in all"
+        refuse(
+            place, "light in every channel", came, "Leave it out, or take another model, skin or more photons"
+        )
