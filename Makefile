@@ -12,9 +12,9 @@ help: ## this list
 setup: ## an environment in .venv from requirements.lock, and a Vulkan driver
 	@sh tools/setup.sh
 
-demo: setup ## render the sample head into out/demo.png
+demo: setup ## make a head and render it into out/demo.png
 	@mkdir -p out
-	@.venv/bin/dermis render lee_perry_smith --subdivide 1 -o out/demo.png
+	@.venv/bin/dermis render -o out/demo.png
 
 lint: setup ## style, types and floors
 	$(PY) -m ruff check .

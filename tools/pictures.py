@@ -19,6 +19,8 @@ PICTURES = {
     "03_pores": "pores",
     "05_skin_colours": "skin-colours",
     "06_layers": "layers",
+    "07_bust": "bust",
+    "08_family": "family",
 }
 QUALITY = 88
 

@@ -11,7 +11,10 @@ from typing import Any, Literal
 
 import numpy as np
 
+from dermis.assets.bust import BUSTS
 from dermis.assets.check import check_head_height
+from dermis.assets.formats import is_gltf
+from dermis.assets.gltf_maps import embedded_maps
 from dermis.assets.load import load_mesh
 from dermis.assets.maps import Maps, load_maps
 from dermis.assets.mesh import Mesh
@@ -70,9 +73,9 @@ def load_head(
     opaque: Sequence[str] = (),
     subdivide: int = 0,
 ) -> Head:
-    """A sample ("lee_perry_smith") or a mesh file (.glb, .gltf, .obj, .ply) with the given maps.
+    """The built-in "bust", a sample ("lee_perry_smith") or a mesh file (.glb, .gltf, .obj, .ply) with maps.
 
-    Options given for a sample replace its own.
+    Options replace what a sample or a glTF file has of its own.
 
     colour, normal, height, specular, roughness : image files; see `load_maps`
     height_mm : relief of one grey level of an 8-bit height map [mm]
@@ -86,8 +89,12 @@ def load_head(
     Raises DermisError for files that cannot be rendered as a head.
     """
     name, path = str(head), Path(head)
-    sample, files = SAMPLES.get(name), {}
-    if sample is not None:
+    sample, files = SAMPLES.get(name), dict[str, Any]()
+    if name in BUSTS:
+        from dermis.assets.bust.build import cached_bust
+
+        path = cached_bust(name)
+    elif sample is not None:
         if sample.kind != "head":
             refuse(
                 name, "a head", f"this sample is an {sample.kind}", f"Use one of {', '.join(_head_names())}"
@@ -100,11 +107,15 @@ def load_head(
     elif not path.is_file():
         known = ", ".join(_head_names())
         refuse(name or "head", f"a mesh file or a sample ({known})", f"{name!r} is neither", "Check the name")
+    if sample is None and is_gltf(path):
+        files = embedded_maps(path)
     mesh = load_mesh(path, unit_mm=unit_mm, v_origin=v_origin, up=up, opaque=tuple(opaque))
     check_head_height(mesh, name, unit_mm)
     own = {"colour": colour, "normal": normal, "height": height}
     own |= {"specular": specular, "roughness": roughness}
     chosen = _chosen(own, files)
+    if height is None and height_mm is None:
+        height_mm = files.get("height_mm")
     if height_mm is not None and chosen["height"] is None:
         came = f"{height_mm} came without a height map"
         refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
@@ -112,10 +123,11 @@ def load_head(
     return Head(name, subdivided(mesh, subdivide), maps, sample.attribution if sample else "")
 
 
-def _chosen(given: dict[str, MapFile], sample: dict[str, Path]) -> dict[str, Any]:
-    """For each role the file given, else the sample's."""
-    return {role: sample.get(role) if file is None else file for role, file in given.items()}
+def _chosen(given: dict[str, MapFile], files: dict[str, Any]) -> dict[str, Any]:
+    """For each role the file given, else the head's own; a normal map that is given replaces its relief."""
+    chosen = {role: files.get(role) if file is None else file for role, file in given.items()}
+    return chosen | {"region": files.get("region")}
 
 
 def _head_names() -> list[str]:
-    return [name for name, sample in SAMPLES.items() if sample.kind == "head"]
+    return [*BUSTS, *(name for name, sample in SAMPLES.items() if sample.kind == "head")]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.hankel import STILL
@@ -14,6 +15,7 @@ from dermis.optics.pigments.skin import SkinParameters, spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
 _NODES = 65
+_COEFFICIENTS = ("sigma_a", "sigma_s_prime")
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,8 @@ class ColourTable:
     def read(self, melanin: Floats, blood: Floats) -> Floats:
         """Colours (k, 3) of skins with these shares (k,) of melanin and blood, 0 to 1 [-].
 
-        Bilinear in the square roots, along which reflectance falls almost straight: 0.002 off at worst.
+        Bilinear in the square roots, along which reflectance falls almost straight: 0.004 off at worst, where
+        there is next to no blood, and 0.0015 where there is 0.001 of both.
         """
         n = len(self.colours)
         (i, u), (j, v) = (_split(share, n) for share in (melanin, blood))
@@ -40,7 +43,7 @@ class ColourTable:
         return np.asarray(near + u * (far - near))
 
 
-def _split(share: Floats, nodes: int) -> tuple[np.ndarray, Floats]:
+def _split(share: Floats, nodes: int) -> tuple[NDArray[np.int64], Floats]:
     """The node before each share, and how far (k, 1) it is to the next."""
     place = np.sqrt(np.clip(share, 0.0, 1.0)) * (nodes - 1)
     before = np.minimum(place.astype(np.int64), nodes - 2)
@@ -69,9 +72,6 @@ def _stacked(layers: list[Layer]) -> Layer:
     return replace(layers[0], sigma_a=sigma_a, sigma_s_prime=sigma_s_prime)
 
 
-def _picked(layer: Layer, rows: np.ndarray) -> Layer:
+def _picked(layer: Layer, rows: NDArray[np.int64]) -> Layer:
     """Rows of a stacked layer, their channels in one line."""
     return replace(layer, **{name: getattr(layer, name)[rows].ravel() for name in _COEFFICIENTS})
-
-
-_COEFFICIENTS = ("sigma_a", "sigma_s_prime")
