@@ -12,7 +12,7 @@ from dermis.cli.console import print_json, print_lines, progress
 from dermis.cli.options import Json, Whole
 
 _SHAPE = ("width", "nose", "ears", "jaw", "fullness", "asymmetry")
-_LOOK = ("melanin", "eumelanin", "blood", "oxygen", "freckles", "moles", "oil", "age")
+_LOOK = ("melanin", "eumelanin", "blood", "oxygen", "freckles", "moles", "oil", "age", "stubble")
 
 
 def head(
@@ -33,6 +33,7 @@ def head(
     moles: float | None = None,
     oil: float | None = None,
     age: float | None = None,
+    stubble: float | None = None,
     size: Whole = None,
     layout: Literal["few", "many"] = "few",
     as_json: Json = False,
@@ -84,6 +85,8 @@ def head(
         Oil on the skin, 0 to 1.
     age:
         Depth of the folds, 0 to 1.
+    stubble:
+        Shadow of the hair that was shaved off the head, 0 (bald) to 1.
     size:
         Side of the maps in texels, a power of two from 256 to 4096 [2048].
     layout:

@@ -110,10 +110,10 @@ _MATERIAL = {
 def _paint(recipe: BustRecipe, mesh: Mesh, atlas: Atlas, report: Report) -> Painted:
     """Paint of every texel, (n, n, ...), the empty space filled from beside it."""
     found: dict[str, NDArray[Any]] = {}
-    texel_mm = _texel_mm(atlas)
     for rows in _strips(recipe.size):
         covered = atlas.coverage[rows]
         places = atlas.interpolate(mesh, np.hstack((mesh.positions, mesh.normals)), rows)[covered]
+        texel_mm = 1.0 / np.sqrt(atlas.stretch[rows][covered].astype(np.float64).prod(axis=-1))
         part = paint_skin(places[:, :3], places[:, 3:], recipe.shape, recipe.look, texel_mm)
         for name, values in part._asdict().items():
             shape = (recipe.size, recipe.size, *values.shape[1:])
@@ -125,11 +125,6 @@ def _paint(recipe: BustRecipe, mesh: Mesh, atlas: Atlas, report: Report) -> Pain
 def _strips(size: int) -> Iterator[slice]:
     step = min(_STRIP, size)
     return (slice(top, top + step) for top in range(0, size, step))
-
-
-def _texel_mm(atlas: Atlas) -> float:
-    """Width of a texel on the face, about [mm]."""
-    return float(1.0 / np.median(atlas.stretch[atlas.coverage].astype(np.float64)))
 
 
 def _pictures(painted: Painted, atlas: Atlas) -> dict[str, bytes]:
@@ -177,14 +172,11 @@ def _digest(recipe: BustRecipe) -> str:
 
 @cache
 def _code() -> str:
-    """A digest of the code that makes busts, so that a changed one makes them anew."""
+    """A digest of what makes busts, so that a changed generator makes them anew."""
     assets = Path(__file__).parent.parent
-    makers = (
-        assets,
-        assets / "bust",
-        assets / "skin_maps",
-        assets / "skin_maps" / "compiled",
-        assets / "unwrap",
-    )
-    files = (file for folder in makers for file in sorted(folder.glob("*.py")))
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+    below = ("bust", "skin_maps", "skin_maps/compiled", "unwrap")
+    files = [file for folder in below for kind in ("*.py", "*.csv") for file in (assets / folder).glob(kind)]
+    digest = hashlib.sha256()
+    for file in sorted((*files, assets / "atlas.py", assets / "geometry.py", assets / "gltf_write.py")):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()

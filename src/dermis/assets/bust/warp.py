@@ -48,6 +48,8 @@ class Warp:
     def undo(self, points: Doubles) -> Doubles:
         """The points (n, 3) of the symmetric head that come to lie at these [mm]."""
         back = np.array(points, dtype=np.float64)
+        if not np.any(self.shifts):
+            return back / (self.width, 1, 1)
         for _ in range(_STEPS):
             back = (points - self._shift(back)) / (self.width, 1, 1)
         return back

@@ -17,6 +17,7 @@ _STEP_MM = 0.25
 DEGREES = 2
 """Angle between the columns of `Face.hairline`."""
 _REACH_MM = 52.0
+_UPPER_LID_MM = 0.5  # from the line of the lids to where they meet
 _AMOUNTS = (
     "blood",
     "melanin",
@@ -38,7 +39,7 @@ class Face(NamedTuple):
     zone_centres, zone_radii : (k, 3) of soft zones on the symmetric head [mm]
     zone_amounts : (k, 10) what each zone changes, see the table zones.csv
     lips : (3, m) heights of the upper border, the line and the lower border of the lips [mm]
-    lids : (2, m) heights of the line of the lids and of the fold [mm]
+    lids : (m,) height of the line where the lids meet [mm]
     hairline : (91,) height of the edge of the hair, by the angle from the front [mm]
     step_mm : distance in x between columns of `lips` and `lids`, from 0 [mm]
     """
@@ -62,7 +63,7 @@ def make_face(parameters: BustParameters) -> Face:
     centres, radii, amounts = _zones(parameters)
     return Face(
         warp.width, warp.centres, warp.radii, warp.shifts, centres, radii, amounts,
-        _curves(lips.BORDERS), _curves(eyes.LINES), _hairline(), _STEP_MM,
+        _curves(lips.BORDERS), _curves(eyes.LINES)[0] - _UPPER_LID_MM, _hairline(), _STEP_MM,
     )  # fmt: skip
 
 

@@ -53,7 +53,7 @@ def paint_skin(
     """Colour, relief and gloss of the skin at these places of a bust.
 
     points : (n, 3) on the bust of `parameters` [mm]
-    normals : (n, 3) unit normals of its smooth surface
+    normals : (n, 3) of its smooth surface, of any length
     texel_mm : how far apart places are, one number or (n,): nothing finer than about two is painted [mm]
 
     Each place is painted by itself: their order and number do not matter.
@@ -63,6 +63,7 @@ def paint_skin(
 
     def paint(rows: slice) -> Painted:
         place, normal, texel = (np.array(values[rows], np.float64) for values in (points, normals, texels))
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         return brush.paint(Patch(place, normal, texel, look.seed * _TEXTURES))
 
     starts = range(0, max(len(points), 1), _CHUNK)

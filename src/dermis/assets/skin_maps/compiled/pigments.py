@@ -29,7 +29,7 @@ def spread(patch: Patch, places: Doubles, marks: Doubles, melanin: float, blood:
         red = place[BLOOD] + _RED_PORE * mark[PORE]
         red += _BLOTCHES * fractal_noise(x, y, z, _BLOTCH_BLOB_MM, _BLOTCH_GAIN, texel, seed + 131)
         red += place[LIP] * _lip(x, y, z, place, seed)
-        red += _RED_LIDS * (1.0 - smooth_step(0.3, 2.0, abs(place[LID] + 0.5)))
+        red += _RED_LIDS * (1.0 - smooth_step(0.3, 2.0, place[LID]))
         out[row, 0] = min(melanin * math.exp2(brown), 1.0)
         out[row, 1] = min(blood * math.exp2(red), 1.0)
 

@@ -13,11 +13,13 @@ X, Y, Z = 0, 1, 2  # place on the symmetric head [mm]
 # Sums over the zones, in the order of their table.
 BLOOD, MELANIN, STRENGTH, ROUGHNESS, PORES, FURROWS, FRECKLES, LEVEL, AROUND, HAIR = range(3, 13)
 LIP = 13  # how much the place is red lip [-]
-MOUTH, LID = 14, 15  # height over the lines of the mouth and of the lids [mm]
+MOUTH = 14  # height over the line of the mouth [mm]
+LID = 15  # distance from the line of the closed lids [mm]
 SCALP = 16  # how densely hair grows there [-]
 COLUMNS = 17
 
 _FAR = 99.0
+_INNER_END, _OUTER_END = 18.5, 43.5  # of the line of the lids, in x
 _ROUNDS = 4  # of undoing the warp: each comes at least four times closer
 _WANDER_MM, _WANDER_BLOB_MM = 5.0, 17.0  # of the zones' borders
 
@@ -87,8 +89,9 @@ def _find_lip(x: float, y: float, z: float, face: Face, seed: int, place: Double
 def _find_lid(face: Face, place: Doubles) -> None:
     px, py = abs(place[X]), place[Y]
     place[LID] = _FAR
-    if 17.0 < px < 45.0 and abs(py) < 20.0 and place[Z] > 50.0:
-        place[LID] = py - _read(face.lids[0], px / face.step_mm)
+    if px < 50.0 and abs(py) < 20.0 and place[Z] > 50.0:
+        beyond = max(max(_INNER_END - px, px - _OUTER_END), 0.0)
+        place[LID] = math.hypot(py - _read(face.lids, px / face.step_mm), beyond)
 
 
 @compiled
