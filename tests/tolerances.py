@@ -11,7 +11,19 @@ TWIN = 1e-4
 PUBLISHED = 1e-9
 """Closed forms against tables printed with 16 digits, relative."""
 
-TABLE_ALBEDO = 0.01
+LOBE_TWIN = 1e-5
+"""Surface lobes and their albedos, shader against float64 twin, of the value's scale."""
+
+RECIPROCAL = 1e-6
+"""Change of a lobe when light and view change places, of its largest value."""
+
+QUADRATURE = 0.001
+"""Directional albedos against independent ones, relative; V-cavities have a crease, others are 1e-7."""
+
+FURNACE = 0.01
+"""White skin under light from everywhere alike against 1: what the tables of albedo cost."""
+
+TABLE_ALBEDO = 0.005
 """The shader's 64 x 32 table of the surface albedo, read between its texels, relative."""
 
 TABLE_LOBE = 0.005
@@ -49,3 +61,15 @@ STANDARD_ERRORS = 3.0
 
 CHANCE = 0.0027
 """Probability with which a right program fails one statistical test: that of three standard errors."""
+
+PREFILTERED = 1e-3
+"""Panoramas convolved in harmonics of degree 96 against plain sums over their texels, relative."""
+
+PANORAMA = 1e-3
+"""Panoramas read in a direction, shader against float64 twin, of the scale: acos and atan2 are coarse."""
+
+AREA_LIGHT = 0.01
+"""Irradiance of a light with a size, shaded as a few lights, against its closed form, of the largest."""
+
+OCCLUSION = 0.04
+"""Open share of the sky by 128 directions against closed forms: one direction stands for up to 0.03 of it."""

@@ -6,8 +6,8 @@ import sys
 from pathlib import Path
 
 import accuracy_optics as optics
+import accuracy_specular as specular
 import numpy as np
-from scipy.interpolate import RegularGridInterpolator
 
 from dermis.assets.atlas import build_atlas
 from dermis.assets.geometry import build_mesh
@@ -18,8 +18,6 @@ from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
 from dermis.rendering.maps import upload_atlas
 from dermis.rendering.stages.diffuse import Diffuse
-from dermis.specular.albedo import albedo_table, directional_albedo
-from dermis.specular.beckmann import beckmann, beckmann_table
 
 PAGE = Path(__file__).parent.parent / "docs" / "accuracy.md"
 SIZE = 256
@@ -81,26 +79,9 @@ def constant_light(device: Device) -> float:
     return max(float(np.abs(level[atlas.coverage] - 1).max()) for level in levels)
 
 
-def table_errors() -> tuple[float, float]:
-    """Largest relative errors of the two lookup tables, interpolated, over m 0.1-0.5 and cos 0.05-1."""
-    m, c = np.meshgrid(np.linspace(0.1, 0.5, 23), np.linspace(0.05, 1.0, 61), indexing="ij")
-    places = np.stack([m, c], axis=-1)
-    axes = [(np.arange(n) + 0.5) / n for n in albedo_table().shape]
-    inside = np.minimum(places, [1.0, axes[1][-1]])  # the shader clamps there
-    albedo = RegularGridInterpolator(axes, albedo_table())(inside)
-    exact = directional_albedo(c, m, nodes=(256, 128))
-    rows, columns = beckmann_table().shape
-    axes = [(np.arange(rows) + 0.5) / rows, np.arange(columns) / (columns - 1)]
-    peak = (2 * RegularGridInterpolator(axes, beckmann_table())(places)) ** 10
-    truth = beckmann(c, m)
-    seen = truth > 1e-3  # below that the lobe adds nothing that could be seen
-    return float(np.abs(albedo / exact - 1).max()), float(np.abs(peak[seen] / truth[seen] - 1).max())
-
-
 def main() -> None:
     """Measure and write the page."""
     device = open_device(sys.argv[1] if len(sys.argv) > 1 else "auto")
-    albedo, peak = table_errors()
     text = (PAGE.parent / "accuracy.in.md").read_text(encoding="utf-8")
     rows = "\n".join(point_of_light(device, density) for density in (0.75, 1.0, 1.5, 3.0, 6.0, 12.0))
     leaning = "\n".join(sheared(device, degrees) for degrees in (90, 80, 60, 45))
@@ -110,9 +91,8 @@ def main() -> None:
             rows=rows,
             leaning=leaning,
             constant=f"{constant_light(device):.1e}",
-            albedo=f"{100 * albedo:.2f} %",
-            peak=f"{100 * peak:.1f} %",
             rounding=half_store_rounding(device),
+            **specular.tables(),
             **optics.tables(),
         ),
         encoding="utf-8",

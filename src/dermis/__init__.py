@@ -18,8 +18,17 @@ if TYPE_CHECKING:
     from dermis.optics.tissue import Tissue, load_tissue
     from dermis.rendering.renderer import Renderer, render
     from dermis.scene.camera import Camera, portrait, profile, three_quarter
-    from dermis.scene.files import load_scene
-    from dermis.scene.lights import DirectionalLight, PointLight, SpotLight, studio
+    from dermis.scene.environment import Environment
+    from dermis.scene.files import load_lights, load_scene
+    from dermis.scene.lights import (
+        DirectionalLight,
+        PointLight,
+        RectangleLight,
+        SphereLight,
+        SpotLight,
+        StripeLight,
+        studio,
+    )
     from dermis.scene.model import Scene
     from dermis.scene.settings import Settings
     from dermis.scene.skin import Skin
@@ -38,10 +47,15 @@ _HOME = {
     "portrait": "scene.camera",
     "profile": "scene.camera",
     "three_quarter": "scene.camera",
+    "Environment": "scene.environment",
+    "load_lights": "scene.files",
     "load_scene": "scene.files",
     "DirectionalLight": "scene.lights",
     "PointLight": "scene.lights",
+    "RectangleLight": "scene.lights",
+    "SphereLight": "scene.lights",
     "SpotLight": "scene.lights",
+    "StripeLight": "scene.lights",
     "studio": "scene.lights",
     "Scene": "scene.model",
     "Settings": "scene.settings",
@@ -52,15 +66,20 @@ __all__ = [
     "Camera",
     "DermisError",
     "DirectionalLight",
+    "Environment",
     "Head",
     "PointLight",
+    "RectangleLight",
     "Renderer",
     "Scene",
     "Settings",
     "Skin",
+    "SphereLight",
     "SpotLight",
+    "StripeLight",
     "Tissue",
     "load_head",
+    "load_lights",
     "load_profile",
     "load_scene",
     "load_tissue",

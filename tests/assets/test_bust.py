@@ -55,6 +55,12 @@ def test_it_is_closed_and_of_human_size(head: Head) -> None:
     assert triangle_areas(head.mesh.positions[head.mesh.triangles]).min() > 0.0
 
 
+def test_a_shape_whose_border_once_bridged_itself_is_closed() -> None:
+    mesh = bust_of(BustRecipe(BustParameters(nose=1.2, fullness=-0.8, seed=6), size=256))
+    _, _, sides = edges(mesh.point[mesh.triangles])
+    assert (sides == 2).all()
+
+
 def test_maps_are_there_and_look_like_skin(head: Head) -> None:
     maps = head.maps
     assert maps.colour is not None and maps.height is not None

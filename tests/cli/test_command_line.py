@@ -90,7 +90,7 @@ def test_help_of_the_whole_names_each_command(run: Run) -> None:
         assert len(line.split()) > 5  # with a sentence of what it does
 
 
-@pytest.mark.parametrize("command", ["render", "doctor", "cite"])
+@pytest.mark.parametrize("command", ["render", "compare", "doctor", "cite"])
 def test_help_of_each_command_shows_examples(run: Run, command: str) -> None:
     ended = run(command, "--help")
     assert (ended.code, ended.stderr) == (0, "")
@@ -112,13 +112,23 @@ def test_version(run: Run) -> None:
 def test_cite_prints_the_works_behind_the_technique(run: Run) -> None:
     ended = run("cite")
     assert (ended.code, ended.stderr) == (0, "")
-    assert list(dermis.cite.parse_bibtex(ended.stdout)) == [*TECHNIQUE, "DonnerJensen2005"]
+    assert list(dermis.cite.parse_bibtex(ended.stdout)) == [
+        *TECHNIQUE,
+        "Kelemen2001",
+        "Beckmann1963",
+        "DonnerJensen2005",
+    ]
 
 
 def test_cite_adds_the_works_behind_a_profile(run: Run) -> None:
     keys = list(dermis.cite.parse_bibtex(run("cite", "--profile", "light").stdout))
     assert keys[: len(TECHNIQUE)] == list(TECHNIQUE)
     assert {"DonnerJensen2006", "Kienle1998"} <= set(keys)
+
+
+def test_cite_names_the_surface_model_in_use(run: Run) -> None:
+    keys = list(dermis.cite.parse_bibtex(run("cite", "--specular", "torrance-sparrow-smith").stdout))
+    assert {"TorranceSparrow1967", "Smith1967"} <= set(keys) and "Kelemen2001" not in keys
 
 
 def test_cite_prints_the_works_asked_for(run: Run) -> None:

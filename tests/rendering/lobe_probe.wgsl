@@ -6,7 +6,8 @@
 
 @group(1) @binding(0) var to_light: texture_2d<f32>; // and the roughness
 @group(1) @binding(1) var to_eye: texture_2d<f32>; // and rho_s
-@group(1) @binding(2) var lobe: texture_storage_2d<rgba32float, write>;
+@group(1) @binding(2) var reflected: texture_storage_2d<rgba32float, write>;
+@group(1) @binding(3) var passed: texture_storage_2d<rgba32float, write>;
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -16,10 +17,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let l = textureLoad(to_light, id.xy, 0);
     let v = textureLoad(to_eye, id.xy, 0);
     let up = vec3f(0.0, 0.0, 1.0);
-    textureStore(lobe, id.xy, vec4f(
-        schlick(l.z, skin.f0),
-        beckmann(l.z, l.w),
-        kelemen(up, l.xyz, v.xyz, l.w, skin.f0),
-        passes(l.z, l.w, v.w),
-    ));
+    let slopes = beckmann_by_table(l.z, l.w);
+    textureStore(reflected, id.xy, vec4f(fresnel(l.z), slopes, lobe(up, l.xyz, v.xyz, l.w), 0.0));
+    let shares = vec2f(enters(l.z, l.w, v.w), enters_from_everywhere(l.w, v.w));
+    textureStore(passed, id.xy, vec4f(shares, leaves(v.z, l.w, v.w), 0.0));
 }

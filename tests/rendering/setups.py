@@ -22,6 +22,7 @@ from dermis.rendering.frame import draw_frame
 from dermis.rendering.inputs import Inputs
 from dermis.rendering.renderer import Renderer
 from dermis.rendering.stages import SHARED_SHADERS
+from dermis.rendering.stages.variants import Switches
 from dermis.scene.camera import Camera
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
 from dermis.scene.model import Scene
@@ -71,12 +72,22 @@ def run_frame(renderer: Renderer, scene: Scene, **given: Any) -> Inputs:
     return inputs
 
 
-def probe(device: Device, name: str, size: tuple[int, int], outputs: Sequence[str], **bound: Any) -> Any:
+def probe(
+    device: Device,
+    name: str,
+    size: tuple[int, int],
+    outputs: Sequence[str],
+    switches: Switches = (),
+    **bound: Any,
+) -> Any:
     """Run a test shader of this folder and download its outputs.
+
+    switches : names and values of the shader's `override`s
 
     A keyword whose value is a dict is taken as the members of the shader's struct of that name.
     """
-    program = ComputeProgram(device, Path(__file__).parent / f"{name}.wgsl", (SHARED_SHADERS,))
+    path = Path(__file__).parent / f"{name}.wgsl"
+    program = ComputeProgram(device, path, (SHARED_SHADERS,), dict(switches))
     made = {output: make_texture(device, size, "rgba32float") for output in outputs}
     records = {
         key: program.record(key.title(), **v) if isinstance(v, dict) else v for key, v in bound.items()

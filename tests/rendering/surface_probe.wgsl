@@ -31,6 +31,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let surface = surface_at(point, footprint.side);
     textureStore(relief, id.xy, vec4f(surface.normal, surface.roughness));
     let light = lights.light[0];
-    let l = incident(light, point.position).direction;
+    let l = incident(light, point.position, 0u).direction;
     textureStore(arriving, id.xy, vec4f(visibility(light, point, l), dot(point.normal, l), 0.0, 0.0));
 }

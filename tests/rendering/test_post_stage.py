@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import light_twins
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -9,17 +12,18 @@ from numpy.typing import NDArray
 from dermis.gpu import Device, Frame, download, upload
 from dermis.images.colour import encode_srgb, encode_srgb8
 from dermis.rendering.frame import Stages
+from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float32]
 
 
 def finished(
-    device: Device, stages: Stages, radiance: Floats, exposure: float
+    device: Device, stages: Stages, radiance: Floats, exposure: float, **settings: Any
 ) -> tuple[Floats, NDArray[np.uint8]]:
     picture = stages.post.make_picture((radiance.shape[1], radiance.shape[0]))
     upload(device, picture.radiance, radiance)
     frame = Frame(device)
-    stages.post.draw(frame, picture, exposure)
+    stages.post.draw(frame, picture.radiance, picture, Settings(exposure=exposure, **settings))
     frame.submit()
     return download(device, picture.exposed), download(device, picture.bytes)
 
@@ -61,3 +65,32 @@ def test_ends_of_the_range(device: Device, stages: Stages) -> None:
     radiance = np.array([[[-1.0, 0.0, 1e-8, 1], [1.0, 1.5, 1e30, 1], [3e38, 1e-30, 0.5, 0]]], np.float32)
     _, encoded = finished(device, stages, radiance, 1.0)
     assert encoded[0].tolist() == [[0, 0, 0, 255], [255, 255, 255, 255], [255, 0, 188, 0]]
+
+
+@pytest.mark.parametrize("tone", ["filmic", "neutral"])
+def test_tone_curves_are_the_published_ones(device: Device, stages: Stages, tone: str) -> None:
+    radiance = 6.0 * values(2) ** 2
+    exposed, encoded = finished(device, stages, radiance, 1.5, tone=tone)
+    assert np.array_equal(
+        exposed[..., :3], radiance[..., :3] * np.float32(1.5)
+    )  # the curve is for bytes alone
+    curve = {"filmic": light_twins.filmic, "neutral": light_twins.neutral}[tone]
+    exact = 255 * encode_srgb(np.clip(curve(exposed[..., :3].astype(float)), 0, 1))
+    assert np.abs(encoded[..., :3] - exact).max() < 0.5 + 0.01
+
+
+def test_tone_curves_end_where_they_should(device: Device, stages: Stages) -> None:
+    ends = np.array([[[0, 0, 0, 1], [11.2 / 2, 11.2 / 2, 11.2 / 2, 1], [1e30, 1e30, 1e30, 1]]], np.float32)
+    _, film = finished(device, stages, ends, 1.0, tone="filmic")
+    assert film[0, :, 0].tolist() == [0, 255, 255]
+    _, plain = finished(
+        device, stages, np.float32([[[0.5, 0.3, 0.2, 1], [0.5, 0.3, 0.2, 1]]]), 1.0, tone="neutral"
+    )
+    # the specification keeps colours under 0.8 but for the shift by the reflection of 4 per cent
+    assert np.array_equal(plain[0, 0, :3], encode_srgb8(np.array([0.46, 0.26, 0.16])))
+
+
+def test_wrong_gamma_leaves_the_encoding_out(device: Device, stages: Stages) -> None:
+    radiance = values(3)
+    _, encoded = finished(device, stages, radiance, 1.0, gamma="wrong")
+    assert np.abs(encoded[..., :3] - 255.0 * np.clip(radiance[..., :3], 0, 1)).max() <= 0.5 + 1e-4

@@ -90,7 +90,7 @@ def other(renderer: Renderer) -> Renderer:
 
 
 def fresh(other: Renderer, what: Scene, **settings: Any) -> Image:
-    other._kept.clear()
+    other.forget()
     return drawn(other, what, **settings)
 
 

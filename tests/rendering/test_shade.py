@@ -19,6 +19,7 @@ from dermis.optics.profiles import load_profile
 from dermis.rendering.renderer import Renderer
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
 from dermis.scene.model import Scene
+from dermis.specular.cosines import cosines
 from dermis.specular.kelemen import kelemen
 
 Floats = NDArray[np.float64]
@@ -51,10 +52,10 @@ def closed_form(scene: Scene, colour: Floats | float) -> Floats:
     points, view = seen_points(scene)
     m, rho_s = scene.skin.roughness, scene.skin.rho_s
     below = twins.entering(scene, points, np.broadcast_to(Z, points.shape))
-    radiance = below * colour * twins.passes(view[..., 2], m, rho_s)[..., None] / np.pi
+    radiance = below * colour * twins.leaves(view[..., 2], m, rho_s)[..., None] / np.pi
     for light in scene.lights:
         to_light, arriving = twins.incident(light, scene.head.centre_mm, points)
-        lobe = rho_s * kelemen(Z, np.asarray(to_light), view, m) * np.maximum(to_light[..., 2], 0)
+        lobe = rho_s * kelemen(cosines(Z, np.asarray(to_light), view), m) * np.maximum(to_light[..., 2], 0)
         radiance = radiance + arriving * lobe[..., None]
     return radiance
 
@@ -161,8 +162,8 @@ def test_opaque_material(renderer: Renderer) -> None:
     light = DirectionalLight(direction=(1, 0, -1), irradiance=(2.0, 2.0, 2.0), shadows=False)
     made = image(renderer, scene_of(head, light, camera=front_camera(head, frame_mm=5.0)), atlas=128)
     cosine = np.sqrt(0.5)
-    entered = 2.0 * cosine * twins.passes([cosine], 0.1, 1.0)
-    exact = entered * np.array([0.5, 0.25, 0.125]) / np.pi
+    below = 2.0 * cosine * twins.enters([cosine], 0.1, 1.0) * twins.leaves([1.0], 0.1, 1.0)
+    exact = below * np.array([0.5, 0.25, 0.125]) / np.pi
     assert np.abs(made[..., :3] - exact).max() < 10 * TWIN * exact.max()
 
 

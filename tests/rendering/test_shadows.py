@@ -14,7 +14,7 @@ from tolerances import LIT
 from dermis.assets.cache import cached_atlas
 from dermis.assets.head import Head
 from dermis.assets.primitives import plane, uv_sphere
-from dermis.rendering.inputs import light_views
+from dermis.rendering.lights import light_views
 from dermis.rendering.renderer import Renderer
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
 

@@ -13,6 +13,8 @@ from dermis.rendering.kernels import ROWS_PER_UNIT, TRUNCATION, WIDEST, kernel_t
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
 from dermis.scene.model import Scene
 from dermis.specular.albedo import albedo_table
+from dermis.specular.beckmann import beckmann_table
+from dermis.specular.energy import ENERGY
 
 Floats = NDArray[np.float64]
 SMOOTH = 1.6
@@ -74,14 +76,32 @@ def gaussian_sum(profile: GaussianSum, first: int, r2_mm2: Floats) -> Floats:
     return total
 
 
-def passes(cosine: ArrayLike, m: float, rho_s: float) -> Floats:
-    """Share of light that passes the surface, by the shader's table."""
-    table = albedo_table().astype(np.float64)
-    c = np.clip(np.asarray(cosine, float), 0, None)
-    rows, columns = table.shape
-    where = [np.full(c.shape, m * rows - 0.5), c * columns - 0.5]
-    read = map_coordinates(table, where, order=1, mode="nearest")
-    return np.asarray(np.maximum(0.0, 1.0 - rho_s * read))
+def surface_albedo(
+    cosine: ArrayLike, m: float, model: str = "kelemen", fresnel: str = "schlick"
+) -> tuple[Floats, Floats]:
+    """Directional albedo of the surface and its mean, by the shader's table."""
+    table = albedo_table(model, fresnel).astype(np.float64)
+    column = np.sqrt(np.clip(np.asarray(cosine, float), 0, None)) * (table.shape[1] - 1)
+    where = [np.full(column.shape, (np.sqrt(m) - 0.2) / 0.8 * (len(table) - 1)), column]
+    albedo, mean = (map_coordinates(table[..., k], where, order=1, mode="nearest") for k in (0, 1))
+    return albedo, mean
+
+
+def enters(cosine: ArrayLike, m: float, rho_s: float) -> Floats:
+    """Share of light from a direction that enters the skin."""
+    return ENERGY["full"].enters(surface_albedo(cosine, m)[0], rho_s)
+
+
+def leaves(cosine: ArrayLike, m: float, rho_s: float) -> Floats:
+    """What leaves in a direction, of light that would leave evenly."""
+    return ENERGY["full"].leaves(*surface_albedo(cosine, m), rho_s)
+
+
+def beckmann_by_table(cos_h: Floats, m: float) -> Floats:
+    """Beckmann's distribution by the shader's table."""
+    table = beckmann_table().astype(np.float64)
+    where = [np.full(cos_h.shape, m * len(table) - 0.5), cos_h * (len(table) - 1)]
+    return np.asarray((2.0 * map_coordinates(table, where, order=1, mode="nearest")) ** 10)
 
 
 def incident(
@@ -111,7 +131,7 @@ def entering(scene: Scene, points: Floats, normals: Floats) -> Floats:
     for light in scene.lights:
         to_light, arriving = incident(light, scene.head.centre_mm, points)
         cosine = np.maximum((to_light * normals).sum(-1), 0.0)
-        share = cosine * passes(cosine, scene.skin.roughness, scene.skin.rho_s)
+        share = cosine * enters(cosine, scene.skin.roughness, scene.skin.rho_s)
         total += arriving * share[..., None]
     return total
 

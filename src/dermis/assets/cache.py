@@ -1,4 +1,4 @@
-"""Atlases on disk, by the content of the mesh they were made for."""
+"""Atlases and occlusion on disk, by the content of the mesh they were made for."""
 
 from __future__ import annotations
 
@@ -6,32 +6,60 @@ import contextlib
 import hashlib
 import os
 import zipfile
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.assets.atlas import GUTTER, Atlas, build_atlas
 from dermis.assets.folders import cache_folder
 from dermis.assets.mesh import Mesh
 
+Array = NDArray[Any]
+Arrays = dict[str, Array]
 _FORM = 2  # raise when `build_atlas` gives other results for the same mesh
 _MOST_BYTES = 2 << 30
 
 
 def cached_atlas(mesh: Mesh, size: int) -> Atlas:
     """`build_atlas`, read back from disk when it was made before; the disk may fail without harm."""
-    path = cache_folder() / "atlas" / f"{_key(mesh, size)}.npz"
+    names = [field.name for field in fields(Atlas)]
+
+    def make() -> Arrays:
+        atlas = build_atlas(mesh, size)
+        return {name: getattr(atlas, name) for name in names}
+
+    return Atlas(**_kept("atlas", _key(mesh, size), names, make))
+
+
+def cached_occlusion(mesh: Mesh, size: int, form: str, bake: Callable[[], Array]) -> Array:
+    """What `bake` returns for a mesh and the size of its atlas, kept on disk in the same way.
+
+    form : everything else that the result depends on
+    """
+    digest = hashlib.sha256(f"{_key(mesh, size)} {form}".encode())
+    for array in (mesh.positions, mesh.normals):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    made = _kept("occlusion", digest.hexdigest()[:40], ["open"], lambda: {"open": bake()})
+    return made["open"]
+
+
+def _kept(folder: str, key: str, names: list[str], make: Callable[[], Arrays]) -> Arrays:
+    """The arrays `names` from the file of that key, or made and stored."""
+    path = cache_folder() / folder / f"{key}.npz"
     with contextlib.suppress(OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         with path.open("rb") as file, np.load(file) as stored:
-            atlas = Atlas(**{field.name: stored[field.name] for field in fields(Atlas)})
+            arrays = {name: stored[name] for name in names}
         path.touch()
-        return atlas
-    atlas = build_atlas(mesh, size)
+        return arrays
+    arrays = make()
     with contextlib.suppress(OSError):
-        _store(path, atlas)
+        _store(path, arrays)
         _prune(path.parent)
-    return atlas
+    return arrays
 
 
 def _key(mesh: Mesh, size: int) -> str:
@@ -42,19 +70,19 @@ def _key(mesh: Mesh, size: int) -> str:
     return digest.hexdigest()[:40]
 
 
-def _store(path: Path, atlas: Atlas) -> None:
+def _store(path: Path, arrays: Arrays) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_suffix(f".{os.getpid()}.part")
     try:
         with unfinished.open("wb") as file:
-            np.savez(file, **{field.name: getattr(atlas, field.name) for field in fields(Atlas)})
+            np.savez(file, **arrays)  # type: ignore[arg-type]  # its last parameter is no array
         unfinished.replace(path)
     finally:
         unfinished.unlink(missing_ok=True)
 
 
 def _prune(folder: Path) -> None:
-    """Forget the atlases used longest ago while the folder holds more than its share."""
+    """Forget the files used longest ago while the folder holds more than its share."""
     stored = sorted(folder.glob("*.npz"), key=lambda p: p.stat().st_mtime, reverse=True)
     total = 0
     for path in stored:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dermis.cli.console import print_lines
+from dermis.specular.names import ModelName
 
 
-def cite(*keys: str, profile: str | None = None) -> int:
-    """Print BibTeX entries: of the given keys, or of the technique and a profile.
+def cite(*keys: str, profile: str | None = None, specular: ModelName | None = None) -> int:
+    """Print BibTeX entries: of the given keys, or of the technique, a surface model and a profile.
 
     For example:
 
         dermis cite
 
-        dermis cite --profile dj3
+        dermis cite --profile dj3 --specular two-lobe
 
         dermis cite Kelemen2001 DonnerJensen2005
 
@@ -22,10 +23,14 @@ def cite(*keys: str, profile: str | None = None) -> int:
         Author-year keys as they stand in the documentation.
     profile:
         A diffusion profile whose sources are wanted too, as render takes it [gpu-gems-3].
+    specular:
+        A surface model whose sources are wanted too [kelemen].
     """
     from dermis.cite import bibtex
+    from dermis.specular.models import MODELS
 
-    wanted = keys or (*TECHNIQUE, *_sources(profile or "gpu-gems-3"))
+    surface = MODELS[specular or "kelemen"].sources
+    wanted = keys or (*TECHNIQUE, *surface, *_sources(profile or "gpu-gems-3"))
     print_lines(bibtex(wanted))
     return 0
 
@@ -39,4 +44,4 @@ def _sources(profile: str) -> tuple[str, ...]:
     return load_tissue(profile).profile().sources
 
 
-TECHNIQUE = ("dEonLuebke2007", "Dudash2007", "Kelemen2001", "Schlick1994", "Beckmann1963", "OlanoBaker2010")
+TECHNIQUE = ("dEonLuebke2007", "Dudash2007", "Schlick1994", "OlanoBaker2010")

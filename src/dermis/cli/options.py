@@ -23,10 +23,11 @@ Json = Annotated[bool, Parameter(name="--json", negative="")]
 Whole = Annotated[int | None, Parameter(converter=_whole)]
 
 
-def check(kind: type[Plain], given: Mapping[str, Any]) -> None:
+def check(kind: type[Plain], given: Mapping[str, Any], names: Mapping[str, str] | None = None) -> None:
     """Refuse values that no field of `kind` can have, under the names of their options.
 
     given : values by field
+    names : options by field, where they differ
     """
     from dermis.scene.plain import ImpossibleError
 
@@ -34,7 +35,8 @@ def check(kind: type[Plain], given: Mapping[str, Any]) -> None:
         kind(**given)
     except ImpossibleError as error:
         place, finding = next(iter(error.findings.items()))
-        option = place.partition(".")[0].replace("_", "-") or "size"
+        field = place.partition(".")[0]
+        option = (names or {}).get(field, field).replace("_", "-") or "size"
         raise DermisError(f"--{option}: {finding}. Correct it.") from None
 
 

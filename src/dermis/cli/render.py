@@ -9,20 +9,17 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from dermis.cli.console import note, print_json, print_lines, working_on
-from dermis.cli.options import Json, Whole, check, parse_colour, parse_size
-from dermis.errors import refuse
+from dermis.cli.options import Json, Whole, parse_colour, parse_size
+from dermis.cli.render_scene import assemble
+from dermis.specular.names import EnergyName, FresnelName, SpecularName
 
 _MOST_UNSCATTERED = 0.05  # closed eyes and other collapsed charts of real scans stay under it
-_MAP_OPTIONS = ("colour", "normal", "height", "height_mm", "specular", "roughness_map")
-_HEAD_OPTIONS = (*_MAP_OPTIONS, "unit_mm", "v_origin", "up", "normal_y", "opaque", "subdivide")
-_SKIN_OPTIONS = ("profile", "albedo", "mix", "roughness", "rho_s")
-_SETTINGS = ("size", "atlas", "samples", "technique", "exposure", "background")
 
 Output = Annotated[Path, Parameter(name=("--output", "-o"))]
 
 
 def render(
-    head: str,
+    head: str = "bust",
     /,
     *,
     output: Output = Path("dermis.png"),
@@ -35,15 +32,28 @@ def render(
     mix: float | None = None,
     roughness: float | None = None,
     rho_s: float | None = None,
+    oiliness: float | None = None,
+    regions: str | None = None,
+    specular: SpecularName | None = None,
+    fresnel: FresnelName | None = None,
+    specular_colour: Literal["white", "wrong"] | None = None,
+    energy: EnergyName | None = None,
     lights: str | None = None,
+    env: str | None = None,
+    env_rotation: float | None = None,
+    env_exposure: float | None = None,
+    occlusion: Literal["baked", "none"] | None = None,
     camera: str | None = None,
     exposure: float | None = None,
+    bloom: float | None = None,
+    tone: Literal["none", "filmic", "neutral"] | None = None,
+    gamma: Literal["right", "wrong"] | None = None,
     background: str | None = None,
     colour: Path | None = None,
     normal: Path | None = None,
     height: Path | None = None,
     height_mm: float | None = None,
-    specular: Path | None = None,
+    specular_map: Path | None = None,
     roughness_map: Path | None = None,
     unit_mm: float | None = None,
     v_origin: Literal["auto", "top", "bottom"] | None = None,
@@ -58,7 +68,7 @@ def render(
 
     Examples:
 
-        dermis render lee_perry_smith -o face.png
+        dermis render -o face.png
 
         dermis render lee_perry_smith --camera cheek --technique none -o dry.exr
 
@@ -69,7 +79,8 @@ def render(
     Parameters
     ----------
     head:
-        A sample (lee_perry_smith), a mesh (.glb .gltf .obj .ply) or a scene (.toml).
+        bust, the head that the package makes [the default], a sample (lee_perry_smith), a mesh (.glb .gltf .obj
+        .ply) or a scene (.toml).
     output:
         Image to write: .png (sRGB, 8 bit) or .exr (linear Rec. 709, float).
     size:
@@ -90,12 +101,39 @@ def render(
         Beckmann roughness m of the surface [0.3]; a roughness map replaces it.
     rho_s:
         Strength of the surface reflection [0.18].
+    oiliness:
+        One dial over both, 0 to 1 for shiny skin; an artist's mapping [0].
+    regions:
+        Roughness and strength by region of the face: default (an artist's values), or a TOML file.
+    specular:
+        Model of the surface reflection; none leaves it out [kelemen].
+    fresnel:
+        schlick, or the exact curve of index 1.4 [schlick].
+    specular_colour:
+        white; wrong tints the reflection by the colour map, for comparison.
+    energy:
+        What is reflected does not enter: full; published overstates that as the deck does; none [full].
     lights:
-        studio, or a TOML file with [[lights]].
+        A rig (studio, window, top, rim, rembrandt, laser, none) or a TOML file with [[lights]]; studio unless
+        --env is given.
+    env:
+        Light from all around: royal_esplanade, lebombo, uniform, or a latitude-longitude .hdr or .exr file.
+    env_rotation:
+        Turn of the environment about the upward axis [degrees].
+    env_exposure:
+        Factor of the environment's light [1].
+    occlusion:
+        baked dims the environment's light where the head is in its way; none does not.
     camera:
         portrait, three-quarter, profile, cheek, or a TOML file with [camera].
     exposure:
         Factor from radiance to the image [1].
+    bloom:
+        Share of the light that the lens scatters around, 0 to 1 [0].
+    tone:
+        Curve before the encoding of a PNG: none, filmic, or the Khronos group's neutral [none].
+    gamma:
+        right; wrong takes the colour map for linear and leaves sRGB out, for comparison only.
     background:
         Linear red,green,blue [0,0,0].
     colour:
@@ -106,7 +144,7 @@ def render(
         Height map; needs --height-mm.
     height_mm:
         Relief of one grey level of an 8-bit height map [mm].
-    specular:
+    specular_map:
         Map of the surface reflection's strength, scaled to a mean of --rho-s.
     roughness_map:
         Map of the roughness m, 0 to 1.
@@ -135,7 +173,7 @@ def render(
     given |= {"size": parse_size(size)} if size is not None else {}
     given |= {"background": parse_colour(background)} if background is not None else {}
     with working_on("loading"):
-        scene, settings = _scene(head, given)
+        scene, settings = assemble(head, given)
     return _draw_and_report(scene, settings, output, adapter, as_json, started)
 
 
@@ -155,6 +193,7 @@ def _draw_and_report(
         share = f"{rendered.unscattered:.0%} of the skin's triangles"
         why = "their uv is collapsed, mirrored onto other skin, or thinner than a texel of the atlas"
         note(f"note: {share} are lit without scattering: {why}")
+    _note_light(scene, settings, rendered.suns)
     if output.suffix.lower() == ".png":
         write_png(output, rendered.srgb8())
     else:
@@ -177,36 +216,15 @@ def _draw_and_report(
     return 0
 
 
+def _note_light(scene: Any, settings: Any, suns: int) -> None:
+    if suns:
+        one, name = suns == 1, scene.environment.name
+        peaks = "a sun-like peak" if one else f"{suns} sun-like peaks"
+        shine = "shines as a light" if one else "shine as lights"
+        note(f"note: {peaks} of {name} {shine} with shadows, the rest from all around")
+    if settings.gamma == "wrong":
+        note("note: --gamma wrong shades encoded colours, which is a mistake: for comparison only")
+
+
 def _thanks(attribution: str) -> list[str]:
     return [attribution] if attribution else []
-
-
-def _scene(head: str, given: dict[str, Any]) -> tuple[Any, Any]:
-    """The scene and its settings: the head's, or the file's, with the options given on top."""
-    from dermis.assets.head import load_head
-    from dermis.optics.profiles import load_profile
-    from dermis.scene import Scene, Settings, Skin, load_camera, load_lights, load_scene
-
-    own = {name: given[name] for name in _HEAD_OPTIONS if name in given}
-    skin = {name: given[name] for name in _SKIN_OPTIONS if name in given}
-    chosen = {name: given[name] for name in _SETTINGS if name in given}
-    check(Skin, skin)  # before the head is loaded
-    check(Settings, chosen)
-    if "profile" in skin:
-        load_profile(skin["profile"])
-    if Path(head).suffix.lower() == ".toml":
-        if own:
-            option = "--" + next(iter(own)).replace("_", "-")
-            refuse(option, "no such option with a scene file", "it came", "Write it into the file's [head]")
-        scene, settings = load_scene(Path(head))
-    else:
-        if "roughness_map" in own:
-            own["roughness"] = own.pop("roughness_map")
-        scene, settings = Scene(load_head(head, **own)), Settings()
-    body = scene.head
-    return Scene(
-        body,
-        lights=load_lights(given["lights"]) if "lights" in given else scene.lights,
-        camera=load_camera(given["camera"], body) if "camera" in given else scene.camera,
-        skin=Skin(**(scene.skin.model_dump() | skin)),
-    ), Settings(**(settings.model_dump() | chosen))

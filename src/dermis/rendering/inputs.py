@@ -13,23 +13,22 @@ from dermis.errors import refuse
 from dermis.gpu import ComputeProgram
 from dermis.optics.gaussians import GaussianSum
 from dermis.rendering.maps import HeadTextures
-from dermis.rendering.projection import Matrix, ShadowView, depth_range, frame_of, perspective, shadow_view
+from dermis.rendering.projection import Matrix, depth_range, frame_of, perspective
 from dermis.rendering.samples import pixel_samples
+from dermis.rendering.stages.bloom import Glow
 from dermis.rendering.stages.diffuse import Levels
 from dermis.rendering.stages.nearest import Layers
 from dermis.rendering.stages.post import Picture
+from dermis.rendering.stages.variants import Switches
 from dermis.rendering.stages.shadows import ShadowMaps
 from dermis.scene.camera import Camera
-from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
-from dermis.specular.fresnel import SKIN_F0
 
 Floats = NDArray[np.float64]
 # A Gaussian narrower than this is finer than texels and pores: it is lit again, not blurred.
 _RELIT_MM2 = 0.1**2
 _MOST_MATERIALS = 64
-_WIDEST_SHADOW_FILTER = 6
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,10 @@ class Inputs:
     light_clips, shadow_key : a matrix for each shadow map, and what the maps would show
     scatters : whether light spreads below the surface
     blurred_mm2, level_weight, scattered : variances and weights of the blurred levels; texture of their sum
-    view : record of the shading pass
+    view, switches : record of the shading pass, and the values of its `override`s
+    light_switches : those of the irradiance pass
+    suns : lights that the environment adds
+    glow : space for the bloom, None without one
     """
 
     head: HeadTextures
@@ -57,8 +59,12 @@ class Inputs:
     seen: Layers
     camera_clips: list[Matrix]
     view: Any
+    switches: Switches
+    light_switches: Switches
+    suns: int
     picture: Picture
-    exposure: float
+    glow: Glow | None
+    settings: Settings
 
 
 @dataclass(frozen=True)
@@ -127,75 +133,6 @@ def view_record(shade: ComputeProgram, scene: Scene, settings: Settings, split: 
         material_colour=colours,
         jitter=jitter,
     )
-
-
-def skin_record(program: ComputeProgram, scene: Scene, head: HeadTextures) -> Any:
-    """The skin's parameters; a roughness map replaces the constant."""
-    skin = scene.skin
-    return program.record(
-        "Skin",
-        roughness=1.0 if scene.head.maps.roughness is not None else skin.roughness,
-        rho_s=skin.rho_s,
-        f0=SKIN_F0,
-        mix=skin.mix,
-        relief_band=head.relief_band,
-        light_count=len(scene.lights),
-    )
-
-
-def light_views(scene: Scene, size: int) -> list[ShadowView | None]:
-    """How each light sees the head; None for one without shadows."""
-    centre = np.array(scene.head.centre_mm)
-    return [
-        shadow_view(light, centre, scene.head.mesh, size, f"light {index + 1}") if light.shadows else None
-        for index, light in enumerate(scene.lights)
-    ]
-
-
-def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView | None]) -> Any:
-    """The shader's array of lights.
-
-    Raises DermisError for more lights than it holds.
-    """
-    centre = np.array(scene.head.centre_mm)
-    record = program.record("Lights")
-    if len(views) > len(record["light"]):
-        refuse("lights", f"at most {len(record['light'])}", f"there are {len(views)}", "Leave some out")
-    layer = 0
-    for index, (light, view) in enumerate(zip(scene.lights, views, strict=True)):
-        record["light"][index] = _light_record(program, light, centre, view, layer if view else -1)
-        layer += view is not None
-    return record
-
-
-def _light_record(
-    program: ComputeProgram,
-    light: PointLight | SpotLight | DirectionalLight,
-    centre: Floats,
-    view: ShadowView | None,
-    layer: int,
-) -> Any:
-    record = program.record("Light", irradiance=light.irradiance, layer=layer, reference_mm=1.0)
-    texel = view.texel if view else 1.0
-    if isinstance(light, DirectionalLight):
-        record["kind"], distance = 2, 1.0
-        record["direction"] = np.array(light.direction) / np.linalg.norm(light.direction)
-    else:
-        path = np.subtract(light.target, light.position)
-        distance = float(np.linalg.norm(path))
-        record["kind"] = 1 if isinstance(light, SpotLight) else 0
-        record["position"], record["direction"] = np.array(light.position) + centre, path / distance
-        record["reference_mm"] = distance
-    if isinstance(light, SpotLight):
-        record["cos_inner"] = np.cos(np.radians(light.inner_degrees))
-        record["cos_outer"] = np.cos(np.radians(light.outer_degrees))
-    if view:
-        record["to_map"], record["texel"] = view.clip.T, texel
-    # A tent of half width h fades over 2 h texels.
-    record["half_width"] = np.clip(
-        round(0.5 * light.softness_mm / (texel * distance)), 1, _WIDEST_SHADOW_FILTER
-    )
-    return record
 
 
 def _pinhole(camera: Camera, head: Head, settings: Settings) -> tuple[Floats, Any, tuple[float, float]]:

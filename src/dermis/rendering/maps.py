@@ -14,8 +14,8 @@ from dermis.assets.maps import Maps
 from dermis.assets.mesh import Mesh
 from dermis.gpu import Device, make_texture, upload
 from dermis.gpu.textures import texture_from
+from dermis.images.colour import encode_srgb
 from dermis.images.filters import derivatives, mip_chain
-from dermis.specular.albedo import albedo_table
 from dermis.specular.beckmann import beckmann_table
 
 _TRIANGLES_PER_ROW = 2048  # the shaders take it from the texture's width
@@ -39,14 +39,18 @@ class HeadTextures:
     unscattered: float
 
 
-def upload_head(device: Device, head: Head, atlas: Atlas, use_colour: bool) -> HeadTextures:
+def upload_head(
+    device: Device, head: Head, atlas: Atlas, use_colour: bool, decoded: bool = True
+) -> HeadTextures:
     """All textures of a head except its atlas.
 
     use_colour : False leaves the colour map white, for profiles that carry the colour
+    decoded : False takes the colour map's sRGB for linear, which is wrong
     """
     mesh, maps = head.mesh, head.maps
     white = np.ones((1, 1, 3), np.float32)
     colour = maps.colour if use_colour and maps.colour is not None else white * (0.8 if use_colour else 1.0)
+    colour = colour if decoded else encode_srgb(colour)
     resources = {
         "triangle_table": texture_from(device, _triangle_table(mesh, atlas.mapped), "rgba32uint"),
         "vertex_table": texture_from(device, _vertex_table(mesh), "rgba32float"),
@@ -59,7 +63,6 @@ def upload_head(device: Device, head: Head, atlas: Atlas, use_colour: bool) -> H
         "specular_map": _mipped(device, _factor(maps.specular, atlas), "r16float"),
         "roughness_map": _mipped(device, _plain(maps.roughness), "r16float"),
         "beckmann_table": texture_from(device, beckmann_table(), "r32float"),
-        "albedo_table": texture_from(device, albedo_table(), "r32float"),
     }
     return HeadTextures(resources, _relief_band(maps), len(mesh.triangles), atlas.unscattered(mesh))
 

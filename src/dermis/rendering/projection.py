@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dermis.assets.mesh import Mesh
 from dermis.errors import refuse
-from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
+from dermis.scene.lights import DirectionalLight, Light
 
 Vec = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -21,11 +21,19 @@ class ShadowView:
     """How a light sees the head.
 
     clip : (4, 4) world to clip space
-    texel : side of a texel of its map [mm]; for point and spot lights per mm of distance
+    texel : side of a texel of its map [mm]; for all but parallel light per mm of distance
+    origin : the eye, in parallel light a point in the map's middle [mm]
+    right, up : axes of its map, unit vectors
+    near, far : depths at which the map holds 1 and 0 [mm]
     """
 
     clip: Matrix
     texel: float
+    origin: Vec
+    right: Vec
+    up: Vec
+    near: float
+    far: float
 
 
 def frame_of(forward: Vec, up: Vec) -> tuple[Vec, Vec, Vec]:
@@ -60,15 +68,13 @@ def depth_range(mesh: Mesh, eye: Vec, forward: Vec) -> tuple[float, float]:
     return max(near - 1.0, 0.5, 1e-3 * far), max(far + 1.0, 2.0)
 
 
-def shadow_view(
-    light: PointLight | SpotLight | DirectionalLight, centre: Vec, mesh: Mesh, size: int, culprit: str
-) -> ShadowView:
+def shadow_view(light: Light, centre: Vec, mesh: Mesh, size: int, culprit: str) -> ShadowView:
     """The tightest map of `size` texels from the light around the whole mesh.
 
     Raises DermisError when a point light stands inside the mesh's bounds: one map cannot look all around.
     """
     if isinstance(light, DirectionalLight):
-        return _parallel(np.array(light.direction), mesh, size)
+        return parallel_view(np.array(light.direction), mesh, size)
     eye = np.array(light.position) + centre
     points = mesh.positions.astype(np.float64)
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
@@ -82,10 +88,12 @@ def shadow_view(
         )
     half = 1.02 * max(float(np.abs(x / z).max()), float(np.abs(y / z).max()))
     near, far = 0.98 * float(z.min()), 1.02 * float(z.max())
-    return ShadowView(perspective(eye, axes, (half, half), near, far), 2.0 * half / size)
+    clip = perspective(eye, axes, (half, half), near, far)
+    return ShadowView(clip, 2.0 * half / size, eye, axes[0], axes[1], near, far)
 
 
-def _parallel(direction: Vec, mesh: Mesh, size: int) -> ShadowView:
+def parallel_view(direction: Vec, mesh: Mesh, size: int) -> ShadowView:
+    """The tightest map of `size` texels around the whole mesh in parallel light."""
     points = mesh.positions.astype(np.float64)
     axes = frame_of(direction, np.array([0.0, 1.0, 0.0]))
     local = points @ np.stack(axes, axis=1)
@@ -96,7 +104,8 @@ def _parallel(direction: Vec, mesh: Mesh, size: int) -> ShadowView:
     clip[2, :3] = -axes[2] / (high[2] - low[2])
     clip[0, 3], clip[1, 3] = -0.5 * (low[0] + high[0]) / half, -0.5 * (low[1] + high[1]) / half
     clip[2, 3] = high[2] / (high[2] - low[2])
-    return ShadowView(clip, 2.0 * half / size)
+    middle = 0.5 * (low[0] + high[0]) * axes[0] + 0.5 * (low[1] + high[1]) * axes[1]
+    return ShadowView(clip, 2.0 * half / size, middle, axes[0], axes[1], float(low[2]), float(high[2]))
 
 
 def _view(eye: Vec, axes: tuple[Vec, Vec, Vec]) -> Matrix:

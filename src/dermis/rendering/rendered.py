@@ -22,6 +22,7 @@ class Rendered:
     setup_ms : what was made for this scene before: loading to the device, atlas, shaders [ms]
     gaussians : levels of the profile
     unscattered : share of the skin's triangles that the atlas cannot hold; they are lit directly
+    suns : sun-like peaks of the environment that shine as lights of their own
     """
 
     device: Device
@@ -31,14 +32,15 @@ class Rendered:
     setup_ms: float
     gaussians: int
     unscattered: float
+    suns: int
     is_current: Callable[[], bool]
 
     def linear(self) -> NDArray[np.float32]:
-        """(h, w, 3) linear Rec. 709 after exposure, float32."""
+        """(h, w, 3) linear Rec. 709 after bloom and exposure, float32."""
         return np.ascontiguousarray(self._read(self.picture.exposed)[..., :3])
 
     def srgb8(self) -> NDArray[np.uint8]:
-        """(h, w, 3) sRGB bytes, encoded on the device."""
+        """(h, w, 3) sRGB bytes, with the tone curve, encoded on the device."""
         return np.ascontiguousarray(self._read(self.picture.bytes)[..., :3])
 
     def _read(self, texture: Any) -> NDArray[Any]:

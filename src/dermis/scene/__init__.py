@@ -1,8 +1,18 @@
 """What is to be seen, as plain data without a GPU."""
 
 from dermis.scene.camera import Camera, portrait, profile, three_quarter
+from dermis.scene.environment import Environment
 from dermis.scene.files import load_camera, load_lights, load_scene
-from dermis.scene.lights import DirectionalLight, PointLight, SpotLight, studio
+from dermis.scene.lights import (
+    DirectionalLight,
+    Light,
+    PointLight,
+    RectangleLight,
+    SphereLight,
+    SpotLight,
+    StripeLight,
+    studio,
+)
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
@@ -10,11 +20,16 @@ from dermis.scene.skin import Skin
 __all__ = [
     "Camera",
     "DirectionalLight",
+    "Environment",
+    "Light",
     "PointLight",
+    "RectangleLight",
     "Scene",
     "Settings",
     "Skin",
+    "SphereLight",
     "SpotLight",
+    "StripeLight",
     "load_camera",
     "load_lights",
     "load_scene",

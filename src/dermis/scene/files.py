@@ -12,15 +12,33 @@ from pydantic import Field
 from dermis.assets.head import Head, load_head
 from dermis.errors import refuse
 from dermis.scene.camera import PRESETS, Camera, preset
-from dermis.scene.lights import DirectionalLight, Light, PointLight, SpotLight
+from dermis.scene.environment import Environment
+from dermis.scene.lights import (
+    DirectionalLight,
+    Light,
+    PointLight,
+    RectangleLight,
+    SphereLight,
+    SpotLight,
+    StripeLight,
+)
 from dermis.scene.model import Scene
 from dermis.scene.plain import ImpossibleError, Plain
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 
 P = TypeVar("P", bound=Plain)
-_KINDS: dict[str, type[Light]] = {"point": PointLight, "spot": SpotLight, "directional": DirectionalLight}
-_PARTS = {"head", "skin", "lights", "camera", "render"}
+_KINDS: dict[str, type[Light]] = {
+    "point": PointLight,
+    "spot": SpotLight,
+    "rectangle": RectangleLight,
+    "sphere": SphereLight,
+    "directional": DirectionalLight,
+    "stripe": StripeLight,
+}
+NO_LIGHTS = "none"
+"""Name of the rig without lights, for an environment alone."""
+_PARTS = {"head", "skin", "lights", "environment", "camera", "render"}
 _MAPS = ("colour", "normal", "height", "specular", "roughness")
 _Length = Annotated[float | None, Field(gt=0, allow_inf_nan=False)]
 
@@ -50,8 +68,10 @@ def preset_lights(name: str) -> tuple[Light, ...]:
 
 
 def load_lights(name: str) -> tuple[Light, ...]:
-    """The lights of a preset ("studio") or of a TOML file with [[lights]] tables."""
-    known = _light_presets()
+    """The lights of a preset ("studio", "window", ...) or of a TOML file with [[lights]] tables."""
+    known = light_presets()
+    if name == NO_LIGHTS:
+        return ()
     if name in known:
         return preset_lights(name)
     return _lights(name, _read(Path(name), f"a preset ({', '.join(known)}) or a TOML file").get("lights"))
@@ -69,7 +89,8 @@ def load_scene(path: Path) -> tuple[Scene, Settings]:
     """Scene and settings of a TOML file; what it leaves out keeps its default.
 
     Tables: [head] (file or sample under `name`, and the options of `load_head`), [skin], [[lights]] or
-    lights = "preset", [camera] or camera = "preset", [render]. File names are relative to the scene's folder.
+    lights = "preset", [environment], [camera] or camera = "preset", [render]. File names are relative to the
+    scene's folder. With an environment there are no other lights unless the file names some.
     """
     table = _read(path, "a scene in TOML")
     for part in table.keys() - _PARTS:
@@ -77,10 +98,14 @@ def load_scene(path: Path) -> tuple[Scene, Settings]:
     skin = _made(Skin, path, "skin", table.get("skin", {}))
     settings = _made(Settings, path, "render", table.get("render", {}))
     head = _head(path, _made(_HeadTable, path, "head", table.get("head")))
-    lights, camera = table.get("lights", "studio"), table.get("camera", "portrait")
+    environment = _environment(path, table["environment"]) if "environment" in table else None
+    lights, camera = table.get("lights"), table.get("camera", "portrait")
+    if lights is None:
+        lights = "studio" if environment is None else NO_LIGHTS
     return Scene(
         head,
         lights=load_lights(_beside(path, lights)) if isinstance(lights, str) else _lights(path, lights),
+        environment=environment,
         camera=load_camera(_beside(path, camera), head)
         if isinstance(camera, str)
         else _made(Camera, path, "camera", camera),
@@ -94,15 +119,21 @@ def _head(path: Path, table: _HeadTable) -> Head:
     return load_head(_beside(path, table.name), **options)
 
 
+def _environment(path: Path, table: Any) -> Environment:
+    environment = _made(Environment, path, "environment", table)
+    return environment.model_copy(update={"name": _beside(path, environment.name)})
+
+
 def _beside(path: Path, name: str) -> str:
     """The file of that name in the scene's folder if there is one, else the name, of a preset mostly."""
     file = path.parent / name
     return str(file) if file.is_file() else name
 
 
-def _light_presets() -> list[str]:
+def light_presets() -> list[str]:
+    """Names of the rigs of the package."""
     names = [entry.name for entry in (resources.files("dermis.scene") / "presets").iterdir()]
-    return sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml"))
+    return sorted([NO_LIGHTS, *(name.removesuffix(".toml") for name in names if name.endswith(".toml"))])
 
 
 def _lights(culprit: object, tables: Any) -> tuple[Light, ...]:

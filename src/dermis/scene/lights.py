@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from dermis.scene.plain import Colour, Direction, Plain, Vector
 
 _Degrees = Annotated[float, Field(gt=0, lt=89)]
+_Length = Annotated[float, Field(ge=0.1, le=1e5)]
 
 
 class _Source(Plain):
@@ -17,7 +18,8 @@ class _Source(Plain):
 
     irradiance : on a surface at the target that faces the light, linear Rec. 709; pi makes white skin 1
     shadows : whether it casts shadows
-    softness_mm : width over which a shadow's edge fades, at most 12 texels of the shadow map [mm]
+    softness_mm : width over which a shadow's edge fades, at most 12 texels of the shadow map; for lights of
+        some size the least width [mm]
     """
 
     irradiance: Colour = (3.14, 3.14, 3.14)
@@ -56,17 +58,68 @@ class SpotLight(PointLight):
         return self
 
 
+class RectangleLight(PointLight):
+    """A window or softbox: an even rectangle that faces the target, one pair of sides level.
+
+    width_mm, height_mm : its sides [mm]
+    """
+
+    kind: Literal["rectangle"] = "rectangle"  # type: ignore[assignment]
+    width_mm: _Length = 600.0
+    height_mm: _Length = 600.0
+
+
+class SphereLight(PointLight):
+    """An evenly bright sphere, as a lamp with a globe.
+
+    radius_mm : [mm]
+    """
+
+    kind: Literal["sphere"] = "sphere"  # type: ignore[assignment]
+    radius_mm: _Length = 100.0
+
+    @model_validator(mode="after")
+    def _outside(self) -> SphereLight:
+        if np.linalg.norm(np.subtract(self.target, self.position)) <= self.radius_mm:
+            raise ValueError("a target outside the sphere")
+        return self
+
+
 class DirectionalLight(_Source):
     """Parallel light, as from the sun.
 
     direction : the way the light travels
+    angle_degrees : what its source spans, 0.53 for the sun: shadows harden towards what casts them
     """
 
     kind: Literal["directional"] = "directional"
     direction: Direction
+    angle_degrees: Annotated[float, Field(ge=0, le=20)] = 0.0
 
 
-Light = PointLight | SpotLight | DirectionalLight
+class StripeLight(DirectionalLight):
+    """A sheet of parallel light, as from a laser through a cylindrical lens.
+
+    position : a point in the sheet's middle
+    up : the way along which the stripe is long
+    width_mm : across, from edge to edge at 1/e^2 of the middle, of a Gaussian [mm]
+    length_mm : [mm]
+    """
+
+    kind: Literal["stripe"] = "stripe"  # type: ignore[assignment]
+    position: Vector = (0.0, 0.0, 0.0)
+    up: Direction = (0.0, 1.0, 0.0)
+    width_mm: _Length = 1.5
+    length_mm: _Length = 300.0
+
+    @model_validator(mode="after")
+    def _across(self) -> StripeLight:
+        if np.linalg.norm(np.cross(self.direction, self.up)) < 1e-6 * np.linalg.norm(self.up):
+            raise ValueError("up in another direction than the light's")
+        return self
+
+
+Light = PointLight | SpotLight | RectangleLight | SphereLight | DirectionalLight | StripeLight
 
 
 def studio() -> tuple[Light, ...]:

@@ -21,7 +21,11 @@ class Settings(Plain):
     samples : samples of each pixel
     technique : "texture-space" scatters light over the atlas; "none" is the dry, unscattered skin
     shadow_size : side of each shadow map [texel]
+    occlusion : "baked" dims an environment's light where the head is in its way
     exposure : factor from radiance to the image [-]
+    bloom : share of the light that the lens scatters around [0..1]
+    tone : curve before the encoding of bytes: "none", "filmic", or the Khronos group's "neutral"
+    gamma : "wrong" takes the colour map for linear and leaves the encoding out, for comparison
     background : linear Rec. 709
     """
 
@@ -30,7 +34,11 @@ class Settings(Plain):
     samples: Annotated[int, Field(ge=1, le=_MOST_SAMPLES)] = 4
     technique: Literal["texture-space", "none"] = "texture-space"
     shadow_size: Annotated[int, Field(ge=64, le=8192)] = 2048
+    occlusion: Literal["baked", "none"] = "baked"
     exposure: Annotated[float, Field(ge=1e-6, le=1e6)] = 1.0
+    bloom: Annotated[float, Field(ge=0, le=1)] = 0.0
+    tone: Literal["none", "filmic", "neutral"] = "none"
+    gamma: Literal["right", "wrong"] = "right"
     background: Colour = (0.0, 0.0, 0.0)
 
     @model_validator(mode="after")

@@ -7,46 +7,74 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.specular.fresnel import SKIN_F0, schlick
+from dermis.specular.cosines import Cosines
+from dermis.specular.fresnel import FRESNEL, Fresnel, schlick
+from dermis.specular.kelemen import kelemen
+from dermis.specular.models import MODELS, Lobe
 
 Floats = NDArray[np.float64]
-TABLE_COSINES = 64
-TABLE_ROUGHNESSES = 32
+TABLE_COSINES: Floats = np.linspace(0.0, 1.0, 64) ** 2
+TABLE_ROUGHNESSES: Floats = np.linspace(0.2, 1.0, 32) ** 2
+"""Columns and rows of the shader's table: evenly spaced roots, for albedos bend at grazing angles."""
+
+_TABLE_NODES = (24, 12)
+_LEAST_COSINE = 1e-3
 
 
 def directional_albedo(
-    cos_theta: ArrayLike, m: ArrayLike, f0: float = SKIN_F0, nodes: tuple[int, int] = (48, 48)
+    cos_theta: ArrayLike,
+    m: ArrayLike,
+    lobe: Lobe = kelemen,
+    fresnel: Fresnel = schlick,
+    nodes: tuple[int, int] = (48, 32),
 ) -> Floats:
-    """Hemispherical reflectance rho_dt of the Kelemen lobe for rho_s = 1 [-].
+    """Hemispherical reflectance rho_dt of a lobe for rho_s = 1 [-].
 
-    cos_theta : cosine of the incident or, the same by reciprocity, the exitant angle
+    cos_theta : cosine of the exitant angle or, for reciprocal models the same, of the incident one
     m : roughness; broadcast against cos_theta
-    nodes : points of the quadrature over the half vector's slope and azimuth
+    nodes : points of the quadrature along and across the plane of the view
 
-    The integral runs over half vectors instead of directions: with x = tan^2 / m^2 the Beckmann peak becomes
-    exp(-x), which midpoints in exp(-x) sample evenly at any roughness, where the 80 x 80 directions of the
-    published rule miss it. Divided by pi as the lobe is.
+    The integral runs over slopes (x, y) of the half vector, where lobes are smooth and m wide. The light is
+    above the surface for slopes within a circle of radius 1 / cos theta around (tan theta, 0): Gauss rules in
+    atan(x / m) and atan(y / m) from edge to edge meet no corner, and find narrow peaks and grazing angles
+    that the 80 x 80 directions of the published rule miss.
 
     Source: [dEonLuebke2007] section 14.3 for the quantity.
     """
     cosine, rough = np.broadcast_arrays(np.asarray(cos_theta, float), np.asarray(m, float))
-    c, m2 = cosine[..., None, None], rough[..., None, None] ** 2
-    x = -np.log((np.arange(nodes[0]) + 0.5) / nodes[0])[:, None]
-    phi = np.pi * (np.arange(nodes[1]) + 0.5)[None, :] / nodes[1]
-    cos_h = 1.0 / np.sqrt(1.0 + m2 * x)
-    sin_h = np.sqrt(1.0 - cos_h**2)
-    v_h = c * cos_h + np.sqrt(np.maximum(1.0 - c**2, 0.0)) * sin_h * np.cos(phi)
-    n_l = 2.0 * v_h * cos_h - c
-    lit = (n_l > 0) & (v_h > 1e-9)
-    ratio = np.where(lit, n_l / np.where(lit, v_h, 1.0), 0.0)
-    integrand = schlick(v_h, f0) * ratio / cos_h
-    albedo: Floats = integrand.mean(axis=(-2, -1))
+    c, m = np.clip(cosine[..., None, None], _LEAST_COSINE, 1.0), rough[..., None, None]
+    tangent = np.sqrt(1.0 - c**2) / c
+    y, dy = _slopes(np.zeros_like(c), 1.0 / c, m, nodes[1])
+    reach = np.sqrt(np.maximum(c**-2 - y**2, 0.0))
+    y, dy, reach = (np.swapaxes(a, -1, -2) for a in (y, dy, reach))
+    x, dx = _slopes(tangent - reach, tangent + reach, m, nodes[0])
+    n_h = 1.0 / np.sqrt(1.0 + x**2 + y**2)
+    v_h = c * (1.0 + tangent * x) * n_h
+    n_l = np.maximum(2.0 * v_h * n_h - c, 0.0)
+    reflected = n_l * lobe(Cosines(n_l, np.broadcast_to(c, n_l.shape), n_h, v_h), m, fresnel)
+    # A half vector's solid angle is n_h^3 dx dy, the light's 4 v_h times that; both sides of the plane count.
+    albedo: Floats = (8.0 * reflected * v_h * n_h**3 * dx * dy).sum(axis=(-2, -1))
     return albedo
 
 
+def _slopes(low: Floats, high: Floats, m: Floats, nodes: int) -> tuple[Floats, Floats]:
+    """Places and weights between two slopes, dense within m of 0; along the last axis."""
+    at, weight = np.polynomial.legendre.leggauss(nodes)
+    first, last = np.arctan(low / m), np.arctan(high / m)
+    t = np.tan(0.5 * (first + last) + 0.5 * (last - first) * at)
+    return m * t, m * (1.0 + t**2) * 0.5 * (last - first) * weight
+
+
 @cache
-def albedo_table() -> NDArray[np.float32]:
-    """(roughness, cosine) table of `directional_albedo` for the shader, at texel centres in 0..1."""
-    cosine = (np.arange(TABLE_COSINES) + 0.5) / TABLE_COSINES
-    m = (np.arange(TABLE_ROUGHNESSES) + 0.5) / TABLE_ROUGHNESSES
-    return directional_albedo(cosine[None, :], m[:, None]).astype(np.float32)
+def albedo_table(model: str = "kelemen", fresnel: str = "schlick") -> NDArray[np.float32]:
+    """(roughness, cosine, 2) table for the shader, at TABLE_ROUGHNESSES and TABLE_COSINES, of
+    `directional_albedo` and its mean over all directions, weighed by their cosine.
+
+    model, fresnel : names in MODELS and FRESNEL
+    """
+    lobe, reflectance = MODELS[model].lobe, FRESNEL[fresnel]
+    # row by row: the nodes of all rows at once would not fit into a processor's cache
+    rows = [directional_albedo(TABLE_COSINES, m, lobe, reflectance, _TABLE_NODES) for m in TABLE_ROUGHNESSES]
+    rho = np.stack(rows)
+    mean = np.asarray(2.0 * np.trapezoid(rho * TABLE_COSINES, TABLE_COSINES, axis=1))[:, None]
+    return np.stack([rho, np.broadcast_to(mean, rho.shape)], axis=-1).astype(np.float32)

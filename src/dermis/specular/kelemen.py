@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from dermis.specular.beckmann import beckmann
-from dermis.specular.fresnel import SKIN_F0, schlick
+from dermis.specular.cosines import Cosines, Floats
+from dermis.specular.fresnel import Fresnel, schlick
 
-Floats = NDArray[np.float64]
 
-
-def kelemen(n: Floats, l: Floats, v: Floats, m: float, f0: float = SKIN_F0) -> Floats:
+def kelemen(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
     """BRDF of the rough surface for rho_s = 1, without the cosine [1/sr].
 
-    n, l, v : (..., 3) unit vectors: normal, to the light, to the eye
-    m : roughness [-]
+    m : roughness, broadcast against the angles [-]
 
-    f = D F / (h.h) with h = l + v not normalised. The published lobe leaves out the 1/pi of the Beckmann
-    distribution, because its diffuse term does too; here both carry it, so their ratio is the published one.
+    f = D F / (h.h) with h = l + v not normalised, so h.h = 4 (v.h)^2 of the unit half vector. The published
+    lobe leaves out the 1/pi of the Beckmann distribution, because its diffuse term does too; here both carry
+    it, so their ratio is the published one.
 
     Source: [Kelemen2001]; [dEonLuebke2007] section 14.3.
     """
-    h = l + v
-    h2 = np.maximum((h * h).sum(-1), 1e-12)
-    unit = h / np.sqrt(h2)[..., None]
-    lobe: Floats = beckmann((n * unit).sum(-1), m) * schlick((v * unit).sum(-1), f0) / (np.pi * h2)
-    return np.where(((n * l).sum(-1) > 0) & ((n * unit).sum(-1) > 0), lobe, 0.0)
+    h2 = np.maximum(4.0 * angles.v_h**2, 1e-12)
+    lobe = beckmann(angles.n_h, m) * fresnel(angles.v_h) / (np.pi * h2)
+    return np.asarray(np.where(angles.above, lobe, 0.0))

@@ -27,7 +27,26 @@ def remesh(surface: Surface, field: Field, size: Field, rounds: int) -> Surface:
         surface = flip(flip(surface))
         surface = relax(surface, field, size, passes=2 if turn < rounds - 1 else 3)
         surface = flip(surface)
-    return surface
+    return part_bridges(surface, field)
+
+
+def part_bridges(surface: Surface, field: Field) -> Surface:
+    """Edges inside the half that join two points of its border, cut: their mirror images would be the same."""
+    p, t, border = surface.points, surface.triangles, surface.on_border
+    ends, of_side, counts = edges(t)
+    bridge = (counts == 2) & border[ends].all(axis=1)
+    if not bridge.any():
+        return surface
+    opposite = np.roll(t, 1, axis=1).T.ravel()  # the corner that faces each side
+    sides = bridge[of_side]
+    number = np.full(len(ends), -1, dtype=np.int64)
+    number[bridge] = len(p) + np.arange(bridge.sum())
+    facing = sum_at(number[of_side[sides]] - len(p), p[opposite[sides]], int(bridge.sum())) / 2
+    points = (p[ends[bridge]].mean(axis=1) + facing) / 2
+    for _ in range(3):
+        slope = gradient(field, points, np.full(len(points), 0.1))
+        points -= slope * (field(points) / np.einsum("ni,ni->n", slope, slope))[:, None]
+    return Surface(np.vstack((p, points)), _cut_triangles(p, t, number[of_side].reshape(3, -1).T))
 
 
 def split(surface: Surface, size: Field) -> Surface:

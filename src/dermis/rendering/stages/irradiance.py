@@ -4,17 +4,25 @@ from __future__ import annotations
 
 from typing import Any
 
-from dermis.gpu import ComputeProgram, Device, Frame
+from dermis.gpu import Device, Frame
 from dermis.gpu.program import Resources
-from dermis.rendering.stages import SHARED_SHADERS, STAGES
+from dermis.rendering.stages import STAGES
+from dermis.rendering.stages.variants import Switches, Variants
 
 
 class Irradiance:
     """Lights each texel of the atlas."""
 
     def __init__(self, device: Device) -> None:
-        self.program = ComputeProgram(device, STAGES / "irradiance.wgsl", (SHARED_SHADERS,))
+        self._variants = Variants(device, STAGES / "irradiance.wgsl")
+        self._variants.program()
 
-    def draw(self, frame: Frame, lit: Resources, atlas: Resources, into: Any, size: int) -> None:
-        """Irradiance that passes the surface, times albedo^mix, into a texture of the atlas' size."""
-        frame.compute("irradiance", self.program, {**lit, **atlas, "entered": into}, (size, size))
+    def draw(
+        self, frame: Frame, lit: Resources, switches: Switches, atlas: Resources, into: Any, size: int
+    ) -> None:
+        """Irradiance that passes the surface, times albedo^mix, into a texture of the atlas' size.
+
+        switches : of the lights
+        """
+        program = self._variants.program(switches)
+        frame.compute("irradiance", program, {**lit, **atlas, "entered": into}, (size, size))

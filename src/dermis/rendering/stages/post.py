@@ -6,7 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from dermis.gpu import ComputeProgram, Device, Frame, make_texture
-from dermis.rendering.stages import STAGES
+from dermis.rendering.stages import SHARED_SHADERS, STAGES
+from dermis.scene.settings import Settings
+
+_TONES = ("none", "filmic", "neutral")  # numbered as in tone.wgsl
 
 
 @dataclass(frozen=True)
@@ -20,22 +23,28 @@ class Picture:
 
 
 class Post:
-    """Exposes and encodes."""
+    """Exposes, applies the tone curve and encodes."""
 
     def __init__(self, device: Device) -> None:
         self._device = device
-        self._program = ComputeProgram(device, STAGES / "post.wgsl")
+        self._program = ComputeProgram(device, STAGES / "post.wgsl", (SHARED_SHADERS,))
 
     def make_picture(self, size: tuple[int, int]) -> Picture:
         """Space for an image of size (width, height)."""
         radiance, exposed = (make_texture(self._device, size, "rgba32float") for _ in range(2))
         return Picture(radiance, exposed, make_texture(self._device, size, "rgba8uint"), size)
 
-    def draw(self, frame: Frame, picture: Picture, exposure: float) -> None:
-        """Fill the picture's linear and byte images from its radiance."""
+    def draw(self, frame: Frame, radiance: Any, picture: Picture, settings: Settings) -> None:
+        """Fill the picture's linear and byte images."""
+        record = self._program.record(
+            "Post",
+            exposure=settings.exposure,
+            tone=_TONES.index(settings.tone),
+            encoded=int(settings.gamma == "right"),
+        )
         bound = {
-            "settings": self._program.record("Post", exposure=exposure),
-            "image": picture.radiance,
+            "settings": record,
+            "image": radiance,
             "exposed": picture.exposed,
             "bytes": picture.bytes,
         }

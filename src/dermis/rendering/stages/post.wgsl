@@ -1,8 +1,11 @@
-// From radiance to the display's bytes: exposure and sRGB encoding.
+// From radiance to the display's bytes: exposure, tone curve and sRGB encoding.
 //#include "srgb.wgsl"
+//#include "tone.wgsl"
 
 struct Post {
     exposure: f32,
+    tone: u32,
+    encoded: u32, // 0 leaves the encoding out, which is wrong
 }
 
 @group(0) @binding(0) var<uniform> settings: Post;
@@ -18,6 +21,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let texel = textureLoad(image, id.xy, 0);
     let linear = texel.rgb * settings.exposure;
     textureStore(exposed, id.xy, vec4f(linear, texel.a));
+    let shown = toned(linear, settings.tone);
+    let levels = select(clamp(shown, vec3f(0.0), vec3f(1.0)), encode_srgb(shown), settings.encoded != 0u);
     // Integers, because a store to a normalised format may round either way.
-    textureStore(bytes, id.xy, vec4u(vec3u(round(255.0 * encode_srgb(linear))), u32(round(255.0 * texel.a))));
+    textureStore(bytes, id.xy, vec4u(vec3u(round(255.0 * levels)), u32(round(255.0 * texel.a))));
 }

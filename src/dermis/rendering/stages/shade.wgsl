@@ -4,6 +4,7 @@
 //#include "skin.wgsl"
 //#include "lobe.wgsl"
 //#include "lights.wgsl"
+//#include "environment.wgsl"
 
 const EYE_ROUGHNESS: f32 = 0.1; // plain materials are wet: eyeballs, teeth
 const FINEST_RATIO: f32 = 4.0; // longest over shortest side of a footprint that one map sample may stand for
@@ -31,38 +32,63 @@ struct Lit {
     reflected: vec3f, // radiance off the surface
 }
 
-fn light_up(point: Point, surface: Surface, v: vec3f) -> Lit {
+// open: share of the sky that the point sees
+fn light_up(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
     var lit = Lit(vec3f(0.0), vec3f(0.0));
     for (var i = 0u; i < skin.light_count; i++) {
         let light = lights.light[i];
-        let arriving = incident(light, point.position);
-        let cosine = dot(surface.normal, arriving.direction);
-        if (cosine > 0.0) {
-            let e = arriving.irradiance * (cosine * visibility(light, point, arriving.direction));
-            lit.entered += e * passes(cosine, surface.roughness, surface.rho_s);
-            lit.reflected += e * surface.rho_s * kelemen(surface.normal, arriving.direction, v, surface.roughness, skin.f0);
+        var seen = -1.0; // how much of the light: not known yet
+        for (var part = 0u; part < parts_of(light); part++) {
+            let arriving = incident(light, point.position, part);
+            let cosine = dot(surface.normal, arriving.direction);
+            if (cosine > 0.0) {
+                if (seen < 0.0) {
+                    seen = visibility(light, point, arriving.direction);
+                }
+                let e = arriving.irradiance * (cosine * seen);
+                lit.entered += e * enters(cosine, surface.roughness, surface.rho_s);
+                lit.reflected += e * surface.rho_s * lobe(surface.normal, arriving.direction, v, surface.roughness);
+            }
         }
+    }
+    if (ENVIRONMENT) {
+        let around = ambient(surface.normal, open, surface.colour * environment.albedo);
+        let albedo = surface.rho_s * surface_albedo(dot(surface.normal, v), surface.roughness).x;
+        lit.entered += around * enters_from_everywhere(surface.roughness, surface.rho_s);
+        lit.reflected += albedo * mirrored(point, surface.normal, v, surface.roughness, open);
     }
     return lit;
 }
 
-fn skin_radiance(point: Point, v: vec3f, footprint: f32) -> vec3f {
+// t: corners of the triangle, w: barycentric weights
+fn open_sky(point: Point, t: vec4u, w: vec3f) -> f32 {
+    if (!ENVIRONMENT) {
+        return 1.0;
+    }
+    if ((t.w & MAPPED) != 0u) {
+        return open_at(point.uv);
+    }
+    return dot(w, vec3f(open_at_vertex(t.x), open_at_vertex(t.y), open_at_vertex(t.z)));
+}
+
+fn skin_radiance(point: Point, v: vec3f, footprint: f32, open: f32) -> vec3f {
     let surface = surface_at(point, footprint);
-    let lit = light_up(point, surface, v);
+    let lit = light_up(point, surface, v, open);
     var below = lit.entered * share_of(surface.colour, skin.mix);
     if ((point.flags & MAPPED) != 0u) {
         below = shade.relit * below + load_bilinear(scattered, point.uv).rgb;
     } else {
         below *= shade.total;
     }
-    let leaves = passes(dot(surface.normal, v), surface.roughness, surface.rho_s);
-    return below * share_of(surface.colour, 1.0 - skin.mix) * leaves / PI + lit.reflected;
+    let out = leaves(dot(surface.normal, v), surface.roughness, surface.rho_s) / PI;
+    let tint = mix(vec3f(1.0), surface.colour, skin.tint);
+    return below * share_of(surface.colour, 1.0 - skin.mix) * out + lit.reflected * tint;
 }
 
-fn opaque_radiance(point: Point, v: vec3f) -> vec3f {
+fn opaque_radiance(point: Point, v: vec3f, open: f32) -> vec3f {
     let colour = shade.material_colour[point.flags >> 8u].rgb;
-    let lit = light_up(point, Surface(point.normal, colour, EYE_ROUGHNESS, 1.0), v);
-    return lit.entered * colour / PI + lit.reflected;
+    let lit = light_up(point, Surface(point.normal, colour, EYE_ROUGHNESS, 1.0), v, open);
+    return lit.entered * colour * leaves(dot(point.normal, v), EYE_ROUGHNESS, 1.0) / PI + lit.reflected;
 }
 
 // Barycentric weights of where a ray from the eye meets a triangle's plane are linear in the ray, up to scale.
@@ -92,18 +118,20 @@ fn radiance(triangle: u32, place: vec2f, share: f32, size: vec2f) -> vec3f {
     let weights = ray_to_weights(a.position, b.position, c.position);
     let w = meet(weights, ray_through(place, size));
     // A sample on an edge may lie a little outside: stay on the triangle.
-    let inside = max(w, vec3f(0.0));
-    let point = interpolate(a, b, c, inside / (inside.x + inside.y + inside.z), t.w);
+    let clamped = max(w, vec3f(0.0));
+    let inside = clamped / (clamped.x + clamped.y + clamped.z);
+    let point = interpolate(a, b, c, inside, t.w);
+    let open = open_sky(point, t, inside);
     let v = normalize(shade.eye - point.position);
     if ((t.w & OPAQUE) != 0u) {
-        return opaque_radiance(point, v);
+        return opaque_radiance(point, v, open);
     }
     let spacing = sqrt(share);
     let wx = meet(weights, ray_through(place + vec2f(spacing, 0.0), size)) - w;
     let wy = meet(weights, ray_through(place + vec2f(0.0, spacing), size)) - w;
     let x = length(wx.x * a.uv + wx.y * b.uv + wx.z * c.uv);
     let y = length(wy.x * a.uv + wy.y * b.uv + wy.z * c.uv);
-    return skin_radiance(point, v, max(min(x, y), max(x, y) / FINEST_RATIO));
+    return skin_radiance(point, v, max(min(x, y), max(x, y) / FINEST_RATIO), open);
 }
 
 @compute @workgroup_size(8, 8)

@@ -1,38 +1,72 @@
-// The rough white surface over the skin: Kelemen/Szirmay-Kalos with Schlick's Fresnel and a Beckmann table.
+// The rough white surface over the skin: the model in use, and how light shares itself out between it and the skin.
+//#include "bilinear.wgsl"
+//#include "surface.wgsl"
+//#include "lobes/angles.wgsl"
+//#include "lobes/fresnel.wgsl"
+//#include "lobes/kelemen.wgsl"
+//#include "lobes/torrance_sparrow.wgsl"
+//#include "lobes/blinn_phong.wgsl"
+//#include "lobes/phong.wgsl"
+//#include "lobes/two_lobe.wgsl"
 
-fn schlick(cos_theta: f32, f0: f32) -> f32 {
-    let c = clamp(1.0 - cos_theta, 0.0, 1.0);
-    let c2 = c * c;
-    return f0 + (1.0 - f0) * c2 * c2 * c;
-}
+// A pipeline is made for one model, so that the others cost nothing; numbered as in specular/models.py.
+override MODEL: u32 = 0u;
 
-// exp(-tan^2 / m^2) / (m^2 cos^4), from the table that holds half its tenth root.
-fn beckmann(cos_h: f32, m: f32) -> f32 {
-    let columns = f32(textureDimensions(beckmann_table).x); // the first is cos_h = 0, the last 1
-    let t = 2.0 * load_bilinear(beckmann_table, vec2f((cos_h * (columns - 1.0) + 0.5) / columns, m)).x;
-    let t2 = t * t;
-    let t4 = t2 * t2;
-    return t4 * t4 * t2;
-}
+// Roots of cosine and roughness are evenly spaced in the table of albedos; as in specular/albedo.py.
+const ROOT_OF_FIRST_ROW: f32 = 0.2;
 
-// BRDF for rho_s = 1, without the cosine [1/sr]. Source: [Kelemen2001], divided by pi.
-fn kelemen(n: vec3f, l: vec3f, v: vec3f, m: f32, f0: f32) -> f32 {
-    let h = l + v;
-    let h2 = max(dot(h, h), 1e-12);
-    let unit = h * inverseSqrt(h2);
-    let cos_h = dot(n, unit);
-    if (cos_h <= 0.0) {
+// BRDF for rho_s = 1, without the cosine [1/sr], for light above the surface.
+fn lobe(n: vec3f, l: vec3f, v: vec3f, m: f32) -> f32 {
+    let a = angles_between(n, l, v);
+    if (a.n_h <= 0.0) {
         return 0.0;
     }
-    return beckmann(cos_h, m) * schlick(dot(v, unit), f0) / (PI * h2);
+    if (MODEL == 1u) {
+        return torrance_sparrow(a, m);
+    }
+    if (MODEL == 2u) {
+        return torrance_sparrow_smith(a, m);
+    }
+    if (MODEL == 3u) {
+        return blinn_phong(a, m);
+    }
+    if (MODEL == 4u) {
+        return blinn_phong_plain(a, m);
+    }
+    if (MODEL == 5u) {
+        return phong(a, m);
+    }
+    if (MODEL == 6u) {
+        return phong_plain(a, m);
+    }
+    if (MODEL == 7u) {
+        return two_lobe(a, m);
+    }
+    if (MODEL == 8u) {
+        return kelemen_direct(a, m);
+    }
+    return kelemen(a, m);
 }
 
-// Share of light from (or to) a direction that the surface reflects, for rho_s = 1.
-fn surface_albedo(cos_theta: f32, m: f32) -> f32 {
-    return load_bilinear(albedo_table, vec2f(cos_theta, m)).x;
+// Share of light from (or to) a direction that the surface reflects, for rho_s = 1, and its mean over directions.
+fn surface_albedo(cos_theta: f32, m: f32) -> vec2f {
+    let size = vec2f(textureDimensions(albedo_table));
+    let place = vec2f(sqrt(max(cos_theta, 0.0)), (sqrt(m) - ROOT_OF_FIRST_ROW) / (1.0 - ROOT_OF_FIRST_ROW));
+    return load_bilinear(albedo_table, (place * (size - 1.0) + 0.5) / size).xy;
 }
 
-// Share of light that enters, or leaves, the skin in a direction.
-fn passes(cos_theta: f32, m: f32, rho_s: f32) -> f32 {
-    return max(0.0, 1.0 - rho_s * surface_albedo(max(cos_theta, 0.0), m));
+// Share of light from a direction that enters the skin.
+fn enters(cos_theta: f32, m: f32, rho_s: f32) -> f32 {
+    return max(0.0, 1.0 - rho_s * skin.loss * surface_albedo(cos_theta, m).x);
+}
+
+// Share of light from everywhere alike that enters the skin.
+fn enters_from_everywhere(m: f32, rho_s: f32) -> f32 {
+    return max(0.0, 1.0 - rho_s * skin.loss * surface_albedo(1.0, m).y);
+}
+
+// What leaves in a direction, over the mean of all directions unless light that is thrown back inside is lost [Kelemen2001].
+fn leaves(cos_theta: f32, m: f32, rho_s: f32) -> f32 {
+    let rho = rho_s * skin.loss * surface_albedo(cos_theta, m);
+    return max(0.0, 1.0 - rho.x) / max(1.0 - skin.returned * rho.y, 0.5);
 }

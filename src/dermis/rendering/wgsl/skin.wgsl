@@ -1,25 +1,12 @@
 // The skin's own parameters and its maps: colour, relief as a surface gradient, gloss.
+//#include "surface.wgsl"
 
-const PI: f32 = 3.14159265358979;
-
-struct Skin {
-    roughness: f32,
-    rho_s: f32,
-    f0: f32,
-    mix: f32, // share of the colour map applied before scattering
-    relief_band: f32, // mip of the height map from which on the normal map knows the relief, -1 without one
-    light_count: u32,
-}
-
-@group(0) @binding(2) var<uniform> skin: Skin;
 @group(0) @binding(3) var map_sampler: sampler;
 @group(0) @binding(4) var colour_map: texture_2d<f32>; // filtered
 @group(0) @binding(5) var slope_map: texture_2d<f32>; // filtered: mean slopes along +u, +v-up; their squares
 @group(0) @binding(6) var relief_map: texture_2d<f32>; // filtered: mean mm per texel along u, v; their squares
 @group(0) @binding(7) var specular_map: texture_2d<f32>; // filtered: factor of rho_s
 @group(0) @binding(8) var roughness_map: texture_2d<f32>; // filtered: factor of the roughness
-@group(0) @binding(9) var beckmann_table: texture_2d<f32>;
-@group(0) @binding(10) var albedo_table: texture_2d<f32>;
 
 struct Surface {
     normal: vec3f, // with the relief

@@ -1,0 +1,1 @@
+"""Roughness and strength of the reflection by region of the face."""

@@ -1,0 +1,89 @@
+"""The figures of `dermis compare specular -o`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dermis.outputs import refuse_output, replacing
+from dermis.specular.albedo import directional_albedo
+from dermis.specular.cosines import cosines
+from dermis.specular.models import MODELS
+
+_INCIDENT = {15: "#2a62b0", 45: "#2e8b57", 75: "#c0392b"}
+_DRAWN = [name for name in MODELS if name != "kelemen-direct"]  # the same curve as kelemen
+_FARTHEST = 1.8  # root of the intensity over kelemen's peak: two-lobe's reaches 1.7
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+def draw(folder: Path, m: float) -> None:
+    """Write lobes.png and albedo.png of all models into a folder, made when it is not there."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        refuse_output(folder, fault)
+    _save(_lobes(m), folder / "lobes.png")
+    _save(_albedos(m), folder / "albedo.png")
+
+
+def _lobes(m: float) -> Any:
+    """Intensity under three lights in the plane of incidence: a polar panel for each model."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12.0, 4.8), dpi=130, layout="constrained")
+    figure.suptitle(f"Intensity over kelemen's peak under the same light, on a root scale; m = {m:g}")
+    panels = figure.subplots(2, 4, subplot_kw={"projection": "polar"}).ravel()
+    whole = _intensity("kelemen", m).max(axis=1, keepdims=True)
+    for axes, name in zip(panels, _DRAWN, strict=True):
+        for (degrees, ink), values in zip(_INCIDENT.items(), _intensity(name, m) / whole, strict=True):
+            axes.plot(_view_angles(), np.sqrt(values), color=ink, label=f"light from {degrees}°")
+        axes.set(thetamin=-90, thetamax=90, theta_zero_location="N", theta_direction=-1, rmax=_FARTHEST)
+        axes.set(
+            rticks=np.sqrt([0.25, 1.0, 2.25]),
+            yticklabels=["", "1", ""],
+            xticks=np.radians(range(-90, 91, 30)),
+        )
+        axes.tick_params(labelsize=7)
+        axes.set_title(name, fontsize=10)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    return figure
+
+
+def _intensity(name: str, m: float) -> Any:
+    """(3, n) BRDF times both cosines, for each incident angle and view [1/sr]."""
+    angle = _view_angles()
+    view = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=-1)
+    rows = []
+    for degrees in _INCIDENT:
+        theta = np.radians(degrees)
+        light = np.broadcast_to([-np.sin(theta), 0.0, np.cos(theta)], view.shape)
+        rows.append(MODELS[name].lobe(cosines(_UP, light, view), m) * np.cos(theta) * np.cos(angle))
+    return np.stack(rows)
+
+
+def _view_angles() -> Any:
+    return np.radians(np.linspace(-89.9, 89.9, 1200))
+
+
+def _albedos(m: float) -> Any:
+    """Directional albedo by angle, all models in one panel."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.2, 4.6), dpi=130, layout="constrained")
+    axes = figure.subplots()
+    degrees = np.linspace(0.0, 89.0, 180)
+    for name in _DRAWN:
+        rho = directional_albedo(np.cos(np.radians(degrees)), m, MODELS[name].lobe)
+        axes.plot(degrees, rho, linewidth=1.4, label=name)
+    axes.set(xlabel="angle from the normal [°]", ylabel="share reflected, ρ_s = 1", xlim=(0, 90))
+    axes.set(yscale="log", title=f"Directional albedo, m = {m:g}")
+    axes.grid(which="major", alpha=0.25, linewidth=0.6)
+    axes.legend(frameon=False, fontsize=8)
+    return figure
+
+
+def _save(figure: Any, path: Path) -> None:
+    with replacing(path) as trial:
+        figure.savefig(trial)

@@ -1,0 +1,144 @@
+"""The scene's lights as the shaders read them, and how each sees the head."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.assets.environment.suns import Sun
+from dermis.errors import refuse
+from dermis.gpu import ComputeProgram
+from dermis.rendering.projection import ShadowView, frame_of, shadow_view
+from dermis.rendering.rectangles import facing_irradiance, parts_of
+from dermis.rendering.stages.variants import Switches
+from dermis.scene.environment import Environment
+from dermis.scene.lights import (
+    DirectionalLight,
+    Light,
+    PointLight,
+    RectangleLight,
+    SphereLight,
+    SpotLight,
+    StripeLight,
+)
+from dermis.scene.model import Scene
+
+Floats = NDArray[np.float64]
+_KINDS = (PointLight, SpotLight, DirectionalLight, StripeLight, RectangleLight, SphereLight)
+_BRIGHTEST = 1e6
+_UP = np.array([0.0, 1.0, 0.0])
+_WIDEST_SHADOW_FILTER = 6
+_SIDE, _PART_SIDE = 4, 2  # a light of some size is shaded as SIDE x SIDE lights, a part as fewer
+_LINES, _LEAST_LINES, _SUN_LINES = 64, 12, 32  # of sight to places on a light, for its shadow
+
+
+def sun_lights(suns: tuple[Sun, ...], environment: Environment) -> tuple[DirectionalLight, ...]:
+    """The peaks of a panorama as lights, turned and exposed with it."""
+    angle = np.radians(environment.rotation_degrees)
+    lights = []
+    for sun in suns:
+        x, y, z = -sun.direction
+        red, green, blue = np.minimum(environment.exposure * sun.irradiance, _BRIGHTEST)
+        lights.append(
+            DirectionalLight(
+                direction=(np.cos(angle) * x + np.sin(angle) * z, y, np.cos(angle) * z - np.sin(angle) * x),
+                irradiance=(red, green, blue),
+                angle_degrees=min(np.degrees(2.0 * sun.radius), 20.0),
+                softness_mm=0.5,
+            )
+        )
+    return tuple(lights)
+
+
+def light_switches(scene: Scene) -> Switches:
+    """Values of the `override`s of lights.wgsl and environment.wgsl."""
+    shaped = any(
+        isinstance(light, StripeLight | RectangleLight | SphereLight)
+        or getattr(light, "angle_degrees", 0) > 0
+        for light in scene.lights
+    )
+    return (("SHAPES", 1),) * shaped + (("ENVIRONMENT", 1),) * (scene.environment is not None)
+
+
+def light_views(scene: Scene, size: int) -> list[ShadowView | None]:
+    """How each part of each light sees the head; None for those without shadows."""
+    centre = np.array(scene.head.centre_mm)
+    return [
+        shadow_view(part, centre, scene.head.mesh, size, f"light {number}") if light.shadows else None
+        for number, light in enumerate(scene.lights, start=1)
+        for part in parts_of(light)
+    ]
+
+
+def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView | None]) -> Any:
+    """The shader's array of lights.
+
+    views : one for each part of each light
+
+    Raises DermisError for more lights than it holds.
+    """
+    centre = np.array(scene.head.centre_mm)
+    record = program.record("Lights")
+    if len(views) > len(record["light"]):
+        came = f"there are {len(views)}, large rectangles counted by their parts"
+        refuse("lights", f"at most {len(record['light'])}", came, "Leave some out")
+    divided = [(part, len(parts)) for parts in map(parts_of, scene.lights) for part in parts]
+    layer = 0
+    for index, ((light, siblings), view) in enumerate(zip(divided, views, strict=True)):
+        one = _light_record(program, light, centre, view)
+        one["layer"] = layer if view else -1
+        few = isinstance(light, DirectionalLight)
+        one["lines"] = _SUN_LINES if few else max(_LEAST_LINES, _LINES // siblings)
+        one["side"] = _PART_SIDE if siblings > 1 else _SIDE
+        record["light"][index] = one
+        layer += view is not None
+    return record
+
+
+def _light_record(program: ComputeProgram, light: Light, centre: Floats, view: ShadowView | None) -> Any:
+    record = program.record("Light", kind=_KINDS.index(type(light)), irradiance=light.irradiance)
+    distance, texel = 1.0, view.texel if view else 1.0
+    if isinstance(light, DirectionalLight):
+        record["direction"] = np.array(light.direction) / np.linalg.norm(light.direction)
+    else:
+        path = np.subtract(light.target, light.position)
+        distance = float(np.linalg.norm(path))
+        record["position"], record["direction"] = np.array(light.position) + centre, path / distance
+    record["reference_mm"] = distance
+    if view:
+        record["position"] = view.origin
+        record["to_map"], record["texel"] = view.clip.T, texel
+        record["map_right"], record["map_up"] = view.right, view.up
+        record["map_near"], record["map_far"] = view.near, view.far
+    _add_shape(record, light, centre, distance)
+    # A tent of half width h fades over 2 h texels.
+    record["softness"] = 0.5 * light.softness_mm
+    record["half_width"] = np.clip(
+        round(0.5 * light.softness_mm / (texel * distance)), 1, _WIDEST_SHADOW_FILTER
+    )
+    return record
+
+
+def _add_shape(record: Any, light: Light, centre: Floats, distance: float) -> None:
+    """What only some kinds have: a cone, a stripe, or a size; lights of some size carry their radiance."""
+    if isinstance(light, SpotLight):
+        record["cos_inner"] = np.cos(np.radians(light.inner_degrees))
+        record["cos_outer"] = np.cos(np.radians(light.outer_degrees))
+    right, up, forward = (np.array(axis) for axis in frame_of(record["direction"].astype(float), _UP))
+    if isinstance(light, StripeLight):
+        right, up, _ = frame_of(forward, np.array(light.up))
+        record["position"] = np.array(light.position) + centre
+        record["half_u"], record["half_v"] = 2.0 * right / light.width_mm, 2.0 * up / light.length_mm
+    elif isinstance(light, DirectionalLight):
+        record["extent"] = np.tan(0.5 * np.radians(light.angle_degrees))
+    elif isinstance(light, RectangleLight):
+        half = 0.5 * light.width_mm * right, 0.5 * light.height_mm * up
+        record["half_u"], record["half_v"] = half
+        record["extent"] = 0.5 * light.width_mm, 0.5 * light.height_mm
+        record["irradiance"] /= facing_irradiance(light.width_mm, light.height_mm, distance)
+    elif isinstance(light, SphereLight):
+        record["half_u"], record["half_v"] = light.radius_mm * right, light.radius_mm * up
+        record["extent"] = light.radius_mm
+        record["irradiance"] /= np.pi * (light.radius_mm / distance) ** 2

@@ -1,0 +1,26 @@
+// What evaluating a lobe costs: each invocation is a point of a ball under many lights, seen from the front.
+//#include "lobe.wgsl"
+
+override LIGHTS: u32 = 16u; // for each point
+override IDLE: bool = false; // leave the lobe out: what remains is not its cost
+
+@group(1) @binding(0) var sums: texture_storage_2d<r32float, write>;
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    let size = vec2f(textureDimensions(sums));
+    let place = (vec2f(id.xy) + 0.5) / size;
+    let n = normalize(vec3f(place - 0.5, 0.5));
+    let m = 0.1 + 0.4 * place.x;
+    var sum = 0.0;
+    for (var i = 0u; i < LIGHTS; i++) {
+        let turn = 2.4 * f32(i);
+        let l = normalize(vec3f(0.6 * cos(turn), 0.6 * sin(turn), 1.0));
+        if (IDLE) {
+            sum += dot(n, l) * m;
+        } else {
+            sum += lobe(n, l, vec3f(0.0, 0.0, 1.0), m);
+        }
+    }
+    textureStore(sums, id.xy, vec4f(sum));
+}

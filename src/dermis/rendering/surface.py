@@ -1,0 +1,44 @@
+"""The surface of the skin as the shaders take it: numbers, pipeline switches and tables."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dermis.gpu import ComputeProgram
+from dermis.rendering.maps import HeadTextures
+from dermis.rendering.stages.variants import Switches
+from dermis.scene.model import Scene
+from dermis.scene.skin import Skin
+from dermis.specular.energy import ENERGY
+from dermis.specular.fresnel import FRESNEL, SKIN_ETA, SKIN_F0
+from dermis.specular.models import MODELS
+
+
+def model_of(skin: Skin) -> str:
+    """Name of the lobe in MODELS; skin without one keeps the default's, for wet materials beside it."""
+    return next(iter(MODELS)) if skin.specular == "none" else skin.specular
+
+
+def switches(skin: Skin) -> Switches:
+    """Values of lobe.wgsl's `override`s where they are not the default 0."""
+    numbers = {"MODEL": list(MODELS).index(model_of(skin)), "FRESNEL": list(FRESNEL).index(skin.fresnel)}
+    return tuple((name, number) for name, number in numbers.items() if number)
+
+
+def skin_record(program: ComputeProgram, scene: Scene, head: HeadTextures) -> Any:
+    """The skin's parameters; a roughness map replaces the constant."""
+    skin, energy = scene.skin, ENERGY[scene.skin.energy]
+    mapped = scene.head.maps.roughness is not None
+    return program.record(
+        "Skin",
+        roughness=skin.smoothing * (1.0 if mapped else skin.roughness),
+        rho_s=skin.strength,
+        f0=SKIN_F0,
+        eta=SKIN_ETA,
+        loss=energy.loss,
+        returned=float(energy.returned),
+        tint=float(skin.specular_colour == "wrong"),
+        mix=skin.mix,
+        relief_band=head.relief_band,
+        light_count=len(scene.lights),
+    )

@@ -1,0 +1,101 @@
+"""The environment as the shaders read it: panorama, sun-like peaks, and how much of it each place sees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.assets.cache import cached_occlusion
+from dermis.assets.environment.mirrors import equivalent_mirrors
+from dermis.assets.environment.prefilter import prefilter
+from dermis.assets.environment.suns import Sun
+from dermis.assets.head import Head
+from dermis.gpu import ComputeProgram, Device, make_texture, upload
+from dermis.gpu.program import Resources
+from dermis.gpu.textures import texture_from
+from dermis.rendering.lights import sun_lights
+from dermis.rendering.maps import HeadTextures
+from dermis.rendering.stages.occlusion import FORM, Occlusion, whole_map
+from dermis.scene.model import Scene
+
+_FINEST_OCCLUSION = 1024  # texels a side: it is smooth, and a texel of it is under a millimetre
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """A panorama on the device.
+
+    panorama : layers of irradiance and of reflections, black without an environment
+    suns : its peaks
+    """
+
+    panorama: Any
+    suns: tuple[Sun, ...]
+
+
+def load_surroundings(device: Device, name: str | None) -> Surroundings:
+    """The prefiltered panorama of an environment, or of none.
+
+    Raises DermisError when there is no such environment.
+    """
+    if name is None:
+        return Surroundings(make_texture(device, (1, 1), "rgba32float", layers=2, use="map"), ())
+    made = prefilter(name)
+    count, height, width, _ = made.layers.shape
+    texture = make_texture(device, (width, height), "rgba32float", layers=count, use="map")
+    for index, layer in enumerate(made.layers):
+        upload(device, texture, np.dstack([layer, np.ones((height, width))]), layer=index)
+    return Surroundings(texture, made.suns)
+
+
+def with_suns(scene: Scene, surroundings: Surroundings) -> Scene:
+    """The scene with its environment's peaks among its lights."""
+    if scene.environment is None or not surroundings.suns:
+        return scene
+    return replace(scene, lights=(*scene.lights, *sun_lights(surroundings.suns, scene.environment)))
+
+
+def environment_record(program: ComputeProgram, scene: Scene, total: Any, occluded: bool) -> Any:
+    """The shader's record of the environment.
+
+    total : (3,) the profile's albedo as the frame uses it
+    """
+    environment = scene.environment
+    if environment is None:
+        return program.record("Environment")
+    angle = np.radians(environment.rotation_degrees)
+    return program.record(
+        "Environment",
+        turn=(np.cos(angle), np.sin(angle)),
+        exposure=environment.exposure,
+        albedo=np.minimum(total, 1.0),
+        occluded=int(occluded),
+        mirrors=np.pad(equivalent_mirrors().reshape(-1, 3), ((0, 0), (0, 1))),
+    )
+
+
+def occlusion_map(
+    device: Device, head: Head, textures: HeadTextures, lit: Resources, atlas: Any, size: int
+) -> Any:
+    """The open share of the sky of the atlas' texels and of the vertices, baked or read from disk.
+
+    lit : what the lighting passes read
+    atlas, size : texture of the atlas, and its side
+    """
+    side = min(size, _FINEST_OCCLUSION)
+
+    def bake() -> NDArray[np.uint16]:
+        baked = Occlusion(device).bake(head.mesh, textures, lit, atlas, side)
+        levels: NDArray[np.uint16] = np.rint(65535.0 * whole_map(baked, side)).astype(np.uint16)
+        return levels
+
+    levels = cached_occlusion(head.mesh, size, f"{FORM} {side}", bake)
+    return texture_from(device, levels / np.float32(65535.0), "r32float")
+
+
+def no_occlusion(device: Device) -> Any:
+    """Stands for the map where nothing is occluded."""
+    return make_texture(device, (1, 1), "r32float", use="map")

@@ -1,0 +1,98 @@
+// Light from all around: a panorama's irradiance and its reflections by roughness, dimmed where the head is in the way.
+
+override ENVIRONMENT: bool = false; // whether there is one
+
+const LAYERS: f32 = 10.0; // of reflections, even in the logarithm of the roughness
+const SMOOTHEST: f32 = 0.05; // roughness of the first and of the last of them
+const ROUGHEST: f32 = 1.0;
+const MIRRORS: u32 = 8u; // rows and columns of their table
+
+struct Environment {
+    turn: vec2f, // cosine and sine of the rotation about +Y
+    exposure: f32,
+    albedo: vec3f, // of skin whose colour map is white
+    occluded: u32, // whether the occlusion map holds anything
+    mirrors: array<vec4f, 64>, // by roughness and cosine: sine and cosine of where the lobe points, its roughness
+}
+
+@group(0) @binding(20) var<uniform> environment: Environment;
+@group(0) @binding(21) var panorama: texture_2d_array<f32>; // irradiance, then mean radiance by roughness
+@group(0) @binding(22) var occlusion_map: texture_2d<f32>; // open share of the sky: the atlas, then the vertices
+
+// The panorama's layer in a direction, bilinear, around the seam.
+fn panorama_at(direction: vec3f, layer: u32) -> vec3f {
+    let d = vec3f(
+        environment.turn.x * direction.x - environment.turn.y * direction.z,
+        direction.y,
+        environment.turn.y * direction.x + environment.turn.x * direction.z,
+    );
+    let size = vec2i(textureDimensions(panorama));
+    let uv = vec2f(0.5 + atan2(d.x, -d.z) / (2.0 * PI), acos(clamp(d.y, -1.0, 1.0)) / PI);
+    let place = uv * vec2f(size) - 0.5;
+    let a = vec2i(floor(place));
+    let x = (vec2i(a.x, a.x + 1) + size.x) % size.x;
+    let y = clamp(vec2i(a.y, a.y + 1), vec2i(0), vec2i(size.y - 1));
+    let w = bilinear_weights(place);
+    return environment.exposure * (w.x * textureLoad(panorama, vec2i(x.x, y.x), layer, 0).rgb
+        + w.y * textureLoad(panorama, vec2i(x.y, y.x), layer, 0).rgb
+        + w.z * textureLoad(panorama, vec2i(x.x, y.y), layer, 0).rgb
+        + w.w * textureLoad(panorama, vec2i(x.y, y.y), layer, 0).rgb);
+}
+
+// Mean radiance under a lobe of roughness m about a direction.
+fn reflection(direction: vec3f, m: f32) -> vec3f {
+    let layer = (LAYERS - 1.0) * clamp(log(m / SMOOTHEST) / log(ROUGHEST / SMOOTHEST), 0.0, 1.0);
+    let low = min(u32(layer), u32(LAYERS) - 2u);
+    return mix(panorama_at(direction, 1u + low), panorama_at(direction, 2u + low), layer - f32(low));
+}
+
+// Irradiance of a surface that sees the open share of the sky; the rest is skin, which passes light on: a fit to
+// path-traced corners [Jimenez2016].
+fn ambient(normal: vec3f, open: f32, albedo: vec3f) -> vec3f {
+    let a = 2.0404 * albedo - 0.3324;
+    let b = -4.7951 * albedo + 0.6417;
+    let c = 2.7552 * albedo + 0.6903;
+    return panorama_at(normal, 0u) * max(vec3f(open), ((open * a + b) * open + c) * open);
+}
+
+// Direction and roughness of the round lobe that stands for the surface's, in the plane of view and normal.
+fn mirror_at(cosine: f32, m: f32) -> vec3f {
+    let last = f32(MIRRORS - 1u);
+    let place = clamp(vec2f(cosine, log(m / SMOOTHEST) / log(ROUGHEST / SMOOTHEST)), vec2f(0.0), vec2f(1.0)) * last;
+    let at = min(vec2u(place), vec2u(MIRRORS - 2u));
+    let f = place - vec2f(at);
+    let row = at.y * MIRRORS + at.x;
+    let low = mix(environment.mirrors[row], environment.mirrors[row + 1u], f.x);
+    let high = mix(environment.mirrors[row + MIRRORS], environment.mirrors[row + MIRRORS + 1u], f.x);
+    return mix(low, high, f.y).xyz;
+}
+
+// Radiance that a lobe sees, for the surface's albedo 1, less what hides it [LagardeRousiers2014] and nothing from
+// below the surface that carries the relief.
+fn mirrored(point: Point, normal: vec3f, v: vec3f, m: f32, open: f32) -> vec3f {
+    let cosine = clamp(dot(normal, v), 0.0, 1.0);
+    let mirror = mirror_at(cosine, m);
+    let along = cosine * normal - v; // away from the eye, as long as the angle's sine
+    let direction = normalize(mirror.y * normal + mirror.x * along / max(length(along), 1e-6));
+    let seen = clamp(pow(cosine + open, exp2(-16.0 * m - 1.0)) - 1.0 + open, 0.0, 1.0);
+    let risen = clamp(1.0 + dot(direction, point.normal) / m, 0.0, 1.0);
+    return reflection(direction, mirror.z) * seen * risen;
+}
+
+// Open share of the sky on the atlas.
+fn open_at(uv: vec2f) -> f32 {
+    if (environment.occluded == 0u) {
+        return 1.0;
+    }
+    let size = vec2f(textureDimensions(occlusion_map));
+    return load_bilinear(occlusion_map, uv * vec2f(1.0, size.x / size.y)).x;
+}
+
+// The same at a vertex, for surfaces without a place on the atlas.
+fn open_at_vertex(index: u32) -> f32 {
+    if (environment.occluded == 0u) {
+        return 1.0;
+    }
+    let side = textureDimensions(occlusion_map).x;
+    return textureLoad(occlusion_map, vec2u(index % side, side + 1u + index / side), 0).x;
+}

@@ -1,0 +1,20 @@
+// The skin's numbers, and the tables of its surface.
+
+const PI: f32 = 3.14159265358979;
+
+struct Skin {
+    roughness: f32,
+    rho_s: f32,
+    f0: f32, // Schlick's reflectance at normal incidence
+    eta: f32, // index of refraction
+    loss: f32, // factor of the surface's albedo in what enters and leaves: 0 for no term, 1, or the published pi
+    returned: f32, // 1 when light that the surface throws back inside comes out after all, else 0
+    tint: f32, // 1 colours the reflection by the colour map, which is wrong for skin
+    mix: f32, // share of the colour map applied before scattering
+    relief_band: f32, // mip of the height map from which on the normal map knows the relief, -1 without one
+    light_count: u32,
+}
+
+@group(0) @binding(2) var<uniform> skin: Skin;
+@group(0) @binding(9) var beckmann_table: texture_2d<f32>;
+@group(0) @binding(10) var albedo_table: texture_2d<f32>; // rho_dt and its mean over directions

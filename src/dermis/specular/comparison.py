@@ -1,0 +1,54 @@
+"""What sets the surface models apart, in numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.specular.albedo import directional_albedo
+from dermis.specular.cosines import cosines
+from dermis.specular.models import MODELS
+
+Floats = NDArray[np.float64]
+ROUGHNESSES = np.round(np.arange(1, 6) / 10, 1)
+COSINES = np.round(np.arange(1, 21) / 20, 2)
+_PAIRS = 4000
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+def peak(model: str, m: float) -> float:
+    """BRDF towards the light that stands over the surface, for rho_s = 1 [1/sr]."""
+    return float(MODELS[model].lobe(cosines(_UP, _UP, _UP), m))
+
+
+def reciprocity_error(model: str) -> float:
+    """Largest change of the BRDF when light and view change places, of the largest value [-].
+
+    Over directions up to 85 degrees from the normal and ROUGHNESSES.
+    """
+    rng = np.random.default_rng(1)
+    l, v = (_directions(rng) for _ in range(2))
+    lobe = MODELS[model].lobe
+    errors = []
+    for m in ROUGHNESSES:
+        there, back = lobe(cosines(_UP, l, v), m), lobe(cosines(_UP, v, l), m)
+        errors.append(np.abs(there - back).max() / max(there.max(), back.max()))
+    return float(max(errors))
+
+
+def albedo_rows(model: str) -> list[dict[str, float]]:
+    """`directional_albedo` over ROUGHNESSES and COSINES, in plain numbers: m, cos_theta, rho."""
+    rho = directional_albedo(COSINES, ROUGHNESSES[:, None], MODELS[model].lobe)
+    return [
+        {"m": float(m), "cos_theta": float(c), "rho": float(rho[i, k])}
+        for i, m in enumerate(ROUGHNESSES)
+        for k, c in enumerate(COSINES)
+    ]
+
+
+def _directions(rng: Any) -> Floats:
+    cosine, phi = rng.uniform(np.cos(np.radians(85)), 1.0, _PAIRS), rng.uniform(0, 2 * np.pi, _PAIRS)
+    sine = np.sqrt(1.0 - cosine**2)
+    return np.stack([sine * np.cos(phi), sine * np.sin(phi), cosine], axis=-1)

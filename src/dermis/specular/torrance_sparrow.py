@@ -1,0 +1,58 @@
+"""Microfacets after Torrance and Sparrow: Beckmann's slopes, masked by V-cavities or after Smith."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dermis.specular.beckmann import beckmann
+from dermis.specular.cosines import Cosines, Floats
+from dermis.specular.fresnel import Fresnel, schlick
+
+_GRAZING = 1e-6
+
+
+def torrance_sparrow(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
+    """BRDF D F G / (4 n.l n.v) with the masking of V-shaped grooves [1/sr].
+
+    m : roughness, broadcast against the angles [-]
+
+    Source: [TorranceSparrow1967]; masking in the form of [Blinn1977].
+    """
+    n_l, n_v = _raised(angles)
+    groove = 2.0 * angles.n_h * np.minimum(n_l, n_v) / np.maximum(angles.v_h, _GRAZING)
+    return _lobe(angles, m, fresnel, np.minimum(1.0, groove))
+
+
+def torrance_sparrow_smith(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
+    """BRDF D F G1(l) G1(v) / (4 n.l n.v) with Smith's masking of a random surface [1/sr].
+
+    m : roughness, broadcast against the angles [-]
+
+    Source: [Walter2007] section 5; [Smith1967].
+    """
+    n_l, n_v = _raised(angles)
+    return _lobe(angles, m, fresnel, smith_masking(n_l, m) * smith_masking(n_v, m))
+
+
+def smith_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
+    """Share of facets seen from a direction, G1, exact for Beckmann's slopes [-].
+
+    Source: [Smith1967]; [Walter2007] section 5.2, before its rational approximation.
+    """
+    from scipy.special import erf
+
+    c = np.asarray(cos_theta, dtype=np.float64)
+    a = c / (np.asarray(m, dtype=np.float64) * np.sqrt(np.maximum(1.0 - c**2, 1e-12)))
+    return np.asarray(2.0 / (1.0 + erf(a) + np.exp(-(a**2)) / (a * np.sqrt(np.pi))))
+
+
+def _raised(angles: Cosines) -> tuple[Floats, Floats]:
+    """Cosines of light and view, kept from 0."""
+    return np.maximum(angles.n_l, _GRAZING), np.maximum(angles.n_v, _GRAZING)
+
+
+def _lobe(angles: Cosines, m: ArrayLike, fresnel: Fresnel, masking: Floats) -> Floats:
+    n_l, n_v = _raised(angles)
+    slopes = beckmann(angles.n_h, m) / np.pi
+    return np.where(angles.above, slopes * fresnel(angles.v_h) * masking / (4.0 * n_l * n_v), 0.0)

@@ -1,0 +1,108 @@
+"""`dermis render` under environments and rigs, with bloom and tone curves: what wins, and what is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dermis.assets.environment.panorama import directions
+from dermis.images.io import read_image, write_exr
+
+Run = Callable[..., Any]
+
+
+@pytest.fixture
+def sky(folder: Path) -> str:
+    """A panorama that is bright on the head's left, with a lamp like a sun."""
+    towards = directions(64, 128)
+    radiance = np.full((64, 128, 3), 0.2, np.float32)
+    radiance[towards[..., 0] > 0.5] = 2.0
+    radiance[towards @ [0, 1, 0] > np.cos(np.radians(3.0))] = 2000.0
+    write_exr(folder / "sky.exr", radiance)
+    return "sky.exr"
+
+
+def picture(render: Run, *words: str) -> Any:
+    ended = render("head.obj", "-o", "a.exr", *words)
+    assert ended.code == 0, ended.stderr
+    return read_image("a.exr")
+
+
+def test_an_environment_lights_alone_unless_lights_are_named(render: Run) -> None:
+    one, studio = picture(render, "--env", "uniform"), picture(render, "--lights", "studio")
+    both = picture(render, "--env", "uniform", "--lights", "studio")
+    assert one.max() > 0.1 and studio.max() > 0.1
+    assert np.abs(one + studio - both).max() < 1e-4 * both.max()
+    assert np.array_equal(one, picture(render, "--env", "uniform", "--lights", "none"))
+    assert np.allclose(picture(render, "--env", "uniform", "--env-exposure", "2"), 2 * one, rtol=1e-4)
+
+
+def test_peaks_are_told(render: Run, sky: str) -> None:
+    ended = render("head.obj", "--env", sky, "-o", "a.exr")
+    assert (ended.code, ended.stderr) == (
+        0,
+        "note: a sun-like peak of sky.exr shines as a light with shadows, the rest from all around\n",
+    )
+    assert render("head.obj", "--env", "uniform", "-o", "a.exr").stderr == ""
+
+
+def test_rotation_turns_the_light(render: Run, sky: str) -> None:
+    left, right = (picture(render, "--env", sky, "--env-rotation", angle) for angle in ("0", "180"))
+    half = left.shape[1] // 2
+    assert left[:, half:].sum() > left[:, :half].sum()
+    assert right[:, half:].sum() < right[:, :half].sum()
+
+
+def test_a_scenes_environment_can_be_changed(render: Run, folder: Path, sky: str) -> None:
+    scene = '[environment]\nname = "sky.exr"\nexposure = 0.5\n[head]\nname = "head.obj"\n'
+    (folder / "scene.toml").write_text(scene)
+    assert render("scene.toml", "-o", "b.exr").code == 0
+    dim = read_image("b.exr")
+    whole = picture(render, "--env", sky)
+    assert np.allclose(dim, picture(render, "--env", sky, "--env-exposure", "0.5"))
+    assert render("scene.toml", "-o", "b.exr", "--env-exposure", "1").code == 0
+    assert np.allclose(read_image("b.exr"), whole)
+
+
+def test_wrong_gamma_is_marked(render: Run) -> None:
+    right = render("head.obj", "-o", "a.png", "--gamma", "right")
+    wrong = render("head.obj", "-o", "b.png", "--gamma", "wrong")
+    assert right.stderr == "" and "for comparison" in wrong.stderr and wrong.code == 0
+    assert not np.array_equal(read_image("a.png"), read_image("b.png"))
+
+
+def test_bloom_and_tone_reach_the_picture(render: Run) -> None:
+    plain = picture(render)
+    assert np.array_equal(plain, picture(render, "--tone", "filmic"))  # linear stays linear
+    soft = picture(render, "--bloom", "0.3")
+    assert soft.sum() == pytest.approx(plain.sum(), rel=0.05) and soft.max() < plain.max()
+    curves = []
+    for tone in ("none", "filmic", "neutral"):
+        assert render("head.obj", "-o", "a.png", "--tone", tone).code == 0
+        curves.append(read_image("a.png").astype(int))
+    assert all((a != b).any() for a, b in ((curves[0], curves[1]), (curves[1], curves[2])))
+
+
+@pytest.mark.parametrize(
+    ("words", "culprit", "came"),
+    [
+        ("--env nowhere.hdr", "environment 'nowhere.hdr'", "neither"),
+        ("--env lee_perry_smith", "lee_perry_smith", "a head"),
+        ("--env head.obj", "head.obj", "none"),
+        ("--env-rotation 30", "--env-rotation", "there is none"),
+        ("--env uniform --env-rotation nan", "--env-rotation", "nan"),
+        ("--env uniform --env-exposure -1", "--env-exposure", "-1.0 came"),
+        ("--lights none", "--lights", "'none' has none"),
+        ("--bloom 1.5", "--bloom", "1.5 came"),
+        ("--tone aces", "--tone", "'aces' came"),
+        ("--occlusion some", "--occlusion", "'some' came"),
+    ],
+)
+def test_bad_light_is_refused(render: Run, words: str, culprit: str, came: str) -> None:
+    ended = render("head.obj", *words.split(), "-o", "a.png")
+    assert ended.code == 2 and ended.stdout == ""
+    assert ended.stderr.startswith(f"dermis: {culprit}: expected ") and came in ended.stderr

@@ -1,0 +1,123 @@
+"""Rigs, lights of every kind and environments in scene files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_head import write_head
+
+from dermis.errors import DermisError
+from dermis.scene import (
+    Environment,
+    RectangleLight,
+    Scene,
+    SphereLight,
+    StripeLight,
+    load_lights,
+    load_scene,
+    studio,
+)
+from dermis.scene.files import light_presets
+
+KINDS = """
+[[lights]]
+kind = "rectangle"
+position = [0, 0, 900]
+width_mm = 500
+height_mm = 300
+
+[[lights]]
+kind = "sphere"
+position = [400, 0, 900]
+radius_mm = 40
+
+[[lights]]
+kind = "stripe"
+direction = [-1, 0, 0]
+position = [80, 0, 0]
+up = [0, 1, 1]
+width_mm = 2
+length_mm = 60
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    write_head(tmp_path / "head.obj")
+    return tmp_path
+
+
+def _scene(folder: Path, text: str) -> Scene:
+    path = folder / "scene.toml"
+    path.write_text(text + '\n[head]\nname = "head.obj"\n')
+    return load_scene(path)[0]
+
+
+def test_kinds_of_lights(folder: Path) -> None:
+    scene = _scene(folder, KINDS)
+    assert scene.lights == (
+        RectangleLight(position=(0, 0, 900), width_mm=500, height_mm=300),
+        SphereLight(position=(400, 0, 900), radius_mm=40),
+        StripeLight(direction=(-1, 0, 0), position=(80, 0, 0), up=(0, 1, 1), width_mm=2, length_mm=60),
+    )
+
+
+@pytest.mark.parametrize("name", light_presets())
+def test_every_rig_loads_and_says_what_it_is(name: str) -> None:
+    lights = load_lights(name)
+    assert (len(lights) == 0) == (name == "none")
+    if lights:
+        file = Path(load_lights.__code__.co_filename).parent / "presets" / f"{name}.toml"
+        assert file.read_text().startswith("# ")
+        keys = [sum(light.irradiance) for light in lights]
+        assert max(keys) > 3 and all(light.shadows for light in lights)
+
+
+def test_rigs_are_those_asked_for() -> None:
+    assert light_presets() == ["laser", "none", "rembrandt", "rim", "studio", "top", "window"]
+    assert load_lights("studio") == studio()
+    assert isinstance(load_lights("laser")[0], StripeLight)
+    top, rim = load_lights("top")[0], load_lights("rim")[0]
+    assert isinstance(top, RectangleLight) and top.position[1] > 2 * abs(top.position[2])
+    assert isinstance(rim, RectangleLight) and rim.position[2] < 0
+
+
+def test_an_environment_replaces_the_lights_that_are_not_named(folder: Path) -> None:
+    text = '[environment]\nname = "uniform"\nrotation_degrees = 30\nexposure = 0.5\n'
+    scene = _scene(folder, text)
+    assert scene.environment == Environment(name="uniform", rotation_degrees=30, exposure=0.5)
+    assert scene.lights == ()
+    assert _scene(folder, 'lights = "studio"\n' + text).lights == studio()
+    assert Scene(scene.head, environment=scene.environment).lights == ()
+    assert Scene(scene.head).lights == studio()
+
+
+def test_an_environments_file_lies_beside_the_scene(folder: Path) -> None:
+    (folder / "sky.hdr").write_bytes(b"")
+    scene = _scene(folder, '[environment]\nname = "sky.hdr"\n')
+    assert scene.environment is not None and scene.environment.name == str(folder / "sky.hdr")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[environment]\nexposure = 2\n", "name: expected a value"),
+        ('[environment]\nname = "uniform"\nturn = 2\n', "turn"),
+        ('[environment]\nname = "uniform"\nexposure = -1\n', "-1"),
+        ('[[lights]]\nkind = "sphere"\nposition = [0, 0, 90]\nradius_mm = 100\n', "outside the sphere"),
+        ('[[lights]]\nkind = "stripe"\ndirection = [0, -1, 0]\n', "another direction"),
+        ('[[lights]]\nkind = "rectangle"\nposition = [0, 0, 900]\nwidth_mm = 0\n', "width_mm"),
+    ],
+)
+def test_what_cannot_be_is_refused(folder: Path, text: str, said: str) -> None:
+    with pytest.raises(DermisError, match=said):
+        _scene(folder, text)
+
+
+def test_a_sphere_is_a_point_from_afar() -> None:
+    """The same place and target: what differs is its size alone."""
+    light = SphereLight(position=(0, 0, 900))
+    assert np.isclose(np.linalg.norm(np.subtract(light.target, light.position)), 900)
+    assert light.kind == "sphere"

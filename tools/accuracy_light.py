@@ -1,0 +1,195 @@
+"""Tables of the light's errors for docs/accuracy.md: environments, furnaces, lights of some size, occlusion.
+
+python tools/accuracy_light.py [ADAPTER] prints them alone. The sample data is needed.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+
+import dermis
+from dermis.assets.environment.mirrors import ROUGHEST, SIDE, SMOOTHEST, equivalent_mirrors
+from dermis.assets.environment.panorama import directions, load_panorama, reduced, solid_angles
+from dermis.assets.environment.prefilter import ROUGHNESSES, Prefiltered, prefilter
+from dermis.assets.environment.suns import split_suns
+from dermis.assets.head import Head
+from dermis.assets.primitives import uv_sphere
+from dermis.rendering.projection import frame_of
+from dermis.rendering.rectangles import facing_irradiance
+from dermis.rendering.stages.occlusion import DIRECTIONS, Occlusion
+from dermis.scene import Environment, PointLight, RectangleLight, Scene, Settings, Skin, load_lights
+from dermis.specular.albedo import directional_albedo
+from dermis.specular.cosines import cosines
+from dermis.specular.kelemen import kelemen
+
+MAPS = ("royal_esplanade", "lebombo")
+Array = np.ndarray
+UP = np.array([0.0, 1.0, 0.0])
+
+
+def looked_up(layer: Array, towards: Array) -> Array:
+    """(n, 3) of a layer (h, w, 3) in n directions, bilinear, as the shader reads it."""
+    height, width = layer.shape[:2]
+    x = (0.5 + np.arctan2(towards[:, 0], -towards[:, 2]) / (2 * np.pi)) * width - 0.5
+    y = np.arccos(np.clip(towards[:, 1], -1, 1)) / np.pi * height - 0.5
+    left, top = np.floor(x).astype(int), np.floor(y).astype(int)
+    total = np.zeros((len(towards), 3))
+    for i in (0, 1):
+        for j in (0, 1):
+            weight = np.abs(1 - i - (y - top)) * np.abs(1 - j - (x - left))
+            total += weight[:, None] * layer[np.clip(top + i, 0, height - 1), (left + j) % width]
+    return total
+
+
+def unit(v: Array) -> Array:
+    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
+
+
+def panorama(name: str) -> tuple[Array, Array, Prefiltered]:
+    """Directions and light of a panorama's texels without its suns, and what the frame reads."""
+    radiance = reduced(split_suns(load_panorama(name))[0], 512)
+    light = radiance * solid_angles(*radiance.shape[:2])[..., None]
+    return directions(*radiance.shape[:2]).reshape(-1, 3), light.reshape(-1, 3), prefilter(name)
+
+
+def irradiance_error(name: str, count: int = 200) -> float:
+    """Largest relative error of the irradiance over random normals."""
+    towards, light, made = panorama(name)
+    normals = unit(np.random.default_rng(1).normal(size=(count, 3)))
+    exact = np.array([np.maximum(towards @ normal, 0) @ light for normal in normals])
+    return float(np.abs(looked_up(made.layers[0], normals) / exact - 1).max())
+
+
+def reflection_error(name: str, m: float, cosine: float, count: int = 60) -> float:
+    """Root mean square error of reflected radiance over random normals and views, of its mean."""
+    towards, light, made = panorama(name)
+    rng = np.random.default_rng(2)
+    normals = unit(rng.normal(size=(count, 3)))
+    along = unit(np.cross(normals, rng.normal(size=(count, 3))))
+    views = cosine * normals - np.sqrt(1 - cosine**2) * along
+    exact = []
+    for normal, view in zip(normals, views, strict=True):
+        weight = kelemen(cosines(normal, towards, view), np.array(m)) * np.maximum(towards @ normal, 0)
+        exact.append(weight @ light)
+    across, up, mirror_m = mirror(cosine, m)
+    seen = reflected(made.layers, up * normals + across * along, mirror_m)
+    error = directional_albedo(cosine, m) * seen - np.array(exact)
+    return float(np.sqrt((error**2).mean()) / np.mean(exact))
+
+
+def mirror(cosine: float, m: float) -> Array:
+    """Where the lobe points, and its roughness, between the table's nodes."""
+    x, y = cosine * (SIDE - 1), np.log(m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST) * (SIDE - 1)
+    j, i = min(int(x), SIDE - 2), min(int(y), SIDE - 2)
+    rows = equivalent_mirrors()[i : i + 2, j : j + 2]
+    return np.asarray(np.einsum("i,j,ijk->k", [1 - (y - i), y - i], [1 - (x - j), x - j], rows))
+
+
+def reflected(layers: Array, towards: Array, m: float) -> Array:
+    """Mean radiance under round lobes."""
+    place = (len(ROUGHNESSES) - 1) * np.log(m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST)
+    low = int(np.clip(place, 0, len(ROUGHNESSES) - 2))
+    f = float(np.clip(place - low, 0, 1))
+    near, far = (looked_up(layers[1 + k], towards) for k in (low, low + 1))
+    return np.asarray((1 - f) * near + f * far)
+
+
+def furnace(renderer: dermis.Renderer, head: Head, energy: str, occlusion: str) -> Array:
+    """Least, mean and largest outgoing over incoming radiance of a white head under light from everywhere."""
+    white = replace(head, maps=replace(head.maps, colour=np.ones((4, 4, 3), np.float32)))
+    skin = Skin(energy=energy)  # type: ignore[arg-type]
+    scene = Scene(white, environment=Environment(name="uniform"), skin=skin)
+    settings = Settings(size=(384, 384), atlas=1024, samples=1, occlusion=occlusion)  # type: ignore[arg-type]
+    shown = renderer.draw(scene, settings)
+    inside = shown.linear()[shown._read(shown.picture.exposed)[..., 3] == 1][:, 1]
+    return np.array([inside.min(), inside.mean(), inside.max()])
+
+
+def furnaces(renderer: dermis.Renderer) -> str:
+    """Rows of the furnace table."""
+    ball = dermis.Head("ball", uv_sphere(115.0), dermis.load_head("lee_perry_smith").maps)
+    ball = replace(ball, maps=replace(ball.maps, normal=None, height=None, specular=None, roughness=None))
+    heads = {"sphere": ball, "scan": dermis.load_head("lee_perry_smith")}
+    rows = []
+    for name, head in heads.items():
+        for energy, occlusion in (
+            ("none", "none"),
+            ("published", "none"),
+            ("full", "none"),
+            ("full", "baked"),
+        ):
+            least, mean, most = furnace(renderer, head, energy, occlusion)
+            rows.append(f"| {name} | {energy} | {occlusion} | {least:.3f} | {mean:.4f} | {most:.3f} |")
+    return "\n".join(rows)
+
+
+def as_points(light: RectangleLight, side: int = 8) -> list[PointLight]:
+    """A rectangle as side x side points, each with a shadow map of its own."""
+    position, target = np.array(light.position), np.array(light.target)
+    distance = float(np.linalg.norm(target - position))
+    right, up, forward = frame_of(target - position, UP)
+    area = light.width_mm * light.height_mm / side**2
+    radiance = np.array(light.irradiance) / facing_irradiance(light.width_mm, light.height_mm, distance)
+    points = []
+    for index in range(side**2):
+        x, y = ((2 * k + 1) / side - 1 for k in divmod(index, side))
+        place = position + 0.5 * (x * light.width_mm * right + y * light.height_mm * up)
+        away = target - place
+        given = radiance * area * (unit(away) @ forward) / (away @ away)
+        points.append(PointLight(position=tuple(place), irradiance=tuple(given), softness_mm=2.0))
+    return points
+
+
+def soft_shadow_error(renderer: dermis.Renderer, rig: str) -> tuple[float, float]:
+    """Bias and root mean square difference from 64 points, of the mean radiance."""
+    light = load_lights(rig)[0]
+    assert isinstance(light, RectangleLight)
+    head = dermis.load_head("lee_perry_smith")
+    settings = Settings(size=(384, 384), atlas=256, samples=1, technique="none", shadow_size=1024)
+    made, exact = (
+        renderer.draw(Scene(head, lights=lights), settings).linear() for lights in ([light], as_points(light))
+    )
+    lit = exact.max(axis=-1) > 0
+    error = (made - exact)[lit]
+    return float(error.mean() / exact[lit].mean()), float(np.sqrt((error**2).mean()) / exact[lit].mean())
+
+
+def occlusion_error(renderer: dermis.Renderer) -> float:
+    """Root mean square difference of the open share of the sky from 1024 directions, on the scan."""
+    head = dermis.load_head("lee_perry_smith")
+    inputs, _ = renderer._inputs(Scene(head), Settings(size=(64, 64), atlas=512, samples=1))
+    few, many = (
+        Occlusion(renderer.device, count).bake(
+            head.mesh, inputs.head, inputs.lit, inputs.atlas["atlas"], 512
+        )[:512]
+        for count in (DIRECTIONS, 1024)
+    )
+    return float(np.sqrt(np.nanmean((few - many) ** 2)))
+
+
+def tables(adapter: str = "auto") -> dict[str, str]:
+    """What the page says of light, by the names in its template."""
+    renderer = dermis.Renderer(adapter)
+    shadows = [(rig, *soft_shadow_error(renderer, rig)) for rig in ("window", "top", "rim")]
+    return {
+        "irradiance": f"{max(map(irradiance_error, MAPS)):.1e}",
+        "reflections": "\n".join(
+            f"| {name} | {m} | "
+            + " | ".join(f"{reflection_error(name, m, c):.0%}" for c in (1.0, 0.7, 0.4, 0.2))
+            + " |"
+            for name in MAPS
+            for m in (0.15, 0.3, 0.5)
+        ),
+        "furnaces": furnaces(renderer),
+        "soft_shadows": "\n".join(f"| {rig} | {bias:+.1%} | {rms:.1%} |" for rig, bias, rms in shadows),
+        "occlusion": f"{occlusion_error(renderer):.3f}",
+        "directions": str(DIRECTIONS),
+    }
+
+
+if __name__ == "__main__":
+    for title, text in tables(*sys.argv[1:]).items():
+        sys.stdout.write(f"{title}\n{text}\n\n")

@@ -1,0 +1,95 @@
+"""The surface's part of docs/accuracy.md: tables against their functions, and the white furnace."""
+
+from __future__ import annotations
+
+import timeit
+
+import numpy as np
+from scipy.interpolate import RegularGridInterpolator
+
+from dermis.specular.albedo import TABLE_COSINES, TABLE_ROUGHNESSES, albedo_table, directional_albedo
+from dermis.specular.beckmann import beckmann, beckmann_table
+from dermis.specular.energy import ENERGY, Energy
+from dermis.specular.fresnel import hemispherical_reflectance, schlick
+from dermis.specular.models import MODELS
+
+VIEWS = (np.arange(200) + 0.5) / 200
+LAWS = {
+    "none": ENERGY["none"],
+    "published": ENERGY["published"],
+    "divided by π, light thrown back inside lost": Energy(1.0, returned=False),
+    "full": ENERGY["full"],
+}
+SKINS = ((0.1, 0.18), (0.3, 0.18), (0.5, 0.18), (0.3, 1.0))
+DENSE = (96, 96)
+
+
+def read_albedo(model: str, cosine: np.ndarray, m: np.ndarray) -> np.ndarray:
+    """Albedo and its mean (..., 2) between the table's texels, as the shader reads them."""
+    axes = np.sqrt(TABLE_ROUGHNESSES), np.sqrt(TABLE_COSINES)
+    places = np.stack(np.broadcast_arrays(np.sqrt(m), np.sqrt(cosine)), axis=-1)
+    return np.asarray(RegularGridInterpolator(axes, albedo_table(model).astype(float))(places))
+
+
+def albedo_rows() -> str:
+    """Of each model: the quadrature against a dense one, the table between its texels, and its making."""
+    m, c = np.linspace(0.1, 0.5, 17)[:, None], np.linspace(0.05, 1.0, 39)
+    rows = []
+    for name, model in MODELS.items():
+        if name == "kelemen-direct":
+            continue
+        dense = directional_albedo(c, m, model.lobe, nodes=DENSE)
+        ms = 1e3 * min(timeit.repeat(lambda name=name: albedo_table.__wrapped__(name), number=1, repeat=5))
+        errors = (directional_albedo(c, m, model.lobe), read_albedo(name, c, m)[..., 0])
+        cells = [f"{100 * np.abs(one / dense - 1).max():.1g} %" for one in errors]
+        rows.append(f"| {name} | {' | '.join(cells)} | {ms:.0f} ms |")
+    return "\n".join(rows)
+
+
+def peak_error() -> float:
+    """Largest relative error of the Beckmann table, interpolated, where the lobe can be seen."""
+    m, c = np.meshgrid(np.linspace(0.1, 0.5, 23), np.linspace(0.05, 1.0, 61), indexing="ij")
+    rows, columns = beckmann_table().shape
+    axes = [(np.arange(rows) + 0.5) / rows, np.arange(columns) / (columns - 1)]
+    peak = (2 * RegularGridInterpolator(axes, beckmann_table())(np.stack([m, c], axis=-1))) ** 10
+    truth = beckmann(c, m)
+    seen = truth > 1e-3  # below that the lobe adds nothing that could be seen
+    return float(np.abs(peak[seen] / truth[seen] - 1).max())
+
+
+def furnace_cell(law: Energy, m: float, rho_s: float) -> str:
+    """Least, mean and most of outgoing over incoming light on a white sphere in light from everywhere."""
+    albedo, mean = (read_albedo("kelemen", VIEWS, np.array(m))[..., k] for k in (0, 1))
+    exact = directional_albedo(VIEWS, m)
+    entered = law.enters(mean, rho_s)
+    out = rho_s * exact + entered * law.leaves(albedo, mean, rho_s)
+    return f"{out.min():.3f} {(out * VIEWS).sum() / VIEWS.sum():.3f} {out.max():.3f}"
+
+
+def furnace_rows() -> str:
+    """The furnace of each way to count energy."""
+    return "\n".join(
+        f"| {name} | {' | '.join(furnace_cell(law, m, rho_s) for m, rho_s in SKINS)} |"
+        for name, law in LAWS.items()
+    )
+
+
+def tables() -> dict[str, str]:
+    """Everything that the page has room for, by the names it uses."""
+    below = (np.arange(4000) + 0.5) / 4000
+    kelemen = float((directional_albedo(below, 0.3) * below).sum() / below.sum())
+    return {
+        "albedos": albedo_rows(),
+        "peak": f"{100 * peak_error():.1f} %",
+        "furnace": furnace_rows(),
+        "smooth": f"{hemispherical_reflectance():.1%}",
+        "smooth_schlick": f"{hemispherical_reflectance(schlick):.1%}",
+        "rough": f"{kelemen:.1%}",
+        "rough_in_use": f"{0.18 * kelemen:.1%}",
+    }
+
+
+if __name__ == "__main__":
+    import sys
+
+    sys.stdout.write("\n\n".join(f"{name}:\n{value}" for name, value in tables().items()) + "\n")
