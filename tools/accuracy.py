@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import accuracy_light as light
 import accuracy_optics as optics
 import accuracy_specular as specular
 import numpy as np
@@ -93,6 +94,7 @@ def main() -> None:
             constant=f"{constant_light(device):.1e}",
             rounding=half_store_rounding(device),
             **specular.tables(),
+            **light.tables(*sys.argv[1:2]),
             **optics.tables(),
         ),
         encoding="utf-8",

@@ -24,6 +24,7 @@ from dermis.scene.lights import DirectionalLight, Light, RectangleLight, SphereL
 
 Floats = NDArray[np.float64]
 SIZE = 32
+SHAPED = (("SHAPES", 1),)
 FLOOR = head_of(plane(200.0, 4))
 PLATE = head_of(
     joined((plane(120.0, 6), (0, 0, 0), (0, 0, 0.7)), (plane(30.0, 2), (-15, 0, 12), (0.75, 0.75, 0.2)))
@@ -117,6 +118,7 @@ def test_parts_are_numpys(renderer: Renderer, kind: str, part: int) -> None:
         "light_probe",
         (SIZE, SIZE),
         ["towards", "arriving"],
+        SHAPED,
         **lit,
         **textures,
         part={"index": part},
@@ -164,6 +166,7 @@ def visibility(renderer: Renderer, head: Any, light: Light, size: int = 1024) ->
             "light_probe",
             (SIZE, SIZE),
             ["towards", "arriving"],
+            SHAPED,
             **(inputs.lit | {"lights": records}),
             **textures,
             part={"index": 0},
@@ -213,6 +216,7 @@ def test_soft_visibility_is_numpys(renderer: Renderer, kind: str) -> None:
         "light_probe",
         (SIZE, SIZE),
         ["towards", "arriving"],
+        SHAPED,
         **inputs.lit,
         **textures,
         part={"index": 0},

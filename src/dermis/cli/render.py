@@ -79,8 +79,8 @@ def render(
     Parameters
     ----------
     head:
-        bust, the head that the package makes [the default], a sample (lee_perry_smith), a mesh (.glb .gltf .obj
-        .ply) or a scene (.toml).
+        bust, the head that the package makes [the default], a sample (lee_perry_smith), a mesh (.glb .gltf
+        .obj .ply) or a scene (.toml).
     output:
         Image to write: .png (sRGB, 8 bit) or .exr (linear Rec. 709, float).
     size:

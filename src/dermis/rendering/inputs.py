@@ -19,8 +19,8 @@ from dermis.rendering.stages.bloom import Glow
 from dermis.rendering.stages.diffuse import Levels
 from dermis.rendering.stages.nearest import Layers
 from dermis.rendering.stages.post import Picture
-from dermis.rendering.stages.variants import Switches
 from dermis.rendering.stages.shadows import ShadowMaps
+from dermis.rendering.stages.variants import Switches
 from dermis.scene.camera import Camera
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings

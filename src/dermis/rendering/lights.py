@@ -54,11 +54,9 @@ def sun_lights(suns: tuple[Sun, ...], environment: Environment) -> tuple[Directi
 
 def light_switches(scene: Scene) -> Switches:
     """Values of the `override`s of lights.wgsl and environment.wgsl."""
-    shaped = any(
-        isinstance(light, StripeLight | RectangleLight | SphereLight)
-        or getattr(light, "angle_degrees", 0) > 0
-        for light in scene.lights
-    )
+    shapes = StripeLight, RectangleLight, SphereLight
+    wide = any(isinstance(light, DirectionalLight) and light.angle_degrees > 0 for light in scene.lights)
+    shaped = wide or any(isinstance(light, shapes) for light in scene.lights)
     return (("SHAPES", 1),) * shaped + (("ENVIRONMENT", 1),) * (scene.environment is not None)
 
 

@@ -31,7 +31,7 @@ def remesh(surface: Surface, field: Field, size: Field, rounds: int) -> Surface:
 
 
 def part_bridges(surface: Surface, field: Field) -> Surface:
-    """Edges inside the half that join two points of its border, cut: their mirror images would be the same."""
+    """Edges inside the half that join two points of its border, cut: they would be their own images."""
     p, t, border = surface.points, surface.triangles, surface.on_border
     ends, of_side, counts = edges(t)
     bridge = (counts == 2) & border[ends].all(axis=1)

@@ -2,7 +2,7 @@
 
 const STEPS: u32 = 8u; // of a line of sight to a light of some size
 const THICKNESS: f32 = 4.0; // that what hides has at least [mm]
-const STEEP: f32 = 1.5;
+const STEEP: f32 = 1.5; // steps by which a line may be behind a surface just before it goes through
 const LEAST_PROBES: u32 = 8u; // lines of sight that may stand for all
 const LEAST_TEXELS: f32 = 1.5; // half width of the sharpest soft shadow's edge
 
@@ -104,7 +104,7 @@ fn hides(light: Light, at: Receiver, least: f32, place: vec2f) -> u32 {
         let found = depth_of(light, nearness);
         let blocker = select(vec3f(found * line, found), vec3f(line, found), parallel);
         let slack = 2.0 * light.texel * select(found, 1.0, parallel);
-        // Before it goes through a surface a line is behind it by about the next step.
+        // A line farther behind went past the edge of what is in front.
         let thickness = max(THICKNESS, STEEP * (depth - depth_on_line(light, at.depth, f32(k) + 1.5)));
         let behind = depth - found;
         if (nearness > 0.0 && behind > 0.0 && behind < thickness && dot(at.normal, blocker) - at.height > slack) {
