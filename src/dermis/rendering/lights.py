@@ -124,19 +124,21 @@ def _add_shape(record: Any, light: Light, centre: Floats, distance: float) -> No
     if isinstance(light, SpotLight):
         record["cos_inner"] = np.cos(np.radians(light.inner_degrees))
         record["cos_outer"] = np.cos(np.radians(light.outer_degrees))
-    right, up, forward = (np.array(axis) for axis in frame_of(record["direction"].astype(float), _UP))
-    if isinstance(light, StripeLight):
-        right, up, _ = frame_of(forward, np.array(light.up))
+    elif isinstance(light, StripeLight):
+        right, up, _ = frame_of(record["direction"].astype(float), np.array(light.up))
         record["position"] = np.array(light.position) + centre
         record["half_u"], record["half_v"] = 2.0 * right / light.width_mm, 2.0 * up / light.length_mm
     elif isinstance(light, DirectionalLight):
         record["extent"] = np.tan(0.5 * np.radians(light.angle_degrees))
     elif isinstance(light, RectangleLight):
-        half = 0.5 * light.width_mm * right, 0.5 * light.height_mm * up
-        record["half_u"], record["half_v"] = half
-        record["extent"] = 0.5 * light.width_mm, 0.5 * light.height_mm
+        _add_sides(record, 0.5 * light.width_mm, 0.5 * light.height_mm)
         record["irradiance"] /= facing_irradiance(light.width_mm, light.height_mm, distance)
     elif isinstance(light, SphereLight):
-        record["half_u"], record["half_v"] = light.radius_mm * right, light.radius_mm * up
-        record["extent"] = light.radius_mm
+        _add_sides(record, light.radius_mm, light.radius_mm)
         record["irradiance"] /= np.pi * (light.radius_mm / distance) ** 2
+
+
+def _add_sides(record: Any, half_width: float, half_height: float) -> None:
+    right, up, _ = frame_of(record["direction"].astype(float), _UP)
+    record["half_u"], record["half_v"] = half_width * right, half_height * up
+    record["extent"] = half_width, half_height
