@@ -26,7 +26,7 @@ from dermis.errors import refuse
 from dermis.images.codecs import encode_png8, encode_png16
 from dermis.images.colour import encode_srgb8
 from dermis.images.fill import fill_empty
-from dermis.outputs import replacing
+from dermis.outputs import refuse_output, replacing
 
 Floats = NDArray[np.float32]
 Report = Callable[[int, int], None]
@@ -63,7 +63,10 @@ def cached_bust(name: str) -> Path:
     recipe = BustRecipe(layout="few" if name == BUSTS[0] else "many")
     path = cache_folder() / "bust" / f"{name}-{_digest(recipe)}.glb"
     if not path.is_file():
-        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as fault:
+            refuse_output(path, fault)
         write_bust(path, recipe)
     return path
 
