@@ -44,6 +44,12 @@ SPREAD_ENERGY = 0.002
 SPREAD_VARIANCE = 0.002
 """Second moment of a blurred point against the one asked for, relative: the stretch map holds halves."""
 
+SHEARED_PEAK = 0.03
+"""A blurred point on a sheared map against the analytic one, of the peak: light is read between texels."""
+
+SHEARED_VARIANCE = 0.03
+"""Its second moments, along all directions alike, of the variance asked for."""
+
 MAP_NORMAL = 1e-3
 """Normals from slopes stored as halves, between texels that a sampler weighs in 1/256."""
 

@@ -110,7 +110,7 @@ def part_of(light: Any, points: Floats, part: int) -> tuple[Floats, Floats]:
 
 
 def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) -> Floats:
-    """(n,) share of a light of some size that points see, by lines through its map of depths (s, s).
+    """(n,) share that points see of what rises of a light of some size, by lines through its map of depths (s, s).
 
     light : the shader's record, points and normals : (n, 3)
     """
@@ -129,7 +129,7 @@ def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) ->
             return np.asarray((1 - way) * depth + way * near)
         return np.asarray(1 / ((1 - way) / depth + way / near))
 
-    hidden = []
+    risen, hidden = [], []
     for index in range(int(light["lines"])):
         even = (0.5 + index * np.array([0.7548776662, 0.5698402910])) % 1
         turn = 2 * np.pi * even[1]
@@ -138,7 +138,8 @@ def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) ->
         lateral = spot * light["extent"].astype(float)
         straight = np.column_stack([lateral - p[:, :2], -depth])
         towards = np.array([*lateral, -1.0]) if parallel else straight
-        blocked = dot(n, np.broadcast_to(towards, n.shape)) <= 0
+        risen.append(dot(n, np.broadcast_to(towards, n.shape)) > 0)
+        blocked = np.zeros(len(points), bool)
         for k in range(8):
             d = on_line(k + 0.5)
             lean = depth - d if parallel else 1 / d - 1 / depth
@@ -153,9 +154,15 @@ def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) ->
             behind = d - found
             blocked |= (held > 0) & (behind > 0) & (behind < thick) & (dot(n, blocker) - height > slack)
         hidden.append(blocked)
-    probes = max(len(hidden) // 4, 8)
-    few = np.mean(hidden[:probes], axis=0)
-    return np.where((few == 0) | (few == 1), 1 - few, 1 - np.mean(hidden, axis=0))
+    above, blocked = np.array(risen), np.array(hidden)
+    first = above & (np.cumsum(above, axis=0) <= max(len(above) // 4, 8))
+    few, all_ = (_share(blocked, some) for some in (first, above))
+    return np.where(above.any(axis=0), 1 - np.where((few == 0) | (few == 1), few, all_), 0.0)
+
+
+def _share(blocked: Any, among: Any) -> Floats:
+    """Share of lines blocked among some, by point."""
+    return np.asarray((blocked & among).sum(axis=0) / np.maximum(among.sum(axis=0), 1))
 
 
 def halved(picture: Floats) -> Floats:

@@ -277,8 +277,7 @@ def test_a_ball_does_not_shade_itself(renderer: Renderer, kind: str) -> None:
         for shadows in (False, True)
     )
     assert (shaded <= plain + 1e-6).all()
-    bright = plain > 0.5 * plain.max()
-    assert (shaded[bright] > 0.99 * plain[bright]).all()
+    assert (plain - shaded).max() < AREA_LIGHT * plain.max()  # also where a part of the light has set
 
 
 def test_too_many_parts_are_refused(renderer: Renderer) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,15 +10,14 @@ import pytest
 import twins
 from numpy.typing import NDArray
 from setups import bent_plane
-from tolerances import FLAT, SPREAD_ENERGY, SPREAD_PEAK, SPREAD_VARIANCE, TWIN
+from tolerances import FLAT, SHEARED_PEAK, SHEARED_VARIANCE, SPREAD_ENERGY, SPREAD_PEAK, SPREAD_VARIANCE, TWIN
 
 from dermis.assets.atlas import Atlas, build_atlas
 from dermis.assets.primitives import plane, uv_sphere
 from dermis.gpu import Device, Frame, download, make_texture, upload
-from dermis.gpu.textures import texture_from
 from dermis.optics.profiles import load_profile
 from dermis.rendering.frame import Stages
-from dermis.rendering.maps import upload_atlas
+from dermis.rendering.maps import AtlasTextures, upload_atlas
 from dermis.rendering.stages.diffuse import Diffuse
 
 Floats = NDArray[np.float64]
@@ -26,39 +26,65 @@ BLURRED = PROFILE.variance_mm2[1:]
 
 
 def blur(
-    device: Device, diffuse: Diffuse, source: Floats, resources: Any, variances: Floats = BLURRED
+    device: Device,
+    diffuse: Diffuse,
+    source: Floats,
+    atlas: AtlasTextures,
+    variances: Floats = BLURRED,
+    **edge: Any,
 ) -> list[Floats]:
-    """Levels of the stage over an (n, n, 3) source."""
+    """Levels of the stage over an (n, n, 3) source, or (n, n, 4) with its coverage."""
     size = len(source)
     space = diffuse.make_levels(size, len(variances))
-    upload(device, space.stack, np.dstack([source, np.ones((size, size))]))
+    upload(device, space.stack, np.dstack([source, np.ones((size, size))])[..., :4])
     frame = Frame(device)
-    diffuse.draw(frame, space, resources, variances)
+    diffuse.draw(frame, space, atlas, variances, **edge)
     frame.submit()
     return [download(device, space.stack, layer=k + 1)[..., :3].astype(float) for k in range(len(variances))]
 
 
-def random_layout(size: int) -> tuple[NDArray[np.float16], NDArray[np.uint8]]:
+def random_atlas(size: int, shear: float) -> Atlas:
     """Stretch from coarse to fine, with some texels empty, and charts that end anywhere in the map."""
     rng = np.random.default_rng(11)
     stretch = np.exp(rng.uniform(np.log(0.2), np.log(12.0), (size, size, 2))).astype(np.float16)
-    stretch[rng.random((size, size)) < 0.05] = 0
+    triangle = np.where(rng.random((size, size)) < 0.05, -1, 0).astype(np.int32)
+    stretch[triangle < 0] = 0
     y, x = np.indices((size, size))
     room = np.stack([x, size - 1 - x, y, size - 1 - y], axis=-1)
-    return stretch, np.minimum(room, rng.integers(0, 40, room.shape)).astype(np.uint8)
+    return replace(
+        build_atlas(plane(40.0), size),
+        triangle=triangle,
+        stretch=stretch,
+        shear=rng.uniform(-shear, shear, (size, size)).astype(np.float16),
+        reach=np.minimum(room, rng.integers(0, 40, room.shape)).astype(np.uint16),
+    )
 
 
-def test_twin(device: Device, stages: Stages) -> None:
-    stretch, reach = random_layout(64)
+def metric(atlas: Atlas) -> Floats:
+    return np.dstack([atlas.stretch, atlas.shear]).astype(float)
+
+
+@pytest.mark.parametrize("shear", [0.0, 0.8])
+@pytest.mark.parametrize("edge", ["repeated", "skipped"])
+def test_twin(device: Device, stages: Stages, shear: float, edge: str) -> None:
+    atlas = random_atlas(64, shear)
     source = np.random.default_rng(2).random((64, 64, 3)).astype(np.float32).astype(float)
-    resources = {
-        "stretch_map": texture_from(device, stretch, "rg16float"),
-        "reach_map": texture_from(device, reach, "rgba8uint"),
-    }
-    made = blur(device, stages.diffuse, source, resources)
-    expected = twins.levels(source, stretch.astype(float), reach, BLURRED)
-    for level, twin in zip(made, expected, strict=True):
+    made = blur(device, stages.diffuse, source, upload_atlas(device, atlas), edge=edge)
+    reach = atlas.reach if edge == "repeated" else None
+    for level, twin in zip(made, twins.levels(source, metric(atlas), reach, BLURRED), strict=True):
         assert np.abs(level - twin).max() < TWIN
+
+
+def test_empty_texels_show_the_clear_colour(device: Device, stages: Stages) -> None:
+    """Black bleeds in where they are black; constant light stays constant where they have its colour."""
+    atlas = build_atlas(plane(60.0, 2, uv_scale=0.7), 64)
+    source, resources = atlas.coverage[..., None] * np.ones(4), upload_atlas(device, atlas)
+    black, white = (
+        blur(device, stages.diffuse, source, resources, edge="cleared", clear=(level,) * 3)[-1]
+        for level in (0.0, 1.0)
+    )
+    assert black[atlas.coverage].min() < 0.8
+    assert np.abs(white[atlas.coverage] - 1).max() < FLAT
 
 
 def test_combined_twin(device: Device, stages: Stages) -> None:
@@ -142,9 +168,8 @@ def test_the_order_of_the_axes_does_not_matter(device: Device, stages: Stages) -
     """Where the stretch is the same everywhere, first along v and then along u is the same blur."""
     atlas = build_atlas(plane(40.0), 64)
     source = np.random.default_rng(9).random((64, 64, 3))
-    other = Diffuse(device)
-    other._along.reverse()
-    resources = upload_atlas(device, atlas)
+    other, resources = Diffuse(device), upload_atlas(device, atlas)
+    other._along(resources.sheared, "repeated").reverse()
     first, swapped = (blur(device, stage, source, resources) for stage in (stages.diffuse, other))
     assert max(np.abs(a - b).max() for a, b in zip(first, swapped, strict=True)) < TWIN
 
@@ -166,3 +191,38 @@ def test_one_wide_gaussian_alone_is_smooth(device: Device, stages: Stages, texel
     exact = np.exp(-r2 / (2 * 7.41)) / (2 * np.pi * 7.41) * area
     assert np.abs(image[..., 0] - exact).max() < SPREAD_PEAK * exact.max()
     assert image[..., 0].sum() == pytest.approx(1.0, rel=SPREAD_ENERGY)
+
+
+# u and v by the patch's places (x, y) from 0 to 1.
+SHEARED = {
+    "sheared 45": [[0.5, 0.5, 0.0], [0.0, 1.0, 0.0]],
+    "sheared -45": [[0.5, -0.5, 0.5], [0.0, 1.0, 0.0]],
+    "rotated 30": [[0.63, -0.36, 0.36], [0.36, 0.63, 0.0]],
+    "4 : 1 sheared": [[0.8, 0.2, 0.0], [0.0, 0.25, 0.0]],
+}
+
+
+@pytest.mark.parametrize("name", SHEARED)
+def test_sheared_maps_spread_light_in_circles(device: Device, stages: Stages, name: str) -> None:
+    """Against the sum of Gaussians by distance on the surface, and in all directions alike."""
+    mesh = bent_plane(60.0, SHEARED[name])
+    atlas = build_atlas(mesh, 256)
+    position = atlas.interpolate(mesh, mesh.positions)
+    y, x = np.unravel_index(
+        np.argmin(np.where(atlas.coverage, (position**2).sum(axis=-1), np.inf)), atlas.coverage.shape
+    )
+    source = np.zeros((256, 256, 3))
+    source[y, x] = 1.0
+    matrix = np.array(SHEARED[name])[:, :2]
+    area = (60.0 / 256) ** 2 / abs(np.linalg.det(matrix))
+    away = position - position[y, x]
+    for variance, level in zip(
+        BLURRED, blur(device, stages.diffuse, source, upload_atlas(device, atlas)), strict=True
+    ):
+        if variance * 256**2 / 60**2 * np.linalg.eigvalsh(matrix @ matrix.T)[0] < 2.0:
+            continue  # finer than the texels are wide
+        image = np.where(atlas.coverage, level[..., 0], 0.0)
+        exact = np.exp(-(away**2).sum(axis=-1) / (2 * variance)) / (2 * np.pi * variance) * area
+        assert np.abs(image - exact)[atlas.coverage].max() < SHEARED_PEAK * exact.max()
+        moments = np.einsum("yx,yxi,yxj->ij", image, away[..., :2], away[..., :2]) / image.sum()
+        assert np.allclose(moments, variance * np.eye(2), atol=SHEARED_VARIANCE * variance)

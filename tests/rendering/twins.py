@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import map_coordinates
@@ -31,41 +33,100 @@ def _table_ratio(relative: Floats) -> Floats:
     return np.asarray(low + (high - low) * (row % 1))
 
 
+class Kernel(NamedTuple):
+    """For each texel: texels between taps, taps on each side, the first tap's weight over the centre's."""
+
+    step: NDArray[np.int64]
+    taps: NDArray[np.int64]
+    q: Floats
+
+    @classmethod
+    def of(cls, variance: Floats, step: Floats) -> Kernel:
+        """variance : [texel^2]"""
+        relative = variance / step**2
+        wide = relative > WIDEST
+        taps = np.ceil(np.where(wide, WIDE_TRUNCATION, TRUNCATION) * np.sqrt(relative)).astype(int)
+        narrow = _table_ratio(np.minimum(relative, WIDEST))
+        return cls(step.astype(int), taps, np.where(wide, np.exp(-0.5 / np.maximum(relative, 1)), narrow))
+
+    def weight(self, n: int) -> Floats:
+        return np.asarray(np.where(n <= self.taps, self.q ** (n * n), 0.0))
+
+
+def _step(sigma: Floats, sigma_before: Floats) -> Floats:
+    return np.asarray(np.maximum(1, np.floor(np.minimum(SMOOTH * sigma_before, sigma))))
+
+
+def _added_by_lean(lean: Floats, kernel: Kernel) -> Floats:
+    """Variance [texel^2] that reading between two texels adds."""
+    added, total = np.zeros(lean.shape), np.ones(lean.shape)
+    for n in range(1, kernel.taps.max() + 1):
+        f = (lean * n * kernel.step) % 1.0
+        added += 2 * kernel.weight(n) * f * (1 - f)
+        total += 2 * kernel.weight(n)
+    return np.asarray(added / total)
+
+
+def _between(source: Floats, y: NDArray[np.int64], x: Floats) -> Floats:
+    """Texels of row y between two columns; the outermost ones repeat themselves beyond the texture."""
+    n = len(source)
+    column = np.floor(x).astype(int)
+    one, other = (source[np.clip(y, 0, n - 1), np.clip(column + k, 0, n - 1)] for k in (0, 1))
+    return np.asarray(one + (other - one) * (x - column)[..., None])
+
+
 def spread(
-    source: Floats, stretch: Floats, reach: NDArray[np.uint8], variance: float, before: float, axis: int
+    source: Floats,
+    metric: Floats,
+    reach: NDArray[np.integer] | None,
+    variance: float,
+    before: float,
+    axis: int,
 ) -> Floats:
     """One axis of one Gaussian of variance [mm2] added to a source that has `before` already.
 
-    source : (n, n, c) light, stretch : (n, n, 2) [texel/mm], reach : (n, n, 4) left, right, up, down
+    source : (n, n, 4) light and coverage, metric : (n, n, 3) texels per mm along u, v and the cosine between
+    reach : (n, n, 4) left, right, up, down; None reads whatever the texture holds
     """
-    scale = stretch[..., axis].astype(np.float64)
-    sigma, sigma_before = np.sqrt(variance) * scale, np.sqrt(before) * scale
-    step = np.maximum(1, np.floor(np.minimum(SMOOTH * sigma_before, sigma)))
-    relative = (sigma / step) ** 2
-    wide = relative > WIDEST
-    taps = np.ceil(np.where(wide, WIDE_TRUNCATION, TRUNCATION) * np.sqrt(relative)).astype(int)
-    q = np.where(wide, np.exp(-0.5 / np.maximum(relative, 1)), _table_ratio(np.minimum(relative, WIDEST)))
-    y, x = np.indices(scale.shape)
-    behind, ahead = reach[..., 2 * axis].astype(int), reach[..., 2 * axis + 1].astype(int)
-    total, weights = source.copy(), np.ones(scale.shape)
-    for n in range(1, taps.max() + 1):
-        weight = np.where(n <= taps, q ** (n * n), 0.0)
-        for sign, limit in ((-1, behind), (1, ahead)):
-            move = sign * np.minimum(n * step.astype(int), limit)
-            there = source[y + move, x] if axis else source[y, x + move]
-            total += weight[..., None] * there
-        weights += 2 * weight
-    return np.asarray(np.where(scale[..., None] > 0, total / weights[..., None], 0.0))
+    along_u, along_v, cosine = np.moveaxis(np.asarray(metric, float), -1, 0)
+    covered = along_v > 0
+    lean = np.where(covered, -cosine * along_u / np.where(covered, along_v, 1), 0.0)
+    upright = along_v / np.sqrt(1 - cosine**2)
+    sigma, sigma_before = (np.sqrt(v) * np.stack([along_u, upright]) for v in (variance, before))
+    step = _step(sigma, sigma_before)
+    kernel = Kernel.of(sigma[1] ** 2, step[1])
+    if axis == 0:
+        kernel = Kernel.of(np.maximum(0, sigma[0] ** 2 - _added_by_lean(lean, kernel)), step[0])
+    y, x = np.indices(lean.shape)
+    total = source.copy()
+    for n in range(1, kernel.taps.max() + 1):
+        weight = kernel.weight(n)[..., None]
+        for side, sign in enumerate((-1, 1)):
+            move = n * kernel.step
+            move = sign * (
+                move if reach is None else np.minimum(move, reach[..., 2 * axis + side].astype(int))
+            )
+            total += weight * (
+                _between(source, y + move, x + lean * move) if axis else _between(source, y, x + move)
+            )
+    share = np.where(covered, total[..., 3], 1.0)[..., None]
+    return np.asarray(np.where(covered[..., None], total / share, 0.0))
 
 
-def levels(source: Floats, stretch: Floats, reach: NDArray[np.uint8], variances: ArrayLike) -> list[Floats]:
-    """The blurred levels, each from the one before."""
-    made, before = [source], 0.0
+def levels(
+    source: Floats, metric: Floats, reach: NDArray[np.integer] | None, variances: ArrayLike
+) -> list[Floats]:
+    """The blurred levels of (n, n, 3) light, each from the one before.
+
+    metric : (n, n, 2 or 3) texels per mm along u, v, and the cosine between them, 0 when left out
+    """
+    metric = np.concatenate([metric, np.zeros((*metric.shape[:2], 3 - metric.shape[2]))], axis=-1)
+    made, before = [np.dstack([source, np.ones(source.shape[:2])])], 0.0
     for variance in np.asarray(variances, float):
-        along_u = spread(made[-1], stretch, reach, variance - before, before, 0)
-        made.append(spread(along_u, stretch, reach, variance - before, before, 1))
+        along_u = spread(made[-1], metric, reach, variance - before, before, 0)
+        made.append(spread(along_u, metric, reach, variance - before, before, 1))
         before = float(variance)
-    return made[1:]
+    return [level[..., :3] for level in made[1:]]
 
 
 def gaussian_sum(profile: GaussianSum, first: int, r2_mm2: Floats) -> Floats:

@@ -16,6 +16,7 @@ from dermis.errors import refuse
 ALL_ROWS = slice(None)
 GUTTER = 3  # texels around each chart, so that interpolation at its edge finds light
 _SMALLEST = 64
+MOST_SHEAR = 0.9  # a map that is sheared more is blurred as if by this much
 _LEAST_TEXELS = 4.0  # a chart with less uv area than this holds nothing that could be blurred
 
 
@@ -26,14 +27,22 @@ class Atlas:
     triangle : (n, n) int32 triangle at the texel's centre, nearest one in the gutter, -1 elsewhere
     barycentric : (n, n, 2) uint16 weights of the triangle's second and third corner [1/65535]
     stretch : (n, n, 2) float16 texels per mm along u and v [1/mm]
+    shear : (n, n) float16 cosine of the angle that the directions of u and v make on the surface
     reach : (n, n, 4) uint16 texels to the left, right, up and down that are on the same chart
+    place : (f, 3, 2) float32 uv of each triangle's corners in the atlas, v down
+    apron : (a, 2) uint16 texels (x, y) beyond a chart's edge, which show what other texels compute
+    source : (a, 2) float32 where that is [texel], whole numbers at texel centres
     mapped : (f,) triangles that own texels; the others (opaque, collapsed, overlapped in uv) are lit directly
     """
 
     triangle: NDArray[np.int32]
     barycentric: NDArray[np.uint16]
     stretch: NDArray[np.float16]
+    shear: NDArray[np.float16]
     reach: NDArray[np.uint16]
+    place: NDArray[np.float32]
+    apron: NDArray[np.uint16]
+    source: NDArray[np.float32]
     mapped: NDArray[np.bool_]
 
     @property
@@ -46,6 +55,13 @@ class Atlas:
         """(n, n) texels that hold surface, gutter included."""
         covered: NDArray[np.bool_] = self.triangle >= 0
         return covered
+
+    @property
+    def own(self) -> NDArray[np.bool_]:
+        """(n, n) texels that hold surface of their own, gutter included, the aprons not."""
+        own = self.coverage
+        own[self.apron[:, 1], self.apron[:, 0]] = False
+        return own
 
     def unscattered(self, mesh: Mesh) -> float:
         """Share of the skin's triangles that own no texels [0..1]."""
@@ -87,8 +103,20 @@ def build_atlas(mesh: Mesh, size: int) -> Atlas:
     mapped &= _readable(mesh, size, owner)
     barycentric = _barycentric(mesh, size, owner)
     chart_map = np.where(owner >= 0, chart[np.maximum(owner, 0)], -1)
-    stretch = _stretch(mesh, size, owner, barycentric)
-    return Atlas(owner, barycentric, stretch, _reach(chart_map), mapped)
+    stretch, shear = _metric(mesh, size, owner, barycentric)
+    place = mesh.uv[mesh.triangles]
+    none = np.zeros((0, 2))
+    return Atlas(
+        owner,
+        barycentric,
+        stretch,
+        shear,
+        _reach(chart_map),
+        place,
+        none.astype(np.uint16),
+        none.astype(np.float32),
+        mapped,
+    )
 
 
 def _overlapped(
@@ -159,19 +187,23 @@ def _barycentric(mesh: Mesh, size: int, owner: NDArray[np.int32]) -> NDArray[np.
     return whole
 
 
-def _stretch(
+def _metric(
     mesh: Mesh, size: int, owner: NDArray[np.int32], barycentric: NDArray[np.uint16]
-) -> NDArray[np.float16]:
-    """Texels per mm along u and v from the interpolated derivatives."""
+) -> tuple[NDArray[np.float16], NDArray[np.float16]]:
+    """Texels per mm along u and v, and the cosine between the two, from the interpolated derivatives."""
     y, x = np.nonzero(owner >= 0)
     corners = mesh.triangles[owner[y, x]]
     b = barycentric[y, x] / np.float32(65535)
     weights = np.stack([1 - b[:, 0] - b[:, 1], b[:, 0], b[:, 1]])
-    mm = np.stack([np.linalg.norm(mesh.dpdu, axis=1), np.linalg.norm(mesh.dpdv, axis=1)], axis=-1)
-    interpolated = sum(weights[k][:, None] * mm[corners[:, k]] for k in range(3))
-    whole = np.zeros((size, size, 2), dtype=np.float16)
-    whole[y, x] = np.clip(size / np.maximum(interpolated, 1e-3), 0.0, 6e4)
-    return whole
+    du, dv = (np.linalg.norm(d, axis=1) for d in (mesh.dpdu, mesh.dpdv))
+    cosine = (mesh.dpdu * mesh.dpdv).sum(axis=1) / np.maximum(du * dv, 1e-12)
+    corner = np.stack([du, dv, cosine], axis=-1)
+    interpolated = sum(weights[k][:, None] * corner[corners[:, k]] for k in range(3))
+    stretch = np.zeros((size, size, 2), dtype=np.float16)
+    stretch[y, x] = np.clip(size / np.maximum(interpolated[:, :2], 1e-3), 0.0, 6e4)
+    shear = np.zeros((size, size), dtype=np.float16)
+    shear[y, x] = np.clip(interpolated[:, 2], -MOST_SHEAR, MOST_SHEAR)
+    return stretch, shear
 
 
 def _reach(chart: NDArray[np.integer]) -> NDArray[np.uint16]:

@@ -33,7 +33,9 @@ def draw_frame(frame: Frame, stages: Stages, inputs: Inputs) -> None:
     head, atlas, lit, levels = inputs.head, inputs.atlas, inputs.lit, inputs.levels
     stages.shadows.draw(frame, inputs.shadow_maps, inputs.light_clips, head, inputs.shadow_key)
     if inputs.scatters:
-        stages.irradiance.draw(frame, lit, inputs.light_switches, atlas, levels.views[0], levels.size)
+        stages.irradiance.draw(
+            frame, lit, inputs.light_switches, atlas.resources, levels.views[0], levels.size
+        )
         stages.diffuse.draw(frame, levels, atlas, inputs.blurred_mm2)
         stages.combine.draw(frame, levels, inputs.level_weight, inputs.scattered)
     stages.visibility.draw(frame, inputs.seen, inputs.camera_clips, head)

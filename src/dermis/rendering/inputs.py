@@ -12,7 +12,7 @@ from dermis.assets.head import Head
 from dermis.errors import refuse
 from dermis.gpu import ComputeProgram
 from dermis.optics.gaussians import GaussianSum
-from dermis.rendering.maps import HeadTextures
+from dermis.rendering.maps import AtlasTextures, HeadTextures
 from dermis.rendering.projection import Matrix, depth_range, frame_of, perspective
 from dermis.rendering.samples import pixel_samples
 from dermis.rendering.stages.bloom import Glow
@@ -46,7 +46,7 @@ class Inputs:
     """
 
     head: HeadTextures
-    atlas: dict[str, Any]
+    atlas: AtlasTextures
     lit: dict[str, Any]
     shadow_maps: ShadowMaps
     light_clips: list[Matrix]

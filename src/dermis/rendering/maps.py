@@ -39,6 +39,21 @@ class HeadTextures:
     unscattered: float
 
 
+@dataclass(frozen=True)
+class AtlasTextures:
+    """What the shaders read of an atlas, by the names they use.
+
+    resources : atlas, stretch_map and reach_map
+    sheared : whether u and v meet at other than right angles somewhere
+    apron, gathered : the list of texels beyond the charts' edges and space for their light; None without any
+    """
+
+    resources: dict[str, Any]
+    sheared: bool
+    apron: Any = None
+    gathered: Any = None
+
+
 def upload_head(
     device: Device, head: Head, atlas: Atlas, use_colour: bool, decoded: bool = True
 ) -> HeadTextures:
@@ -52,7 +67,7 @@ def upload_head(
     colour = maps.colour if use_colour and maps.colour is not None else white * (0.8 if use_colour else 1.0)
     colour = colour if decoded else encode_srgb(colour)
     resources = {
-        "triangle_table": texture_from(device, _triangle_table(mesh, atlas.mapped), "rgba32uint"),
+        "triangle_table": texture_from(device, _triangle_table(mesh, atlas), "rgba32uint"),
         "vertex_table": texture_from(device, _vertex_table(mesh), "rgba32float"),
         "map_sampler": device.sampler(mag_filter="linear", min_filter="linear", mipmap_filter="linear"),
         "colour_map": _mipped(
@@ -60,30 +75,57 @@ def upload_head(
         ),
         "slope_map": _mipped(device, _moments(maps.normal), "rgba16float"),
         "relief_map": _mipped(device, _moments(_relief(maps)), "rgba16float"),
-        "specular_map": _mipped(device, _factor(maps.specular, atlas), "r16float"),
+        "specular_map": _mipped(device, _factor(maps.specular, mesh, atlas), "r16float"),
         "roughness_map": _mipped(device, _plain(maps.roughness), "r16float"),
         "beckmann_table": texture_from(device, beckmann_table(), "r32float"),
     }
     return HeadTextures(resources, _relief_band(maps), len(mesh.triangles), atlas.unscattered(mesh))
 
 
-def upload_atlas(device: Device, atlas: Atlas) -> dict[str, Any]:
-    """The atlas as the shaders read it: texel -> triangle and weights, stretch, reach."""
+def upload_atlas(device: Device, atlas: Atlas, stretch: str = "full") -> AtlasTextures:
+    """The atlas as the shaders read it.
+
+    stretch : "full" knows the angle between u and v, "axes" takes it for right, "none" is one density for all
+    """
     packed = atlas.barycentric[..., 0].astype(np.uint32) | (atlas.barycentric[..., 1].astype(np.uint32) << 16)
     texels = np.stack([(atlas.triangle + 1).astype(np.uint32), packed], axis=-1)
-    return {
+    texels[~atlas.own] = 0
+    metric = _metric(atlas, stretch)
+    resources = {
         "atlas": texture_from(device, texels, "rg32uint"),
-        "stretch_map": texture_from(device, atlas.stretch, "rg16float"),
+        "stretch_map": texture_from(device, metric, "rgba16float"),
         "reach_map": texture_from(device, atlas.reach, "rgba16uint"),
     }
+    sheared = bool(metric[..., 2].any())
+    if not len(atlas.apron):
+        return AtlasTextures(resources, sheared)
+    beyond = np.concatenate([atlas.source.view(np.uint32), atlas.apron.astype(np.uint32)], axis=1)
+    light = np.zeros((len(beyond), 4), np.float32)
+    lists = (device.buffer(words, "STORAGE") for words in (beyond, light))
+    return AtlasTextures(resources, sheared, *lists)
 
 
-def _triangle_table(mesh: Mesh, mapped: NDArray[np.bool_]) -> NDArray[np.uint32]:
+def _metric(atlas: Atlas, stretch: str) -> NDArray[np.float16]:
+    """(n, n, 4) texels per mm along u and v, the cosine between the two, and 1 in the apron."""
+    metric = np.zeros((atlas.size, atlas.size, 4), np.float16)
+    metric[..., :2] = atlas.stretch
+    if stretch == "full":
+        metric[..., 2] = atlas.shear
+    if stretch == "none":
+        covered = atlas.stretch[atlas.own].astype(np.float64)
+        metric[atlas.coverage, :2] = np.sqrt((covered**2).mean()) if len(covered) else 0.0
+    metric[atlas.coverage & ~atlas.own, 3] = 1.0
+    return metric
+
+
+def _triangle_table(mesh: Mesh, atlas: Atlas) -> NDArray[np.uint32]:
     opaque = np.array([material.kind == "opaque" for material in mesh.materials])
-    table = np.zeros((len(mesh.triangles), 4), dtype=np.uint32)
-    table[:, :3] = mesh.triangles
-    table[:, 3] = mapped | (opaque[mesh.material] << 1) | (mesh.material.astype(np.uint32) << 8)
-    return _rows(table, _TRIANGLES_PER_ROW)
+    table = np.zeros((3, len(mesh.triangles), 4), dtype=np.uint32)
+    table[0, :, :3] = mesh.triangles
+    table[0, :, 3] = atlas.mapped | (opaque[mesh.material] << 1) | (mesh.material.astype(np.uint32) << 8)
+    table[1] = np.ascontiguousarray(atlas.place[:, :2]).reshape(-1, 4).view(np.uint32)
+    table[2, :, :2] = np.ascontiguousarray(atlas.place[:, 2]).view(np.uint32)
+    return np.concatenate([_rows(part, _TRIANGLES_PER_ROW) for part in table])
 
 
 def _vertex_table(mesh: Mesh) -> NDArray[np.float32]:
@@ -105,13 +147,13 @@ def _plain(values: NDArray[np.float32] | None) -> NDArray[np.float32]:
     return np.ones((1, 1, 1), np.float32) if values is None else values[..., None]
 
 
-def _factor(values: NDArray[np.float32] | None, atlas: Atlas) -> NDArray[np.float32]:
+def _factor(values: NDArray[np.float32] | None, mesh: Mesh, atlas: Atlas) -> NDArray[np.float32]:
     """A map as a factor of the skin's own value: its mean over the surface is 1."""
     if values is None:
         return _plain(None)
-    y, x = np.nonzero(atlas.coverage)
     height, width = values.shape
-    mean = float(values[y * height // atlas.size, x * width // atlas.size].mean()) if y.size else 0.0
+    u, v = np.clip(atlas.interpolate(mesh, mesh.uv)[atlas.own].T, 0.0, 1.0 - 1e-6)
+    mean = float(values[(v * height).astype(int), (u * width).astype(int)].mean()) if len(u) else 0.0
     return _plain(values / mean if mean > 0 else np.ones_like(values))
 
 

@@ -22,7 +22,7 @@ from dermis.rendering.inputs import Inputs
 from dermis.rendering.kept import Kept
 from dermis.rendering.lights import light_records, light_switches, light_views
 from dermis.rendering.limits import check_limits
-from dermis.rendering.maps import HeadTextures, upload_atlas, upload_head
+from dermis.rendering.maps import AtlasTextures, HeadTextures, upload_atlas, upload_head
 from dermis.rendering.projection import ShadowView
 from dermis.rendering.rendered import Rendered
 from dermis.rendering.stages.shadows import ShadowMaps
@@ -144,7 +144,8 @@ class Renderer:
         inputs = Inputs(
             head=head,
             atlas=atlas_textures,
-            lit=lit | self._environment(scene, settings, split.total, head, lit, atlas_textures["atlas"]),
+            lit=lit
+            | self._environment(scene, settings, split.total, head, lit, atlas_textures.resources["atlas"]),
             shadow_maps=shadow_maps,
             light_clips=clips,
             shadow_key=np.array(clips).tobytes(),
@@ -217,8 +218,8 @@ class Renderer:
     def _plain(self, size: tuple[int, int]) -> Any:
         return make_texture(self.device, size, "rgba32float")
 
-    def _atlas(self, head: Head, size: int) -> tuple[Atlas, dict[str, Any]]:
-        def make() -> tuple[Atlas, dict[str, Any]]:
+    def _atlas(self, head: Head, size: int) -> tuple[Atlas, AtlasTextures]:
+        def make() -> tuple[Atlas, AtlasTextures]:
             atlas = cached_atlas(head.mesh, size)
             return atlas, upload_atlas(self.device, atlas)
 

@@ -9,10 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.gpu import ComputeProgram, Device, Frame, make_texture
-from dermis.gpu.program import Resources
 from dermis.gpu.textures import texture_from
 from dermis.rendering.kernels import ROWS_PER_UNIT, TRUNCATION, WIDEST, kernel_table
+from dermis.rendering.maps import AtlasTextures
 from dermis.rendering.stages import STAGES
+from dermis.rendering.stages.stitch import Stitch
+
+EDGES = ("repeated", "cleared", "skipped")
+Colour = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -30,9 +34,9 @@ class Diffuse:
 
     def __init__(self, device: Device) -> None:
         self._device = device
-        path = STAGES / "diffuse.wgsl"
-        table = {"ROWS_PER_UNIT": ROWS_PER_UNIT, "WIDEST": WIDEST, "TRUNCATION": TRUNCATION}
-        self._along = [ComputeProgram(device, path, constants={"AXIS": axis, **table}) for axis in (0, 1)]
+        self._stitch = Stitch(device)
+        self._path = STAGES / "diffuse.wgsl"
+        self._made: dict[tuple[bool, str], list[ComputeProgram]] = {}
         self._kernels = texture_from(device, kernel_table(), "r32float")
 
     def make_levels(self, size: int, count: int) -> Levels:
@@ -44,15 +48,31 @@ class Diffuse:
         ]
         return Levels(stack, views, make_texture(self._device, (size, size), "rgba32float"), size)
 
-    def draw(self, frame: Frame, levels: Levels, atlas: Resources, variance_mm2: NDArray[np.float64]) -> None:
-        """Fill layer k with the light spread by variance_mm2[k - 1] (increasing)."""
+    def draw(
+        self,
+        frame: Frame,
+        levels: Levels,
+        atlas: AtlasTextures,
+        variance_mm2: NDArray[np.float64],
+        *,
+        edge: str = "repeated",
+        clear: Colour = (0.0, 0.0, 0.0),
+    ) -> None:
+        """Fill layer k with the light spread by variance_mm2[k - 1] (increasing).
+
+        edge : one of EDGES, what lies beyond a chart's edge and its apron
+        clear : the light that empty texels show when the edge is "cleared"
+        """
+        along = self._along(atlas.sheared, edge)
         before = 0.0
         for k, variance in enumerate(variance_mm2, start=1):
-            record = self._along[0].record("Spread", variance_mm2=variance - before, before_mm2=before)
+            self._stitch.draw(frame, "diffuse", atlas, levels.views[k - 1], levels.scratch)
+            added = {"variance_mm2": variance - before, "before_mm2": before}
+            record = along[0].record("Spread", **added, clear=clear)
             passes = ((levels.views[k - 1], levels.scratch), (levels.scratch, levels.views[k]))
-            for program, (source, blurred) in zip(self._along, passes, strict=True):
+            for program, (source, blurred) in zip(along, passes, strict=True):
                 bound = {
-                    **atlas,
+                    **atlas.resources,
                     "spread": record,
                     "source": source,
                     "kernel_table": self._kernels,
@@ -60,3 +80,14 @@ class Diffuse:
                 }
                 frame.compute("diffuse", program, bound, (levels.size, levels.size))
             before = float(variance)
+
+    def _along(self, sheared: bool, edge: str) -> list[ComputeProgram]:
+        """The passes along u and along v, made when first asked for."""
+        if (sheared, edge) not in self._made:
+            table = {"ROWS_PER_UNIT": ROWS_PER_UNIT, "WIDEST": WIDEST, "TRUNCATION": TRUNCATION}
+            chosen = {**table, "SHEARED": sheared, "EDGE": EDGES.index(edge)}
+            self._made[sheared, edge] = [
+                ComputeProgram(self._device, self._path, constants={"AXIS": axis, **chosen})
+                for axis in (0, 1)
+            ]
+        return self._made[sheared, edge]

@@ -1,10 +1,5 @@
 // The image: light that scattered below, relit at its finest level, under the white lobe of the surface.
-//#include "geometry.wgsl"
-//#include "bilinear.wgsl"
-//#include "skin.wgsl"
-//#include "lobe.wgsl"
-//#include "lights.wgsl"
-//#include "environment.wgsl"
+//#include "lighting.wgsl"
 
 const EYE_ROUGHNESS: f32 = 0.1; // plain materials are wet: eyeballs, teeth
 const FINEST_RATIO: f32 = 4.0; // longest over shortest side of a footprint that one map sample may stand for
@@ -27,46 +22,13 @@ struct Shade {
 @group(1) @binding(2) var scattered: texture_2d<f32>; // blurred and combined, per texel of the atlas
 @group(1) @binding(3) var image: texture_storage_2d<rgba32float, write>;
 
-struct Lit {
-    entered: vec3f, // irradiance that enters the skin
-    reflected: vec3f, // radiance off the surface
-}
-
-// open: share of the sky that the point sees
-fn light_up(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
-    var lit = Lit(vec3f(0.0), vec3f(0.0));
-    for (var i = 0u; i < skin.light_count; i++) {
-        let light = lights.light[i];
-        var seen = -1.0; // how much of the light: not known yet
-        for (var part = 0u; part < parts_of(light); part++) {
-            let arriving = incident(light, point.position, part);
-            let cosine = dot(surface.normal, arriving.direction);
-            if (cosine > 0.0) {
-                if (seen < 0.0) {
-                    seen = visibility(light, point, arriving.direction);
-                }
-                let e = arriving.irradiance * (cosine * seen);
-                lit.entered += e * enters(cosine, surface.roughness, surface.rho_s);
-                lit.reflected += e * surface.rho_s * lobe(surface.normal, arriving.direction, v, surface.roughness);
-            }
-        }
-    }
-    if (ENVIRONMENT) {
-        let around = ambient(surface.normal, open, surface.colour * environment.albedo);
-        let albedo = surface.rho_s * surface_albedo(dot(surface.normal, v), surface.roughness).x;
-        lit.entered += around * enters_from_everywhere(surface.roughness, surface.rho_s);
-        lit.reflected += albedo * mirrored(point, surface.normal, v, surface.roughness, open);
-    }
-    return lit;
-}
-
 // t: corners of the triangle, w: barycentric weights
 fn open_sky(point: Point, t: vec4u, w: vec3f) -> f32 {
     if (!ENVIRONMENT) {
         return 1.0;
     }
     if ((t.w & MAPPED) != 0u) {
-        return open_at(point.uv);
+        return open_at(point.place);
     }
     return dot(w, vec3f(open_at_vertex(t.x), open_at_vertex(t.y), open_at_vertex(t.z)));
 }
@@ -76,7 +38,7 @@ fn skin_radiance(point: Point, v: vec3f, footprint: f32, open: f32) -> vec3f {
     let lit = light_up(point, surface, v, open);
     var below = lit.entered * share_of(surface.colour, skin.mix);
     if ((point.flags & MAPPED) != 0u) {
-        below = shade.relit * below + load_bilinear(scattered, point.uv).rgb;
+        below = shade.relit * below + load_bilinear(scattered, point.place).rgb;
     } else {
         below *= shade.total;
     }
@@ -120,7 +82,8 @@ fn radiance(triangle: u32, place: vec2f, share: f32, size: vec2f) -> vec3f {
     // A sample on an edge may lie a little outside: stay on the triangle.
     let clamped = max(w, vec3f(0.0));
     let inside = clamped / (clamped.x + clamped.y + clamped.z);
-    let point = interpolate(a, b, c, inside, t.w);
+    var point = interpolate(a, b, c, inside, t.w);
+    point.place = place_of_point(triangle, inside);
     let open = open_sky(point, t, inside);
     let v = normalize(shade.eye - point.position);
     if ((t.w & OPAQUE) != 0u) {

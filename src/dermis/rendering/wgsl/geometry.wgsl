@@ -3,7 +3,7 @@
 const MAPPED: u32 = 1u; // the triangle has texels in the atlas
 const OPAQUE: u32 = 2u; // plain material, no scattering
 
-@group(0) @binding(0) var triangle_table: texture_2d<u32>; // corners a, b, c and flags | material << 8
+@group(0) @binding(0) var triangle_table: texture_2d<u32>; // three tables, see below
 @group(0) @binding(1) var vertex_table: texture_2d<f32>; // four texels: position u, normal v, dpdu, dpdv
 
 struct Corner {
@@ -18,15 +18,28 @@ struct Point {
     position: vec3f, // [mm]
     lit_position: vec3f, // moved onto the smooth surface, for shadow rays
     normal: vec3f, // interpolated, unit
-    uv: vec2f,
+    uv: vec2f, // in the maps
+    place: vec2f, // in the atlas, where someone asked for it
     dpdu: vec3f, // [mm per unit of uv]
     dpdv: vec3f,
     flags: u32,
 }
 
+// Of three tables one over the other: corners a, b, c and flags | material << 8; atlas places of a and b; that of c.
+fn triangle_row(index: u32, table: u32) -> vec4u {
+    let size = textureDimensions(triangle_table);
+    return textureLoad(triangle_table, vec2u(index % size.x, index / size.x + table * (size.y / 3u)), 0);
+}
+
 fn triangle_at(index: u32) -> vec4u {
-    let per_row = textureDimensions(triangle_table).x;
-    return textureLoad(triangle_table, vec2u(index % per_row, index / per_row), 0);
+    return triangle_row(index, 0u);
+}
+
+// Where in the atlas, from 0 to 1, the light of a point of a triangle is.
+fn place_of_point(index: u32, w: vec3f) -> vec2f {
+    let ab = bitcast<vec4f>(triangle_row(index, 1u));
+    let c = bitcast<vec4f>(triangle_row(index, 2u));
+    return w.x * ab.xy + w.y * ab.zw + w.z * c.xy;
 }
 
 fn vertex_texel(index: u32) -> vec2u {

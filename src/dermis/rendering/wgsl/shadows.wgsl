@@ -60,8 +60,8 @@ struct Receiver {
     depth: f32, // [mm]
 }
 
-// Share of a light of some size that is in sight: lines to places spread over it are followed through the light's
-// map of depths. Close to what hides it a shadow is sharp.
+// Share of what rises of a light of some size that is in sight: lines to places spread over it are followed through the
+// light's map of depths. Close to what hides it a shadow is sharp.
 fn soft_visibility(light: Light, point: Point) -> f32 {
     let frame = mat3x3f(light.map_right, light.map_up, cross(light.map_up, light.map_right));
     let p = (point.lit_position - light.position) * frame;
@@ -73,25 +73,34 @@ fn soft_visibility(light: Light, point: Point) -> f32 {
     let at = Receiver(n, dot(n, p), select(p.xy / p.z, p.xy, parallel), p.z);
     let least = max(select(light.softness / p.z, light.softness, parallel), LEAST_TEXELS * light.texel);
     let probes = max(light.lines / 4u, LEAST_PROBES);
+    var followed = 0u;
     var hidden = 0u;
     for (var i = 0u; i < light.lines; i++) {
-        if (i == probes && (hidden == 0u || hidden == probes)) {
-            return select(0.0, 1.0, hidden == 0u); // wholly in light or in shadow, as most points are
+        let place = place_on(i, light.kind != RECTANGLE);
+        if (!rises(light, at, place)) {
+            continue; // it gives no light here, as its cosine says
         }
-        hidden += hides(light, at, least, place_on(i, light.kind != RECTANGLE));
+        if (followed == probes && (hidden == 0u || hidden == probes)) {
+            break; // wholly in light or in shadow, as most points are
+        }
+        followed += 1u;
+        hidden += hides(light, at, least, place);
     }
-    return 1.0 - f32(hidden) / f32(light.lines);
+    return select(0.0, 1.0 - f32(hidden) / f32(followed), followed > 0u);
 }
 
-// 1 when something above the point's tangent plane is in the way to a place of the light, or the place is below it.
+// Whether a place of the light stands above the point's tangent plane.
+fn rises(light: Light, at: Receiver, place: vec2f) -> bool {
+    let lateral = place * light.extent;
+    let towards = select(vec3f(lateral - at.place * at.depth, -at.depth), vec3f(lateral, -1.0), is_parallel(light));
+    return dot(at.normal, towards) > 0.0;
+}
+
+// 1 when something above the point's tangent plane is in the way to a place of the light.
 fn hides(light: Light, at: Receiver, least: f32, place: vec2f) -> u32 {
     let size = vec2f(textureDimensions(shadow_maps));
     let parallel = is_parallel(light);
     let lateral = place * light.extent;
-    let towards = select(vec3f(lateral - at.place * at.depth, -at.depth), vec3f(lateral, -1.0), parallel);
-    if (dot(at.normal, towards) <= 0.0) {
-        return 1u;
-    }
     for (var k = 0u; k < STEPS; k++) {
         let depth = depth_on_line(light, at.depth, f32(k) + 0.5);
         let lean = select(1.0 / depth - 1.0 / at.depth, at.depth - depth, parallel);
