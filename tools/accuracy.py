@@ -17,7 +17,7 @@ from dermis.gpu import Device, Frame, download, open_device, upload
 from dermis.gpu.probe import half_store_rounding
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
-from dermis.rendering.maps import upload_atlas
+from dermis.rendering.atlas_textures import upload_atlas
 from dermis.rendering.stages.diffuse import Diffuse
 
 PAGE = Path(__file__).parent.parent / "docs" / "accuracy.md"

@@ -12,7 +12,7 @@ import numpy as np
 
 import dermis
 from dermis.assets.environment.mirrors import ROUGHEST, SIDE, SMOOTHEST, equivalent_mirrors
-from dermis.assets.environment.panorama import directions, load_panorama, reduced, solid_angles
+from dermis.assets.environment.panorama import directions, load_panorama, resampled, solid_angles
 from dermis.assets.environment.prefilter import ROUGHNESSES, Prefiltered, prefilter
 from dermis.assets.environment.suns import split_suns
 from dermis.assets.head import Head
@@ -50,7 +50,7 @@ def unit(v: Array) -> Array:
 
 def panorama(name: str) -> tuple[Array, Array, Prefiltered]:
     """Directions and light of a panorama's texels without its suns, and what the frame reads."""
-    radiance = reduced(split_suns(load_panorama(name))[0], 512)
+    radiance = resampled(split_suns(load_panorama(name))[0], 256)
     light = radiance * solid_angles(*radiance.shape[:2])[..., None]
     return directions(*radiance.shape[:2]).reshape(-1, 3), light.reshape(-1, 3), prefilter(name)
 
@@ -160,7 +160,7 @@ def soft_shadow_error(renderer: dermis.Renderer, rig: str) -> tuple[float, float
 def occlusion_error(renderer: dermis.Renderer) -> float:
     """Root mean square difference of the open share of the sky from 1024 directions, on the scan."""
     head = dermis.load_head("lee_perry_smith")
-    inputs, _ = renderer._inputs(Scene(head), Settings(size=(64, 64), atlas=512, samples=1))
+    inputs = renderer.prepare(Scene(head), Settings(size=(64, 64), atlas=512, samples=1))
     few, many = (
         Occlusion(renderer.device, count).bake(
             head.mesh, inputs.head, inputs.lit, inputs.atlas.resources["atlas"], 512

@@ -65,7 +65,7 @@ def settings_of(**given: Any) -> Settings:
 
 def run_frame(renderer: Renderer, scene: Scene, **given: Any) -> Inputs:
     """A whole frame; what its stages made can be downloaded from the result."""
-    inputs, *_ = renderer._inputs(scene, settings_of(**given))
+    inputs = renderer.prepare(scene, settings_of(**given))
     frame = Frame(renderer.device)
     draw_frame(frame, renderer._stages, inputs)
     frame.submit()

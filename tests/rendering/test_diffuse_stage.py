@@ -16,8 +16,8 @@ from dermis.assets.atlas import Atlas, build_atlas
 from dermis.assets.primitives import plane, uv_sphere
 from dermis.gpu import Device, Frame, download, make_texture, upload
 from dermis.optics.profiles import load_profile
+from dermis.rendering.atlas_textures import AtlasTextures, upload_atlas
 from dermis.rendering.frame import Stages
-from dermis.rendering.maps import AtlasTextures, upload_atlas
 from dermis.rendering.stages.diffuse import Diffuse
 
 Floats = NDArray[np.float64]

@@ -18,6 +18,7 @@ from dermis.assets.cache import cached_atlas
 from dermis.assets.environment.panorama import directions, solid_angles
 from dermis.assets.environment.prefilter import prefilter
 from dermis.assets.primitives import plane, uv_sphere
+from dermis.errors import DermisError
 from dermis.gpu import download
 from dermis.gpu.textures import texture_from
 from dermis.images.io import write_exr
@@ -153,10 +154,28 @@ def test_an_environment_adds_to_lights(renderer: Renderer) -> None:
         for scene in (scene_of(head, frontal()), around(head, Environment(name="uniform")), both)
     )
     assert np.abs(one + other - sum_).max() < TWIN * sum_.max()
-    plain = renderer._inputs(scene_of(head, frontal()), settings_of())[0]
+    plain = renderer.prepare(scene_of(head, frontal()), settings_of())
     assert plain.switches == plain.light_switches == ()
     lit = plain.lit
     assert lit["panorama"].size[:2] == lit["occlusion_map"].size[:2] == (1, 1)
+
+
+def test_exposure_is_a_factor_of_suns_too(renderer: Renderer, room: str) -> None:
+    """Also far beyond what a light that is written down may give."""
+    plain, bright = (
+        download(
+            renderer.device,
+            run_frame(renderer, around(WHITE, Environment(name=room, exposure=e))).picture.exposed,
+        )[..., :3]
+        for e in (1.0, 1e6)
+    )
+    assert np.abs(bright / 1e6 - plain).max() < TWIN * plain.max()
+
+
+def test_suns_count_among_the_lights(renderer: Renderer, room: str) -> None:
+    full = replace(scene_of(head_of(plane(50.0)), *[frontal()] * 64), environment=Environment(name=room))
+    with pytest.raises(DermisError, match="65, with the environment's suns"):
+        renderer.draw(full, settings_of(occlusion="none"))
 
 
 def test_light_follows_the_rotation(renderer: Renderer, room: str) -> None:

@@ -47,7 +47,7 @@ def corner() -> Head:
 
 def baked(renderer: Renderer, head: Head, side: int = SIDE, **options: Any) -> NDArray[np.float32]:
     """Rows of the bake: the atlas and the vertices."""
-    inputs, *_ = renderer._inputs(scene_of(head), settings_of(atlas=side))
+    inputs = renderer.prepare(scene_of(head), settings_of(atlas=side))
     stage = Occlusion(renderer.device, **options)
     return stage.bake(head.mesh, inputs.head, inputs.lit, inputs.atlas.resources["atlas"], side)
 
@@ -141,6 +141,6 @@ def test_baked_once(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None
     head = corner()
     scene = replace(scene_of(head, rho_s=0.0), environment=Environment(name="uniform"))
     first = seen(renderer, scene)
-    renderer._forget("occlusion")
+    renderer.forget()
     monkeypatch.setattr(surroundings, "Occlusion", None)
     assert np.array_equal(seen(renderer, scene), first)

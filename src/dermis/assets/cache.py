@@ -24,7 +24,7 @@ _FORM = 2  # raise when `build_atlas` gives other results for the same mesh
 _MOST_BYTES = 2 << 30
 
 
-def cached_atlas(mesh: Mesh, size: int) -> Atlas:
+def cached_atlas(mesh: Mesh, size: int, layout: str = "mesh") -> Atlas:
     """`build_atlas`, read back from disk when it was made before; the disk may fail without harm."""
     names = [field.name for field in fields(Atlas)]
 
@@ -35,13 +35,13 @@ def cached_atlas(mesh: Mesh, size: int) -> Atlas:
     return Atlas(**_kept("atlas", _key(mesh, size), names, make))
 
 
-def cached_occlusion(mesh: Mesh, size: int, form: str, bake: Callable[[], Array]) -> Array:
-    """What `bake` returns for a mesh and the size of its atlas, kept on disk in the same way.
+def cached_occlusion(mesh: Mesh, atlas: Atlas, form: str, bake: Callable[[], Array]) -> Array:
+    """What `bake` returns for a mesh and its atlas, kept on disk in the same way.
 
     form : everything else that the result depends on
     """
-    digest = hashlib.sha256(f"{_key(mesh, size)} {form}".encode())
-    for array in (mesh.positions, mesh.normals):
+    digest = hashlib.sha256(f"{_key(mesh, atlas.size)} {form}".encode())
+    for array in (mesh.positions, mesh.normals, atlas.place):
         digest.update(np.ascontiguousarray(array).tobytes())
     made = _kept("occlusion", digest.hexdigest()[:40], ["open"], lambda: {"open": bake()})
     return made["open"]

@@ -12,7 +12,9 @@ from dermis.assets.head import Head
 from dermis.errors import refuse
 from dermis.gpu import ComputeProgram
 from dermis.optics.gaussians import GaussianSum
-from dermis.rendering.maps import AtlasTextures, HeadTextures
+from dermis.rendering.atlas_textures import AtlasTextures
+from dermis.rendering.geometry import HeadTextures
+from dermis.rendering.layout import Layout
 from dermis.rendering.projection import Matrix, depth_range, frame_of, perspective
 from dermis.rendering.samples import pixel_samples
 from dermis.rendering.stages.bloom import Glow
@@ -35,19 +37,21 @@ _MOST_MATERIALS = 64
 class Inputs:
     """Everything `draw_frame` touches.
 
-    head, atlas, lit : resources by the shaders' names: geometry and maps; atlas; those, lights and shadows
+    layouts : atlases that light is spread on; the first is the one that is looked at
     light_clips, shadow_key : a matrix for each shadow map, and what the maps would show
     scatters : whether light spreads below the surface
-    blurred_mm2, level_weight, scattered : variances and weights of the blurred levels; texture of their sum
+    blurred_mm2, level_weight : variances and weights of the blurred levels
+    edge, clear : what blurs find beyond a chart's edge, and the light of empty texels
+    scattered : texture of the light that leaves below the surface
     view, switches : record of the shading pass, and the values of its `override`s
     light_switches : those of the irradiance pass
     suns : lights that the environment adds
+    gaussians : terms of the profile
     glow : space for the bloom, None without one
     """
 
     head: HeadTextures
-    atlas: AtlasTextures
-    lit: dict[str, Any]
+    layouts: list[Layout]
     shadow_maps: ShadowMaps
     light_clips: list[Matrix]
     shadow_key: bytes
@@ -55,6 +59,8 @@ class Inputs:
     levels: Levels
     blurred_mm2: Floats
     level_weight: Floats
+    edge: str
+    clear: Floats
     scattered: Any
     seen: Layers
     camera_clips: list[Matrix]
@@ -62,9 +68,20 @@ class Inputs:
     switches: Switches
     light_switches: Switches
     suns: int
+    gaussians: int
     picture: Picture
     glow: Glow | None
     settings: Settings
+
+    @property
+    def atlas(self) -> AtlasTextures:
+        """Of the layout that is looked at."""
+        return self.layouts[0].atlas
+
+    @property
+    def lit(self) -> dict[str, Any]:
+        """Of the layout that is looked at."""
+        return self.layouts[0].lit
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,6 @@ from dermis.scene.model import Scene
 
 Floats = NDArray[np.float64]
 _KINDS = (PointLight, SpotLight, DirectionalLight, StripeLight, RectangleLight, SphereLight)
-_BRIGHTEST = 1e6
 _UP = np.array([0.0, 1.0, 0.0])
 _WIDEST_SHADOW_FILTER = 6
 _SIDE, _PART_SIDE = 4, 2  # a light of some size is shaded as SIDE x SIDE lights, a part as fewer
@@ -40,12 +39,12 @@ def sun_lights(suns: tuple[Sun, ...], environment: Environment) -> tuple[Directi
     lights = []
     for sun in suns:
         x, y, z = -sun.direction
-        red, green, blue = np.minimum(environment.exposure * sun.irradiance, _BRIGHTEST)
         lights.append(
-            DirectionalLight(
+            # Not checked: with the exposure it may be brighter than lights that are written down.
+            DirectionalLight.model_construct(
                 direction=(np.cos(angle) * x + np.sin(angle) * z, y, np.cos(angle) * z - np.sin(angle) * x),
-                irradiance=(red, green, blue),
-                angle_degrees=min(np.degrees(2.0 * sun.radius), 20.0),
+                irradiance=tuple(environment.exposure * sun.irradiance),
+                angle_degrees=float(np.degrees(2.0 * sun.radius)),
                 softness_mm=0.5,
             )
         )
@@ -80,7 +79,7 @@ def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView 
     centre = np.array(scene.head.centre_mm)
     record = program.record("Lights")
     if len(views) > len(record["light"]):
-        came = f"there are {len(views)}, large rectangles counted by their parts"
+        came = f"there are {len(views)}, with the environment's suns and each part of a large rectangle"
         refuse("lights", f"at most {len(record['light'])}", came, "Leave some out")
     divided = [(part, len(parts)) for parts in map(parts_of, scene.lights) for part in parts]
     layer = 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from dermis.gpu import ComputeProgram
-from dermis.rendering.maps import HeadTextures
+from dermis.rendering.geometry import HeadTextures
 from dermis.rendering.stages.variants import Switches
 from dermis.scene.model import Scene
 from dermis.scene.skin import Skin

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.assets.atlas import Atlas
 from dermis.assets.cache import cached_occlusion
 from dermis.assets.environment.mirrors import equivalent_mirrors
 from dermis.assets.environment.prefilter import prefilter
@@ -16,8 +17,9 @@ from dermis.assets.head import Head
 from dermis.gpu import ComputeProgram, Device, make_texture, upload
 from dermis.gpu.program import Resources
 from dermis.gpu.textures import texture_from
+from dermis.rendering.atlas_textures import AtlasTextures
+from dermis.rendering.geometry import HeadTextures
 from dermis.rendering.lights import sun_lights
-from dermis.rendering.maps import HeadTextures
 from dermis.rendering.stages.occlusion import FORM, Occlusion, whole_map
 from dermis.scene.model import Scene
 
@@ -78,21 +80,20 @@ def environment_record(program: ComputeProgram, scene: Scene, total: Any, occlud
 
 
 def occlusion_map(
-    device: Device, head: Head, textures: HeadTextures, lit: Resources, atlas: Any, size: int
+    device: Device, head: Head, geometry: HeadTextures, lit: Resources, atlas: Atlas, textures: AtlasTextures
 ) -> Any:
     """The open share of the sky of the atlas' texels and of the vertices, baked or read from disk.
 
     lit : what the lighting passes read
-    atlas, size : texture of the atlas, and its side
     """
-    side = min(size, _FINEST_OCCLUSION)
+    side = min(atlas.size, _FINEST_OCCLUSION)
 
     def bake() -> NDArray[np.uint16]:
-        baked = Occlusion(device).bake(head.mesh, textures, lit, atlas, side)
+        baked = Occlusion(device).bake(head.mesh, geometry, lit, textures.resources["atlas"], side)
         levels: NDArray[np.uint16] = np.rint(65535.0 * whole_map(baked, side)).astype(np.uint16)
         return levels
 
-    levels = cached_occlusion(head.mesh, size, f"{FORM} {side}", bake)
+    levels = cached_occlusion(head.mesh, atlas, f"{FORM} {side}", bake)
     return texture_from(device, levels / np.float32(65535.0), "r32float")
 
 

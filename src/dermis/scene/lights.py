@@ -114,6 +114,8 @@ class StripeLight(DirectionalLight):
 
     @model_validator(mode="after")
     def _across(self) -> StripeLight:
+        if self.angle_degrees > 0:
+            raise ValueError("no angle_degrees, for a sheet of light is parallel")
         if np.linalg.norm(np.cross(self.direction, self.up)) < 1e-6 * np.linalg.norm(self.up):
             raise ValueError("up in another direction than the light's")
         return self

@@ -6,17 +6,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dermis.gpu import ComputeProgram, Device, Frame, make_texture
 from dermis.gpu.textures import texture_from
+from dermis.rendering.atlas_textures import AtlasTextures
 from dermis.rendering.kernels import ROWS_PER_UNIT, TRUNCATION, WIDEST, kernel_table
-from dermis.rendering.maps import AtlasTextures
 from dermis.rendering.stages import STAGES
 from dermis.rendering.stages.stitch import Stitch
 
 EDGES = ("repeated", "cleared", "skipped")
-Colour = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -54,9 +53,8 @@ class Diffuse:
         levels: Levels,
         atlas: AtlasTextures,
         variance_mm2: NDArray[np.float64],
-        *,
         edge: str = "repeated",
-        clear: Colour = (0.0, 0.0, 0.0),
+        clear: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
         """Fill layer k with the light spread by variance_mm2[k - 1] (increasing).
 

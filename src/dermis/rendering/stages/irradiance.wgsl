@@ -2,8 +2,7 @@
 //#include "lighting.wgsl"
 
 @group(1) @binding(0) var atlas: texture_2d<u32>; // triangle + 1, two barycentric weights packed
-@group(1) @binding(1) var stretch_map: texture_2d<f32>; // texels per mm along u, v
-@group(1) @binding(2) var entered: texture_storage_2d<rgba32float, write>;
+@group(1) @binding(1) var entered: texture_storage_2d<rgba32float, write>;
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -18,9 +17,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let t = triangle_at(texel.x - 1u);
     let w = unpack2x16unorm(texel.y);
-    let point = interpolate(corner_at(t.x), corner_at(t.y), corner_at(t.z), vec3f(1.0 - w.x - w.y, w), t.w);
-    let texel_mm = 1.0 / textureLoad(stretch_map, id.xy, 0).x;
-    let surface = surface_at(point, texel_mm / max(length(point.dpdu), 1e-3));
+    let a = corner_at(t.x);
+    let b = corner_at(t.y);
+    let c = corner_at(t.z);
+    let point = interpolate(a, b, c, vec3f(1.0 - w.x - w.y, w), t.w);
+    let surface = surface_at(point, maps_over_atlas(texel.x - 1u, a, b, c) / f32(size.x));
     let open = open_at((vec2f(id.xy) + 0.5) / vec2f(size));
     // The view is of no account: what is reflected is left out, and the compiler leaves out its computation.
     let lit = light_up(point, surface, surface.normal, open);

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from dermis.gpu import ComputeProgram, Device, Frame, RasterProgram, make_texture
-from dermis.rendering.maps import HeadTextures
+from dermis.rendering.geometry import HeadTextures
 from dermis.rendering.projection import Matrix
 from dermis.rendering.stages import SHARED_SHADERS, STAGES
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dermis.assets.mesh import Mesh
 from dermis.gpu import ComputeProgram, Device, Frame
 from dermis.gpu.program import Resources
-from dermis.rendering.maps import HeadTextures
+from dermis.rendering.geometry import HeadTextures
 from dermis.rendering.projection import ShadowView, parallel_view
 from dermis.rendering.stages import SHARED_SHADERS, STAGES
 from dermis.rendering.stages.nearest import Nearest

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dermis.gpu import Device, Frame
-from dermis.rendering.maps import HeadTextures
+from dermis.rendering.geometry import HeadTextures
 from dermis.rendering.projection import Matrix
 from dermis.rendering.stages.nearest import Layers, Nearest
 

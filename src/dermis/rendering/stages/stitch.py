@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from dermis.gpu import ComputeProgram, Device, Frame
-from dermis.rendering.maps import AtlasTextures
+from dermis.rendering.atlas_textures import AtlasTextures
 from dermis.rendering.stages import STAGES
 
 _ROW = 1024  # as in stitch.wgsl

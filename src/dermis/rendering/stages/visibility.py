@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dermis.gpu import Device, Frame
-from dermis.rendering.maps import HeadTextures
+from dermis.rendering.geometry import HeadTextures
 from dermis.rendering.projection import Matrix
 from dermis.rendering.stages.nearest import Layers, Nearest
 

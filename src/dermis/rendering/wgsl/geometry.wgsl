@@ -60,6 +60,15 @@ fn corner_at(index: u32) -> Corner {
     return Corner(p.xyz, n.xyz, vec2f(p.w, n.w), du.xyz, dv.xyz);
 }
 
+// Side of a triangle in the maps over its side in the atlas.
+fn maps_over_atlas(index: u32, a: Corner, b: Corner, c: Corner) -> f32 {
+    let ab = bitcast<vec4f>(triangle_row(index, 1u));
+    let ac = bitcast<vec4f>(triangle_row(index, 2u)).xy - ab.xy;
+    let in_atlas = determinant(mat2x2f(ab.zw - ab.xy, ac));
+    let in_maps = determinant(mat2x2f(b.uv - a.uv, c.uv - a.uv));
+    return sqrt(abs(in_maps / in_atlas));
+}
+
 fn lifted(p: vec3f, corner: Corner) -> vec3f {
     return p - min(0.0, dot(p - corner.position, corner.normal)) * corner.normal;
 }

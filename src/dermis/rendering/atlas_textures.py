@@ -1,0 +1,88 @@
+"""The atlas as textures, with the stretch correction and the remedies for seams that are asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.assets.atlas import Atlas
+from dermis.gpu import Device
+from dermis.gpu.textures import texture_from
+from dermis.rendering.seams import FEATHER_MM, REMEDIES, Remedy
+
+_LEAST_SHARE = 1e-3  # of the blur at the edge itself: 0 would mean no surface
+
+
+@dataclass(frozen=True)
+class AtlasTextures:
+    """What the shaders read of an atlas, by the names they use.
+
+    resources : atlas, stretch_map, reach_map, and edge_map where two layouts are blended
+    sheared : whether u and v meet at other than right angles somewhere
+    apron, gathered : the list of texels beyond the charts' edges and space for their light; None without any
+    """
+
+    resources: dict[str, Any]
+    sheared: bool
+    apron: Any = None
+    gathered: Any = None
+
+
+def upload_atlas(
+    device: Device, atlas: Atlas, stretch: str = "full", remedy: Remedy = REMEDIES["stitch"]
+) -> AtlasTextures:
+    """The atlas as the shaders read it.
+
+    stretch : "full" knows the angle between u and v, "axes" takes it for right, "none" is one density for all
+    """
+    packed = atlas.barycentric[..., 0].astype(np.uint32) | (atlas.barycentric[..., 1].astype(np.uint32) << 16)
+    texels = np.stack([(atlas.triangle + 1).astype(np.uint32), packed], axis=-1)
+    texels[~atlas.own] = 0
+    metric = _metric(atlas, stretch)
+    if remedy.feathered:
+        metric[..., :2] = _feathered(atlas, metric[..., :2])
+    resources = {
+        "atlas": texture_from(device, texels, "rg32uint"),
+        "stretch_map": texture_from(device, metric, "rgba16float"),
+        "reach_map": texture_from(device, atlas.reach, "rgba16uint"),
+    }
+    if len(remedy.layouts) > 1:
+        resources["edge_map"] = texture_from(device, edge_mm(atlas), "r32float")
+    sheared = bool(metric[..., 2].any())
+    if not len(atlas.apron):
+        return AtlasTextures(resources, sheared)
+    beyond = np.concatenate([atlas.source.view(np.uint32), atlas.apron.astype(np.uint32)], axis=1)
+    light = np.zeros((len(beyond), 4), np.float32)
+    lists = (device.buffer(words, "STORAGE") for words in (beyond, light))
+    return AtlasTextures(resources, sheared, *lists)
+
+
+def _metric(atlas: Atlas, stretch: str) -> NDArray[np.float16]:
+    """(n, n, 4) texels per mm along u and v, the cosine between the two, and 1 in the apron."""
+    metric = np.zeros((atlas.size, atlas.size, 4), np.float16)
+    metric[..., :2] = atlas.stretch
+    if stretch == "full":
+        metric[..., 2] = atlas.shear
+    if stretch == "none":
+        covered = atlas.stretch[atlas.own].astype(np.float64)
+        metric[atlas.coverage, :2] = np.sqrt((covered**2).mean()) if len(covered) else 0.0
+    metric[atlas.coverage & ~atlas.own, 3] = 1.0
+    return metric
+
+
+def edge_mm(atlas: Atlas) -> NDArray[np.float32]:
+    """(n, n) distance of each texel to the nearest edge of its chart, roughly [mm]."""
+    from scipy.ndimage import distance_transform_edt
+
+    texels = distance_transform_edt(np.pad(atlas.own, 1))[1:-1, 1:-1]
+    density = np.sqrt(atlas.stretch.astype(np.float32).prod(axis=-1))
+    return np.asarray(texels / np.maximum(density, 1e-3), np.float32)
+
+
+def _feathered(atlas: Atlas, stretch: NDArray[np.float16]) -> NDArray[np.float16]:
+    """Texels per mm, fewer the nearer the edge, so that a blur hardly reaches over it."""
+    share = np.clip(edge_mm(atlas) / FEATHER_MM, _LEAST_SHARE, 1.0)
+    return np.asarray(stretch * share[..., None], np.float16)

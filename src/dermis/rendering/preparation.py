@@ -1,0 +1,197 @@
+"""From a scene to what a frame reads, keeping on the device what stays the same."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dermis.assets.atlas import Atlas
+from dermis.assets.cache import cached_atlas
+from dermis.assets.head import Head
+from dermis.gpu import Device, make_texture
+from dermis.gpu.textures import texture_from
+from dermis.optics.profiles import load_profile
+from dermis.rendering import inputs as made
+from dermis.rendering import surface
+from dermis.rendering.atlas_textures import AtlasTextures, upload_atlas
+from dermis.rendering.frame import Stages
+from dermis.rendering.geometry import HeadTextures, upload_geometry
+from dermis.rendering.inputs import Inputs
+from dermis.rendering.kept import Kept
+from dermis.rendering.layout import Layout
+from dermis.rendering.lights import light_records, light_switches, light_views
+from dermis.rendering.limits import check_limits
+from dermis.rendering.maps import relief_band, upload_maps
+from dermis.rendering.projection import ShadowView
+from dermis.rendering.seams import REMEDIES
+from dermis.rendering.stages.shadows import ShadowMaps
+from dermis.rendering.surroundings import (
+    Surroundings,
+    environment_record,
+    load_surroundings,
+    no_occlusion,
+    occlusion_map,
+    with_suns,
+)
+from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
+from dermis.specular.albedo import albedo_table
+
+
+class Preparation:
+    """Makes the inputs of frames on a device; what does not change between two frames is not made again."""
+
+    def __init__(self, device: Device, stages: Stages) -> None:
+        self.device, self._stages = device, stages
+        kept = Kept()
+        self._keep, self._forget = kept.keep, kept.forget
+        self.forget_all = kept.forget_all
+
+    def inputs(self, scene: Scene, settings: Settings) -> Inputs:
+        """Everything that `draw_frame` touches.
+
+        Raises DermisError for sizes over the device's limits.
+        """
+        check_limits(self.device, settings)
+        profile = load_profile(scene.skin.profile)
+        split = made.split_profile(profile, settings, white=scene.skin.albedo == "map")
+        surroundings = self._surroundings(scene)
+        scene = with_suns(scene, surroundings)
+        views = self._views(scene, settings.shadow_size)
+        clips = [view.clip for view in views if view]
+        shadow_maps = self._shadow_maps(len(clips), settings.shadow_size if clips else 1)
+        layouts = self._layouts(scene, settings, split, views, shadow_maps, surroundings)
+        stages, count, size = self._stages, len(split.blurred_mm2), settings.size
+        side = settings.atlas if count else 1
+        return Inputs(
+            head=layouts[0].head,
+            layouts=layouts,
+            shadow_maps=shadow_maps,
+            light_clips=clips,
+            shadow_key=np.array(clips).tobytes(),
+            scatters=count > 0,
+            levels=self._keep("levels", (side, count), lambda: stages.diffuse.make_levels(side, count)),
+            blurred_mm2=split.blurred_mm2,
+            level_weight=split.weight,
+            edge=REMEDIES[settings.seams].edge,
+            clear=np.pi
+            * np.array(settings.seam_colour if settings.seams == "clear-colour" else (0.0, 0.0, 0.0)),
+            scattered=self._space("scattered", side) if len(layouts) > 1 else layouts[0].scattered,
+            seen=self._keep(
+                "seen", (size, settings.samples), lambda: stages.visibility.make_seen(size, settings.samples)
+            ),
+            camera_clips=made.camera_clips(scene.camera, scene.head, settings),
+            view=made.view_record(stages.shade.program, scene, settings, split),
+            switches=surface.switches(scene.skin) + light_switches(scene),
+            light_switches=light_switches(scene),
+            suns=len(surroundings.suns),
+            gaussians=len(profile.variance_mm2),
+            picture=self._keep("picture", size, lambda: stages.post.make_picture(size)),
+            glow=self._keep("glow", size, lambda: stages.bloom.make_glow(size)) if settings.bloom else None,
+            settings=settings,
+        )
+
+    def _layouts(
+        self,
+        scene: Scene,
+        settings: Settings,
+        split: made.Split,
+        views: list[ShadowView | None],
+        shadow_maps: ShadowMaps,
+        surroundings: Surroundings,
+    ) -> list[Layout]:
+        """The atlases that light is spread on: one, or two that hide each other's seams."""
+        layouts = []
+        for index, name in enumerate(REMEDIES[settings.seams].layouts):
+            atlas, textures = self._atlas(scene.head, name, settings, index)
+            head = self._head(scene, atlas, settings, index)
+            lit = self._lit(scene, head, views, shadow_maps) | {"panorama": surroundings.panorama}
+            around = self._environment(scene, settings, split.total, head, lit, atlas, textures, index)
+            space = self._space(f"scattered {index}", settings.atlas if len(split.blurred_mm2) else 1)
+            layouts.append(Layout(head, textures, lit | around, space))
+        return layouts
+
+    def _surroundings(self, scene: Scene) -> Surroundings:
+        name = scene.environment.name if scene.environment else None
+        return self._keep("surroundings", (name,), lambda: load_surroundings(self.device, name))
+
+    def _views(self, scene: Scene, size: int) -> list[ShadowView | None]:
+        return self._keep("views", (scene.head, tuple(scene.lights), size), lambda: light_views(scene, size))
+
+    def _lit(
+        self, scene: Scene, head: HeadTextures, views: list[ShadowView | None], shadow_maps: ShadowMaps
+    ) -> dict[str, Any]:
+        """What both lighting passes read: the head, its skin, the lights and their shadows."""
+        program = self._stages.shade.program
+        skin = surface.skin_record(program, scene, head)
+        skin["light_count"] = len(views)
+        return {
+            **head.resources,
+            "skin": skin,
+            "albedo_table": self._albedo_table(surface.model_of(scene.skin), scene.skin.fresnel),
+            "lights": light_records(program, scene, views),
+            "shadow_maps": shadow_maps.texture,
+            "shadow_sampler": self.device.sampler(),
+        }
+
+    def _environment(
+        self,
+        scene: Scene,
+        settings: Settings,
+        total: Any,
+        head: HeadTextures,
+        lit: Any,
+        atlas: Atlas,
+        textures: AtlasTextures,
+        index: int,
+    ) -> dict[str, Any]:
+        """The environment's record, and how much of it each place sees."""
+        occluded = scene.environment is not None and settings.occlusion == "baked"
+
+        def make() -> Any:
+            if not occluded:
+                return no_occlusion(self.device)
+            return occlusion_map(self.device, scene.head, head, lit, atlas, textures)
+
+        key = (atlas,) if occluded else ()
+        record = environment_record(self._stages.shade.program, scene, total, occluded)
+        return {"environment": record, "occlusion_map": self._keep(f"occlusion {index}", key, make)}
+
+    def _albedo_table(self, model: str, fresnel: str) -> Any:
+        def make() -> Any:
+            return texture_from(self.device, albedo_table(model, fresnel), "rg32float")
+
+        return self._keep("albedo table", (model, fresnel), make)
+
+    def _shadow_maps(self, layers: int, size: int) -> ShadowMaps:
+        return self._keep("shadows", (layers, size), lambda: self._stages.shadows.make_maps(layers, size))
+
+    def _space(self, role: str, side: int) -> Any:
+        return self._keep(role, side, lambda: make_texture(self.device, (side, side), "rgba32float"))
+
+    def _atlas(self, head: Head, layout: str, settings: Settings, index: int) -> tuple[Atlas, AtlasTextures]:
+        size, remedy = settings.atlas, REMEDIES[settings.seams]
+        atlas = self._keep(
+            f"atlas {index}", (head, layout, size), lambda: cached_atlas(head.mesh, size, layout)
+        )
+
+        def make() -> AtlasTextures:
+            return upload_atlas(self.device, atlas, settings.stretch, remedy)
+
+        return atlas, self._keep(f"atlas textures {index}", (atlas, settings.stretch, settings.seams), make)
+
+    def _head(self, scene: Scene, atlas: Atlas, settings: Settings, index: int) -> HeadTextures:
+        head, use_colour = scene.head, scene.skin.albedo == "map"
+
+        def make_maps() -> dict[str, Any]:
+            self._forget("shadows")  # they show another head
+            return upload_maps(self.device, head, use_colour, decoded=settings.gamma == "right")
+
+        def make_geometry() -> dict[str, Any]:
+            return upload_geometry(self.device, head.mesh, atlas)
+
+        maps = self._keep("maps", (head, use_colour, settings.gamma), make_maps)
+        geometry = self._keep(f"geometry {index}", (head, atlas), make_geometry)
+        unscattered = self._keep(f"unscattered {index}", (head, atlas), lambda: atlas.unscattered(head.mesh))
+        return HeadTextures(maps | geometry, relief_band(head.maps), len(head.mesh.triangles), unscattered)

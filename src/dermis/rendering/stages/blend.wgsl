@@ -1,0 +1,28 @@
+// Light near the seams of one layout from another, whose seams are elsewhere.
+//#include "geometry.wgsl"
+//#include "bilinear.wgsl"
+
+override FADE_MM: f32; // width over which one gives way to the other
+
+@group(1) @binding(0) var atlas: texture_2d<u32>; // of the first layout: triangle + 1, two barycentric weights packed
+@group(1) @binding(1) var edge_map: texture_2d<f32>; // distance to the nearest seam [mm]
+@group(1) @binding(2) var first: texture_2d<f32>;
+@group(1) @binding(3) var second: texture_2d<f32>; // in the layout that the triangle table tells
+@group(1) @binding(4) var blended: texture_storage_2d<rgba32float, write>;
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if (any(id.xy >= textureDimensions(atlas))) {
+        return;
+    }
+    let own = textureLoad(first, id.xy, 0);
+    let texel = textureLoad(atlas, id.xy, 0);
+    if (texel.x == 0u) {
+        textureStore(blended, id.xy, own);
+        return;
+    }
+    let w = unpack2x16unorm(texel.y);
+    let other = load_bilinear(second, place_of_point(texel.x - 1u, vec3f(1.0 - w.x - w.y, w)));
+    let kept = smoothstep(0.0, FADE_MM, textureLoad(edge_map, id.xy, 0).x);
+    textureStore(blended, id.xy, mix(other, own, kept));
+}

@@ -1,0 +1,82 @@
+// One axis of the separable kernel: spreads light below the skin along the picture's rows or columns [Jimenez2015].
+
+override AXIS: u32 = 0u; // 0 along rows, 1 along columns
+
+const TAPS: u32 = 16u; // on each side, on neighbouring pixels where these reach far enough, else ever farther apart
+const STEEPEST: f32 = 4.0; // change of depth over width that is still one surface and not the edge of another
+
+struct Spread {
+    half: vec2f, // tangents of the half angles of view
+    reach: f32, // of the kernel [mm]
+}
+
+@group(0) @binding(0) var<uniform> spread: Spread;
+@group(0) @binding(1) var source: texture_2d<f32>; // light below the skin; depth [mm], 0 where there is no skin
+@group(0) @binding(2) var kernel: texture_2d<f32>; // share of the light up to a distance to one side, by its root
+@group(0) @binding(3) var blurred: texture_storage_2d<rgba32float, write>;
+
+// Of a pixel's surface in the camera's frame [mm].
+fn place_of(pixel: vec2i, depth: f32) -> vec3f {
+    let ndc = vec2f(2.0, -2.0) * (vec2f(pixel) + 0.5) / vec2f(textureDimensions(source)) + vec2f(-1.0, 1.0);
+    return depth * vec3f(ndc * spread.half, 1.0);
+}
+
+// Share of the light that goes to one side, but not beyond a distance.
+fn share_within(distance: f32) -> vec3f {
+    let last = f32(textureDimensions(kernel).x - 1u);
+    let at = last * sqrt(min(distance / spread.reach, 1.0));
+    let low = min(floor(at), last - 1.0);
+    let below = textureLoad(kernel, vec2u(u32(low), 0u), 0).rgb;
+    let above = textureLoad(kernel, vec2u(u32(low) + 1u, 0u), 0).rgb;
+    return mix(below, above, at - low);
+}
+
+// Light from one side. Each tap stands for the surface up to halfway to the next, measured on the surface; where no
+// skin follows, the last tap stands for all beyond. So all weights together are 1/2, whatever is seen.
+fn from_side(here: vec2i, centre: vec4f, step: vec2i) -> vec3f {
+    let place = place_of(here, centre.a);
+    let pixel = distance(place, place_of(here + step, centre.a));
+    let reach = spread.reach / pixel;
+    var sum = vec3f(0.0);
+    var light = centre.rgb; // of the tap before
+    var at = 0.0; // its distance
+    var share = vec3f(0.0); // of the light from nearer than it stands for
+    var before = 0u;
+    for (var k = 1u; k <= TAPS; k++) {
+        let part = f32(k) / f32(TAPS);
+        let n = max(k, u32(round(reach * part * part)));
+        let pixels = here + i32(n) * step;
+        if (any(pixels < vec2i(0)) || any(pixels >= vec2i(textureDimensions(source)))) {
+            break;
+        }
+        let tap = textureLoad(source, pixels, 0);
+        let away = distance(place, place_of(pixels, tap.a));
+        // What is no farther than the tap before lies behind an edge: another surface was in front.
+        if (tap.a > 0.0 && away > at) {
+            let widest = STEEPEST * pixel * f32(n - before);
+            let within = share_within(max(0.5 * (at + away), away - 0.5 * widest));
+            sum += (within - share) * light;
+            light = tap.rgb;
+            at = away;
+            share = within;
+        }
+        before = n;
+    }
+    return sum + (0.5 - share) * light;
+}
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if (any(id.xy >= textureDimensions(source))) {
+        return;
+    }
+    let here = vec2i(id.xy);
+    let centre = textureLoad(source, here, 0);
+    if (centre.a == 0.0) {
+        textureStore(blurred, here, centre);
+        return;
+    }
+    let step = select(vec2i(0, 1), vec2i(1, 0), AXIS == 0u);
+    let light = from_side(here, centre, step) + from_side(here, centre, -step);
+    textureStore(blurred, here, vec4f(light, centre.a));
+}
