@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from dermis.scene.settings import Settings
+
 FEATHER_MM = 3.0  # width over which an edited stretch map narrows the blur towards an edge
 
 
@@ -14,18 +16,33 @@ class Remedy:
     layouts : of the atlas: "stitched", "mesh" for the mesh's own uv, "unwrapped" for one with other seams
     edge : one of `diffuse.EDGES`
     feathered : whether the stretch map is edited so that blurs narrow towards the edges
+    coloured : whether empty texels show `Settings.seam_colour` rather than black
     """
 
     layouts: tuple[str, ...] = ("mesh",)
     edge: str = "cleared"
     feathered: bool = False
+    coloured: bool = False
 
 
 REMEDIES = {
     "stitch": Remedy(("stitched",), "repeated"),
     "none": Remedy(),
-    "clear-colour": Remedy(),
+    "clear-colour": Remedy(coloured=True),
     "stretch-map": Remedy(feathered=True),
     "alpha": Remedy(edge="skipped"),
     "multi-uv": Remedy(("mesh", "unwrapped"), edge="skipped"),
 }
+_BASELINES = ("one-blur", "published")  # never knew what lies across a seam
+
+
+def remedy_of(settings: Settings) -> Remedy:
+    """What is done at the seams; the baselines take their own remedy where ours is asked for."""
+    if settings.technique in _BASELINES and settings.seams == "stitch":
+        return REMEDIES["clear-colour"]
+    return REMEDIES[settings.seams]
+
+
+def stretch_of(settings: Settings) -> str:
+    """How blurs follow the map's stretch: a single blur does not."""
+    return "none" if settings.technique == "one-blur" else settings.stretch

@@ -19,12 +19,15 @@ class Settings(Plain):
     size : width and height of the image [pixel]
     atlas : side of the irradiance map [texel]
     samples : samples of each pixel
-    technique : "texture-space" scatters light over the atlas; "none" is the dry, unscattered skin
+    technique : "texture-space" scatters light over the atlas; "none" is the dry, unscattered skin; baselines are
+        "one-blur" (a single blur of the light map) and "published" (the passes of 2007 as they were),
+        and what engines do: "screen-space" scatters over the picture, "pre-integrated" by tables of curvature
     stretch : "full" corrects blurs for the map's stretch and shear, "axes" takes u and v for at right angles,
         "none" blurs alike everywhere, for comparison
     seams : "stitch" lets light cross the map's seams; "none" and the talk's remedies "clear-colour",
         "stretch-map", "alpha" and "multi-uv" are for comparison
     seam_colour : light beside the charts for "clear-colour", as irradiance over pi
+    transmission : "thin" lets light through thin parts: ears, nostrils; "none" takes all for thick
     shadow_size : side of each shadow map [texel]
     occlusion : "baked" dims an environment's light where the head is in its way
     exposure : factor from radiance to the image [-]
@@ -37,10 +40,13 @@ class Settings(Plain):
     size: tuple[_Side, _Side] = (1024, 1024)
     atlas: Annotated[int, Field(ge=64)] = 2048
     samples: Annotated[int, Field(ge=1, le=_MOST_SAMPLES)] = 4
-    technique: Literal["texture-space", "none"] = "texture-space"
+    technique: Literal["texture-space", "none", "one-blur", "published", "screen-space", "pre-integrated"] = (
+        "texture-space"
+    )
     stretch: Literal["full", "axes", "none"] = "full"
     seams: Literal["stitch", "none", "clear-colour", "stretch-map", "alpha", "multi-uv"] = "stitch"
     seam_colour: Colour = (0.5, 0.35, 0.3)
+    transmission: Literal["thin", "none"] = "thin"
     shadow_size: Annotated[int, Field(ge=64, le=8192)] = 2048
     occlusion: Literal["baked", "none"] = "baked"
     exposure: Annotated[float, Field(ge=1e-6, le=1e6)] = 1.0

@@ -31,6 +31,8 @@ class Levels:
 class Diffuse:
     """Spreads the light of layer 0 to the layers above it."""
 
+    name = "diffuse"
+
     def __init__(self, device: Device) -> None:
         self._device = device
         self._stitch = Stitch(device)
