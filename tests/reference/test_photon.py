@@ -79,7 +79,7 @@ def test_machine_without_a_folder_for_compiled_code_compiles_anew(monkeypatch: p
         return compiles(**options)
 
     monkeypatch.setattr(numba, "njit", no_folder)
-    assert photon._compiled(_double)(2) == 4
+    assert photon.compiled(_double)(2) == 4
 
 
 def _double(number: int) -> int:

@@ -7,17 +7,16 @@ layer k.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from dermis.reference.compiled import compiled
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.int64]
 Words = NDArray[np.uint64]
-Function = TypeVar("Function", bound=Callable[..., Any])
 
 MAX_EVENTS = 100_000
 """Scatterings and faces after which a photon is given up: without absorption some would walk for ever."""
@@ -49,16 +48,7 @@ class Tally(NamedTuple):
     unfinished: Counts
 
 
-def _compiled(function: Function) -> Function:
-    """The function as machine code, kept on disk where numba finds a folder that it may write to."""
-    options = {"nogil": True, "error_model": "numpy"}
-    try:
-        return cast(Function, numba.njit(cache=True, **options)(function))
-    except RuntimeError:  # neither the package's folder nor the user's can be written to
-        return cast(Function, numba.njit(**options)(function))
-
-
-@_compiled
+@compiled
 def next_word(rng: Words) -> np.uint64:
     """64 random bits by xoshiro256++; advances the state rng (4,).
 
@@ -76,13 +66,13 @@ def next_word(rng: Words) -> np.uint64:
     return np.uint64(word)
 
 
-@_compiled
+@compiled
 def uniform(rng: Words) -> float:
     """A number between 0 and 1, never either of them, so that its logarithm is finite and not 0."""
     return ((next_word(rng) >> np.uint64(12)) + 0.5) * 2.0**-52
 
 
-@_compiled
+@compiled
 def refract(cosine: float, eta: float) -> tuple[float, float]:
     """Reflectance of unpolarised light, and the cosine beyond the face, which is 0 when all is reflected [-].
 
@@ -101,7 +91,7 @@ def refract(cosine: float, eta: float) -> tuple[float, float]:
     return 0.5 * (across**2 + along**2), beyond
 
 
-@_compiled
+@compiled
 def deflect(x: float, y: float, z: float, g: float, rng: Words) -> tuple[float, float, float]:
     """The unit direction (x, y, z) after it has scattered by Henyey and Greenstein.
 
@@ -128,13 +118,13 @@ def deflect(x: float, y: float, z: float, g: float, rng: Words) -> tuple[float, 
     )
 
 
-@_compiled
+@compiled
 def _ring(x: float, y: float, edges2: Floats) -> int:
     """The ring between squared edges (n + 1,) that holds a point; n beyond the last edge."""
     return int(np.searchsorted(edges2, x * x + y * y, side="right")) - 1
 
 
-@_compiled
+@compiled
 def _leave(x: float, y: float, upward: bool, scatterings: int, edges2: Floats, tally: Tally) -> None:
     if scatterings == 0:
         tally.unscattered[0 if upward else 1] += 1
@@ -144,7 +134,7 @@ def _leave(x: float, y: float, upward: bool, scatterings: int, edges2: Floats, t
         tally.transmitted[_ring(x, y, edges2)] += 1
 
 
-@_compiled
+@compiled
 def _walk(stack: Stack, edges2: Floats, rng: Words, tally: Tally) -> None:
     """One photon that has entered straight down on the axis, until it leaves or is absorbed."""
     x = y = z = ux = uy = 0.0
@@ -182,7 +172,7 @@ def _walk(stack: Stack, edges2: Floats, rng: Words, tally: Tally) -> None:
     tally.unfinished[0] += 1
 
 
-@_compiled
+@compiled
 def walk_batch(photons: int, stack: Stack, edges2: Floats, rng: Words, tally: Tally) -> None:
     """Add to the tally what becomes of so many photons.
 

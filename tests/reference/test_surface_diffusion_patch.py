@@ -1,0 +1,157 @@
+"""Patches: the surface stays, places are found again, and heat on them is that on the whole surface."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dermis.assets.geometry import edges, triangle_areas
+from dermis.assets.head import load_head
+from dermis.assets.primitives import plane, uv_sphere
+from dermis.errors import DermisError
+from dermis.reference.refine import Patch, refine_patch
+from dermis.reference.surface_diffusion import (
+    diffuse_on_surface,
+    edge_for,
+    longest_edge_mm,
+    margin_for,
+    vertex_areas,
+    welded,
+)
+
+Floats = NDArray[np.float64]
+
+RADIUS_MM = 12.0
+COARSE = welded(uv_sphere(RADIUS_MM, 24, 12))
+PLACE = RADIUS_MM * np.array([0.6, 0.0, 0.8])
+VARIANCES = [1.0, 2.5]
+SMALL = refine_patch(*COARSE, PLACE, 3.0, edge_for(VARIANCES), margin_for(VARIANCES))
+WHOLE = refine_patch(*COARSE, PLACE, np.inf, edge_for(VARIANCES), margin_for(VARIANCES))
+
+
+def uses(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+    return edges(triangles)[2]
+
+
+@pytest.mark.parametrize("patch", [SMALL, WHOLE])
+def test_edges_are_short_and_the_surface_is_the_same(patch: Patch) -> None:
+    assert longest_edge_mm(patch.positions, patch.triangles) <= edge_for(VARIANCES)
+    corners = COARSE[0][COARSE[1]][patch.parent]
+    assert np.allclose(patch.weights @ corners, patch.positions[patch.triangles], atol=1e-12)
+    fine, coarse = (
+        np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]) for c in (patch.weights @ corners, corners)
+    )
+    assert ((fine * coarse).sum(axis=1) > 0).all()
+    assert np.array_equal(np.unique(patch.triangles), np.arange(len(patch.positions)))
+
+
+def test_the_whole_is_closed_and_has_its_area() -> None:
+    assert (uses(WHOLE.triangles) == 2).all() and WHOLE.judged.all()
+    area = triangle_areas(WHOLE.positions[WHOLE.triangles])
+    per_parent = np.bincount(WHOLE.parent, area)
+    assert np.allclose(per_parent, triangle_areas(COARSE[0][COARSE[1]]), rtol=1e-12)
+
+
+def test_a_patch_has_one_border_outside_its_margin() -> None:
+    ends, _, counts = edges(SMALL.triangles)
+    border = np.unique(ends[counts == 1])
+    assert counts.max() == 2
+    distance = np.linalg.norm(SMALL.positions - PLACE, axis=1)
+    assert distance[border].min() >= 3.0 + margin_for(VARIANCES) - edge_for(VARIANCES)
+    assert distance.max() < 3.0 + margin_for(VARIANCES) + 2 * edge_for(VARIANCES)
+    assert 0 < SMALL.judged.sum() < len(SMALL.positions)
+
+
+def test_places_are_found_again() -> None:
+    rng = np.random.default_rng(2)
+    fine = rng.integers(len(SMALL.triangles), size=500)
+    inside = rng.dirichlet(np.ones(3), 500)
+    weights = np.einsum("mi,mij->mj", inside, SMALL.weights[fine])
+    found, again = SMALL.find(SMALL.parent[fine], weights)
+    assert np.array_equal(found, fine) and np.allclose(again, inside, atol=1e-9)
+    placed = SMALL.interpolate(SMALL.positions, found, again)
+    assert np.allclose(placed, np.einsum("mi,mij->mj", weights, COARSE[0][COARSE[1]][SMALL.parent[fine]]))
+
+
+def test_places_off_the_patch_are_not_found() -> None:
+    far = np.setdiff1d(np.arange(len(COARSE[1])), SMALL.parent)[:5]
+    found, _ = SMALL.find(far, np.full((5, 3), 1 / 3))
+    assert (found == -1).all()
+
+
+def test_vertices_know_their_place_on_the_coarse_surface() -> None:
+    triangle, weights = SMALL.vertex_places()
+    placed = np.einsum("mi,mij->mj", weights, COARSE[0][COARSE[1]][triangle])
+    assert np.allclose(placed, SMALL.positions, atol=1e-12)
+
+
+def heat(patch: Patch) -> tuple[Floats, Floats]:
+    """Positions and levels where the small patch may judge; the light is everywhere, and uneven."""
+    values = 1 + np.cos(patch.positions @ np.array([[1.1, 0.2], [0.4, -0.9], [0.3, 0.7]]))
+    levels = diffuse_on_surface(patch.positions, patch.triangles, values, VARIANCES)
+    judged = SMALL.holds(patch.positions)
+    order = np.lexsort(patch.positions[judged].round(9).T)
+    return patch.positions[judged][order], levels[:, judged][:, order]
+
+
+def test_heat_on_a_patch_is_that_on_the_whole_within_the_margin() -> None:
+    places, truth = heat(WHOLE)
+    same, levels = heat(SMALL)
+    assert np.allclose(places, same)
+    assert np.abs(levels - truth).max() < 5e-4 * truth.max()
+
+
+def test_without_a_margin_the_border_is_felt() -> None:
+    bare = refine_patch(*COARSE, PLACE, 3.0, edge_for(VARIANCES), 0.0)
+    values = 1 + np.cos(bare.positions[:, :1])
+    levels = diffuse_on_surface(bare.positions, bare.triangles, values, VARIANCES)
+    wide = diffuse_on_surface(SMALL.positions, SMALL.triangles, 1 + np.cos(SMALL.positions[:, :1]), VARIANCES)
+    assert abs(levels[1, :, 0].max() - wide[1, SMALL.judged, 0].max()) > 0.01
+
+
+def test_edges_in_need_alone_are_halved() -> None:
+    """A long thin triangle is cut across, and one that is fine already stays as it is."""
+    positions = np.array([[0.0, 0, 0], [8, 0, 0], [0, 0.5, 0], [-0.5, 0, 0]])
+    patch = refine_patch(positions, [[0, 1, 2], [0, 2, 3]], [0, 0, 0], np.inf, 1.0, 0.0)
+    assert (patch.parent == 1).sum() == 1
+    assert longest_edge_mm(patch.positions, patch.triangles) <= 1.0
+    assert triangle_areas(patch.positions[patch.triangles]).sum() == pytest.approx(2.125)
+    assert (uses(patch.triangles) <= 2).all()
+
+
+def test_huge_flat_triangles_are_cut_near_the_place_only() -> None:
+    patch = refine_patch(*welded(plane(1000.0)), [3.0, 4.0, 0.0], 2.0, 0.5, 1.0)
+    assert 100 < len(patch.triangles) < 1500
+
+
+@pytest.mark.samples
+def test_the_ear_of_a_scan_keeps_its_light() -> None:
+    """Thin, folded and cut by uv seams: the rightmost place at the height of the eyes."""
+    head = load_head("lee_perry_smith")
+    surface = welded(head.mesh)
+    off = surface[0] - head.centre_mm
+    ear = surface[0][np.where(np.abs(off[:, 1]) < 40, off[:, 0], -np.inf).argmax()]
+    variances = [1.99, 7.41]
+    patch = refine_patch(*surface, ear, 6.0, edge_for(variances), margin_for(variances))
+    values = (patch.positions[:, :1] > ear[0] - 5.0).astype(np.float64)
+    levels = diffuse_on_surface(patch.positions, patch.triangles, values, variances)
+    areas = vertex_areas(patch.positions, patch.triangles)
+    assert np.allclose(areas @ levels[..., 0].T, areas @ values[:, 0], rtol=1e-10, atol=0)
+    assert levels.min() > -0.005 and levels.max() < 1.005
+    assert levels[1, :, 0].std() < levels[0, :, 0].std() < values.std()
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ({"centre_mm": [99.0, 0, 0]}, "there is none at"),
+        ({"edge_mm": 0.0}, "edge and radius above 0"),
+        ({"radius_mm": -1.0}, "edge and radius above 0"),
+        ({"edge_mm": 1e-4, "radius_mm": 5.0}, "make more than 8000000"),
+    ],
+)
+def test_patches_that_cannot_be_are_refused(change: dict[str, float], complaint: str) -> None:
+    settings = {"centre_mm": PLACE, "radius_mm": 1.0, "edge_mm": 0.5, "margin_mm": 0.0} | change
+    with pytest.raises(DermisError, match=complaint):
+        refine_patch(*COARSE, **settings)
