@@ -1,0 +1,135 @@
+"""The truth for a scene: volumetric path tracing by Mitsuba, with the variance of each pixel."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.errors import refuse
+from dermis.optics.media import Medium
+from dermis.reference.mitsuba_passes import Passes, kept_passes, scene_key, store_passes
+from dermis.reference.mitsuba_scene import (
+    ROULETTE_DEPTH,
+    load_mitsuba,
+    mask_scene,
+    radiance_scene,
+    variant_of,
+)
+from dermis.reference.mitsuba_skin import Lambertian, check_traceable
+from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
+
+__all__ = ["Lambertian", "PathTraced", "path_trace"]
+
+Floats = NDArray[np.float32]
+Report = Callable[[int, int], None]
+Variant = Literal["scalar_rgb", "llvm_ad_rgb", "cuda_ad_rgb"]
+
+SAMPLES_PER_PASS = 4
+_LEAST_PASSES = 2
+_MOST_SAMPLES = 2**20
+_MASK_SAMPLES = 64
+_STORE_SECONDS = 30.0
+
+
+@dataclass(frozen=True, eq=False)
+class PathTraced:
+    """A path-traced image, black where there is no head.
+
+    image : (h, w, 3) radiance, linear Rec. 709
+    variance : (h, w, 3) of each value of the image, as a mean
+    mask : (h, w) share of the pixel that skin fills, with what is in front of it left out
+    samples : paths through each pixel
+    seconds : that they took
+    notes : what had to be done to the head
+    """
+
+    image: Floats
+    variance: Floats
+    mask: Floats
+    samples: int
+    seconds: float
+    notes: tuple[str, ...]
+
+
+def path_trace(
+    scene: Scene,
+    medium: Medium | Lambertian,
+    samples: int = 64,
+    settings: Settings | None = None,
+    *,
+    variant: Variant = "scalar_rgb",
+    report: Report | None = None,
+) -> PathTraced:
+    """The scene with its skin filled by a medium; its maps, profile and surface reflection play no part.
+
+    medium : index-matched (eta 1), isotropic and of three channels; layers become bodies inside one another,
+        each face the skin moved inwards by its depth. Or a `Lambertian`, for the dry, directly lit skin
+    samples : at least so many paths through each pixel, in whole passes of 4. Passes are kept on disk by the
+        scene's content, so that a second call with more samples adds to the first
+    settings : only the size counts
+    variant : of Mitsuba; "llvm_ad_rgb" takes half the time of many samples but wants a recent LLVM (14 and 15
+        end the process), "cuda_ad_rgb" wants an NVIDIA GPU
+    report : called with how many passes are done, and of how many
+
+    Raises DermisError when Mitsuba is missing, and for what it cannot trace: a surface without volume, media
+    under a refracting surface, lights without shadows.
+
+    Light passes the surface straight on, so that lights of no size connect to what lies below it; profiles to
+    be compared are those for eta 1. Lights are not seen, nor do they shadow one another.
+
+    Sources: [Jakob2022], [Miller2019].
+    """
+    _check(samples)
+    check_traceable(medium)
+    mi, size = load_mitsuba(), (settings or Settings()).size
+    key = scene_key(scene, medium, size, f"{mi.__version__} {variant} {SAMPLES_PER_PASS} {ROULETTE_DEPTH}")
+    wanted = max(_LEAST_PASSES, -(-samples // SAMPLES_PER_PASS))
+    passes = kept_passes(key, size)
+    if passes is None or passes.count < wanted:
+        with variant_of(mi, variant):
+            built, notes = radiance_scene(mi, scene, medium, size)
+            passes = passes or Passes.none(size, _mask(mi, scene, size), notes)
+            _add_passes(mi, built, passes, wanted, key, report)
+    return PathTraced(
+        passes.mean.astype(np.float32),
+        passes.variance.astype(np.float32),
+        passes.mask,
+        passes.count * SAMPLES_PER_PASS,
+        passes.seconds,
+        passes.notes,
+    )
+
+
+def _check(samples: int) -> None:
+    if not (isinstance(samples, int | np.integer) and 1 <= samples <= _MOST_SAMPLES):
+        refuse("samples", f"a whole number from 1 to {_MOST_SAMPLES}", f"{samples} came", "Correct it")
+
+
+def _mask(mi: Any, scene: Scene, size: tuple[int, int]) -> Floats:
+    share = np.array(mi.render(mask_scene(mi, scene, size), spp=_MASK_SAMPLES), np.float32)[..., 0]
+    return np.clip(share, 0.0, 1.0)
+
+
+def _add_passes(mi: Any, built: Any, passes: Passes, wanted: int, key: str, report: Report | None) -> None:
+    """Passes up to the number that is wanted; those that are done are stored, whatever happens."""
+    stored = time.perf_counter()
+    try:
+        while passes.count < wanted:
+            began = time.perf_counter()
+            image = np.array(mi.render(built, spp=SAMPLES_PER_PASS, seed=passes.count), np.float64)
+            ended = time.perf_counter()
+            passes.add(image, ended - began)
+            if report is not None:
+                report(passes.count, wanted)
+            if ended - stored > _STORE_SECONDS and passes.count < wanted:
+                store_passes(key, passes)
+                stored = ended
+    finally:
+        if passes.count > 0:
+            store_passes(key, passes)

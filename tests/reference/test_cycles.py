@@ -1,0 +1,100 @@
+"""Cycles as a peer: what it is told, and, where DERMIS_BLENDER_PYTHON names a Blender, what it renders."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lit_balls import BALL, LIGHTS, ball_scene
+
+from dermis.errors import DermisError
+from dermis.optics.presets import media
+from dermis.reference.cycles import PYTHON_VARIABLE, Method, cycles_render
+from dermis.reference.cycles_scene import describe
+from dermis.reference.half_space import diffuse_albedo
+from dermis.reference.path_traced import Lambertian, path_trace
+from dermis.scene.environment import Environment
+from dermis.scene.settings import Settings
+
+SKIN1 = media()["skin1"].with_eta(1.0)
+GREY = Lambertian((0.8, 0.5, 0.2))
+blender = pytest.mark.skipif(not os.environ.get(PYTHON_VARIABLE), reason=f"{PYTHON_VARIABLE} is not set")
+
+
+def test_skin_is_told_as_colour_and_radius() -> None:
+    described, arrays = describe(ball_scene(LIGHTS["point"]), SKIN1, "random-walk", (8, 8), 4, 2)
+    (skin,) = described["materials"]
+    (layer,) = SKIN1.layers
+    assert skin["method"] == "RANDOM_WALK"
+    assert skin["colour"] == pytest.approx([diffuse_albedo(float(a)) for a in layer.alpha_prime])
+    assert np.array(skin["radius"]) * 100.0 == pytest.approx(4.0 * np.pi * layer.mean_free_path_mm)
+    assert len(arrays["positions"]) == len(BALL.mesh.positions)
+
+
+def test_missing_blender_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.delenv(PYTHON_VARIABLE, raising=False)
+    with pytest.raises(DermisError, match=rf"none is named\. Set {PYTHON_VARIABLE}"):
+        cycles_render(ball_scene(LIGHTS["point"]), SKIN1)
+    with pytest.raises(DermisError, match="there is no file"):
+        cycles_render(ball_scene(LIGHTS["point"]), SKIN1, python=tmp_path / "python")
+
+
+def test_what_cycles_cannot_do_is_refused() -> None:
+    scene = ball_scene(LIGHTS["point"])
+    with pytest.raises(DermisError, match="expected one layer, for Cycles, but it has 3"):
+        cycles_render(scene, media()["dj3"])
+    with pytest.raises(DermisError, match="method: expected one of random-walk, burley"):
+        cycles_render(scene, SKIN1, method="gaussian")  # type: ignore[arg-type]
+    dark = LIGHTS["point"].model_copy(update={"shadows": False})
+    with pytest.raises(DermisError, match="light 1: expected a light with shadows"):
+        cycles_render(ball_scene(dark), SKIN1)
+
+
+def test_python_without_bpy_is_named(tmp_path: Path) -> None:
+    python = tmp_path / "python"
+    python.write_text("#!/bin/sh\necho \"ModuleNotFoundError: No module named 'bpy'\" >&2\nexit 1\n")
+    python.chmod(0o755)
+    with pytest.raises(DermisError, match=r"No module named 'bpy'\. Set DERMIS_BLENDER_PYTHON"):
+        cycles_render(ball_scene(LIGHTS["point"]), SKIN1, 4, Settings(size=(4, 4)), python=python)
+
+
+@blender
+@pytest.mark.parametrize("kind", LIGHTS)
+def test_lights_and_pixels_are_those_of_the_truth(kind: str) -> None:
+    pytest.importorskip("mitsuba")
+    scene, settings = ball_scene(LIGHTS[kind]), Settings(size=(64, 64))
+    ours, theirs = path_trace(scene, GREY, 128, settings), cycles_render(scene, GREY, 64, settings)
+    whole = ours.mask > 0.999
+    noise = (ours.variance[whole] + theirs.variance[whole]).mean()
+    squared = np.mean((ours.image[whole] - theirs.image[whole]) ** 2) - noise
+    assert squared < 0.01**2 * np.mean(ours.image[whole] ** 2)
+    assert theirs.image[whole].sum() / ours.image[whole].sum() == pytest.approx(1.0, abs=0.004)
+
+
+@blender
+@pytest.mark.samples
+def test_environment_is_that_of_the_truth() -> None:
+    pytest.importorskip("mitsuba")
+    scene = ball_scene(environment=Environment(name="lebombo", rotation_degrees=70.0))
+    ours, theirs = (
+        render(scene, GREY, 192, Settings(size=(48, 48))) for render in (path_trace, cycles_render)
+    )
+    whole = ours.mask > 0.999
+    noise = (ours.variance[whole] + theirs.variance[whole]).mean()
+    squared = np.mean((ours.image[whole] - theirs.image[whole]) ** 2) - noise
+    # The truth's own noise is 4 %, which hides what is smaller than this.
+    assert squared < 0.02**2 * np.mean(ours.image[whole] ** 2)
+    assert theirs.image[whole].sum() / ours.image[whole].sum() == pytest.approx(1.0, abs=0.006)
+
+
+@blender
+@pytest.mark.parametrize(("method", "tolerance"), [("random-walk", 0.03), ("burley", 0.01)])
+def test_ball_returns_its_colour(method: Method, tolerance: float) -> None:
+    scene = ball_scene(environment=Environment(name="uniform"))
+    lit = cycles_render(scene, SKIN1, 64, Settings(size=(32, 32)), method=method)
+    colour = [diffuse_albedo(float(a)) for a in SKIN1.layers[0].alpha_prime]
+    mean = lit.image[lit.coverage > 0.999].mean(axis=0)
+    assert mean == pytest.approx(colour, rel=tolerance)
+    assert lit.samples == 64 and lit.seconds > 0.0
