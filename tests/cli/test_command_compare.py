@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from tolerances import RECIPROCAL
 
+from dermis.cli.specular_plot import _lobes
 from dermis.images.io import read_image
 from dermis.specular.models import MODELS
 
@@ -68,10 +69,20 @@ def test_pictures_are_written_into_a_new_folder(compare: Run) -> None:
         assert picture.shape[1] > 500 and len(np.unique(picture.reshape(-1, 3), axis=0)) > 20
 
 
+@pytest.mark.parametrize("m", [0.1, 1.0])
+def test_no_curve_leaves_its_panel(m: float) -> None:
+    for axes in _lobes(m).axes:
+        assert all(curve.get_ydata().max() <= axes.get_rmax() for curve in axes.lines)
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (("moon",), "expected specular"),
+        (("moon",), "expected a mesh file or a sample"),
+        (("head.obj", "--against", "taste"), "--against: expected one of surface-integral"),
+        (("head.obj", "--techniques", "none,magic"), "--techniques: expected"),
+        (("head.obj", "--size", "wide"), "--size: expected WIDTHxHEIGHT"),
+        (("head.obj", "-o", "report.pdf"), "expected a name that ends in .html"),
         ((), "expected a value"),
         (("specular", "--roughness", "2"), "--roughness: expected a number less than or equal to 1"),
         (("specular", "-o", "taken/plots"), "expected a place to write"),
@@ -116,3 +127,16 @@ def test_wrong_colour_needs_a_map_to_be_seen(render: Run, folder: Path) -> None:
     assert render("head.obj", *words, "--specular-colour", "wrong").code == 0
     wrong = read_image("a.exr")
     assert (wrong <= white + 1e-6).all() and wrong[..., 2].sum() < white[..., 2].sum()
+
+
+def test_techniques_against_a_truth(run: Run, folder: Path, opened: None) -> None:
+    """Rows in JSON, and a page that needs no other file."""
+    words = ("--size", "24x24", "--atlas", "128", "--techniques", "none,texture-space")
+    ended = run("compare", "head.obj", *words, "-o", "report.html", "--json")
+    assert ended.code == 0, ended.stderr
+    rows = json.loads(ended.stdout)["rows"]
+    assert [row["technique"] for row in rows] == ["none", "texture-space"]
+    for row in rows:
+        assert row["against"] == "surface-integral" and row["relrmse_se"] == 0.0
+        assert np.isfinite([row["relrmse"], row["energy_ratio"], row["ms"]]).all()
+    assert Path("report.html").read_text(encoding="utf-8").count("<img") == 5

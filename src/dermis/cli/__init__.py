@@ -8,7 +8,7 @@ COMMANDS = {
     "render": "Render a head to a PNG (sRGB) or EXR (linear float) image.",
     "profile": "Compute how light spreads below a skin, and fit Gaussians to it.",
     "head": "Make a head with its maps and write it as glTF.",
-    "compare": "Compare the models of the surface: energy, reciprocity, cost.",
+    "compare": "Compare techniques with the truth, or the models of the surface.",
     "doctor": "Show what this machine can do and render a test frame.",
     "cite": "Print BibTeX entries of the works behind a picture.",
 }

@@ -1,48 +1,17 @@
-"""`dermis compare`: the parts of the renderer against each other, in numbers."""
+"""`dermis compare specular`: the models of the surface against each other, in numbers."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
-
-from cyclopts import Parameter
+from typing import Any
 
 from dermis.cli.console import print_json, print_lines, working_on
-from dermis.cli.options import Json
 
 _DEGREES = (0, 30, 60, 75, 85)
 
 
-def compare(
-    what: Literal["specular"],
-    /,
-    *,
-    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
-    roughness: float = 0.3,
-    adapter: str = "auto",
-    as_json: Json = False,
-) -> int:
-    """Compare surface models: what they reflect, whether light and view may change places, what they cost.
-
-    Examples:
-
-        dermis compare specular
-
-        dermis compare specular -o plots --json
-
-    Parameters
-    ----------
-    what:
-        specular: the models of the surface reflection.
-    output:
-        Folder for pictures of the lobes and their albedos; made when it is not there.
-    roughness:
-        Beckmann roughness m of the printed table and the pictures [0.3].
-    adapter:
-        auto (the best), cpu (software), or a part of an adapter's name.
-    as_json:
-        Print one JSON object, with albedos for roughnesses 0.1 to 0.5 and cosines 0.05 to 1.
-    """
+def compare_specular(output: Path | None, roughness: float, adapter: str, as_json: bool) -> None:
+    """Print what surface models reflect and cost, and draw their lobes into a folder if there is one."""
     from dermis.cli.options import check
     from dermis.scene.skin import Skin
 
@@ -57,7 +26,6 @@ def compare(
         print_json(report)
     else:
         print_lines(*_lines(report, roughness))
-    return 0
 
 
 def _specular(adapter: str) -> dict[str, Any]:

@@ -38,8 +38,7 @@ def upload_atlas(
 
     stretch : "full" knows the angle between u and v, "axes" takes it for right, "none" is one density for all
     """
-    packed = atlas.barycentric[..., 0].astype(np.uint32) | (atlas.barycentric[..., 1].astype(np.uint32) << 16)
-    texels = np.stack([(atlas.triangle + 1).astype(np.uint32), packed], axis=-1)
+    texels = packed_texels(atlas.triangle, atlas.barycentric)
     texels[~atlas.own] = 0
     metric = _metric(atlas, stretch)
     if remedy.feathered:
@@ -58,6 +57,16 @@ def upload_atlas(
     light = np.zeros((len(beyond), 4), np.float32)
     lists = (device.buffer(words, "STORAGE") for words in (beyond, light))
     return AtlasTextures(resources, sheared, *lists)
+
+
+def packed_texels(triangle: NDArray[Any], barycentric: NDArray[Any]) -> NDArray[np.uint32]:
+    """(n, n, 2) places on the mesh as the shaders read them.
+
+    triangle : (n, n) -1 for none
+    barycentric : (n, n, 2) weights of the second and third corner [1/65535]
+    """
+    packed = barycentric[..., 0].astype(np.uint32) | (barycentric[..., 1].astype(np.uint32) << 16)
+    return np.stack([(triangle + 1).astype(np.uint32), packed], axis=-1)
 
 
 def _metric(atlas: Atlas, stretch: str) -> NDArray[np.float16]:

@@ -30,8 +30,8 @@ class Renderer:
         started = time.perf_counter()
         self.device = open_device(adapter)
         with gpu_failures(self.device):
-            self._stages = Stages(self.device)
-        self._preparation = Preparation(self.device, self._stages)
+            self.stages = Stages(self.device)
+        self._preparation = Preparation(self.device, self.stages)
         self.prepare, self.forget = self._preparation.inputs, self._preparation.forget_all
         self._frames = 0
         self._opening_ms = 1e3 * (time.perf_counter() - started)
@@ -95,7 +95,7 @@ class Renderer:
         if not keep_shadows:
             inputs.shadow_maps.drawn = b""
         try:
-            draw_frame(frame, self._stages, inputs)
+            draw_frame(frame, self.stages, inputs)
             frame.submit()
         except Exception:
             inputs.shadow_maps.drawn = b""

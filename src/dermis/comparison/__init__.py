@@ -1,0 +1,1 @@
+"""Techniques against the truth: scenes, truths, figures and a report."""

@@ -1,0 +1,169 @@
+"""Techniques against one truth: figures and pictures."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.assets.head import Head
+from dermis.comparison.scenes import LIGHTS, REGIONS, comparison_scene
+from dermis.comparison.truths import TRUTHS, Subject, Truth, matched
+from dermis.errors import refuse
+from dermis.images.colour import encode_srgb
+from dermis.optics.diffusion.models import diffusion_profile
+from dermis.optics.fits.gaussian import fit_gaussians
+from dermis.optics.presets import media
+from dermis.optics.profiles import TERMS, write_profile
+from dermis.rendering.renderer import Renderer
+from dermis.scene.settings import Settings
+
+Floats = NDArray[np.float64]
+_SHOWN_PERCENTILE = 99.0
+
+
+@dataclass(frozen=True)
+class Row:
+    """A technique's figures, with standard errors where the truth is noisy.
+
+    relrmse, relrmse_se : root of the squared error over that of the squared truth [-]
+    flip : mean perceived difference [0..1]; None without the package that measures it
+    energy_ratio, energy_ratio_se : light of the image over that of the truth [-]
+    ms : device time of the frame
+    """
+
+    technique: str
+    against: str
+    relrmse: float
+    relrmse_se: float
+    flip: float | None
+    energy_ratio: float
+    energy_ratio_se: float
+    ms: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What was compared, and all that came of it.
+
+    images : linear radiance (h, w, 3) by technique
+    """
+
+    title: str
+    adapter: str
+    truth: Truth
+    against: str
+    rows: tuple[Row, ...]
+    images: dict[str, Floats]
+
+    @property
+    def exposure(self) -> float:
+        """Factor that shows the truth's bright parts as nearly white."""
+        bright = np.percentile(self.truth.image[self.truth.mask], _SHOWN_PERCENTILE)
+        return 0.8 / max(float(bright), 1e-9)
+
+    def shown(self, image: Floats) -> Floats:
+        """sRGB (h, w, 3) in 0..1 at the comparison's exposure."""
+        return np.asarray(encode_srgb(np.clip(self.exposure * image, 0.0, 1.0)))
+
+
+def compare(
+    head: Head,
+    against: str,
+    techniques: Sequence[str],
+    *,
+    light: str = "front",
+    region: str = "portrait",
+    medium: str = "skin1",
+    settings: Settings | None = None,
+    samples: int = 64,
+    adapter: str = "auto",
+    report: Callable[[str], None] = lambda doing: None,
+) -> Comparison:
+    """Techniques with the profile's own colour, no surface reflection and no energy term, against a truth.
+
+    against : of TRUTHS
+    light, region : of `scenes.LIGHTS` and `scenes.REGIONS`
+    medium : of the named media, taken without a refracting surface
+    samples : paths through each pixel
+    report : told what is being done
+
+    Raises DermisError for names that are none, and what the truth cannot do.
+    """
+    check_choices(against, light, region, medium)
+    settings = settings or Settings(size=(256, 256), atlas=1024)
+    body = matched(media()[medium])
+    profile = fit_gaussians(diffusion_profile(body).rings(), TERMS, name=medium).profile
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "profile.toml"
+        write_profile(file, profile, {})
+        renderer = Renderer(adapter)
+        scene = comparison_scene(head, light, region, str(file))
+        subject = Subject(renderer, scene, profile, body, settings)
+        report(f"truth: {against}")
+        truth = TRUTHS[against](subject, samples)
+        images, ms = {}, {}
+        for technique in techniques:
+            report(technique)
+            images[technique], ms[technique] = _render(subject, technique, truth.subpixels)
+    title = f"{head.name}, {medium}, light: {light}, region: {region}, {settings.size[0]}x{settings.size[1]}"
+    made = Comparison(title, renderer.device.adapter.name, truth, against, (), images)
+    rows = tuple(_row(made, technique, ms[technique]) for technique in techniques)
+    return Comparison(title, made.adapter, truth, against, rows, images)
+
+
+def check_choices(against: str, light: str, region: str, medium: str) -> None:
+    """Raises DermisError for names that are none; cheap, so call it before long work."""
+    choices = {
+        "against": (against, TRUTHS),
+        "light": (light, LIGHTS),
+        "region": (region, REGIONS),
+        "medium": (medium, media()),
+    }
+    for option, (chosen, known) in choices.items():
+        if chosen not in known:
+            refuse(f"--{option}", f"one of {', '.join(known)}", f"{chosen!r} came", "Choose one of them")
+
+
+def _render(subject: Subject, technique: str, subpixels: int) -> tuple[Floats, float]:
+    """Linear radiance of a technique, and the device time of its frame at four samples a pixel [ms]."""
+    chosen = subject.settings.model_dump() | {"technique": technique}
+    drawn = subject.renderer.draw(subject.scene, Settings(**(chosen | {"samples": subpixels})))
+    image = drawn.linear().astype(np.float64)
+    timed = subject.renderer.draw_warm(subject.scene, Settings(**(chosen | {"samples": 4})))
+    return image, (timed.gpu_ms or {"total": timed.frame_ms})["total"]
+
+
+def _row(made: Comparison, technique: str, ms: float) -> Row:
+    from dermis.reference.metrics import energy_ratio, relative_rmse
+
+    truth, image = made.truth, made.images[technique]
+    error = relative_rmse(image, truth.image, truth.mask, truth.variance)
+    energy = energy_ratio(image, truth.image, truth.mask, truth.variance)
+    perceived = _flip(made.shown(image), made.shown(truth.image), truth.mask)
+    return Row(technique, made.against, *error, perceived, *energy, ms)
+
+
+def _flip(image: Floats, truth: Floats, mask: NDArray[np.bool_]) -> float | None:
+    from importlib.util import find_spec
+
+    from dermis.reference.metrics import flip
+
+    return flip(image, truth, mask).mean if find_spec("flip_evaluator") else None
+
+
+def by_channel(made: Comparison, technique: str) -> dict[str, Any]:
+    """Relative error and energy in red, green and blue, for a report."""
+    from dermis.reference.metrics import energy_ratio, relative_rmse
+
+    truth, image = made.truth, made.images[technique]
+    parts = [(image[..., c], truth.image[..., c], truth.mask, truth.variance[..., c]) for c in range(3)]
+    return {
+        "relrmse": [relative_rmse(*part).value for part in parts],
+        "energy_ratio": [energy_ratio(*part).value for part in parts],
+    }

@@ -1,0 +1,78 @@
+"""The scenes that techniques are judged on: light from the front, through the ear, and a laser's stripe."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from dermis.assets.head import Head
+from dermis.assets.maps import Maps
+from dermis.scene.camera import Camera, portrait, three_quarter
+from dermis.scene.lights import Light, SpotLight, StripeLight
+from dermis.scene.model import Scene
+from dermis.scene.skin import Skin
+
+_WHITE = (3.14, 3.14, 3.14)
+
+
+def _front(head: Head) -> tuple[Light, ...]:
+    """A key light from the upper left, whose shadow edges cross the face."""
+    return (SpotLight(position=(450.0, 350.0, 750.0), irradiance=_WHITE),)
+
+
+def _back(head: Head) -> tuple[Light, ...]:
+    """A lamp behind the left ear."""
+    ear = _ear(head)
+    return (SpotLight(position=(ear[0] + 150.0, 60.0, -600.0), target=ear, irradiance=(12.0, 12.0, 12.0)),)
+
+
+def _laser(head: Head) -> tuple[Light, ...]:
+    """A sheet of light up and down over the cheek and the ear's front edge."""
+    ear = _ear(head)
+    place = (ear[0] - 12.0, ear[1], ear[2])
+    return (StripeLight(direction=(-0.55, 0.0, -1.0), position=place, irradiance=(30.0, 30.0, 30.0)),)
+
+
+LIGHTS: dict[str, Callable[[Head], tuple[Light, ...]]] = {"front": _front, "back": _back, "laser": _laser}
+
+
+def _ear(head: Head) -> tuple[float, float, float]:
+    """The outermost place of the head's left half above the neck: the left ear."""
+    places = head.mesh.positions - head.centre_mm
+    height = places[:, 1].max() - places[:, 1].min()
+    head_only = places[places[:, 1] > places[:, 1].max() - 0.75 * min(height, 330.0)]
+    x, y, z = (float(c) for c in head_only[head_only[:, 0].argmax()])
+    return (x, y, z)
+
+
+def _at_ear(head: Head) -> Camera:
+    x, y, z = _ear(head)
+    return Camera(position=(x + 420.0, y + 20.0, z + 420.0), target=(x - 8.0, y, z), frame_mm=95.0)
+
+
+def _at_cheek(head: Head) -> Camera:
+    spot = head.frontmost(40.0, -35.0)
+    return Camera(position=(spot[0] + 250.0, spot[1], spot[2] + 300.0), target=spot, frame_mm=90.0)
+
+
+REGIONS: dict[str, Callable[[Head], Camera]] = {
+    "portrait": portrait,
+    "three-quarter": three_quarter,
+    "ear": _at_ear,
+    "cheek": _at_cheek,
+}
+
+
+def comparison_scene(head: Head, light: str, region: str, profile: str) -> Scene:
+    """A head without maps, of white surface-free skin with a profile's own colour.
+
+    light, region : of LIGHTS and REGIONS
+    profile : name or file
+    """
+    bare = Head(head.name, head.mesh, Maps(), head.attribution)
+    skin = Skin(profile=profile, albedo="profile", specular="none", energy="none")
+    return Scene(bare, lights=LIGHTS[light](head), camera=REGIONS[region](head), skin=skin)
+
+
+def usual_region(light: str) -> str:
+    """Where a light shows most."""
+    return {"back": "ear", "laser": "three-quarter"}.get(light, "portrait")

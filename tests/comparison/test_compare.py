@@ -1,0 +1,94 @@
+"""Techniques against truths on a ball, where shadows and curvature are known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dermis.assets.head import Head
+from dermis.assets.maps import Maps
+from dermis.assets.primitives import uv_sphere
+from dermis.comparison.compare import Comparison, compare
+from dermis.comparison.report import write_report
+from dermis.comparison.scenes import LIGHTS, REGIONS, comparison_scene
+from dermis.errors import DermisError
+from dermis.scene.settings import Settings
+
+BALL = Head("ball", uv_sphere(100.0, 96, 48), Maps())
+SETTINGS = Settings(size=(64, 64), atlas=1024, shadow_size=256)
+
+
+@pytest.fixture(scope="module")
+def lasered() -> Comparison:
+    """A narrow stripe: all that is seen next to it is scattered light."""
+    return compare(
+        BALL,
+        "surface-integral",
+        ("none", "texture-space"),
+        light="laser",
+        region="ear",
+        settings=SETTINGS,
+        adapter="cpu",
+    )
+
+
+def test_scattering_is_nearer_the_truth_than_none(lasered: Comparison) -> None:
+    none, ours = lasered.rows
+    assert ours.relrmse < 0.2 * none.relrmse
+    assert ours.energy_ratio == pytest.approx(1.0, abs=0.03)
+    assert ours.relrmse_se == 0.0 and ours.ms > 0
+
+
+def test_truth_is_seen_where_the_image_is(lasered: Comparison) -> None:
+    """The brightest columns of both are the same: rays, lights and places agree."""
+    ours = lasered.images["texture-space"]
+    peaks = [picture.sum(axis=(0, 2)).argmax() for picture in (ours, lasered.truth.image)]
+    assert abs(int(peaks[0]) - int(peaks[1])) <= 1
+
+
+def test_heat_agrees_along_a_gentle_surface(lasered: Comparison) -> None:
+    heat = compare(
+        BALL,
+        "heat",
+        ("none", "texture-space"),
+        light="laser",
+        region="ear",
+        settings=SETTINGS,
+        adapter="cpu",
+    )
+    none, ours = heat.rows
+    assert 0 < heat.truth.mask.sum() < lasered.truth.mask.sum()
+    assert ours.relrmse < 0.2 * none.relrmse
+
+
+def test_report_holds_all_pictures(lasered: Comparison, tmp_path: Path) -> None:
+    write_report(tmp_path / "report.html", lasered)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert text.count("data:image/png;base64,") == 1 + 2 * len(lasered.rows)
+    assert "surface-integral" in text and "http" not in text
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+@pytest.mark.parametrize("region", REGIONS)
+def test_scenes_have_no_colour_of_their_own(light: str, region: str) -> None:
+    scene = comparison_scene(BALL, light, region, "gpu-gems-3")
+    assert scene.head.maps.colour is None and scene.skin.strength == 0.0
+    assert scene.skin.albedo == "profile" and scene.skin.energy == "none"
+    assert np.isfinite(scene.camera.position).all()
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ({"against": "taste"}, "--against: expected one of"),
+        ({"medium": "marzipan"}, "--medium: expected one of"),
+        ({"light": "moon"}, "--light: expected one of"),
+        ({"region": "elbow"}, "--region: expected one of"),
+    ],
+)
+def test_unknown_names_are_refused(words: dict[str, str], says: str) -> None:
+    against = words.pop("against", "surface-integral")
+    with pytest.raises(DermisError, match=says):
+        compare(BALL, against, ("none",), settings=SETTINGS, adapter="cpu", **words)

@@ -1,0 +1,100 @@
+"""Write docs/techniques.md: techniques of scattering on the scanned head against truths.
+
+python tools/accuracy_techniques.py [ADAPTER]; the sample data and Mitsuba are needed. Paths that were traced are
+kept on disk, so that only the first run takes its time.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import dermis
+from dermis.assets.head import Head
+from dermis.comparison.compare import Comparison, Row, compare
+from dermis.comparison.report import cells
+from dermis.comparison.scenes import comparison_scene, usual_region
+from dermis.optics.presets import media
+from dermis.reference.half_space import directional_albedo
+from dermis.reference.metrics import energy_ratio, relative_rmse
+from dermis.rendering.surface_points import irradiance_at, surface_points
+from dermis.scene import Settings
+
+PAGE = Path(__file__).parent.parent / "docs" / "techniques.md"
+TECHNIQUES = ("none", "one-blur", "published", "texture-space", "screen-space", "pre-integrated")
+LIGHTS = {"front": 64, "back": 256, "laser": 256}  # paths through each pixel
+SETTINGS = Settings(size=(256, 256), atlas=1024)
+HEAD = "|  | technique | relative RMSE | FLIP | energy ratio | ms |\n|---|---|---|---|---|---|"
+
+
+def line(first: str, row: Row) -> str:
+    return f"| {first} | " + " | ".join(cells(row)) + " |"
+
+
+def table(head: Head, against: str, medium: str, adapter: str) -> tuple[str, dict[str, Comparison]]:
+    """Rows of all techniques under each light, and the comparisons behind them."""
+    rows, made = [HEAD], {}
+    for light, samples in LIGHTS.items():
+        region = "ear" if against == "heat" else usual_region(light)
+        techniques = ("none", "published", "texture-space") if against == "heat" else TECHNIQUES
+        made[light] = compare(
+            head,
+            against,
+            techniques,
+            light=light,
+            region=region,
+            medium=medium,
+            settings=SETTINGS,
+            samples=samples,
+            adapter=adapter,
+        )
+        rows += [line(light, row) for row in made[light].rows]
+    return "\n".join(rows), made
+
+
+def floor(head: Head, medium: str, traced: Comparison, adapter: str) -> str:
+    """The front light on skin that reflects what a half space does from that direction, in all directions alike."""
+    renderer = dermis.Renderer(adapter)
+    scene = comparison_scene(head, "front", usual_region("front"), "gpu-gems-3")
+    seen = surface_points(renderer, scene, SETTINGS)
+    mesh = head.mesh
+
+    def at(values: np.ndarray) -> np.ndarray:
+        return np.einsum("nk,nkc->nc", seen.barycentric, values[mesh.triangles[seen.triangle]].astype(float))
+
+    normal, place = at(mesh.normals), at(mesh.positions) - np.array(head.centre_mm)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    towards = np.array(scene.lights[0].position) - place
+    cosine = np.clip((normal * towards).sum(axis=1) / np.linalg.norm(towards, axis=1), 0.0, 1.0)
+    layer = media()[medium].layers[0]
+    single = layer.sigma_s_prime / (layer.sigma_a + layer.sigma_s_prime)
+    albedo = np.stack([directional_albedo(cosine, one) for one in single], axis=-1)
+    entered = irradiance_at(renderer, scene, SETTINGS, seen.triangle, seen.barycentric)
+    image = np.zeros((*seen.mask.shape, 3))
+    image[seen.mask] = entered * albedo / np.pi
+    truth, mask = traced.truth, traced.truth.mask & seen.mask
+    figures = [
+        (measure(image[..., c], truth.image[..., c], mask, truth.variance[..., c]).value for c in range(3))
+        for measure in (relative_rmse, energy_ratio)
+    ]
+    error, energy = (" / ".join(f"{value:.3f}" for value in values) for values in figures)
+    return f"relative RMSE {error} and energy {energy} in red, green and blue"
+
+
+def main() -> None:
+    adapter = sys.argv[1] if len(sys.argv) > 1 else "auto"
+    head = dermis.load_head("lee_perry_smith")
+    found: dict[str, str] = {}
+    for medium in ("skin1", "skin2"):
+        found[f"traced_{medium}"], made = table(head, "path-traced", medium, adapter)
+        found[f"floor_{medium}"] = floor(head, medium, made["front"], adapter)
+    found["integral"], _ = table(head, "surface-integral", "skin1", adapter)
+    found["heat"], _ = table(head, "heat", "skin1", adapter)
+    text = (PAGE.parent / "techniques.in.md").read_text(encoding="utf-8")
+    PAGE.write_text(text.format(adapter=made["front"].adapter, **found), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
