@@ -12,9 +12,10 @@ import pytest
 
 from dermis.images.io import read_image
 from dermis.rendering.renderer import Renderer
+from dermis.scene.settings import Settings
 
 SCRIPTS = sorted((Path(__file__).parent.parent / "gallery").glob("[0-9]*.py"))
-SMALL = {"size": (48, 48), "atlas": 128, "samples": 1}
+SMALL = {"size": (48, 48), "atlas": 128, "samples": 1, "shadow_size": 256}
 
 
 def test_there_are_scripts() -> None:
@@ -24,15 +25,16 @@ def test_there_are_scripts() -> None:
 @pytest.mark.samples
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
 def test_script(script: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = Renderer.render
+    whole = Renderer.draw
 
-    def small(self: Renderer, scene: Any, **settings: Any) -> Any:
-        return whole(self, scene, **(settings | SMALL))
+    def small(self: Renderer, scene: Any, settings: Settings, **options: Any) -> Any:
+        return whole(self, scene, settings.model_copy(update=SMALL), **options)
 
     output = tmp_path / "picture.png"
     makehuman = Path(os.environ["DERMIS_DATA"]) / "heads" / "makehuman"
-    monkeypatch.setattr(Renderer, "render", small)
-    monkeypatch.setattr(sys, "argv", [str(script), str(output), str(makehuman)])
+    folder = [str(makehuman)] if "MAKEHUMAN_FOLDER" in script.read_text(encoding="utf-8") else []
+    monkeypatch.setattr(Renderer, "draw", small)
+    monkeypatch.setattr(sys, "argv", [str(script), str(output), *folder])
     runpy.run_path(str(script), run_name="__main__")
     picture = read_image(output)
     assert picture.max() > 60

@@ -21,6 +21,14 @@ PICTURES = {
     "06_layers": "layers",
     "07_bust": "bust",
     "08_family": "family",
+    "09_lobes": "lobes",
+    "10_regions": "regions",
+    "11_fresnel": "fresnel",
+    "12_environments": "environments",
+    "13_gamma": "gamma",
+    "14_energy": "energy",
+    "15_tinted": "tinted",
+    "16_area_lights": "area-lights",
 }
 QUALITY = 88
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from dermis.assets.head import Head, load_head
+    from dermis.assets.regions.apply import with_regions
     from dermis.errors import DermisError
     from dermis.images.io import write_image
     from dermis.optics.profiles import load_profile
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 _HOME = {
     "Head": "assets.head",
     "load_head": "assets.head",
+    "with_regions": "assets.regions.apply",
     "DermisError": "errors",
     "write_image": "images.io",
     "load_profile": "optics.profiles",
@@ -88,6 +90,7 @@ __all__ = [
     "render",
     "studio",
     "three_quarter",
+    "with_regions",
     "write_image",
 ]
 

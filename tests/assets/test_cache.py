@@ -28,9 +28,9 @@ def built(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     sizes: list[int] = []
     build = cache.build_atlas
 
-    def counted(mesh: Mesh, size: int) -> Atlas:
+    def counted(mesh: Mesh, size: int, layout: str, reach_mm: float) -> Atlas:
         sizes.append(size)
-        return build(mesh, size)
+        return build(mesh, size, layout, reach_mm)
 
     monkeypatch.setattr(cache, "build_atlas", counted)
     return sizes
@@ -58,6 +58,17 @@ def test_mesh_and_size_are_told_apart(folder: Path, built: list[int]) -> None:
     for mesh, size in ((plane(10.0), 64), (plane(20.0), 64), (plane(10.0), 65), (plane(10.0, 2), 64)):
         cached_atlas(mesh, size)
     assert len(built) == 4 and len(list(folder.iterdir())) == 4
+
+
+def test_layouts_and_reaches_are_told_apart(folder: Path, built: list[int]) -> None:
+    sphere = uv_sphere(40.0, 24, 12)
+    made = [
+        cached_atlas(sphere, 64, *how)
+        for how in (("mesh",), ("stitched",), ("stitched", 5.0), ("unwrapped",), ("stitched",))
+    ]
+    assert len(built) == 4 and len(list(folder.iterdir())) == 4
+    assert same(made[1], made[4])
+    assert len(made[1].apron) > len(made[2].apron) > len(made[0].apron) == len(made[3].apron) == 0
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from dermis.assets.environment.panorama import (
     load_panorama,
     mean_radiance,
     panorama_file,
-    reduced,
+    resampled,
     solid_angles,
 )
 from dermis.assets.environment.prefilter import HEIGHT, ROUGHNESSES, mirror_kernel, prefilter
@@ -25,7 +25,7 @@ from dermis.errors import DermisError
 from dermis.images.colour import luminance
 from dermis.images.io import write_exr, write_png
 from dermis.specular.cosines import cosines
-from dermis.specular.kelemen import kelemen
+from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]
 
@@ -63,12 +63,29 @@ def test_the_middle_lies_behind_the_head_and_the_right_at_its_left() -> None:
     assert solid_angles(64, 128).sum() * 128 == pytest.approx(4 * np.pi)
 
 
-def test_reduction_keeps_the_light() -> None:
-    radiance = room(256)
-    small = reduced(radiance, 128)
-    assert small.shape == (64, 128, 3)
-    assert np.allclose(mean_radiance(small), mean_radiance(radiance), rtol=1e-12)
-    assert reduced(room(64), 128).shape == (64, 128, 3)
+@pytest.mark.parametrize("height", [64, 100, 128, 300])
+def test_resampling_keeps_the_light(height: int) -> None:
+    """All of it, and where it is: the mean of radiance times direction."""
+    radiance = with_lamp(room(), (0.3, 0.8, 0.2), 50.0)
+    made = resampled(radiance.astype(np.float32), height)
+    assert made.shape == (height, 2 * height, 3)
+    assert np.allclose(mean_radiance(made), mean_radiance(radiance), rtol=1e-6)
+    for axis in range(3):
+        pull, exact = (
+            mean_radiance(part * directions(*part.shape[:2])[..., axis, None]) for part in (made, radiance)
+        )
+        assert np.abs(pull - exact).max() < 2e-3 * mean_radiance(radiance).max()
+    assert np.array_equal(resampled(made, height), made)
+
+
+@pytest.mark.parametrize(("height", "kept"), [(1, 256), (127, 256), (300, 300), (521, 512)])
+def test_any_size_is_taken(tmp_path: Path, height: int, kept: int) -> None:
+    """Also a prime number of rows, and two texels alone."""
+    pixels = np.random.default_rng(height).uniform(0, 2, (height, 2 * height, 3)).astype(np.float32)
+    write_exr(tmp_path / "sky.exr", pixels)
+    made = load_panorama(str(tmp_path / "sky.exr"))
+    assert made.shape == (kept, 2 * kept, 3)
+    assert np.allclose(mean_radiance(made), mean_radiance(pixels.astype(float)), rtol=1e-6)
 
 
 def test_a_lamp_becomes_a_sun_and_no_light_is_lost() -> None:
@@ -83,6 +100,25 @@ def test_a_lamp_becomes_a_sun_and_no_light_is_lost() -> None:
     assert np.allclose(left + sum(sun.irradiance for sun in suns), whole, rtol=1e-9)
     assert rest.min() > 0 and (rest <= radiance + 1e-12).all()
     assert luminance(rest).max() < luminance(radiance).max() / 10
+
+
+def test_stars_brighter_than_the_sun_do_not_keep_it_from_shining() -> None:
+    """Single texels that give next to no light: a sun is taken for what it gives, not for its brightness."""
+    towards = np.array([0.3, 0.8, 0.2]) / np.linalg.norm([0.3, 0.8, 0.2])
+    radiance = with_lamp(room(), (0.3, 0.8, 0.2), 900.0)
+    spots = np.random.default_rng(2).integers(20, 100, (40, 2))
+    radiance[spots[:, 0], 2 * spots[:, 1]] = 1200.0
+    _, suns = split_suns(radiance)
+    assert suns and suns[0].direction @ towards > np.cos(np.radians(0.5))
+    assert [sun.irradiance.sum() for sun in suns] == sorted((s.irradiance.sum() for s in suns), reverse=True)
+
+
+def test_a_glow_around_the_sun_does_not_widen_it() -> None:
+    """Its shadows are as sharp as the disc that gives most of the light."""
+    radiance = with_lamp(np.full((512, 1024, 3), 0.5), (0.3, 0.8, 0.2), 20000.0)
+    angle = np.degrees(np.arccos(directions(512, 1024) @ [0.3, 0.8, 0.2] / np.linalg.norm([0.3, 0.8, 0.2])))
+    _, (sun,) = split_suns(radiance + 400.0 * np.exp(-((angle / 4.0) ** 2))[..., None])
+    assert np.degrees(sun.radius) == pytest.approx(2.0, rel=0.15)
 
 
 def test_a_soft_room_has_no_sun() -> None:
@@ -154,19 +190,26 @@ def test_kernels_are_too_smooth_to_ring() -> None:
         )
 
 
-def test_mirrors_have_the_lobes_mean_direction() -> None:
-    """At a node of the table, by light sampled over the hemisphere; the normal's view keeps its roughness."""
+def test_mirrors_seen_along_the_normal_keep_their_roughness() -> None:
     table, roughness = equivalent_mirrors(), np.geomspace(0.05, 1, 8)
     assert np.allclose(table[:, -1, 0], 0, atol=1e-6)
     assert np.allclose(table[:, -1, 2], roughness, rtol=0.02)
     assert np.allclose(table[..., 0] ** 2 + table[..., 1] ** 2, 1)
-    light = directions(256, 512)[:128]
+
+
+@pytest.mark.parametrize("model", ["kelemen", "torrance-sparrow", "blinn-phong", "phong", "two-lobe"])
+def test_mirrors_have_the_lobes_mean_direction(model: str) -> None:
+    """At a node of the table, by light sampled over the hemisphere; and the mean cosine of a round lobe."""
+    table, roughness = equivalent_mirrors(model), np.geomspace(0.05, 1, 8)
+    light, area = directions(256, 512)[:128], solid_angles(256, 512)[:128]
     cosine = 3 / 7
     view = np.array([-np.sqrt(1 - cosine**2), cosine, 0])
     up = np.array([0.0, 1.0, 0.0])
-    weight = kelemen(cosines(up, light, view), roughness[5]) * light[..., 1] * solid_angles(256, 512)[:128]
-    mean = (light * weight[..., None]).sum(axis=(0, 1))
+    weight = MODELS[model].lobe(cosines(up, light, view), roughness[5]) * light[..., 1] * area
+    mean = (light * weight[..., None]).sum(axis=(0, 1)) / weight.sum()
     assert np.allclose(mean[:2] / np.linalg.norm(mean), table[5, 3, :2], atol=2e-3)
+    own = round_lobe(np.arccos(light[..., 1]), table[5, 3, 2]) * area
+    assert (own * light[..., 1]).sum() / own.sum() == pytest.approx(np.linalg.norm(mean), abs=2e-3)
 
 
 def test_samples_are_found(sample_folder: Path) -> None:
@@ -177,13 +220,23 @@ def test_samples_are_found(sample_folder: Path) -> None:
 
 
 def test_what_is_no_panorama_is_refused(tmp_path: Path) -> None:
-    square, negative, bytes_ = tmp_path / "square.exr", tmp_path / "negative.exr", tmp_path / "grey.png"
+    square, bytes_ = tmp_path / "square.exr", tmp_path / "grey.png"
     write_exr(square, np.ones((8, 8, 3), np.float32))
-    write_exr(negative, -np.ones((8, 16, 3), np.float32))
     write_png(bytes_, np.full((8, 16, 3), 100, np.uint8))
-    for path, said in ((square, "twice as wide"), (negative, "0 and more"), (bytes_, "uint8")):
+    for path, said in ((square, "twice as wide"), (bytes_, "uint8")):
         with pytest.raises(DermisError, match=said):
             load_panorama(str(path))
+    for worst, said in (
+        (-1, "from -1"),
+        (np.nan, "from nan"),
+        (np.inf, "from 1 to inf"),
+        (2e12, "from 1 to 2e"),
+    ):
+        pixels = np.ones((8, 16, 3), np.float32)
+        pixels[3, 4] = worst
+        write_exr(tmp_path / "odd.exr", pixels)
+        with pytest.raises(DermisError, match=rf"from 0 to 1e\+12, not all of it 0, but it is {said}"):
+            load_panorama(str(tmp_path / "odd.exr"))
     with pytest.raises(DermisError, match="royal_esplanade"):
         panorama_file("nowhere.hdr")
     with pytest.raises(DermisError, match="an environment"):

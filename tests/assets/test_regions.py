@@ -125,7 +125,10 @@ def test_landmarks_of_another_head_are_refused(tmp_path: Path) -> None:
     head, atlas = Head("card", _quad(), Maps()), build_atlas(_quad(), 64)
     table = RegionTable(_table(0.3, 0.2).values, landmarks=file)
     rows = [f"{name},500,0,0" for name in average_landmarks()]
+    corners = np.resize(head.mesh.positions - head.centre_mm, (len(rows), 3))
+    flat = [f"{name},{x},{y},{z}" for name, (x, y, z) in zip(average_landmarks(), corners, strict=True)]
     for text, message in (
+        ("\n".join(flat), "they lie in one plane"),
         ("\n".join(rows), "off the nearest corner"),
         ("horn,0,0,0", "'horn' came"),
         ("nose tip,0,0,0", "at least 10"),
@@ -149,6 +152,18 @@ def test_soft_maps_stay_within_the_table_and_have_no_edge(monkeypatch: pytest.Mo
         steps = np.abs(np.diff(picture, axis=1)).max() / (high - low)
         assert steps < 0.3  # a texel is 0.8 mm, so a hard border would be a step of 1
     assert rho_s == pytest.approx((nose[1] + neck[1]) / 2, rel=0.02)
+
+
+def test_specks_in_the_dark_of_the_own_map_do_not_outshine_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(apply, "SIZE", 256)
+    specks = np.full((256, 256), 0.5, np.float32)
+    specks[:, 128:] = 0.001
+    specks[40:200:40, 160:240:20] = 1.0
+    for own, most in ((specks, 3.0), (0 * specks, 0.0)):
+        maps = Maps(region=np.full((16, 16), 4, np.uint8), specular=own)
+        head, _ = apply.with_regions(Head("card", _quad(), maps), _table(0.3, 0.2))
+        assert head.maps.specular is not None
+        assert head.maps.specular.max() <= most * 0.2 * (1 + 1e-5)
 
 
 def test_fine_detail_of_the_own_map_stays_and_its_level_goes(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,4 +23,4 @@ def device(renderer: Renderer) -> Device:
 
 @pytest.fixture(scope="session")
 def stages(renderer: Renderer) -> Stages:
-    return renderer._stages
+    return renderer.stages

@@ -34,7 +34,9 @@ def panorama_at(layer: Floats, environment: Any, direction: Floats) -> Floats:
     for i in (0, 1):
         for j in (0, 1):
             weight = np.abs(1 - i - (row - top)) * np.abs(1 - j - (column - left))
-            total += weight[..., None] * layer[np.clip(top + i, 0, height - 1), (left + j) % width]
+            inside = np.clip(top + i, 0, height - 1)
+            around = left + j + np.where(inside == top + i, 0, width // 2)  # over a pole, to its other side
+            total += weight[..., None] * layer[inside, around % width]
     return total * float(environment["exposure"])
 
 

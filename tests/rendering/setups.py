@@ -59,15 +59,16 @@ def frontal(irradiance: float = 3.0, *, shadows: bool = False) -> DirectionalLig
 
 
 def settings_of(**given: Any) -> Settings:
-    """Small sizes unless told otherwise."""
-    return Settings(**({"size": (48, 48), "atlas": 64, "samples": 1, "shadow_size": 64} | given))
+    """Small sizes unless told otherwise, and an atlas laid out as the mesh's maps are."""
+    small = {"size": (48, 48), "atlas": 64, "samples": 1, "shadow_size": 64, "seams": "alpha"}
+    return Settings(**(small | given))
 
 
 def run_frame(renderer: Renderer, scene: Scene, **given: Any) -> Inputs:
     """A whole frame; what its stages made can be downloaded from the result."""
     inputs = renderer.prepare(scene, settings_of(**given))
     frame = Frame(renderer.device)
-    draw_frame(frame, renderer._stages, inputs)
+    draw_frame(frame, renderer.stages, inputs)
     frame.submit()
     return inputs
 

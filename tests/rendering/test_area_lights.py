@@ -158,7 +158,7 @@ def visibility(renderer: Renderer, head: Any, light: Light, size: int = 1024) ->
         "normals": texture_from(renderer.device, normals, "rgba32float"),
     }
     seen = []
-    records = light_records(renderer._stages.shade.program, scene, views)
+    records = light_records(renderer.stages.shade.program, scene, views)
     for one in records["light"][: len(views)].copy():
         records["light"][0] = one
         towards, _ = probe(
@@ -278,6 +278,19 @@ def test_a_ball_does_not_shade_itself(renderer: Renderer, kind: str) -> None:
     )
     assert (shaded <= plain + 1e-6).all()
     assert (plain - shaded).max() < AREA_LIGHT * plain.max()  # also where a part of the light has set
+
+
+def test_a_sphere_around_the_head_is_refused(renderer: Renderer) -> None:
+    """It shines outwards: within it there is no light."""
+    light = SphereLight(position=(0, 0, 900), target=(0, 0, -5000), radius_mm=1000, shadows=False)
+    with pytest.raises(DermisError, match=r"light 2: expected a head outside the sphere of 1000 mm"):
+        renderer.draw(scene_of(FLOOR, DirectionalLight(direction=(0, 0, -1)), light), settings_of())
+
+
+def test_far_too_many_lights_are_refused_before_their_maps_are_made(renderer: Renderer) -> None:
+    lights = [DirectionalLight(direction=(0, 0, -1))] * 300
+    with pytest.raises(DermisError, match="lights: expected at most 64, but there are 300"):
+        renderer.draw(scene_of(FLOOR, *lights), settings_of())
 
 
 def test_too_many_parts_are_refused(renderer: Renderer) -> None:

@@ -15,6 +15,7 @@ from tolerances import FURNACE, PANORAMA, PREFILTERED, TWIN
 from twins import DEFAULT_COLOUR, surface, surface_albedo
 
 from dermis.assets.cache import cached_atlas
+from dermis.assets.environment.mirrors import equivalent_mirrors
 from dermis.assets.environment.panorama import directions, solid_angles
 from dermis.assets.environment.prefilter import prefilter
 from dermis.assets.primitives import plane, uv_sphere
@@ -66,6 +67,10 @@ def test_functions_are_numpys(renderer: Renderer, room: str) -> None:
     lit = run_frame(renderer, around(WHITE, environment), occlusion="none").lit
     rng = np.random.default_rng(3)
     normal, smooth = hemisphere(1), hemisphere(2)
+    normal[0] = twins.unit(normal[0] * [0.01, 0, 0.01] + [0, 1, 0])  # within a texel of the poles
+    normal[1] = -normal[0]
+    normal[:2, 0] = [[0, 1, 0], [0, -1, 0]]
+    normal = normal.astype(np.float32).astype(float)
     view = facing(normal, 4)
     open_, albedo = (rng.uniform(0, 1, (SIZE, SIZE)).astype(np.float32).astype(float) for _ in range(2))
     m = rng.uniform(0.06, 1, (SIZE, SIZE)).astype(np.float32).astype(float)
@@ -160,6 +165,14 @@ def test_an_environment_adds_to_lights(renderer: Renderer) -> None:
     assert lit["panorama"].size[:2] == lit["occlusion_map"].size[:2] == (1, 1)
 
 
+@pytest.mark.parametrize("model", ["kelemen", "phong"])
+def test_reflections_follow_the_model_in_use(renderer: Renderer, model: str) -> None:
+    scene = around(WHITE, Environment(name="uniform"), specular=model)
+    record = run_frame(renderer, scene, occlusion="none").lit["environment"]
+    table = equivalent_mirrors(model).reshape(-1, 3)
+    assert np.abs(record["mirrors"][:, :3] - table).max() < 1e-6
+
+
 def test_exposure_is_a_factor_of_suns_too(renderer: Renderer, room: str) -> None:
     """Also far beyond what a light that is written down may give."""
     plain, bright = (
@@ -176,6 +189,52 @@ def test_suns_count_among_the_lights(renderer: Renderer, room: str) -> None:
     full = replace(scene_of(head_of(plane(50.0)), *[frontal()] * 64), environment=Environment(name=room))
     with pytest.raises(DermisError, match="65, with the environment's suns"):
         renderer.draw(full, settings_of(occlusion="none"))
+
+
+@pytest.mark.parametrize("rotation", [60.0, -150.0])
+def test_it_is_seen_behind_the_head(renderer: Renderer, room: str, rotation: float) -> None:
+    """Where each pixel's ray goes; turned by 60 degrees the window is in the picture's right."""
+    environment = Environment(name=room, rotation_degrees=rotation, exposure=0.5, visible=True)
+    camera = front_camera(WHITE, frame_mm=600.0)
+    scene = replace(scene_of(WHITE, camera=camera), environment=environment)
+    inputs = run_frame(renderer, scene, occlusion="none", exposure=2.0, background=(9, 9, 9))
+    image = download(renderer.device, inputs.picture.exposed).astype(float)
+    y, x = np.mgrid[:48, :48]
+    ray = twins.unit(np.dstack([x - 23.5, 23.5 - y, np.full(x.shape, -24.0)]))  # 45 degrees to each side
+    exact = 2 * twins.panorama_at(prefilter(room).layers[1].astype(float), inputs.lit["environment"], ray)
+    free = image[..., 3] == 0
+    assert free.sum() > 1000
+    assert np.abs(image[..., :3] - exact)[free].max() < PANORAMA * exact.max()
+    if rotation == 60.0:
+        assert image[24, 38, 2] > 2 * image[24, 9, 2]
+
+
+def test_a_colour_is_behind_the_head_unless_asked(renderer: Renderer, room: str) -> None:
+    scene = around(WHITE, Environment(name=room))
+    image = download(renderer.device, run_frame(renderer, scene, background=(0, 1, 0)).picture.exposed)
+    assert np.allclose(image[0, 0], [0, 1, 0, 0])
+
+
+def test_the_poles_are_no_seams(renderer: Renderer, tmp_path: Path) -> None:
+    """Half of the sky is bright: across the zenith its reflection changes by steps, not by a leap."""
+    radiance = np.where(directions(64, 128)[..., :1] > 0, [1.0, 1.0, 1.0], [0.0, 0.0, 0.0])
+    write_exr(tmp_path / "half.exr", radiance.astype(np.float32))
+    lit = run_frame(
+        renderer, around(WHITE, Environment(name=str(tmp_path / "half.exr"))), occlusion="none"
+    ).lit
+    angle = np.radians(np.linspace(-3, 3, SIZE * SIZE)).reshape(SIZE, SIZE)
+    normal = np.dstack([np.sin(angle), np.cos(angle), 0 * angle, 1 + 0 * angle])
+    view = np.dstack([normal[..., :3], np.full((SIZE, SIZE), 0.05)])
+    textures = {
+        name: texture_from(renderer.device, values, "rgba32float")
+        for name, values in {"normals": normal, "smooth_normals": normal, "views": view}.items()
+    }
+    _, mirror = probe(
+        renderer.device, "environment_probe", (SIZE, SIZE), ["around", "mirror"], **lit, **textures
+    )
+    seen = mirror[..., 0].ravel()
+    assert np.diff(seen).max() < 2 * np.median(np.diff(seen))
+    assert seen[0] < 0.4 and seen[-1] > 0.6
 
 
 def test_light_follows_the_rotation(renderer: Renderer, room: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from dermis.assets.primitives import plane
 from dermis.gpu.textures import texture_from
 from dermis.rendering import surface
 from dermis.rendering.renderer import Renderer
+from dermis.scene.lights import DirectionalLight
 from dermis.scene.skin import Skin
 from dermis.specular.beckmann import beckmann
 from dermis.specular.cosines import cosines
@@ -117,3 +119,33 @@ def test_nothing_enters_beyond_all_of_the_light(renderer: Renderer) -> None:
     """The published albedo passes 1 for fine lobes at grazing light: the share must stop at 0."""
     *_, entering, _, leaving = shader(renderer, directions(5), directions(6), 0.06, 1.0, energy="published")
     assert entering.min() == 0.0 and leaving.min() == 0.0
+
+
+def test_relief_that_turns_away_from_the_eye_reflects_as_seen_at_its_horizon(renderer: Renderer) -> None:
+    """Also with the light behind it, where the lobe of a normal that cannot be seen has no bounds."""
+    rng = np.random.default_rng(4)
+    view = directions(9)
+    to_light = np.array([0.1, 0.2, -1.0]) / np.sqrt(1.05)
+    view[:8] = Z + rng.normal(0, 0.02, (8, SIZE, 3)) - (to_light + Z)  # straight at the light, nearly
+    view /= np.linalg.norm(view, axis=-1, keepdims=True)
+    normal = rng.normal(size=(SIZE, SIZE, 3))
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    view, normal = (a.astype(np.float32).astype(float) for a in (view, normal))
+    light = DirectionalLight(direction=tuple(-to_light), irradiance=(1, 1, 1), shadows=False)
+    lit = run_frame(renderer, scene_of(head_of(plane(50.0)), light, specular="kelemen-direct")).lit
+    textures = {
+        "normals": texture_from(renderer.device, np.dstack([normal, 0 * normal[..., :1]]), "rgba32float"),
+        "views": texture_from(renderer.device, np.dstack([view, 0 * normal[..., :1] + 0.3]), "rgba32float"),
+    }
+    chosen = surface.switches(Skin(specular="kelemen-direct"))
+    (made,) = probe(renderer.device, "lighting_probe", (SIZE, SIZE), ["mirror"], chosen, **lit, **textures)
+    n_v = (normal * view).sum(-1, keepdims=True)
+    seen = normal - np.minimum(n_v, 0) * view
+    seen /= np.linalg.norm(seen, axis=-1, keepdims=True)
+    angles = cosines(seen, np.broadcast_to(to_light, seen.shape), view)
+    angles = replace(angles, n_v=np.maximum(angles.n_v, 1e-6))
+    lit_at_all = (normal * to_light).sum(-1) > 0
+    exact = np.where(lit_at_all, kelemen(angles, 0.3) * np.maximum(angles.n_l, 0), 0.0)
+    assert ((n_v[..., 0] < 0) & (exact > 0)).sum() > 50
+    assert np.median(np.abs(made[..., 0] - exact)[exact > 0] / exact[exact > 0]) < LOBE_TWIN
+    assert made[..., 0].max() < 1.1 * exact.max()

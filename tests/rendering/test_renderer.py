@@ -58,7 +58,7 @@ def test_a_failed_frame_leaves_no_half_drawn_shadows(monkeypatch: pytest.MonkeyP
         raise ValueError
 
     with monkeypatch.context() as patch:
-        patch.setattr(renderer._stages.shade, "draw", fail)
+        patch.setattr(renderer.stages.shade, "draw", fail)
         with pytest.raises(ValueError):
             renderer.draw(scene(), settings_of())
     assert drawn(renderer, scene()).tobytes() == drawn(Renderer(ADAPTER), scene()).tobytes()
@@ -172,7 +172,7 @@ def test_what_a_frame_reports(renderer: Renderer) -> None:
     assert rendered.frame_ms > 0 and rendered.setup_ms > 0
     if rendered.gpu_ms is not None:
         stages = {"irradiance", "diffuse", "combine", "visibility", "shade", "post"}
-        assert stages <= set(rendered.gpu_ms) <= stages | {"shadows", "total"}
+        assert stages <= set(rendered.gpu_ms) <= stages | {"shadows", "transmission", "total"}
 
 
 def test_one_call_is_enough(renderer: Renderer) -> None:
@@ -188,3 +188,7 @@ def test_more_than_the_memory_is_refused(renderer: Renderer, monkeypatch: pytest
     monkeypatch.setattr("os.sysconf", lambda name: 100)
     with pytest.raises(DermisError, match="GB"):
         renderer.draw(scene(), settings_of())
+    monkeypatch.setattr("os.sysconf", lambda name: 10_000)
+    shaded = scene(BALL, frontal(shadows=True))
+    with pytest.raises(DermisError, match=r"shadow_size: expected a frame within 0 GB.* 1 maps of 8192"):
+        renderer.draw(shaded, settings_of(shadow_size=8192))

@@ -198,9 +198,9 @@ def entering(scene: Scene, points: Floats, normals: Floats) -> Floats:
 
 
 def surface(atlas: Atlas, head: Head) -> tuple[Floats, Floats]:
-    """Position and unit normal of each texel, 0 outside the coverage."""
+    """Position and unit normal of each texel, 0 where there is none."""
     point = atlas.interpolate(head.mesh, head.mesh.positions)
     normal = atlas.interpolate(head.mesh, head.mesh.normals)
     length = np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
-    covered = atlas.coverage[..., None]
+    covered = atlas.own[..., None]
     return np.where(covered, point, 0.0), np.where(covered, normal / length, 0.0)

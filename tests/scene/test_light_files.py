@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 from small_head import write_head
 
@@ -108,16 +107,10 @@ def test_an_environments_file_lies_beside_the_scene(folder: Path) -> None:
         ('[environment]\nname = "uniform"\nexposure = -1\n', "-1"),
         ('[[lights]]\nkind = "sphere"\nposition = [0, 0, 90]\nradius_mm = 100\n', "outside the sphere"),
         ('[[lights]]\nkind = "stripe"\ndirection = [0, -1, 0]\n', "another direction"),
+        ('[[lights]]\nkind = "stripe"\ndirection = [1, 0, 0]\nangle_degrees = 2\n', "no angle_degrees"),
         ('[[lights]]\nkind = "rectangle"\nposition = [0, 0, 900]\nwidth_mm = 0\n', "width_mm"),
     ],
 )
 def test_what_cannot_be_is_refused(folder: Path, text: str, said: str) -> None:
     with pytest.raises(DermisError, match=said):
         _scene(folder, text)
-
-
-def test_a_sphere_is_a_point_from_afar() -> None:
-    """The same place and target: what differs is its size alone."""
-    light = SphereLight(position=(0, 0, 900))
-    assert np.isclose(np.linalg.norm(np.subtract(light.target, light.position)), 900)
-    assert light.kind == "sphere"

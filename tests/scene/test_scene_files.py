@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from small_head import HEIGHT_MM, write_head
 
+from dermis.assets.bust.regions import REGIONS
 from dermis.assets.head import load_head
 from dermis.errors import DermisError
 from dermis.images.io import write_png
@@ -173,3 +174,29 @@ def test_studio_is_three_shadowed_spots_from_three_sides() -> None:
     key, fill, rim = (np.array(light.position) for light in lights)
     assert key[0] < 0 < fill[0] and rim[2] < 0 < min(key[2], fill[2])
     assert sum(lights[0].irradiance) > sum(lights[1].irradiance)
+
+
+def test_regions_of_the_face_come_from_a_table(folder: Path) -> None:
+    values = "".join(f'["{region}"]\nm = 0.4\nrho_s = 0.25\n' for region in REGIONS)
+    (folder / "face.toml").write_text('labels = "face.png"\n' + values)
+    write_png(folder / "face.png", np.zeros((16, 16), np.uint8))
+    scene, _ = _load(folder, '[head]\nname = "head.obj"\nregions = "face.toml"\n[skin]\noiliness = 0.5\n')
+    for picture, level in ((scene.head.maps.roughness, 0.4), (scene.head.maps.specular, 0.25)):
+        np.testing.assert_allclose(picture, level, rtol=1e-5)
+    assert scene.skin.rho_s == pytest.approx(0.25, rel=1e-5)
+    assert scene.skin == Skin(oiliness=0.5, rho_s=scene.skin.rho_s)
+
+
+@pytest.mark.parametrize(
+    ("head", "skin", "said"),
+    [
+        ('regions = "default"', "rho_s = 0.2", "scene.toml: skin: rho_s: expected one or the other"),
+        ('regions = "default"', "roughness = 0.2", "skin: roughness: expected one or the other"),
+        ('regions = "other"', "", "other: expected default, or regions in TOML"),
+        ('regions = "default"', "", "a head whose regions are known"),
+        ("regions = 3", "", "regions"),
+    ],
+)
+def test_regions_that_cannot_be_are_refused(folder: Path, head: str, skin: str, said: str) -> None:
+    with pytest.raises(DermisError, match=said):
+        _load(folder, f'[head]\nname = "head.obj"\n{head}\n[skin]\n{skin}\n')

@@ -14,25 +14,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.atlas import GUTTER, Atlas, build_atlas
+from dermis.assets.atlas import GUTTER, REACH_MM, Atlas, build_atlas
 from dermis.assets.folders import cache_folder
 from dermis.assets.mesh import Mesh
 
 Array = NDArray[Any]
 Arrays = dict[str, Array]
-_FORM = 2  # raise when `build_atlas` gives other results for the same mesh
+_FORM = 3  # raise when `build_atlas` gives other results for the same mesh
 _MOST_BYTES = 2 << 30
 
 
-def cached_atlas(mesh: Mesh, size: int, layout: str = "mesh") -> Atlas:
+def cached_atlas(mesh: Mesh, size: int, layout: str = "mesh", reach_mm: float = REACH_MM) -> Atlas:
     """`build_atlas`, read back from disk when it was made before; the disk may fail without harm."""
     names = [field.name for field in fields(Atlas)]
 
     def make() -> Arrays:
-        atlas = build_atlas(mesh, size)
+        atlas = build_atlas(mesh, size, layout, reach_mm)
         return {name: getattr(atlas, name) for name in names}
 
-    return Atlas(**_kept("atlas", _key(mesh, size), names, make))
+    return Atlas(**_kept("atlas", _key(mesh, size, layout, reach_mm), names, make))
 
 
 def cached_occlusion(mesh: Mesh, atlas: Atlas, form: str, bake: Callable[[], Array]) -> Array:
@@ -40,11 +40,19 @@ def cached_occlusion(mesh: Mesh, atlas: Atlas, form: str, bake: Callable[[], Arr
 
     form : everything else that the result depends on
     """
+    return _baked("occlusion", mesh, atlas, form, bake)
+
+
+def cached_opposite(mesh: Mesh, atlas: Atlas, form: str, find: Callable[[], Array]) -> Array:
+    """What `find` returns of thin parts, kept on disk in the same way."""
+    return _baked("opposite", mesh, atlas, form, find)
+
+
+def _baked(folder: str, mesh: Mesh, atlas: Atlas, form: str, bake: Callable[[], Array]) -> Array:
     digest = hashlib.sha256(f"{_key(mesh, atlas.size)} {form}".encode())
-    for array in (mesh.positions, mesh.normals, atlas.place):
+    for array in (mesh.positions, mesh.normals, atlas.place, np.packbits(atlas.own)):
         digest.update(np.ascontiguousarray(array).tobytes())
-    made = _kept("occlusion", digest.hexdigest()[:40], ["open"], lambda: {"open": bake()})
-    return made["open"]
+    return _kept(folder, digest.hexdigest()[:40], ["open"], lambda: {"open": bake()})["open"]
 
 
 def _kept(folder: str, key: str, names: list[str], make: Callable[[], Arrays]) -> Arrays:
@@ -62,10 +70,10 @@ def _kept(folder: str, key: str, names: list[str], make: Callable[[], Arrays]) -
     return arrays
 
 
-def _key(mesh: Mesh, size: int) -> str:
-    digest = hashlib.sha256(f"{_FORM} {GUTTER} {size}".encode())
+def _key(mesh: Mesh, size: int, layout: str = "mesh", reach_mm: float = REACH_MM) -> str:
+    digest = hashlib.sha256(f"{_FORM} {GUTTER} {size} {layout} {reach_mm}".encode())
     digest.update(repr([material.kind for material in mesh.materials]).encode())
-    for array in (mesh.material, mesh.uv, mesh.triangles, mesh.dpdu, mesh.dpdv):
+    for array in (mesh.material, mesh.positions, mesh.uv, mesh.triangles, mesh.dpdu, mesh.dpdv, mesh.point):
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()[:40]
 

@@ -9,6 +9,16 @@ from dermis.assets.mesh import Ints, Material, Mesh
 from dermis.errors import refuse
 
 SKIN = (Material("skin"),)
+# Faces of a box: corners (x, y, z) in 0..1 from the top left as seen from outside, to the right, down; and
+# left, top and side of its chart.
+_FACES = (
+    (((0, 1, 1), (1, 1, 1), (1, 0, 1), (0, 0, 1)), (0.02, 0.02, 0.45)),
+    (((1, 1, 0), (0, 1, 0), (0, 0, 0), (1, 0, 0)), (0.52, 0.02, 0.45)),
+    (((1, 1, 1), (1, 1, 0), (1, 0, 0), (1, 0, 1)), (0.02, 0.52, 0.2)),
+    (((0, 1, 0), (0, 1, 1), (0, 0, 1), (0, 0, 0)), (0.27, 0.52, 0.2)),
+    (((0, 1, 0), (1, 1, 0), (1, 1, 1), (0, 1, 1)), (0.52, 0.52, 0.2)),
+    (((0, 0, 1), (1, 0, 1), (1, 0, 0), (0, 0, 0)), (0.77, 0.52, 0.2)),
+)
 
 
 def _grid_triangles(columns: int, rows: int) -> tuple[Ints, Ints]:
@@ -76,3 +86,39 @@ def uv_sphere(radius_mm: float, segments: int = 64, rings: int = 32) -> Mesh:
     corners = compact.reshape(-1, 3)
     material = np.zeros(len(corners))
     return build_mesh(radius_mm * normals[used], uv[used], corners, material, SKIN, normals[used])
+
+
+def wedge(side_mm: float, thin_mm: float, thick_mm: float, cells: int = 4) -> Mesh:
+    """A closed slab about the origin, its front towards +Z, thin at -X and thick at +X, each face a chart.
+
+    side_mm : along X and Y [mm]
+    thin_mm, thick_mm : along Z at either end [mm]
+    cells : along a side
+    """
+    if not (side_mm > 0 and min(thin_mm, thick_mm) > 0 and cells >= 1):
+        came = f"{side_mm}, {thin_mm} and {thick_mm} mm and {cells} came"
+        refuse("wedge", "sides above 0 and a cell", came, "Mend the arguments")
+    v, u = (axis.ravel() for axis in np.mgrid[: cells + 1, : cells + 1] / cells)
+    row, column = (axis.ravel() for axis in np.mgrid[:cells, :cells])
+    a = row * (cells + 1) + column
+    quads = np.column_stack((a, a + cells + 1, a + cells + 2, a, a + cells + 2, a + 1)).reshape(-1, 3)
+    positions, uv, normals, triangles = [], [], [], []
+    for index, (corners, (left, top, size)) in enumerate(_FACES):
+        c = np.array(corners, float)
+        c[:, 2] = (c[:, 2] - 0.5) * np.where(c[:, 0] > 0, thick_mm, thin_mm)
+        c[:, :2] = (c[:, :2] - 0.5) * side_mm
+        places = (
+            np.outer((1 - u) * (1 - v), c[0])
+            + np.outer(u * (1 - v), c[1])
+            + np.outer(u * v, c[2])
+            + np.outer((1 - u) * v, c[3])
+        )
+        normal = np.cross(c[3] - c[0], c[1] - c[0])
+        positions.append(places)
+        normals.append(np.tile(normal / np.linalg.norm(normal), (len(places), 1)))
+        uv.append(np.column_stack((left + size * u, top + size * v)))
+        triangles.append(quads + index * len(places))
+    count = sum(map(len, triangles))
+    return build_mesh(
+        np.vstack(positions), np.vstack(uv), np.vstack(triangles), np.zeros(count), SKIN, np.vstack(normals)
+    )

@@ -26,7 +26,9 @@ def render(
     size: str | None = None,
     atlas: Whole = None,
     samples: Whole = None,
-    technique: Literal["texture-space", "none"] | None = None,
+    technique: Literal["texture-space", "none", "one-blur", "published", "screen-space", "pre-integrated"]
+    | None = None,
+    transmission: Literal["thin", "none"] | None = None,
     profile: str | None = None,
     albedo: Literal["map", "profile"] | None = None,
     mix: float | None = None,
@@ -42,6 +44,7 @@ def render(
     env: str | None = None,
     env_rotation: float | None = None,
     env_exposure: float | None = None,
+    env_visible: bool | None = None,
     occlusion: Literal["baked", "none"] | None = None,
     camera: str | None = None,
     exposure: float | None = None,
@@ -90,7 +93,10 @@ def render(
     samples:
         Samples of each pixel's edges [4].
     technique:
-        texture-space scatters light below the surface; none is dry skin.
+        texture-space scatters light below the surface; none is dry skin. Baselines: one-blur, published (the
+        passes of 2007), and what engines do: screen-space, pre-integrated.
+    transmission:
+        thin lets light through thin parts such as ears; none takes all for thick [thin].
     profile:
         Diffusion profile: gpu-gems-3, or a CSV file with variance_mm2,red,green,blue.
     albedo:
@@ -122,6 +128,8 @@ def render(
         Turn of the environment about the upward axis [degrees].
     env_exposure:
         Factor of the environment's light [1].
+    env_visible:
+        Show the environment behind the head, out of focus.
     occlusion:
         baked dims the environment's light where the head is in its way; none does not.
     camera:

@@ -18,8 +18,13 @@ _HEAD_OPTIONS = (*_MAP_OPTIONS, "unit_mm", "v_origin", "up", "normal_y", "opaque
 _SURFACE_OPTIONS = ("roughness", "rho_s", "oiliness", "specular", "fresnel", "specular_colour", "energy")
 _SKIN_OPTIONS = ("profile", "albedo", "mix", *_SURFACE_OPTIONS)
 _POST_OPTIONS = ("exposure", "bloom", "tone", "gamma", "background")
-_SETTINGS = ("size", "atlas", "samples", "technique", "occlusion", *_POST_OPTIONS)
-_ENVIRONMENT = {"name": "env", "rotation_degrees": "env_rotation", "exposure": "env_exposure"}
+_SETTINGS = ("size", "atlas", "samples", "technique", "transmission", "occlusion", *_POST_OPTIONS)
+_ENVIRONMENT = {
+    "name": "env",
+    "rotation_degrees": "env_rotation",
+    "exposure": "env_exposure",
+    "visible": "env_visible",
+}
 
 
 def assemble(head: str, given: Mapping[str, Any]) -> tuple[Scene, Settings]:
@@ -30,11 +35,11 @@ def assemble(head: str, given: Mapping[str, Any]) -> tuple[Scene, Settings]:
     from dermis.assets.regions.apply import with_regions
     from dermis.scene import Scene, Settings, Skin, load_camera
 
-    own, skin, chosen = (_of(given, names) for names in (_HEAD_OPTIONS, _SKIN_OPTIONS, _SETTINGS))
+    skin, chosen = (_of(given, names) for names in (_SKIN_OPTIONS, _SETTINGS))
     around = {field: given[option] for field, option in _ENVIRONMENT.items() if option in given}
     _check(skin, chosen, around)
     regions = _regions(given)
-    scene, settings = _begin(head, own)
+    scene, settings = _begin(head, given)
     environment, body = _environment(scene.environment, around), scene.head
     if regions is not None:
         body, skin["rho_s"] = with_regions(body, regions)
@@ -77,16 +82,16 @@ def _regions(given: Mapping[str, Any]) -> RegionTable | None:
     return load_table(given["regions"]) if "regions" in given else None
 
 
-def _begin(head: str, own: dict[str, Any]) -> tuple[Scene, Settings]:
+def _begin(head: str, given: Mapping[str, Any]) -> tuple[Scene, Settings]:
     """The file's scene, or a head's with defaults."""
     from dermis.assets.head import load_head
     from dermis.scene import Scene, Settings, load_scene
 
     if Path(head).suffix.lower() != ".toml":
-        own = {name.removesuffix("_map"): value for name, value in own.items()}
+        own = {name.removesuffix("_map"): value for name, value in _of(given, _HEAD_OPTIONS).items()}
         return Scene(load_head(head, **own)), Settings()
-    if own:
-        option = "--" + next(iter(own)).replace("_", "-")
+    for name in _of(given, (*_HEAD_OPTIONS, "regions")):
+        option = "--" + name.replace("_", "-")
         refuse(option, "no such option with a scene file", "it came", "Write it into the file's [head]")
     return load_scene(Path(head))
 

@@ -14,7 +14,7 @@ from dermis.specular.models import MODELS
 
 _INCIDENT = {15: "#2a62b0", 45: "#2e8b57", 75: "#c0392b"}
 _DRAWN = [name for name in MODELS if name != "kelemen-direct"]  # the same curve as kelemen
-_FARTHEST = 1.8  # root of the intensity over kelemen's peak: two-lobe's reaches 1.7
+_FARTHEST = 1.8  # root of the intensity over kelemen's peak; on rough skin some models pass it
 _UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -36,10 +36,12 @@ def _lobes(m: float) -> Any:
     figure.suptitle(f"Intensity over kelemen's peak under the same light, on a root scale; m = {m:g}")
     panels = figure.subplots(2, 4, subplot_kw={"projection": "polar"}).ravel()
     whole = _intensity("kelemen", m).max(axis=1, keepdims=True)
-    for axes, name in zip(panels, _DRAWN, strict=True):
-        for (degrees, ink), values in zip(_INCIDENT.items(), _intensity(name, m) / whole, strict=True):
-            axes.plot(_view_angles(), np.sqrt(values), color=ink, label=f"light from {degrees}°")
-        axes.set(thetamin=-90, thetamax=90, theta_zero_location="N", theta_direction=-1, rmax=_FARTHEST)
+    roots = [np.sqrt(_intensity(name, m) / whole) for name in _DRAWN]
+    farthest = max(_FARTHEST, 1.05 * float(np.max(roots)))
+    for axes, name, curves in zip(panels, _DRAWN, roots, strict=True):
+        for (degrees, ink), curve in zip(_INCIDENT.items(), curves, strict=True):
+            axes.plot(_view_angles(), curve, color=ink, label=f"light from {degrees}°")
+        axes.set(thetamin=-90, thetamax=90, theta_zero_location="N", theta_direction=-1, rmax=farthest)
         axes.set(
             rticks=np.sqrt([0.25, 1.0, 2.25]),
             yticklabels=["", "1", ""],

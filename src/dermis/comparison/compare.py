@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -119,7 +119,7 @@ def compare(
 
 def check_choices(against: str, light: str, region: str, medium: str) -> None:
     """Raises DermisError for names that are none; cheap, so call it before long work."""
-    choices = {
+    choices: dict[str, tuple[str, Collection[str]]] = {
         "against": (against, TRUTHS),
         "light": (light, LIGHTS),
         "region": (region, REGIONS),

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.assets.atlas import Atlas
+from dermis.assets.curvature import vertex_curvature
 from dermis.assets.mesh import Mesh
 from dermis.gpu import Device
 from dermis.gpu.textures import texture_from
@@ -56,6 +57,7 @@ def _vertex_table(mesh: Mesh) -> NDArray[np.float32]:
     for k, attribute in enumerate((mesh.positions, mesh.normals, mesh.dpdu, mesh.dpdv)):
         table[:, k, :3] = attribute
     table[:, :2, 3] = mesh.uv
+    table[:, 2, 3] = vertex_curvature(mesh)
     return _rows(table.reshape(len(table), 16), _VERTICES_PER_ROW).reshape(-1, 4 * _VERTICES_PER_ROW, 4)
 
 

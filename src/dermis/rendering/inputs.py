@@ -11,16 +11,19 @@ from numpy.typing import NDArray
 from dermis.assets.head import Head
 from dermis.errors import refuse
 from dermis.gpu import ComputeProgram
+from dermis.optics.fits.single import single_gaussian
 from dermis.optics.gaussians import GaussianSum
 from dermis.rendering.atlas_textures import AtlasTextures
 from dermis.rendering.geometry import HeadTextures
 from dermis.rendering.layout import Layout
+from dermis.rendering.pre_integrated import PreIntegrated
 from dermis.rendering.projection import Matrix, depth_range, frame_of, perspective
 from dermis.rendering.samples import pixel_samples
 from dermis.rendering.stages.bloom import Glow
 from dermis.rendering.stages.diffuse import Levels
 from dermis.rendering.stages.nearest import Layers
 from dermis.rendering.stages.post import Picture
+from dermis.rendering.stages.screen_space import ScreenSpread
 from dermis.rendering.stages.shadows import ShadowMaps
 from dermis.rendering.stages.variants import Switches
 from dermis.scene.camera import Camera
@@ -31,6 +34,8 @@ Floats = NDArray[np.float64]
 # A Gaussian narrower than this is finer than texels and pores: it is lit again, not blurred.
 _RELIT_MM2 = 0.1**2
 _MOST_MATERIALS = 64
+WITHOUT_ATLAS = ("none", "screen-space", "pre-integrated")
+"""Techniques that do not spread light over the atlas."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +52,7 @@ class Inputs:
     light_switches : those of the irradiance pass
     suns : lights that the environment adds
     gaussians : terms of the profile
+    spread : how light spreads over the picture, None when it does not
     glow : space for the bloom, None without one
     """
 
@@ -70,6 +76,7 @@ class Inputs:
     suns: int
     gaussians: int
     picture: Picture
+    spread: ScreenSpread | None
     glow: Glow | None
     settings: Settings
 
@@ -103,11 +110,13 @@ def split_profile(profile: GaussianSum, settings: Settings, white: bool) -> Spli
 
     white : renormalise each channel's weights to 1, so that the colour map alone gives the colour
     """
+    if settings.technique == "one-blur":
+        profile = single_gaussian(profile)
     weight = profile.weight / profile.albedo if white else profile.weight
     total = weight.sum(axis=0)
-    if settings.technique == "none":
+    if settings.technique in WITHOUT_ATLAS:
         return Split(total, total, np.empty(0), np.empty((0, 3)))
-    if profile.variance_mm2[0] <= _RELIT_MM2:
+    if profile.variance_mm2[0] <= _RELIT_MM2 and settings.technique != "one-blur":
         return Split(weight[0], total, profile.variance_mm2[1:], weight[1:])
     return Split(np.zeros(3), total, profile.variance_mm2, weight)
 
@@ -125,8 +134,13 @@ def camera_clips(camera: Camera, head: Head, settings: Settings) -> list[Matrix]
     return clips
 
 
-def view_record(shade: ComputeProgram, scene: Scene, settings: Settings, split: Split) -> Any:
-    """The shading pass' record: rays, samples and weights."""
+def view_record(
+    shade: ComputeProgram, scene: Scene, settings: Settings, split: Split, pre: PreIntegrated | None = None
+) -> Any:
+    """The shading pass' record: rays, samples and weights.
+
+    pre : tables of pre-integrated skin and their scales
+    """
     eye, axes, half = _pinhole(scene.camera, scene.head, settings)
     jitter = np.zeros((64, 4), np.float32)
     jitter[: settings.samples, :2] = pixel_samples(settings.samples)
@@ -137,7 +151,7 @@ def view_record(shade: ComputeProgram, scene: Scene, settings: Settings, split: 
         refuse(scene.head.name, f"at most {_MOST_MATERIALS} materials", count, "Join some groups")
     for index, material in enumerate(materials):
         colours[index, :3] = material.colour
-    return shade.record(
+    record = shade.record(
         "Shade",
         eye=eye,
         samples=settings.samples,
@@ -150,6 +164,9 @@ def view_record(shade: ComputeProgram, scene: Scene, settings: Settings, split: 
         material_colour=colours,
         jitter=jitter,
     )
+    if pre:
+        record["pre"] = pre.record(shade)
+    return record
 
 
 def _pinhole(camera: Camera, head: Head, settings: Settings) -> tuple[Floats, Any, tuple[float, float]]:

@@ -7,6 +7,7 @@ from typing import Any
 
 from dermis.rendering.atlas_textures import AtlasTextures
 from dermis.rendering.geometry import HeadTextures
+from dermis.rendering.stages.transmission import Thin
 
 
 @dataclass(frozen=True)
@@ -15,9 +16,11 @@ class Layout:
 
     lit : resources by the shaders' names: geometry, maps, lights, shadows, surroundings
     scattered : texture of the light that leaves below the surface
+    thin : what lies opposite through thin parts, None where nothing comes through
     """
 
     head: HeadTextures
     atlas: AtlasTextures
     lit: dict[str, Any]
     scattered: Any
+    thin: Thin | None = None

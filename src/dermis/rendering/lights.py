@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.assets.environment.suns import Sun
+from dermis.assets.head import Head
 from dermis.errors import refuse
 from dermis.gpu import ComputeProgram
 from dermis.rendering.projection import ShadowView, frame_of, shadow_view
@@ -27,6 +28,7 @@ from dermis.scene.model import Scene
 
 Floats = NDArray[np.float64]
 _KINDS = (PointLight, SpotLight, DirectionalLight, StripeLight, RectangleLight, SphereLight)
+_MOST_LIGHTS = 64  # in lights.wgsl
 _UP = np.array([0.0, 1.0, 0.0])
 _WIDEST_SHADOW_FILTER = 6
 _SIDE, _PART_SIDE = 4, 2  # a light of some size is shaded as SIDE x SIDE lights, a part as fewer
@@ -60,27 +62,36 @@ def light_switches(scene: Scene) -> Switches:
 
 
 def light_views(scene: Scene, size: int) -> list[ShadowView | None]:
-    """How each part of each light sees the head; None for those without shadows."""
-    centre = np.array(scene.head.centre_mm)
-    return [
-        shadow_view(part, centre, scene.head.mesh, size, f"light {number}") if light.shadows else None
-        for number, light in enumerate(scene.lights, start=1)
-        for part in parts_of(light)
+    """How each part of each light sees the head; None for those without shadows.
+
+    Raises DermisError for more lights than the shader holds, and for one that the head reaches into.
+    """
+    numbered = [
+        (f"light {k}", part) for k, light in enumerate(scene.lights, start=1) for part in parts_of(light)
     ]
+    if len(numbered) > _MOST_LIGHTS:
+        came = f"there are {len(numbered)}, with the environment's suns and each part of a large rectangle"
+        refuse("lights", f"at most {_MOST_LIGHTS}", came, "Leave some out")
+    return [_view(scene.head, light, size, culprit) for culprit, light in numbered]
+
+
+def _view(head: Head, light: Light, size: int, culprit: str) -> ShadowView | None:
+    centre = np.array(head.centre_mm)
+    if isinstance(light, SphereLight):
+        near = float(np.linalg.norm(head.mesh.positions - (centre + light.position), axis=1).min())
+        if near <= light.radius_mm:
+            came = f"the head is {near:.0f} mm from its middle"
+            refuse(culprit, f"a head outside the sphere of {light.radius_mm:g} mm", came, "Move it away")
+    return shadow_view(light, centre, head.mesh, size, culprit) if light.shadows else None
 
 
 def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView | None]) -> Any:
     """The shader's array of lights.
 
     views : one for each part of each light
-
-    Raises DermisError for more lights than it holds.
     """
     centre = np.array(scene.head.centre_mm)
     record = program.record("Lights")
-    if len(views) > len(record["light"]):
-        came = f"there are {len(views)}, with the environment's suns and each part of a large rectangle"
-        refuse("lights", f"at most {len(record['light'])}", came, "Leave some out")
     divided = [(part, len(parts)) for parts in map(parts_of, scene.lights) for part in parts]
     layer = 0
     for index, ((light, siblings), view) in enumerate(zip(divided, views, strict=True)):

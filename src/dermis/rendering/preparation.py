@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from dermis.optics.profiles import load_profile
 from dermis.rendering import inputs as made
 from dermis.rendering import surface
 from dermis.rendering.atlas_textures import AtlasTextures, upload_atlas
+from dermis.rendering.engine_techniques import pre_integrated, screen_spread
 from dermis.rendering.frame import Stages
 from dermis.rendering.geometry import HeadTextures, upload_geometry
 from dermis.rendering.inputs import Inputs
@@ -24,8 +26,12 @@ from dermis.rendering.lights import light_records, light_switches, light_views
 from dermis.rendering.limits import check_limits
 from dermis.rendering.maps import relief_band, upload_maps
 from dermis.rendering.projection import ShadowView
-from dermis.rendering.seams import REMEDIES
+from dermis.rendering.seams import remedy_of, stretch_of
+from dermis.rendering.stages.diffuse import Levels
+from dermis.rendering.stages.shade import TECHNIQUES
 from dermis.rendering.stages.shadows import ShadowMaps
+from dermis.rendering.stages.transmission import Thin
+from dermis.rendering.stages.variants import Switches
 from dermis.rendering.surroundings import (
     Surroundings,
     environment_record,
@@ -34,6 +40,7 @@ from dermis.rendering.surroundings import (
     occlusion_map,
     with_suns,
 )
+from dermis.rendering.thin_parts import lets_through, opposite_map
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.specular.albedo import albedo_table
@@ -64,6 +71,8 @@ class Preparation:
         layouts = self._layouts(scene, settings, split, views, shadow_maps, surroundings)
         stages, count, size = self._stages, len(split.blurred_mm2), settings.size
         side = settings.atlas if count else 1
+        pre = pre_integrated(self._keep, self.device, settings, profile)
+        view = made.view_record(stages.shade.program, scene, settings, split, pre)
         return Inputs(
             head=layouts[0].head,
             layouts=layouts,
@@ -71,23 +80,23 @@ class Preparation:
             light_clips=clips,
             shadow_key=np.array(clips).tobytes(),
             scatters=count > 0,
-            levels=self._keep("levels", (side, count), lambda: stages.diffuse.make_levels(side, count)),
+            levels=self._levels(settings.technique, side, count),
             blurred_mm2=split.blurred_mm2,
             level_weight=split.weight,
-            edge=REMEDIES[settings.seams].edge,
-            clear=np.pi
-            * np.array(settings.seam_colour if settings.seams == "clear-colour" else (0.0, 0.0, 0.0)),
-            scattered=self._space("scattered", side) if len(layouts) > 1 else layouts[0].scattered,
+            edge=remedy_of(settings).edge,
+            clear=np.pi * np.array(settings.seam_colour) * remedy_of(settings).coloured,
+            scattered=pre.table if pre else self._scattered(layouts, side),
             seen=self._keep(
                 "seen", (size, settings.samples), lambda: stages.visibility.make_seen(size, settings.samples)
             ),
             camera_clips=made.camera_clips(scene.camera, scene.head, settings),
-            view=made.view_record(stages.shade.program, scene, settings, split),
-            switches=surface.switches(scene.skin) + light_switches(scene),
+            view=view,
+            switches=_switches(scene, settings),
             light_switches=light_switches(scene),
             suns=len(surroundings.suns),
             gaussians=len(profile.variance_mm2),
             picture=self._keep("picture", size, lambda: stages.post.make_picture(size)),
+            spread=screen_spread(self._keep, stages.screen_space, settings, profile, view),
             glow=self._keep("glow", size, lambda: stages.bloom.make_glow(size)) if settings.bloom else None,
             settings=settings,
         )
@@ -103,14 +112,37 @@ class Preparation:
     ) -> list[Layout]:
         """The atlases that light is spread on: one, or two that hide each other's seams."""
         layouts = []
-        for index, name in enumerate(REMEDIES[settings.seams].layouts):
+        for index, name in enumerate(remedy_of(settings).layouts):
             atlas, textures = self._atlas(scene.head, name, settings, index)
             head = self._head(scene, atlas, settings, index)
             lit = self._lit(scene, head, views, shadow_maps) | {"panorama": surroundings.panorama}
             around = self._environment(scene, settings, split.total, head, lit, atlas, textures, index)
             space = self._space(f"scattered {index}", settings.atlas if len(split.blurred_mm2) else 1)
-            layouts.append(Layout(head, textures, lit | around, space))
+            layout = Layout(head, textures, lit | around, space)
+            layouts.append(self._thin(scene.head, settings, split, atlas, layout, index))
         return layouts
+
+    def _thin(
+        self, head: Head, settings: Settings, split: made.Split, atlas: Atlas, layout: Layout, index: int
+    ) -> Layout:
+        """The layout with what lies opposite its thin parts, and space for the light from there."""
+        if not (len(split.blurred_mm2) and lets_through(settings)):
+            return layout
+        widest = float(np.sqrt(split.blurred_mm2[-1]))
+
+        def find() -> Any:
+            return opposite_map(self.device, self._stages.opposite, head.mesh, atlas, layout, widest)
+
+        opposite = self._keep(f"opposite {index}", (head, atlas, repr(widest)), find)
+        light = self._space(f"transmitted {index}", opposite.size[0])
+        return replace(layout, thin=Thin(opposite, light))
+
+    def _levels(self, technique: str, side: int, count: int) -> Levels:
+        stage = self._stages.spreading(technique)
+        return self._keep("levels", (stage.name, side, count), lambda: stage.make_levels(side, count))
+
+    def _scattered(self, layouts: list[Layout], side: int) -> Any:
+        return self._space("scattered", side) if len(layouts) > 1 else layouts[0].scattered
 
     def _surroundings(self, scene: Scene) -> Surroundings:
         name = scene.environment.name if scene.environment else None
@@ -171,15 +203,15 @@ class Preparation:
         return self._keep(role, side, lambda: make_texture(self.device, (side, side), "rgba32float"))
 
     def _atlas(self, head: Head, layout: str, settings: Settings, index: int) -> tuple[Atlas, AtlasTextures]:
-        size, remedy = settings.atlas, REMEDIES[settings.seams]
+        size, remedy, stretch = settings.atlas, remedy_of(settings), stretch_of(settings)
         atlas = self._keep(
             f"atlas {index}", (head, layout, size), lambda: cached_atlas(head.mesh, size, layout)
         )
 
         def make() -> AtlasTextures:
-            return upload_atlas(self.device, atlas, settings.stretch, remedy)
+            return upload_atlas(self.device, atlas, stretch, remedy)
 
-        return atlas, self._keep(f"atlas textures {index}", (atlas, settings.stretch, settings.seams), make)
+        return atlas, self._keep(f"atlas textures {index}", (atlas, stretch, remedy), make)
 
     def _head(self, scene: Scene, atlas: Atlas, settings: Settings, index: int) -> HeadTextures:
         head, use_colour = scene.head, scene.skin.albedo == "map"
@@ -195,3 +227,9 @@ class Preparation:
         geometry = self._keep(f"geometry {index}", (head, atlas), make_geometry)
         unscattered = self._keep(f"unscattered {index}", (head, atlas), lambda: atlas.unscattered(head.mesh))
         return HeadTextures(maps | geometry, relief_band(head.maps), len(head.mesh.triangles), unscattered)
+
+
+def _switches(scene: Scene, settings: Settings) -> Switches:
+    """Those of the shading pass."""
+    technique = TECHNIQUES.get(settings.technique, ())
+    return surface.switches(scene.skin) + light_switches(scene) + technique

@@ -21,6 +21,7 @@ from dermis.rendering.atlas_textures import AtlasTextures
 from dermis.rendering.geometry import HeadTextures
 from dermis.rendering.lights import sun_lights
 from dermis.rendering.stages.occlusion import FORM, Occlusion, whole_map
+from dermis.rendering.surface import model_of
 from dermis.scene.model import Scene
 
 _FINEST_OCCLUSION = 1024  # texels a side: it is smooth, and a texel of it is under a millimetre
@@ -75,7 +76,8 @@ def environment_record(program: ComputeProgram, scene: Scene, total: Any, occlud
         exposure=environment.exposure,
         albedo=np.minimum(total, 1.0),
         occluded=int(occluded),
-        mirrors=np.pad(equivalent_mirrors().reshape(-1, 3), ((0, 0), (0, 1))),
+        visible=int(environment.visible),
+        mirrors=np.pad(equivalent_mirrors(model_of(scene.skin)).reshape(-1, 3), ((0, 0), (0, 1))),
     )
 
 

@@ -16,8 +16,10 @@ class Environment(Plain):
         for radiance 1 from everywhere
     rotation_degrees : turn about the upward axis, counter-clockwise seen from above
     exposure : factor of its radiance [-]
+    visible : whether it is seen behind the head, out of focus and without its sun-like peaks
     """
 
     name: str
     rotation_degrees: Annotated[float, Field(ge=-3600, le=3600)] = 0.0
     exposure: Annotated[float, Field(ge=0, le=1e6)] = 1.0
+    visible: bool = False

@@ -10,6 +10,8 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import Field
 
 from dermis.assets.head import Head, load_head
+from dermis.assets.regions.apply import with_regions
+from dermis.assets.regions.table import load_table
 from dermis.errors import refuse
 from dermis.scene.camera import PRESETS, Camera, preset
 from dermis.scene.environment import Environment
@@ -44,7 +46,7 @@ _Length = Annotated[float | None, Field(gt=0, allow_inf_nan=False)]
 
 
 class _HeadTable(Plain):
-    """The [head] of a scene: what `load_head` takes."""
+    """The [head] of a scene: what `load_head` takes, and a table of regions of the face."""
 
     name: str
     colour: str | None = None
@@ -59,6 +61,7 @@ class _HeadTable(Plain):
     normal_y: Literal["up", "down"] = "up"
     opaque: tuple[str, ...] = ()
     subdivide: Annotated[int, Field(ge=0, le=3)] = 0
+    regions: str | None = None
 
 
 def preset_lights(name: str) -> tuple[Light, ...]:
@@ -88,16 +91,19 @@ def load_camera(name: str, head: Head) -> Camera:
 def load_scene(path: Path) -> tuple[Scene, Settings]:
     """Scene and settings of a TOML file; what it leaves out keeps its default.
 
-    Tables: [head] (file or sample under `name`, and the options of `load_head`), [skin], [[lights]] or
-    lights = "preset", [environment], [camera] or camera = "preset", [render]. File names are relative to the
-    scene's folder. With an environment there are no other lights unless the file names some.
+    Tables: [head] (file or sample under `name`, the options of `load_head`, and `regions`, a table as for
+    `with_regions`), [skin], [[lights]] or lights = "preset", [environment], [camera] or camera = "preset",
+    [render]. File names are relative to the scene's folder. With an environment there are no other lights
+    unless the file names some.
     """
     table = _read(path, "a scene in TOML")
     for part in table.keys() - _PARTS:
         refuse(path, f"only the parts {', '.join(sorted(_PARTS))}", f"{part!r} came", "Correct its name")
     skin = _made(Skin, path, "skin", table.get("skin", {}))
     settings = _made(Settings, path, "render", table.get("render", {}))
-    head = _head(path, _made(_HeadTable, path, "head", table.get("head")))
+    described = _made(_HeadTable, path, "head", table.get("head"))
+    _check_said_once(path, described, skin)
+    head, skin = _head(path, described, skin)
     environment = _environment(path, table["environment"]) if "environment" in table else None
     lights, camera = table.get("lights"), table.get("camera", "portrait")
     if lights is None:
@@ -113,10 +119,23 @@ def load_scene(path: Path) -> tuple[Scene, Settings]:
     ), settings
 
 
-def _head(path: Path, table: _HeadTable) -> Head:
-    options = table.model_dump(exclude={"name"}, exclude_none=True)
+def _head(path: Path, table: _HeadTable, skin: Skin) -> tuple[Head, Skin]:
+    """The head, and the skin with the mean strength that a table of regions gives it."""
+    regions = None if table.regions is None else load_table(_beside(path, table.regions))
+    options = table.model_dump(exclude={"name", "regions"}, exclude_none=True)
     options |= {role: path.parent / options[role] for role in _MAPS if role in options}
-    return load_head(_beside(path, table.name), **options)
+    head = load_head(_beside(path, table.name), **options)
+    if regions is None:
+        return head, skin
+    head, rho_s = with_regions(head, regions)
+    return head, skin.model_copy(update={"rho_s": rho_s})
+
+
+def _check_said_once(path: Path, table: _HeadTable, skin: Skin) -> None:
+    for name in ("rho_s", "roughness"):
+        if table.regions is not None and name in skin.model_fields_set:
+            came = "it came beside the head's regions, which say it for each region"
+            refuse(f"{path}: skin: {name}", "one or the other", came, "Leave one out, or use oiliness")
 
 
 def _environment(path: Path, table: Any) -> Environment:

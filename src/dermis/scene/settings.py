@@ -19,9 +19,9 @@ class Settings(Plain):
     size : width and height of the image [pixel]
     atlas : side of the irradiance map [texel]
     samples : samples of each pixel
-    technique : "texture-space" scatters light over the atlas; "none" is the dry, unscattered skin; baselines are
-        "one-blur" (a single blur of the light map) and "published" (the passes of 2007 as they were),
-        and what engines do: "screen-space" scatters over the picture, "pre-integrated" by tables of curvature
+    technique : "texture-space" scatters light over the atlas; "none" is the dry, unscattered skin; baselines
+        are "one-blur" (a single blur of the light map), "published" (the passes of 2007 as they were) and
+        what engines do: "screen-space" scatters over the picture, "pre-integrated" by tables over curvature
     stretch : "full" corrects blurs for the map's stretch and shear, "axes" takes u and v for at right angles,
         "none" blurs alike everywhere, for comparison
     seams : "stitch" lets light cross the map's seams; "none" and the talk's remedies "clear-colour",

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dermis.specular.beckmann import beckmann
 from dermis.specular.cosines import cosines
-from dermis.specular.kelemen import kelemen
+from dermis.specular.models import MODELS, Lobe
 
 Floats = NDArray[np.float64]
 SIDE = 8
@@ -33,8 +33,10 @@ def round_lobe(theta: Floats, m: float) -> Floats:
 
 
 @cache
-def equivalent_mirrors() -> Floats:
+def equivalent_mirrors(model: str = "kelemen") -> Floats:
     """(8, 8, 3) by roughness and view: sine and cosine of where the lobe points, and its roughness.
+
+    model : name in MODELS
 
     Rows are even in the logarithm of the roughness from 0.05 to 1, columns in the view's cosine. Towards
     grazing views a lobe leaves the mirror direction and gets narrower; the round lobe that stands for it has
@@ -44,13 +46,13 @@ def equivalent_mirrors() -> Floats:
     spread, known = _spreads()
     for row, m in enumerate(np.geomspace(SMOOTHEST, ROUGHEST, SIDE)):
         for column, cosine in enumerate(np.linspace(0.0, 1.0, SIDE)):
-            across, along = _mean_direction(max(float(cosine), _LEAST_COSINE), float(m))
+            across, along = _mean_direction(MODELS[model].lobe, max(float(cosine), _LEAST_COSINE), float(m))
             length = np.hypot(across, along)
             table[row, column] = across / length, along / length, np.interp(-length, -spread, known)
     return table
 
 
-def _mean_direction(cosine: float, m: float) -> tuple[float, float]:
+def _mean_direction(lobe: Lobe, cosine: float, m: float) -> tuple[float, float]:
     """Mean of the directions of reflected light: along the surface away from the view, and the normal."""
     theta = 0.5 * np.pi * ((np.arange(_NODES[0]) + 0.5) / _NODES[0])[:, None]
     phi = np.pi * ((np.arange(_NODES[1]) + 0.5) / _NODES[1])[None, :]
@@ -59,7 +61,7 @@ def _mean_direction(cosine: float, m: float) -> tuple[float, float]:
     )
     view = np.array([-np.sqrt(1.0 - cosine**2), 0.0, cosine])
     with np.errstate(under="ignore"):
-        weight = kelemen(cosines(np.array([0.0, 0.0, 1.0]), light, view), m) * light[..., 2] * np.sin(theta)
+        weight = lobe(cosines(np.array([0.0, 0.0, 1.0]), light, view), m) * light[..., 2] * np.sin(theta)
     x, _, z = (weight[..., None] * light).sum(axis=(0, 1)) / weight.sum()
     return float(x), float(z)
 

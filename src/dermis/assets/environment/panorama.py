@@ -14,8 +14,9 @@ from dermis.images.io import read_image
 Floats = NDArray[np.float64]
 UNIFORM = "uniform"
 """Name of the panorama with radiance 1 everywhere."""
-_WIDEST = 1024  # a wider picture is averaged: the finest lobe still spans 16 of its texels
-_LEAST_ROWS = 256  # a smaller one is divided: sums over its texels stand for integrals
+_LEAST_ROWS, _MOST_ROWS = 256, 512
+"""Fewer are divided, for sums over texels stand for integrals; more averaged: a fine lobe spans 16 texels."""
+_BRIGHTEST = 1e12  # far beyond any sun; keeps single precision on the device from overflowing
 
 
 def load_panorama(name: str) -> Floats:
@@ -33,15 +34,15 @@ def load_panorama(name: str) -> Floats:
         came, remedy = f"it is a picture of {image.dtype.name}", "Take its .hdr or .exr version"
         refuse(name, "a picture of radiance (.hdr, .exr)", came, remedy)
     rgb = np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image[..., :3]
-    if not np.isfinite(rgb).all() or rgb.min() < 0 or not rgb.any():
-        came = "it is black, or has negative or infinite pixels"
-        refuse(name, "radiance of 0 and more", came, "Export it again")
+    low, high = float(rgb.min()), float(rgb.max())
+    if low < 0 or not 0 < high <= _BRIGHTEST:
+        expected = f"radiance from 0 to {_BRIGHTEST:g}, not all of it 0"
+        refuse(name, expected, f"it is from {low:g} to {high:g}", "Export it again")
     height, width = rgb.shape[:2]
     if width != 2 * height:
         came, remedy = f"it is {width}x{height}", "Export it as latitude and longitude"
         refuse(name, "a picture twice as wide as high", came, remedy)
-    finer = -(-_LEAST_ROWS // height)
-    return reduced(rgb.astype(np.float64).repeat(finer, axis=0).repeat(finer, axis=1))
+    return resampled(rgb.astype(np.float32, copy=False), min(max(height, _LEAST_ROWS), _MOST_ROWS))
 
 
 def directions(height: int, width: int) -> Floats:
@@ -67,18 +68,24 @@ def mean_radiance(radiance: Floats) -> Floats:
     return mean
 
 
-def reduced(radiance: Floats, widest: int = _WIDEST) -> Floats:
-    """The panorama at most about `widest` wide: blocks of texels averaged by their solid angle."""
-    height, width = radiance.shape[:2]
-    factor = width // widest
-    while factor > 1 and (height % factor or width % factor):
-        factor -= 1
-    if factor <= 1:
-        return radiance
-    weight = solid_angles(height, width)[..., None]
-    blocks = (radiance * weight).reshape(height // factor, factor, width // factor, factor, 3)
-    total = weight.reshape(height // factor, factor, 1, 1).sum(axis=1) * factor
-    return np.asarray(blocks.sum(axis=(1, 3)) / total)
+def resampled(radiance: NDArray[np.floating], height: int) -> Floats:
+    """The panorama as (height, 2 height, 3): means over each texel's solid angle, whatever the sizes."""
+    rows, columns = radiance.shape[:2]
+    ours, theirs = (-np.cos(np.linspace(0.0, np.pi, n + 1)) for n in (rows, height))
+    upright = _means(radiance, ours, theirs)
+    ours, theirs = (np.linspace(0.0, 1.0, n + 1) for n in (columns, 2 * height))
+    return _means(upright.swapaxes(0, 1), ours, theirs).swapaxes(0, 1)
+
+
+def _means(values: NDArray[np.floating], edges: Floats, wanted: Floats) -> Floats:
+    """Means between each two of `wanted` of what is constant between each two of `edges`; first axis."""
+    first = np.clip(np.searchsorted(edges, wanted[:-1], "right") - 1, 0, len(values) - 1)
+    after = np.clip(np.searchsorted(edges, wanted[1:], "left"), 1, len(values))
+    means = np.empty((len(first), *values.shape[1:]))
+    for k, (a, b) in enumerate(zip(first, after, strict=True)):
+        share = np.diff(np.clip(edges[a : b + 1], wanted[k], wanted[k + 1]))
+        means[k] = np.tensordot(share / share.sum(), values[a:b], 1)
+    return means
 
 
 def panorama_file(name: str) -> Path | None:

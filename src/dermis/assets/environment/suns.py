@@ -32,38 +32,55 @@ class Sun:
 
 
 def split_suns(radiance: Floats) -> tuple[Floats, list[Sun]]:
-    """The panorama without its peaks, and the peaks, brightest first; together they hold all of its light.
+    """The panorama without its peaks, and the peaks, strongest first; together they hold all of its light.
 
     radiance : (h, w, 3)
 
-    Each peak is the light above 32 times the mean within 8 degrees of the middle of what is bright; one that
-    gives less than a twentieth of what the mean radiance gives stays in the picture. A lighter cousin of the
-    median cut of light probes [Debevec2005].
+    Each peak is the light above 32 times the mean within 8 degrees of the middle of what is bright. At most
+    four are taken, and none that gives less than a twentieth of what the mean radiance gives. A lighter
+    cousin of the median cut of light probes [Debevec2005].
     """
-    rest = radiance.copy()
-    suns: list[Sun] = []
-    limit = _PEAK * float(luminance(mean_radiance(radiance)))
-    towards = directions(*radiance.shape[:2])
-    weight = np.broadcast_to(solid_angles(*radiance.shape[:2]), radiance.shape[:2])
-    bright = np.asarray(luminance(radiance), np.float64)
-    while len(suns) < MOST_SUNS and bright.max() > limit:
-        inside = _cluster(bright > limit, towards, towards[np.unravel_index(bright.argmax(), bright.shape)])
-        keep = limit / bright[inside]
-        light = rest[inside] * ((1.0 - keep) * weight[inside])[:, None]
-        irradiance = light.sum(axis=0)
-        if luminance(irradiance) < _LEAST_SHARE * np.pi * limit / _PEAK:
+    mean = float(luminance(mean_radiance(radiance)))
+    brightness = np.asarray(luminance(radiance), np.float64)
+    above = brightness > _PEAK * mean
+    towards = directions(*radiance.shape[:2])[above]
+    weight = np.broadcast_to(solid_angles(*radiance.shape[:2]), above.shape)[above]
+    keep = _PEAK * mean / brightness[above]
+    light = radiance[above] * ((1.0 - keep) * weight)[:, None]
+    left, suns = np.ones(len(keep)), list[Sun]()
+    for inside in sorted(_clusters(brightness[above], towards, weight), key=lambda c: -_strength(light[c])):
+        if len(suns) == MOST_SUNS or _strength(light[inside]) < _LEAST_SHARE * np.pi * mean:
             break
-        middle = luminance(light) @ towards[inside]
-        radius = float(np.sqrt(weight[inside].sum() / np.pi))
-        suns.append(Sun(middle / np.linalg.norm(middle), irradiance, radius))
-        rest[inside] *= keep[:, None]
-        bright[inside] = limit
+        suns.append(_sun(light[inside], towards[inside], weight[inside]))
+        left[inside] = keep[inside]
+    rest = radiance.copy()
+    rest[above] *= left[:, None]
     return rest, suns
 
 
-def _cluster(bright: NDArray[np.bool_], towards: Floats, peak: Floats) -> NDArray[np.bool_]:
-    """Bright texels around the middle of those around a peak; the peak itself is among them."""
+def _strength(light: Floats) -> float:
+    return float(luminance(light.sum(axis=0)))
+
+
+def _sun(light: Floats, towards: Floats, weight: Floats) -> Sun:
+    """One light for the texels of a peak (n, 3), as wide as an even disc with the same mean square."""
+    grey = np.asarray(luminance(light), np.float64)
+    middle = grey @ towards
+    solid_angle = grey.sum() ** 2 / (grey**2 / weight).sum()
+    return Sun(middle / np.linalg.norm(middle), light.sum(axis=0), float(np.sqrt(solid_angle / np.pi)))
+
+
+def _clusters(brightness: Floats, towards: Floats, weight: Floats) -> list[NDArray[np.bool_]]:
+    """Bright texels (n,) sorted into peaks: those around the middle of those around the brightest left."""
     near = np.cos(np.radians(_NEAR_DEGREES))
-    middle = towards[bright & (towards @ peak > near)].mean(axis=0)
-    inside: NDArray[np.bool_] = bright & (towards @ middle > near * np.linalg.norm(middle))
-    return inside | (bright & (towards @ peak > 1.0 - 1e-9))
+    left = np.ones(len(brightness), bool)
+    clusters = []
+    while left.any():
+        peak = np.where(left, brightness, 0.0).argmax()
+        around = left & (towards @ towards[peak] > near)
+        middle = weight[around] @ towards[around]
+        inside = left & (towards @ middle > near * np.linalg.norm(middle))
+        inside[peak] = True
+        left &= ~inside
+        clusters.append(inside)
+    return clusters

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from dermis.assets.atlas import Atlas, build_atlas
 from dermis.assets.head import Head
 from dermis.assets.regions.labels import label_texels
 from dermis.assets.regions.soften import soften
-from dermis.assets.regions.table import LIMITS, RegionTable
+from dermis.assets.regions.table import DEFAULT, LIMITS, RegionTable, load_table
 
 Floats = NDArray[np.float32]
 
@@ -20,16 +21,20 @@ SIZE = 1024
 EDGE_MM = 2.5
 """Borders between regions go over softly: standard deviation of the blur [mm]."""
 _DETAIL_MM = 6.0  # what is finer stays in the head's own maps; what is coarser comes from the table
-_DARKEST = 1e-3
+_DARKEST, _BRIGHTEST = 0.4, 3.0  # of the mean, of what is around: else specks in black would outshine all
 
 
-def with_regions(head: Head, table: RegionTable) -> tuple[Head, float]:
-    """The head with the table's roughness and specular maps, and the mean rho_s of its skin [-].
+def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT) -> tuple[Head, float]:
+    """The head with roughness and specular maps by region of the face, and the mean rho_s of its skin [-].
+
+    table : what `load_table` gives or takes
 
     The specular map holds rho_s itself; who scales maps to a mean takes the one returned. Pores and blotches
     of the head's own two maps stay, as a factor of what is around them.
-    Raises DermisError when the head's regions are not known.
+    Raises DermisError when the head's regions are not known, and for tables that cannot be.
     """
+    if not isinstance(table, RegionTable):
+        table = load_table(table)
     atlas = build_atlas(head.mesh, SIZE)
     points = atlas.interpolate(head.mesh, head.mesh.positions)[atlas.coverage]
     soft = soften(points, table.values[label_texels(head, atlas, table)], EDGE_MM)
@@ -50,9 +55,11 @@ def _map(atlas: Atlas, points: NDArray[np.float64], level: NDArray[np.float64], 
     y, x = np.nonzero(atlas.coverage)
     height, width = own.shape
     values = own[y * height // SIZE, x * width // SIZE].astype(np.float64)
-    around = np.maximum(soften(points, values[:, None], _DETAIL_MM)[:, 0], _DARKEST)
+    around = np.maximum(soften(points, values[:, None], _DETAIL_MM)[:, 0], _DARKEST * values.mean())
+    around = np.maximum(around, np.finfo(np.float32).eps)
     shape = max(height, SIZE), max(width, SIZE)
-    return _resized(own, shape) * _resized(_picture(atlas, level / around), shape)
+    detail = np.minimum(_resized(own, shape) / _resized(_picture(atlas, around), shape), _BRIGHTEST)
+    return np.asarray(detail * _resized(_picture(atlas, level), shape))
 
 
 def _picture(atlas: Atlas, values: NDArray[np.float64]) -> Floats:

@@ -33,6 +33,7 @@ _EAR = {
     "tragus": (-1.6, -5.5, 3.5),
 }
 _FEWEST = 10
+_FLATTEST_MM = 2.0  # root mean square distance from a plane: the warp needs three dimensions
 _FARTHEST_MM = 15.0  # centres of eyes lie this deep; what is farther belongs to another head
 _SLACK = 1.0  # for places picked by eye; 0 would carry each landmark exactly onto its twin
 _STEPS, _LONGEST_MM = 4, 4.0
@@ -109,3 +110,7 @@ def _check(head: Head, places: Places, average: Places) -> None:
         if not off < _FARTHEST_MM:
             came = f"{name!r} is {off:.0f} mm off the nearest corner of the mesh"
             refuse(culprit, "places on the skin, in mm from the head's centre", came, "Correct the place")
+    spots = np.array(list(places.values()))
+    off_plane = np.linalg.svd(spots - spots.mean(axis=0), compute_uv=False)[-1] / np.sqrt(len(spots))
+    if off_plane < _FLATTEST_MM:
+        refuse(culprit, "places all around the head", "they lie in one plane", "Add some beside it")

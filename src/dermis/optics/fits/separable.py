@@ -44,6 +44,13 @@ class SeparableKernel:
         v = self.variance_mm2
         return np.asarray((self.weight * np.exp(-(x**2) / (2.0 * v)) / np.sqrt(2.0 * np.pi * v)).sum(axis=-2))
 
+    def one_side(self, offset_mm: ArrayLike) -> Floats:
+        """Integral of a(x) from 0 to an offset, shape (..., c), up to 1/2 [-]."""
+        from scipy.special import erf
+
+        x = np.asarray(offset_mm, dtype=np.float64)[..., None, None]
+        return np.asarray(0.5 * (self.weight * erf(x / np.sqrt(2.0 * self.variance_mm2))).sum(axis=-2))
+
     def cells(self, edges_mm: Floats) -> Floats:
         """Light through the sectors of rings, (n, m, c): all four quarters in one, m = `SECTORS` [-].
 

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from dermis.gpu import Device, Frame
+from dermis.gpu import Device, Frame, make_texture
 from dermis.gpu.program import Resources
 from dermis.rendering.stages import STAGES
 from dermis.rendering.stages.nearest import Layers
 from dermis.rendering.stages.variants import Switches, Variants
+
+TECHNIQUES: dict[str, Switches] = {
+    "screen-space": (("SPLIT", 1),),
+    "pre-integrated": (("PRE_INTEGRATED", 1),),
+}
+"""Switches of the techniques that this pass has a part in."""
 
 
 class Shade:
@@ -17,6 +23,7 @@ class Shade:
     def __init__(self, device: Device) -> None:
         self._variants = Variants(device, STAGES / "shade.wgsl")
         self.program = self._variants.program()
+        self._nothing = make_texture(device, (1, 1), "rgba32float", layers=2)
 
     def draw(
         self,
@@ -28,11 +35,15 @@ class Shade:
         scattered: Any,
         into: Any,
         size: tuple[int, int],
+        apart: Any = None,
     ) -> None:
         """Radiance and coverage into a texture of the image's size.
 
         view : record of the shader's struct Shade
-        switches : of the lights and the surface
+        switches : of the lights, the surface and the technique
+        scattered : light below the skin by place on the atlas, or the tables of pre-integrated skin
+        apart : layers for the light below the skin and how it leaves, which the radiance is then without
         """
         bound = {**lit, "shade": view, "seen": seen.texture, "scattered": scattered, "image": into}
+        bound["apart"] = apart or self._nothing
         frame.compute("shade", self._variants.program(switches), bound, size)

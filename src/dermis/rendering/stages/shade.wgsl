@@ -1,8 +1,12 @@
 // The image: light that scattered below, relit at its finest level, under the white lobe of the surface.
 //#include "lighting.wgsl"
+//#include "pre_integrated.wgsl"
+
+override SPLIT: bool = false; // whether light below the skin is kept apart, to spread over the picture
 
 const EYE_ROUGHNESS: f32 = 0.1; // plain materials are wet: eyeballs, teeth
 const FINEST_RATIO: f32 = 4.0; // longest over shortest side of a footprint that one map sample may stand for
+const ONE_SURFACE: f32 = 4.0; // difference of depth within a pixel over its width that is still one surface
 
 struct Shade {
     eye: vec3f,
@@ -12,6 +16,7 @@ struct Shade {
     up: vec3f,
     relit: vec3f, // weight of the level that is not blurred
     total: vec3f, // weight of all levels
+    pre: PreIntegrated,
     background: vec3f,
     material_colour: array<vec4f, 64>,
     jitter: array<vec4f, 64>, // sample places in the pixel, 0..1
@@ -19,8 +24,16 @@ struct Shade {
 
 @group(1) @binding(0) var<uniform> shade: Shade;
 @group(1) @binding(1) var seen: texture_2d_array<u32>;
-@group(1) @binding(2) var scattered: texture_2d<f32>; // blurred and combined, per texel of the atlas
+@group(1) @binding(2) var scattered: texture_2d<f32>; // per texel of the atlas, blurred and combined; or pre-integrated
 @group(1) @binding(3) var image: texture_storage_2d<rgba32float, write>;
+@group(1) @binding(4) var apart: texture_storage_2d_array<rgba32float, write>; // light below, depth; its share that leaves
+
+struct Shaded {
+    below: vec3f, // light below the skin
+    leaving: vec3f, // share of it that leaves towards the eye
+    over: vec3f, // light that does not spread: off the surface, from plain materials
+    depth: f32, // of skin [mm], else 0
+}
 
 // t: corners of the triangle, w: barycentric weights
 fn open_sky(point: Point, t: vec4u, w: vec3f) -> f32 {
@@ -33,24 +46,28 @@ fn open_sky(point: Point, t: vec4u, w: vec3f) -> f32 {
     return dot(w, vec3f(open_at_vertex(t.x), open_at_vertex(t.y), open_at_vertex(t.z)));
 }
 
-fn skin_radiance(point: Point, v: vec3f, footprint: f32, open: f32) -> vec3f {
+fn shaded_skin(point: Point, v: vec3f, footprint: f32, open: f32) -> Shaded {
     let surface = surface_at(point, footprint);
     let lit = light_up(point, surface, v, open);
     var below = lit.entered * share_of(surface.colour, skin.mix);
-    if ((point.flags & MAPPED) != 0u) {
+    if (PRE_INTEGRATED) {
+        below = shade.total * pre_integrated(point, surface, footprint, open) * share_of(surface.colour, skin.mix);
+    } else if ((point.flags & MAPPED) != 0u) {
         below = shade.relit * below + load_bilinear(scattered, point.place).rgb;
     } else {
         below *= shade.total;
     }
     let out = leaves(dot(surface.normal, v), surface.roughness, surface.rho_s) / PI;
     let tint = mix(vec3f(1.0), surface.colour, skin.tint);
-    return below * share_of(surface.colour, 1.0 - skin.mix) * out + lit.reflected * tint;
+    let depth = dot(point.position - shade.eye, shade.forward);
+    return Shaded(below, share_of(surface.colour, 1.0 - skin.mix) * out, lit.reflected * tint, depth);
 }
 
-fn opaque_radiance(point: Point, v: vec3f, open: f32) -> vec3f {
+fn shaded_plain(point: Point, v: vec3f, open: f32) -> Shaded {
     let colour = shade.material_colour[point.flags >> 8u].rgb;
     let lit = light_up(point, Surface(point.normal, colour, EYE_ROUGHNESS, 1.0), v, open);
-    return lit.entered * colour * leaves(dot(point.normal, v), EYE_ROUGHNESS, 1.0) / PI + lit.reflected;
+    let below = lit.entered * colour * leaves(dot(point.normal, v), EYE_ROUGHNESS, 1.0) / PI;
+    return Shaded(vec3f(0.0), vec3f(0.0), below + lit.reflected, 0.0);
 }
 
 // Barycentric weights of where a ray from the eye meets a triangle's plane are linear in the ray, up to scale.
@@ -72,7 +89,7 @@ fn ray_through(place: vec2f, size: vec2f) -> vec3f {
 }
 
 // share: part of the pixel that this shading stands for; maps are filtered over it.
-fn radiance(triangle: u32, place: vec2f, share: f32, size: vec2f) -> vec3f {
+fn shaded(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Shaded {
     let t = triangle_at(triangle);
     let a = corner_at(t.x);
     let b = corner_at(t.y);
@@ -87,14 +104,35 @@ fn radiance(triangle: u32, place: vec2f, share: f32, size: vec2f) -> vec3f {
     let open = open_sky(point, t, inside);
     let v = normalize(shade.eye - point.position);
     if ((t.w & OPAQUE) != 0u) {
-        return opaque_radiance(point, v, open);
+        return shaded_plain(point, v, open);
     }
     let spacing = sqrt(share);
     let wx = meet(weights, ray_through(place + vec2f(spacing, 0.0), size)) - w;
     let wy = meet(weights, ray_through(place + vec2f(0.0, spacing), size)) - w;
     let x = length(wx.x * a.uv + wx.y * b.uv + wx.z * c.uv);
     let y = length(wy.x * a.uv + wy.y * b.uv + wy.z * c.uv);
-    return skin_radiance(point, v, max(min(x, y), max(x, y) / FINEST_RATIO), open);
+    return shaded_skin(point, v, max(min(x, y), max(x, y) / FINEST_RATIO), open);
+}
+
+// The skin of one pixel, each member times the share of its samples.
+struct PixelSkin {
+    below: vec3f,
+    leaving: vec3f,
+    depth: f32,
+    share: f32,
+}
+
+// Adds a part of a pixel to its skin, which is the one surface that most samples see.
+fn keep(held: PixelSkin, part: Shaded, share: f32, pixel: f32) -> PixelSkin {
+    let one = PixelSkin(share * part.below, share * part.leaving, share * part.depth, share);
+    let apart = abs(part.depth - held.depth / max(held.share, 1e-6));
+    if (held.share > 0.0 && apart <= ONE_SURFACE * pixel * part.depth) {
+        return PixelSkin(held.below + one.below, held.leaving + one.leaving, held.depth + one.depth, held.share + share);
+    }
+    if (share > held.share) {
+        return one;
+    }
+    return held;
 }
 
 @compute @workgroup_size(8, 8)
@@ -105,6 +143,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let pixel = vec2f(id.xy);
     var sum = vec4f(0.0);
+    var skin_below: PixelSkin;
     // Samples are shaded together while they see one triangle: its maps are filtered over their part of the pixel.
     for (var s = 0u; s < shade.samples;) {
         let triangle = textureLoad(seen, id.xy, s, 0).x;
@@ -116,9 +155,21 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         }
         let share = f32(n) / f32(shade.samples);
         if (triangle > 0u) {
-            sum += share * vec4f(radiance(triangle - 1u, pixel + place / f32(n), share, vec2f(size)), 1.0);
+            let part = shaded(triangle - 1u, pixel + place / f32(n), share, vec2f(size));
+            sum += share * vec4f(part.below * part.leaving + part.over, 1.0);
+            if (SPLIT && part.depth > 0.0) {
+                skin_below = keep(skin_below, part, share, 2.0 * length(shade.up) / f32(size.y));
+            }
         }
         s += n;
     }
-    textureStore(image, id.xy, vec4f(sum.rgb + (1.0 - sum.a) * shade.background, sum.a));
+    if (SPLIT) {
+        // What is taken out here comes back spread; light of a pixel's lesser surfaces stays where it is.
+        let held = max(skin_below.share, 1e-6);
+        sum -= vec4f(skin_below.below * skin_below.leaving / held, 0.0);
+        textureStore(apart, id.xy, 0, vec4f(skin_below.below, skin_below.depth) / held);
+        textureStore(apart, id.xy, 1, vec4f(skin_below.leaving, 0.0));
+    }
+    let behind = seen_behind(ray_through(pixel + 0.5, vec2f(size)), shade.background);
+    textureStore(image, id.xy, vec4f(sum.rgb + (1.0 - sum.a) * behind, sum.a));
 }

@@ -7,6 +7,7 @@ from typing import Any
 
 from dermis.gpu import Device, Frame
 from dermis.rendering.geometry import HeadTextures
+from dermis.rendering.limits import check_shadows
 from dermis.rendering.projection import Matrix
 from dermis.rendering.stages.nearest import Layers, Nearest
 
@@ -28,10 +29,15 @@ class Shadows:
     """Draws the depth that each light sees."""
 
     def __init__(self, device: Device) -> None:
+        self._device = device
         self._nearest = Nearest(device, triangles=False)
 
     def make_maps(self, layers: int, size: int) -> ShadowMaps:
-        """Empty maps, `size` texels a side."""
+        """Empty maps, `size` texels a side.
+
+        Raises DermisError when they do not fit into memory.
+        """
+        check_shadows(self._device, layers, size)
         return ShadowMaps(self._nearest.make_layers((size, size), layers))
 
     def draw(

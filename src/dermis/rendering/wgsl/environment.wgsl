@@ -12,6 +12,7 @@ struct Environment {
     exposure: f32,
     albedo: vec3f, // of skin whose colour map is white
     occluded: u32, // whether the occlusion map holds anything
+    visible: u32, // whether it is seen behind the head
     mirrors: array<vec4f, 64>, // by roughness and cosine: sine and cosine of where the lobe points, its roughness
 }
 
@@ -19,24 +20,28 @@ struct Environment {
 @group(0) @binding(21) var panorama: texture_2d_array<f32>; // irradiance, then mean radiance by roughness
 @group(0) @binding(22) var occlusion_map: texture_2d<f32>; // open share of the sky: the atlas, then the vertices
 
-// The panorama's layer in a direction, bilinear, around the seam.
+// The panorama's layer in a direction, bilinear, around the seam and over the poles.
 fn panorama_at(direction: vec3f, layer: u32) -> vec3f {
     let d = vec3f(
         environment.turn.x * direction.x - environment.turn.y * direction.z,
         direction.y,
         environment.turn.y * direction.x + environment.turn.x * direction.z,
     );
-    let size = vec2i(textureDimensions(panorama));
-    let uv = vec2f(0.5 + atan2(d.x, -d.z) / (2.0 * PI), acos(clamp(d.y, -1.0, 1.0)) / PI);
-    let place = uv * vec2f(size) - 0.5;
+    let azimuth = select(0.0, atan2(d.x, -d.z), any(d.xz != vec2f(0.0))); // of a pole it has no value
+    let uv = vec2f(0.5 + azimuth / (2.0 * PI), atan2(length(d.xz), d.y) / PI);
+    let place = uv * vec2f(textureDimensions(panorama)) - 0.5;
     let a = vec2i(floor(place));
-    let x = (vec2i(a.x, a.x + 1) + size.x) % size.x;
-    let y = clamp(vec2i(a.y, a.y + 1), vec2i(0), vec2i(size.y - 1));
     let w = bilinear_weights(place);
-    return environment.exposure * (w.x * textureLoad(panorama, vec2i(x.x, y.x), layer, 0).rgb
-        + w.y * textureLoad(panorama, vec2i(x.y, y.x), layer, 0).rgb
-        + w.z * textureLoad(panorama, vec2i(x.x, y.y), layer, 0).rgb
-        + w.w * textureLoad(panorama, vec2i(x.y, y.y), layer, 0).rgb);
+    return environment.exposure * (w.x * panorama_texel(a, layer) + w.y * panorama_texel(a + vec2i(1, 0), layer)
+        + w.z * panorama_texel(a + vec2i(0, 1), layer) + w.w * panorama_texel(a + vec2i(1, 1), layer));
+}
+
+// Beyond a pole lies the first row again, half way around.
+fn panorama_texel(at: vec2i, layer: u32) -> vec3f {
+    let size = vec2i(textureDimensions(panorama));
+    let y = clamp(at.y, 0, size.y - 1);
+    let x = at.x + size.x + select(0, size.x / 2, y != at.y);
+    return textureLoad(panorama, vec2i(x % size.x, y), layer, 0).rgb;
 }
 
 // Mean radiance under a lobe of roughness m about a direction.
@@ -44,6 +49,14 @@ fn reflection(direction: vec3f, m: f32) -> vec3f {
     let layer = (LAYERS - 1.0) * clamp(log(m / SMOOTHEST) / log(ROUGHEST / SMOOTHEST), 0.0, 1.0);
     let low = min(u32(layer), u32(LAYERS) - 2u);
     return mix(panorama_at(direction, 1u + low), panorama_at(direction, 2u + low), layer - f32(low));
+}
+
+// What is behind the head along a ray from the eye: the panorama as a lens sees it that is focused on the head, or a colour.
+fn seen_behind(ray: vec3f, colour: vec3f) -> vec3f {
+    if (!ENVIRONMENT || environment.visible == 0u) {
+        return colour;
+    }
+    return panorama_at(normalize(ray), 1u);
 }
 
 // Irradiance of a surface that sees the open share of the sky; the rest is skin, which passes light on: a fit to

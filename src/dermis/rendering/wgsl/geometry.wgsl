@@ -4,7 +4,7 @@ const MAPPED: u32 = 1u; // the triangle has texels in the atlas
 const OPAQUE: u32 = 2u; // plain material, no scattering
 
 @group(0) @binding(0) var triangle_table: texture_2d<u32>; // three tables, see below
-@group(0) @binding(1) var vertex_table: texture_2d<f32>; // four texels: position u, normal v, dpdu, dpdv
+@group(0) @binding(1) var vertex_table: texture_2d<f32>; // four texels: position u, normal v, dpdu curvature, dpdv
 
 struct Corner {
     position: vec3f,
@@ -12,6 +12,7 @@ struct Corner {
     uv: vec2f,
     dpdu: vec3f,
     dpdv: vec3f,
+    curvature: f32,
 }
 
 struct Point {
@@ -22,6 +23,7 @@ struct Point {
     place: vec2f, // in the atlas, where someone asked for it
     dpdu: vec3f, // [mm per unit of uv]
     dpdv: vec3f,
+    curvature: f32, // root mean square over directions [1/mm]
     flags: u32,
 }
 
@@ -57,7 +59,7 @@ fn corner_at(index: u32) -> Corner {
     let n = textureLoad(vertex_table, at + vec2u(1u, 0u), 0);
     let du = textureLoad(vertex_table, at + vec2u(2u, 0u), 0);
     let dv = textureLoad(vertex_table, at + vec2u(3u, 0u), 0);
-    return Corner(p.xyz, n.xyz, vec2f(p.w, n.w), du.xyz, dv.xyz);
+    return Corner(p.xyz, n.xyz, vec2f(p.w, n.w), du.xyz, dv.xyz, du.w);
 }
 
 // Side of a triangle in the maps over its side in the atlas.
@@ -84,6 +86,7 @@ fn interpolate(a: Corner, b: Corner, c: Corner, w: vec3f, flags: u32) -> Point {
     point.uv = w.x * a.uv + w.y * b.uv + w.z * c.uv;
     point.dpdu = w.x * a.dpdu + w.y * b.dpdu + w.z * c.dpdu;
     point.dpdv = w.x * a.dpdv + w.y * b.dpdv + w.z * c.dpdv;
+    point.curvature = w.x * a.curvature + w.y * b.curvature + w.z * c.curvature;
     point.flags = flags;
     return point;
 }

@@ -11,9 +11,17 @@ struct Lit {
     reflected: vec3f, // radiance off the surface
 }
 
+// The normal of the facets that are seen: where the relief turns away from the eye, it is turned back to the horizon. A lobe
+// has no value beyond it, and with light from behind the head none that is finite.
+fn seen_normal(normal: vec3f, v: vec3f) -> vec3f {
+    let turned = normal - min(dot(normal, v), 0.0) * v;
+    return turned / max(length(turned), 1e-3);
+}
+
 // open: share of the sky that the point sees
 fn light_up(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
     var lit = Lit(vec3f(0.0), vec3f(0.0));
+    let mirror = seen_normal(surface.normal, v);
     for (var i = 0u; i < skin.light_count; i++) {
         let light = lights.light[i];
         var seen = -1.0; // how much of the light: not known yet
@@ -24,17 +32,18 @@ fn light_up(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
                 if (seen < 0.0) {
                     seen = visibility(light, point, arriving.direction);
                 }
-                let e = arriving.irradiance * (cosine * seen);
-                lit.entered += e * enters(cosine, surface.roughness, surface.rho_s);
-                lit.reflected += e * surface.rho_s * lobe(surface.normal, arriving.direction, v, surface.roughness);
+                let e = arriving.irradiance * seen;
+                lit.entered += e * (cosine * enters(cosine, surface.roughness, surface.rho_s));
+                let share = surface.rho_s * max(dot(mirror, arriving.direction), 0.0);
+                lit.reflected += e * (share * lobe(mirror, arriving.direction, v, surface.roughness));
             }
         }
     }
     if (ENVIRONMENT) {
         let around = ambient(surface.normal, open, surface.colour * environment.albedo);
-        let albedo = surface.rho_s * surface_albedo(dot(surface.normal, v), surface.roughness).x;
+        let albedo = surface.rho_s * surface_albedo(dot(mirror, v), surface.roughness).x;
         lit.entered += around * enters_from_everywhere(surface.roughness, surface.rho_s);
-        lit.reflected += albedo * mirrored(point, surface.normal, v, surface.roughness, open);
+        lit.reflected += albedo * mirrored(point, mirror, v, surface.roughness, open);
     }
     return lit;
 }

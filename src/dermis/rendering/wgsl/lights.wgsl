@@ -1,4 +1,5 @@
 // Lights of every kind: what arrives from each at a point.
+//#include "axes.wgsl"
 //#include "shadows.wgsl"
 
 override SHAPES: bool = false; // whether some light is more than a point, a cone or one direction
@@ -120,12 +121,4 @@ fn from_sphere(light: Light, p: vec3f, part: u32) -> Incident {
     let axes = beside(w);
     let l = sine * (cos(phi) * axes[0] + sin(phi) * axes[1]) + cosine * w;
     return Incident(l, light.irradiance * (PI * sine2 / (cosine * f32(parts_of(light)))));
-}
-
-// Two unit vectors at right angles to a third and to each other. Source: [Duff2017].
-fn beside(w: vec3f) -> mat2x3f {
-    let s = select(-1.0, 1.0, w.z >= 0.0);
-    let a = -1.0 / (s + w.z);
-    let b = w.x * w.y * a;
-    return mat2x3f(vec3f(1.0 + s * w.x * w.x * a, s * b, -s * w.x), vec3f(b, s + w.y * w.y * a, -w.y));
 }

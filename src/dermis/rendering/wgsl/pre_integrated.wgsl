@@ -1,0 +1,131 @@
+// Light that spread over curved skin and into shadows, from tables made once for a profile [Penner2011]: `scattered`
+// holds them, `shade.pre` their scales.
+
+override PRE_INTEGRATED: bool = false;
+
+const SPHERES: u32 = 33u; // rows, evenly by curvature
+const EDGES: u32 = 9u; // rows, evenly by the half width of the shadow's own edge up to `penumbra`
+const LIT: f32 = 1e-4; // share of a light that counts as none of it, or all but which as all
+const PROBES: u32 = 64u; // places around a point whose share in the light tells how far off a shadow's edge is
+const FEWEST_PROBES: u32 = 24u; // that may stand for all
+const LEAST_COSINE: f32 = 0.3; // of the light on the plane that the places lie in
+const HIGHEST: f32 = 3.0; // that a point past its horizon is lifted [mm]
+
+struct PreIntegrated {
+    most_curved: f32, // curvature of the table's last row [1/mm]
+    penumbra: f32, // radius around a point in which a shadow's edge is looked for [mm]
+    relief: vec3f, // standard deviation of the Gaussian that smooths the relief [mm]
+}
+
+// A place of the tables: rows of spheres, then of the edges of shadows.
+fn table_at(x: f32, row: f32) -> vec3f {
+    let size = vec2f(textureDimensions(scattered));
+    return load_bilinear(scattered, (vec2f(x * (size.x - 1.0), row) + 0.5) / size).rgb;
+}
+
+// What max(N.L, 0) becomes when light spreads, by the cosines for red, green and blue.
+fn spread_cosine(cosines: vec3f, curvature: f32) -> vec3f {
+    let row = f32(SPHERES - 1u) * min(curvature / shade.pre.most_curved, 1.0);
+    let x = 0.5 + 0.5 * cosines;
+    return vec3f(table_at(x.r, row).r, table_at(x.g, row).g, table_at(x.b, row).b);
+}
+
+// The normal as red, green and blue light see it, which forget relief that they spread over.
+fn spread_normals(point: Point, footprint: f32) -> mat3x3f {
+    let mm = max(sqrt(length(point.dpdu) * length(point.dpdv)), 1e-3); // per side of the uv square
+    let wide = sqrt(footprint * footprint + 12.0 * shade.pre.relief * shade.pre.relief / (mm * mm));
+    return mat3x3f(surface_at(point, wide.r).normal, surface_at(point, wide.g).normal, surface_at(point, wide.b).normal);
+}
+
+// Light from a side that the surface turns away from reaches it from beyond its horizon: what shadows it is judged
+// from there, on a plane that faces the light.
+fn above_horizon(point: Point, l: vec3f) -> Point {
+    var out = point;
+    let cosine = dot(point.normal, l);
+    let height = (inverseSqrt(max(1.0 - cosine * cosine, 1e-4)) - 1.0) / max(point.curvature, 1e-4);
+    out.lit_position += point.normal * select(0.0, min(height, HIGHEST), cosine < 0.0);
+    out.normal = normalize(point.normal + l * max(0.0, LEAST_COSINE - cosine));
+    return out;
+}
+
+// Share of a light that reaches a point and its surroundings, for red, green and blue: by how far off the shadow's
+// edge is, taken for straight. Shadows of lights of some size, mostly wider, stay as they are.
+fn spread_visibility(light: Light, point: Point, l: vec3f) -> vec3f {
+    let raised = above_horizon(point, l);
+    let seen = clamp(visibility(light, raised, l), 0.0, 1.0);
+    if (light.layer < 0 || (SHAPES && light.extent.x > 0.0)) {
+        return vec3f(seen);
+    }
+    let texel = light.texel * select(distance(light.position, point.position), 1.0, is_parallel(light));
+    let soft = texel * f32(light.half_width) / dot(raised.normal, l); // on the surface
+    let radius = shade.pre.penumbra;
+    if (soft >= radius) {
+        return vec3f(seen);
+    }
+    var edge = soft * select(1.0 - sqrt(2.0 - 2.0 * seen), sqrt(2.0 * seen) - 1.0, seen < 0.5); // under a tent
+    if (seen < LIT || seen > 1.0 - LIT) {
+        let far = radius * (2.0 * share_around(light, raised, l, texel * f32(light.half_width)) - 1.0);
+        edge = select(min(far, -soft), max(far, soft), seen > 0.5);
+    }
+    return table_at(0.5 + 0.5 * edge / radius, f32(SPHERES) + soft / radius * f32(EDGES - 1u));
+}
+
+// Share of the places around a point that a light reaches. They lie like those of a ball seen from above, so that
+// an edge that crosses them hides a share that is linear in its distance. They are lifted like the filter's points.
+fn share_around(light: Light, point: Point, l: vec3f, lift: f32) -> f32 {
+    let axes = shade.pre.penumbra * beside(point.normal);
+    let cosine = dot(point.normal, l);
+    let lifted = point.lit_position + lift * (sqrt(1.0 - cosine * cosine) * point.normal + 0.75 * l);
+    let centre = light.to_map * vec4f(lifted, 1.0);
+    let right = light.to_map * vec4f(axes[0], 0.0);
+    let up = light.to_map * vec4f(axes[1], 0.0);
+    // Between the places and the light the surface itself may rise, in hollows: by twice what its curvature says.
+    let rise = light.to_map * vec4f(l, 0.0) * (point.curvature * shade.pre.penumbra * shade.pre.penumbra);
+    var lit = 0u;
+    for (var i = 0u; i < PROBES; i++) {
+        if (i == FEWEST_PROBES && (lit == 0u || lit == i)) {
+            return select(0.0, 1.0, lit > 0u);
+        }
+        let even = fract(vec2f(0.5) + f32(i) * vec2f(0.7548776662, 0.5698402910)); // [Roberts2018]
+        let place = sqrt(1.0 - even.x * even.x) * vec2f(cos(2.0 * PI * even.y), sin(2.0 * PI * even.y));
+        lit += sees(light, centre + place.x * right + place.y * up + dot(place, place) * rise);
+    }
+    return f32(lit) / f32(PROBES);
+}
+
+fn sees(light: Light, clip: vec4f) -> u32 {
+    if (clip.w <= 0.0) {
+        return 1u;
+    }
+    let ndc = clip.xyz / clip.w;
+    let size = vec2f(textureDimensions(shadow_maps));
+    let texel = vec2i(floor(vec2f(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y) * size));
+    return select(0u, 1u, textureLoad(shadow_maps, clamp(texel, vec2i(0), vec2i(size) - 1), light.layer, 0).x <= ndc.z);
+}
+
+// Irradiance that enters around a point and leaves there. What the surface reflects of it is taken from the mean
+// cosine of the light that arrives.
+fn pre_integrated(point: Point, surface: Surface, footprint: f32, open: f32) -> vec3f {
+    let normals = spread_normals(point, footprint);
+    var sum = vec3f(0.0);
+    for (var i = 0u; i < skin.light_count; i++) {
+        let light = lights.light[i];
+        var seen = vec3f(-1.0); // how much of the light: not known yet
+        for (var part = 0u; part < parts_of(light); part++) {
+            let arriving = incident(light, point.position, part);
+            let cosine = spread_cosine(arriving.direction * normals, point.curvature);
+            if (any(cosine > vec3f(0.0))) {
+                if (seen.x < 0.0) {
+                    seen = spread_visibility(light, point, arriving.direction);
+                }
+                let mean = dot(cosine, vec3f(1.0 / 3.0));
+                sum += arriving.irradiance * cosine * seen * enters(mean, surface.roughness, surface.rho_s);
+            }
+        }
+    }
+    if (ENVIRONMENT) {
+        let around = ambient(normals[1], open, surface.colour * environment.albedo);
+        sum += around * enters_from_everywhere(surface.roughness, surface.rho_s);
+    }
+    return sum;
+}

@@ -1,0 +1,141 @@
+"""Tables of the errors of light through thin parts for docs/accuracy.md.
+
+python tools/accuracy_thin.py [ADAPTER] prints them alone. The sample data is needed.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+import dermis
+from dermis.assets.head import Head
+from dermis.assets.maps import Maps
+from dermis.assets.mesh import Mesh
+from dermis.assets.primitives import wedge
+from dermis.gpu import Frame, download
+from dermis.optics.diffusion.transmission import through_gaussians
+from dermis.optics.gaussians import GaussianSum
+from dermis.optics.profiles import load_profile
+from dermis.reference import surface_integral
+from dermis.reference.irradiance_samples import Places
+from dermis.rendering.frame import draw_frame
+from dermis.scene import DirectionalLight, Scene, Settings, Skin
+
+Array = np.ndarray
+PROFILE = load_profile("gpu-gems-3")
+BLURRED = GaussianSum("blurred levels", PROFILE.variance_mm2[1:], PROFILE.weight[1:])
+THICK_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0)
+ANGLES = (5.0, 10.0, 20.0, 30.0, 45.0)
+EAR_MM = 66.0  # the scan's ears lie farther from its middle
+
+
+def scattered(
+    renderer: dermis.Renderer, mesh: Mesh, way: Array, transmission: str, atlas: int
+) -> tuple[Array, Array, Array]:
+    """(n, 3) places, normals and light of the texels of a mesh lit from one side without shadows."""
+    light = DirectionalLight(direction=tuple(way), irradiance=(1.0, 1.0, 1.0), shadows=False)
+    scene = Scene(Head("thin", mesh, Maps()), lights=[light], skin=Skin(albedo="profile", rho_s=0.0))
+    settings = Settings(size=(16, 16), atlas=atlas, samples=1, transmission=transmission)  # type: ignore[arg-type]
+    inputs = renderer.prepare(scene, settings)
+    frame = Frame(renderer.device)
+    draw_frame(frame, renderer.stages, inputs)
+    frame.submit()
+    texels = download(renderer.device, inputs.layouts[0].atlas.resources["atlas"])
+    own = texels[..., 0] > 0
+    w = np.stack([texels[own][:, 1] & 0xFFFF, texels[own][:, 1] >> 16], axis=-1) / 65535.0
+    w = np.column_stack([1 - w.sum(axis=1), w])
+    corners = mesh.triangles[texels[own][:, 0].astype(int) - 1]
+    places, normals = (np.einsum("nk,nkc->nc", w, a[corners]) for a in (mesh.positions, mesh.normals))
+    return places, normals, download(renderer.device, inputs.scattered)[own][:, :3].astype(float)
+
+
+def summed(mesh: Mesh, way: Array, places: Array, spacing: float) -> Array:
+    """What the profile brings to places by straight lines, from all of the surface."""
+
+    def light(at: Places) -> Array:
+        normals = at.interpolate(mesh, mesh.normals)
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+        return np.repeat(np.maximum(normals @ -way, 0.0)[:, None], 3, axis=1)
+
+    profile = surface_integral.GaussianSum(BLURRED.weight, BLURRED.variance_mm2)
+    samples = surface_integral.sample_irradiance(mesh, light, spacing)
+    return surface_integral.integrate(places, samples, profile, 0.002)
+
+
+def slabs(renderer: dermis.Renderer) -> str:
+    """Light through slabs far from their rim, as the frame has it and as the profile says."""
+    rows = []
+    for thickness in THICK_MM:
+        way = np.array([0.0, 0.0, 1.0])
+        places, normals, light = scattered(renderer, wedge(60.0, thickness, thickness), way, "thin", 256)
+        inner = (normals[:, 2] > 0.9) & (np.abs(places[:, :2]).max(axis=1) < 12.0)
+        made, exact = light[inner].mean(axis=0), through_gaussians(BLURRED, thickness)
+        shown = (" ".join(f"{value:.4f}" for value in light) for light in (made, exact))
+        rows.append(f"| {thickness:g} mm | {' | '.join(shown)} |")
+    return "\n".join(rows)
+
+
+def compared(
+    renderer: dermis.Renderer, mesh: Mesh, way: Array, chosen: object, atlas: int, spacing: float
+) -> str:
+    """Energy and relative root mean square error against the sum over the surface, without and with."""
+    cells = []
+    for transmission in ("none", "thin"):
+        places, normals, light = scattered(renderer, mesh, way, transmission, atlas)
+        some = np.flatnonzero(chosen(places, normals))  # type: ignore[operator]
+        some = np.random.default_rng(5).permutation(some)[:3000]
+        exact = summed(mesh, way, places[some], spacing)[:, 0]
+        error = light[some, 0] - exact
+        cells.append(
+            f"{light[some, 0].sum() / exact.sum():.3f} | {np.sqrt((error**2).mean() / (exact**2).mean()):.1%}"
+        )
+    return " | ".join(cells)
+
+
+def wedges(renderer: dermis.Renderer) -> str:
+    """Red light on the dark face of wedges lit from behind, within 15 mm of their edge."""
+    rows = []
+    for angle in ANGLES:
+        mesh = wedge(60.0, 0.01, 120.0 * float(np.tan(np.radians(angle / 2))), cells=16)
+
+        def near(places: Array, normals: Array, half: float = angle / 2) -> Array:
+            dark = normals @ [-np.sin(np.radians(half)), 0.0, np.cos(np.radians(half))] > 0.99
+            return np.asarray(dark & (places[:, 0] < -15.0) & (np.abs(places[:, 1]) < 15.0))
+
+        rows.append(f"| {angle:g}° | {compared(renderer, mesh, np.array([0.0, 0.0, 1.0]), near, 512, 0.7)} |")
+    return "\n".join(rows)
+
+
+def ears(renderer: dermis.Renderer) -> str:
+    """Red light on the dark side of heads' ears, lit from behind and from the front."""
+    rows = []
+    for name in ("lee_perry_smith", "bust"):
+        head = dermis.load_head(name)
+        mesh, centre = head.mesh, np.array(head.centre_mm)
+        for side, z in (("behind", 1.0), ("the front", -1.0)):
+            way = np.array([0.0, 0.0, z])
+
+            def dark(places: Array, normals: Array, way: Array = way, centre: Array = centre) -> Array:
+                local = places - centre
+                ear = (np.abs(local[:, 0]) > EAR_MM) & (np.abs(local[:, 1]) < 45.0)
+                return np.asarray(ear & (normals @ way > 0.3))
+
+            rows.append(f"| {name} | {side} | {compared(renderer, mesh, way, dark, 1024, 1.5)} |")
+    return "\n".join(rows)
+
+
+def tables(adapter: str = "auto") -> dict[str, str]:
+    """What the page says of thin parts, by the names in its template."""
+    renderer = dermis.Renderer(adapter)
+    return {
+        "thin_slabs": slabs(renderer),
+        "thin_wedges": wedges(renderer),
+        "thin_ears": ears(renderer),
+    }
+
+
+if __name__ == "__main__":
+    for title, text in tables(*sys.argv[1:]).items():
+        sys.stdout.write(f"{title}\n{text}\n\n")
