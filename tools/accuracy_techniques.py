@@ -1,7 +1,7 @@
 """Write docs/techniques.md: techniques of scattering on the scanned head against truths.
 
-python tools/accuracy_techniques.py [ADAPTER]; the sample data and Mitsuba are needed. Paths that were traced are
-kept on disk, so that only the first run takes its time.
+python tools/accuracy_techniques.py [ADAPTER]; the sample data and Mitsuba are needed. Paths that were traced
+are kept on disk, so that only the first run takes its time.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def table(head: Head, against: str, medium: str, adapter: str) -> tuple[str, dic
 
 
 def floor(head: Head, medium: str, traced: Comparison, adapter: str) -> str:
-    """The front light on skin that reflects what a half space does from that direction, in all directions alike."""
+    """The front light on skin that sends what a half space reflects of it in all directions alike."""
     renderer = dermis.Renderer(adapter)
     scene = comparison_scene(head, "front", usual_region("front"), "gpu-gems-3")
     seen = surface_points(renderer, scene, SETTINGS)

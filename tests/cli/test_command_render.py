@@ -14,7 +14,17 @@ from dermis.images.colour import encode_srgb8
 from dermis.images.io import read_image, write_png
 
 Run = Callable[..., Any]
-STAGES = {"shadows", "irradiance", "diffuse", "combine", "visibility", "shade", "post", "total"}
+STAGES = {
+    "shadows",
+    "irradiance",
+    "diffuse",
+    "transmission",
+    "combine",
+    "visibility",
+    "shade",
+    "post",
+    "total",
+}
 KEYS = ["image", "adapter", "size", "atlas", "gaussians", "gpu_ms", "frame_ms", "setup_ms"]
 SCENE = """
 lights = "studio"

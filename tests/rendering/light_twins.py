@@ -112,7 +112,7 @@ def part_of(light: Any, points: Floats, part: int) -> tuple[Floats, Floats]:
 
 
 def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) -> Floats:
-    """(n,) share that points see of what rises of a light of some size, by lines through its map of depths (s, s).
+    """(n,) share that points see of what rises of a light, by lines through its map of depths (s, s).
 
     light : the shader's record, points and normals : (n, 3)
     """

@@ -171,7 +171,7 @@ def test_what_a_frame_reports(renderer: Renderer) -> None:
     assert rendered.gaussians == 6
     assert rendered.frame_ms > 0 and rendered.setup_ms > 0
     if rendered.gpu_ms is not None:
-        stages = {"irradiance", "diffuse", "combine", "visibility", "shade", "post"}
+        stages = {"irradiance", "diffuse", "transmission", "combine", "visibility", "shade", "post"}
         assert stages <= set(rendered.gpu_ms) <= stages | {"shadows", "transmission", "total"}
 
 

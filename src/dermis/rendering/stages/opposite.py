@@ -19,10 +19,11 @@ FORM = "8"
 _JUDGED = 0.7  # of the widest one is the Gaussian that judges: its few rays step less for those that matter
 _CREASE_MM = 1.0  # over which normals are smoothed: in a crease thick and thin would meet without it
 _REACH = 4.0  # standard deviations of the widest Gaussian: a three-thousandth of it passes
+_WIDEST_MM = 10.0  # rays through wax, which spreads light farther, would take minutes
 
 
 class Opposite:
-    """Follows a ray into the flesh from each texel, and rays to the rim of what turns out to be thin.
+    """Follows rays into the flesh around each texel, spread like a Gaussian.
 
     The shader is compiled when it is first wanted.
     """
@@ -35,7 +36,7 @@ class Opposite:
         """A texture of side x side of the atlas' texels: place there, thickness, distances to the rim.
 
         geometry : triangle_table and vertex_table
-        widest_mm : standard deviation of the widest Gaussian; nothing farther than four of them is found [mm]
+        widest_mm : standard deviation of the widest Gaussian; it sees four of them far, 40 mm at most [mm]
         """
         path = STAGES / "opposite.wgsl"
         self._program = self._program or ComputeProgram(self._device, path, (SHARED_SHADERS,))
@@ -46,8 +47,8 @@ class Opposite:
             low=cells.low,
             cell_mm=cells.cell_mm,
             size=(*cells.size, 0),
-            limit_mm=_REACH * widest_mm,
-            sigma_mm=_JUDGED * widest_mm,
+            limit_mm=_REACH * min(widest_mm, _WIDEST_MM),
+            sigma_mm=_JUDGED * min(widest_mm, _WIDEST_MM),
             side=side,
         )
         bound = {
