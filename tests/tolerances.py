@@ -78,7 +78,7 @@ AREA_LIGHT = 0.01
 """Irradiance of a light with a size, shaded as a few lights, against its closed form, of the largest."""
 
 SLAB_THROUGH = 0.01
-"""Light through a slab against the profile, of all its light: rays feel the thickness, atlases hold halves."""
+"""Light through a slab against the profile, of all its light: rays feel the depth, atlases hold halves."""
 
 OCCLUSION = 0.04
 """Open share of the sky by 128 directions against closed forms: one direction stands for up to 0.03 of it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from dermis.errors import DermisError
 from dermis.scene.settings import Settings
 
 BALL = Head("ball", uv_sphere(100.0, 96, 48), Maps())
+ADAPTER = os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
 SETTINGS = Settings(size=(64, 64), atlas=1024, shadow_size=256)
 
 
@@ -30,7 +32,7 @@ def lasered() -> Comparison:
         light="laser",
         region="ear",
         settings=SETTINGS,
-        adapter="cpu",
+        adapter=ADAPTER,
     )
 
 
@@ -56,7 +58,7 @@ def test_heat_agrees_along_a_gentle_surface(lasered: Comparison) -> None:
         light="laser",
         region="ear",
         settings=SETTINGS,
-        adapter="cpu",
+        adapter=ADAPTER,
     )
     none, ours = heat.rows
     assert 0 < heat.truth.mask.sum() < lasered.truth.mask.sum()
@@ -91,4 +93,4 @@ def test_scenes_have_no_colour_of_their_own(light: str, region: str) -> None:
 def test_unknown_names_are_refused(words: dict[str, str], says: str) -> None:
     against = words.pop("against", "surface-integral")
     with pytest.raises(DermisError, match=says):
-        compare(BALL, against, ("none",), settings=SETTINGS, adapter="cpu", **words)
+        compare(BALL, against, ("none",), settings=SETTINGS, adapter=ADAPTER, **words)
