@@ -82,3 +82,6 @@ SLAB_THROUGH = 0.01
 
 OCCLUSION = 0.04
 """Open share of the sky by 128 directions against closed forms: one direction stands for up to 0.03 of it."""
+
+SEAM = 0.01
+"""Jump of the scattered light across a seam, of the light there."""

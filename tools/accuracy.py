@@ -8,10 +8,12 @@ from pathlib import Path
 import accuracy_light as light
 import accuracy_optics as optics
 import accuracy_specular as specular
+import accuracy_thin as thin
 import numpy as np
 
 from dermis.assets.atlas import build_atlas
 from dermis.assets.geometry import build_mesh
+from dermis.assets.mesh import Mesh
 from dermis.assets.primitives import plane, uv_sphere
 from dermis.gpu import Device, Frame, download, open_device, upload
 from dermis.gpu.probe import half_store_rounding
@@ -24,14 +26,14 @@ PAGE = Path(__file__).parent.parent / "docs" / "accuracy.md"
 SIZE = 256
 
 
-def spread(device: Device, mesh: object, light: np.ndarray) -> list[np.ndarray]:
+def spread(device: Device, mesh: Mesh, light: np.ndarray, stretch: str = "full") -> list[np.ndarray]:
     """The blurred levels of light (n, n) on a mesh's atlas."""
     stage = Diffuse(device)
     variance = load_profile("gpu-gems-3").variance_mm2[1:]
     levels = stage.make_levels(len(light), len(variance))
-    upload(device, levels.stack, np.repeat(light[..., None], 4, axis=2))
+    upload(device, levels.stack, np.dstack([light, light, light, np.ones_like(light)]))
     frame = Frame(device)
-    stage.draw(frame, levels, upload_atlas(device, build_atlas(mesh, len(light))), variance)  # type: ignore[arg-type]
+    stage.draw(frame, levels, upload_atlas(device, build_atlas(mesh, len(light)), stretch), variance)
     frame.submit()
     return [download(device, levels.stack, layer=k + 1)[..., 0] for k in range(len(variance))]
 
@@ -64,13 +66,15 @@ def sheared(device: Device, degrees: float) -> str:
     mesh = build_mesh(positions, flat.uv, flat.triangles, flat.material, flat.materials)
     light = np.zeros((SIZE, SIZE), np.float32)
     light[SIZE // 2, SIZE // 2] = 1.0
-    spot = spread(device, mesh, light)[-1].astype(float)
     y, x = np.mgrid[:SIZE, :SIZE] - SIZE // 2
     place = np.stack([x - lean[0] * y, -lean[1] * y]) / 3.0  # v points down
-    covariance = np.einsum("iyx,jyx,yx->ij", place, place, spot) / spot.sum()
     wanted = load_profile("gpu-gems-3").variance_mm2[-1]
-    narrow, wide = np.sqrt(np.linalg.eigvalsh(covariance) / wanted)
-    return f"| {degrees:g}° | {narrow:.2f} | {wide:.2f} |"
+    cells = []
+    for stretch in ("axes", "full"):
+        spot = spread(device, mesh, light, stretch)[-1].astype(float)
+        covariance = np.einsum("iyx,jyx,yx->ij", place, place, spot) / spot.sum()
+        cells += [f"{width:.3f}" for width in np.sqrt(np.linalg.eigvalsh(covariance) / wanted)]
+    return f"| {degrees:g}° | {' | '.join(cells)} |"
 
 
 def constant_light(device: Device) -> float:
@@ -96,6 +100,7 @@ def main() -> None:
             **specular.tables(),
             **light.tables(*sys.argv[1:2]),
             **optics.tables(),
+            **thin.tables(*sys.argv[1:2]),
         ),
         encoding="utf-8",
     )

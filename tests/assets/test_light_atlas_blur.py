@@ -11,15 +11,13 @@ from atlas_reading import lit_at, read, seam_points, shown
 from cut_meshes import cut_cylinder, cut_sphere, folded_sheet
 from numpy.typing import NDArray
 from scipy.special import eval_legendre
+from tolerances import SEAM
 
 from dermis.assets.atlas import Atlas, build_atlas
 from dermis.assets.mesh import Mesh
 
 Floats = NDArray[np.float64]
 VARIANCES = (0.567, 1.99, 7.41)  # [mm2] those of the widely used profile that are not finer than texels here
-
-SEAM = 0.01
-"""Jump across a seam, of the irradiance there."""
 
 
 def blurred(atlas: Atlas, light: Floats) -> list[Floats]:

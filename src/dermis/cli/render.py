@@ -29,6 +29,8 @@ def render(
     technique: Literal["texture-space", "none", "one-blur", "published", "screen-space", "pre-integrated"]
     | None = None,
     transmission: Literal["thin", "none"] | None = None,
+    seams: Literal["stitch", "none", "clear-colour", "stretch-map", "alpha", "multi-uv"] | None = None,
+    stretch: Literal["full", "axes", "none"] | None = None,
     profile: str | None = None,
     albedo: Literal["map", "profile"] | None = None,
     mix: float | None = None,
@@ -97,6 +99,10 @@ def render(
         passes of 2007), and what engines do: screen-space, pre-integrated.
     transmission:
         thin lets light through thin parts such as ears; none takes all for thick [thin].
+    seams:
+        stitch lets light cross the map's seams; the others are the talk's remedies, for comparison [stitch].
+    stretch:
+        full corrects blurs for the map's stretch and shear; axes takes u and v for at right angles [full].
     profile:
         Diffusion profile: gpu-gems-3, or a CSV file with variance_mm2,red,green,blue.
     albedo:

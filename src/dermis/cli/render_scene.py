@@ -18,7 +18,17 @@ _HEAD_OPTIONS = (*_MAP_OPTIONS, "unit_mm", "v_origin", "up", "normal_y", "opaque
 _SURFACE_OPTIONS = ("roughness", "rho_s", "oiliness", "specular", "fresnel", "specular_colour", "energy")
 _SKIN_OPTIONS = ("profile", "albedo", "mix", *_SURFACE_OPTIONS)
 _POST_OPTIONS = ("exposure", "bloom", "tone", "gamma", "background")
-_SETTINGS = ("size", "atlas", "samples", "technique", "transmission", "occlusion", *_POST_OPTIONS)
+_SETTINGS = (
+    "size",
+    "atlas",
+    "samples",
+    "technique",
+    "transmission",
+    "seams",
+    "stretch",
+    "occlusion",
+    *_POST_OPTIONS,
+)
 _ENVIRONMENT = {
     "name": "env",
     "rotation_degrees": "env_rotation",

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.atlas import Atlas
+from dermis.assets.atlas import GUTTER, Atlas
 from dermis.gpu import Device
 from dermis.gpu.textures import texture_from
 from dermis.rendering.seams import FEATHER_MM, REMEDIES, Remedy
@@ -86,7 +86,8 @@ def edge_mm(atlas: Atlas) -> NDArray[np.float32]:
     """(n, n) distance of each texel to the nearest edge of its chart, roughly [mm]."""
     from scipy.ndimage import distance_transform_edt
 
-    texels = distance_transform_edt(np.pad(atlas.own, 1))[1:-1, 1:-1]
+    inner = atlas.own & (atlas.reach > 0).all(axis=-1)  # charts may touch without an empty texel between
+    texels = np.maximum(distance_transform_edt(np.pad(inner, 1))[1:-1, 1:-1] - GUTTER, 0.0)
     density = np.sqrt(atlas.stretch.astype(np.float32).prod(axis=-1))
     return np.asarray(texels / np.maximum(density, 1e-3), np.float32)
 
