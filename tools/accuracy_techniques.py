@@ -76,7 +76,7 @@ def floor(head: Head, medium: str, traced: Comparison, adapter: str) -> str:
     image[seen.mask] = entered * albedo / np.pi
     truth, mask = traced.truth, traced.truth.mask & seen.mask
     figures = [
-        (measure(image[..., c], truth.image[..., c], mask, truth.variance[..., c]).value for c in range(3))
+        [measure(image[..., c], truth.image[..., c], mask, truth.variance[..., c]).value for c in range(3)]
         for measure in (relative_rmse, energy_ratio)
     ]
     error, energy = (" / ".join(f"{value:.3f}" for value in values) for values in figures)

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dermis.assets.geometry import build_mesh
 from dermis.assets.head import Head
 from dermis.assets.maps import Maps
-from dermis.assets.primitives import uv_sphere
+from dermis.assets.primitives import SKIN, uv_sphere
 from dermis.comparison.compare import Comparison, compare
 from dermis.comparison.report import write_report
 from dermis.comparison.scenes import LIGHTS, REGIONS, comparison_scene
@@ -94,3 +95,15 @@ def test_unknown_names_are_refused(words: dict[str, str], says: str) -> None:
     against = words.pop("against", "surface-integral")
     with pytest.raises(DermisError, match=says):
         compare(BALL, against, ("none",), settings=SETTINGS, adapter=ADAPTER, **words)
+
+
+@pytest.mark.parametrize("against", ["heat", "surface-integral"])
+def test_a_picture_without_the_head_is_refused(against: str) -> None:
+    """Its one pixel looks between two balls."""
+    ball = uv_sphere(30.0, 16, 8)
+    places = np.vstack([ball.positions + np.array([x, 0, 0]) for x in (-60, 60)])
+    uv = np.vstack([ball.uv * (0.5, 1) + (x, 0) for x in (0, 0.5)])
+    triangles = np.vstack([ball.triangles, ball.triangles + len(ball.positions)])
+    balls = Head("balls", build_mesh(places, uv, triangles, np.tile(ball.material, 2), SKIN), Maps())
+    with pytest.raises(DermisError, match="the picture: expected a pixel that shows nothing but the head"):
+        compare(balls, against, ("none",), settings=Settings(size=(1, 1), atlas=64), adapter=ADAPTER)

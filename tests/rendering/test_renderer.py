@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from setups import bent_plane, front_camera, frontal, head_of, scene_of, settings_of
+from setups import bent_plane, front_camera, frontal, head_of, joined, scene_of, settings_of
 
+from dermis.assets.geometry import build_mesh
 from dermis.assets.head import Head
-from dermis.assets.primitives import uv_sphere
+from dermis.assets.primitives import SKIN, plane, uv_sphere
 from dermis.errors import DermisError
 from dermis.rendering.renderer import Renderer, render
+from dermis.rendering.seams import REMEDIES
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.model import Scene
 
@@ -24,6 +26,9 @@ BALL = head_of(uv_sphere(30.0, 24, 12))
 SLAB = head_of(
     bent_plane(50.0, [[0.5, 0, 0.2], [0, 0.9, 0]], 2), colour=np.random.default_rng(0).random((16, 16, 3))
 )
+FLAT = uv_sphere(30.0, 24, 12)
+LEAF = head_of(build_mesh(FLAT.positions * (1, 1, 0.1), FLAT.uv, FLAT.triangles, FLAT.material, SKIN))
+LEANING = head_of(bent_plane(50.0, [[0.5, 0.3, 0.1], [0, 0.9, 0]], 2))
 LIGHT = DirectionalLight(direction=(1, -0.4, -1), irradiance=(2.0, 1.5, 1.0))
 
 
@@ -75,7 +80,18 @@ CHANGES: dict[str, tuple[Callable[[], Scene], dict[str, Any]]] = {
     "shadow size": (scene, {"shadow_size": 200}),
     "no shadows": (lambda: scene(BALL, frontal()), {}),
     "samples": (scene, {"samples": 4}),
-    "technique": (scene, {"technique": "none"}),
+    **{
+        f"technique {name}": (scene, {"technique": name})
+        for name in ("none", "one-blur", "published", "screen-space", "pre-integrated")
+    },
+    **{f"seams {name}": (lambda: scene(LEANING), {"seams": name}) for name in REMEDIES},
+    "seam colour": (lambda: scene(LEANING), {"seams": "clear-colour", "seam_colour": (0.1, 0.2, 0.9)}),
+    "published on two atlases": (scene, {"technique": "published", "seams": "multi-uv"}),
+    "axes": (lambda: scene(LEANING), {"stretch": "axes"}),
+    "one density": (scene, {"stretch": "none"}),
+    "thin": (lambda: scene(LEAF), {}),
+    "thin taken for thick": (lambda: scene(LEAF), {"transmission": "none"}),
+    "gamma": (lambda: scene(SLAB), {"gamma": "wrong"}),
     "skin": (lambda: scene(BALL, roughness=0.6, rho_s=0.9, mix=0.1), {}),
     "albedo": (lambda: scene(SLAB, albedo="profile"), {}),
     "albedo back": (lambda: scene(SLAB), {}),
@@ -119,6 +135,24 @@ def test_light_of_another_head_does_not_linger(renderer: Renderer, other: Render
     drawn(renderer, scene(full, frontal(9.0)))
     made = drawn(renderer, scene(tailed(), frontal(1.0)))
     assert np.array_equal(made, fresh(other, scene(tailed(), frontal(1.0))))
+
+
+def test_shadows_of_another_head_do_not_linger(renderer: Renderer, other: Renderer) -> None:
+    """Heads of one size, seen by the light through one matrix: only what is inside has moved."""
+
+    def under(x: float) -> Scene:
+        corners = [(plane(4.0), (s * 25.0, s * 25.0, 20.0), (0.8, 0.4 + 0.4 * s, 0.1)) for s in (-1, 1)]
+        shade = (plane(10.0), (x, 0.0, 20.0), (0.5, 0.5, 0.2))
+        whole = head_of(joined((plane(60.0), (0, 0, 0), (0, 0, 0.5)), shade, *corners))
+        return scene(whole, frontal(shadows=True))
+
+    left, right, bare = under(-12.0), under(12.0), {"technique": "none"}
+    for _ in range(2):
+        drawn(renderer, left, **bare)
+    made = drawn(renderer, right, **bare)
+    assert np.array_equal(made, fresh(other, right, **bare))
+    keys = [renderer.prepare(one, settings_of(**bare)).shadow_key for one in (left, right)]
+    assert keys[0] == keys[1] and not np.array_equal(made, drawn(renderer, left, **bare))
 
 
 @pytest.mark.parametrize("samples", [1, 2, 3, 4, 5])

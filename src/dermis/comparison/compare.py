@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dermis.assets.head import Head
 from dermis.comparison.scenes import LIGHTS, REGIONS, comparison_scene
-from dermis.comparison.truths import TRUTHS, Subject, Truth, matched
+from dermis.comparison.truths import TRUTHS, Subject, Truth, check_seen, matched
 from dermis.errors import refuse
 from dermis.images.colour import encode_srgb
 from dermis.optics.diffusion.models import diffusion_profile
@@ -93,7 +93,7 @@ def compare(
     samples : paths through each pixel
     report : told what is being done
 
-    Raises DermisError for names that are none, and what the truth cannot do.
+    Raises DermisError for names that are none, pictures without the head, and what the truth cannot do.
     """
     check_choices(against, light, region, medium)
     settings = settings or Settings(size=(256, 256), atlas=1024)
@@ -107,10 +107,11 @@ def compare(
         subject = Subject(renderer, scene, profile, body, settings)
         report(f"truth: {against}")
         truth = TRUTHS[against](subject, samples)
+        check_seen(truth.mask)
         images, ms = {}, {}
         for technique in techniques:
             report(technique)
-            images[technique], ms[technique] = _render(subject, technique, truth.subpixels)
+            images[technique], ms[technique] = _render(subject, technique, truth)
     title = f"{head.name}, {medium}, light: {light}, region: {region}, {settings.size[0]}x{settings.size[1]}"
     made = Comparison(title, renderer.device.adapter.name, truth, against, (), images)
     rows = tuple(_row(made, technique, ms[technique]) for technique in techniques)
@@ -130,10 +131,11 @@ def check_choices(against: str, light: str, region: str, medium: str) -> None:
             refuse(f"--{option}", f"one of {', '.join(known)}", f"{chosen!r} came", "Choose one of them")
 
 
-def _render(subject: Subject, technique: str, subpixels: int) -> tuple[Floats, float]:
+def _render(subject: Subject, technique: str, truth: Truth) -> tuple[Floats, float]:
     """Linear radiance of a technique, and the device time of its frame at four samples a pixel [ms]."""
-    chosen = subject.settings.model_dump() | {"technique": technique}
-    drawn = subject.renderer.draw(subject.scene, Settings(**(chosen | {"samples": subpixels})))
+    through = {} if truth.through else {"transmission": "none"}
+    chosen = subject.settings.model_dump() | {"technique": technique} | through
+    drawn = subject.renderer.draw(subject.scene, Settings(**(chosen | {"samples": truth.subpixels})))
     image = drawn.linear().astype(np.float64)
     timed = subject.renderer.draw_warm(subject.scene, Settings(**(chosen | {"samples": 4})))
     return image, (timed.gpu_ms or {"total": timed.frame_ms})["total"]

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.errors import refuse
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Medium
 from dermis.rendering.renderer import Renderer
@@ -44,6 +45,7 @@ class Truth:
     subpixels : samples of each pixel that an image should have to be compared with it
     seconds : that it took
     notes : for the reader
+    through : whether light also takes the way through thin parts
     """
 
     image: Floats
@@ -52,6 +54,7 @@ class Truth:
     subpixels: int
     seconds: float
     notes: tuple[str, ...] = ()
+    through: bool = True
 
 
 def surface_integral(subject: Subject, samples: int) -> Truth:
@@ -89,6 +92,7 @@ def heat(subject: Subject, samples: int) -> Truth:
     narrow = subject.profile.variance_mm2 < _LEAST_VARIANCE_MM2
     variances, weight = subject.profile.variance_mm2[~narrow], subject.profile.weight
     seen = surface_points(renderer, scene, settings)
+    check_seen(seen.mask)
     places = _positions(subject, seen)
     target = np.array(scene.camera.target) + scene.head.centre_mm
     centre = places[np.linalg.norm(places - target, axis=1).argmin()]
@@ -103,7 +107,8 @@ def heat(subject: Subject, samples: int) -> Truth:
     judged = SurfacePoints(mask, seen.triangle[on], seen.barycentric[on])
     kept = f"{narrow.sum()} Gaussians under {_LEAST_VARIANCE_MM2:g} mm2 kept in place"
     note = f"{_HEAT_RADIUS_MM:g} mm around the middle; {kept}"
-    return _by_pixel(judged, patch.interpolate(exitance, fine[on], weights[on]), started, note)
+    made = _by_pixel(judged, patch.interpolate(exitance, fine[on], weights[on]), started, note)
+    return replace(made, through=False)
 
 
 def path_traced(subject: Subject, samples: int) -> Truth:
@@ -151,6 +156,13 @@ def _by_pixel(seen: SurfacePoints, exitance: Floats, started: float, note: str) 
     image = np.zeros((*seen.mask.shape, 3))
     image[seen.mask] = exitance / np.pi
     return Truth(image, np.zeros_like(image), seen.mask, 1, time.perf_counter() - started, (note,))
+
+
+def check_seen(mask: NDArray[np.bool_]) -> None:
+    """Raises DermisError when there is no pixel to judge."""
+    if not mask.any():
+        expected = "a pixel that shows nothing but the head"
+        refuse("the picture", expected, "there is none", "Choose a larger size or another region")
 
 
 def matched(medium: Medium) -> Medium:

@@ -29,10 +29,6 @@ class Kept:
         """Make everything again."""
         self._things.clear()
 
-    def forget(self, role: str) -> None:
-        """Make the thing of this role again when it is next wanted."""
-        self._things.pop(role, None)
-
 
 def _same(a: Any, b: Any) -> bool:
     """Equality that compares heads and atlases by identity, without touching their arrays."""

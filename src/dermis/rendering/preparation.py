@@ -52,8 +52,7 @@ class Preparation:
     def __init__(self, device: Device, stages: Stages) -> None:
         self.device, self._stages = device, stages
         kept = Kept()
-        self._keep, self._forget = kept.keep, kept.forget
-        self.forget_all = kept.forget_all
+        self._keep, self.forget_all = kept.keep, kept.forget_all
 
     def inputs(self, scene: Scene, settings: Settings) -> Inputs:
         """Everything that `draw_frame` touches.
@@ -67,7 +66,7 @@ class Preparation:
         scene = with_suns(scene, surroundings)
         views = self._views(scene, settings.shadow_size)
         clips = [view.clip for view in views if view]
-        shadow_maps = self._shadow_maps(len(clips), settings.shadow_size if clips else 1)
+        shadow_maps = self._shadow_maps(scene.head, len(clips), settings.shadow_size if clips else 1)
         layouts = self._layouts(scene, settings, split, views, shadow_maps, surroundings)
         stages, count, size = self._stages, len(split.blurred_mm2), settings.size
         side = settings.atlas if count else 1
@@ -196,8 +195,9 @@ class Preparation:
 
         return self._keep("albedo table", (model, fresnel), make)
 
-    def _shadow_maps(self, layers: int, size: int) -> ShadowMaps:
-        return self._keep("shadows", (layers, size), lambda: self._stages.shadows.make_maps(layers, size))
+    def _shadow_maps(self, head: Head, layers: int, size: int) -> ShadowMaps:
+        key = (head, layers, size)  # heads of one size have the same matrices
+        return self._keep("shadows", key, lambda: self._stages.shadows.make_maps(layers, size))
 
     def _space(self, role: str, side: int) -> Any:
         return self._keep(role, side, lambda: make_texture(self.device, (side, side), "rgba32float"))
@@ -217,7 +217,6 @@ class Preparation:
         head, use_colour = scene.head, scene.skin.albedo == "map"
 
         def make_maps() -> dict[str, Any]:
-            self._forget("shadows")  # they show another head
             return upload_maps(self.device, head, use_colour, decoded=settings.gamma == "right")
 
         def make_geometry() -> dict[str, Any]:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from dermis.gpu import Frame, download, make_texture
 from dermis.gpu.textures import texture_from
 from dermis.rendering.atlas_textures import AtlasTextures, packed_texels
-from dermis.rendering.frame import draw_frame
 from dermis.rendering.layout import Layout
 from dermis.rendering.renderer import Renderer
 from dermis.scene.model import Scene
@@ -41,7 +40,7 @@ def surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> Surf
     single = settings.model_copy(update={"samples": 1, "technique": "none"})
     inputs = renderer.prepare(scene, single)
     frame = Frame(renderer.device)
-    draw_frame(frame, renderer.stages, inputs)
+    renderer.stages.visibility.draw(frame, inputs.seen, inputs.camera_clips, inputs.head)
     frame.submit()
     seen = download(renderer.device, inputs.seen.texture).astype(np.int64)
     mask = seen > 0
@@ -70,6 +69,7 @@ def irradiance_at(
 ) -> Floats:
     """(n, 3) light that enters the skin at places, times the colour's share before scattering.
 
+    scene : without maps and environment, whose texels and occlusion belong to places of the atlas
     triangle, barycentric : (n,) and (n, 3)
     """
     side = max(1, int(np.ceil(np.sqrt(len(triangle)))))
