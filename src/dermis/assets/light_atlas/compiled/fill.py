@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.light_atlas.compiled.machine_code import compiled
+from dermis.assets.machine_code import compiled
 
 _EDGE = 1e-6  # texels this near outside an edge count as on it
 _WELL = 1e-3  # texels this far from an edge are on no other triangle that only shares it

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.light_atlas.compiled.machine_code import compiled
+from dermis.assets.machine_code import compiled
 
 
 @compiled

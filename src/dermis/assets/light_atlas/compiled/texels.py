@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.light_atlas.compiled.machine_code import compiled
+from dermis.assets.machine_code import compiled
 
 
 @compiled

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from dermis.assets.skin_maps.compiled.noise import compiled, share, word_at
+from dermis.assets.machine_code import compiled
+from dermis.assets.skin_maps.compiled.noise import share, word_at
 from dermis.assets.skin_maps.patch import Doubles
 
 

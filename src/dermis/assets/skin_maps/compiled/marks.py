@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
+from dermis.assets.machine_code import compiled
 from dermis.assets.skin_maps.compiled.dots import dots
-from dermis.assets.skin_maps.compiled.noise import blobs, compiled, smooth_step, visible
+from dermis.assets.skin_maps.compiled.noise import blobs, smooth_step, visible
 from dermis.assets.skin_maps.compiled.places import FRECKLES, LIP, PORES, SCALP, X, Y, Z
 from dermis.assets.skin_maps.hairs import WIDEST_TEXEL_MM, Hairs
 from dermis.assets.skin_maps.patch import Doubles, Patch

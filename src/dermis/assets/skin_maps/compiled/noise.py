@@ -2,31 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any, TypeVar, cast
 
-import numba
 import numpy as np
 
-Function = TypeVar("Function", bound=Callable[..., Any])
-
-_FOLDER = Path(__file__).parents[1]
-_CODE = hashlib.sha256(b"".join(file.read_bytes() for file in sorted(_FOLDER.rglob("*.py")))).hexdigest()[:12]
-
-
-def compiled(function: Function) -> Function:
-    """The function as machine code, kept on disk where numba finds a folder that it may write to."""
-    # what is kept is looked up by name, and must not outlive a change of another file that it calls
-    function.__qualname__ += "_" + _CODE
-    options = {"nogil": True, "error_model": "numpy"}
-    try:
-        return cast(Function, numba.njit(cache=True, **options)(function))
-    except RuntimeError:  # neither the package's folder nor the user's can be written to
-        return cast(Function, numba.njit(**options)(function))
-
+from dermis.assets.machine_code import compiled
 
 _ALONG_I, _ALONG_J = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xC2B2AE3D27D4EB4F)
 _ALONG_K, _ALONG_SEED = np.uint64(0x165667B19E3779F9), np.uint64(0xD6E8FEB86659FD93)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
+from dermis.assets.machine_code import compiled
 from dermis.assets.skin_maps.compiled.marks import FRECKLE, MOLE, PORE
-from dermis.assets.skin_maps.compiled.noise import compiled, fractal_noise, gradient_noise, smooth_step
+from dermis.assets.skin_maps.compiled.noise import fractal_noise, gradient_noise, smooth_step
 from dermis.assets.skin_maps.compiled.places import BLOOD, LID, LIP, MELANIN, MOUTH
 from dermis.assets.skin_maps.patch import Doubles, Patch
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from dermis.assets.skin_maps.compiled.noise import blobs, compiled, smooth_step
+from dermis.assets.machine_code import compiled
+from dermis.assets.skin_maps.compiled.noise import blobs, smooth_step
 from dermis.assets.skin_maps.face import DEGREES, Face
 from dermis.assets.skin_maps.patch import Doubles, Patch
 

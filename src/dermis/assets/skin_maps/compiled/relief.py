@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
+from dermis.assets.machine_code import compiled
 from dermis.assets.skin_maps.compiled.marks import HAIR, MOLE, PORE
 from dermis.assets.skin_maps.compiled.noise import (
     blobs,
-    compiled,
     fractal_noise,
     gradient_noise,
     smooth_step,
