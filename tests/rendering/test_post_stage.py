@@ -71,9 +71,8 @@ def test_ends_of_the_range(device: Device, stages: Stages) -> None:
 def test_tone_curves_are_the_published_ones(device: Device, stages: Stages, tone: str) -> None:
     radiance = 6.0 * values(2) ** 2
     exposed, encoded = finished(device, stages, radiance, 1.5, tone=tone)
-    assert np.array_equal(
-        exposed[..., :3], radiance[..., :3] * np.float32(1.5)
-    )  # the curve is for bytes alone
+    # the curve is for bytes alone; what is too small for a normal float may become 0
+    assert np.abs(exposed[..., :3] - radiance[..., :3] * np.float32(1.5)).max() < 1e-37
     curve = {"filmic": light_twins.filmic, "neutral": light_twins.neutral}[tone]
     exact = 255 * encode_srgb(np.clip(curve(exposed[..., :3].astype(float)), 0, 1))
     assert np.abs(encoded[..., :3] - exact).max() < 0.5 + 0.01
