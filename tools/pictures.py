@@ -29,6 +29,9 @@ PICTURES = {
     "14_energy": "energy",
     "15_tinted": "tinted",
     "16_area_lights": "area-lights",
+    "17_seams": "seams",
+    "18_thin_parts": "thin-parts",
+    "19_techniques": "techniques",
 }
 QUALITY = 88
 
