@@ -1,9 +1,9 @@
-"""What blurs do at the seams of the map: python gallery/17_seams.py OUTPUT.
+"""What blurs do at the seams of the map: python gallery/17_seams.py OUTPUT [HEAD].
 
 Left to right: no remedy, the talk's but the slow one (a colour around the charts, blurs that narrow at their
 edges, blurs that leave out what lies beside them), and blurs that go on across the seam. Above the package's
-bust from behind its left ear, then the same head in 300 charts; below each how far it is from the last, 4
-times as bright.
+bust from behind its left ear, then the same head in 300 charts (HEAD: one of the two); below each how far it
+is from the last, 4 times as bright.
 """
 
 import sys
@@ -27,7 +27,8 @@ VIEWS = {
 renderer = dermis.Renderer()
 skin = dermis.Skin(profile="skin1", specular="none")
 rows = []
-for name, (camera, light) in VIEWS.items():
+for name in sys.argv[2:] or VIEWS:
+    camera, light = VIEWS[name]
     scene = dermis.Scene(dermis.load_head(name), lights=[light], camera=camera, skin=skin)
     row = [renderer.render(scene, size=(256, 256), atlas=1024, seams=seams) for seams in REMEDIES]
     rows += [np.hstack(row), np.hstack([4 * np.abs(one - row[-1]) for one in row])]
