@@ -43,10 +43,7 @@ class Diffuse:
     def make_levels(self, size: int, count: int) -> Levels:
         """Space for the unblurred light and `count` blurred levels."""
         stack = make_texture(self._device, (size, size), "rgba32float", layers=max(2, count + 1))
-        views = [
-            stack.create_view(dimension="2d", base_array_layer=k, array_layer_count=1)
-            for k in range(count + 1)
-        ]
+        views = layer_views(stack, count + 1)
         return Levels(stack, views, make_texture(self._device, (size, size), "rgba32float"), size)
 
     def draw(
@@ -91,3 +88,9 @@ class Diffuse:
                 for axis in (0, 1)
             ]
         return self._made[sheared, edge]
+
+
+def layer_views(stack: Any, count: int) -> list[Any]:
+    """Views of the first `count` layers of a texture array, each by itself."""
+    options = {"dimension": "2d", "array_layer_count": 1}
+    return [stack.create_view(base_array_layer=k, **options) for k in range(count)]

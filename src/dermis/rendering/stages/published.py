@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.gpu import ComputeProgram, Device, Frame, make_texture
 from dermis.rendering.atlas_textures import AtlasTextures
 from dermis.rendering.stages import STAGES
-from dermis.rendering.stages.diffuse import Levels
+from dermis.rendering.stages.diffuse import Levels, layer_views
 
 _TEXEL = "rgba16float"
 
@@ -30,12 +30,13 @@ class Published:
     def make_levels(self, size: int, count: int) -> Levels:
         """Space for the unblurred light, as floats, and `count` blurred levels."""
         stack = make_texture(self._device, (size, size), _TEXEL, layers=max(2, count + 1))
-        views = [
-            stack.create_view(dimension="2d", base_array_layer=k, array_layer_count=1)
-            for k in range(1, count + 1)
-        ]
         light = make_texture(self._device, (size, size), "rgba32float")
-        return Levels(stack, [light, *views], make_texture(self._device, (size, size), _TEXEL), size)
+        return Levels(
+            stack,
+            [light, *layer_views(stack, count + 1)[1:]],
+            make_texture(self._device, (size, size), _TEXEL),
+            size,
+        )
 
     def draw(
         self,
@@ -52,7 +53,7 @@ class Published:
         """
         sampler = self._device.sampler(mag_filter="linear", min_filter="linear")
         stretch, spare = self._stretch_maps(levels.size)
-        first = levels.stack.create_view(dimension="2d", base_array_layer=0, array_layer_count=1)
+        (first,) = layer_views(levels.stack, 1)
         size = (levels.size, levels.size)
         frame.compute("diffuse", self._halve, {"light": levels.views[0], "halves": first}, size)
         light_levels = [first, *levels.views[1:]]
