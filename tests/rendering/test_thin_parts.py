@@ -1,4 +1,4 @@
-"""Light through thin parts: twins, slabs and wedges lit from behind, spheres that let nothing through."""
+"""Light through thin parts: twins; slabs, wedges and a rolled rim lit from behind; spheres let none pass."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ from typing import Any
 import numpy as np
 import pytest
 import thin_twins
-import twins
 from numpy.typing import NDArray
 from setups import head_of, run_frame, scene_of
+from thin_truth import hook, straight
 from tolerances import SLAB_THROUGH, TWIN
 
-from dermis.assets.atlas import build_atlas
+from dermis.assets.atlas import Atlas, build_atlas
 from dermis.assets.mesh import Mesh
 from dermis.assets.primitives import uv_sphere, wedge
-from dermis.assets.smooth_normals import smooth_normals
-from dermis.gpu import Device, Frame, download, make_texture, upload
-from dermis.gpu.textures import texture_from
+from dermis.assets.thin_parts.links import Links, _in_cells, find_links
+from dermis.assets.thin_parts.samples import giving, taking
+from dermis.gpu import Device, Frame, download, upload
 from dermis.optics.diffusion.transmission import through_gaussians
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
-from dermis.rendering.atlas_textures import upload_atlas
 from dermis.rendering.frame import Stages
-from dermis.rendering.geometry import upload_geometry
+from dermis.rendering.levels import ENTERED, make_levels
 from dermis.rendering.renderer import Renderer
-from dermis.rendering.stages.transmission import Thin
+from dermis.rendering.stages.opposite import upload_pairs
+from dermis.rendering.thin_parts import thin_of
 from dermis.scene.lights import DirectionalLight
 
 Floats = NDArray[np.float64]
@@ -35,53 +35,97 @@ SIGMA = float(np.sqrt(PROFILE.variance_mm2[-1]))
 BEHIND = DirectionalLight(direction=(0, 0, 1), irradiance=(1.0, 1.0, 1.0), shadows=False)
 
 
-def unpacked(words: NDArray[np.uint32]) -> Floats:
-    """What the shader stores: place, thickness, distances to the rim."""
-    place = np.stack([words[..., 0] & 0xFFFF, words[..., 0] >> 16], axis=-1) / 65535.0
-    return np.concatenate([place, np.ascontiguousarray(words[..., 1:]).view(np.float32)], axis=-1)
+@pytest.fixture(scope="module")
+def found() -> tuple[Mesh, Atlas, Links]:
+    """What lies opposite on a small wedge."""
+    mesh = wedge(12.0, 1.0, 4.0, cells=2)
+    atlas = build_atlas(mesh, 64, "stitched")
+    return mesh, atlas, find_links(mesh, atlas, SIGMA)
 
 
-@pytest.mark.parametrize("thick", [(2.0, 2.0), (0.5, 14.0)])
-def test_twin_of_what_lies_opposite(device: Device, stages: Stages, thick: tuple[float, float]) -> None:
-    mesh = wedge(30.0, *thick, cells=2)
-    atlas = build_atlas(mesh, 64)
-    texels = upload_atlas(device, atlas).resources["atlas"]
-    found = stages.opposite.find(mesh, upload_geometry(device, mesh, atlas), texels, 64, SIGMA)
-    made = unpacked(download(device, found))
-    assert (made[~atlas.own, 2] < 0).all()
-    points, _ = twins.surface(atlas, head_of(mesh))
-    normals = atlas.interpolate(mesh, smooth_normals(mesh, 1.0))
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    inner = atlas.own & (np.abs(points[..., :2]).max(axis=-1) < 14.5)  # rays along an edge fall either way
-    made, twin = made[inner], thin_twins.opposite(mesh, atlas, points[inner], normals[inner], SIGMA)
-    thin = np.isfinite(twin[:, 2])
-    assert np.mean(thin == (made[:, 2] < 1e5)) > 0.999
-    both = thin & (made[:, 2] < 1e5)
-    assert 0.5 < both.mean() <= 1.0
-    error = np.abs(made - twin)[both]
-    for column, close in enumerate((1e-3, 1e-3, 0.01, 0.01, 0.01)):
-        assert np.mean(error[:, column] < close) > 0.99  # some rays meet an edge
+def test_the_places_stand_for_all_of_the_surface(found: tuple[Mesh, Atlas, Links]) -> None:
+    mesh, atlas, links = found
+    given = giving(mesh, atlas, len(links.receiver))
+    corners = mesh.positions[mesh.triangles].astype(float)
+    area = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    ).sum()
+    assert abs(given.area_mm2.sum() / (area / 2) - 1) < 0.05
+    assert atlas.own[given.texel[:, 1], given.texel[:, 0]].all()
+    assert len(np.unique(given.cell, axis=0)) == len(given.cell)
 
 
-def test_twin_of_what_comes_through(device: Device, stages: Stages) -> None:
-    rng = np.random.default_rng(8)
-    size, k = 32, len(BLURRED.weight)
-    space = stages.diffuse.make_levels(size, k)
-    levels = rng.random((k, size, size, 3)).astype(np.float32)
+def test_twin_of_what_lies_opposite(found: tuple[Mesh, Atlas, Links]) -> None:
+    mesh, atlas, links = found
+    given = giving(mesh, atlas, len(links.receiver))
+    taken, radius = taking(mesh, atlas, given), float(links.radius_mm)
+    shape = thin_twins.lie(taken, given, radius)
+    far = np.stack([thin_twins.along(atlas, taken, given, radius, same) for same in (1.6, 0.4)])
+    far[1] += 2.0 / atlas.stretch[atlas.own].min()  # what nine texels' mean may add
+    receiver = links.receiver[taken.cell[:, 1], taken.cell[:, 0]]
+    assert (receiver > 0).all()
+    texel = {tuple(t): j for j, t in enumerate(given.texel)}
+    names = np.array([texel[tuple(t)] for t in links.texel])
+    unit = np.array([radius, radius, radius, 1.0]) / 65535.0
+    wrong = 0
+    for i, r in enumerate(receiver):
+        part = slice(links.first[r], links.first[r + 1])
+        j = names[links.source[part]]
+        assert abs(len(j) - np.count_nonzero(shape[i, :, 2])) <= 2  # at the very edge of a ball
+        made, (low, high) = links.lie[part] * unit, np.minimum(far[:, i, j], radius)
+        wrong += np.count_nonzero(np.abs(made[:, [0, 1, 3]] - shape[i, j]) > 2e-3)
+        wrong += np.count_nonzero((made[:, 2] < low - 2e-3) | (made[:, 2] > high + 2e-3))
+    assert wrong == 0
+
+
+def test_a_narrow_profile_asks_for_no_more_cells_than_memory_holds() -> None:
+    mesh = uv_sphere(100.0, 8)
+    atlas = build_atlas(mesh, 64, "stitched")
+    sources = _in_cells(giving(mesh, atlas, 64), 0.01)
+    assert sources.size.prod() < 2**22
+    assert len(find_links(mesh, atlas, 0.01).source) == 0
+
+
+def test_twin_of_what_passes(device: Device, stages: Stages, found: tuple[Mesh, Atlas, Links]) -> None:
+    links = found[2]
+    pairs = upload_pairs(device, links)
+    words = read_buffer(device, stages.opposite.weigh(pairs, BLURRED.variance_mm2, BLURRED.weight))
+    assert (words.reshape(-1, 2)[:, 0] == links.source).all()
+    radius, cell = pairs.radius_mm, pairs.spacing_mm
+    unit = np.array([radius, radius, radius, 1.0]) / 65535.0
+    depth, aside, far, share = (links.lie * unit).T
+    far[links.lie[:, 2] == 65535] = np.inf
+    shape, area = np.column_stack([depth, aside, share]), links.area_mm2.astype(float)[links.source]
+    twin = thin_twins.passed(shape, far, area, radius, cell, BLURRED.variance_mm2, BLURRED.weight)
+    error = np.abs(thin_twins.decoded(words.reshape(-1, 2)[:, 1]) - twin)
+    assert twin.max() > 1e-3
+    assert (error <= twin.max(axis=1, keepdims=True) / 400 + 1e-6).all()  # nine bits of the brightest
+
+
+def test_twin_of_what_comes_through(device: Device, stages: Stages, found: tuple[Mesh, Atlas, Links]) -> None:
+    links, k = found[2], len(BLURRED.weight)
+    space = make_levels(device, 64, k, ENTERED)
+    levels = np.random.default_rng(8).random((k, 64, 64, 3)).astype(np.float32)
     for layer, level in enumerate(levels, start=1):
-        upload(device, space.stack, np.dstack([level, np.ones((size, size))]), layer=layer)
-    place = rng.integers(0, 1 << 16, (size, size, 2)).astype(np.uint32)
-    shape = rng.uniform(0.0, 8.0, (size, size, 3)).astype(np.float32)
-    shape[..., 2] = np.minimum(shape[..., 1], shape[..., 2])
-    words = np.dstack([place[..., 0] | (place[..., 1] << 16), shape.view(np.uint32)])
-    thin = Thin(texture_from(device, words, "rgba32uint"), make_texture(device, (size, size), "rgba32float"))
+        upload(device, space.stack, np.dstack([level, np.ones((64, 64))]), layer=layer)
+    pairs = upload_pairs(device, links)
+    thin = thin_of(device, stages.opposite, pairs, BLURRED.variance_mm2, BLURRED.weight)
+    share = thin_twins.decoded(read_buffer(device, thin.links).reshape(-1, 2)[:, 1])
     frame = Frame(device)
-    stages.transmission.draw(frame, space, thin, BLURRED.variance_mm2, BLURRED.weight)
+    stages.transmission.draw(frame, space, thin)
     frame.submit()
-    found = np.dstack([place / 65535.0, shape.astype(float)])
-    twin = thin_twins.transmitted(levels.astype(float), found, BLURRED.variance_mm2, BLURRED.weight)
-    assert twin.max() > 0.3
-    assert np.abs(download(device, thin.light)[..., :3] - twin).max() < TWIN * twin.max()
+    x, y = links.texel[links.source].astype(int).T
+    light = share * levels[thin.layer, y, x]
+    sums = np.concatenate([np.zeros((1, 3)), np.cumsum(light, axis=0)])[links.first.astype(int)]
+    twin = np.diff(sums, axis=0)[links.receiver]
+    made = download(device, thin.light)
+    assert twin.max() > 0.1
+    assert np.abs(made[..., :3] - twin).max() < TWIN * twin.max()
+    assert ((made[..., 3] == 1) == (links.receiver > 0)).all()
+
+
+def read_buffer(device: Device, buffer: Any) -> NDArray[np.uint32]:
+    return np.frombuffer(device.handle.queue.read_buffer(buffer), np.uint32)
 
 
 def scattered(
@@ -172,3 +216,27 @@ def test_light_counts_once_where_both_sides_meet(renderer: Renderer) -> None:
     points, light = front(renderer, mesh, *everywhere, atlas=256)
     inner = light[np.abs(points[:, :2]).max(axis=1) < 8.0]
     assert (light.max(axis=0) < 1.05 * inner.mean(axis=0)).all()
+
+
+def test_a_rolled_rim_glows_evenly(renderer: Renderer) -> None:
+    """No dark spots, no bright chains, and nearly all of the light that straight lines bring."""
+    mesh = hook()
+    points, normals, light = scattered(renderer, mesh, atlas=256)
+    dark = (normals[:, 2] > 0.1) & (np.abs(points[:, 1]) < 5.0) & (points[:, 0] > -7.0)
+    places, red = points[dark][::7], light[dark][::7, 0]
+    exact = straight(mesh, places, BLURRED)
+    assert 0.9 < red.sum() / exact.sum() < 1.05
+    assert np.sqrt(((red - exact) ** 2).mean() / (exact**2).mean()) < 0.15
+    bright = exact > 0.2 * exact.max()
+    assert 0.7 < (red[bright] / exact[bright]).min() < (red[bright] / exact[bright]).max() < 1.4
+
+
+@pytest.mark.parametrize("angle", [10.0, 45.0])
+def test_a_wedge_lets_through_what_straight_lines_bring(renderer: Renderer, angle: float) -> None:
+    mesh = wedge(60.0, 0.01, 120.0 * float(np.tan(np.radians(angle / 2))), cells=16)
+    points, normals, light = scattered(renderer, mesh, atlas=512)
+    half = np.radians(angle / 2)
+    dark = normals @ [-np.sin(half), 0.0, np.cos(half)] > 0.99
+    dark &= (points[:, 0] < -15.0) & (np.abs(points[:, 1]) < 15.0)
+    exact = straight(mesh, points[dark][::9], BLURRED)
+    assert abs(light[dark][::9, 0].sum() / exact.sum() - 1) < 0.06

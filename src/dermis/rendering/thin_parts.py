@@ -1,4 +1,4 @@
-"""What lies opposite the thin parts of a head, made or read from disk."""
+"""The thin parts of a head: which places lie opposite each other, and space for what passes between them."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.assets.atlas import Atlas
-from dermis.assets.cache import cached_opposite
+from dermis.assets.cache import cached_links
 from dermis.assets.mesh import Mesh
-from dermis.gpu import Device, download
-from dermis.gpu.textures import texture_from
-from dermis.rendering.layout import Layout
-from dermis.rendering.stages.opposite import FORM, Opposite
+from dermis.gpu import Device, make_texture
+from dermis.rendering.stages.opposite import Opposite, Pairs, source_level, upload_pairs
+from dermis.rendering.stages.transmission import Thin
 from dermis.scene.settings import Settings
 
+Floats = NDArray[np.float64]
 _WITH_TRANSMISSION = ("texture-space", "published")
-_FINEST_SIDE = 1024  # texels: what comes through half a millimetre and more is smooth
+_WIDTHS_TO_DOUBLE, _LEAST_SHARED_MM = 2, 0.5
 
 
 def lets_through(settings: Settings) -> bool:
@@ -25,19 +25,26 @@ def lets_through(settings: Settings) -> bool:
     return settings.transmission == "thin" and settings.technique in _WITH_TRANSMISSION
 
 
-def opposite_map(
-    device: Device, stage: Opposite, mesh: Mesh, atlas: Atlas, layout: Layout, widest_mm: float
-) -> Any:
-    """The texture that `Opposite.find` makes, of at most 1024 texels a side.
+def shared_width(widest_mm: float) -> float:
+    """The nearest of a few widths [mm]: skins that differ little share what lies opposite."""
+    step = round(_WIDTHS_TO_DOUBLE * float(np.log2(max(widest_mm, _LEAST_SHARED_MM))))
+    return float(2.0 ** (step / _WIDTHS_TO_DOUBLE))
+
+
+def pairs_of(device: Device, mesh: Mesh, atlas: Atlas, widest_mm: float) -> Pairs:
+    """The places that lie opposite each other, made or read from disk.
 
     widest_mm : standard deviation of the widest Gaussian [mm]
     """
-    side = min(atlas.size, _FINEST_SIDE)
+    return upload_pairs(device, cached_links(mesh, atlas, widest_mm))
 
-    def find() -> NDArray[np.uint32]:
-        texels = layout.atlas.resources["atlas"]
-        found: NDArray[np.uint32] = download(device, stage.find(mesh, layout.lit, texels, side, widest_mm))
-        return found
 
-    form = f"{FORM} {side} {widest_mm!r}"
-    return texture_from(device, cached_opposite(mesh, atlas, form, find), "rgba32uint")
+def thin_of(device: Device, stage: Opposite, pairs: Pairs, variance_mm2: Floats, weight: Floats) -> Thin:
+    """What a profile lets pass between pairs, and space for it.
+
+    variance_mm2, weight : (k,) and (k, 3) of the blurred levels
+    """
+    gathered = device.buffer(np.zeros((pairs.source_count, 4), np.float32), "STORAGE")
+    light: Any = make_texture(device, (pairs.side, pairs.side), "rgba32float")
+    links = stage.weigh(pairs, variance_mm2, weight)
+    return Thin(pairs, links, source_level(pairs, variance_mm2), gathered, light)

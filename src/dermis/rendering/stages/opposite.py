@@ -1,70 +1,102 @@
-"""What lies opposite each place of the surface through the flesh; found once for a mesh and an atlas."""
+"""How much light passes between places that lie opposite each other; told once for a profile."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.mesh import Mesh
-from dermis.assets.smooth_normals import smooth_normals
-from dermis.assets.triangle_grid import build_grid
-from dermis.gpu import ComputeProgram, Device, Frame, make_texture
-from dermis.gpu.program import Resources
-from dermis.rendering.stages import SHARED_SHADERS, STAGES
+from dermis.assets.thin_parts.links import Links
+from dermis.gpu import ComputeProgram, Device, Frame
+from dermis.optics.gaussians import MOST_GAUSSIANS
+from dermis.rendering.stages import STAGES
 
-FORM = "8"
-"""Differs when finding gives other results."""
-_JUDGED = 0.7  # of the widest one is the Gaussian that judges: its few rays step less for those that matter
-_CREASE_MM = 1.0  # over which normals are smoothed: in a crease thick and thin would meet without it
-_REACH = 4.0  # standard deviations of the widest Gaussian: a three-thousandth of it passes
-_WIDEST_MM = 10.0  # rays through wax, which spreads light farther, would take minutes
+Floats = NDArray[np.float64]
+ROW = 1024  # as in the shaders
+GRAIN = (
+    0.72  # sampled at their spacing, Gaussians of more variance than this times its square are even to 1e-6
+)
+_SMOOTH = 0.45  # of the spacing; light of this standard deviation has no detail that the sources miss
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Pairs of places on a device, and how they lie.
+
+    side : of the coarse atlas
+    receiver, first : buffers, as in `Links`
+    pairs, sources : buffers of words, as opposite.wgsl reads them
+    count, source_count : of pairs and sources
+    """
+
+    side: int
+    radius_mm: float
+    spacing_mm: float
+    receiver: Any
+    first: Any
+    pairs: Any
+    sources: Any
+    count: int
+    source_count: int
+
+
+def upload_pairs(device: Device, links: Links) -> Pairs:
+    """The links as the shaders read them."""
+    count, number = len(links.source), len(links.texel)
+    pairs = np.zeros((max(1, count), 3), np.uint32)
+    pairs[:count, 0] = links.source
+    pairs[:count, 1:] = np.ascontiguousarray(links.lie).view(np.uint32)
+    sources = np.zeros((max(1, number), 2), np.uint32)
+    sources[:number, 0] = np.ascontiguousarray(links.texel).view(np.uint32)[:, 0]
+    sources[:number, 1] = links.area_mm2.view(np.uint32)
+    return Pairs(
+        side=len(links.receiver),
+        radius_mm=float(links.radius_mm),
+        spacing_mm=float(links.spacing_mm),
+        receiver=device.buffer(links.receiver.astype(np.uint32), "STORAGE"),
+        first=device.buffer(links.first, "STORAGE"),
+        pairs=device.buffer(pairs, "STORAGE"),
+        sources=device.buffer(sources, "STORAGE"),
+        count=len(pairs),
+        source_count=len(sources),
+    )
+
+
+def source_level(pairs: Pairs, variance_mm2: Floats) -> int:
+    """The blurred level that is smooth enough for the sources to tell all of it."""
+    smooth = np.flatnonzero(variance_mm2 >= (_SMOOTH * pairs.spacing_mm) ** 2)
+    return int(smooth[0]) if len(smooth) else len(variance_mm2) - 1
 
 
 class Opposite:
-    """Follows rays into the flesh around each texel, spread like a Gaussian.
-
-    The shader is compiled when it is first wanted.
-    """
+    """Weighs pairs for a profile. The shader is compiled when it is first wanted."""
 
     def __init__(self, device: Device) -> None:
         self._device = device
         self._program: ComputeProgram | None = None
 
-    def find(self, mesh: Mesh, geometry: Resources, atlas: Any, side: int, widest_mm: float) -> Any:
-        """A texture of side x side of the atlas' texels: place there, thickness, distances to the rim.
+    def weigh(self, pairs: Pairs, variance_mm2: Floats, weight: Floats) -> Any:
+        """A buffer of the source of each pair and the share of its light, red, green and blue, that passes.
 
-        geometry : triangle_table and vertex_table
-        widest_mm : standard deviation of the widest Gaussian; it sees four of them far, 40 mm at most [mm]
+        variance_mm2, weight : (k,) and (k, 3) of the blurred levels
         """
-        path = STAGES / "opposite.wgsl"
-        self._program = self._program or ComputeProgram(self._device, path, (SHARED_SHADERS,))
-        cells = build_grid(mesh)
-        found = make_texture(self._device, (side, side), "rgba32uint")
-        grid = self._program.record(
-            "Grid",
-            low=cells.low,
-            cell_mm=cells.cell_mm,
-            size=(*cells.size, 0),
-            limit_mm=_REACH * min(widest_mm, _WIDEST_MM),
-            sigma_mm=_JUDGED * min(widest_mm, _WIDEST_MM),
-            side=side,
+        self._program = self._program or ComputeProgram(self._device, STAGES / "opposite.wgsl")
+        gaussian = np.zeros((MOST_GAUSSIANS, 4), np.float32)
+        gaussian[: len(weight), :3], gaussian[: len(weight), 3] = weight, variance_mm2
+        record = self._program.record(
+            "Opposite",
+            radius_mm=pairs.radius_mm,
+            before_mm2=variance_mm2[source_level(pairs, variance_mm2)],
+            cell_mm2=pairs.spacing_mm**2,
+            grain=GRAIN,
+            count=len(weight),
+            gaussian=gaussian,
         )
-        bound = {
-            **geometry,
-            "grid": grid,
-            "first": self._device.buffer(cells.first, "STORAGE"),
-            "listed": self._device.buffer(np.append(cells.triangle, np.uint32(0)), "STORAGE"),
-            "atlas": atlas,
-            "normals": self._device.buffer(_padded(smooth_normals(mesh, _CREASE_MM**2)), "STORAGE"),
-            "opposite": found,
-        }
+        links = self._device.handle.create_buffer(size=8 * pairs.count, usage=pairs.pairs.usage)
+        bound = {"opposite": record, "pairs": pairs.pairs, "sources": pairs.sources, "links": links}
         frame = Frame(self._device)
-        frame.compute("opposite", self._program, bound, (side, side))
+        frame.compute("opposite", self._program, bound, (ROW, -(-pairs.count // ROW)))
         frame.submit()
-        return found
-
-
-def _padded(vectors: NDArray[np.float64]) -> NDArray[np.float32]:
-    return np.pad(vectors, ((0, 0), (0, 1))).astype(np.float32)
+        return links

@@ -5,55 +5,59 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from dermis.gpu import ComputeProgram, Device, Frame
-from dermis.optics.gaussians import MOST_GAUSSIANS
-from dermis.rendering.stages import SHARED_SHADERS, STAGES
-from dermis.rendering.stages.diffuse import Levels
-
-Floats = NDArray[np.float64]
+from dermis.rendering.levels import Levels
+from dermis.rendering.stages import STAGES
+from dermis.rendering.stages.opposite import ROW, Pairs
 
 
 @dataclass(frozen=True)
 class Thin:
     """Thin parts of an atlas.
 
-    opposite : what `Opposite.find` found
-    light : texture of the same size for what comes through
+    pairs : places opposite each other
+    links : what `Opposite.weigh` made of them
+    layer : blurred level, counted from 0, whose light passes
+    gathered : buffer for the light of the sources
+    light : texture of the coarse atlas for what comes through
     """
 
-    opposite: Any
+    pairs: Pairs
+    links: Any
+    layer: int
+    gathered: Any
     light: Any
 
 
 class Transmission:
-    """Lets the blurred levels of the far side through [dEonLuebke2007].
-
-    A Gaussian of the straight distance is one over the far surface times exp(-d^2 / 2v). So the far side's
-    own blurred levels are what comes through, whatever lights made them, and there is nothing left to blur.
-    """
+    """Sums what passes from all places opposite [JensenBuhler2002; dEonLuebke2007]."""
 
     def __init__(self, device: Device) -> None:
-        self._program = ComputeProgram(device, STAGES / "transmission.wgsl", (SHARED_SHADERS,))
+        path = STAGES / "transmission.wgsl"
+        self._gather, self._sum = (ComputeProgram(device, path, constants={"SUM": s}) for s in (0, 1))
 
-    def draw(
-        self,
-        frame: Frame,
-        levels: Levels,
-        thin: Thin,
-        variance_mm2: Floats,
-        weight: Floats,
-    ) -> Any:
-        """The light that comes through, summed over the blurred layers, which start after the unblurred one.
-
-        variance_mm2, weight : (k,) and (k, 3) of the layers
-        """
-        gaussian = np.zeros((MOST_GAUSSIANS, 4), np.float32)
-        gaussian[: len(weight), :3], gaussian[: len(weight), 3] = weight, np.sqrt(variance_mm2)
-        record = self._program.record("Through", first=1, count=len(weight), gaussian=gaussian)
-        shown = {"opposite": thin.opposite, "transmitted": thin.light}
-        bound = {"through": record, "levels": levels.stack, **shown}
-        frame.compute("transmission", self._program, bound, thin.light.size[:2])
+    def draw(self, frame: Frame, levels: Levels, thin: Thin) -> Any:
+        """The light that comes through, from the blurred layers, which start after the unblurred one."""
+        pairs = thin.pairs
+        layer = 1 + thin.layer
+        record = self._sum.record(
+            "Through",
+            layer=layer,
+            side=pairs.side,
+            sources=pairs.source_count,
+            mip=levels.halvings[layer],
+            scale=1.0 / levels.scale,
+        )
+        bound = {
+            "through": record,
+            "levels": levels.stack,
+            "sources": pairs.sources,
+            "receiver": pairs.receiver,
+            "first": pairs.first,
+            "links": thin.links,
+            "gathered": thin.gathered,
+            "transmitted": thin.light,
+        }
+        frame.compute("transmission", self._gather, bound, (ROW, -(-pairs.source_count // ROW)))
+        frame.compute("transmission", self._sum, bound, (pairs.side, pairs.side))
         return thin.light

@@ -1,61 +1,66 @@
-// Light that comes through thin parts: what has spread on the other side, as far as the flesh between lets it pass.
-//#include "normal_distribution.wgsl"
+// Light that comes through thin parts: gathered where it enters, then summed where it leaves.
 //#include "bilinear.wgsl"
 
+override SUM: bool = false; // false: gather; true: sum
+
 struct Through {
-    first: u32, // blurred layer
-    count: u32,
-    gaussian: array<vec4f, 24>, // weight per channel, standard deviation [mm]
+    layer: u32, // blurred level that the sources show
+    side: u32, // of the coarse atlas
+    sources: u32,
+    mip: u32, // that holds the level
+    scale: f32, // of the light over what the level holds
 }
 
 @group(0) @binding(0) var<uniform> through: Through;
 @group(0) @binding(1) var levels: texture_2d_array<f32>;
-@group(0) @binding(2) var opposite: texture_2d<u32>; // place in the atlas, thickness, distances to the rim on either side
-@group(0) @binding(3) var transmitted: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(2) var<storage, read> sources: array<vec2u>; // texel, x and y packed; area
+@group(0) @binding(3) var<storage, read> receiver: array<u32>; // of each cell: 0 without surface, else which one
+@group(0) @binding(4) var<storage, read> first: array<u32>; // where each receiver's links begin
+@group(0) @binding(5) var<storage, read> links: array<vec2u>; // source, and the share of its light, as in opposite.wgsl
+@group(0) @binding(6) var<storage, read_write> gathered: array<vec4f>;
+@group(0) @binding(7) var transmitted: texture_storage_2d<rgba32float, write>;
 
-const THICK: f32 = 4.0; // standard deviations that hardly anything passes
+const ROW: u32 = 1024u; // of the sources, as they are spread over invocations
 
-fn level_at(place: vec2f, layer: u32) -> vec3f {
-    let size = vec2i(textureDimensions(levels));
-    let at = place * vec2f(size) - 0.5;
-    let a = clamp(vec2i(floor(at)), vec2i(0), size - 1);
-    let b = clamp(vec2i(floor(at)) + 1, vec2i(0), size - 1);
-    let w = bilinear_weights(at);
-    let light = w.x * textureLoad(levels, a, layer, 0) + w.y * textureLoad(levels, vec2i(b.x, a.y), layer, 0)
-        + w.z * textureLoad(levels, vec2i(a.x, b.y), layer, 0) + w.w * textureLoad(levels, b, layer, 0);
-    return light.rgb;
+fn level_at(at: vec2i) -> vec4f {
+    let most = vec2i(textureDimensions(levels, through.mip)) - 1;
+    return textureLoad(levels, clamp(at, vec2i(0), most), through.layer, through.mip);
 }
 
-// A Gaussian of distance sqrt(r^2 + d^2) is exp(-d^2 / 2v) G(v, r) [dEonLuebke2007]. Near a rim the light that both
-// sides share over it is taken apart first, so that none counts twice: what is beyond the rim lies nearer by the surface.
-fn passes(here: vec3f, there: vec3f, thickness: f32, rim: vec2f) -> vec3f {
-    let over = beyond_line(rim.x); // share of this side's blur that comes from the other
-    let f = exp(-0.5 * thickness * thickness);
-    let share = clamp((f * (1.0 - beyond_line(rim.y)) - over) / max(1.0 - 2.0 * over, 1e-4), 0.0, 1.0);
-    return share * max(vec3f(0.0), (1.0 - over) * there - over * here);
+fn gather(index: u32) {
+    let texel = sources[index].x;
+    let place = (vec2f(f32(texel & 0xffffu), f32(texel >> 16u)) + 0.5) / f32(1u << through.mip) - 0.5;
+    let a = vec2i(floor(place));
+    let w = through.scale * bilinear_weights(place);
+    gathered[index] = w.x * level_at(a) + w.y * level_at(a + vec2i(1, 0)) + w.z * level_at(a + vec2i(0, 1))
+        + w.w * level_at(a + vec2i(1, 1));
+}
+
+// Three shares with one exponent.
+fn decoded(word: u32) -> vec3f {
+    return exp2(f32(word >> 27u) - 24.0) * vec3f(f32(word & 511u), f32((word >> 9u) & 511u), f32((word >> 18u) & 511u));
+}
+
+fn add_up(at: vec2u) {
+    let which = receiver[at.y * through.side + at.x];
+    var sum = vec3f(0.0);
+    for (var k = first[which]; k < first[which + 1u]; k++) {
+        let link = links[k];
+        sum += decoded(link.y) * gathered[link.x].rgb;
+    }
+    textureStore(transmitted, at, vec4f(sum, select(0.0, 1.0, which > 0u)));
 }
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let side = textureDimensions(transmitted);
-    if (any(id.xy >= side)) {
+    if (SUM) {
+        if (all(id.xy < vec2u(through.side))) {
+            add_up(id.xy);
+        }
         return;
     }
-    let other = textureLoad(opposite, id.xy, 0);
-    let shape = bitcast<vec3f>(other.yzw);
-    if (shape.x < 0.0) {
-        textureStore(transmitted, id.xy, vec4f(0.0)); // no surface
-        return;
+    let index = id.y * ROW + id.x;
+    if (id.x < ROW && index < through.sources) {
+        gather(index);
     }
-    let at = vec2u((vec2f(id.xy) + 0.5) * vec2f(textureDimensions(levels)) / vec2f(side));
-    var sum = vec3f(0.0);
-    // From wide to narrow, to stop where the rest is too narrow: that costs nothing where it is thick.
-    for (var k = through.count; k > 0u && shape.x < THICK * through.gaussian[k - 1u].w; k--) {
-        let gaussian = through.gaussian[k - 1u];
-        let layer = through.first + k - 1u;
-        let scaled = shape / gaussian.w;
-        let there = level_at(unpack2x16unorm(other.x), layer);
-        sum += gaussian.rgb * passes(textureLoad(levels, at, layer, 0).rgb, there, scaled.x, scaled.yz);
-    }
-    textureStore(transmitted, id.xy, vec4f(sum, 1.0));
 }
