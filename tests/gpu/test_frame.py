@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import weakref
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from dermis.errors import DermisError
 from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture
-from dermis.gpu.device import _POOLED_UNIFORMS, gpu_failures
+from dermis.gpu.device import gpu_failures
 from dermis.gpu.probe import half_store_rounding
 from dermis.gpu.textures import texture_from
+from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
 
 SIZE = (37, 21)  # no multiple of a tile
 
@@ -61,23 +64,76 @@ def test_an_empty_frame_takes_no_time(device: Device) -> None:
     assert sum((frame.stage_ms() or {}).values()) == 0
 
 
-def test_equal_uniforms_are_one_buffer(device: Device, scale: ComputeProgram) -> None:
-    records = [scale.record("Factor", value=value) for value in (1.25, 1.25, 1.5)]
-    first, same, other = (device.uniform(record) for record in records)
-    assert first is same and first is not other
+def record_of(scale: ComputeProgram, value: float) -> Any:
+    return scale.record("Factor", value=value)
 
 
-def test_the_uniform_pool_stays_bounded(device: Device, scale: ComputeProgram) -> None:
-    kept = device.uniform(scale.record("Factor", value=-1))
-    for value in range(_POOLED_UNIFORMS + 50):
-        device.uniform(scale.record("Factor", value=value))
-        assert device.uniform(scale.record("Factor", value=-1)) is kept  # used again and again: it stays
-    assert len(device._uniforms) == _POOLED_UNIFORMS
+def test_equal_uniforms_share_a_place(device: Device, scale: ComputeProgram) -> None:
+    uniforms = Uniforms(device)
+    first, same, other = (uniforms.place(record_of(scale, value)) for value in (1.25, 1.25, 1.5))
+    assert first == same and first != other
+
+
+def test_one_frame_may_have_more_uniforms_than_a_buffer_holds(device: Device, scale: ComputeProgram) -> None:
+    count = CHUNK_BYTES // 256 + 3
+    image = texture_from(device, np.ones((1, 1), np.float32), "r32float")
+    frame, made = Frame(device), [make_texture(device, (1, 1), "r32float") for _ in range(count)]
+    for value, into in enumerate(made):
+        frame.compute(
+            "scale", scale, {"factor": record_of(scale, value), "image": image, "scaled": into}, (1, 1)
+        )
+    frame.submit()
+    for value in (0, 1, count - 4, count - 3, count - 1):
+        assert download(device, made[value])[0, 0] == value
+
+
+def test_frames_in_flight_keep_their_uniforms(device: Device, scale: ComputeProgram) -> None:
+    """All frames write to one buffer; each must read its own numbers, whichever was recorded first."""
+    image = texture_from(device, np.ones((64, 64), np.float32), "r32float")
+    made = [make_texture(device, (64, 64), "r32float") for _ in range(20)]
+    frames = [Frame(device, timed=False) for _ in made]
+    for value, (frame, into) in enumerate(zip(frames, made, strict=True)):
+        bound = {"factor": record_of(scale, value), "image": image, "scaled": into}
+        frame.compute("scale", scale, bound, (64, 64))
+    for frame in frames:
+        frame.submit()
+    assert [float(download(device, into).min()) for into in made] == list(range(20))
+
+
+def test_bind_groups_are_kept(device: Device, scale: ComputeProgram) -> None:
+    image, into = (make_texture(device, SIZE, "r32float") for _ in range(2))
+    bound = [{"factor": record_of(scale, value), "image": image, "scaled": into} for value in (1, 2)]
+    uniforms = Uniforms(device)
+    (first, _), (second, _) = (scale.bind_groups(one, uniforms)[0] for one in bound)
+    assert first is second  # other numbers, the same group
+
+
+def test_bind_groups_go_with_what_they_bind(device: Device) -> None:
+    """A group that stayed would hold on to the memory of textures that nobody uses any more."""
+    program = ComputeProgram(device, Path(__file__).parent / "scale.wgsl")
+    uniforms, image = Uniforms(device), make_texture(device, SIZE, "r32float")
+    for _ in range(3):
+        into = make_texture(device, SIZE, "r32float")
+        bound = {"factor": record_of(program, 1), "image": image, "scaled": into}
+        (group, _), *_ = program.bind_groups(bound, uniforms)
+        assert len(program.kept_groups) == 1
+        gone = weakref.ref(group)
+        del group, into, bound
+        assert len(program.kept_groups) == 0 and gone() is None
+    assert program.kept_groups.followed <= 2  # the image and the uniforms
 
 
 def test_a_forgotten_resource_is_named(device: Device, scale: ComputeProgram) -> None:
     with pytest.raises(KeyError, match=r"scale\.wgsl declares 'image'"):
-        scale.bind_groups({"factor": scale.record("Factor", value=1)})
+        scale.bind_groups({"factor": record_of(scale, 1)}, Uniforms(device))
+
+
+def test_untimed_frames_tell_no_times(device: Device, scale: ComputeProgram) -> None:
+    frame = Frame(device, timed=False)
+    image, into = (make_texture(device, SIZE, "r32float") for _ in range(2))
+    frame.compute("one", scale, {"factor": record_of(scale, 2), "image": image, "scaled": into}, SIZE)
+    frame.submit()
+    assert frame.stage_ms() is None
 
 
 def test_what_the_driver_says_becomes_our_error(device: Device) -> None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dermis.errors import refuse
+from dermis.gpu.native_types import tell_wgpus_types
 
 # None is needed to render; timestamps give stage times, the others tell what more an adapter could do.
 WANTED_FEATURES = ("float32-filterable", "timestamp-query", "shader-f16")
@@ -47,6 +48,7 @@ def list_adapters() -> list[Adapter]:
         import wgpu
     except (ImportError, OSError) as error:
         refuse("wgpu", "its native library to load", f"it does not: {error}", "Install the package again")
+    tell_wgpus_types()
     try:
         with _quiet_drivers():
             found = [_describe(handle) for handle in wgpu.gpu.enumerate_adapters_sync()]

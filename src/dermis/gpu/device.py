@@ -1,9 +1,8 @@
-"""An opened adapter, with what every pass needs: limits, the uniform pool, the sampler."""
+"""An opened adapter, with what every pass needs: limits, uniform buffers, samplers."""
 
 from __future__ import annotations
 
 import contextlib
-from collections import OrderedDict
 from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
@@ -13,9 +12,10 @@ from numpy.typing import NDArray
 
 from dermis.errors import DermisError
 from dermis.gpu.adapters import Adapter, fitting_adapters
+from dermis.gpu.uniforms import CHUNK_BYTES
 
-_POOLED_UNIFORMS = 512
 _TIMED_PASSES = 2048
+_STAGING_STEP = 4096
 _RAISED_LIMITS = ("max-texture-dimension-2d", "max-storage-buffer-binding-size", "max-buffer-size")
 
 
@@ -50,14 +50,27 @@ class Device:
         self.max_texture_size, self.max_storage_bytes = (int(limits[name]) for name in _RAISED_LIMITS[:2])
         self.has_timestamps = "timestamp-query" in adapter.features
         self._timestamps: tuple[Any, Any] | None = None
-        self._uniforms: OrderedDict[bytes, Any] = OrderedDict()
-        self._fence = self.buffer(np.zeros(1, np.uint32), "UNIFORM")
+        self._uniform_chunks: list[Any] = []
+        self._staging: dict[int, list[Any]] = {}
+        self.fetching: set[Any] = set()
         self._samplers: dict[tuple[tuple[str, str], ...], Any] = {}
 
-    def wait(self) -> None:
-        """Return when the device has done all that was submitted."""
-        # wgpu 0.32's own wait for submitted work raises TypeError; a read waits for all that came before it.
-        self.handle.queue.read_buffer(self._fence)
+    def submit(self, commands: Any) -> int:
+        """Hand a command buffer over; returns its number, to wait for."""
+        from wgpu.backends.wgpu_native import ffi
+        from wgpu.backends.wgpu_native._api import libf
+
+        # wgpu's own submit does not tell the number, without which there is only waiting for everything.
+        listed = ffi.new("WGPUCommandBuffer[]", [commands._internal])
+        return int(libf.wgpuQueueSubmitForIndex(self.handle.queue._internal, 1, listed))
+
+    def wait(self, submitted: int | None = None) -> None:
+        """Return when the device has done what was submitted up to a number from `submit`, or all."""
+        from wgpu.backends.wgpu_native import ffi
+        from wgpu.backends.wgpu_native._api import libf
+
+        number = ffi.NULL if submitted is None else ffi.new("WGPUSubmissionIndex *", submitted)
+        libf.wgpuDevicePoll(self.handle._internal, True, number)
 
     @cached_property
     def timestamp_period_ns(self) -> float:
@@ -66,16 +79,30 @@ class Device:
 
         return float(lib.wgpuQueueGetTimestampPeriod(self.handle.queue._internal))
 
-    def uniform(self, record: NDArray[Any]) -> Any:
-        """A uniform buffer that holds `record`; the same bytes give the same buffer."""
-        key = record.tobytes()
-        found = self._uniforms.pop(key, None)
-        if found is None:
-            found = self.buffer(record, "UNIFORM")
-            while len(self._uniforms) >= _POOLED_UNIFORMS:
-                self._uniforms.popitem(last=False)
-        self._uniforms[key] = found
-        return found
+    def uniform_chunk(self, index: int) -> Any:
+        """One of the buffers for the records of frames; made when first asked for."""
+        while len(self._uniform_chunks) <= index:
+            self._uniform_chunks.append(self.uniform_buffer(CHUNK_BYTES))
+        return self._uniform_chunks[index]
+
+    def uniform_buffer(self, size: int) -> Any:
+        """A new buffer for records [byte]."""
+        return self.buffer(np.zeros(size, np.uint8), "UNIFORM")
+
+    def staging(self, size: int) -> Any:
+        """A buffer of at least `size` bytes that the CPU can read, one given back if there is any."""
+        import wgpu
+
+        size = -(-size // _STAGING_STEP) * _STAGING_STEP
+        spare = self._staging.get(size)
+        usage = wgpu.BufferUsage.COPY_DST | wgpu.BufferUsage.MAP_READ
+        return spare.pop() if spare else self.handle.create_buffer(size=size, usage=usage)
+
+    def give_back(self, buffer: Any) -> None:
+        """Keep a buffer from `staging` for the next one of its size; those of other sizes go."""
+        if buffer.size not in self._staging:
+            self._staging.clear()
+        self._staging.setdefault(buffer.size, []).append(buffer)
 
     def buffer(self, data: NDArray[Any], usage: str) -> Any:
         """A new buffer with the array's bytes; usage is wgpu's name ("STORAGE", "UNIFORM")."""

@@ -3,25 +3,40 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from typing import Any
 
+from dermis.gpu.compute_pass import ComputePass
 from dermis.gpu.device import Device
 from dermis.gpu.program import ComputeProgram, RasterProgram, Resources
+from dermis.gpu.readback import Fetched
 from dermis.gpu.timing import Timestamps, WallClock
+from dermis.gpu.uniforms import Uniforms
+
+Step = tuple[str, Any, list[tuple[Any, list[int]]], tuple[int, int, int]]
+"""A dispatch: its stage, its pipeline, bind groups with offsets of their uniforms, and workgroups."""
 
 
 class Frame:
     """Records passes, submits them together, then knows how long each stage took.
 
     On software adapters each stage is submitted and waited for by itself, to time it.
+
+    timed : False leaves the stages' times out; dispatches then share passes across stages
+    submitted : number of the last submit, for `Device.wait`
     """
 
-    def __init__(self, device: Device) -> None:
+    def __init__(self, device: Device, *, timed: bool = True) -> None:
         self.device = device
         self._encoder = device.handle.create_command_encoder()
+        self._uniforms = Uniforms(device)
+        self._fetched: list[Fetched] = []
+        self.submitted = 0
         self._stage = ""
-        self._wall = WallClock() if device.adapter.kind == "CPU" else None
-        self._stamps = Timestamps(device) if device.has_timestamps and not self._wall else None
+        self._pass: ComputePass | None = None
+        software = device.adapter.kind == "CPU"
+        self._wall = WallClock() if software and timed else None
+        self._stamps = Timestamps(device) if device.has_timestamps and timed and not software else None
 
     def compute(
         self, stage: str, program: ComputeProgram, resources: Resources, size: tuple[int, int], tile: int = 8
@@ -33,26 +48,39 @@ class Frame:
         self, stage: str, program: ComputeProgram, resources: Resources, groups: tuple[int, int, int]
     ) -> None:
         """Run `program` for a number of workgroups along each axis."""
-        stamps = self._begin(stage)
-        one = self._encoder.begin_compute_pass(label=stage, timestamp_writes=stamps)
-        one.set_pipeline(program.pipeline)
-        for index, group in enumerate(program.bind_groups(resources)):
-            one.set_bind_group(index, group)
-        one.dispatch_workgroups(*groups)
-        one.end()
+        self.repeat([(stage, program.pipeline, program.bind_groups(resources, self._uniforms), groups)])
+
+    def repeat(self, steps: Iterable[Step]) -> None:
+        """Run dispatches whose bind groups are known."""
+        for stage, pipeline, bound, groups in steps:
+            one = self._compute_pass(stage)
+            one.set_pipeline(pipeline)
+            for index, (group, offsets) in enumerate(bound):
+                one.set_bind_group(index, group, offsets)
+            one.dispatch(groups)
 
     def clear(self, buffer: Any) -> None:
         """Fill a buffer with zeros."""
+        self._end_pass()
         self._encoder.clear_buffer(buffer, 0, buffer.size)
 
     def copy(self, buffer: Any, texture: Any, *, pitch: int, layers: int) -> None:
         """Copy rows of `pitch` 4-byte pixels, layer after layer, from a buffer into a texture."""
         width, height = texture.size[:2]
+        self._end_pass()
         self._encoder.copy_buffer_to_texture(
             {"buffer": buffer, "offset": 0, "bytes_per_row": 4 * pitch, "rows_per_image": height},
             {"texture": texture, "mip_level": 0, "origin": (0, 0, 0)},
             (width, height, layers),
         )
+
+    def fetch(self, buffer: Any) -> Fetched:
+        """The bytes of a buffer as the passes so far leave them, on their way from the device."""
+        self._end_pass()
+        fetched = Fetched(self.device, buffer.size)
+        self._encoder.copy_buffer_to_buffer(buffer, 0, fetched.buffer, 0, buffer.size)
+        self._fetched.append(fetched)
+        return fetched
 
     def draw(
         self,
@@ -72,6 +100,7 @@ class Frame:
         far : the depth that the attachment starts at
         """
         colour = [{"view": target, "load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 0)}]
+        self._end_pass()
         stamps = self._begin(stage)
         one = self._encoder.begin_render_pass(
             label=stage,
@@ -85,13 +114,14 @@ class Frame:
             timestamp_writes=stamps,
         )
         one.set_pipeline(program.pipeline)
-        for index, group in enumerate(program.bind_groups(resources)):
-            one.set_bind_group(index, group)
+        for index, (group, offsets) in enumerate(program.bind_groups(resources, self._uniforms)):
+            one.set_bind_group(index, group, offsets)
         one.draw(vertices, 1, 0, layer)
         one.end()
 
     def submit(self) -> None:
         """Hand the passes to the device."""
+        self._end_pass()
         if self._wall and self._stage:
             self._finish_stage(self._wall)
         elif self._stamps:
@@ -101,13 +131,27 @@ class Frame:
             self._flush()
 
     def wait(self) -> None:
-        """Return when the device has done all that was submitted."""
-        self.device.wait()
+        """Return when the device has done what was submitted."""
+        self.device.wait(self.submitted)
 
     def stage_ms(self) -> dict[str, float] | None:
         """Time of each stage after `submit` [ms], with "total"; None when the device cannot tell."""
         clock = self._wall or self._stamps
         return clock.stage_ms() if clock else None
+
+    def _compute_pass(self, stage: str) -> ComputePass:
+        """The open pass, or a new one where a stage begins whose time is taken."""
+        if self._pass and stage != self._stage and (self._wall or self._stamps):
+            self._end_pass()
+        if not self._pass:
+            stamps = self._begin(stage)
+            self._pass = ComputePass(self._encoder, stage, stamps)
+        return self._pass
+
+    def _end_pass(self) -> None:
+        if self._pass:
+            self._pass.end()
+        self._pass = None
 
     def _begin(self, stage: str) -> dict[str, Any] | None:
         """Enter a stage; returns what its pass writes as timestamps."""
@@ -123,5 +167,9 @@ class Frame:
         wall.measure(self._stage, started)
 
     def _flush(self) -> None:
-        self.device.handle.queue.submit([self._encoder.finish()])
+        self._uniforms.upload()
+        self.submitted = self.device.submit(self._encoder.finish())
+        for one in self._fetched:
+            one.begin(self.submitted)
+        self._fetched.clear()
         self._encoder = self.device.handle.create_command_encoder()

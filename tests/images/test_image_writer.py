@@ -1,0 +1,61 @@
+"""Pictures written by threads are the pictures, and what goes wrong is told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dermis.errors import DermisError
+from dermis.images import writer as writing
+from dermis.images.codecs import decode_with_pillow, encode_png8
+from dermis.images.io import read_image
+from dermis.images.writer import ImageWriter
+
+
+@pytest.mark.parametrize("shape", [(1, 1, 3), (1, 9, 1), (13, 7, 3), (40, 61, 4)])
+@pytest.mark.parametrize("effort", [1, 6])
+def test_png_keeps_every_byte(shape: tuple[int, int, int], effort: int) -> None:
+    levels = np.random.default_rng(1).integers(0, 256, shape).astype(np.uint8)
+    decoded = decode_with_pillow(encode_png8(levels, effort))
+    assert np.array_equal(decoded.reshape(shape), levels)
+
+
+def test_smooth_pictures_become_small() -> None:
+    ramp = np.linspace(0, 255, 256).astype(np.uint8)
+    assert len(encode_png8(np.broadcast_to(ramp[:, None, None], (256, 256, 3)).copy())) < 3000
+
+
+def test_many_pictures_are_all_written(tmp_path: Path) -> None:
+    pictures = [np.full((20, 30, 3), k, np.uint8) for k in range(40)]
+    with ImageWriter(threads=2) as writer:
+        for k, picture in enumerate(pictures):
+            writer.write(tmp_path / f"{k:02}.png", picture)
+        writer.write(tmp_path / "linear.exr", pictures[1].astype(np.float32) / 7)
+    for k, picture in enumerate(pictures):
+        assert np.array_equal(read_image(tmp_path / f"{k:02}.png"), picture)
+    assert np.array_equal(read_image(tmp_path / "linear.exr"), pictures[1].astype(np.float32) / 7)
+    assert len(list(tmp_path.iterdir())) == 41  # and nothing half-written
+
+
+def test_what_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    picture = np.zeros((2, 2, 3), np.uint8)
+    with ImageWriter(threads=1) as writer:
+        with pytest.raises(DermisError, match=r"\.jpg: expected"):
+            writer.write(tmp_path / "a.jpg", picture)
+        with pytest.raises(DermisError, match="uint8"):
+            writer.write(tmp_path / "a.png", picture.astype(np.float32))
+
+    def full(path: Path, levels: object) -> None:
+        raise DermisError("no space")
+
+    monkeypatch.setattr(writing, "_write_png", full)
+    with pytest.raises(DermisError, match="no space"), ImageWriter(threads=1) as writer:
+        writer.write(tmp_path / "a.png", picture)
+
+
+def test_an_error_of_the_caller_is_not_hidden(tmp_path: Path) -> None:
+    with pytest.raises(ZeroDivisionError), ImageWriter(threads=1) as writer:
+        writer.write(tmp_path / "a.png", np.zeros((2, 2, 3), np.uint8))
+        raise ZeroDivisionError
