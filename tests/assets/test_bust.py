@@ -118,5 +118,7 @@ def test_odd_sizes_are_refused(size: int) -> None:
 def test_impossible_shapes_and_looks_are_refused() -> None:
     with pytest.raises(DermisError, match="nose"):
         BustParameters(nose=3.0)
+    with pytest.raises(DermisError, match="seed: expected a whole number"):
+        BustParameters(seed=0.5)  # type: ignore[arg-type]
     with pytest.raises(DermisError, match="melanin"):
         SkinLook(melanin=2.0)

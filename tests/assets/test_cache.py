@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from dermis.assets import cache
 from dermis.assets.atlas import Atlas
-from dermis.assets.cache import cached_atlas
+from dermis.assets.cache import cached_array, cached_atlas, cached_mesh, cached_mips
 from dermis.assets.mesh import Mesh
 from dermis.assets.primitives import plane, uv_sphere
 
@@ -144,3 +145,43 @@ def test_the_longest_unused_are_forgotten(folder: Path, monkeypatch: pytest.Monk
     cached_atlas(plane(12.0), 64)
     left = set(folder.iterdir())
     assert first in left and second not in left and len(left) == 2
+
+
+def test_mips_and_arrays_come_back_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    source = np.random.default_rng(1).random((6, 9)).astype(np.float32)
+    chain = [source, source[:3, :4], source[:1, :2], source[:1, :1]]
+    made: list[str] = []
+
+    def note(what: str, result: Any) -> Any:
+        made.append(what)
+        return result
+
+    for _ in range(2):
+        levels = cached_mips(source, "a", lambda: note("mips", chain))
+        assert all(np.array_equal(one, other) for one, other in zip(levels, chain, strict=True))
+        assert np.array_equal(cached_array(source, "a", lambda: note("picture", 2 * source)), 2 * source)
+    assert made == ["mips", "picture"]
+    for other, form in ((source, "b"), (source + 1, "a"), (source.reshape(9, 6), "a")):
+        assert np.array_equal(cached_array(other, form, lambda: note("again", source)), source)
+    assert made[2:] == ["again"] * 3
+
+
+def test_a_mesh_comes_back_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    mesh, made = uv_sphere(20.0), []
+
+    def load() -> Mesh:
+        made.append(1)
+        return mesh
+
+    first, second = (cached_mesh(b"file", "up y", load) for _ in range(2))
+    for one in (first, second):
+        assert one.materials == mesh.materials
+        for name in ("positions", "normals", "uv", "dpdu", "dpdv", "point", "triangles", "material"):
+            kept, given = getattr(one, name), getattr(mesh, name)
+            assert kept.dtype == given.dtype and np.array_equal(kept, given)
+    assert len(made) == 1
+    cached_mesh(b"file", "up z", load)
+    cached_mesh(b"another", "up y", load)
+    assert len(made) == 3

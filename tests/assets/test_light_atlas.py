@@ -6,16 +6,6 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from atlas_reading import lit_at, random_points, read, shown
-from cut_meshes import (
-    CYLINDER_LAYS,
-    SPHERE_LAYS,
-    Lay,
-    cut_cone,
-    cut_cylinder,
-    cut_sphere,
-    folded_sheet,
-)
 from numpy.typing import NDArray
 
 from dermis.assets.atlas import Atlas, build_atlas
@@ -27,6 +17,16 @@ from dermis.assets.primitives import plane
 from dermis.assets.unwrap.charts import grow
 from dermis.assets.unwrap.layout import unwrap
 from dermis.assets.uv import charts
+from dermis.reference.atlas_reading import lit_at, random_points, read, shown
+from dermis.reference.cut_meshes import (
+    CYLINDER_LAYS,
+    SPHERE_LAYS,
+    Lay,
+    cut_cone,
+    cut_cylinder,
+    cut_sphere,
+    folded_sheet,
+)
 
 Floats = NDArray[np.float64]
 

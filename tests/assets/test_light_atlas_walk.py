@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from cut_meshes import cut_cone, cut_cylinder, cut_sphere
 from numpy.typing import NDArray
 
 from dermis.assets.geometry import build_mesh
@@ -12,6 +11,7 @@ from dermis.assets.light_atlas.pieces import find_pieces
 from dermis.assets.light_atlas.slits import cut_slits, find_conflicts
 from dermis.assets.light_atlas.surface import Surface, survey
 from dermis.assets.mesh import Mesh
+from dermis.reference.cut_meshes import cut_cone, cut_cylinder, cut_sphere
 
 Floats = NDArray[np.float64]
 RADIUS, HEIGHT, CELLS = 30.0, 80.0, 12

@@ -65,7 +65,7 @@ def test_parts_of_a_rectangle_are_the_whole(size: tuple[float, float]) -> None:
 def entered(renderer: Renderer, head: Any, light: Light) -> tuple[Floats, Floats]:
     """Irradiance of each texel, and their places."""
     inputs = run_frame(renderer, scene_of(head, light, rho_s=0.0, mix=0.0), atlas=64)
-    made = download(renderer.device, inputs.levels.stack, layer=0)[..., :3].astype(float)
+    made = download(renderer.device, inputs.levels.entered)[..., :3].astype(float)
     return made, surface(cached_atlas(head.mesh, 64), head)[0]
 
 

@@ -97,7 +97,7 @@ def test_what_enters_is_the_sum_over_all_directions(renderer: Renderer, room: st
     )
     inputs = run_frame(renderer, scene, occlusion="none", shadow_size=1024)
     assert inputs.suns == 1
-    entered = download(renderer.device, inputs.levels.stack, layer=0)[..., :3].astype(float)
+    entered = download(renderer.device, inputs.levels.entered)[..., :3].astype(float)
     atlas = cached_atlas(BALL, 64)
     _, normals = surface(atlas, scene.head)
     radiance = 2.0 * np.asarray(_read(room))

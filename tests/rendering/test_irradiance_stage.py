@@ -36,7 +36,7 @@ LIGHTS: dict[str, AnyLight] = {
 def entered(renderer: Renderer, scene: Scene) -> NDArray[np.float64]:
     """Layer 0 of the levels: what the irradiance stage wrote."""
     inputs = run_frame(renderer, scene, atlas=SIZE)
-    return download(renderer.device, inputs.levels.stack, layer=0).astype(float)
+    return download(renderer.device, inputs.levels.entered).astype(float)
 
 
 @pytest.mark.parametrize("rho_s", [0.0, 0.18, 1.0])

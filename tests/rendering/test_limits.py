@@ -9,15 +9,16 @@ import pytest
 
 from dermis.gpu.layout import bindings, struct_dtype
 from dermis.gpu.wgsl_source import compose
-from dermis.rendering.stages import SHARED_SHADERS, STAGES
+from dermis.rendering.stages import SHARED_SHADERS, SOURCE_SHADERS, STAGES, STORE_SHADERS
 
 TOOLKIT = Path(SHARED_SHADERS).parent.parent / "gpu" / "wgsl"
+FOLDERS = (SHARED_SHADERS, TOOLKIT, SOURCE_SHADERS["rgba16float"], STORE_SHADERS["rgba16float"])
 MOST = {"texture": 16, "sampler": 16, "storage_texture": 4, "storage": 8, "uniform": 12}
 
 
 @pytest.mark.parametrize("path", sorted(STAGES.glob("*.wgsl")), ids=lambda path: path.stem)
 def test_bindings_fit_any_device(path: Path) -> None:
-    found = bindings(compose(path, (SHARED_SHADERS, TOOLKIT)).text)
+    found = bindings(compose(path, FOLDERS).text)
     assert found
     kinds = Counter(_kind(binding.entry) for binding in found)
     assert not {kind: count for kind, count in kinds.items() if count > MOST[kind]}

@@ -49,7 +49,7 @@ def baked(renderer: Renderer, head: Head, side: int = SIDE, **options: Any) -> N
     """Rows of the bake: the atlas and the vertices."""
     inputs = renderer.prepare(scene_of(head), settings_of(atlas=side))
     stage = Occlusion(renderer.device, **options)
-    return stage.bake(head.mesh, inputs.head, inputs.lit, inputs.atlas.resources["atlas"], side)
+    return stage.bake(head.mesh, inputs.head, inputs.lit, inputs.layouts[0].atlas.resources["atlas"], side)
 
 
 def test_directions_share_the_sphere() -> None:

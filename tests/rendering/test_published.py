@@ -24,7 +24,7 @@ def levels(device: Device, stages: Stages) -> list[np.ndarray]:
     light = np.zeros((SIZE, SIZE, 4))
     light[..., 3] = 1.0
     light[SIZE // 2, SIZE // 2, :3] = 1000.0
-    upload(device, space.views[0], light)
+    upload(device, space.entered, light)
     frame = Frame(device)
     stages.published.draw(frame, space, upload_atlas(device, atlas), VARIANCES)
     frame.submit()

@@ -30,7 +30,7 @@ def relief(renderer: Renderer, head: Head, *, texels: float = 1.0, roughness: fl
         (SIZE, SIZE),
         ["relief", "arriving"],
         **inputs.lit,
-        atlas=inputs.atlas.resources["atlas"],
+        atlas=inputs.layouts[0].atlas.resources["atlas"],
         footprint={"side": texels / SIZE},
     )
     return made[..., :3], made[..., 3]

@@ -15,6 +15,7 @@ from dermis.assets.geometry import build_mesh
 from dermis.assets.head import Head
 from dermis.assets.primitives import SKIN, plane, uv_sphere
 from dermis.errors import DermisError
+from dermis.gpu import download
 from dermis.rendering.renderer import Renderer, render
 from dermis.rendering.seams import REMEDIES
 from dermis.scene.lights import DirectionalLight
@@ -163,6 +164,41 @@ def test_any_size_and_samples(renderer: Renderer, size: tuple[int, int], samples
     assert linear.shape == (size[1], size[0], 3) and linear.dtype == np.float32
     assert encoded.shape == linear.shape and encoded.dtype == np.uint8
     assert np.isfinite(linear).all() and linear.max() > 0.01
+
+
+@pytest.mark.parametrize("size", [(1, 1), (3, 1), (13, 7), (64, 40)])
+def test_bytes_arrive_as_they_were_made(renderer: Renderer, size: tuple[int, int]) -> None:
+    rendered = renderer.draw(scene(), settings_of(size=size))
+    assert np.array_equal(rendered.srgb8(), download(renderer.device, rendered.picture.bytes)[..., :3])
+
+
+def moving(count: int) -> list[Scene]:
+    """Scenes whose light and camera move."""
+    lights = [DirectionalLight(direction=(1, -0.4, -1 - k), irradiance=(2.0, 1.5, 1.0)) for k in range(count)]
+    camera = [front_camera(BALL, frame_mm=70.0 + 5 * k) for k in range(count)]
+    return [scene_of(BALL, light, camera=one) for light, one in zip(lights, camera, strict=True)]
+
+
+def test_many_images_are_the_images_one_by_one(renderer: Renderer) -> None:
+    scenes = moving(7)
+    one_by_one = [renderer.draw(one, settings_of()).srgb8() for one in scenes]
+    many = list(renderer.render_many(iter(scenes), **settings_of().model_dump()))
+    assert [image.tobytes() for image in many] == [image.tobytes() for image in one_by_one]
+    assert len({image.tobytes() for image in many}) == 7
+
+
+def test_who_asks_for_many_images_may_stop(renderer: Renderer) -> None:
+    """Bytes that nobody fetches harm nobody, and other frames may come in between."""
+    scenes, chosen = moving(5), settings_of()
+    expected = [renderer.draw(one, chosen).srgb8().tobytes() for one in scenes]
+    for _ in range(3):
+        images = renderer.render_many(scenes, **chosen.model_dump())
+        assert next(images).tobytes() == expected[0]
+        assert renderer.draw(scenes[4], chosen).srgb8().tobytes() == expected[4]
+        assert next(images).tobytes() == expected[1]
+        images.close()
+    renderer.device.wait()
+    assert not renderer.device.fetching
 
 
 def test_the_image_does_not_depend_on_its_width(renderer: Renderer) -> None:

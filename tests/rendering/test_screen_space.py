@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -71,19 +72,28 @@ def twin_side(
     pixel = float(
         depth[here] * (2 * view.half[0] / view.size[0] if step[1] else 2 * view.half[1] / view.size[1])
     )
-    total, share, at, tap, before = np.zeros(3), np.zeros(3), 0.0, light[here], 0
+    taps, before = [(here, 0.0, 0.5 * pixel)], 0  # pixel, distance, half the way from the tap before
     for k in range(1, TAPS + 1):
         n = max(k, round(REACH / pixel * (k / TAPS) ** 2))
         y, x = here[0] + n * step[0], here[1] + n * step[1]
         if not (0 <= y < depth.shape[0] and 0 <= x < depth.shape[1]):
             break
         away = float(np.linalg.norm(places[here] - places[y, x]))
-        if depth[y, x] > 0 and away > at:
-            within = share_within(max(0.5 * (at + away), away - 0.5 * STEEPEST * pixel * (n - before)))
-            total += (within - share) * tap
-            tap, at, share = light[y, x], away, within
+        taps.append(((y, x), away, 0.5 * pixel * (n - before)))
         before = n
-    return np.asarray(total + (0.5 - share) * tap)
+    near, far = [0.0], []  # what each tap stands for
+    for (one, at, _), (other, away, half) in pairwise(taps):
+        joined = min(depth[one], depth[other]) > 0 and at < away <= at + 2 * STEEPEST * half
+        far.append(0.5 * (at + away) if joined else at + half)
+        near.append(0.5 * (at + away) if joined else max(away - half, 0.0))
+    far.append(taps[-1][1] + taps[-1][2])
+    shares = [
+        (share_within(b) - share_within(a)) * (depth[pixel] > 0)
+        for (pixel, *_), a, b in zip(taps, near, far, strict=True)
+    ]
+    total = np.sum(shares, axis=0)
+    seen = np.sum([share * light[tap[0]] for share, tap in zip(shares, taps, strict=True)], axis=0)
+    return np.asarray(seen * np.minimum(0.5 / total, 1.0) + np.maximum(0.5 - total, 0.0) * light[here])
 
 
 def twin(view: View, light: Floats, depth: Floats) -> Floats:
@@ -221,6 +231,20 @@ def test_light_stays_on_its_own_surface(device: Device, stages: Stages, gap_mm: 
     made = spread(device, stages, view, light, depth)[32]
     assert made[32:].max() <= leak + 1e-6
     assert (1 - made[:32]).max() <= leak + 1e-6
+
+
+@pytest.mark.parametrize("gap_mm", [2.0, 90.0])
+def test_light_passes_a_slit(device: Device, stages: Stages, gap_mm: float) -> None:
+    """A pixel that shows something dark behind takes no light from the skin on its sides."""
+    side, middle = 64, 32
+    view = View.over(side * 0.1, 500.0, side)
+    x = np.broadcast_to(np.arange(side), (side, side))
+    light = np.repeat((x > middle).astype(float)[..., None], 3, axis=2)
+    whole, slit = np.full((side, side), 500.0), np.where(x == middle, 500.0 + gap_mm, 500.0)
+    closed, open_ = (spread(device, stages, view, light, depth)[middle] for depth in (whole, slit))
+    dark = slice(middle - 8, middle)
+    assert closed[dark, 0].min() > 0.1
+    assert np.abs(open_ - closed)[dark].max() < 0.01
 
 
 def test_other_materials_neither_give_nor_take(device: Device, stages: Stages) -> None:

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from setups import front_camera, frontal, head_of, joined, run_frame, scene_of
+from setups import front_camera, frontal, head_of, joined, place, run_frame, scene_of
 from tolerances import TWIN
 
 from dermis.assets.primitives import plane, uv_sphere
 from dermis.gpu import download
 from dermis.rendering.renderer import Renderer
-from dermis.scene import DirectionalLight, Scene
+from dermis.scene import DirectionalLight, Scene, StripeLight
 
 Floats = NDArray[np.float64]
 BALL = head_of(uv_sphere(30.0, 48, 24))
@@ -95,3 +95,18 @@ def test_a_lit_plate_before_a_shaded_wall(renderer: Renderer) -> None:
     assert dry[row, 8:24, 0].min() > 0.1 and dry[row, shaded, :3].max() < 1e-3
     assert spread[row, shaded, :3].max() < 1e-3
     assert np.abs(spread - dry)[row, 8:24, :3].max() < 0.01 * dry.max()
+
+
+def test_a_step_within_a_pixel(renderer: Renderer) -> None:
+    """A step of a millimetre in skin that glows from a stripe of light beside it is no dark line."""
+    mesh = joined((plane(40.0), (-20, 0, 1), (0, 0, 0.5)), (plane(200.0), (0, 0, 0), (0.5, 0.5, 0.5)))
+    head = head_of(mesh)
+    beside = place(head, (-3, 0, 1))
+    stripe = StripeLight(direction=(0, 0, -1), position=beside, width_mm=3.0, irradiance=(90.0,) * 3)
+    camera = front_camera(head, (0.02, 0, 1), frame_mm=10.0)
+    scene = scene_of(head, stripe, camera=camera, specular="none", energy="none")
+    dry, spread = (
+        image(renderer, scene, technique, samples=4)[32, :, 0] for technique in ("none", "screen-space")
+    )
+    assert dry[31] < 1e-3 * dry.max()
+    assert spread[31] > 0.95 * 0.5 * (spread[30] + spread[32])

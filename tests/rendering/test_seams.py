@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from atlas_reading import lit_at, seam_points
-from cut_meshes import cut_sphere
 from numpy.typing import NDArray
 from setups import head_of, place, run_frame, scene_of
 from tolerances import SEAM
 
 from dermis.assets.cache import cached_atlas
 from dermis.gpu import download
+from dermis.reference.atlas_reading import lit_at, seam_points
+from dermis.reference.cut_meshes import cut_sphere
 from dermis.rendering.renderer import Renderer
 from dermis.rendering.seams import REMEDIES
 from dermis.scene.lights import DirectionalLight, StripeLight
@@ -62,11 +62,13 @@ def test_remedies_leave_seams(renderer: Renderer, seams: str) -> None:
     assert np.percentile(jumps(renderer, seams), 90) > 3 * SEAM
 
 
-def test_black_bleeds_in_without_a_remedy(renderer: Renderer) -> None:
+@pytest.mark.parametrize("technique", ["texture-space", "published"])
+def test_black_bleeds_in_without_a_remedy(renderer: Renderer, technique: str) -> None:
     """The darkest light at the seams, by remedy: each of them is lighter than none."""
     darkest = {}
     for seams in ("none", "clear-colour", "stretch-map", "alpha"):
-        inputs = run_frame(renderer, striped(), atlas=SIZE, seams=seams, transmission="none")
+        chosen = {"atlas": SIZE, "seams": seams, "technique": technique, "transmission": "none"}
+        inputs = run_frame(renderer, striped(), **chosen)
         light = download(renderer.device, inputs.scattered).astype(float)[..., :3]
         one, _ = seam_points(BALL)
         facing = one.on(BALL.normals[BALL.triangles])[:, 2] > 0.4

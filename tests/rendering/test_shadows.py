@@ -32,7 +32,7 @@ def seen(renderer: Renderer, head: Head, light: AnyLight, **settings: Any) -> tu
         (size, size),
         ["relief", "arriving"],
         **inputs.lit,
-        atlas=inputs.atlas.resources["atlas"],
+        atlas=inputs.layouts[0].atlas.resources["atlas"],
         footprint={"side": 1.0 / size},
     )
     points, _ = twins.surface(cached_atlas(head.mesh, size), head)

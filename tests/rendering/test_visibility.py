@@ -139,6 +139,21 @@ def test_triangles_that_reach_behind_the_eye(renderer: Renderer, compute: bool) 
     assert (layer[-5:] > 0).all()
 
 
+@pytest.mark.parametrize("triangles", [False, True])
+def test_nothing_is_left_of_the_view_before(renderer: Renderer, triangles: bool) -> None:
+    """Layers that were drawn to hold only what they are drawn with."""
+    finder = Nearest(renderer.device, triangles=triangles, compute=True)
+    used, fresh = (finder.make_layers(SIZE, 2) for _ in range(2))
+    for turned, layers in ((False, used), (True, used), (True, fresh)):
+        inputs = run_frame(renderer, view_of(HEADS["sphere"], turned), size=SIZE, samples=2)
+        frame = Frame(renderer.device)
+        finder.draw(frame, "nearest", layers, inputs.camera_clips, inputs.head)
+        frame.submit()
+    for layer in range(2):
+        left, right = (download(renderer.device, layers.texture, layer=layer) for layers in (used, fresh))
+        assert (right > 0).any() and np.array_equal(left, right)
+
+
 @pytest.mark.parametrize("count", [1, 2, 5, 8, 64])
 def test_samples_are_even_in_both_axes(count: int) -> None:
     """One in each of `count` columns and rows of the pixel, with the pixel's centre as their mean nearly."""

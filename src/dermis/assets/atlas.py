@@ -16,7 +16,7 @@ LAYOUTS = ("mesh", "stitched", "unwrapped")
 REACH_MM = (
     8.0  # of aprons: 3.4 standard deviations of the widest Gaussian that is added to another [dEonLuebke2007]
 )
-_SMALLEST = 64
+SMALLEST = 64
 MOST_SHEAR = 0.9  # a map that is sheared more is blurred as if by this much
 
 
@@ -93,9 +93,9 @@ def build_atlas(mesh: Mesh, size: int, layout: str = "mesh", reach_mm: float = R
 
     Raises DermisError when the size is under 64.
     """
-    if size < _SMALLEST:
+    if size < SMALLEST:
         refuse(
-            "atlas", f"a size of {_SMALLEST} texels or more", f"it is {size}", "Choose --atlas 1024 or 2048"
+            "atlas", f"a size of {SMALLEST} texels or more", f"it is {size}", "Choose --atlas 1024 or 2048"
         )
     if layout not in LAYOUTS:
         refuse("layout", f"one of {', '.join(LAYOUTS)}", f"{layout} came", "Choose one of these")

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import json
 import os
 import zipfile
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +17,14 @@ from numpy.typing import NDArray
 
 from dermis.assets.atlas import GUTTER, REACH_MM, Atlas, build_atlas
 from dermis.assets.folders import cache_folder
-from dermis.assets.mesh import Mesh
+from dermis.assets.mesh import Material, Mesh
+from dermis.assets.thin_parts.links import FORM as LINKS_FORM
+from dermis.assets.thin_parts.links import Links, find_links
 
 Array = NDArray[Any]
 Arrays = dict[str, Array]
 _FORM = 3  # raise when `build_atlas` gives other results for the same mesh
+_MESH_FORM = 1  # raise when `load_mesh` gives other results for the same file
 _MOST_BYTES = 2 << 30
 
 
@@ -43,16 +47,76 @@ def cached_occlusion(mesh: Mesh, atlas: Atlas, form: str, bake: Callable[[], Arr
     return _baked("occlusion", mesh, atlas, form, bake)
 
 
-def cached_opposite(mesh: Mesh, atlas: Atlas, form: str, find: Callable[[], Array]) -> Array:
-    """What `find` returns of thin parts, kept on disk in the same way."""
-    return _baked("opposite", mesh, atlas, form, find)
+def cached_links(mesh: Mesh, atlas: Atlas, widest_mm: float) -> Links:
+    """`find_links`, kept on disk in the same way."""
+    names = [field.name for field in fields(Links)]
+
+    def make() -> Arrays:
+        links = find_links(mesh, atlas, widest_mm)
+        return {name: getattr(links, name) for name in names}
+
+    key = _baked_key(mesh, atlas, f"{LINKS_FORM} {widest_mm!r}")
+    return Links(**_kept("opposite", key, names, make))
+
+
+def cached_mesh(data: bytes, options: str, load: Callable[[], Mesh]) -> Mesh:
+    """The mesh that `load` makes of a file, kept on disk in the same way.
+
+    data : the file, with all that the mesh is made of
+    options : how it is read
+    """
+    arrays = [field.name for field in fields(Mesh) if field.name != "materials"]
+
+    def make() -> Arrays:
+        mesh = load()
+        told = json.dumps([asdict(material) for material in mesh.materials]).encode()
+        return {name: getattr(mesh, name) for name in arrays} | {"materials": np.frombuffer(told, np.uint8)}
+
+    digest = hashlib.sha256(f"{_MESH_FORM} {options}".encode())
+    digest.update(data)
+    found = _kept("meshes", digest.hexdigest()[:40], [*arrays, "materials"], make)
+    materials = json.loads(found.pop("materials").tobytes())
+    return Mesh(
+        **found,
+        materials=tuple(Material(one["name"], one["kind"], tuple(one["colour"])) for one in materials),
+    )
+
+
+def cached_mips(source: Array, form: str, make: Callable[[], list[Array]]) -> list[Array]:
+    """The mip levels that `make` returns for a picture, kept on disk in the same way.
+
+    source : all that they are made of
+    form : how
+    """
+    names = [f"level {k}" for k in range(max(source.shape[:2]).bit_length())]
+
+    def levels() -> Arrays:
+        return dict(zip(names, make(), strict=True))
+
+    made = _kept("mips", _array_key(source, form), names, levels)
+    return [made[name] for name in names]
+
+
+def cached_array(source: Array, form: str, make: Callable[[], Array]) -> Array:
+    """The array that `make` returns for another one, kept on disk in the same way."""
+    return _kept("arrays", _array_key(source, form), ["array"], lambda: {"array": make()})["array"]
+
+
+def _array_key(source: Array, form: str) -> str:
+    digest = hashlib.sha256(f"{form} {source.shape} {source.dtype}".encode())
+    digest.update(np.ascontiguousarray(source).data)
+    return digest.hexdigest()[:40]
 
 
 def _baked(folder: str, mesh: Mesh, atlas: Atlas, form: str, bake: Callable[[], Array]) -> Array:
+    return _kept(folder, _baked_key(mesh, atlas, form), ["open"], lambda: {"open": bake()})["open"]
+
+
+def _baked_key(mesh: Mesh, atlas: Atlas, form: str) -> str:
     digest = hashlib.sha256(f"{_key(mesh, atlas.size)} {form}".encode())
     for array in (mesh.positions, mesh.normals, atlas.place, np.packbits(atlas.own)):
         digest.update(np.ascontiguousarray(array).tobytes())
-    return _kept(folder, digest.hexdigest()[:40], ["open"], lambda: {"open": bake()})["open"]
+    return digest.hexdigest()[:40]
 
 
 def _kept(folder: str, key: str, names: list[str], make: Callable[[], Arrays]) -> Arrays:

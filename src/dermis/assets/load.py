@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.assets.cache import cached_mesh
 from dermis.assets.check import UV_TOLERANCE, check_arrays, check_mesh
 from dermis.assets.formats import READERS, Group, Part, default_unit_mm, is_gltf
 from dermis.assets.geometry import build_mesh
@@ -48,6 +49,18 @@ def load_mesh(
     source = Path(path)
     unit = default_unit_mm(source) if unit_mm is None else float(unit_mm)
     _check_options(source, unit, v_origin, up)
+
+    def load() -> Mesh:
+        return _loaded(source, unit, v_origin, up, opaque)
+
+    data = source.read_bytes() if source.suffix.lower() == ".glb" and source.is_file() else b""
+    if not data or b'"uri"' in data:  # what it is made of lies elsewhere
+        return load()
+    return cached_mesh(data, repr((unit, v_origin, up, opaque)), load)
+
+
+def _loaded(source: Path, unit: float, v_origin: Origin, up: Up, opaque: tuple[str, ...]) -> Mesh:
+    """The mesh as it is in the file."""
     with np.errstate(all="ignore"):
         parts = _read(source)
         positions, uv, normals, triangles = _joined(parts, source)

@@ -20,6 +20,8 @@ PathLike = str | Path | Picture
 MIN_SIZE, MAX_SIZE = 16, 16384
 # A normal this far off its surface (87 degrees) has its slope capped; nothing real leans further.
 _MIN_NORMAL_Z = 0.05
+_LARGE = 1 << 22  # texels
+_SMOOTHING = "without steps 1"  # raise when that gives other results
 
 
 @dataclass(frozen=True)
@@ -96,8 +98,17 @@ def load_height(path: PathLike, height_mm: float | None) -> Floats:
     image = _read(path, "a height map")
     grey = _grey(path, "a height map", image)
     if image.dtype == np.uint8:
-        grey = without_steps(grey)
+        grey = _without_steps(grey)
     return grey * np.float32(255 * height_mm)
+
+
+def _without_steps(grey: Floats) -> Floats:
+    """Smoothed; a large map is kept on disk."""
+    if grey.size < _LARGE:
+        return without_steps(grey)
+    from dermis.assets.cache import cached_array
+
+    return cached_array(grey, _SMOOTHING, lambda: without_steps(grey))
 
 
 def load_grey(path: PathLike, role: str) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,3 +56,20 @@ class Mesh:
         """Extent along x, y and z [mm]."""
         extent: Floats = self.positions.max(axis=0) - self.positions.min(axis=0)
         return extent
+
+    @cached_property
+    def outline(self) -> NDArray[np.float64]:
+        """(n, 3) corners of the convex hull [mm]: from wherever it is seen, no place lies farther out."""
+        from dermis.assets.cache import cached_array  # the import alone of what finds it takes longer
+
+        return cached_array(self.positions, "outline 1", lambda: _outline(self.positions))
+
+
+def _outline(positions: Floats) -> NDArray[np.float64]:
+    from scipy.spatial import ConvexHull, QhullError
+
+    points = positions.astype(np.float64)
+    try:
+        return np.asarray(points[ConvexHull(points).vertices])
+    except QhullError:  # it is flat
+        return points

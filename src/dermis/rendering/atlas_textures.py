@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from dermis.assets.atlas import GUTTER, Atlas
 from dermis.gpu import Device
 from dermis.gpu.textures import texture_from
+from dermis.rendering.coarser import Sheet, halved
+from dermis.rendering.levels import MOST_HALVINGS
 from dermis.rendering.seams import FEATHER_MM, REMEDIES, Remedy
 
 _LEAST_SHARE = 1e-3  # of the blur at the edge itself: 0 would mean no surface
@@ -23,12 +25,16 @@ class AtlasTextures:
     resources : atlas, stretch_map, reach_map, and edge_map where two layouts are blended
     sheared : whether u and v meet at other than right angles somewhere
     apron, gathered : the list of texels beyond the charts' edges and space for their light; None without any
+    coarser : the same, again and again at half the resolution; only of stitched layouts
+    usual_per_mm : median of the texels per mm along the axis that has fewer
     """
 
     resources: dict[str, Any]
     sheared: bool
     apron: Any = None
     gathered: Any = None
+    coarser: tuple[AtlasTextures, ...] = ()
+    usual_per_mm: float = 0.0
 
 
 def upload_atlas(
@@ -43,20 +49,37 @@ def upload_atlas(
     metric = _metric(atlas, stretch)
     if remedy.feathered:
         metric[..., :2] = _feathered(atlas, metric[..., :2])
-    resources = {
-        "atlas": texture_from(device, texels, "rg32uint"),
-        "stretch_map": texture_from(device, metric, "rgba16float"),
-        "reach_map": texture_from(device, atlas.reach, "rgba16uint"),
-    }
+    resources = {"atlas": texture_from(device, texels, "rg32uint")}
     if len(remedy.layouts) > 1:
         resources["edge_map"] = texture_from(device, edge_mm(atlas), "r32float")
-    sheared = bool(metric[..., 2].any())
-    if not len(atlas.apron):
-        return AtlasTextures(resources, sheared)
-    beyond = np.concatenate([atlas.source.view(np.uint32), atlas.apron.astype(np.uint32)], axis=1)
+    sheet = Sheet(metric, atlas.reach, atlas.apron, atlas.source)
+    own = metric[atlas.own, :2].min(axis=-1)
+    usual = float(np.median(own)) if len(own) else 0.0
+    coarser = _coarser(device, sheet) if len(atlas.apron) else ()
+    return _uploaded(device, sheet, resources, coarser=coarser, usual_per_mm=usual)
+
+
+def _uploaded(device: Device, sheet: Sheet, resources: dict[str, Any], **more: Any) -> AtlasTextures:
+    resources = resources | {
+        "stretch_map": texture_from(device, sheet.metric, "rgba16float"),
+        "reach_map": texture_from(device, sheet.reach, "rgba16uint"),
+    }
+    sheared = bool(sheet.metric[..., 2].any())
+    if not len(sheet.apron):
+        return AtlasTextures(resources, sheared, **more)
+    beyond = np.concatenate([sheet.source.view(np.uint32), sheet.apron.astype(np.uint32)], axis=1)
     light = np.zeros((len(beyond), 4), np.float32)
     lists = (device.buffer(words, "STORAGE") for words in (beyond, light))
-    return AtlasTextures(resources, sheared, *lists)
+    return AtlasTextures(resources, sheared, *lists, **more)
+
+
+def _coarser(device: Device, sheet: Sheet) -> tuple[AtlasTextures, ...]:
+    """The sheet at half, a quarter, ... of its resolution."""
+    made: list[AtlasTextures] = []
+    while len(made) < MOST_HALVINGS and len(sheet.metric) % 2 == 0:
+        sheet = halved(sheet)
+        made.append(_uploaded(device, sheet, {}))
+    return tuple(made)
 
 
 def packed_texels(triangle: NDArray[Any], barycentric: NDArray[Any]) -> NDArray[np.uint32]:

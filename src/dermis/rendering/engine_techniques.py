@@ -29,14 +29,16 @@ def pre_integrated(
 
 
 def screen_spread(
-    keep: Keep, stage: ScreenSpace, settings: Settings, profile: GaussianSum, view: Any
+    keep: Keep, stage_of: Callable[[], ScreenSpace], settings: Settings, profile: GaussianSum, view: Any
 ) -> ScreenSpread | None:
     """Space and kernel for light that spreads over the picture, None for other techniques.
 
+    stage_of : the stage, asked for only when it is needed
     view : record of the shading pass
     """
     if settings.technique != "screen-space":
         return None
+    stage = stage_of()
 
     def make() -> Kernel:
         return stage.make_kernel(preintegrate(profile))

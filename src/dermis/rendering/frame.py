@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import weakref
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+
 from dermis.gpu import Device, Frame
+from dermis.gpu.repeated import Repeated
 from dermis.rendering.inputs import Inputs
+from dermis.rendering.layout import Layout
+from dermis.rendering.levels import scale_of
+from dermis.rendering.scattered import Scattered
 from dermis.rendering.stages.blend import Blend
 from dermis.rendering.stages.bloom import Bloom
 from dermis.rendering.stages.combine import Combine
 from dermis.rendering.stages.diffuse import Diffuse
 from dermis.rendering.stages.irradiance import Irradiance
 from dermis.rendering.stages.opposite import Opposite
+from dermis.rendering.stages.pack import Pack
 from dermis.rendering.stages.post import Post
 from dermis.rendering.stages.published import Published
 from dermis.rendering.stages.screen_space import ScreenSpace
@@ -20,33 +31,69 @@ from dermis.rendering.stages.visibility import Visibility
 
 
 class Stages:
-    """The compiled stages of a device."""
+    """The compiled stages of a device; those that not every frame has are compiled when first asked for."""
 
     def __init__(self, device: Device) -> None:
+        self._device = device
+        self.scattered = Scattered()
+        self.repeated = Repeated()
         self.shadows = Shadows(device)
         self.irradiance = Irradiance(device)
         self.diffuse = Diffuse(device)
-        self.published = Published(device)
-        self.opposite = Opposite(device)
-        self.transmission = Transmission(device)
         self.combine = Combine(device)
-        self.blend = Blend(device)
         self.visibility = Visibility(device)
         self.shade = Shade(device)
-        self.screen_space = ScreenSpace(device)
-        self.bloom = Bloom(device)
         self.post = Post(device)
+        self.pack = Pack(device)
+
+    @cached_property
+    def published(self) -> Published:
+        """For the technique of that name."""
+        return Published(self._device)
+
+    @cached_property
+    def opposite(self) -> Opposite:
+        """For heads with thin parts."""
+        return Opposite(self._device)
+
+    @cached_property
+    def transmission(self) -> Transmission:
+        """For heads with thin parts."""
+        return Transmission(self._device)
+
+    @cached_property
+    def blend(self) -> Blend:
+        """For two layouts."""
+        return Blend(self._device)
+
+    @cached_property
+    def screen_space(self) -> ScreenSpace:
+        """For the technique of that name."""
+        return ScreenSpace(self._device)
+
+    @cached_property
+    def bloom(self) -> Bloom:
+        """For pictures with bloom."""
+        return Bloom(self._device)
 
     def spreading(self, technique: str) -> Diffuse | Published:
         """The stage that blurs light over the atlas."""
         return self.published if technique == "published" else self.diffuse
 
 
-def draw_frame(frame: Frame, stages: Stages, inputs: Inputs) -> None:
-    """Record all of a frame: light the skin, let it spread below, look at it."""
-    stages.shadows.draw(frame, inputs.shadow_maps, inputs.light_clips, inputs.head, inputs.shadow_key)
-    if inputs.scatters:
+def draw_frame(frame: Frame, stages: Stages, inputs: Inputs, keep_light: bool = False) -> None:
+    """Record all of a frame: light the skin, let it spread below, look at it.
+
+    keep_light : leave the atlas as it is when it already shows the light
+    """
+    shaped = ("SHAPES", 1) in inputs.light_switches
+    stages.shadows.draw(
+        frame, inputs.shadow_maps, inputs.light_clips, inputs.head, inputs.shadow_key, bounded=shaped
+    )
+    if inputs.scatters and not (keep_light and stages.scattered.holds(inputs)):
         scatter(frame, stages, inputs)
+        if keep_light:
+            stages.scattered.note(inputs)
     stages.visibility.draw(frame, inputs.seen, inputs.camera_clips, inputs.head)
     view, picture = inputs.view, inputs.picture
     stages.shade.draw(
@@ -70,13 +117,34 @@ def draw_frame(frame: Frame, stages: Stages, inputs: Inputs) -> None:
 
 def scatter(frame: Frame, stages: Stages, inputs: Inputs) -> None:
     """Light the atlas and let the light spread over it."""
-    levels, spread = inputs.levels, stages.spreading(inputs.settings.technique)
-    for layout in inputs.layouts:
-        stages.irradiance.draw(frame, layout, inputs.light_switches, levels.views[0], levels.size)
-        spread.draw(frame, levels, layout.atlas, inputs.blurred_mm2, inputs.edge, inputs.clear)
-        weights = inputs.blurred_mm2, inputs.level_weight
-        through = stages.transmission.draw(frame, levels, layout.thin, *weights) if layout.thin else None
-        stages.combine.draw(frame, levels, inputs.level_weight, layout.scattered, through)
+    for index, layout in enumerate(inputs.layouts):
+        levels = inputs.levels
+        stages.irradiance.draw(frame, layout, inputs.light_switches, levels.entering, levels.size)
+        if inputs.settings.technique == Published.name:
+            _spread(frame, stages, inputs, layout)
+        else:  # the same, whatever lights and camera do
+            key = _spreading_key(inputs, layout)
+            record = partial(_spread, stages=stages, inputs=inputs, layout=layout)
+            stages.repeated.draw(frame, f"spread {index}", key, record)
     if len(inputs.layouts) > 1:
         first, second = inputs.layouts
         stages.blend.draw(frame, first, second, inputs.scattered)
+
+
+def _spread(frame: Frame, stages: Stages, inputs: Inputs, layout: Layout) -> None:
+    """Let the light that has entered spread, through thin parts too, and add up what leaves."""
+    levels, spread = inputs.levels, stages.spreading(inputs.settings.technique)
+    beyond = inputs.edge, inputs.clear
+    spread.draw(frame, levels, layout.atlas, inputs.blurred_mm2, *beyond, exposure=inputs.settings.exposure)
+    through = stages.transmission.draw(frame, levels, layout.thin) if layout.thin else None
+    stages.combine.draw(frame, levels, inputs.level_weight, layout.scattered, through)
+
+
+def _spreading_key(inputs: Inputs, layout: Layout) -> tuple[Any, ...]:
+    """Everything that `_spread` reads: numbers, and textures by identity, which are not kept alive."""
+    arrays = inputs.blurred_mm2, inputs.level_weight, inputs.clear
+    textures = [inputs.levels.stack, layout.scattered, *layout.atlas.resources.values()]
+    textures += [layout.thin.links, layout.thin.light] if layout.thin else []
+    scale = scale_of(inputs.levels.texel, inputs.settings.exposure)
+    numbers = inputs.settings.technique, inputs.edge, scale
+    return (*numbers, *(np.asarray(a).tobytes() for a in arrays), *map(weakref.ref, textures))

@@ -1,4 +1,4 @@
-"""The mesh as textures, with where each triangle's light is in the atlas."""
+"""The mesh as textures and as buffers, with where each triangle's light is in the atlas."""
 
 from __future__ import annotations
 
@@ -35,11 +35,20 @@ class HeadTextures:
 
 
 def upload_geometry(device: Device, mesh: Mesh, atlas: Atlas) -> dict[str, Any]:
-    """Textures by their names in geometry.wgsl."""
+    """Textures and buffers by their names in geometry.wgsl."""
+    triangles, vertices = _triangle_table(mesh, atlas), _vertex_table(mesh)
+    read = mesh_switches(device)  # what is not read still needs to be there
     return {
-        "triangle_table": texture_from(device, _triangle_table(mesh, atlas), "rgba32uint"),
-        "vertex_table": texture_from(device, _vertex_table(mesh), "rgba32float"),
+        "triangle_table": texture_from(device, triangles, "rgba32uint"),
+        "vertex_table": texture_from(device, vertices, "rgba32float"),
+        "triangle_buffer": device.buffer(triangles if read else triangles[:1, :3], "STORAGE"),
+        "vertex_buffer": device.buffer(vertices if read else vertices[:1, :4], "STORAGE"),
     }
+
+
+def mesh_switches(device: Device) -> tuple[tuple[str, int], ...]:
+    """Values of geometry.wgsl's `override`s: GPUs read buffers faster, software adapters textures."""
+    return () if device.adapter.kind == "CPU" else (("MESH_IN_BUFFERS", 1),)
 
 
 def _triangle_table(mesh: Mesh, atlas: Atlas) -> NDArray[np.uint32]:

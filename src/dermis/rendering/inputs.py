@@ -13,14 +13,13 @@ from dermis.errors import refuse
 from dermis.gpu import ComputeProgram
 from dermis.optics.fits.single import single_gaussian
 from dermis.optics.gaussians import GaussianSum
-from dermis.rendering.atlas_textures import AtlasTextures
 from dermis.rendering.geometry import HeadTextures
 from dermis.rendering.layout import Layout
+from dermis.rendering.levels import Levels
 from dermis.rendering.pre_integrated import PreIntegrated
 from dermis.rendering.projection import Matrix, depth_range, frame_of, perspective
 from dermis.rendering.samples import pixel_samples
 from dermis.rendering.stages.bloom import Glow
-from dermis.rendering.stages.diffuse import Levels
 from dermis.rendering.stages.nearest import Layers
 from dermis.rendering.stages.post import Picture
 from dermis.rendering.stages.screen_space import ScreenSpread
@@ -34,6 +33,7 @@ Floats = NDArray[np.float64]
 # A Gaussian narrower than this is finer than texels and pores: it is lit again, not blurred.
 _RELIT_MM2 = 0.1**2
 _MOST_MATERIALS = 64
+_PARTS = {"all": (1.0, 1.0), "diffuse": (1.0, 0.0), "specular": (0.0, 1.0)}  # from below, off the surface
 WITHOUT_ATLAS = ("none", "screen-space", "pre-integrated")
 """Techniques that do not spread light over the atlas."""
 
@@ -81,11 +81,6 @@ class Inputs:
     settings: Settings
 
     @property
-    def atlas(self) -> AtlasTextures:
-        """Of the layout that is looked at."""
-        return self.layouts[0].atlas
-
-    @property
     def lit(self) -> dict[str, Any]:
         """Of the layout that is looked at."""
         return self.layouts[0].lit
@@ -126,12 +121,10 @@ def camera_clips(camera: Camera, head: Head, settings: Settings) -> list[Matrix]
     eye, axes, half = _pinhole(camera, head, settings)
     whole = perspective(eye, axes, half, *depth_range(head.mesh, eye, axes[2]))
     width, height = settings.size
-    clips = []
-    for x, y in pixel_samples(settings.samples):
-        shift = np.eye(4)
-        shift[0, 3], shift[1, 3] = -2.0 * (x - 0.5) / width, 2.0 * (y - 0.5) / height
-        clips.append(shift @ whole)
-    return clips
+    shift = (pixel_samples(settings.samples) - 0.5) * (-2.0 / width, 2.0 / height)
+    clips = np.repeat(whole[None], len(shift), axis=0)
+    clips[:, :2] += shift[..., None] * whole[3]
+    return list(clips)
 
 
 def view_record(
@@ -160,6 +153,7 @@ def view_record(
         up=axes[1] * half[1],
         relit=split.relit,
         total=split.total,
+        shown=_PARTS[settings.parts],
         background=np.divide(settings.background, settings.exposure),
         material_colour=colours,
         jitter=jitter,

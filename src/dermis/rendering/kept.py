@@ -1,7 +1,8 @@
-"""What a renderer keeps from frame to frame: for each role the thing made last."""
+"""What a renderer keeps from frame to frame: for each role the things used last."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -11,19 +12,35 @@ T = TypeVar("T")
 
 
 class Kept:
-    """Things by role, each made again only when its key changes."""
+    """Things by role, each made again only when its key changes.
 
-    def __init__(self) -> None:
-        self._things: dict[str, tuple[Any, Any]] = {}
+    depth : how many things of each role are kept, and for how many rounds a role that nobody asks for; for
+        who goes back and forth between some
+    """
+
+    def __init__(self, depth: int = 1) -> None:
+        self._depth = depth
+        self._things: dict[str, list[tuple[Any, Any]]] = {}
+        self._asked: deque[set[str]] = deque([set()], maxlen=depth)
 
     def keep(self, role: str, key: Any, make: Callable[[], T]) -> T:
-        """The last thing made for this role while its key stays the same."""
-        old, value = self._things.get(role, (None, None))
-        if value is None or not _same(old, key):
-            self._things.pop(role, None)
-            value = make()
-            self._things[role] = (key, value)
-        return value  # type: ignore[no-any-return]
+        """The thing of this role and key, made unless it is one of those used last."""
+        self._asked[-1].add(role)
+        things = self._things.setdefault(role, [])
+        found = next((k for k, (old, _) in enumerate(things) if _same(old, key)), None)
+        if found is None:
+            del things[self._depth - 1 :]  # before making, which may need the space
+            things.insert(0, (key, make()))
+        else:
+            things.insert(0, things.pop(found))
+        value: T = things[0][1]
+        return value
+
+    def forget_idle(self) -> None:
+        """End a round: let go of roles that nobody has asked for in the last `depth` rounds."""
+        used = set().union(*self._asked)
+        self._things = {role: things for role, things in self._things.items() if role in used}
+        self._asked.append(set())
 
     def forget_all(self) -> None:
         """Make everything again."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -92,21 +93,32 @@ def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView 
     """
     centre = np.array(scene.head.centre_mm)
     record = program.record("Lights")
+    record["place"] = places_on_lights()
     divided = [(part, len(parts)) for parts in map(parts_of, scene.lights) for part in parts]
     layer = 0
     for index, ((light, siblings), view) in enumerate(zip(divided, views, strict=True)):
-        one = _light_record(program, light, centre, view)
+        one = record["light"][index]
+        _fill(one, light, centre, view)
         one["layer"] = layer if view else -1
         few = isinstance(light, DirectionalLight)
         one["lines"] = _SUN_LINES if few else max(_LEAST_LINES, _LINES // siblings)
         one["side"] = _PART_SIDE if siblings > 1 else _SIDE
-        record["light"][index] = one
         layer += view is not None
     return record
 
 
-def _light_record(program: ComputeProgram, light: Light, centre: Floats, view: ShadowView | None) -> Any:
-    record = program.record("Light", kind=_KINDS.index(type(light)), irradiance=light.irradiance)
+@cache
+def places_on_lights() -> Floats:
+    """(64, 4) places spread evenly [Roberts2018] over a disc and over a square, both from -1 to 1."""
+    even = (0.5 + np.arange(_LINES)[:, None] * [0.7548776662, 0.5698402910]) % 1.0
+    phi = 2.0 * np.pi * even[:, 1]
+    disc = np.sqrt(even[:, :1]) * np.stack([np.cos(phi), np.sin(phi)], axis=-1)
+    return np.hstack([disc, 2.0 * even - 1.0])
+
+
+def _fill(record: Any, light: Light, centre: Floats, view: ShadowView | None) -> None:
+    """A light's element of the shader's array."""
+    record["kind"], record["irradiance"] = _KINDS.index(type(light)), light.irradiance
     distance, texel = 1.0, view.texel if view else 1.0
     if isinstance(light, DirectionalLight):
         record["direction"] = np.array(light.direction) / np.linalg.norm(light.direction)
@@ -123,10 +135,8 @@ def _light_record(program: ComputeProgram, light: Light, centre: Floats, view: S
     _add_shape(record, light, centre, distance)
     # A tent of half width h fades over 2 h texels.
     record["softness"] = 0.5 * light.softness_mm
-    record["half_width"] = np.clip(
-        round(0.5 * light.softness_mm / (texel * distance)), 1, _WIDEST_SHADOW_FILTER
-    )
-    return record
+    half_width = round(0.5 * light.softness_mm / (texel * distance))
+    record["half_width"] = min(max(half_width, 1), _WIDEST_SHADOW_FILTER)
 
 
 def _add_shape(record: Any, light: Light, centre: Floats, distance: float) -> None:

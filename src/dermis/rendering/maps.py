@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.assets.atlas_raster import rasterise
+from dermis.assets.cache import cached_mips
 from dermis.assets.geometry import triangle_areas
 from dermis.assets.head import Head
 from dermis.assets.maps import Maps
@@ -21,6 +23,9 @@ from dermis.specular.beckmann import beckmann_table
 
 _MEAN_TEXELS = 512  # a side of the grid that a map's mean is taken on
 _NO_BAND = -1.0
+_FOUR = "rgba16float"
+_LARGE = 1 << 20  # numbers in a map whose mips are kept on disk
+_FORM = "1"  # raise when a map's mips become others
 
 
 def upload_maps(device: Device, head: Head, use_colour: bool, decoded: bool = True) -> dict[str, Any]:
@@ -36,12 +41,12 @@ def upload_maps(device: Device, head: Head, use_colour: bool, decoded: bool = Tr
     return {
         "map_sampler": device.sampler(mag_filter="linear", min_filter="linear", mipmap_filter="linear"),
         "colour_map": _mipped(
-            device, np.dstack([colour, np.ones(colour.shape[:2], np.float32)]), "rgba16float"
+            device, lambda: np.dstack([colour, np.ones(colour.shape[:2], np.float32)]), _FOUR, colour
         ),
-        "slope_map": _mipped(device, _moments(maps.normal), "rgba16float"),
-        "relief_map": _mipped(device, _moments(_relief(maps)), "rgba16float"),
-        "specular_map": _mipped(device, _factor(maps.specular, head.mesh), "r16float"),
-        "roughness_map": _mipped(device, _plain(maps.roughness), "r16float"),
+        "slope_map": _mipped(device, lambda: _moments(maps.normal), _FOUR, maps.normal),
+        "relief_map": _mipped(device, lambda: _moments(_relief(maps)), _FOUR, maps.height),
+        "specular_map": _mipped(device, lambda: _factor(maps.specular, head.mesh), "r16float"),
+        "roughness_map": _mipped(device, lambda: _plain(maps.roughness), "r16float"),
         "beckmann_table": texture_from(device, beckmann_table(), "r32float"),
     }
 
@@ -85,9 +90,24 @@ def relief_band(maps: Maps) -> float:
     return float(np.log2(finer)) if finer > 1 else _NO_BAND
 
 
-def _mipped(device: Device, image: NDArray[np.float32], texel: str) -> Any:
-    chain = mip_chain(image)
-    texture = make_texture(device, (image.shape[1], image.shape[0]), texel, mips=len(chain), use="map")
-    for level, part in enumerate(chain):
-        upload(device, texture, part, mip=level)
+def _mipped(
+    device: Device,
+    make: Callable[[], NDArray[np.float32]],
+    texel: str,
+    source: NDArray[np.float32] | None = None,
+) -> Any:
+    """A texture with all its mips, of halves.
+
+    source : all that the picture is made of, so that a large one can be kept on disk
+    """
+
+    def chain() -> list[NDArray[Any]]:
+        return [level.astype(np.float16) for level in mip_chain(make())]
+
+    large = source is not None and source.size >= _LARGE
+    levels = cached_mips(source, _FORM, chain) if large and source is not None else chain()
+    height, width = levels[0].shape[:2]
+    texture = make_texture(device, (width, height), texel, mips=len(levels), use="map")
+    for index, level in enumerate(levels):
+        upload(device, texture, level, mip=index)
     return texture

@@ -90,11 +90,15 @@ def spread_cosine(cosines: ArrayLike, concentration: float) -> Floats:
 def shadow_edge(profile: GaussianSum, radius_mm: float, half_width_mm: float = 0.0) -> Floats:
     """Light that spread over a shadow's straight edge, (m, c), from -radius (dark) to the radius (lit) [-].
 
-    half_width_mm : of the tent that already makes the edge soft, taken for a Gaussian
+    half_width_mm : of the tent that already makes the edge soft
     """
-    kernel = preintegrate(profile.widened(half_width_mm**2 / 6.0))
+    kernel = preintegrate(profile)
     distance = radius_mm * np.linspace(-1.0, 1.0, _COSINES)
-    return np.asarray(0.5 + 0.5 * kernel.one_side(distance) / kernel.one_side(radius_mm))
+    x, w = np.polynomial.legendre.leggauss(_NODES)
+    x, w = 0.5 + 0.5 * x, w * (0.5 - 0.5 * x)  # one half of the tent, whose light is 1
+    ends = half_width_mm * np.concatenate([x, -x])
+    lit = np.concatenate([0.5 * w, 0.5 * w]) @ kernel.one_side(distance[:, None] - ends)
+    return np.asarray(np.clip(0.5 + 0.5 * lit / lit[-1], 0.0, 1.0))
 
 
 def penumbra_mm(profile: GaussianSum) -> float:

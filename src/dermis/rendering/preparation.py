@@ -12,7 +12,6 @@ from dermis.assets.cache import cached_atlas
 from dermis.assets.head import Head
 from dermis.gpu import Device, make_texture
 from dermis.gpu.textures import texture_from
-from dermis.optics.profiles import load_profile
 from dermis.rendering import inputs as made
 from dermis.rendering import surface
 from dermis.rendering.atlas_textures import AtlasTextures, upload_atlas
@@ -22,25 +21,27 @@ from dermis.rendering.geometry import HeadTextures, upload_geometry
 from dermis.rendering.inputs import Inputs
 from dermis.rendering.kept import Kept
 from dermis.rendering.layout import Layout
+from dermis.rendering.levels import Levels
 from dermis.rendering.lights import light_records, light_switches, light_views
 from dermis.rendering.limits import check_limits
 from dermis.rendering.maps import relief_band, upload_maps
 from dermis.rendering.projection import ShadowView
-from dermis.rendering.seams import remedy_of, stretch_of
-from dermis.rendering.stages.diffuse import Levels
-from dermis.rendering.stages.shade import TECHNIQUES
+from dermis.rendering.seams import LaidOut, laid_out, remedy_of, stretch_of
+from dermis.rendering.skin_profiles import SkinProfiles
+from dermis.rendering.stages.opposite import Pairs
+from dermis.rendering.stages.shade import technique_switches
 from dermis.rendering.stages.shadows import ShadowMaps
 from dermis.rendering.stages.transmission import Thin
-from dermis.rendering.stages.variants import Switches
 from dermis.rendering.surroundings import (
     Surroundings,
     environment_record,
+    is_occluded,
     load_surroundings,
     no_occlusion,
     occlusion_map,
     with_suns,
 )
-from dermis.rendering.thin_parts import lets_through, opposite_map
+from dermis.rendering.thin_parts import lets_through, pairs_of, shared_width, thin_of
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.specular.albedo import albedo_table
@@ -49,27 +50,33 @@ from dermis.specular.albedo import albedo_table
 class Preparation:
     """Makes the inputs of frames on a device; what does not change between two frames is not made again."""
 
-    def __init__(self, device: Device, stages: Stages) -> None:
+    def __init__(self, device: Device, stages: Stages, depth: int = 1) -> None:
         self.device, self._stages = device, stages
-        kept = Kept()
-        self._keep, self.forget_all = kept.keep, kept.forget_all
+        self._profiles = SkinProfiles()
+        kept = Kept(depth)
+        self._keep, self.forget_all, self._forget_idle = kept.keep, kept.forget_all, kept.forget_idle
 
     def inputs(self, scene: Scene, settings: Settings) -> Inputs:
-        """Everything that `draw_frame` touches.
+        """Everything that `draw_frame` touches; what it does not is let go of.
 
         Raises DermisError for sizes over the device's limits.
         """
-        check_limits(self.device, settings)
-        profile = load_profile(scene.skin.profile)
+        made_now = self._inputs(scene, settings)
+        self._forget_idle()
+        return made_now
+
+    def _inputs(self, scene: Scene, settings: Settings) -> Inputs:
+        profile = self._profiles.of(scene.skin)
         split = made.split_profile(profile, settings, white=scene.skin.albedo == "map")
+        count, size, stages = len(split.blurred_mm2), settings.size, self._stages
+        atlases = laid_out(settings, count, is_occluded(scene, settings))
+        check_limits(self.device, settings, atlases, count)
         surroundings = self._surroundings(scene)
         scene = with_suns(scene, surroundings)
         views = self._views(scene, settings.shadow_size)
         clips = [view.clip for view in views if view]
         shadow_maps = self._shadow_maps(scene.head, len(clips), settings.shadow_size if clips else 1)
-        layouts = self._layouts(scene, settings, split, views, shadow_maps, surroundings)
-        stages, count, size = self._stages, len(split.blurred_mm2), settings.size
-        side = settings.atlas if count else 1
+        layouts = self._layouts(scene, settings, split, atlases, views, shadow_maps, surroundings)
         pre = pre_integrated(self._keep, self.device, settings, profile)
         view = made.view_record(stages.shade.program, scene, settings, split, pre)
         return Inputs(
@@ -79,23 +86,23 @@ class Preparation:
             light_clips=clips,
             shadow_key=np.array(clips).tobytes(),
             scatters=count > 0,
-            levels=self._levels(settings.technique, side, count),
+            levels=self._levels(settings.technique, settings.atlas if count else 1, count),
             blurred_mm2=split.blurred_mm2,
             level_weight=split.weight,
             edge=remedy_of(settings).edge,
             clear=np.pi * np.array(settings.seam_colour) * remedy_of(settings).coloured,
-            scattered=pre.table if pre else self._scattered(layouts, side),
+            scattered=pre.table if pre else self._scattered(layouts, settings.atlas),
             seen=self._keep(
                 "seen", (size, settings.samples), lambda: stages.visibility.make_seen(size, settings.samples)
             ),
             camera_clips=made.camera_clips(scene.camera, scene.head, settings),
             view=view,
-            switches=_switches(scene, settings),
+            switches=surface.switches(scene.skin) + light_switches(scene) + technique_switches(settings),
             light_switches=light_switches(scene),
             suns=len(surroundings.suns),
             gaussians=len(profile.variance_mm2),
             picture=self._keep("picture", size, lambda: stages.post.make_picture(size)),
-            spread=screen_spread(self._keep, stages.screen_space, settings, profile, view),
+            spread=screen_spread(self._keep, lambda: stages.screen_space, settings, profile, view),
             glow=self._keep("glow", size, lambda: stages.bloom.make_glow(size)) if settings.bloom else None,
             settings=settings,
         )
@@ -105,36 +112,44 @@ class Preparation:
         scene: Scene,
         settings: Settings,
         split: made.Split,
+        atlases: LaidOut,
         views: list[ShadowView | None],
         shadow_maps: ShadowMaps,
         surroundings: Surroundings,
     ) -> list[Layout]:
         """The atlases that light is spread on: one, or two that hide each other's seams."""
         layouts = []
-        for index, name in enumerate(remedy_of(settings).layouts):
-            atlas, textures = self._atlas(scene.head, name, settings, index)
+        for index, name in enumerate(atlases.layouts):
+            atlas, textures = self._atlas(scene.head, name, atlases.side, settings, index)
             head = self._head(scene, atlas, settings, index)
             lit = self._lit(scene, head, views, shadow_maps) | {"panorama": surroundings.panorama}
             around = self._environment(scene, settings, split.total, head, lit, atlas, textures, index)
             space = self._space(f"scattered {index}", settings.atlas if len(split.blurred_mm2) else 1)
             layout = Layout(head, textures, lit | around, space)
-            layouts.append(self._thin(scene.head, settings, split, atlas, layout, index))
+            layouts.append(self._thin(scene, settings, split, atlas, layout, index))
         return layouts
 
     def _thin(
-        self, head: Head, settings: Settings, split: made.Split, atlas: Atlas, layout: Layout, index: int
+        self, scene: Scene, settings: Settings, split: made.Split, atlas: Atlas, layout: Layout, index: int
     ) -> Layout:
         """The layout with what lies opposite its thin parts, and space for the light from there."""
         if not (len(split.blurred_mm2) and lets_through(settings)):
             return layout
-        widest = float(np.sqrt(split.blurred_mm2[-1]))
+        head, widest = scene.head, float(np.sqrt(split.blurred_mm2[-1]))
+        if scene.skin.pigments:
+            widest = shared_width(widest)
 
-        def find() -> Any:
-            return opposite_map(self.device, self._stages.opposite, head.mesh, atlas, layout, widest)
+        def find() -> Pairs:
+            return pairs_of(self.device, head.mesh, atlas, widest)
 
-        opposite = self._keep(f"opposite {index}", (head, atlas, repr(widest)), find)
-        light = self._space(f"transmitted {index}", opposite.size[0])
-        return replace(layout, thin=Thin(opposite, light))
+        pairs = self._keep(f"pairs {index}", (head, atlas, repr(widest)), find)
+        profile = split.blurred_mm2, split.weight
+
+        def make() -> Thin:
+            return thin_of(self.device, self._stages.opposite, pairs, *profile)
+
+        key = (pairs, *(numbers.tobytes() for numbers in profile))
+        return replace(layout, thin=self._keep(f"thin {index}", key, make))
 
     def _levels(self, technique: str, side: int, count: int) -> Levels:
         stage = self._stages.spreading(technique)
@@ -161,8 +176,9 @@ class Preparation:
             **head.resources,
             "skin": skin,
             "albedo_table": self._albedo_table(surface.model_of(scene.skin), scene.skin.fresnel),
-            "lights": light_records(program, scene, views),
+            "lights": self._keep("light records", views, lambda: light_records(program, scene, views)),
             "shadow_maps": shadow_maps.texture,
+            "shadow_bounds": shadow_maps.bounds,
             "shadow_sampler": self.device.sampler(),
         }
 
@@ -178,7 +194,7 @@ class Preparation:
         index: int,
     ) -> dict[str, Any]:
         """The environment's record, and how much of it each place sees."""
-        occluded = scene.environment is not None and settings.occlusion == "baked"
+        occluded = is_occluded(scene, settings)
 
         def make() -> Any:
             if not occluded:
@@ -202,8 +218,10 @@ class Preparation:
     def _space(self, role: str, side: int) -> Any:
         return self._keep(role, side, lambda: make_texture(self.device, (side, side), "rgba32float"))
 
-    def _atlas(self, head: Head, layout: str, settings: Settings, index: int) -> tuple[Atlas, AtlasTextures]:
-        size, remedy, stretch = settings.atlas, remedy_of(settings), stretch_of(settings)
+    def _atlas(
+        self, head: Head, layout: str, size: int, settings: Settings, index: int
+    ) -> tuple[Atlas, AtlasTextures]:
+        remedy, stretch = remedy_of(settings), stretch_of(settings)
         atlas = self._keep(
             f"atlas {index}", (head, layout, size), lambda: cached_atlas(head.mesh, size, layout)
         )
@@ -226,9 +244,3 @@ class Preparation:
         geometry = self._keep(f"geometry {index}", (head, atlas), make_geometry)
         unscattered = self._keep(f"unscattered {index}", (head, atlas), lambda: atlas.unscattered(head.mesh))
         return HeadTextures(maps | geometry, relief_band(head.maps), len(head.mesh.triangles), unscattered)
-
-
-def _switches(scene: Scene, settings: Settings) -> Switches:
-    """Those of the shading pass."""
-    technique = TECHNIQUES.get(settings.technique, ())
-    return surface.switches(scene.skin) + light_switches(scene) + technique

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +15,7 @@ from dermis.scene.lights import DirectionalLight, Light
 
 Vec = NDArray[np.float64]
 Matrix = NDArray[np.float64]
+Triple = tuple[float, float, float]
 _WIDEST_LIGHT_DEGREES = 80.0
 
 
@@ -38,12 +41,24 @@ class ShadowView:
 
 def frame_of(forward: Vec, up: Vec) -> tuple[Vec, Vec, Vec]:
     """Right, up and forward as unit vectors."""
-    f = forward / np.linalg.norm(forward)
-    r = np.cross(f, up)
-    if np.linalg.norm(r) < 1e-6:
-        r = np.cross(f, np.array([1.0, 0.0, 0.0] if abs(f[0]) < 0.9 else [0.0, 0.0, 1.0]))
-    r /= np.linalg.norm(r)
-    return r, np.cross(r, f), f
+    # In plain floats: numpy takes ten times as long for so few numbers, and a frame has many of them.
+    f = _unit(forward.tolist())
+    r = _cross(f, up.tolist())
+    if math.hypot(*r) < 1e-6:
+        r = _cross(f, (1.0, 0.0, 0.0) if abs(f[0]) < 0.9 else (0.0, 0.0, 1.0))
+    r = _unit(r)
+    return np.array(r), np.array(_cross(r, f)), np.array(f)
+
+
+def _unit(v: Sequence[float]) -> Triple:
+    x, y, z = v
+    length = math.hypot(x, y, z)
+    return x / length, y / length, z / length
+
+
+def _cross(a: Sequence[float], b: Sequence[float]) -> Triple:
+    (ax, ay, az), (bx, by, bz) = a, b
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 def perspective(
@@ -53,17 +68,19 @@ def perspective(
 
     Floats are densest at 0: depths turned round are even over the whole range.
     """
-    view = _view(eye, axes)
-    clip = np.zeros((4, 4))
-    clip[0, 0], clip[1, 1] = 1.0 / half[0], 1.0 / half[1]
-    clip[2, 2], clip[2, 3] = -near / (far - near), far * near / (far - near)
-    clip[3, 2] = 1.0
-    return clip @ view
+    view = np.empty((3, 4))
+    view[:, :3] = axes
+    view[:, 3] = -view[:, :3] @ eye
+    clip = np.empty((4, 4))
+    clip[0], clip[1], clip[3] = view[0] / half[0], view[1] / half[1], view[2]
+    clip[2] = view[2] * (-near / (far - near))
+    clip[2, 3] += far * near / (far - near)
+    return clip
 
 
 def depth_range(mesh: Mesh, eye: Vec, forward: Vec) -> tuple[float, float]:
     """Nearest and farthest depth of the mesh before the eye, a little widened [mm]."""
-    z = (mesh.positions - eye) @ forward
+    z = (mesh.outline - eye) @ forward
     near, far = float(z.min()), float(z.max())
     return max(near - 1.0, 0.5, 1e-3 * far), max(far + 1.0, 2.0)
 
@@ -76,25 +93,25 @@ def shadow_view(light: Light, centre: Vec, mesh: Mesh, size: int, culprit: str) 
     if isinstance(light, DirectionalLight):
         return parallel_view(np.array(light.direction), mesh, size)
     eye = np.array(light.position) + centre
-    points = mesh.positions.astype(np.float64)
+    points = mesh.outline
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     axes = frame_of(middle - eye, np.array([0.0, 1.0, 0.0]))
-    x, y, z = ((points - eye) @ axis for axis in axes)
-    steepest = np.tan(np.radians(_WIDEST_LIGHT_DEGREES))
-    if z.min() <= 1.0 or max(np.abs(x / z).max(), np.abs(y / z).max()) > steepest:
+    x, y, z = np.array(axes) @ (points - eye).T
+    near, far = float(z.min()), float(z.max())
+    half = float(np.abs((x / z, y / z)).max()) if near > 0.0 else math.inf
+    if near <= 1.0 or half > math.tan(math.radians(_WIDEST_LIGHT_DEGREES)):
         place = [round(c) for c in light.position]
         refuse(
             culprit, "a place outside the head", f"it is at {place} mm", "Move it away or set shadows = false"
         )
-    half = 1.02 * max(float(np.abs(x / z).max()), float(np.abs(y / z).max()))
-    near, far = 0.98 * float(z.min()), 1.02 * float(z.max())
+    half, near, far = 1.02 * half, 0.98 * near, 1.02 * far
     clip = perspective(eye, axes, (half, half), near, far)
     return ShadowView(clip, 2.0 * half / size, eye, axes[0], axes[1], near, far)
 
 
 def parallel_view(direction: Vec, mesh: Mesh, size: int) -> ShadowView:
     """The tightest map of `size` texels around the whole mesh in parallel light."""
-    points = mesh.positions.astype(np.float64)
+    points = mesh.outline
     axes = frame_of(direction, np.array([0.0, 1.0, 0.0]))
     local = points @ np.stack(axes, axis=1)
     low, high = local.min(axis=0) - 1.0, local.max(axis=0) + 1.0
@@ -106,10 +123,3 @@ def parallel_view(direction: Vec, mesh: Mesh, size: int) -> ShadowView:
     clip[2, 3] = high[2] / (high[2] - low[2])
     middle = 0.5 * (low[0] + high[0]) * axes[0] + 0.5 * (low[1] + high[1]) * axes[1]
     return ShadowView(clip, 2.0 * half / size, middle, axes[0], axes[1], float(low[2]), float(high[2]))
-
-
-def _view(eye: Vec, axes: tuple[Vec, Vec, Vec]) -> Matrix:
-    view = np.eye(4)
-    view[:3, :3] = np.stack(axes)
-    view[:3, 3] = -view[:3, :3] @ eye
-    return view

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from dermis.gpu import Device, download
 from dermis.gpu.device import gpu_failures
+from dermis.rendering.stages.pack import Leaving
+from dermis.rendering.stages.post import Picture
 
 
 @dataclass(frozen=True)
@@ -23,16 +25,18 @@ class Rendered:
     gaussians : levels of the profile
     unscattered : share of the skin's triangles that the atlas cannot hold; they are lit directly
     suns : sun-like peaks of the environment that shine as lights of their own
+    leave : sends the picture's bytes on their way
     """
 
     device: Device
-    picture: Any
+    picture: Picture
     gpu_ms: dict[str, float] | None
     frame_ms: float
     setup_ms: float
     gaussians: int
     unscattered: float
     suns: int
+    leave: Callable[[Picture], Leaving]
     is_current: Callable[[], bool]
 
     def linear(self) -> NDArray[np.float32]:
@@ -41,12 +45,17 @@ class Rendered:
 
     def srgb8(self) -> NDArray[np.uint8]:
         """(h, w, 3) sRGB bytes, with the tone curve, encoded on the device."""
-        return np.ascontiguousarray(self._read(self.picture.bytes)[..., :3])
+        self._check_current()
+        with gpu_failures(self.device):
+            return self.leave(self.picture).image()
 
     def _read(self, texture: Any) -> NDArray[Any]:
+        self._check_current()
+        with gpu_failures(self.device):
+            return download(self.device, texture)
+
+    def _check_current(self) -> None:
         if not self.is_current():
             raise RuntimeError(
                 "a newer frame has taken this image's place: read each before drawing the next"
             )
-        with gpu_failures(self.device):
-            return download(self.device, texture)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections import deque
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -14,26 +16,33 @@ from dermis.rendering.frame import Stages, draw_frame
 from dermis.rendering.inputs import Inputs
 from dermis.rendering.preparation import Preparation
 from dermis.rendering.rendered import Rendered
+from dermis.rendering.stages.pack import Leaving
+from dermis.rendering.stages.post import Picture
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
 _WARMING_FRAMES = 100
+_IN_FLIGHT = (
+    3  # frames submitted and not done: Python and the device work side by side, the picture stays fresh
+)
 
 
 class Renderer:
     """Renders scenes on one device; what does not change between two frames is not made again.
 
     adapter : "auto", "cpu" or part of an adapter's name
+    depth : how many sizes of things are kept, for who goes back and forth between some
     """
 
-    def __init__(self, adapter: str = "auto") -> None:
+    def __init__(self, adapter: str = "auto", depth: int = 1) -> None:
         started = time.perf_counter()
         self.device = open_device(adapter)
         with gpu_failures(self.device):
             self.stages = Stages(self.device)
-        self._preparation = Preparation(self.device, self.stages)
+        self._preparation = Preparation(self.device, self.stages, depth)
         self.prepare, self.forget = self._preparation.inputs, self._preparation.forget_all
         self._frames = 0
+        self._in_flight: deque[int] = deque()
         self._opening_ms = 1e3 * (time.perf_counter() - started)
 
     def draw(
@@ -42,12 +51,15 @@ class Renderer:
         settings: Settings | None = None,
         *,
         keep_shadows: bool = True,
+        keep_light: bool = False,
         timed: bool = True,
     ) -> Rendered:
         """Render one frame and leave the image on the device.
 
         keep_shadows : False draws the shadow maps again even when no light moved
-        timed : False returns as soon as the frame is submitted, so that the device never waits for Python
+        keep_light : True lights the atlas again only when something that it shows has changed
+        timed : False returns as soon as the frame is submitted, so that the device never waits for Python;
+            only when it is three frames behind is it waited for
 
         Raises DermisError for sizes over the device's limits and when the device fails.
         """
@@ -56,15 +68,16 @@ class Renderer:
             started = time.perf_counter()
             inputs = self.prepare(scene, settings)
             ready = time.perf_counter()
-            frame = Frame(self.device)
-            self._submit(frame, inputs, keep_shadows)
+            frame = Frame(self.device, timed=timed)
+            self._submit(frame, inputs, keep_shadows, keep_light)
             if timed:
                 frame.wait()
+            else:
+                self._keep_pace(frame)
             done = time.perf_counter()
             times = frame.stage_ms() if timed else None
         setup_ms = 1e3 * (ready - started) + self._opening_ms
         self._opening_ms = 0.0
-        self._frames += 1
         number, frame_ms = self._frames, 1e3 * (done - ready)
         return Rendered(
             self.device,
@@ -75,6 +88,7 @@ class Renderer:
             inputs.gaussians,
             inputs.head.unscattered,
             inputs.suns,
+            self._leave,
             is_current=lambda: number == self._frames,
         )
 
@@ -90,20 +104,66 @@ class Renderer:
         self.device.wait()
         return self.draw(scene, settings, keep_shadows=keep_shadows)
 
-    def _submit(self, frame: Frame, inputs: Inputs, keep_shadows: bool) -> None:
-        """Record and submit; after a failure nobody knows what the shadow maps hold."""
+    def _submit(
+        self, frame: Frame, inputs: Inputs, keep_shadows: bool, keep_light: bool, *, leaves: bool = False
+    ) -> Leaving | None:
+        """Record and submit; after a failure nobody knows what the shadow maps and the atlas hold.
+
+        leaves : whether the picture's bytes go on their way to NumPy at once
+        """
         if not keep_shadows:
             inputs.shadow_maps.drawn = b""
+        if not keep_light:
+            self.stages.scattered.forget_all()
         try:
-            draw_frame(frame, self.stages, inputs)
+            draw_frame(frame, self.stages, inputs, keep_light)
+            leaving = self.stages.pack.draw(frame, inputs.picture) if leaves else None
             frame.submit()
         except Exception:
             inputs.shadow_maps.drawn = b""
+            self.stages.scattered.forget_all()
             raise
+        self._frames += 1
+        return leaving
+
+    def _keep_pace(self, frame: Frame) -> None:
+        """Wait for the frame before those that may be in flight."""
+        self._in_flight.append(frame.submitted)
+        while len(self._in_flight) > _IN_FLIGHT:
+            self.device.wait(self._in_flight.popleft())
+
+    def _leave(self, picture: Picture) -> Leaving:
+        frame = Frame(self.device, timed=False)
+        leaving = self.stages.pack.draw(frame, picture)
+        frame.submit()
+        return leaving
 
     def render(self, scene: Scene, **settings: Any) -> NDArray[np.float32]:
         """(h, w, 3) float32 linear Rec. 709 image; `settings` are those of `Settings`."""
         return self.draw(scene, Settings(**settings)).linear()
+
+    def render_many(self, scenes: Iterable[Scene], **settings: Any) -> Iterator[NDArray[np.uint8]]:
+        """(h, w, 3) sRGB bytes of each scene in turn, each handed out while the next ones are drawn.
+
+        settings : those of `Settings`, for all of them; heads and textures that scenes share are loaded once
+
+        Raises DermisError as `draw` does.
+        """
+        chosen, leaving = Settings(**settings), deque[Leaving]()
+        for scene in scenes:
+            leaving.append(self._send(scene, chosen))
+            if len(leaving) >= _IN_FLIGHT:
+                yield leaving.popleft().image()
+        while leaving:
+            yield leaving.popleft().image()
+
+    def _send(self, scene: Scene, settings: Settings) -> Leaving:
+        """Submit a frame and send its bytes on their way."""
+        with gpu_failures(self.device):
+            inputs, frame = self.prepare(scene, settings), Frame(self.device, timed=False)
+            leaving = self._submit(frame, inputs, True, False, leaves=True)
+        assert leaving is not None
+        return leaving
 
 
 def render(scene: Scene, adapter: str = "auto", **settings: Any) -> NDArray[np.float32]:

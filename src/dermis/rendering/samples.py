@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
 
+@cache
 def pixel_samples(count: int) -> NDArray[np.float64]:
     """(count, 2) places in the unit square: Hammersley's set, even in both axes for any count."""
     index = np.arange(count)
@@ -14,4 +17,6 @@ def pixel_samples(count: int) -> NDArray[np.float64]:
         y += digit * (rest & 1)
         rest >>= 1
         digit /= 2
-    return np.stack([(index + 0.5) / count, y + 0.5 / count], axis=-1) % 1.0
+    places = np.stack([(index + 0.5) / count, y + 0.5 / count], axis=-1) % 1.0
+    places.flags.writeable = False
+    return places

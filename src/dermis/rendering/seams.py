@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
+from dermis.assets.atlas import SMALLEST
 from dermis.scene.settings import Settings
 
 FEATHER_MM = 3.0  # width over which an edited stretch map narrows the blur towards an edge
@@ -41,6 +43,25 @@ def remedy_of(settings: Settings) -> Remedy:
     if settings.technique in _BASELINES and settings.seams == "stitch":
         return REMEDIES["clear-colour"]
     return REMEDIES[settings.seams]
+
+
+class LaidOut(NamedTuple):
+    """Atlases of a frame: the names of their layouts, and texels along the side of each."""
+
+    layouts: tuple[str, ...]
+    side: int
+
+
+def laid_out(settings: Settings, levels: int, occluded: bool) -> LaidOut:
+    """The atlases that a frame needs: the least where no light spreads over them and nothing else lies there.
+
+    levels : Gaussians that light is blurred by over the atlas
+    occluded : whether an environment's occlusion lies on it
+    """
+    layouts = remedy_of(settings).layouts
+    if levels:
+        return LaidOut(layouts, settings.atlas)
+    return LaidOut(layouts[:1], settings.atlas) if occluded else LaidOut(("mesh",), SMALLEST)
 
 
 def stretch_of(settings: Settings) -> str:

@@ -23,7 +23,9 @@ from dermis.rendering.lights import sun_lights
 from dermis.rendering.stages.occlusion import FORM, Occlusion, whole_map
 from dermis.rendering.surface import model_of
 from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
 
+_BRIGHTEST = 65504.0  # of 16-bit floats
 _FINEST_OCCLUSION = 1024  # texels a side: it is smooth, and a texel of it is under a millimetre
 
 
@@ -45,13 +47,21 @@ def load_surroundings(device: Device, name: str | None) -> Surroundings:
     Raises DermisError when there is no such environment.
     """
     if name is None:
-        return Surroundings(make_texture(device, (1, 1), "rgba32float", layers=2, use="map"), ())
+        return Surroundings(make_texture(device, (1, 1), "rgba16float", layers=2, use="map"), ())
     made = prefilter(name)
     count, height, width, _ = made.layers.shape
-    texture = make_texture(device, (width, height), "rgba32float", layers=count, use="map")
+    texture = make_texture(device, (width + 2, height + 2), "rgba16float", layers=count, use="map")
     for index, layer in enumerate(made.layers):
-        upload(device, texture, np.dstack([layer, np.ones((height, width))]), layer=index)
+        texels = np.dstack([_bordered(layer), np.ones((height + 2, width + 2))])
+        upload(device, texture, np.minimum(texels, _BRIGHTEST), layer=index)
     return Surroundings(texture, made.suns)
+
+
+def _bordered(layer: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A layer with what a filter finds around it: beyond a pole the first row again, half way around."""
+    half = layer.shape[1] // 2
+    rows = np.concatenate([np.roll(layer[:1], half, axis=1), layer, np.roll(layer[-1:], half, axis=1)])
+    return np.concatenate([rows[:, -1:], rows, rows[:, :1]], axis=1)
 
 
 def with_suns(scene: Scene, surroundings: Surroundings) -> Scene:
@@ -97,6 +107,11 @@ def occlusion_map(
 
     levels = cached_occlusion(head.mesh, atlas, f"{FORM} {side}", bake)
     return texture_from(device, levels / np.float32(65535.0), "r32float")
+
+
+def is_occluded(scene: Scene, settings: Settings) -> bool:
+    """Whether the head hides some of its environment from itself."""
+    return scene.environment is not None and settings.occlusion == "baked"
 
 
 def no_occlusion(device: Device) -> Any:

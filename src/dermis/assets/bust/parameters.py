@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from numbers import Integral
 
 from dermis.errors import refuse
 
@@ -32,8 +33,10 @@ class BustParameters:
         for field in fields(self):
             low, high = RANGES[field.name]
             value = getattr(self, field.name)
-            if not low <= value <= high:
-                refuse(field.name, f"a number from {low:g} to {high:g}", f"{value!r} came", "Choose within")
+            whole = field.name == "seed"
+            if not low <= value <= high or (whole and not isinstance(value, Integral)):
+                number = "a whole number" if whole else "a number"
+                refuse(field.name, f"{number} from {low:g} to {high:g}", f"{value!r} came", "Choose within")
 
 
 RANGES = {

@@ -1,31 +1,45 @@
-// The weighted sum of the blurred levels, and what comes through thin parts: all the light that left the skin.
+// The weighted sum of the blurred levels of one resolution, of the sum of the coarser ones, and of what comes through
+// thin parts.
+//#include "source.wgsl"
+//#include "store.wgsl"
 //#include "bilinear.wgsl"
 
+override COARSER: bool = false; // whether there are levels of less resolution
 override TRANSMITTED: bool = false; // whether something comes through
 
 struct Weights {
-    first: u32,
+    first: u32, // layer
     count: u32,
+    mip: i32, // of these layers
+    scale: f32, // of what is stored over the layers
+    through: f32, // of what comes through
     weight: array<vec4f, 24>,
 }
 
 @group(0) @binding(0) var<uniform> weights: Weights;
 @group(0) @binding(1) var levels: texture_2d_array<f32>;
 @group(0) @binding(2) var transmitted: texture_2d<f32>; // light, and 1 where there is surface; maybe fewer texels
-@group(0) @binding(3) var combined: texture_storage_2d<rgba32float, write>;
+// source: the sum of the coarser levels, and 1 where there is surface
 
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size(16, 16)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    if (any(id.xy >= textureDimensions(levels))) {
+    let size = textureDimensions(levels, weights.mip);
+    if (any(id.xy >= size)) {
         return;
     }
     var sum = vec4f(0.0);
     for (var k = 0u; k < weights.count; k++) {
-        sum += weights.weight[k] * textureLoad(levels, id.xy, weights.first + k, 0);
+        sum += weights.weight[k] * textureLoad(levels, id.xy, weights.first + k, weights.mip);
     }
-    if (TRANSMITTED) {
-        let light = load_bilinear(transmitted, (vec2f(id.xy) + 0.5) / vec2f(textureDimensions(levels)));
+    let place = (vec2f(id.xy) + 0.5) / vec2f(size);
+    if (COARSER) {
+        let light = source_at(place);
         sum += vec4f(light.rgb / max(light.a, 1e-6), 0.0);
     }
-    textureStore(combined, id.xy, sum);
+    sum = vec4f(weights.scale * sum.rgb, sum.a);
+    if (TRANSMITTED) {
+        let light = load_bilinear(transmitted, place);
+        sum += vec4f(weights.through * light.rgb / max(light.a, 1e-6), 0.0);
+    }
+    store(id.xy, sum);
 }

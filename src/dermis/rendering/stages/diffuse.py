@@ -2,49 +2,45 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.gpu import ComputeProgram, Device, Frame, make_texture
+from dermis.gpu import ComputeProgram, Device, Frame
 from dermis.gpu.textures import texture_from
 from dermis.rendering.atlas_textures import AtlasTextures
 from dermis.rendering.kernels import ROWS_PER_UNIT, TRUNCATION, WIDEST, kernel_table
-from dermis.rendering.stages import STAGES
+from dermis.rendering.levels import ENTERED, Levels, halvings_of, make_levels, scale_of
+from dermis.rendering.stages import SOURCE_SHADERS, STAGES, STORE_SHADERS, TILE
 from dermis.rendering.stages.stitch import Stitch
 
 EDGES = ("repeated", "cleared", "skipped")
-
-
-@dataclass(frozen=True)
-class Levels:
-    """The blurred irradiance, layer 0 not blurred, and the space between two passes."""
-
-    stack: Any
-    views: list[Any]
-    scratch: Any
-    size: int
+# Variance that a halved resolution adds: the mean of four texels, and reading between such means [texel^2].
+_AVERAGED, _READ = 1 / 16, 3 / 16
 
 
 class Diffuse:
-    """Spreads the light of layer 0 to the layers above it."""
+    """Spreads the light that enters to the layers above it.
+
+    texel : format of the levels; when left out halves on GPUs, which read them faster, and floats on software
+        adapters, which convert halves one by one
+    """
 
     name = "diffuse"
 
-    def __init__(self, device: Device) -> None:
+    def __init__(self, device: Device, texel: str | None = None) -> None:
         self._device = device
-        self._stitch = Stitch(device)
-        self._path = STAGES / "diffuse.wgsl"
-        self._made: dict[tuple[bool, str], list[ComputeProgram]] = {}
+        self.texel = texel or (ENTERED if device.adapter.kind == "CPU" else "rgba16float")
+        self._stitch = {form: Stitch(device, form) for form in {ENTERED, self.texel}}
+        self._made: dict[tuple[str, bool, str], list[ComputeProgram]] = {}
         self._kernels = texture_from(device, kernel_table(), "r32float")
+        self._linear = device.sampler(mag_filter="linear", min_filter="linear")
+        self._halve = self._program("diffuse_halve.wgsl", self.texel)
 
     def make_levels(self, size: int, count: int) -> Levels:
         """Space for the unblurred light and `count` blurred levels."""
-        stack = make_texture(self._device, (size, size), "rgba32float", layers=max(2, count + 1))
-        views = layer_views(stack, count + 1)
-        return Levels(stack, views, make_texture(self._device, (size, size), "rgba32float"), size)
+        return make_levels(self._device, size, count, self.texel)
 
     def draw(
         self,
@@ -54,43 +50,64 @@ class Diffuse:
         variance_mm2: NDArray[np.float64],
         edge: str = "repeated",
         clear: ArrayLike = (0.0, 0.0, 0.0),
+        exposure: float = 1.0,
     ) -> None:
         """Fill layer k with the light spread by variance_mm2[k - 1] (increasing).
 
         edge : one of EDGES, what lies beyond a chart's edge and its apron
         clear : the light that empty texels show when the edge is "cleared"
+        exposure : factor from the light to the image
         """
-        along = self._along(atlas.sheared, edge)
-        before = 0.0
+        sheets = (atlas, *(atlas.coarser if edge == "repeated" else ()))
+        levels.halvings = halvings_of(variance_mm2, atlas.usual_per_mm, len(sheets) - 1)
+        levels.scale = scale_of(self.texel, exposure)
+        source, before = levels.entering, 0.0
         for k, variance in enumerate(variance_mm2, start=1):
-            self._stitch.draw(frame, "diffuse", atlas, levels.views[k - 1], levels.scratch)
-            added = {"variance_mm2": variance - before, "before_mm2": before}
-            record = along[0].record("Spread", **added, clear=clear)
-            passes = ((levels.views[k - 1], levels.scratch), (levels.scratch, levels.views[k]))
-            for program, (source, blurred) in zip(along, passes, strict=True):
-                bound = {
-                    **atlas.resources,
-                    "spread": record,
-                    "source": source,
-                    "kernel_table": self._kernels,
-                    "blurred": blurred,
-                }
-                frame.compute("diffuse", program, bound, (levels.size, levels.size))
+            finer, here = levels.halvings[k - 1 : k + 1]
+            texel, scale = (ENTERED, 1.0) if k == 1 else (self.texel, levels.scale)
+            self._stitch[texel].draw(frame, "diffuse", sheets[finer], source)
+            if here > finer:
+                source = self._halved(frame, levels, source, k - 1)
+            for along, blurred in zip(
+                self._along(texel, atlas.sheared, edge),
+                (levels.spare(here), levels.layer(k, here)),
+                strict=True,
+            ):
+                spread = along.record(
+                    "Spread",
+                    variance_mm2=variance - before,
+                    before_mm2=before,
+                    resampled=_AVERAGED + _READ if here > finer else 0.0,
+                    to_come=sum(_READ / 4**times for times in range(here)),
+                    scale=levels.scale / scale,
+                    clear=scale * np.asarray(clear),
+                )
+                bound = {"spread": spread, "kernel_table": self._kernels, "source": source, "stored": blurred}
+                self._run(frame, along, sheets[here].resources | bound, levels.size >> here)
+                source, scale = blurred, levels.scale
             before = float(variance)
 
-    def _along(self, sheared: bool, edge: str) -> list[ComputeProgram]:
-        """The passes along u and along v, made when first asked for."""
-        if (sheared, edge) not in self._made:
+    def _halved(self, frame: Frame, levels: Levels, source: Any, k: int) -> Any:
+        """Layer k at half its resolution."""
+        times = levels.halvings[k] + 1
+        bound = {"source": source, "stored": levels.layer(k, times)}
+        self._run(frame, self._halve, bound, levels.size >> times)
+        return bound["stored"]
+
+    def _run(self, frame: Frame, program: ComputeProgram, bound: dict[str, Any], side: int) -> None:
+        frame.compute("diffuse", program, bound | {"linear": self._linear}, (side, side), TILE)
+
+    def _along(self, texel: str, sheared: bool, edge: str) -> list[ComputeProgram]:
+        """The passes along u, from texels of a format, and along v, made when first asked for."""
+        if (texel, sheared, edge) not in self._made:
             table = {"ROWS_PER_UNIT": ROWS_PER_UNIT, "WIDEST": WIDEST, "TRUNCATION": TRUNCATION}
             chosen = {**table, "SHEARED": sheared, "EDGE": EDGES.index(edge)}
-            self._made[sheared, edge] = [
-                ComputeProgram(self._device, self._path, constants={"AXIS": axis, **chosen})
-                for axis in (0, 1)
+            self._made[texel, sheared, edge] = [
+                self._program("diffuse.wgsl", source, {"AXIS": axis, **chosen})
+                for axis, source in enumerate((texel, self.texel))
             ]
-        return self._made[sheared, edge]
+        return self._made[texel, sheared, edge]
 
-
-def layer_views(stack: Any, count: int) -> list[Any]:
-    """Views of the first `count` layers of a texture array, each by itself."""
-    options = {"dimension": "2d", "array_layer_count": 1}
-    return [stack.create_view(base_array_layer=k, **options) for k in range(count)]
+    def _program(self, name: str, source: str, constants: dict[str, float] | None = None) -> ComputeProgram:
+        shaders = SOURCE_SHADERS[source], STORE_SHADERS[self.texel]
+        return ComputeProgram(self._device, STAGES / name, shaders, constants)

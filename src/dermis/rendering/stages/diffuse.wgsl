@@ -1,4 +1,6 @@
 // One axis of one Gaussian: spreads light along u, or along v as the surface has it, by a variance given in mm^2.
+//#include "source.wgsl"
+//#include "store.wgsl"
 
 override AXIS: u32 = 0u; // 0 along u, 1 along v
 override SHEARED: bool = true; // whether u and v may meet at other than right angles
@@ -13,17 +15,20 @@ const CLEARED: u32 = 1u; // whatever the texture holds, the clear colour where t
 const SKIPPED: u32 = 2u; // whatever the texture holds, left out where that is nothing
 const WIDE_TRUNCATION: f32 = 4.0; // beyond the table, where the sampled Gaussian needs no correction
 const SMOOTH: f32 = 1.6; // widest step over the source's width: its ripple stays under 0.1 %
-const PI: f32 = 3.14159265358979;
 
 struct Spread {
     variance_mm2: f32, // to be added
     before_mm2: f32, // already in the source
+    resampled: f32, // of it what going to this resolution and back adds [texel^2]
+    to_come: f32, // what reading between texels at the end will add to the source [texel^2]
+    scale: f32, // of what is stored over the source
     clear: vec3f, // the light that empty texels show
 }
 
-// The Gaussian's covariance in texels makes one blur along u and one along a leaning v [Geusebroek2003].
+// One of the two blurs that make the Gaussian, in texels.
 struct Axis {
-    per_mm: f32, // texels per mm
+    variance: f32, // to be added
+    before: f32, // already in the source
     lean: f32, // texels of u for each one of v
 }
 
@@ -34,27 +39,41 @@ struct Kernel {
 }
 
 @group(0) @binding(0) var<uniform> spread: Spread;
-@group(0) @binding(1) var source: texture_2d<f32>; // light, and 1 where there is surface
-@group(0) @binding(2) var stretch_map: texture_2d<f32>; // texels per mm along u, v; cosine between them; 1 in the apron
-@group(0) @binding(3) var reach_map: texture_2d<u32>; // texels on the same chart: left, right, up, down
-@group(0) @binding(4) var kernel_table: texture_2d<f32>; // row: variance, column: taps on each side
-@group(0) @binding(5) var blurred: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(1) var stretch_map: texture_2d<f32>; // texels per mm along u, v; cosine between them; 1 in the apron
+@group(0) @binding(2) var reach_map: texture_2d<u32>; // texels on the same chart: left, right, up, down
+@group(0) @binding(3) var kernel_table: texture_2d<f32>; // row: variance, column: taps on each side
 
+// Any covariance is that of a blur along u and one along a leaning v [Geusebroek2003]: the lower right element is the
+// latter's, and what that leaves of the upper left one is the former's.
 fn along_v(stretch: vec4f) -> Axis {
-    if (!SHEARED) {
-        return Axis(stretch.y, 0.0);
+    let upright = stretch.xy * stretch.xy / (1.0 - stretch.z * stretch.z);
+    var variance = spread.variance_mm2 * upright.y;
+    var lean = -stretch.z * stretch.x / stretch.y;
+    if (spread.resampled > 0.0) {
+        let covariance = lean * variance;
+        variance = max(variance - spread.resampled, 0.0);
+        let most = sqrt(max(spread.variance_mm2 * upright.x - spread.resampled, 0.0) * variance);
+        lean = clamp(covariance, -most, most) / max(variance, 1e-12);
     }
-    return Axis(stretch.y * inverseSqrt(1.0 - stretch.z * stretch.z), -stretch.z * stretch.x / stretch.y);
+    return Axis(variance, max(upright.y * spread.before_mm2 - spread.to_come, 0.0), lean);
+}
+
+fn along_u(stretch: vec4f, v: Axis) -> Axis {
+    let square = stretch.x * stretch.x;
+    let all = square / (1.0 - stretch.z * stretch.z) * spread.variance_mm2 - spread.resampled;
+    let rest = max(all - v.lean * v.lean * v.variance, 0.0);
+    return Axis(rest, max(square * spread.before_mm2 - spread.to_come, 0.0), 0.0);
 }
 
 // Texels between taps. Only a source that is already smooth at the step's scale may be read sparsely.
-fn tap_step(sigma: f32, sigma_before: f32) -> f32 {
-    return max(1.0, floor(min(SMOOTH * sigma_before, sigma)));
+fn tap_step(axis: Axis) -> f32 {
+    return max(1.0, floor(sqrt(min(SMOOTH * SMOOTH * axis.before, axis.variance))));
 }
 
 fn kernel_of(variance: f32, step: f32) -> Kernel {
-    let taps = i32(ceil(select(TRUNCATION, WIDE_TRUNCATION, variance > WIDEST) * sqrt(variance)));
-    return Kernel(taps, i32(step), first_ratio(taps, variance));
+    let scaled = variance / (step * step);
+    let taps = i32(ceil(select(TRUNCATION, WIDE_TRUNCATION, scaled > WIDEST) * sqrt(scaled)));
+    return Kernel(taps, i32(step), first_ratio(taps, scaled));
 }
 
 // Weight of the first tap over the centre's, such that the kernel of `taps` has the variance.
@@ -69,11 +88,8 @@ fn first_ratio(taps: i32, variance: f32) -> f32 {
 }
 
 // Variance that reading between two texels of u will add on the way along v: the mean of f (1 - f) over the taps.
-fn added_by_lean(stretch: vec4f) -> f32 {
-    let v = along_v(stretch);
-    let sigma = sqrt(spread.variance_mm2) * v.per_mm;
-    let step = tap_step(sigma, sqrt(spread.before_mm2) * v.per_mm);
-    let kernel = kernel_of(sigma * sigma / (step * step), step);
+fn added_by_lean(v: Axis) -> f32 {
+    let kernel = kernel_of(v.variance, tap_step(v));
     var ratio = kernel.q;
     var weight = 1.0;
     var sum = 0.0;
@@ -88,71 +104,70 @@ fn added_by_lean(stretch: vec4f) -> f32 {
     return sum / total;
 }
 
-fn texel(at: vec2i) -> vec4f {
-    if (EDGE == REPEATED && !SHEARED) {
-        return textureLoad(source, at, 0);
-    }
-    let size = vec2i(textureDimensions(source));
-    let light = textureLoad(source, clamp(at, vec2i(0), size - 1), 0);
+fn shown(light: vec4f) -> vec4f {
     if (EDGE == CLEARED) {
         return vec4f(light.rgb + (1.0 - light.a) * spread.clear, 1.0);
     }
     return light;
 }
 
-// The light some texels from here along the axis; its fourth component is the share of it that is surface.
-fn tap(here: vec2i, offset: i32, lean: f32) -> vec4f {
-    if (AXIS == 0u) {
-        return texel(here + vec2i(offset, 0));
+fn texel(at: vec2i) -> vec4f {
+    if (EDGE == REPEATED) {
+        return textureLoad(source, at, 0);
     }
-    if (!SHEARED || lean == 0.0) {
-        return texel(here + vec2i(0, offset));
-    }
-    let drift = lean * f32(offset);
-    let column = floor(drift);
-    let at = here + vec2i(i32(column), offset);
-    return mix(texel(at), texel(at + vec2i(1, 0)), drift - column);
+    return shown(textureLoad(source, clamp(at, vec2i(0), vec2i(textureDimensions(source)) - 1), 0));
 }
 
-@compute @workgroup_size(8, 8)
+// The light some texels from here along the axis; its fourth component is the share of it that is surface.
+fn tap(here: vec2f, offset: f32, lean: f32) -> vec4f {
+    if (AXIS == 1u && SHEARED) {
+        return shown(source_between(here + offset * vec2f(lean, 1.0)));
+    }
+    return texel(vec2i(here + select(vec2f(offset, 0.0), vec2f(0.0, offset), AXIS == 1u)));
+}
+
+@compute @workgroup_size(16, 16)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if (any(id.xy >= textureDimensions(source))) {
         return;
     }
     let here = vec2i(id.xy);
+    // All that is read here is asked for at once: what follows is short, and would wait for each by itself.
     let stretch = textureLoad(stretch_map, here, 0);
+    var sum = texel(here);
+    var limit = vec2f(1e6);
+    if (EDGE == REPEATED) {
+        let reach = vec4f(textureLoad(reach_map, here, 0));
+        limit = select(reach.zw, reach.xy, AXIS == 0u);
+    }
     if (AXIS == 1u && stretch.w > 0.0) {
         return; // the apron is filled from where its light belongs
     }
     if (stretch.x == 0.0) {
-        textureStore(blurred, here, vec4f(0.0)); // no surface here
+        store(id.xy, vec4f(0.0)); // no surface here
         return;
     }
-    var axis = Axis(stretch.x, 0.0);
-    if (AXIS == 1u) {
-        axis = along_v(stretch);
+    let v = along_v(stretch);
+    var axis = v;
+    if (AXIS == 0u) {
+        axis = along_u(stretch, v);
     }
-    let sigma = sqrt(spread.variance_mm2) * axis.per_mm;
-    let step = tap_step(sigma, sqrt(spread.before_mm2) * axis.per_mm);
-    var variance = sigma * sigma;
-    if (SHEARED && AXIS == 0u && stretch.z != 0.0) {
-        variance = max(0.0, variance - added_by_lean(stretch));
+    let step = tap_step(axis);
+    if (SHEARED && AXIS == 0u && v.lean != 0.0) {
+        axis.variance = max(0.0, axis.variance - added_by_lean(v));
     }
-    let kernel = kernel_of(variance / (step * step), step);
-    var limit = vec2i(1 << 20u);
-    if (EDGE == REPEATED) {
-        let reach = vec4i(textureLoad(reach_map, here, 0));
-        limit = select(reach.zw, reach.xy, AXIS == 0u);
-    }
+    let kernel = kernel_of(axis.variance, step);
     // Weights exp(-b n^2) by their ratios: q, q^3, q^5, ... with q = exp(-b).
+    let growth = kernel.q * kernel.q;
     var ratio = kernel.q;
     var weight = 1.0;
-    var sum = texel(here);
-    for (var n = 1; n <= kernel.taps; n++) {
+    var offset = 0.0;
+    for (var n = 0; n < kernel.taps; n++) {
         weight *= ratio;
-        ratio *= kernel.q * kernel.q;
-        let offset = n * kernel.step;
-        sum += weight * (tap(here, -min(offset, limit.x), axis.lean) + tap(here, min(offset, limit.y), axis.lean));
+        ratio *= growth;
+        offset += step;
+        let reached = min(vec2f(offset), limit);
+        sum += weight * (tap(vec2f(here), -reached.x, axis.lean) + tap(vec2f(here), reached.y, axis.lean));
     }
-    textureStore(blurred, here, sum / sum.a);
+    store(id.xy, vec4f(spread.scale * sum.rgb / sum.a, 1.0));
 }

@@ -10,14 +10,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.gpu import ComputeProgram, Device, Frame, RasterProgram, make_texture
 from dermis.rendering.geometry import HeadTextures
 from dermis.rendering.projection import Matrix
 from dermis.rendering.stages import SHARED_SHADERS, STAGES
+from dermis.rendering.stages.variants import Variants
 
+_TAKEN = 4  # triangles of a workgroup, in nearest.wgsl
 _GROUPS_PER_ROW = 32768
-_PITCH = 64  # rows of a copied buffer start at multiples of 256 bytes
+_TILE = (32, 8)  # pixels that a workgroup of resolve_*.wgsl takes
 
 
 @dataclass(frozen=True)
@@ -53,9 +56,10 @@ class Nearest:
         self._triangles = triangles
         self._compute = device.adapter.kind != "CPU" if compute is None else compute
         shared = (SHARED_SHADERS,)
+        self._finders = Variants(device, STAGES / "nearest.wgsl")
         if self._compute:
-            path = STAGES / "nearest.wgsl"
-            self._finders = [ComputeProgram(device, path, shared, {"FIND_TRIANGLE": find}) for find in (0, 1)]
+            resolve = "resolve_triangles.wgsl" if triangles else "resolve_depth.wgsl"
+            self._resolve = ComputeProgram(device, STAGES / resolve, shared)
         target = "r32uint" if triangles else None
         self._raster = RasterProgram(
             device, STAGES / "nearest_raster.wgsl", shared, target=target, depth_compare="greater"
@@ -63,7 +67,7 @@ class Nearest:
 
     def make_layers(self, size: tuple[int, int], count: int) -> Layers:
         """Space for `count` views of size (width, height); those too large for a buffer are rasterised."""
-        fits = 4 * _pitch(size) * size[1] * count <= self._device.max_storage_bytes
+        fits = 4 * size[0] * size[1] * count <= self._device.max_storage_bytes
         make = self._compute_layers if self._compute and fits else self._raster_layers
         return make(size, max(1, count))
 
@@ -76,8 +80,8 @@ class Nearest:
 
     def _compute_layers(self, size: tuple[int, int], count: int) -> Layers:
         texel = "r32uint" if self._triangles else "r32float"
-        texture = make_texture(self._device, size, texel, layers=max(2, count), use="map")
-        words = np.zeros(_pitch(size) * size[1] * count, np.uint32)
+        texture = make_texture(self._device, size, texel, layers=max(2, count))
+        words = np.zeros(size[0] * size[1] * count, np.uint32)
         nearness = self._device.buffer(words, "STORAGE")
         found = self._device.buffer(words if self._triangles else words[:1], "STORAGE")
         return Layers(texture, size, count, [], [], nearness, found)
@@ -98,19 +102,24 @@ class Nearest:
     def _draw_compute(
         self, frame: Frame, stage: str, layers: Layers, clips: list[Matrix], head: HeadTextures
     ) -> None:
+        views, places = _views_and_places(clips, layers.size)
+        record = self._views(self._resolve, layers, views, head)
+        record["sample"][: len(places), :2] = places
+        record["reach"] = *places.min(axis=0), *places.max(axis=0)
         resources = {
             **head.resources,
-            "views": self._views(self._finders[0], layers, clips, head),
+            "views": record,
             "nearness": layers.nearness,
             "found": layers.found,
+            "layers": layers.texture,
         }
-        groups = (min(head.triangles, _GROUPS_PER_ROW), -(-head.triangles // _GROUPS_PER_ROW), len(clips))
-        frame.clear(layers.nearness)
-        frame.clear(layers.found)
-        for finder in self._finders[: 2 if self._triangles else 1]:
+        count = -(-head.triangles // _TAKEN)
+        groups = (min(count, _GROUPS_PER_ROW), -(-count // _GROUPS_PER_ROW), len(views))
+        for find in range(2 if self._triangles else 1):
+            finder = self._finders.program((("FIND_TRIANGLE", find), ("SAMPLES", len(places))))
             frame.dispatch(stage, finder, resources, groups)
-        filled = layers.found if self._triangles else layers.nearness
-        frame.copy(filled, layers.texture, pitch=_pitch(layers.size), layers=layers.count)
+        across, down = (-(-side // tile) for side, tile in zip(layers.size, _TILE, strict=True))
+        frame.dispatch(stage, self._resolve, resources, (across, down, layers.count))
 
     def _draw_raster(
         self, frame: Frame, stage: str, layers: Layers, clips: list[Matrix], head: HeadTextures
@@ -129,11 +138,18 @@ class Nearest:
             )
 
     def _views(self, program: Any, layers: Layers, clips: list[Matrix], head: HeadTextures) -> Any:
-        record = program.record("Views", triangles=head.triangles, pitch=_pitch(layers.size))
+        record = program.record("Views", triangles=head.triangles)
         record["width"], record["height"] = layers.size
         record["clip"][: len(clips)] = np.swapaxes(np.array(clips, np.float32), 1, 2)
         return record
 
 
-def _pitch(size: tuple[int, int]) -> int:
-    return -(-size[0] // _PITCH) * _PITCH
+def _views_and_places(clips: list[Matrix], size: tuple[int, int]) -> tuple[list[Matrix], NDArray[np.float64]]:
+    """One view and (n, 2) places in its pixels when the matrices differ by no more, else all views."""
+    base, way = np.array(clips[0]), clips[0][3] / (clips[0][3] @ clips[0][3])
+    moved = np.array(clips) - base
+    shift = moved[:, :2] @ way
+    apart = np.abs(moved[:, :2] - shift[..., None] * base[3]).max()
+    if apart <= 1e-9 * (1.0 + np.abs(base).max()) and not moved[:, 2:].any():
+        return clips[:1], 0.5 + shift * [-0.5, 0.5] * size
+    return clips, np.full((1, 2), 0.5)

@@ -1,5 +1,5 @@
 // The rasteriser's way to the nearest surface: depth, and the triangle where a colour target asks for it.
-//#include "geometry.wgsl"
+//#include "mesh_textures.wgsl"
 //#include "views.wgsl"
 
 struct Seen {
@@ -9,7 +9,7 @@ struct Seen {
 
 @vertex
 fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) layer: u32) -> Seen {
-    let corner = position_of(triangle_at(index / 3u)[index % 3u]);
+    let corner = textureLoad(vertex_table, vertex_texel(triangle_texel(index / 3u, 0u)[index % 3u]), 0).xyz;
     return Seen(views.clip[layer] * vec4f(corner, 1.0), index / 3u);
 }
 

@@ -2,6 +2,9 @@
 // Kept as it was, with the faults that the frame's own blur mends [dEonLuebke2007].
 
 override AXIS: u32 = 0u; // 0 along u, 1 along v
+override SKIPPED: bool = false; // whether empty texels are left out, as the talk's remedy with alpha does
+
+const LEAST: f32 = 1e-3; // of the weights that may stand for all
 
 struct Spread {
     sigma_mm: f32, // of the Gaussian to be added
@@ -31,8 +34,15 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     for (var n = 0; n < 7; n++) {
         let at = uv + f32(n - 3) * step;
         let tap = textureSampleLevel(source, linear, at, 0.0);
-        light += weights[n] * vec4f(tap.rgb + (1.0 - tap.a) * spread.clear, 1.0);
+        if (SKIPPED) {
+            light += weights[n] * vec4f(tap.rgb, tap.a); // empty texels hold no light
+        } else {
+            light += weights[n] * vec4f(tap.rgb + (1.0 - tap.a) * spread.clear, 1.0);
+        }
         wide += weights[n] * textureSampleLevel(stretch, linear, at, 0.0);
+    }
+    if (SKIPPED) {
+        light = vec4f(light.rgb / max(light.a, LEAST), select(0.0, 1.0, light.a > LEAST));
     }
     textureStore(blurred, id.xy, light);
     textureStore(stretch_blurred, id.xy, wide);

@@ -31,17 +31,20 @@ fn share_within(distance: f32) -> vec3f {
     return mix(below, above, at - low);
 }
 
-// Light from one side. Each tap stands for the surface up to halfway to the next, measured on the surface; where no
-// skin follows, the last tap stands for all beyond. So all weights together are 1/2, whatever is seen.
+// Light from one side. Each tap stands for the surface up to halfway to its neighbours, measured on the surface, or
+// for the width of its pixels where a neighbour is off it. What no tap stands for gets the light of the centre, so all
+// weights together are 1/2, whatever is seen, and each surface that the row crosses counts by its own distance.
 fn from_side(here: vec2i, centre: vec4f, step: vec2i) -> vec3f {
     let place = place_of(here, centre.a);
     let pixel = distance(place, place_of(here + step, centre.a));
     let reach = spread.reach / pixel;
     var sum = vec3f(0.0);
-    var light = centre.rgb; // of the tap before
+    var total = vec3f(0.0); // of the weights
+    var tap = centre;
     var at = 0.0; // its distance
-    var share = vec3f(0.0); // of the light from nearer than it stands for
+    var nearer = vec3f(0.0); // share of the light from nearer than it stands for
     var before = 0u;
+    var half = 0.5 * pixel; // between it and its neighbour
     for (var k = 1u; k <= TAPS; k++) {
         let part = f32(k) / f32(TAPS);
         let n = max(k, u32(round(reach * part * part)));
@@ -49,20 +52,28 @@ fn from_side(here: vec2i, centre: vec4f, step: vec2i) -> vec3f {
         if (any(pixels < vec2i(0)) || any(pixels >= vec2i(textureDimensions(source)))) {
             break;
         }
-        let tap = textureLoad(source, pixels, 0);
-        let away = distance(place, place_of(pixels, tap.a));
-        // What is no farther than the tap before lies behind an edge: another surface was in front.
-        if (tap.a > 0.0 && away > at) {
-            let widest = STEEPEST * pixel * f32(n - before);
-            let within = share_within(max(0.5 * (at + away), away - 0.5 * widest));
-            sum += (within - share) * light;
-            light = tap.rgb;
-            at = away;
-            share = within;
-        }
+        let next = textureLoad(source, pixels, 0);
+        let away = distance(place, place_of(pixels, next.a));
+        half = 0.5 * pixel * f32(n - before);
+        let joined = min(tap.a, next.a) > 0.0 && away > at && away - at <= 2.0 * STEEPEST * half;
+        let middle = 0.5 * (at + away);
+        let share = stands_for(tap, nearer, select(at + half, middle, joined));
+        sum += share * tap.rgb;
+        total += share;
+        nearer = share_within(select(max(away - half, 0.0), middle, joined));
+        tap = next;
+        at = away;
         before = n;
     }
-    return sum + (0.5 - share) * light;
+    let share = stands_for(tap, nearer, at + half);
+    sum += share * tap.rgb;
+    total += share;
+    return sum * min(0.5 / max(total, vec3f(1e-6)), vec3f(1.0)) + max(0.5 - total, vec3f(0.0)) * centre.rgb;
+}
+
+// Share of the light that comes from what a tap stands for, none from pixels without skin.
+fn stands_for(tap: vec4f, nearer: vec3f, farthest: f32) -> vec3f {
+    return select(vec3f(0.0), share_within(farthest) - nearer, tap.a > 0.0);
 }
 
 @compute @workgroup_size(8, 8)

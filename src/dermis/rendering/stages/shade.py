@@ -9,12 +9,17 @@ from dermis.gpu.program import Resources
 from dermis.rendering.stages import STAGES
 from dermis.rendering.stages.nearest import Layers
 from dermis.rendering.stages.variants import Switches, Variants
+from dermis.scene.settings import Settings
 
-TECHNIQUES: dict[str, Switches] = {
+_TECHNIQUES: dict[str, Switches] = {
     "screen-space": (("SPLIT", 1),),
     "pre-integrated": (("PRE_INTEGRATED", 1),),
 }
-"""Switches of the techniques that this pass has a part in."""
+
+
+def technique_switches(settings: Settings) -> Switches:
+    """Those of the techniques that this pass has a part in."""
+    return _TECHNIQUES.get(settings.technique, ())
 
 
 class Shade:

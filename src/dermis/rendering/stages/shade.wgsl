@@ -7,6 +7,7 @@ override SPLIT: bool = false; // whether light below the skin is kept apart, to 
 const EYE_ROUGHNESS: f32 = 0.1; // plain materials are wet: eyeballs, teeth
 const FINEST_RATIO: f32 = 4.0; // longest over shortest side of a footprint that one map sample may stand for
 const ONE_SURFACE: f32 = 4.0; // difference of depth within a pixel over its width that is still one surface
+const CROSSED: f32 = 2.0; // step in depth that light below the skin crosses [mm]: no other surface either
 
 struct Shade {
     eye: vec3f,
@@ -16,6 +17,7 @@ struct Shade {
     up: vec3f,
     relit: vec3f, // weight of the level that is not blurred
     total: vec3f, // weight of all levels
+    shown: vec2f, // factors of the light from below and of that off the surface
     pre: PreIntegrated,
     background: vec3f,
     material_colour: array<vec4f, 64>,
@@ -60,14 +62,15 @@ fn shaded_skin(point: Point, v: vec3f, footprint: f32, open: f32) -> Shaded {
     let out = leaves(dot(surface.normal, v), surface.roughness, surface.rho_s) / PI;
     let tint = mix(vec3f(1.0), surface.colour, skin.tint);
     let depth = dot(point.position - shade.eye, shade.forward);
-    return Shaded(below, share_of(surface.colour, 1.0 - skin.mix) * out, lit.reflected * tint, depth);
+    let leaving = shade.shown.x * out * share_of(surface.colour, 1.0 - skin.mix);
+    return Shaded(below, leaving, shade.shown.y * lit.reflected * tint, depth);
 }
 
 fn shaded_plain(point: Point, v: vec3f, open: f32) -> Shaded {
     let colour = shade.material_colour[point.flags >> 8u].rgb;
     let lit = light_up(point, Surface(point.normal, colour, EYE_ROUGHNESS, 1.0), v, open);
     let below = lit.entered * colour * leaves(dot(point.normal, v), EYE_ROUGHNESS, 1.0) / PI;
-    return Shaded(vec3f(0.0), vec3f(0.0), below + lit.reflected, 0.0);
+    return Shaded(vec3f(0.0), vec3f(0.0), shade.shown.x * below + shade.shown.y * lit.reflected, 0.0);
 }
 
 // Barycentric weights of where a ray from the eye meets a triangle's plane are linear in the ray, up to scale.
@@ -126,13 +129,23 @@ struct PixelSkin {
 fn keep(held: PixelSkin, part: Shaded, share: f32, pixel: f32) -> PixelSkin {
     let one = PixelSkin(share * part.below, share * part.leaving, share * part.depth, share);
     let apart = abs(part.depth - held.depth / max(held.share, 1e-6));
-    if (held.share > 0.0 && apart <= ONE_SURFACE * pixel * part.depth) {
+    if (held.share > 0.0 && apart <= max(ONE_SURFACE * pixel * part.depth, CROSSED)) {
         return PixelSkin(held.below + one.below, held.leaving + one.leaving, held.depth + one.depth, held.share + share);
     }
     if (share > held.share) {
         return one;
     }
     return held;
+}
+
+// One of 64 bits.
+fn bit_of(index: u32) -> vec2u {
+    return select(vec2u(0u, 1u << (index % 32u)), vec2u(1u << (index % 32u), 0u), index < 32u);
+}
+
+// As many bits from the first on.
+fn samples_of(count: u32) -> vec2u {
+    return vec2u(extractBits(~0u, 0u, min(count, 32u)), extractBits(~0u, 0u, max(count, 32u) - 32u));
 }
 
 @compute @workgroup_size(8, 8)
@@ -144,14 +157,19 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let pixel = vec2f(id.xy);
     var sum = vec4f(0.0);
     var skin_below: PixelSkin;
-    // Samples are shaded together while they see one triangle: its maps are filtered over their part of the pixel.
-    for (var s = 0u; s < shade.samples;) {
-        let triangle = textureLoad(seen, id.xy, s, 0).x;
-        var place = shade.jitter[s].xy;
-        var n = 1u;
-        while (s + n < shade.samples && textureLoad(seen, id.xy, s + n, 0).x == triangle) {
-            place += shade.jitter[s + n].xy;
-            n++;
+    var left = samples_of(shade.samples);
+    // Samples that see one triangle are shaded together: its maps are filtered over their part of the pixel.
+    while (any(left != vec2u(0u))) {
+        let first = select(32u + firstTrailingBit(left.y), firstTrailingBit(left.x), left.x != 0u);
+        let triangle = textureLoad(seen, id.xy, first, 0).x;
+        var place = vec2f(0.0);
+        var n = 0u;
+        for (var s = first; s < shade.samples; s++) {
+            if (textureLoad(seen, id.xy, s, 0).x == triangle) {
+                place += shade.jitter[s].xy;
+                n++;
+                left &= ~bit_of(s);
+            }
         }
         let share = f32(n) / f32(shade.samples);
         if (triangle > 0u) {
@@ -161,7 +179,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
                 skin_below = keep(skin_below, part, share, 2.0 * length(shade.up) / f32(size.y));
             }
         }
-        s += n;
     }
     if (SPLIT) {
         // What is taken out here comes back spread; light of a pixel's lesser surfaces stays where it is.

@@ -5,18 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from dermis.gpu import Device, Frame
+from dermis.gpu import ComputeProgram, Device, Frame, make_texture
 from dermis.rendering.geometry import HeadTextures
 from dermis.rendering.limits import check_shadows
 from dermis.rendering.projection import Matrix
+from dermis.rendering.stages import STAGES
 from dermis.rendering.stages.nearest import Layers, Nearest
 
 
 @dataclass
 class ShadowMaps:
-    """A depth layer for each light [Williams1978], and the key of what they show."""
+    """A depth layer for each light [Williams1978].
+
+    bounds : texture of the nearest depths in ever larger squares of each layer, for lights of some size
+    drawn : key of what they show
+    """
 
     layers: Layers
+    bounds: Any
     drawn: bytes = b""
 
     @property
@@ -31,6 +37,7 @@ class Shadows:
     def __init__(self, device: Device) -> None:
         self._device = device
         self._nearest = Nearest(device, triangles=False)
+        self._bound = ComputeProgram(device, STAGES / "shadow_bounds.wgsl")
 
     def make_maps(self, layers: int, size: int) -> ShadowMaps:
         """Empty maps, `size` texels a side.
@@ -38,12 +45,36 @@ class Shadows:
         Raises DermisError when they do not fit into memory.
         """
         check_shadows(self._device, layers, size)
-        return ShadowMaps(self._nearest.make_layers((size, size), layers))
+        side = _squares(size)
+        bounds = make_texture(self._device, (side + side // 2, side), "r32float", layers=max(2, layers))
+        return ShadowMaps(self._nearest.make_layers((size, size), layers), bounds)
 
     def draw(
-        self, frame: Frame, maps: ShadowMaps, clips: list[Matrix], head: HeadTextures, key: bytes
+        self,
+        frame: Frame,
+        maps: ShadowMaps,
+        clips: list[Matrix],
+        head: HeadTextures,
+        key: bytes,
+        bounded: bool = True,
     ) -> None:
-        """Draw every layer, unless the maps already show just that."""
+        """Draw every layer, unless the maps already show just that.
+
+        bounded : whether some light has a size, so that the bounds are read
+        """
+        key += b"bounded" * bounded
         if clips and maps.drawn != key:
             self._nearest.draw(frame, "shadows", maps.layers, clips, head)
+            if bounded:
+                self._draw_bounds(frame, maps, len(clips))
             maps.drawn = key
+
+    def _draw_bounds(self, frame: Frame, maps: ShadowMaps, count: int) -> None:
+        resources = {"maps": maps.texture, "maps_sampler": self._device.sampler(), "bounds": maps.bounds}
+        groups = _squares(maps.layers.size[0]) // 16
+        frame.dispatch("shadows", self._bound, resources, (groups, groups, count))
+
+
+def _squares(size: int) -> int:
+    """Squares of 4 texels along a side of the map, in whole squares of 64."""
+    return 16 * -(-size // 64)

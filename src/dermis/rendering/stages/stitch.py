@@ -6,27 +6,25 @@ from typing import Any
 
 from dermis.gpu import ComputeProgram, Device, Frame
 from dermis.rendering.atlas_textures import AtlasTextures
-from dermis.rendering.stages import STAGES
+from dermis.rendering.stages import SOURCE_SHADERS, STAGES, STORE_SHADERS, TILE
 
-_ROW = 1024  # as in stitch.wgsl
+_ROW = 1024  # as in apron.wgsl
 _BYTES = 16  # of a texel of the apron in its list
 
 
 class Stitch:
-    """Carries light across the seams."""
+    """Carries light across the seams, in textures of a format."""
 
-    def __init__(self, device: Device) -> None:
-        path = STAGES / "stitch.wgsl"
-        self._gather, self._place = (ComputeProgram(device, path, constants={"PLACE": p}) for p in (0, 1))
+    def __init__(self, device: Device, texel: str) -> None:
+        self._gather = ComputeProgram(device, STAGES / "stitch_gather.wgsl", (SOURCE_SHADERS[texel],))
+        self._place = ComputeProgram(device, STAGES / "stitch_place.wgsl", (STORE_SHADERS[texel],))
+        self._linear = device.sampler(mag_filter="linear", min_filter="linear")
 
-    def draw(self, frame: Frame, stage: str, atlas: AtlasTextures, light: Any, spare: Any) -> None:
-        """Fill the apron of `light`; no texture can be read and written at once, so by way of a list.
-
-        spare : a texture of the same kind, left as it is
-        """
+    def draw(self, frame: Frame, stage: str, atlas: AtlasTextures, light: Any) -> None:
+        """Fill the apron of `light`; no texture can be read and written at once, so by way of a list."""
         if atlas.apron is None:
             return
         size = (_ROW, -(-atlas.apron.size // (_BYTES * _ROW)))
         lists = {"apron": atlas.apron, "gathered": atlas.gathered}
-        frame.compute(stage, self._gather, {**lists, "light": light, "stitched": spare}, size)
-        frame.compute(stage, self._place, {**lists, "light": spare, "stitched": light}, size)
+        frame.compute(stage, self._gather, {**lists, "source": light, "linear": self._linear}, size, TILE)
+        frame.compute(stage, self._place, {**lists, "stored": light}, size, TILE)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from dermis.gpu import ComputeProgram, Device
+from dermis.rendering.geometry import mesh_switches
 from dermis.rendering.stages import SHARED_SHADERS
 
 Switches = tuple[tuple[str, int], ...]
@@ -12,7 +13,7 @@ Switches = tuple[tuple[str, int], ...]
 
 
 class Variants:
-    """The pipelines of a compute shader by its switches, each made when first asked for."""
+    """The pipelines of a shader that computes from the mesh, by its switches, made when first asked for."""
 
     def __init__(self, device: Device, path: Path) -> None:
         self._device, self._path = device, path
@@ -21,6 +22,7 @@ class Variants:
     def program(self, switches: Switches = ()) -> ComputeProgram:
         """The pipeline for these switches."""
         if switches not in self._programs:
-            made = ComputeProgram(self._device, self._path, (SHARED_SHADERS,), dict(switches))
+            every = dict(switches + mesh_switches(self._device))
+            made = ComputeProgram(self._device, self._path, (SHARED_SHADERS,), every)
             self._programs[switches] = made
         return self._programs[switches]

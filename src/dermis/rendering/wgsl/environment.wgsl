@@ -20,7 +20,7 @@ struct Environment {
 @group(0) @binding(21) var panorama: texture_2d_array<f32>; // irradiance, then mean radiance by roughness
 @group(0) @binding(22) var occlusion_map: texture_2d<f32>; // open share of the sky: the atlas, then the vertices
 
-// The panorama's layer in a direction, bilinear, around the seam and over the poles.
+// The panorama's layer in a direction, bilinear; its outermost texels repeat what lies beyond the seam and the poles.
 fn panorama_at(direction: vec3f, layer: u32) -> vec3f {
     let d = vec3f(
         environment.turn.x * direction.x - environment.turn.y * direction.z,
@@ -29,19 +29,13 @@ fn panorama_at(direction: vec3f, layer: u32) -> vec3f {
     );
     let azimuth = select(0.0, atan2(d.x, -d.z), any(d.xz != vec2f(0.0))); // of a pole it has no value
     let uv = vec2f(0.5 + azimuth / (2.0 * PI), atan2(length(d.xz), d.y) / PI);
-    let place = uv * vec2f(textureDimensions(panorama)) - 0.5;
+    // Filters of some GPUs are as coarse as the texels, which shows in a wide picture.
+    let place = uv * (vec2f(textureDimensions(panorama)) - 2.0) + 0.5;
     let a = vec2i(floor(place));
     let w = bilinear_weights(place);
-    return environment.exposure * (w.x * panorama_texel(a, layer) + w.y * panorama_texel(a + vec2i(1, 0), layer)
-        + w.z * panorama_texel(a + vec2i(0, 1), layer) + w.w * panorama_texel(a + vec2i(1, 1), layer));
-}
-
-// Beyond a pole lies the first row again, half way around.
-fn panorama_texel(at: vec2i, layer: u32) -> vec3f {
-    let size = vec2i(textureDimensions(panorama));
-    let y = clamp(at.y, 0, size.y - 1);
-    let x = at.x + size.x + select(0, size.x / 2, y != at.y);
-    return textureLoad(panorama, vec2i(x % size.x, y), layer, 0).rgb;
+    let upper = w.x * textureLoad(panorama, a, layer, 0) + w.y * textureLoad(panorama, a + vec2i(1, 0), layer, 0);
+    let lower = w.z * textureLoad(panorama, a + vec2i(0, 1), layer, 0) + w.w * textureLoad(panorama, a + vec2i(1, 1), layer, 0);
+    return environment.exposure * (upper + lower).rgb;
 }
 
 // Mean radiance under a lobe of roughness m about a direction.

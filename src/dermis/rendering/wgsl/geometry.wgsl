@@ -1,10 +1,13 @@
-// The mesh as two textures, and points of its surface by triangle and barycentric weights.
+// Points of the mesh's surface by triangle and barycentric weights.
+//#include "mesh_textures.wgsl"
+
+override MESH_IN_BUFFERS: bool = false; // whether the mesh is read from them, which GPUs do faster than textures
 
 const MAPPED: u32 = 1u; // the triangle has texels in the atlas
 const OPAQUE: u32 = 2u; // plain material, no scattering
 
-@group(0) @binding(0) var triangle_table: texture_2d<u32>; // three tables, see below
-@group(0) @binding(1) var vertex_table: texture_2d<f32>; // four texels: position u, normal v, dpdu curvature, dpdv
+@group(0) @binding(23) var<storage, read> triangle_buffer: array<vec4u>; // texel after texel of the textures
+@group(0) @binding(24) var<storage, read> vertex_buffer: array<vec4f>;
 
 struct Corner {
     position: vec3f,
@@ -27,10 +30,11 @@ struct Point {
     flags: u32,
 }
 
-// Of three tables one over the other: corners a, b, c and flags | material << 8; atlas places of a and b; that of c.
 fn triangle_row(index: u32, table: u32) -> vec4u {
-    let size = textureDimensions(triangle_table);
-    return textureLoad(triangle_table, vec2u(index % size.x, index / size.x + table * (size.y / 3u)), 0);
+    if (MESH_IN_BUFFERS) {
+        return triangle_buffer[table * (arrayLength(&triangle_buffer) / 3u) + index];
+    }
+    return triangle_texel(index, table);
 }
 
 fn triangle_at(index: u32) -> vec4u {
@@ -44,21 +48,28 @@ fn place_of_point(index: u32, w: vec3f) -> vec2f {
     return w.x * ab.xy + w.y * ab.zw + w.z * c.xy;
 }
 
-fn vertex_texel(index: u32) -> vec2u {
-    let per_row = textureDimensions(vertex_table).x / 4u;
-    return vec2u(4u * (index % per_row), index / per_row);
-}
-
 fn position_of(index: u32) -> vec3f {
+    if (MESH_IN_BUFFERS) {
+        return vertex_buffer[4u * index].xyz;
+    }
     return textureLoad(vertex_table, vertex_texel(index), 0).xyz;
 }
 
 fn corner_at(index: u32) -> Corner {
+    if (MESH_IN_BUFFERS) {
+        let at = 4u * index;
+        return corner_of(vertex_buffer[at], vertex_buffer[at + 1u], vertex_buffer[at + 2u], vertex_buffer[at + 3u]);
+    }
     let at = vertex_texel(index);
-    let p = textureLoad(vertex_table, at, 0);
-    let n = textureLoad(vertex_table, at + vec2u(1u, 0u), 0);
-    let du = textureLoad(vertex_table, at + vec2u(2u, 0u), 0);
-    let dv = textureLoad(vertex_table, at + vec2u(3u, 0u), 0);
+    return corner_of(
+        textureLoad(vertex_table, at, 0),
+        textureLoad(vertex_table, at + vec2u(1u, 0u), 0),
+        textureLoad(vertex_table, at + vec2u(2u, 0u), 0),
+        textureLoad(vertex_table, at + vec2u(3u, 0u), 0),
+    );
+}
+
+fn corner_of(p: vec4f, n: vec4f, du: vec4f, dv: vec4f) -> Corner {
     return Corner(p.xyz, n.xyz, vec2f(p.w, n.w), du.xyz, dv.xyz, du.w);
 }
 

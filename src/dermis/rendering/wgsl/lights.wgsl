@@ -1,6 +1,7 @@
 // Lights of every kind: what arrives from each at a point.
 //#include "axes.wgsl"
 //#include "shadows.wgsl"
+//#include "soft_shadows.wgsl"
 
 override SHAPES: bool = false; // whether some light is more than a point, a cone or one direction
 
@@ -37,10 +38,12 @@ struct Light {
 
 struct Lights {
     light: array<Light, 64>,
+    place: array<vec4f, 64>, // spread evenly from -1 to 1: xy over a disc, zw over a square
 }
 
 @group(0) @binding(11) var<uniform> lights: Lights;
 @group(0) @binding(12) var shadow_maps: texture_2d_array<f32>; // depth: 1 near, 0 nothing
+@group(0) @binding(25) var shadow_bounds: texture_2d_array<f32>; // nearest depths in squares, see shadow_bounds.wgsl
 @group(0) @binding(13) var shadow_sampler: sampler; // non-filtering
 
 struct Incident {

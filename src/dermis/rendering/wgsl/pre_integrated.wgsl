@@ -5,11 +5,13 @@ override PRE_INTEGRATED: bool = false;
 
 const SPHERES: u32 = 33u; // rows, evenly by curvature
 const EDGES: u32 = 9u; // rows, evenly by the half width of the shadow's own edge up to `penumbra`
-const LIT: f32 = 1e-4; // share of a light that counts as none of it, or all but which as all
 const PROBES: u32 = 64u; // places around a point whose share in the light tells how far off a shadow's edge is
+const GOLDEN: f32 = 2.3999632; // angle from one place to the next, the outermost first
 const FEWEST_PROBES: u32 = 24u; // that may stand for all
 const LEAST_COSINE: f32 = 0.3; // of the light on the plane that the places lie in
 const HIGHEST: f32 = 3.0; // that a point past its horizon is lifted [mm]
+const WAYS: u32 = 16u; // places that tell the curvature towards the horizon
+const WAYS_MM: f32 = 2.0; // that they are off the way to the light
 
 struct PreIntegrated {
     most_curved: f32, // curvature of the table's last row [1/mm]
@@ -57,22 +59,37 @@ fn spread_visibility(light: Light, point: Point, l: vec3f) -> vec3f {
         return vec3f(seen);
     }
     let texel = light.texel * select(distance(light.position, point.position), 1.0, is_parallel(light));
-    let soft = texel * f32(light.half_width) / dot(raised.normal, l); // on the surface
+    let reach = texel * f32(light.half_width);
+    let around = light_around(light, raised, l, reach, seen);
+    let soft = reach * tent_on_surface(raised.normal, l, around.along);
     let radius = shade.pre.penumbra;
     if (soft >= radius) {
         return vec3f(seen);
     }
-    var edge = soft * select(1.0 - sqrt(2.0 - 2.0 * seen), sqrt(2.0 * seen) - 1.0, seen < 0.5); // under a tent
-    if (seen < LIT || seen > 1.0 - LIT) {
-        let far = radius * (2.0 * share_around(light, raised, l, texel * f32(light.half_width)) - 1.0);
-        edge = select(min(far, -soft), max(far, soft), seen > 0.5);
-    }
+    let near = soft * select(1.0 - sqrt(2.0 - 2.0 * seen), sqrt(2.0 * seen) - 1.0, seen < 0.5); // under a tent
+    // The places tell how much farther off it is than the tent reaches; narrow shadows they miss, so that within the
+    // tent they count by and by.
+    let far = radius * (2.0 * around.share - 1.0);
+    let beyond = select(min(far + soft, 0.0), max(far - soft, 0.0), seen > 0.5);
+    let outside = abs(2.0 * seen - 1.0);
+    let edge = near + outside * outside * outside * beyond;
     return table_at(0.5 + 0.5 * edge / radius, f32(SPHERES) + soft / radius * f32(EDGES - 1u));
 }
 
-// Share of the places around a point that a light reaches. They lie like those of a ball seen from above, so that
-// an edge that crosses them hides a share that is linear in its distance. They are lifted like the filter's points.
-fn share_around(light: Light, point: Point, l: vec3f, lift: f32) -> f32 {
+// How much wider the shadow filter's tent is on the surface, across an edge, than on the light's map.
+fn tent_on_surface(normal: vec3f, l: vec3f, along: vec3f) -> f32 {
+    let lean = dot(along, l);
+    return sqrt(1.0 - lean * lean) / dot(normal, l);
+}
+
+struct Around {
+    share: f32, // of the places around a point that a light reaches
+    along: vec3f, // unit vector on the surface along the shadow's edge
+}
+
+// The places lie like those of a ball seen from above, so that an edge that crosses them hides a share that is linear
+// in its distance. They are lifted like the filter's points.
+fn light_around(light: Light, point: Point, l: vec3f, lift: f32, unknown: f32) -> Around {
     let axes = shade.pre.penumbra * beside(point.normal);
     let cosine = dot(point.normal, l);
     let lifted = point.lit_position + lift * (sqrt(1.0 - cosine * cosine) * point.normal + 0.75 * l);
@@ -82,25 +99,67 @@ fn share_around(light: Light, point: Point, l: vec3f, lift: f32) -> f32 {
     // Between the places and the light the surface itself may rise, in hollows: by twice what its curvature says.
     let rise = light.to_map * vec4f(l, 0.0) * (point.curvature * shade.pre.penumbra * shade.pre.penumbra);
     var lit = 0u;
+    var known = 0u;
+    var towards = vec2f(1e-6, 0.0);
     for (var i = 0u; i < PROBES; i++) {
-        if (i == FEWEST_PROBES && (lit == 0u || lit == i)) {
-            return select(0.0, 1.0, lit > 0u);
+        if (i == FEWEST_PROBES && (lit == 0u || lit == known)) {
+            break;
         }
-        let even = fract(vec2f(0.5) + f32(i) * vec2f(0.7548776662, 0.5698402910)); // [Roberts2018]
-        let place = sqrt(1.0 - even.x * even.x) * vec2f(cos(2.0 * PI * even.y), sin(2.0 * PI * even.y));
-        lit += sees(light, centre + place.x * right + place.y * up + dot(place, place) * rise);
+        let height = (f32(i) + 0.5) / f32(PROBES);
+        let place = sqrt(1.0 - height * height) * vec2f(cos(GOLDEN * f32(i)), sin(GOLDEN * f32(i)));
+        let found = sees(light, centre + place.x * right + place.y * up + dot(place, place) * rise);
+        lit += u32(found == LIGHT);
+        known += u32(found != AIR);
+        towards += place * (f32(found == LIGHT) - f32(found == HIDDEN));
     }
-    return f32(lit) / f32(PROBES);
+    let along = normalize(axes * vec2f(-towards.y, towards.x));
+    return Around(select(f32(lit) / f32(max(known, 1u)), unknown, known == 0u), along);
 }
+
+// What the light's map shows on the way to a place.
+const HIDDEN: u32 = 0u;
+const LIGHT: u32 = 1u;
+const AIR: u32 = 2u; // the place is lit, but skin is farther behind than light spreads
 
 fn sees(light: Light, clip: vec4f) -> u32 {
     if (clip.w <= 0.0) {
-        return 1u;
+        return LIGHT;
     }
-    let ndc = clip.xyz / clip.w;
+    let depth = clip.z / clip.w;
+    let nearest = nearest_at(light, clip);
+    if (nearest > depth) {
+        return HIDDEN;
+    }
+    return select(LIGHT, AIR, depth_of(light, nearest) - depth_of(light, depth) > shade.pre.penumbra);
+}
+
+fn nearest_at(light: Light, clip: vec4f) -> f32 {
+    let ndc = clip.xy / clip.w;
     let size = vec2f(textureDimensions(shadow_maps));
     let texel = vec2i(floor(vec2f(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y) * size));
-    return select(0u, 1u, textureLoad(shadow_maps, clamp(texel, vec2i(0), vec2i(size) - 1), light.layer, 0).x <= ndc.z);
+    return textureLoad(shadow_maps, clamp(texel, vec2i(0), vec2i(size) - 1), light.layer, 0).x;
+}
+
+// Curvature towards the horizon, which may be farther away than the point's own says: the mean of balls that touch the
+// surface here and hold a place that the light sees near by.
+fn curvature_towards(light: Light, point: Point, l: vec3f) -> f32 {
+    let cosine = dot(point.normal, l);
+    if (cosine >= LEAST_COSINE || light.layer < 0 || (SHAPES && light.extent.x > 0.0)) {
+        return point.curvature;
+    }
+    let axes = WAYS_MM * beside(l);
+    var sum = vec2f(0.0);
+    for (var i = 0u; i < WAYS; i++) {
+        let aside = axes * place_on(i, true);
+        let clip = light.to_map * vec4f(point.lit_position + aside, 1.0);
+        let way = aside + l * (depth_of(light, clip.z / clip.w) - depth_of(light, nearest_at(light, clip)));
+        if (dot(way, l) > -shade.pre.penumbra) { // else it is no surface near by
+            let ball = -2.0 * dot(way, point.normal) / max(dot(way, way), 1e-4);
+            sum += vec2f(clamp(ball, 0.0, point.curvature), 1.0);
+        }
+    }
+    let found = select(sum.x / sum.y, point.curvature, sum.y == 0.0);
+    return mix(found, point.curvature, smoothstep(0.0, LEAST_COSINE, cosine));
 }
 
 // Irradiance that enters around a point and leaves there. What the surface reflects of it is taken from the mean
@@ -113,7 +172,8 @@ fn pre_integrated(point: Point, surface: Surface, footprint: f32, open: f32) -> 
         var seen = vec3f(-1.0); // how much of the light: not known yet
         for (var part = 0u; part < parts_of(light); part++) {
             let arriving = incident(light, point.position, part);
-            let cosine = spread_cosine(arriving.direction * normals, point.curvature);
+            let curvature = curvature_towards(light, point, arriving.direction);
+            let cosine = spread_cosine(arriving.direction * normals, curvature);
             if (any(cosine > vec3f(0.0))) {
                 if (seen.x < 0.0) {
                     seen = spread_visibility(light, point, arriving.direction);

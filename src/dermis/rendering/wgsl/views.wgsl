@@ -2,8 +2,9 @@
 
 struct Views {
     clip: array<mat4x4f, 64>, // world to clip space, depth 0 near to 1 far
+    sample: array<vec4f, 64>, // places in a pixel that each view is seen at, one layer each; for the compute pass
+    reach: vec4f, // least and greatest of them
     triangles: u32,
-    pitch: u32, // pixels from one row of a layer to the next
     width: u32,
     height: u32,
 }

@@ -1,0 +1,94 @@
+"""The blurred levels of the light: where they are kept, how, and at which resolution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.gpu import Device, make_texture
+
+ENTERED = "rgba32float"
+"""Format of the light that enters."""
+MOST_HALVINGS = 3
+SHARP = 0.8  # standard deviations of what is halved, in texels of the result: less would lose detail
+
+
+@dataclass
+class Levels:
+    """Light and its blurred levels, layer 0 not blurred, and the space between two passes.
+
+    entered : texture whose first layer the light enters: the stack itself, or its own where that has
+        another format
+    texel : format of the other textures
+    halvings : how often the resolution of each layer is halved; its light is in that mip level
+    scale : what light is multiplied with in the blurred layers
+    stretch : space for a stretch map that is blurred along with the light
+    """
+
+    stack: Any
+    scratch: Any
+    entered: Any
+    size: int
+    texel: str
+    halvings: tuple[int, ...]
+    scale: float = 1.0
+    stretch: tuple[Any, ...] = ()
+    _views: dict[tuple[int, int], Any] = field(default_factory=dict)
+
+    @property
+    def entering(self) -> Any:
+        """The light that enters."""
+        return self.layer(0) if self.entered is self.stack else self.entered
+
+    @property
+    def views(self) -> list[Any]:
+        """What each layer shows, the light that enters first."""
+        return [self.entering, *(self.layer(k, h) for k, h in enumerate(self.halvings) if k)]
+
+    def layer(self, k: int, halvings: int = 0) -> Any:
+        """A view of one layer."""
+        return self._view(self.stack, k, halvings)
+
+    def spare(self, halvings: int = 0) -> Any:
+        """A view of the space between two passes."""
+        return self._view(self.scratch, -1, halvings)
+
+    def _view(self, texture: Any, k: int, mip: int) -> Any:
+        if (k, mip) not in self._views:
+            options = {"dimension": "2d", "array_layer_count": 1, "mip_level_count": 1}
+            view = texture.create_view(base_array_layer=max(0, k), base_mip_level=mip, **options)
+            self._views[k, mip] = view
+        return self._views[k, mip]
+
+
+def make_levels(device: Device, size: int, count: int, texel: str) -> Levels:
+    """Space for the light that enters and `count` blurred levels of the format `texel`."""
+    mips = 1 + sum(size % 2**times == 0 for times in range(1, MOST_HALVINGS + 1))
+    stack = make_texture(device, (size, size), texel, layers=max(2, count + 1), mips=mips)
+    scratch = make_texture(device, (size, size), texel, mips=mips)
+    entered = stack if texel == ENTERED else make_texture(device, (size, size), ENTERED)
+    return Levels(stack, scratch, entered, size, texel, (0,) * (count + 1))
+
+
+def scale_of(texel: str, exposure: float) -> float:
+    """What brings light near 1, where halves are at home: a power of two, which rounds nothing; 1 for floats.
+
+    exposure : factor from light to the image
+    """
+    return 1.0 if texel == ENTERED else float(2.0 ** np.round(np.log2(exposure)))
+
+
+def halvings_of(variance_mm2: NDArray[np.float64], texels_per_mm: float, most: int) -> tuple[int, ...]:
+    """How often the resolution of each layer may be halved, the unblurred one included.
+
+    variance_mm2 : of the blurred layers, increasing
+    texels_per_mm : of the map
+    """
+    found = [0]
+    for before in (0.0, *variance_mm2[:-1]):
+        smooth = np.sqrt(before) * texels_per_mm / SHARP
+        found.append(int(np.clip(np.log2(max(smooth, 1.0)), found[-1], min(most, found[-1] + 1))))
+    return tuple(found)

@@ -1,0 +1,12 @@
+// Light at half the resolution: the mean of those of four texels that are surface.
+//#include "source.wgsl"
+//#include "store.wgsl"
+
+@compute @workgroup_size(16, 16)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    let size = textureDimensions(source) / 2u;
+    if (all(id.xy < size)) {
+        let light = source_at((vec2f(id.xy) + 0.5) / vec2f(size)); // where the four meet
+        store(id.xy, light / max(light.a, 0.25));
+    }
+}

@@ -1,0 +1,17 @@
+// A level whose texels many GPUs cannot filter.
+//#include "bilinear.wgsl"
+
+@group(1) @binding(0) var source: texture_2d<f32>; // light, and 1 where there is surface
+
+fn source_at(uv: vec2f) -> vec4f {
+    return load_bilinear(source, uv);
+}
+
+// Between two texels of a row; whole numbers are texel centres.
+fn source_between(at: vec2f) -> vec4f {
+    let most = vec2i(textureDimensions(source)) - 1;
+    let left = vec2i(vec2f(floor(at.x), at.y));
+    let a = textureLoad(source, clamp(left, vec2i(0), most), 0);
+    let b = textureLoad(source, clamp(left + vec2i(1, 0), vec2i(0), most), 0);
+    return mix(a, b, fract(at.x));
+}

@@ -1,0 +1,72 @@
+"""What is kept from frame to frame."""
+
+from __future__ import annotations
+
+import pytest
+
+from dermis.errors import DermisError
+from dermis.optics.profiles import load_profile
+from dermis.rendering.kept import Kept
+from dermis.rendering.skin_profiles import SkinProfiles
+from dermis.rendering.thin_parts import shared_width
+from dermis.scene.skin import Pigments, Skin
+
+
+def made(kept: Kept, keys: str) -> str:
+    """The keys for which something was made."""
+    log: list[str] = []
+    for key in keys:
+        kept.keep("role", key, lambda key=key: log.append(key) or key)  # type: ignore[misc, func-returns-value]
+    return "".join(log)
+
+
+@pytest.mark.parametrize(
+    ("depth", "keys", "expected"),
+    [(1, "aabba", "aba"), (2, "abab", "ab"), (2, "abcab", "abcab"), (2, "abacab", "abcb")],
+)
+def test_the_things_used_last_are_kept(depth: int, keys: str, expected: str) -> None:
+    assert made(Kept(depth), keys) == expected
+
+
+def test_room_is_made_before_a_thing_is() -> None:
+    """So that memory never holds one more than is kept."""
+    kept = Kept(2)
+    made(kept, "ab")
+    kept.keep("role", "c", lambda: made(kept, "b"))  # "a" went, "b" is still there
+    assert made(kept, "b") == ""
+
+
+def test_forgetting_makes_everything_again() -> None:
+    kept = Kept(3)
+    made(kept, "abc")
+    kept.forget_all()
+    assert made(kept, "abc") == "abc"
+
+
+def skin(**pigments: float) -> Skin:
+    return Skin(profile="light", pigments=Pigments(**pigments))
+
+
+def test_pigments_are_fitted_near_what_a_fresh_fit_finds() -> None:
+    profiles = SkinProfiles()
+    profiles.of(skin(melanin=0.02))
+    near, fresh = profiles.of(skin(melanin=0.03)), load_profile("light", {"melanin": 0.03})
+    radius = [0.1, 0.5, 2.0]
+    assert near.albedo == pytest.approx(fresh.albedo, rel=2e-3)
+    assert near.within(radius) == pytest.approx(fresh.within(radius), rel=5e-3, abs=1e-4)
+
+
+def test_the_same_pigments_are_not_fitted_again() -> None:
+    profiles = SkinProfiles()
+    first = profiles.of(skin(melanin=0.02))
+    assert profiles.of(skin(melanin=0.02).model_copy(update={"mix": 1.0})) is first
+
+
+def test_a_table_has_no_pigments() -> None:
+    with pytest.raises(DermisError, match="gpu-gems-3"):
+        SkinProfiles().of(Skin(pigments=Pigments(melanin=0.1)))
+
+
+def test_widths_that_differ_little_are_one() -> None:
+    assert shared_width(2.0) == shared_width(2.1) == pytest.approx(2.0)
+    assert all(0.84 <= shared_width(w) / w <= 1.19 for w in (0.6, 0.9, 1.3, 2.6, 7.0))
