@@ -1,4 +1,4 @@
-"""Median time from tissue to six shared Gaussians, on one core: python benchmarks/profile.py."""
+"""Median time from tissue to six shared Gaussians, on one core: python benchmarks/profiles.py."""
 
 from __future__ import annotations
 

@@ -1,0 +1,81 @@
+"""The bytes that each stage must move, whatever it computes: what memory alone allows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dermis.gpu import Device, download
+from dermis.gpu.textures import texel_bytes
+from dermis.rendering.inputs import Inputs
+
+_MAPS = ("colour_map", "slope_map", "relief_map", "specular_map", "roughness_map")
+_CORNERS, _PLACE = 16, 16  # bytes of a triangle's corners and of a vertex' position in the tables
+
+
+@dataclass(frozen=True)
+class Moved:
+    """What a frame has to do with.
+
+    texels : of the atlas that show the surface
+    seen : pixels that show something
+    vertices : of the mesh
+    """
+
+    inputs: Inputs
+    texels: int
+    seen: int
+    vertices: int
+
+
+def moved_by(device: Device, inputs: Inputs, vertices: int) -> Moved:
+    """Counts after a frame was drawn."""
+    texels = np.count_nonzero(download(device, inputs.layouts[0].atlas.resources["atlas"])[..., 0])
+    seen = np.count_nonzero(download(device, inputs.picture.bytes)[..., 3])
+    return Moved(inputs, int(texels), int(seen), vertices)
+
+
+def stage_bytes(moved: Moved) -> dict[str, float]:
+    """Bytes by stage: what it needs read once, what it makes written once, in the formats that are used.
+
+    Only texels with surface and pixels that show something count where no others are needed. What is read
+    again, scratch space between two passes, and tables that stay in caches do not.
+    """
+    inputs, picture = moved.inputs, moved.inputs.picture
+    pixels, shadow = picture.size[0] * picture.size[1], inputs.shadow_maps.texture
+    geometry = _CORNERS * inputs.head.triangles + _PLACE * moved.vertices
+    maps_drawn = len(inputs.light_clips) * shadow.size[0] * shadow.size[1]
+    seen = pixels * inputs.settings.samples * texel_bytes(inputs.seen.texture)
+    looked_up = len(inputs.light_clips) * texel_bytes(shadow)
+    radiance = texel_bytes(picture.radiance)
+    shaded = moved.seen * (looked_up + texel_bytes(inputs.scattered)) + _maps(inputs, moved.seen)
+    found: dict[str, float] = {
+        "shadows": maps_drawn * texel_bytes(shadow) + geometry,
+        "visibility": seen + geometry,
+        "shade": seen + shaded + pixels * radiance,
+        "post": pixels * (radiance + texel_bytes(picture.exposed) + texel_bytes(picture.bytes)),
+    }
+    return (found | _scattering_bytes(moved, looked_up)) if inputs.scatters else found
+
+
+def _scattering_bytes(moved: Moved, looked_up: int) -> dict[str, float]:
+    """Of the stages that light the atlas and spread the light."""
+    inputs, texels, levels = moved.inputs, moved.texels, moved.inputs.levels
+    entered = texels * texel_bytes(levels.entered)
+    blurred = [texels * texel_bytes(levels.stack) / 4**halved for halved in levels.halvings[1:]]
+    place = texel_bytes(inputs.layouts[0].atlas.resources["atlas"])
+    found: dict[str, float] = {
+        "irradiance": texels * (place + looked_up) + entered + _maps(inputs, texels),
+        "diffuse": entered + sum(blurred[:-1]) + sum(blurred),
+        "combine": sum(blurred) + texels * texel_bytes(inputs.scattered),
+    }
+    if thin := inputs.layouts[0].thin:
+        found["transmission"] = thin.light.size[0] * thin.light.size[1] * texel_bytes(thin.light)
+    return found
+
+
+def _maps(inputs: Inputs, most: int) -> int:
+    """Bytes of the head's maps that `most` places read, each at least a texel."""
+    textures = [inputs.lit[name] for name in _MAPS]
+    return sum(texel_bytes(one) * min(most, one.size[0] * one.size[1]) for one in textures)

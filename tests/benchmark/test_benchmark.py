@@ -1,0 +1,161 @@
+"""The benchmark measures what it says: floors by hand, cases that differ in one thing, whole runs."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dermis.assets.head import load_head
+from dermis.benchmark import run as running
+from dermis.benchmark.cases import PRESETS, Case
+from dermis.benchmark.copy_rate import copy_rate
+from dermis.benchmark.floor import moved_by, stage_bytes
+from dermis.benchmark.measure import Effort, Row, measure
+from dermis.benchmark.report import COLUMNS, as_json, cells, stage_cells, write_report
+from dermis.benchmark.run import Benchmark, run
+from dermis.benchmark.scenes import scenes_of, settings_of, with_terms
+from dermis.gpu import Device
+from dermis.gpu.textures import texel_bytes
+from dermis.optics.profiles import load_profile
+from dermis.rendering.renderer import Renderer
+
+TINY = Case((48, 32), atlas=64, gaussians=2, lights=1, samples=2)
+BRIEF = Effort(warming=1, between=1, timed=2, row=2)
+
+
+@pytest.fixture(scope="module")
+def head_file(tmp_path_factory: pytest.TempPathFactory) -> str:
+    from small_head import write_head
+
+    path = tmp_path_factory.mktemp("head") / "head.obj"
+    write_head(path)
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def renderer(device: Device) -> Renderer:
+    return Renderer(device.adapter.name)
+
+
+@pytest.fixture(scope="module")
+def row(renderer: Renderer, head_file: str, tmp_path_factory: pytest.TempPathFactory) -> Row:
+    return measure(renderer, TINY, load_head(head_file), tmp_path_factory.mktemp("profile"), 1e9, BRIEF)
+
+
+@pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
+def test_cases_vary_in_one_thing(preset: object) -> None:
+    usual, *others = preset.cases()  # type: ignore[attr-defined]
+    assert usual.varies == "" and any(case.technique == "published" for case in others)
+    for case in others:
+        told = asdict(replace(case, varies=""))
+        assert [name for name, value in asdict(usual).items() if told[name] != value] == [case.varies]
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 6, 8])
+def test_profiles_of_any_length_keep_the_albedo(count: int) -> None:
+    published = load_profile("gpu-gems-3")
+    profile = with_terms(published, count)
+    assert len(profile.variance_mm2) == count
+    assert np.allclose(profile.albedo, published.albedo)
+    assert np.isclose(profile.variance_mm2[-1], published.variance_mm2[-1])
+
+
+def test_cameras_and_lights_move(head_file: str, tmp_path: Path) -> None:
+    case = replace(TINY, lights=5)
+    scenes = scenes_of(case, load_head(head_file), tmp_path, 3)
+    assert len({scene.camera for scene in scenes}) == 3
+    assert all(len({light.position for light in scene.lights}) == 5 for scene in scenes)  # type: ignore[union-attr]
+    assert len({scene.lights[4] for scene in scenes}) == 3
+
+
+def test_the_floor_by_hand(renderer: Renderer, head_file: str, tmp_path: Path) -> None:
+    head = load_head(head_file)
+    (scene,), settings = scenes_of(TINY, head, tmp_path, 1), settings_of(TINY)
+    image = renderer.draw(scene, settings).srgb8()
+    moved = moved_by(renderer.device, renderer.prepare(scene, settings), len(head.mesh.positions))
+    assert 0.1 < moved.seen / (48 * 32) < 0.9 and moved.seen >= np.count_nonzero(image.any(axis=2))
+    assert 0 < moved.texels < 64 * 64
+    found = stage_bytes(moved)
+    geometry = 16 * len(head.mesh.triangles) + 16 * len(head.mesh.positions)
+    assert found["shadows"] == settings.shadow_size**2 * 4 + geometry
+    assert found["visibility"] == 48 * 32 * 2 * 4 + geometry
+    assert found["post"] == 48 * 32 * (16 + 16 + 4)
+    # the narrower of the two is lit again, not blurred
+    assert found["diffuse"] == moved.texels * 2 * 1 * texel_bytes(moved.inputs.levels.stack)
+    assert set(found) >= {"shadows", "irradiance", "diffuse", "combine", "visibility", "shade", "post"}
+
+
+def test_a_row_is_complete(row: Row) -> None:
+    assert row.frame_ms > 0 and row.python_ms > 0 and row.image_ms > 0 and row.memory_mb > 0.1
+    stages = {name: ms for name, ms in row.gpu_ms.items() if name != "total"}
+    assert {"irradiance", "diffuse", "shade"} <= set(stages) and min(stages.values()) > 0
+    assert row.floor_ms["total"] == pytest.approx(sum(row.floor_ms.values()) / 2)
+    assert set(row.floor_ms) <= set(row.gpu_ms)
+    assert row.floor_ratio == row.gpu_ms["total"] / row.floor_ms["total"]
+
+
+def test_more_work_moves_more_bytes(renderer: Renderer, row: Row, head_file: str, tmp_path: Path) -> None:
+    larger = replace(TINY, image=(96, 64), atlas=128, lights=2, gaussians=4)
+    more = measure(renderer, larger, load_head(head_file), tmp_path, 1e9, BRIEF)
+    for stage in ("shadows", "irradiance", "diffuse", "combine", "visibility", "shade", "post"):
+        assert more.floor_ms[stage] > 1.5 * row.floor_ms[stage], stage
+
+
+def test_copies_take_time(device: Device) -> None:
+    assert 1e7 < copy_rate(device) < 1e14
+
+
+@pytest.fixture(scope="module")
+def made(row: Row) -> Benchmark:
+    """A benchmark of which one row was measured."""
+    others = [
+        replace(row, case=replace(TINY, atlas=128, varies="atlas")),
+        replace(row, case=replace(TINY, technique="published", varies="technique"), gpu_ms={"total": 1e3}),
+    ]
+    return Benchmark("head", "an <adapter>", "a driver", {"dermis": "1"}, "now", 2e9, 1.0, (row, *others))
+
+
+def test_the_published_passes_are_compared(made: Benchmark, row: Row) -> None:
+    assert made.published_ratio == 1e3 / row.gpu_ms["total"]
+    assert replace(made, rows=(row,)).published_ratio is None
+
+
+def test_the_json_has_what_was_asked_for(made: Benchmark) -> None:
+    import json
+
+    told = json.loads(json.dumps(as_json(made)))
+    wanted = {"image", "atlas", "adapter", "gaussians", "lights", "frame_ms", "gpu_ms", "floor_ratio"}
+    assert all(wanted <= set(one) for one in told["rows"])
+    assert told["rows"][0]["image"] == [48, 32] and told["copy_gb_s"] == 2.0
+    assert "total" in told["rows"][0]["gpu_ms"]
+
+
+def test_the_report_needs_nothing_else(made: Benchmark, tmp_path: Path) -> None:
+    write_report(tmp_path / "report.html", made)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "an &lt;adapter&gt;" in page and page.count("<svg") == 2
+    assert "src=" not in page and "<script" not in page and 'href="http' not in page
+    for stage, *_ in stage_cells(made.usual):
+        assert f"<td>{stage}</td>" in page
+    assert page.count("<tr>") == 1 + len(made.rows) + 1 + len(stage_cells(made.usual))
+    assert all(len(cells(row)) == len(COLUMNS) for row in made.rows)
+
+
+def test_a_run_measures_every_case(device: Device, head_file: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(running, "ON_CPU", BRIEF)
+    monkeypatch.setattr(running, "Effort", lambda: BRIEF)
+    steps: list[tuple[int, int]] = []
+    cases = [
+        TINY,
+        replace(TINY, technique="published", varies="technique"),
+        replace(TINY, subdivide=1, varies="subdivide"),
+    ]
+    benchmark = run(cases, head_file, device.adapter.name, lambda done, of: steps.append((done, of)))
+    assert steps == [(0, 3), (1, 3), (2, 3)]
+    assert [row.case for row in benchmark.rows] == cases
+    assert benchmark.rows[2].triangles == 4 * benchmark.rows[0].triangles
+    assert benchmark.adapter == device.adapter.name and benchmark.versions["wgpu"]
+    assert benchmark.published_ratio is not None and benchmark.published_ratio > 0

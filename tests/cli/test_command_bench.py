@@ -1,0 +1,58 @@
+"""`dermis bench` at tiny sizes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dermis.benchmark import cases
+from dermis.benchmark.cases import Case, Preset
+from dermis.benchmark.measure import Effort
+
+Run = Callable[..., Any]
+BRIEF = Effort(warming=0, between=0, timed=1, row=1)
+
+
+@pytest.fixture
+def bench(run: Run, folder: Path, opened: None, device: Any, monkeypatch: pytest.MonkeyPatch) -> Run:
+    """`dermis bench` with presets of two tiny frames."""
+    usual = Case((32, 32), atlas=64, gaussians=2, lights=1, samples=1)
+    tiny = Preset(usual, image=((32, 32),), atlas=(64,), gaussians=(2,), lights=(1,), subdivide=(0,))
+    for name in cases.PRESETS:
+        monkeypatch.setitem(cases.PRESETS, name, tiny)
+    monkeypatch.setattr("dermis.benchmark.run.ON_CPU", BRIEF)
+    monkeypatch.setattr("dermis.benchmark.run.Effort", lambda: BRIEF)
+    return lambda *words: run("bench", "--head", "head.obj", "--adapter", device.adapter.name, *words)
+
+
+def test_as_json_with_a_report(bench: Run, tmp_path: Path, device: Any) -> None:
+    ended = bench("--preset", "cpu", "--json", "-o", "report.html")
+    assert (ended.code, ended.stderr) == (0, "")
+    told = json.loads(ended.stdout)
+    assert told["adapter"] == device.adapter.name and told["head"] == "head.obj"
+    assert [row["technique"] for row in told["rows"]] == ["texture-space", "published"]
+    for row in told["rows"]:
+        assert row["frame_ms"] > 0 and row["gpu_ms"]["total"] > 0 and row["floor_ratio"] > 0
+        assert (row["image"], row["atlas"], row["gaussians"], row["lights"]) == ([32, 32], 64, 2, 1)
+    assert "<svg" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_in_words(bench: Run) -> None:
+    ended = bench()
+    assert (ended.code, ended.stderr) == (0, "")
+    for word in ("GB/s", "floor [ms]", "32x32", "irradiance", "the passes of 2007 take"):
+        assert word in ended.stdout
+
+
+def test_an_unwritable_report_is_refused_first(bench: Run) -> None:
+    ended = bench("-o", "report.png")
+    assert ended.code == 2 and "report.png: expected" in ended.stderr and ended.stdout == ""
+
+
+def test_a_head_that_is_not_there(run: Run, opened: None, device: Any) -> None:
+    ended = run("bench", "--head", "nobody.obj", "--adapter", device.adapter.name)
+    assert ended.code == 2 and "nobody.obj" in ended.stderr
