@@ -9,6 +9,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import accuracy_error as error
+import accuracy_surface as surface
 import numpy as np
 
 import dermis
@@ -92,6 +94,7 @@ def main() -> None:
         found[f"floor_{medium}"] = floor(head, medium, made["front"], adapter)
     found["integral"], _ = table(head, "surface-integral", "skin1", adapter)
     found["heat"], _ = table(head, "heat", "skin1", adapter)
+    found |= error.tables(head, SETTINGS, adapter) | surface.tables(adapter)
     text = (PAGE.parent / "techniques.in.md").read_text(encoding="utf-8")
     PAGE.write_text(text.format(adapter=made["front"].adapter, **found), encoding="utf-8")
 

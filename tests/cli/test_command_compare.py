@@ -86,6 +86,11 @@ def test_no_curve_leaves_its_panel(m: float) -> None:
         ((), "expected a value"),
         (("specular", "--roughness", "2"), "--roughness: expected a number less than or equal to 1"),
         (("specular", "-o", "taken/plots"), "expected a place to write"),
+        (("head.obj", "--roughness", "0.4"), "--roughness: expected no such option here"),
+        (("head.obj", "--samples", "8"), "--samples: expected no such option here"),
+        (("head.obj", "--against", "heat", "--samples", "8"), "only path-traced and cycles trace paths"),
+        (("specular", "--light", "back"), "--light: expected no such option here"),
+        (("specular", "--against", "heat"), "--against: expected no such option here"),
     ],
 )
 def test_misuse_is_told(compare: Run, words: tuple[str, ...], says: str) -> None:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from dermis.assets.geometry import build_mesh
-from dermis.assets.head import Head
+from dermis.assets.head import Head, load_head
 from dermis.assets.maps import Maps
 from dermis.assets.primitives import SKIN, uv_sphere
 from dermis.comparison.compare import Comparison, compare
 from dermis.comparison.report import write_report
 from dermis.comparison.scenes import LIGHTS, REGIONS, comparison_scene
+from dermis.comparison.truths import TRUTHS
 from dermis.errors import DermisError
 from dermis.scene.settings import Settings
 
@@ -82,6 +84,13 @@ def test_scenes_have_no_colour_of_their_own(light: str, region: str) -> None:
     assert np.isfinite(scene.camera.position).all()
 
 
+@pytest.mark.parametrize("name", ["bust", pytest.param("lee_perry_smith", marks=pytest.mark.samples)])
+def test_the_back_light_shines_at_an_ear_and_not_at_a_shoulder(name: str) -> None:
+    head = load_head(name)
+    target = comparison_scene(head, "back", "ear", "gpu-gems-3").lights[0].target
+    assert 80.0 < target[0] < 95.0 and abs(target[1]) < 30.0 and -50.0 < target[2] < 0.0
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
@@ -91,19 +100,20 @@ def test_scenes_have_no_colour_of_their_own(light: str, region: str) -> None:
         ({"region": "elbow"}, "--region: expected one of"),
     ],
 )
-def test_unknown_names_are_refused(words: dict[str, str], says: str) -> None:
+def test_unknown_names_are_refused(words: dict[str, Any], says: str) -> None:
     against = words.pop("against", "surface-integral")
     with pytest.raises(DermisError, match=says):
         compare(BALL, against, ("none",), settings=SETTINGS, adapter=ADAPTER, **words)
 
 
-@pytest.mark.parametrize("against", ["heat", "surface-integral"])
-def test_a_picture_without_the_head_is_refused(against: str) -> None:
+def test_a_picture_without_the_head_is_refused_before_the_truth(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its one pixel looks between two balls."""
+    monkeypatch.setitem(TRUTHS, "surface-integral", lambda subject, samples: pytest.fail("it was computed"))
     ball = uv_sphere(30.0, 16, 8)
     places = np.vstack([ball.positions + np.array([x, 0, 0]) for x in (-60, 60)])
     uv = np.vstack([ball.uv * (0.5, 1) + (x, 0) for x in (0, 0.5)])
     triangles = np.vstack([ball.triangles, ball.triangles + len(ball.positions)])
     balls = Head("balls", build_mesh(places, uv, triangles, np.tile(ball.material, 2), SKIN), Maps())
     with pytest.raises(DermisError, match="the picture: expected a pixel that shows nothing but the head"):
-        compare(balls, against, ("none",), settings=Settings(size=(1, 1), atlas=64), adapter=ADAPTER)
+        single = Settings(size=(1, 1), atlas=64)
+        compare(balls, "surface-integral", ("none",), settings=single, adapter=ADAPTER)

@@ -11,7 +11,8 @@ from lit_balls import BALL, LIGHTS, ball_scene
 
 from dermis.errors import DermisError
 from dermis.optics.presets import media
-from dermis.reference.cycles import PYTHON_VARIABLE, Method, cycles_render
+from dermis.reference.cycles import Method, cycles_passes, cycles_render
+from dermis.reference.cycles_process import PYTHON_VARIABLE
 from dermis.reference.cycles_scene import describe
 from dermis.reference.half_space import diffuse_albedo
 from dermis.reference.path_traced import Lambertian, path_trace
@@ -24,7 +25,7 @@ blender = pytest.mark.skipif(not os.environ.get(PYTHON_VARIABLE), reason=f"{PYTH
 
 
 def test_skin_is_told_as_colour_and_radius() -> None:
-    described, arrays = describe(ball_scene(LIGHTS["point"]), SKIN1, "random-walk", (8, 8), 4, 2)
+    described, arrays = describe(ball_scene(LIGHTS["point"]), SKIN1, "random-walk", (8, 8))
     (skin,) = described["materials"]
     (layer,) = SKIN1.layers
     assert skin["method"] == "RANDOM_WALK"
@@ -47,17 +48,11 @@ def test_what_cycles_cannot_do_is_refused() -> None:
         cycles_render(scene, media()["dj3"])
     with pytest.raises(DermisError, match="method: expected one of random-walk, burley"):
         cycles_render(scene, SKIN1, method="gaussian")  # type: ignore[arg-type]
+    with pytest.raises(DermisError, match="samples: expected a whole number from 1, but 0 came"):
+        cycles_passes(scene, SKIN1, [4, 0])
     dark = LIGHTS["point"].model_copy(update={"shadows": False})
     with pytest.raises(DermisError, match="light 1: expected a light with shadows"):
         cycles_render(ball_scene(dark), SKIN1)
-
-
-def test_python_without_bpy_is_named(tmp_path: Path) -> None:
-    python = tmp_path / "python"
-    python.write_text("#!/bin/sh\necho \"ModuleNotFoundError: No module named 'bpy'\" >&2\nexit 1\n")
-    python.chmod(0o755)
-    with pytest.raises(DermisError, match=r"No module named 'bpy'\. Set DERMIS_BLENDER_PYTHON"):
-        cycles_render(ball_scene(LIGHTS["point"]), SKIN1, 4, Settings(size=(4, 4)), python=python)
 
 
 @blender
@@ -98,3 +93,14 @@ def test_ball_returns_its_colour(method: Method, tolerance: float) -> None:
     mean = lit.image[lit.coverage > 0.999].mean(axis=0)
     assert mean == pytest.approx(colour, rel=tolerance)
     assert lit.samples == 64 and lit.seconds > 0.0
+
+
+@blender
+def test_passes_have_seeds_of_their_own_and_repeat() -> None:
+    scene, settings = ball_scene(LIGHTS["point"]), Settings(size=(16, 16))
+    first, again = (cycles_passes(scene, SKIN1, [1, 4, 4], settings, seed=7) for _ in range(2))
+    assert [one.samples for one in first] == [1, 4, 4]
+    assert all((one.image == other.image).all() for one, other in zip(first, again, strict=True))
+    assert (first[1].image != first[2].image).any()
+    other = cycles_passes(scene, SKIN1, [4], settings, seed=8)[0]
+    assert (other.image == first[1].image).all() and other.core_seconds > 0.0

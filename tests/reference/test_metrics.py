@@ -86,6 +86,21 @@ def test_noise_is_taken_off(channels: int, shared: bool, skewed: bool, slack: fl
         assert covered == pytest.approx(erf(slack / np.sqrt(2.0)), abs=0.07)
 
 
+def test_noise_of_both_is_taken_off() -> None:
+    """A noisy image is as far from a noisy truth as without noise; its error is on the safe side."""
+    rng = np.random.default_rng(7)
+    truth, image, deviation = (values[..., None] for values in scene())
+    right, found = relative_rmse(image, truth).value, []
+    for _ in range(TRIALS):
+        mean, variance = noisy(rng, truth, deviation)
+        seen, own = noisy(rng, image, 0.5 * deviation)
+        found.append(relative_rmse(seen, mean, None, variance, own))
+    values, errors = np.array(found).T
+    off = (values**2).mean() - right**2
+    assert abs(off) < 3.0 * (values**2).std() / np.sqrt(TRIALS)
+    assert values.std() < errors.mean() < 1.6 * values.std()
+
+
 def test_a_perfect_picture_is_within_its_error() -> None:
     """Below the noise the root is 0 or small: at most its error where the square is, in 84 of 100 cases."""
     rng = np.random.default_rng(6)

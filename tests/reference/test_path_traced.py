@@ -124,6 +124,18 @@ def test_kept_passes_are_those_traced_at_once(tmp_path: Path, monkeypatch: pytes
 
 
 @pytest.mark.usefixtures("mitsuba")
+def test_passes_not_to_be_kept_are_neither_read_nor_stored(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    alone = path_trace(ball_scene(), SKIN1, 8, SMALL, keep=False)
+    assert not list(tmp_path.iterdir())
+    path_trace(ball_scene(), SKIN1, 16, SMALL)
+    again = path_trace(ball_scene(), SKIN1, 8, SMALL, keep=False)
+    assert again.samples == 8 and np.array_equal(again.image, alone.image)
+
+
+@pytest.mark.usefixtures("mitsuba")
 def test_damaged_file_is_traced_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     first = path_trace(ball_scene(), SKIN1, 8, SMALL)

@@ -2,30 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from dermis.cli.options import Json, parse_size
+from dermis.cli.options import Json, Whole
+from dermis.errors import refuse
 
-_TECHNIQUES = "none,one-blur,published,texture-space,screen-space,pre-integrated"
+_BY_PATHS = ("path-traced", "cycles")
+_OF_HEADS = ("against", "techniques", "light", "region", "medium", "size", "atlas", "samples")
 
 
 def compare(
     what: str,
     /,
     *,
-    against: str = "surface-integral",
-    techniques: str = _TECHNIQUES,
-    light: str = "front",
+    against: str | None = None,
+    techniques: str | None = None,
+    light: str | None = None,
     region: str | None = None,
-    medium: str = "skin1",
-    size: str = "256x256",
-    atlas: int = 1024,
-    samples: int = 64,
+    medium: str | None = None,
+    size: str | None = None,
+    atlas: Whole = None,
+    samples: Whole = None,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
-    roughness: float = 0.3,
+    roughness: float | None = None,
     adapter: str = "auto",
     as_json: Json = False,
 ) -> int:
@@ -50,53 +53,51 @@ def compare(
     against:
         surface-integral (the profile summed over the surface: shows the map's error), heat (spread along the
         surface near the middle of the picture), path-traced (light through the medium; needs Mitsuba) or
-        cycles (Blender's random walk; DERMIS_BLENDER_PYTHON names a Python that has bpy).
+        cycles (Blender's random walk; DERMIS_BLENDER_PYTHON names a Python that has bpy) [surface-integral].
     techniques:
-        Names with commas: none, one-blur, published, texture-space, screen-space, pre-integrated.
+        Names with commas: none, one-blur, published, texture-space, screen-space, pre-integrated [all].
     light:
-        front, back (through the ear) or laser (a stripe over cheek and ear).
+        front, back (through the ear) or laser (a stripe over cheek and ear) [front].
     region:
-        portrait, three-quarter, ear or cheek [where the light shows most].
+        portrait, three-quarter, ear, cheek or nose [where the light shows most].
     medium:
-        skin1, skin2 or another medium with a name, index-matched.
+        skin1, skin2 or another medium with a name, index-matched [skin1].
     size:
-        WIDTHxHEIGHT in pixels.
+        WIDTHxHEIGHT in pixels [256x256].
     atlas:
-        Side of the irradiance map in texels.
+        Side of the irradiance map in texels [1024].
     samples:
-        Paths through each pixel, for path-traced.
+        Paths through each pixel, for path-traced and cycles [64].
     output:
         HTML report; for specular a folder of plots.
     roughness:
-        Beckmann roughness m for specular [0.3].
+        Beckmann roughness m, for specular only [0.3].
     adapter:
         auto (the best), cpu (software), or a part of an adapter's name.
     as_json:
         Print one JSON object.
     """
+    given = {name: value for name, value in locals().items() if value is not None}
+    _check_used(what, given)
     if what == "specular":
         from dermis.cli.compare_specular import compare_specular
 
-        compare_specular(output, roughness, adapter, as_json)
+        compare_specular(output, given.get("roughness", 0.3), adapter, as_json)
         return 0
-    from dermis.cli.compare_techniques import compare_techniques
-    from dermis.cli.options import check
-    from dermis.comparison.scenes import usual_region
-    from dermis.scene import Settings
+    from dermis.cli.compare_techniques import choose, compare_techniques
 
-    sizes: dict[str, Any] = {"size": parse_size(size), "atlas": atlas}
-    names = [name.strip() for name in techniques.split(",")]
-    for name in names:
-        check(Settings, sizes | {"technique": name}, {"technique": "techniques"})
-    chosen = {
-        "against": against,
-        "techniques": names,
-        "light": light,
-        "region": region or usual_region(light),
-        "medium": medium,
-        "settings": Settings(**sizes),
-        "samples": samples,
-        "adapter": adapter,
-    }
-    compare_techniques(what, chosen, output, as_json)
+    compare_techniques(what, choose(given), output, as_json)
     return 0
+
+
+def _check_used(what: str, given: Mapping[str, Any]) -> None:
+    """Refuse options that would change nothing."""
+    if what == "specular":
+        idle = dict.fromkeys(_OF_HEADS, "surface models are compared without a head")
+    else:
+        idle = {"roughness": "techniques are compared without surface reflection"}
+        if given.get("against") not in _BY_PATHS:
+            idle["samples"] = f"only {' and '.join(_BY_PATHS)} trace paths"
+    for name, why in idle.items():
+        if name in given:
+            refuse(f"--{name}", "no such option here", f"it came, and {why}", "Leave it out")

@@ -2,15 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dermis.cli.console import print_json, print_lines, working_on
+from dermis.cli.options import check, parse_size
 
 if TYPE_CHECKING:
     from dermis.comparison.compare import Comparison
+
+
+TECHNIQUES = "none,one-blur,published,texture-space,screen-space,pre-integrated"
+
+
+def choose(given: Mapping[str, Any]) -> dict[str, Any]:
+    """What `dermis.comparison.compare` is asked for.
+
+    given : options of `compare` by parameter, those left out not among them
+    """
+    from dermis.comparison.scenes import usual_region
+    from dermis.scene import Settings
+
+    sizes: dict[str, Any] = {
+        "size": parse_size(given.get("size", "256x256")),
+        "atlas": given.get("atlas", 1024),
+    }
+    names = [name.strip() for name in given.get("techniques", TECHNIQUES).split(",")]
+    for name in names:
+        check(Settings, sizes | {"technique": name}, {"technique": "techniques"})
+    light = given.get("light", "front")
+    return {
+        "against": given.get("against", "surface-integral"),
+        "techniques": names,
+        "light": light,
+        "region": given.get("region", usual_region(light)),
+        "medium": given.get("medium", "skin1"),
+        "settings": Settings(**sizes),
+        "samples": given.get("samples", 64),
+        "adapter": given["adapter"],
+    }
 
 
 def compare_techniques(head: str, chosen: dict[str, Any], output: Path | None, as_json: bool) -> None:

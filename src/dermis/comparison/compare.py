@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.presets import media
 from dermis.optics.profiles import TERMS, write_profile
 from dermis.rendering.renderer import Renderer
+from dermis.rendering.surface_points import surface_points
 from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
@@ -97,14 +99,8 @@ def compare(
     """
     check_choices(against, light, region, medium)
     settings = settings or Settings(size=(256, 256), atlas=1024)
-    body = matched(media()[medium])
-    profile = fit_gaussians(diffusion_profile(body).rings(), TERMS, name=medium).profile
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "profile.toml"
-        write_profile(file, profile, {})
-        renderer = Renderer(adapter)
-        scene = comparison_scene(head, light, region, str(file))
-        subject = Subject(renderer, scene, profile, body, settings)
+    with subject_of(head, light, region, medium, settings, adapter) as subject:
+        check_seen(surface_points(subject.renderer, subject.scene, settings).mask)
         report(f"truth: {against}")
         truth = TRUTHS[against](subject, samples)
         check_seen(truth.mask)
@@ -112,10 +108,25 @@ def compare(
         for technique in techniques:
             report(technique)
             images[technique], ms[technique] = _render(subject, technique, truth)
+        name = subject.renderer.device.adapter.name
     title = f"{head.name}, {medium}, light: {light}, region: {region}, {settings.size[0]}x{settings.size[1]}"
-    made = Comparison(title, renderer.device.adapter.name, truth, against, (), images)
+    made = Comparison(title, name, truth, against, (), images)
     rows = tuple(_row(made, technique, ms[technique]) for technique in techniques)
     return Comparison(title, made.adapter, truth, against, rows, images)
+
+
+@contextmanager
+def subject_of(
+    head: Head, light: str, region: str, medium: str, settings: Settings, adapter: str
+) -> Iterator[Subject]:
+    """What a comparison judges; its profile is a file that lasts as long as the context. See `compare`."""
+    body = matched(media()[medium])
+    profile = fit_gaussians(diffusion_profile(body).rings(), TERMS, name=medium).profile
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "profile.toml"
+        write_profile(file, profile, {})
+        scene = comparison_scene(head, light, region, str(file))
+        yield Subject(Renderer(adapter), scene, profile, body, settings)
 
 
 def check_choices(against: str, light: str, region: str, medium: str) -> None:

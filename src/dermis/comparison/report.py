@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.comparison.compare import Comparison, Row
+from dermis.comparison.sources import comparison_sources
 from dermis.images.codecs import encode_png8
 from dermis.outputs import replacing
 from dermis.reference.difference_images import signed_difference
@@ -35,6 +36,7 @@ def write_report(path: Path, made: Comparison) -> None:
         notes=html.escape("; ".join(made.truth.notes)),
         adapter=html.escape(made.adapter),
         table=_table(made.rows),
+        keys=" ".join(comparison_sources(made.against, made.images)),
         figures="\n".join([truth, *figures]),
     )
     with replacing(path) as trial:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from dermis.assets.head import Head
 from dermis.assets.maps import Maps
 from dermis.scene.camera import Camera, portrait, three_quarter
@@ -12,6 +14,8 @@ from dermis.scene.model import Scene
 from dermis.scene.skin import Skin
 
 _WHITE = (3.14, 3.14, 3.14)
+_NOSE = (14.0, -28.0, 90.0)  # between tip, wing and lip, from the centre [mm]
+_EARS_MM = 60.0  # above and below the centre; farther below, shoulders stand out more
 
 
 def _front(head: Head) -> tuple[Light, ...]:
@@ -36,11 +40,11 @@ LIGHTS: dict[str, Callable[[Head], tuple[Light, ...]]] = {"front": _front, "back
 
 
 def _ear(head: Head) -> tuple[float, float, float]:
-    """The outermost place of the head's left half above the neck: the left ear."""
+    """The outermost place of the head's left half at the height of its ears."""
     places = head.mesh.positions - head.centre_mm
-    height = places[:, 1].max() - places[:, 1].min()
-    head_only = places[places[:, 1] > places[:, 1].max() - 0.75 * min(height, 330.0)]
-    x, y, z = (float(c) for c in head_only[head_only[:, 0].argmax()])
+    off = np.abs(places[:, 1])
+    beside = places[off <= max(_EARS_MM, float(off.min()))]
+    x, y, z = (float(c) for c in beside[beside[:, 0].argmax()])
     return (x, y, z)
 
 
@@ -54,11 +58,17 @@ def _at_cheek(head: Head) -> Camera:
     return Camera(position=(spot[0] + 250.0, spot[1], spot[2] + 300.0), target=spot, frame_mm=90.0)
 
 
+def _at_nose(head: Head) -> Camera:
+    """Close to the nose, from the front."""
+    return Camera(position=(_NOSE[0], _NOSE[1], 900.0), target=_NOSE, frame_mm=90.0)
+
+
 REGIONS: dict[str, Callable[[Head], Camera]] = {
     "portrait": portrait,
     "three-quarter": three_quarter,
     "ear": _at_ear,
     "cheek": _at_cheek,
+    "nose": _at_nose,
 }
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +18,14 @@ from dermis.rendering.surface_points import SurfacePoints, irradiance_at, surfac
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
+if TYPE_CHECKING:
+    from dermis.reference.irradiance_samples import IrradianceSamples
+
 Floats = NDArray[np.float64]
 
-_SPACING_MM, _FINEST_MM = 3.0, 0.4
+_SPACING_MM, _FINEST_MM = 3.0, 0.2  # twice as coarse, a laser's stripe loses 1.5 % of its light
 _HEAT_RADIUS_MM = 10.0
-_LEAST_VARIANCE_MM2 = 0.25  # narrower Gaussians are taken to leave the light where it is
+_LEAST_VARIANCE_MM2 = 0.25  # narrower Gaussians see no difference between straight lines and the surface
 SUBPIXELS = 16
 
 
@@ -62,20 +66,10 @@ def surface_integral(subject: Subject, samples: int) -> Truth:
 
     samples : of no account
     """
-    from dermis.reference.surface_integral import GaussianSum as Profile
-    from dermis.reference.surface_integral import Places, integrate, sample_irradiance
-
     started = time.perf_counter()
-    renderer, scene, settings = subject.renderer, subject.scene, subject.settings
-    mesh = scene.head.mesh
-
-    def light(places: Places) -> Floats:
-        return irradiance_at(renderer, scene, settings, places.face, places.barycentric)
-
-    lit = sample_irradiance(mesh, light, _SPACING_MM, _FINEST_MM)
-    seen = surface_points(renderer, scene, settings)
-    profile = Profile(subject.profile.weight, subject.profile.variance_mm2)
-    exitance = integrate(_positions(subject, seen), lit, profile)
+    seen = surface_points(subject.renderer, subject.scene, subject.settings)
+    lit = irradiance_samples(subject)
+    exitance = _straight(positions(subject, seen), lit, subject.profile.weight, subject.profile.variance_mm2)
     return _by_pixel(seen, exitance, started, f"{len(lit.positions):,} samples of irradiance")
 
 
@@ -84,31 +78,56 @@ def heat(subject: Subject, samples: int) -> Truth:
 
     samples : of no account
     """
+    return heat_around(subject, subject.scene.camera.target, _HEAT_RADIUS_MM, irradiance_samples(subject))
+
+
+def heat_around(
+    subject: Subject,
+    place: tuple[float, float, float],
+    radius_mm: float,
+    lit: IrradianceSamples,
+    least_mm2: float = _LEAST_VARIANCE_MM2,
+) -> Truth:
+    """The same Gaussians as heat that spreads along the surface, around what is seen nearest to a place.
+
+    place : from the head's centre [mm]
+    lit : of the whole head, see `irradiance_samples`
+    least_mm2 : variance under which Gaussians are integrated by straight-line distance
+    """
     from dermis.reference.map_error import patch_of
     from dermis.reference.surface_diffusion import diffuse_on_surface
 
     started = time.perf_counter()
-    renderer, scene, settings = subject.renderer, subject.scene, subject.settings
-    narrow = subject.profile.variance_mm2 < _LEAST_VARIANCE_MM2
-    variances, weight = subject.profile.variance_mm2[~narrow], subject.profile.weight
-    seen = surface_points(renderer, scene, settings)
-    check_seen(seen.mask)
-    places = _positions(subject, seen)
-    target = np.array(scene.camera.target) + scene.head.centre_mm
-    centre = places[np.linalg.norm(places - target, axis=1).argmin()]
-    patch = patch_of(scene.head.mesh, centre, _HEAT_RADIUS_MM, variances)
-    entered = irradiance_at(renderer, scene, settings, *patch.vertex_places())
-    levels = diffuse_on_surface(patch.positions, patch.triangles, entered, variances)
-    exitance = weight[narrow].sum(axis=0) * entered + np.einsum("knc,kc->nc", levels, weight[~narrow])
+    narrow = subject.profile.variance_mm2 < least_mm2
+    variances, weight = subject.profile.variance_mm2, subject.profile.weight
+    seen = surface_points(subject.renderer, subject.scene, subject.settings)
+    places = positions(subject, seen)
+    middle = np.array(place) + subject.scene.head.centre_mm
+    centre = places[np.linalg.norm(places - middle, axis=1).argmin()]
+    patch = patch_of(subject.scene.head.mesh, centre, radius_mm, variances[~narrow])
+    entered = _entered(subject, *patch.vertex_places())
+    levels = diffuse_on_surface(patch.positions, patch.triangles, entered, variances[~narrow])
     fine, weights = patch.find(seen.triangle, seen.barycentric)
     on = (fine >= 0) & patch.holds(places)
+    spread = np.einsum("knc,kc->nc", levels, weight[~narrow])
+    exitance = patch.interpolate(spread, fine[on], weights[on])
+    exitance += _straight(places[on], lit, weight[narrow], variances[narrow])
     mask = seen.mask.copy()
     mask[seen.mask] = on
     judged = SurfacePoints(mask, seen.triangle[on], seen.barycentric[on])
-    kept = f"{narrow.sum()} Gaussians under {_LEAST_VARIANCE_MM2:g} mm2 kept in place"
-    note = f"{_HEAT_RADIUS_MM:g} mm around the middle; {kept}"
-    made = _by_pixel(judged, patch.interpolate(exitance, fine[on], weights[on]), started, note)
+    straight = f"{narrow.sum()} Gaussians under {least_mm2:g} mm2 by straight lines"
+    made = _by_pixel(judged, exitance, started, f"{radius_mm:g} mm around the middle; {straight}")
     return replace(made, through=False)
+
+
+def irradiance_samples(subject: Subject) -> IrradianceSamples:
+    """The light that enters all of the skin, as finely as the truths take it."""
+    from dermis.reference.irradiance_samples import Places, sample_irradiance
+
+    def light(places: Places) -> Floats:
+        return _entered(subject, places.face, places.barycentric)
+
+    return sample_irradiance(subject.scene.head.mesh, light, _SPACING_MM, _FINEST_MM)
 
 
 def path_traced(subject: Subject, samples: int) -> Truth:
@@ -146,7 +165,22 @@ TRUTHS: dict[str, Callable[[Subject, int], Truth]] = {
 }
 
 
-def _positions(subject: Subject, seen: SurfacePoints) -> Floats:
+def _entered(subject: Subject, triangle: NDArray[np.int64], barycentric: Floats) -> Floats:
+    return irradiance_at(subject.renderer, subject.scene, subject.settings, triangle, barycentric)
+
+
+def _straight(points: Floats, lit: IrradianceSamples, weight: Floats, variance_mm2: Floats) -> Floats:
+    """(n, 3) what leaves at points under some Gaussians of the straight-line distance."""
+    from dermis.reference.surface_integral import GaussianSum as Profile
+    from dermis.reference.surface_integral import integrate
+
+    if not len(variance_mm2):
+        return np.zeros_like(points)
+    return integrate(points, lit, Profile(weight, variance_mm2))
+
+
+def positions(subject: Subject, seen: SurfacePoints) -> Floats:
+    """(n, 3) where the pixels' middles meet the head [mm]."""
     mesh = subject.scene.head.mesh
     corners = mesh.positions[mesh.triangles[seen.triangle]].astype(np.float64)
     return np.asarray(np.einsum("nk,nkc->nc", seen.barycentric, corners))

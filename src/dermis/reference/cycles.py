@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, NoReturn
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
-from dermis.images.io import read_image
 from dermis.optics.media import Medium
+from dermis.reference.cycles_process import CyclesPass, blender_python, read_passes, run_cycles, write_scene
 from dermis.reference.cycles_scene import FALLOFFS, describe
 from dermis.reference.mitsuba_skin import Lambertian
 from dermis.scene.model import Scene
@@ -23,12 +21,7 @@ from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float32]
 Method = Literal["random-walk", "burley"]
-PYTHON_VARIABLE = "DERMIS_BLENDER_PYTHON"
 _PASSES = 4
-_REMEDY = (
-    f"Set {PYTHON_VARIABLE} to a Python with bpy, kept apart since bpy wants numpy below 2: "
-    'python3.11 -m venv blender && blender/bin/pip install bpy "numpy<2"'
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,64 +51,63 @@ def cycles_render(
     method: Method = "random-walk",
     python: str | Path | None = None,
 ) -> CyclesRendered:
-    """The scene by Cycles on the CPU, without clamping, denoising or surface reflection.
+    """The scene by Cycles on the CPU: the mean of passes; arguments and refusals as of `cycles_passes`.
+
+    samples : at least so many paths through each pixel, in 4 passes
+    """
+    _check_samples(samples)
+    each = -(-int(samples) // _PASSES)
+    passes = cycles_passes(scene, medium, [each] * _PASSES, settings, method=method, python=python)
+    images = np.stack([one.image for one in passes]).astype(np.float64)
+    coverage = np.stack([one.coverage for one in passes]).astype(np.float64)
+    return CyclesRendered(
+        images.mean(axis=0).astype(np.float32),
+        (images.var(axis=0, ddof=1) / _PASSES).astype(np.float32),
+        coverage.mean(axis=0).astype(np.float32),
+        each * _PASSES,
+        sum(one.seconds for one in passes),
+    )
+
+
+def cycles_passes(
+    scene: Scene,
+    medium: Medium | Lambertian,
+    samples: Sequence[int],
+    settings: Settings | None = None,
+    *,
+    method: Method = "random-walk",
+    seed: int = 0,
+    python: str | Path | None = None,
+) -> list[CyclesPass]:
+    """The scene by Cycles on the CPU, once for each count of samples, in one process.
+
+    There is no clamping, denoising or surface reflection.
 
     medium : of one layer; its eta plays no part, for Cycles' walks end at an index-matched surface. Its
         colour in Cycles is what it reflects of diffuse light, its radius 4 pi mean free paths. Or a
         `Lambertian`
-    samples : at least so many paths through each pixel, in 4 passes
+    samples : paths through each pixel, of each pass
     settings : only the size counts
+    seed : of the first pass; each further one has the next
     python : of an environment with `bpy`; DERMIS_BLENDER_PYTHON when left out
 
     Raises DermisError when there is no such Python, when Cycles fails, and for layers.
     """
-    if not (isinstance(samples, int | np.integer) and samples >= 1):
-        refuse("samples", "a whole number from 1", f"{samples} came", "Correct it")
+    for count in samples:
+        _check_samples(count)
     if method not in FALLOFFS:
         refuse("method", f"one of {', '.join(FALLOFFS)}", f"{method!r} came", "Correct it")
-    each, size = -(-int(samples) // _PASSES), (settings or Settings()).size
-    described, arrays = describe(scene, medium, method, size, each, _PASSES)
-    interpreter = _interpreter(python)
+    size = (settings or Settings()).size
+    described, arrays = describe(scene, medium, method, size)
+    described["passes"] = [{"samples": int(n), "seed": seed + k} for k, n in enumerate(samples)]
+    interpreter = blender_python(python)
     with tempfile.TemporaryDirectory(prefix="dermis-cycles-") as name:
         folder = Path(name)
-        (folder / "scene.json").write_text(json.dumps(described), encoding="utf-8")
-        np.savez(folder / "arrays.npz", **arrays)  # type: ignore[arg-type]  # its last parameter is no array
-        _run(interpreter, folder)
-        passes = np.stack([read_image(folder / f"pass_{k}.exr") for k in range(_PASSES)]).astype(np.float64)
-        seconds = float(sum(json.loads((folder / "seconds.json").read_text(encoding="utf-8"))))
-    return CyclesRendered(
-        passes[..., :3].mean(axis=0).astype(np.float32),
-        (passes[..., :3].var(axis=0, ddof=1) / _PASSES).astype(np.float32),
-        passes[..., 3].mean(axis=0).astype(np.float32),
-        each * _PASSES,
-        seconds,
-    )
+        write_scene(folder, described, arrays)
+        run_cycles(interpreter, folder, paths=size[0] * size[1] * sum(samples))
+        return read_passes(folder, samples, size)
 
 
-def _interpreter(python: str | Path | None) -> Path:
-    named = python or os.environ.get(PYTHON_VARIABLE) or ""
-    if not named:
-        _refuse_python("none is named")
-    if not Path(named).is_file():
-        _refuse_python(f"there is no file {named}")
-    return Path(named)
-
-
-def _run(python: Path, folder: Path) -> None:
-    script = Path(__file__).with_name("cycles_script.py")
-    # Isolated: our packages are for another numpy, and the `cycles` beside the script is not Blender's.
-    command = [str(python), "-I", str(script), str(folder)]
-    try:
-        ran = subprocess.run(command, capture_output=True, text=True, check=False)
-    except OSError as fault:
-        _refuse_python(f"{python} cannot be run ({fault.strerror})")
-    if ran.returncode == 0 and (folder / "seconds.json").is_file():
-        return
-    last = (ran.stderr.strip() or ran.stdout.strip() or "it said nothing").splitlines()[-1]
-    if "No module named 'bpy'" in last:
-        _refuse_python(f"{python} says: {last}")
-    refuse("Cycles", "to render the scene", f"it failed ({last})", "Try bpy 5.0, which this was made with")
-
-
-def _refuse_python(came: str) -> NoReturn:
-    refuse("Cycles", "a Python that has Blender's module bpy", came, _REMEDY)
+def _check_samples(samples: int) -> None:
+    if not (isinstance(samples, int | np.integer) and samples >= 1):
+        refuse("samples", "a whole number from 1", f"{samples} came", "Correct it")

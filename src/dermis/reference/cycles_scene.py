@@ -35,12 +35,9 @@ FALLOFFS = {"random-walk": "RANDOM_WALK", "burley": "BURLEY"}
 
 
 def describe(
-    scene: Scene, medium: Medium | Lambertian, method: str, size: tuple[int, int], samples: int, passes: int
+    scene: Scene, medium: Medium | Lambertian, method: str, size: tuple[int, int]
 ) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """What goes into scene.json, and the arrays beside it.
-
-    samples : of each pass
-    """
+    """What goes into scene.json, less the passes, and the arrays beside it."""
     world, panorama = _world(scene.environment)
     described = {
         "materials": _materials(scene.head, medium, method),
@@ -48,8 +45,6 @@ def describe(
         "world": world,
         "camera": _camera(scene),
         "size": list(size),
-        "samples": samples,
-        "passes": passes,
         "direct": isinstance(medium, Lambertian),
     }
     mesh = scene.head.mesh

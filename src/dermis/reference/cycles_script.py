@@ -1,7 +1,8 @@
 """Renders a described scene with Cycles. Blender's Python runs it by its path: cycles_script.py FOLDER.
 
-FOLDER holds scene.json and arrays.npz as `dermis.reference.cycles` writes them. The script adds pass_K.exr
-(radiance and coverage) and seconds.json. It imports nothing of dermis: Blender's Python is another one.
+FOLDER holds scene.json and arrays.npz as `dermis.reference.cycles_process` writes them. The script adds
+pass_K.exr (radiance and coverage) and, last of all, done.json (Blender's version, times of the passes). It
+imports nothing of dermis: Blender's Python is another one.
 """
 
 from __future__ import annotations
@@ -30,8 +31,9 @@ def main(folder: Path) -> None:
     set_world(described["world"], arrays.get("panorama"))
     set_camera(described["camera"])
     set_render(described)
-    seconds = [render(folder / f"pass_{k}.exr", k) for k in range(described["passes"])]
-    (folder / "seconds.json").write_text(json.dumps(seconds), encoding="utf-8")
+    times = [render(folder / f"pass_{k}.exr", **one) for k, one in enumerate(described["passes"])]
+    done = {"version": bpy.app.version_string, "times": times}
+    (folder / "done.json").write_text(json.dumps(done), encoding="utf-8")
 
 
 def add_mesh(arrays: dict[str, Any], materials: list[Any]) -> None:
@@ -167,7 +169,7 @@ def set_render(described: dict[str, Any]) -> None:
     scene.render.image_settings.color_mode = "RGBA"
     scene.render.image_settings.color_depth = "32"
     cycles = scene.cycles
-    cycles.device, cycles.samples = "CPU", described["samples"]
+    cycles.device = "CPU"
     cycles.use_adaptive_sampling = cycles.use_denoising = False
     cycles.pixel_filter_type = "BOX"
     # Its defaults trade a biased, darker image for less noise.
@@ -176,12 +178,14 @@ def set_render(described: dict[str, Any]) -> None:
         cycles.max_bounces = 0
 
 
-def render(path: Path, seed: int) -> float:
-    bpy.context.scene.cycles.seed = seed
+def render(path: Path, samples: int, seed: int) -> tuple[float, float]:
+    """Seconds on the clock, and of all cores together."""
+    cycles = bpy.context.scene.cycles
+    cycles.samples, cycles.seed = samples, seed
     bpy.context.scene.render.filepath = str(path)
-    began = time.perf_counter()
+    began, worked = time.perf_counter(), time.process_time()
     bpy.ops.render.render(write_still=True)
-    return time.perf_counter() - began
+    return time.perf_counter() - began, time.process_time() - worked
 
 
 def add_object(name: str, data: Any) -> Any:

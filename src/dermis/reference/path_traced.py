@@ -64,6 +64,7 @@ def path_trace(
     settings: Settings | None = None,
     *,
     variant: Variant = "scalar_rgb",
+    keep: bool = True,
     report: Report | None = None,
 ) -> PathTraced:
     """The scene with its skin filled by a medium; its maps, profile and surface reflection play no part.
@@ -75,6 +76,7 @@ def path_trace(
     settings : only the size counts
     variant : of Mitsuba; "llvm_ad_rgb" takes half the time of many samples but wants a recent LLVM (14 and 15
         end the process), "cuda_ad_rgb" wants an NVIDIA GPU
+    keep : False neither looks for passes on disk nor keeps any, so that all of the time is spent now
     report : called with how many passes are done, and of how many
 
     Raises DermisError when Mitsuba is missing, and for what it cannot trace: a surface without volume, media
@@ -88,9 +90,10 @@ def path_trace(
     _check(samples)
     check_traceable(medium)
     mi, size = load_mitsuba(), (settings or Settings()).size
-    key = scene_key(scene, medium, size, f"{mi.__version__} {variant} {SAMPLES_PER_PASS} {ROULETTE_DEPTH}")
+    form = f"{mi.__version__} {variant} {SAMPLES_PER_PASS} {ROULETTE_DEPTH}"
+    key = scene_key(scene, medium, size, form) if keep else None
     wanted = max(_LEAST_PASSES, -(-samples // SAMPLES_PER_PASS))
-    passes = kept_passes(key, size)
+    passes = kept_passes(key, size) if key else None
     if passes is None or passes.count < wanted:
         with variant_of(mi, variant):
             built, notes = radiance_scene(mi, scene, medium, size)
@@ -116,8 +119,10 @@ def _mask(mi: Any, scene: Scene, size: tuple[int, int]) -> Floats:
     return np.clip(share, 0.0, 1.0)
 
 
-def _add_passes(mi: Any, built: Any, passes: Passes, wanted: int, key: str, report: Report | None) -> None:
-    """Passes up to the number that is wanted; those that are done are stored, whatever happens."""
+def _add_passes(
+    mi: Any, built: Any, passes: Passes, wanted: int, key: str | None, report: Report | None
+) -> None:
+    """Passes up to the number that is wanted; with a key the ones done are stored, whatever happens."""
     stored = time.perf_counter()
     try:
         while passes.count < wanted:
@@ -127,9 +132,9 @@ def _add_passes(mi: Any, built: Any, passes: Passes, wanted: int, key: str, repo
             passes.add(image, ended - began)
             if report is not None:
                 report(passes.count, wanted)
-            if ended - stored > _STORE_SECONDS and passes.count < wanted:
+            if key and ended - stored > _STORE_SECONDS and passes.count < wanted:
                 store_passes(key, passes)
                 stored = ended
     finally:
-        if passes.count > 0:
+        if key and passes.count > 0:
             store_passes(key, passes)

@@ -1,0 +1,141 @@
+"""Simple surfaces cut into charts that are turned, scaled, mirrored or folded, for what happens at seams."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.assets.geometry import build_mesh
+from dermis.assets.mesh import Mesh
+from dermis.assets.primitives import SKIN
+
+Floats = NDArray[np.float64]
+
+
+class Patch(NamedTuple):
+    """A grid of cells on a surface and where its chart lies.
+
+    points : (rows, columns, 3) [mm], rows downwards and columns to the right as seen from outside
+    flat : (rows, columns, 2) the same laid flat, x to the right and y down
+    """
+
+    points: Floats
+    flat: Floats
+
+
+class Lay(NamedTuple):
+    """How a chart lies in the map: middle of it in uv, scale, turn, and whether it is mirrored."""
+
+    middle: tuple[float, float]
+    scale: float
+    turn_degrees: float = 0.0
+    mirrored: bool = False
+
+
+def assemble(patches: Sequence[Patch], lays: Sequence[Lay]) -> Mesh:
+    """One mesh of all patches; points in the same place are one."""
+    positions, uv, triangles, first = [], [], [], 0
+    for patch, lay in zip(patches, lays, strict=True):
+        rows, columns = patch.points.shape[:2]
+        at = first + np.arange(rows * columns).reshape(rows, columns)
+        a, b, c, d = at[:-1, :-1].ravel(), at[:-1, 1:].ravel(), at[1:, :-1].ravel(), at[1:, 1:].ravel()
+        triangles += [np.column_stack((a, c, d)), np.column_stack((a, d, b))]
+        positions.append(patch.points.reshape(-1, 3))
+        uv.append(_laid(patch.flat.reshape(-1, 2), lay))
+        first += rows * columns
+    places = np.round(np.concatenate(positions), 4)
+    corners = np.concatenate(triangles)
+    return build_mesh(places, np.concatenate(uv), corners, np.zeros(len(corners)), SKIN)
+
+
+def _laid(flat: Floats, lay: Lay) -> Floats:
+    angle = np.radians(lay.turn_degrees)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    side = np.array([-1.0 if lay.mirrored else 1.0, 1.0])
+    return np.asarray((flat * side) @ turn.T * lay.scale + lay.middle)
+
+
+SPHERE_LAYS = (
+    Lay((0.17, 0.2), 0.10),
+    Lay((0.5, 0.2), 0.09, 90.0),
+    Lay((0.83, 0.2), 0.11, -35.0),
+    Lay((0.17, 0.7), 0.08, 180.0, mirrored=True),
+    Lay((0.5, 0.7), 0.10, 20.0),
+    Lay((0.83, 0.7), 0.095, 0.0, mirrored=True),
+)
+
+
+def cut_sphere(radius_mm: float, cells: int, lays: Sequence[Lay] = SPHERE_LAYS) -> Mesh:
+    """A sphere about the origin as six charts of `cells` x `cells`, each bulging cube face laid flat."""
+    along = np.tan(np.linspace(-np.pi / 4, np.pi / 4, cells + 1))
+    x, y = np.meshgrid(along, along)
+    front = np.stack((x, -y, np.ones_like(x)), axis=-1)
+    flat = np.stack(np.meshgrid(*2 * [np.linspace(-1, 1, cells + 1)]), axis=-1)
+    patches = []
+    for k in range(6):
+        face = front if k < 4 else np.stack((x, np.ones_like(x), y), axis=-1) * [1, 1 if k == 4 else -1, 1]
+        if k == 5:
+            face = face * [1, 1, -1]
+        turn = np.pi / 2 * (k if k < 4 else 0)
+        spin = np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]])
+        face = face @ spin.T
+        patches.append(Patch(radius_mm * face / np.linalg.norm(face, axis=-1, keepdims=True), flat))
+    return assemble(patches, lays)
+
+
+CYLINDER_LAYS = (
+    Lay((0.2, 0.5), 0.0045),
+    Lay((0.53, 0.5), 0.0035, 90.0),
+    Lay((0.84, 0.5), 0.004, 0.0, mirrored=True),
+)
+
+
+def cut_cylinder(radius_mm: float, height_mm: float, cells: int, lays: Sequence[Lay] = CYLINDER_LAYS) -> Mesh:
+    """An open cylinder around the Y axis in as many charts as there are lays, without stretch."""
+    patches = []
+    share = 2 * np.pi / len(lays)
+    for k in range(len(lays)):
+        angle, height = np.meshgrid(
+            share * (k + np.linspace(0, 1, cells + 1)), height_mm * np.linspace(0.5, -0.5, cells + 1)
+        )
+        angle = np.where(
+            np.isclose(angle, 2 * np.pi), 0.0, angle
+        )  # exactly the same numbers, so that it welds
+        points = np.stack((radius_mm * np.sin(angle), height, radius_mm * np.cos(angle)), axis=-1)
+        across, down = np.meshgrid(
+            radius_mm * share * np.linspace(-0.5, 0.5, cells + 1),
+            height_mm * np.linspace(-0.5, 0.5, cells + 1),
+        )
+        patches.append(Patch(points, np.stack((across, down), axis=-1)))
+    return assemble(patches, lays)
+
+
+def cut_cone(radius_mm: float, gap_degrees: float, rings: int = 16, segments: int = 64) -> Mesh:
+    """A cone cut open along one line and laid flat: a disc with a slit that gets narrow towards the apex."""
+    whole = 2 * np.pi - np.radians(gap_degrees)
+    away, angle = np.meshgrid(
+        radius_mm * np.linspace(0, 1, rings + 1), whole * np.linspace(0, 1, segments + 1)
+    )
+    slope = whole / (2 * np.pi)
+    around = np.where(np.isclose(angle, whole), 0.0, angle) / slope
+    points = np.stack(
+        (away * slope * np.sin(around), away * slope * np.cos(around), -away * np.sqrt(1 - slope**2)), axis=-1
+    )
+    start = angle + np.radians(gap_degrees) / 2
+    flat = np.stack((away * np.sin(start), -away * np.cos(start)), axis=-1)
+    # rows run around, columns outwards: a triangle at the apex has no area and is left out
+    mesh = assemble([Patch(points[::-1], flat[::-1])], [Lay((0.5, 0.5), 0.45 / radius_mm)])
+    p = mesh.positions[mesh.triangles]
+    sound = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) > 1e-9
+    return build_mesh(mesh.positions, mesh.uv, mesh.triangles[sound], mesh.material[sound], SKIN)
+
+
+def folded_sheet(side_mm: float, cells: int) -> Mesh:
+    """A flat square whose left half has the uv of the right half, mirrored; joined along the middle."""
+    x, y = np.meshgrid(np.linspace(-0.5, 0.5, 2 * cells + 1), np.linspace(-0.5, 0.5, 2 * cells + 1))
+    points = side_mm * np.stack((x, -y, 0 * x), axis=-1)
+    flat = np.stack((np.abs(x), y), axis=-1)
+    return assemble([Patch(points, flat)], [Lay((0.2, 0.5), 0.9)])

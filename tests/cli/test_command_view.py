@@ -1,0 +1,98 @@
+"""`dermis view` as far as it goes without a window."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from dermis.scene import Scene
+from dermis.viewer.state import ViewerState
+
+Run = Callable[..., Any]
+
+
+@pytest.mark.parametrize(
+    ("words", "culprit"),
+    [
+        (("--port", "80"), "--port"),
+        (("--host", "0.0.0.0"), "--host"),
+        (("--browser", "--port", "70000"), "--port"),
+        (("--size", "wide"), "--size"),
+        (("--atlas", "3"), "--atlas"),
+        (("--samples", "0"), "--samples"),
+        (("--lights", "none"), "--lights"),
+        (("--camera", "nowhere"), "nowhere"),
+    ],
+)
+def test_what_cannot_be_is_refused(run: Run, folder: Path, words: tuple[str, ...], culprit: str) -> None:
+    ended = run("view", "head.obj", *words, "--adapter", "cpu")
+    assert (ended.code, ended.stdout) == (2, "")
+    assert ended.stderr.startswith(f"dermis: {culprit}")
+
+
+@pytest.mark.parametrize(
+    ("words", "package"), [((), "glfw"), (("--browser",), "uvicorn"), ((), "imgui_bundle")]
+)
+def test_without_the_extra_it_says_what_to_install(
+    run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], package: str
+) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    ended = run("view", "head.obj", *words, "--adapter", "cpu")
+    assert ended.code == 2
+    assert package.replace("_", "-") in ended.stderr and 'pip install "dermis[viewer]"' in ended.stderr
+
+
+def test_the_package_imports_without_the_extra() -> None:
+    missing = ("imgui_bundle", "rendercanvas", "glfw", "uvicorn", "websockets")
+    code = f"import sys; sys.modules.update(dict.fromkeys({missing})); import dermis.viewer.windows"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_without_a_display_it_names_the_way_out(
+    run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("glfw", reason="the extra `viewer` is not installed")
+    monkeypatch.setenv("DISPLAY", ":4294")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    ended = run("view", "head.obj", "--adapter", "cpu")
+    assert ended.code == 2 and "--browser" in ended.stderr and "Traceback" not in ended.stderr
+
+
+def test_the_options_make_the_state(run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[Any] = []
+    monkeypatch.setattr("dermis.viewer.windows.show_window", lambda *given: seen.append(given))
+    words = ("--lights", "window", "--camera", "ear", "--samples", "2", "--size", "300x200")
+    assert run("view", "head.obj", *words, "--adapter", "cpu").code == 0
+    state, adapter, size = seen[0]
+    assert (adapter, size, state.rig) == ("cpu", (300, 200), "window")
+    assert (state.settings.atlas, state.settings.samples) == (1024, 2)  # less on a software adapter
+    assert state.head == {"name": str(folder / "head.obj")}
+    assert state.scene.camera.frame_mm == 120.0
+
+
+def test_a_notebook_displays_the_same_viewer(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a notebook at hand: a canvas in the place of rendercanvas' own."""
+    pytest.importorskip("imgui_bundle", reason="the extra `viewer` is not installed")
+    from rendercanvas.offscreen import OffscreenRenderCanvas
+
+    from dermis.assets.head import load_head
+    from dermis.viewer.windows import notebook_viewer
+
+    class Canvas(OffscreenRenderCanvas):  # type: ignore[misc]
+        def _repr_mimebundle_(self, **options: Any) -> dict[str, str]:
+            return {"text/plain": "shown"}
+
+    backend: Any = ModuleType("rendercanvas.anywidget")
+    backend.RenderCanvas = Canvas
+    monkeypatch.setitem(sys.modules, "anywidget", ModuleType("anywidget"))
+    monkeypatch.setitem(sys.modules, "rendercanvas.anywidget", backend)
+    state = ViewerState(Scene(load_head(folder / "head.obj"))).with_settings(atlas=64, samples=1)
+    viewer = notebook_viewer(state, "cpu", (64, 48))
+    assert viewer._repr_mimebundle_() == {"text/plain": "shown"}
+    assert viewer.canvas.draw().shape == (48, 64, 4)

@@ -1,0 +1,57 @@
+"""Truths against each other and against what they come to without scattering."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dermis.assets.head import Head
+from dermis.assets.maps import Maps
+from dermis.assets.primitives import uv_sphere
+from dermis.comparison.compare import subject_of
+from dermis.comparison.truths import Subject, heat_around, irradiance_samples, surface_integral
+from dermis.optics.gaussians import GaussianSum
+from dermis.reference.metrics import energy_ratio, relative_rmse
+from dermis.scene.settings import Settings
+
+BALL = Head("ball", uv_sphere(60.0, 96, 48), Maps())
+ADAPTER = os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
+
+
+@pytest.fixture(scope="module")
+def lasered() -> Iterator[Subject]:
+    """A narrow stripe of light, seen close by."""
+    settings = Settings(size=(64, 64), atlas=64, shadow_size=256)
+    with subject_of(BALL, "laser", "ear", "skin1", settings, ADAPTER) as subject:
+        yield subject
+
+
+def spread_by(subject: Subject, *variance_mm2: float) -> Subject:
+    """The subject with a profile of equal Gaussians that keeps all light."""
+    weight = np.full((len(variance_mm2), 3), 1 / len(variance_mm2))
+    return replace(subject, profile=GaussianSum("test", np.array(variance_mm2), weight))
+
+
+def test_without_scattering_the_integral_is_the_light_that_enters(lasered: Subject) -> None:
+    """A coarser net of samples, which the stripe falls through, errs by a fifteenth."""
+    truth = surface_integral(spread_by(lasered, 0.03**2), 0)
+    plain = Settings(**(lasered.settings.model_dump() | {"technique": "none", "samples": 1}))
+    entered = lasered.renderer.draw(lasered.scene, plain).linear() / lasered.profile.albedo
+    assert relative_rmse(entered, truth.image, truth.mask).value < 0.03
+    assert energy_ratio(entered, truth.image, truth.mask).value == pytest.approx(1.0, abs=0.003)
+
+
+def test_heat_and_the_integral_agree_where_the_surface_is_gentle(lasered: Subject) -> None:
+    """Also for a Gaussian so narrow that heat leaves it to straight lines: it is spread all the same."""
+    subject = spread_by(lasered, 0.2, 0.5)
+    stripe = subject.scene.lights[0]
+    lit_place = np.array(stripe.position) - 17.2 * np.array(stripe.direction)
+    straight = surface_integral(subject, 0)
+    heat = heat_around(subject, tuple(lit_place), 12.0, irradiance_samples(subject))
+    assert 100 < heat.mask.sum() < straight.mask.sum()
+    assert relative_rmse(heat.image, straight.image, heat.mask).value < 0.01
+    assert energy_ratio(heat.image, straight.image, heat.mask).value == pytest.approx(1.0, abs=0.002)

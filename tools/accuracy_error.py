@@ -1,0 +1,119 @@
+"""What the error of texture space against the surface integral is made of, as tables."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from dermis.assets.head import Head
+from dermis.assets.regions.landmarks import known_landmarks
+from dermis.comparison.compare import subject_of
+from dermis.comparison.scenes import usual_region
+from dermis.comparison.truths import (
+    Subject,
+    Truth,
+    heat_around,
+    irradiance_samples,
+    positions,
+    surface_integral,
+)
+from dermis.optics.gaussians import GaussianSum
+from dermis.reference.metrics import energy_ratio, relative_rmse
+from dermis.reference.surface_integral import GaussianSum as Profile
+from dermis.reference.surface_integral import integrate
+from dermis.rendering.surface_points import surface_points
+from dermis.scene.settings import Settings
+
+LIGHTS = ("front", "back", "laser")
+ATLASES = (512, 1024, 2048)
+RADIUS_MM = 14.0
+LEAST_MM2 = 1.0  # of Gaussians for which the surface and straight lines differ
+PLACES = {
+    "front": {
+        "closed lid": ("left inner eye corner", "left outer eye corner"),
+        "ear": ("left ear top", "left ear lobe", "left tragus"),
+        "nostril": ("left nose wing",),
+        "mouth": ("stomion",),
+        "chin": ("pogonion",),
+    },
+    "back": {"ear": ("left ear top", "left ear lobe", "left ear back")},
+}
+"""Places that are seen under a light, each the mean of its landmarks."""
+
+
+def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
+    """Rows for docs/techniques.in.md by their names there."""
+    found: dict[str, list[str]] = {"by_atlas": [], "zero_width": [], "places": [], "even": []}
+    for light in LIGHTS:
+        with subject_of(head, light, usual_region(light), "skin1", settings, adapter) as subject:
+            straight = surface_integral(subject, 0)
+            found["by_atlas"] += by_atlas(subject, straight, light)
+            found["zero_width"].append(zero_width(subject, light))
+            found["places"] += places(subject, straight, light) if light in PLACES else []
+            if light == "front":
+                found["even"].append(even_light(subject))
+    return {name: "\n".join(rows) for name, rows in found.items()}
+
+
+def drawn(subject: Subject, technique: str, **changes: object) -> np.ndarray:
+    """Linear radiance at one sample for each pixel, as the truths have it."""
+    chosen = subject.settings.model_dump() | {"technique": technique, "samples": 1} | changes
+    return subject.renderer.draw(subject.scene, Settings(**chosen)).linear().astype(np.float64)
+
+
+def by_atlas(subject: Subject, straight: Truth, light: str) -> list[str]:
+    """Texture space by the size of its map, beside none."""
+
+    def error(image: np.ndarray) -> float:
+        return relative_rmse(image, straight.image, straight.mask).value
+
+    none, rows = error(drawn(subject, "none")), []
+    for side in ATLASES:
+        image = drawn(subject, "texture-space", atlas=side)
+        energy = energy_ratio(image, straight.image, straight.mask).value
+        rows.append(f"| {light} | {side} | {error(image):.4f} | {error(image) / none:.2f} | {energy:.4f} |")
+    return rows
+
+
+def zero_width(subject: Subject, light: str) -> str:
+    """The truth of a profile that hardly spreads, beside the light that enters: what its samples cost."""
+    narrow = GaussianSum("narrow", np.array([0.05**2]), np.ones((1, 3)))
+    truth = surface_integral(replace(subject, profile=narrow), 0)
+    entered = drawn(subject, "none") / subject.profile.albedo
+    pair = (entered, truth.image, truth.mask)
+    return f"| {light} | {relative_rmse(*pair).value:.4f} | {energy_ratio(*pair).value:.4f} |"
+
+
+def even_light(subject: Subject) -> str:
+    """What the integral makes of light that is the same everywhere: mean and 95th percentile by channel."""
+    lit = irradiance_samples(subject)
+    evenly = replace(lit, irradiance=np.ones_like(lit.irradiance))
+    seen = surface_points(subject.renderer, subject.scene, subject.settings)
+    profile = Profile(subject.profile.weight / subject.profile.albedo, subject.profile.variance_mm2)
+    back = integrate(positions(subject, seen), evenly, profile)
+    pairs = zip(back.mean(axis=0), np.percentile(back, 95, axis=0), strict=True)
+    return ", ".join(f"{mean:.3f} ({high:.3f})" for mean, high in pairs)
+
+
+def places(subject: Subject, straight: Truth, light: str) -> list[str]:
+    """Where the error is, and how much of it a perfect map would have."""
+    landmarks = known_landmarks(subject.scene.head)
+    assert landmarks is not None
+    none, ours = drawn(subject, "none"), drawn(subject, "texture-space")
+    on_map = drawn(subject, "texture-space", transmission="none")
+    lit, total = irradiance_samples(subject), ((ours - straight.image)[straight.mask] ** 2).sum()
+    rows = []
+    for place, names in PLACES[light].items():
+        middle = tuple(np.mean([landmarks[name] for name in names], axis=0))
+        heat = heat_around(subject, middle, RADIUS_MM, lit, LEAST_MM2)
+        share = ((ours - straight.image)[heat.mask] ** 2).sum() / total
+        pixels = heat.mask.sum() / straight.mask.sum()
+        errors = [
+            relative_rmse(image, truth.image, heat.mask).value
+            for truth, images in ((straight, (none, ours, heat.image)), (heat, (none, on_map)))
+            for image in images
+        ]
+        cells = " | ".join(f"{error:.3f}" for error in errors)
+        rows.append(f"| {light} | {place} | {100 * pixels:.1f} % | {100 * share:.0f} % | {cells} |")
+    return rows

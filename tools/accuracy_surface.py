@@ -1,0 +1,136 @@
+"""What the map does to a blur, apart from any light: curvature and seams, as tables."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import dermis
+from dermis.assets.atlas import build_atlas
+from dermis.assets.cache import cached_atlas
+from dermis.assets.head import Head
+from dermis.assets.maps import Maps
+from dermis.gpu import Frame, download, upload
+from dermis.optics.profiles import load_profile
+from dermis.reference.atlas_reading import Points, lit_at, seam_points, shown
+from dermis.reference.cut_meshes import cut_sphere
+from dermis.rendering.atlas_textures import upload_atlas
+from dermis.rendering.frame import scatter
+from dermis.rendering.renderer import Renderer
+from dermis.rendering.seams import REMEDIES
+from dermis.scene import DirectionalLight, Scene, Settings, Skin, StripeLight
+
+Choice = Callable[[np.ndarray], np.ndarray]
+HUMAN = "heads/makehuman/head_young_male_light.obj"
+RADII_MM = (5.0, 10.0, 20.0, 50.0, 100.0)
+BALL_SIDE, HEAD_SIDE = 320, 1024
+SPACING_MM, WIDTH_MM = 12.0, 6.0  # of bands of light across seams
+LEAST_FACING = 0.4  # cosine between a seam and the light
+
+
+def tables(adapter: str) -> dict[str, str]:
+    """Rows for docs/techniques.in.md by their names there."""
+    renderer = dermis.Renderer(adapter)
+    curved = [first_harmonic(renderer, radius) for radius in RADII_MM]
+    return {"curvature": "\n".join(curved), "seams": "\n".join(seams(renderer))}
+
+
+def first_harmonic(renderer: Renderer, radius_mm: float) -> str:
+    """What the widest Gaussian leaves of light in proportion to x on a sphere: by map, heat and chords."""
+    mesh, stage = cut_sphere(radius_mm, 20), renderer.stages.diffuse
+    variances = load_profile("gpu-gems-3").variance_mm2[1:]
+    atlas = build_atlas(mesh, BALL_SIDE, "stitched")
+    light = np.nan_to_num(shown(atlas, mesh, own=True))[..., :1] / radius_mm
+    levels = stage.make_levels(BALL_SIDE, len(variances))
+    upload(renderer.device, levels.stack, np.dstack([light, light, light, np.ones_like(light)]))
+    frame = Frame(renderer.device)
+    stage.draw(frame, levels, upload_atlas(renderer.device, atlas), variances)
+    frame.submit()
+    left = download(renderer.device, levels.stack, layer=len(variances))[..., :1]
+    density = np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
+    area = atlas.own[..., None] / density
+    map_share = (area * left * light).sum() / (area * light**2).sum()
+    v = variances[-1] / radius_mm**2
+    whole = np.exp(-2 / v)
+    chords = (1 - whole) - v * (1 - (1 + 2 / v) * whole)
+    return f"| {radius_mm:g} | {map_share:.3f} | {np.exp(-v):.3f} | {chords:.3f} |"
+
+
+def seams(renderer: Renderer) -> list[str]:
+    """Jump of the scattered light across seams, of the light there [%]: mean and 95th percentile."""
+    ball = cut_sphere(30.0, 20)
+    rows = row(renderer, "sphere in six charts", Head("sphere", ball, Maps()), BALL_SIDE, everywhere)
+    rows += row(renderer, "bust", dermis.load_head("bust"), HEAD_SIDE, everywhere)
+    human = dermis.load_head(Path(os.environ["DERMIS_DATA"]) / HUMAN, unit_mm=100)
+    rows += row(renderer, "MakeHuman, neck", human, HEAD_SIDE, at_neck)
+    return rows + row(renderer, "MakeHuman, back of the head", human, HEAD_SIDE, behind)
+
+
+def everywhere(places: np.ndarray) -> np.ndarray:
+    """Which of the places (n, 3) [mm from the head's centre] count: all."""
+    return np.ones(len(places), bool)
+
+
+def at_neck(places: np.ndarray) -> np.ndarray:
+    """Places on the neck and below it."""
+    return (places[:, 1] < -90.0) & (places[:, 2] < 60.0)
+
+
+def behind(places: np.ndarray) -> np.ndarray:
+    """Places on the back of the head."""
+    return (places[:, 1] > -90.0) & (places[:, 2] < -30.0)
+
+
+def row(
+    renderer: Renderer, name: str, head: Head, side: int, where: Callable[[np.ndarray], np.ndarray]
+) -> list[str]:
+    """One line of the table, a column for each remedy."""
+    one, other = judged(head, where)
+    cells = []
+    for remedy in REMEDIES:
+        found = jumps(renderer, banded(head), remedy, side, one, other)
+        cells.append(f"{100 * found.mean():.1f} / {100 * np.percentile(found, 95):.1f}")
+    return [f"| {name} | {len(one.triangle)} | {' | '.join(cells)} |"]
+
+
+def judged(head: Head, where: Choice) -> tuple[Points, Points]:
+    """Both sides of the places along seams that face the lights."""
+    mesh = head.mesh
+    one, other = seam_points(mesh)
+    places = one.on(mesh.positions[mesh.triangles]) - head.centre_mm
+    kept = where(places) & (np.abs(one.on(mesh.normals[mesh.triangles])[:, 2]) > LEAST_FACING)
+    for size in (BALL_SIDE, HEAD_SIDE):
+        for layout in ("mesh", "stitched"):
+            mapped = cached_atlas(mesh, size, layout).mapped
+            kept &= mapped[one.triangle] & mapped[other.triangle]
+    return Points(one.triangle[kept], one.weights[kept]), Points(other.triangle[kept], other.weights[kept])
+
+
+def banded(head: Head) -> Scene:
+    """Bands of light with hard ends from the front and from behind, and a little light besides."""
+    x = head.mesh.positions[:, 0] - head.centre_mm[0]
+    places = np.arange(max(x.min(), -90.0), min(x.max(), 90.0), SPACING_MM)
+    band = {"up": (0.4, 1, 0), "width_mm": WIDTH_MM, "shadows": False}
+    lights = []
+    for away in ((0, 0, -1), (0, 0, 1)):
+        lights += [StripeLight(direction=away, position=(place, 0, 0), **band) for place in places]
+        lights.append(DirectionalLight(direction=away, irradiance=(1, 1, 1), shadows=False))
+    skin = Skin(profile="gpu-gems-3", albedo="profile", specular="none")
+    return Scene(replace(head, maps=Maps()), lights=lights, skin=skin)
+
+
+def jumps(renderer: Renderer, scene: Scene, remedy: str, side: int, one: Points, other: Points) -> np.ndarray:
+    """Change of red light from one side of each seam to the other, of the light there."""
+    settings = Settings(size=(16, 16), atlas=side, seams=remedy, transmission="none")
+    inputs = renderer.prepare(scene, settings)
+    frame = Frame(renderer.device)
+    scatter(frame, renderer.stages, inputs)
+    frame.submit()
+    light = download(renderer.device, inputs.scattered).astype(float)[..., :3]
+    atlas = cached_atlas(scene.head.mesh, side, REMEDIES[remedy].layouts[0])
+    a, b = (lit_at(light, atlas, points)[:, 0] for points in (one, other))
+    return np.abs(a - b) / np.maximum((a + b) / 2, 1e-9)
