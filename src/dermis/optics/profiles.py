@@ -31,13 +31,20 @@ def preset_names() -> tuple[str, ...]:
     return (PUBLISHED, *names())
 
 
-def load_profile(name: str | Path) -> GaussianSum:
+def load_profile(
+    name: str | Path, pigments: Mapping[str, float] | None = None, near: GaussianSum | None = None
+) -> GaussianSum:
     """The Gaussians of a name ("gpu-gems-3", "dj3" ...) or of a file: .csv, or .toml of `dermis profile`.
 
     Tissue without Gaussians of its own is computed by layered diffusion and fitted with six.
 
+    pigments : fields of `SkinParameters` that replace those of a skin of pigments
+    near : the fit of similar pigments to start from, several times faster
+
     Raises DermisError when there is no such preset or file, or when its numbers cannot be a profile.
     """
+    if pigments:
+        return _fit(name, pigments, near)
     table = find_table(name)
     if table is not None:
         return table
@@ -104,8 +111,11 @@ def _fitted(name: str) -> GaussianSum:
     return _fit(name)
 
 
-def _fit(name: str | Path) -> GaussianSum:
-    return fit_gaussians(load_tissue(name).profile().rings(), TERMS, name=f"profile {name}").profile
+def _fit(
+    name: str | Path, pigments: Mapping[str, float] | None = None, near: GaussianSum | None = None
+) -> GaussianSum:
+    rings = load_tissue(name, pigments=pigments).profile().rings()
+    return fit_gaussians(rings, TERMS, near=near, name=f"profile {name}").profile
 
 
 @cache

@@ -58,7 +58,22 @@ def cheek(head: Head) -> Camera:
     return Camera(position=_add(spot, away, 300.0), target=spot, frame_mm=48.0)
 
 
-PRESETS = {"portrait": portrait, "three-quarter": three_quarter, "profile": profile, "cheek": cheek}
+def ear(head: Head) -> Camera:
+    """Close to the left ear."""
+    p = head.mesh.positions - np.array(head.centre_mm, dtype=np.float32)
+    beside = p[(np.abs(p[:, 1] + 10.0) < 40.0) & (np.abs(p[:, 2]) < 60.0)]
+    x, y, z = (beside if len(beside) else p)[np.argmax((beside if len(beside) else p)[:, 0])]
+    spot = float(x), float(y), float(z)
+    return Camera(position=_add(spot, _turned(75.0), 600.0), target=spot, frame_mm=120.0)
+
+
+PRESETS = {
+    "portrait": portrait,
+    "three-quarter": three_quarter,
+    "profile": profile,
+    "ear": ear,
+    "cheek": cheek,
+}
 
 
 def preset(name: str, head: Head) -> Camera:

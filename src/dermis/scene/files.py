@@ -88,13 +88,15 @@ def load_camera(name: str, head: Head) -> Camera:
     return _made(Camera, name, "camera", table)
 
 
-def load_scene(path: Path) -> tuple[Scene, Settings]:
+def load_scene(path: Path, known: Head | None = None) -> tuple[Scene, Settings]:
     """Scene and settings of a TOML file; what it leaves out keeps its default.
 
     Tables: [head] (file or sample under `name`, the options of `load_head`, and `regions`, a table as for
     `with_regions`), [skin], [[lights]] or lights = "preset", [environment], [camera] or camera = "preset",
     [render]. File names are relative to the scene's folder. With an environment there are no other lights
     unless the file names some.
+
+    known : the head of the file's [head], when the caller has it already
     """
     table = _read(path, "a scene in TOML")
     for part in table.keys() - _PARTS:
@@ -103,7 +105,7 @@ def load_scene(path: Path) -> tuple[Scene, Settings]:
     settings = _made(Settings, path, "render", table.get("render", {}))
     described = _made(_HeadTable, path, "head", table.get("head"))
     _check_said_once(path, described, skin)
-    head, skin = _head(path, described, skin)
+    head, skin = (known, skin) if known else _head(path, described, skin)
     environment = _environment(path, table["environment"]) if "environment" in table else None
     lights, camera = table.get("lights"), table.get("camera", "portrait")
     if lights is None:
@@ -117,6 +119,15 @@ def load_scene(path: Path) -> tuple[Scene, Settings]:
         else _made(Camera, path, "camera", camera),
         skin=skin.model_copy(update={"profile": _beside(path, skin.profile)}),
     ), settings
+
+
+def head_table(path: Path) -> dict[str, Any]:
+    """The [head] of a scene's file with names that hold from any folder."""
+    table = dict(_read(path, "a scene in TOML").get("head", {}))
+    for role in ("name", "regions", *_MAPS):
+        if isinstance(table.get(role), str) and (path.parent / table[role]).is_file():
+            table[role] = str((path.parent / table[role]).resolve())
+    return table
 
 
 def _head(path: Path, table: _HeadTable, skin: Skin) -> tuple[Head, Skin]:

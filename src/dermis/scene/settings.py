@@ -10,7 +10,7 @@ from dermis.scene.plain import Colour, Plain
 
 _Side = Annotated[int, Field(ge=1, le=16384)]
 _MOST_SAMPLES = 64
-_MOST_WORK = 2**27
+MOST_WORK = 2**27
 
 
 class Settings(Plain):
@@ -35,6 +35,7 @@ class Settings(Plain):
     tone : curve before the encoding of bytes: "none", "filmic", or the Khronos group's "neutral"
     gamma : "wrong" takes the colour map for linear and leaves the encoding out, for comparison
     background : linear Rec. 709
+    parts : which light is shown: "all", only the "diffuse" from below, or the "specular" off the surface
     """
 
     size: tuple[_Side, _Side] = (1024, 1024)
@@ -54,9 +55,10 @@ class Settings(Plain):
     tone: Literal["none", "filmic", "neutral"] = "none"
     gamma: Literal["right", "wrong"] = "right"
     background: Colour = (0.0, 0.0, 0.0)
+    parts: Literal["all", "diffuse", "specular"] = "all"
 
     @model_validator(mode="after")
     def _fits_in_memory(self) -> Settings:
-        if self.size[0] * self.size[1] * self.samples > _MOST_WORK:
-            raise ValueError(f"width times height times samples of at most {_MOST_WORK // 10**6} million")
+        if self.size[0] * self.size[1] * self.samples > MOST_WORK:
+            raise ValueError(f"width times height times samples of at most {MOST_WORK // 10**6} million")
         return self

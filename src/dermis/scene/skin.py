@@ -12,6 +12,30 @@ from dermis.specular.names import EnergyName, FresnelName, SpecularName
 _OILY_STRENGTH, _OILY_SMOOTHING = 3.0, 0.6
 
 
+_Share = Annotated[float | None, Field(ge=0, le=1)]
+
+
+class Pigments(Plain):
+    """What replaces the pigments of a skin made of them; None leaves the skin's own.
+
+    melanin : share of the epidermis' volume that is melanosomes [-]
+    eumelanin : share of the melanosomes that hold eumelanin [-]
+    blood : share of the dermis' volume that is blood [-]
+    oxygen : share of the haemoglobin that carries oxygen [-]
+    epidermis_mm : thickness of the epidermis [mm]
+    """
+
+    melanin: _Share = None
+    eumelanin: _Share = None
+    blood: _Share = None
+    oxygen: _Share = None
+    epidermis_mm: Annotated[float | None, Field(gt=0, le=2)] = None
+
+    def given(self) -> dict[str, float]:
+        """Those that replace something."""
+        return self.model_dump(exclude_none=True)
+
+
 class Skin(Plain):
     """Parameters of the two layers: the rough white surface, and what scatters below.
 
@@ -28,6 +52,7 @@ class Skin(Plain):
     specular_colour : "white"; "wrong" tints reflections by the colour map, for comparison
     energy : what the surface reflects does not enter: "full"; "published" as the deck has it, with an albedo
         pi times too large; "none"
+    pigments : what differs from those of the profile's skin: "spectral", "light", "medium", "dark", a file's
 
     Source: [dEonLuebke2007] sections 14.3-14.5; values of [Dudash2007].
     """
@@ -42,6 +67,7 @@ class Skin(Plain):
     fresnel: FresnelName = "schlick"
     specular_colour: Literal["white", "wrong"] = "white"
     energy: EnergyName = "full"
+    pigments: Pigments | None = None
 
     @property
     def strength(self) -> float:

@@ -1,0 +1,43 @@
+"""A light stage: lights all around a head, and how much of each makes the light of any surroundings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.scene.environment import Environment
+from dermis.scene.lights import DirectionalLight
+
+
+def light_stage(count: int) -> list[DirectionalLight]:
+    """Lights of irradiance 1, evenly around the head, on a spiral from above to below.
+
+    Source: [Debevec2000].
+    """
+    y = 1.0 - 2.0 * (np.arange(count) + 0.5) / count
+    turn, radius = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count), np.sqrt(1.0 - y**2)
+    places = np.stack([radius * np.sin(turn), y, radius * np.cos(turn)], axis=-1)
+    return [DirectionalLight(direction=tuple(-place), irradiance=(1.0, 1.0, 1.0)) for place in places]
+
+
+def stage_weights(lights: Sequence[DirectionalLight], around: Environment) -> NDArray[np.float64]:
+    """(n, 3) irradiance that arrives from the directions nearest to each light, linear Rec. 709.
+
+    Pictures of a head under each light, times these and added up, are the head in those surroundings.
+
+    Raises DermisError when the panorama cannot be read.
+    """
+    from dermis.assets.environment.panorama import directions, load_panorama, solid_angles
+
+    radiance = load_panorama(around.name)
+    size = radiance.shape[0], radiance.shape[1]
+    arriving = around.exposure * radiance * solid_angles(*size)[..., None]
+    turn = np.radians(around.rotation_degrees)
+    x, y, z = np.moveaxis(directions(*size).reshape(-1, 3), -1, 0)
+    towards = np.stack([np.cos(turn) * x + np.sin(turn) * z, y, np.cos(turn) * z - np.sin(turn) * x], axis=-1)
+    places = -np.array([light.direction for light in lights], dtype=np.float64)
+    nearest = (towards @ (places / np.linalg.norm(places, axis=1, keepdims=True)).T).argmax(axis=1)
+    sums = [np.bincount(nearest, arriving[..., c].ravel(), len(lights)) for c in range(3)]
+    return np.stack(sums, axis=-1)

@@ -1,0 +1,64 @@
+"""Scenes written as the TOML that `load_scene` reads."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from dermis.outputs import replacing
+from dermis.scene.model import Scene
+from dermis.scene.plain import Plain
+from dermis.scene.settings import Settings
+
+_HEADER = "# A scene of dermis: lengths in mm from the head's centre, colours linear Rec. 709."
+_SAID_BY_REGIONS = {"rho_s", "roughness"}
+_FILES = {"profile", "name"}  # of skins and environments, where they are no presets
+
+
+def save_scene(path: Path, scene: Scene, settings: Settings, head: Mapping[str, Any]) -> None:
+    """Write a scene, whole or not at all; `dermis render` makes the same picture of it.
+
+    head : the [head] table: where the head came from, files by names that hold from anywhere
+
+    Raises DermisError when that is not possible.
+    """
+    with replacing(path) as trial:
+        trial.write_text(scene_toml(scene, settings, head), encoding="utf-8")
+
+
+def scene_toml(scene: Scene, settings: Settings, head: Mapping[str, Any]) -> str:
+    """The text of a scene's file."""
+    said = _SAID_BY_REGIONS if "regions" in head else set()
+    parts = [] if scene.lights else ['lights = "none"\n']
+    parts += [_table("[head]", head), _plain("[skin]", scene.skin, said | {"pigments"})]
+    if scene.skin.pigments:
+        parts.append(_plain("[skin.pigments]", scene.skin.pigments))
+    parts += [_plain("[[lights]]", light) for light in scene.lights]
+    if scene.environment:
+        parts.append(_plain("[environment]", scene.environment))
+    parts += [_plain("[camera]", scene.camera), _plain("[render]", settings)]
+    return "\n".join([_HEADER, *parts])
+
+
+def _plain(title: str, values: Plain, left_out: set[str] | None = None) -> str:
+    table = values.model_dump(exclude=left_out, exclude_none=True)
+    for key in _FILES & table.keys():
+        if Path(table[key]).is_file():
+            table[key] = str(Path(table[key]).resolve())
+    return _table(title, table)
+
+
+def _table(title: str, values: Mapping[str, Any]) -> str:
+    return "\n".join([title, *(f"{key} = {_value(value)}" for key, value in values.items()), ""])
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return f"[{', '.join(map(_value, value))}]"
+    return json.dumps(str(value), ensure_ascii=False)

@@ -1,0 +1,92 @@
+"""The works behind a picture, by what its scene and settings use."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from dermis.scene.environment import Environment
+from dermis.scene.lights import DirectionalLight, Light, RectangleLight, SphereLight
+from dermis.scene.settings import Settings
+from dermis.scene.skin import Skin
+
+_FRAME = ("dEonLuebke2007", "Burns2013")
+_TECHNIQUES = {
+    "texture-space": ("dEonLuebke2007", "Geusebroek2003"),
+    "none": (),
+    "one-blur": ("Borshukov2003", "Green2004"),
+    "published": ("dEonLuebke2007",),
+    "screen-space": ("Jimenez2015",),
+    "pre-integrated": ("Penner2011",),
+}
+_CUT = ("one-blur", "published")  # which stitch nothing
+_WITH_SEAMS = ("texture-space", *_CUT)
+_WITH_TRANSMISSION = ("texture-space", "published")
+_FRESNEL = {"schlick": ("Schlick1994", "Dudash2007"), "exact": ("CookTorrance1982",)}
+_TONES = {"none": (), "filmic": ("Hable2010",), "neutral": ("Khronos2024",)}
+_SHADOWS = ("Williams1978", "Reeves1987", "Hanika2021")
+_RELIEF = ("Mikkelsen2010", "OlanoBaker2010")
+_AROUND = ("RamamoorthiHanrahan2001", "KautzMcCool2000", "Karis2013", "Debevec2005")
+_OCCLUSION = ("Keinert2015", "Jimenez2016", "LagardeRousiers2014")
+
+
+def sources_of(
+    skin: Skin,
+    settings: Settings,
+    lights: Sequence[Light] = (),
+    environment: Environment | None = None,
+    *,
+    relief: bool = True,
+) -> tuple[str, ...]:
+    """Keys of the bibliography, each once.
+
+    relief : whether the head has a normal or a height map
+
+    Raises DermisError for a profile that is none.
+    """
+    keys = [*_FRAME, *scattering_sources(settings), *_surface(skin)]
+    keys += profile_sources(skin.profile)
+    keys += _RELIEF * relief
+    keys += _light(lights)
+    if environment is not None:
+        keys += _AROUND + _OCCLUSION * (settings.occlusion == "baked")
+    keys += _TONES[settings.tone]
+    keys += ("BurtAdelson1983",) * (settings.bloom > 0)
+    return tuple(dict.fromkeys(keys))
+
+
+def scattering_sources(settings: Settings) -> tuple[str, ...]:
+    """Of the technique, of what it does at the seams, and of light through thin parts."""
+    technique = settings.technique
+    remedied = settings.seams != "stitch" or technique in _CUT
+    keys = _TECHNIQUES[technique] + ("Dudash2007",) * (remedied and technique in _WITH_SEAMS)
+    if settings.transmission == "thin" and technique in _WITH_TRANSMISSION:
+        keys += ("JensenBuhler2002",)
+    return keys
+
+
+def profile_sources(profile: str) -> tuple[str, ...]:
+    """Of a diffusion profile; a table's numbers are its own, but for the published ones."""
+    from dermis.optics.profiles import find_table
+    from dermis.optics.tissue import load_tissue
+
+    if find_table(profile) is not None:
+        return ("dEonLuebke2007", "DonnerJensen2005") if profile == "gpu-gems-3" else ()
+    return load_tissue(profile).profile().sources
+
+
+def _surface(skin: Skin) -> tuple[str, ...]:
+    from dermis.specular.models import MODELS
+
+    if skin.specular == "none":
+        return ()
+    energy = ("Kelemen2001",) * (skin.energy != "none")
+    return MODELS[skin.specular].sources + _FRESNEL[skin.fresnel] + energy
+
+
+def _light(lights: Sequence[Light]) -> tuple[str, ...]:
+    rectangles = any(isinstance(light, RectangleLight) for light in lights)
+    spheres = any(isinstance(light, SphereLight) for light in lights)
+    suns = any(isinstance(light, DirectionalLight) and light.angle_degrees > 0 for light in lights)
+    keys: tuple[str, ...] = _SHADOWS * any(light.shadows for light in lights)
+    keys += ("Baum1989",) * rectangles + ("ShirleyChiu1997",) * spheres
+    return keys + ("Roberts2018",) * (rectangles or spheres or suns)

@@ -1,0 +1,1 @@
+"""The viewer in a web page: rendercanvas' HTTP canvas behind a guard."""

@@ -1,0 +1,118 @@
+"""What the viewer shows, as plain data: every change makes a new state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from dermis.errors import refuse
+from dermis.scene.camera import Camera
+from dermis.scene.environment import Environment
+from dermis.scene.files import NO_LIGHTS, head_table, load_lights, load_scene
+from dermis.scene.lights import Light
+from dermis.scene.model import Scene
+from dermis.scene.plain import Plain
+from dermis.scene.saving import save_scene
+from dermis.scene.settings import Settings
+from dermis.scene.skin import Pigments
+
+P = TypeVar("P", bound=Plain)
+PICTURE = "picture"
+
+
+@dataclass(frozen=True, eq=False)
+class ViewerState:
+    """A scene, how it is rendered, and what of it is looked at.
+
+    settings : `size` is of no account, the window has its own
+    head : the [head] table that the head came from
+    view : one of `views.names`: the picture, or something on the way to it
+    rig : the lights' preset, empty when they are no preset's
+    """
+
+    scene: Scene
+    settings: Settings = field(default_factory=Settings)
+    head: Mapping[str, Any] = field(default_factory=dict)
+    view: str = PICTURE
+    rig: str = "studio"
+
+    def with_skin(self, **fields: Any) -> ViewerState:
+        """With other values of the skin; impossible ones raise DermisError."""
+        return self._with_scene(skin=changed(self.scene.skin, **fields))
+
+    def with_pigments(self, **fields: Any) -> ViewerState:
+        """With other pigments of the skin."""
+        pigments = self.scene.skin.pigments or Pigments()
+        return self.with_skin(pigments=changed(pigments, **fields).model_dump())
+
+    def with_settings(self, **fields: Any) -> ViewerState:
+        """With other settings."""
+        return replace(self, settings=changed(self.settings, **fields))
+
+    def with_camera(self, camera: Camera) -> ViewerState:
+        """From another place."""
+        return self._with_scene(camera=camera)
+
+    def with_lights(self, lights: Sequence[Light], rig: str = "") -> ViewerState:
+        """In the light of others."""
+        return replace(self._with_scene(lights=tuple(lights)), rig=rig)
+
+    def with_rig(self, name: str) -> ViewerState:
+        """In the light of a preset."""
+        return self.with_lights(load_lights(name), name)
+
+    def with_light(self, index: int, **fields: Any) -> ViewerState:
+        """With other values of one light."""
+        lights = list(self.scene.lights)
+        lights[index] = changed(lights[index], **fields)
+        return self.with_lights(lights)
+
+    def with_environment(self, environment: Environment | None) -> ViewerState:
+        """With other light from all around, or none."""
+        return self._with_scene(environment=environment)
+
+    def in_view(self, name: str) -> ViewerState:
+        """Looking at something else."""
+        return replace(self, view=name)
+
+    def _with_scene(self, **fields: Any) -> ViewerState:
+        return replace(self, scene=replace(self.scene, **fields))
+
+
+def same(a: ViewerState, b: ViewerState) -> bool:
+    """Whether two states are alike; heads are compared by identity, without touching their arrays."""
+
+    def rest(state: ViewerState) -> tuple[Any, ...]:
+        scene = state.scene
+        seen = tuple(scene.lights), scene.camera, scene.skin, scene.environment
+        return (*seen, state.settings, state.head, state.view, state.rig)
+
+    return a.scene.head is b.scene.head and rest(a) == rest(b)
+
+
+def changed(values: P, **fields: Any) -> P:
+    """A copy with other values, checked."""
+    return type(values)(**(values.model_dump() | fields))
+
+
+def save_state(path: Path, state: ViewerState) -> None:
+    """Write the scene that `dermis render` and `dermis view` take; the view is left out.
+
+    Raises DermisError when that is not possible.
+    """
+    if not state.head:
+        refuse(path, "a head from a file or a sample", "it was made in memory", "Write it to a file first")
+    save_scene(path, state.scene, state.settings, state.head)
+
+
+def load_state(path: Path, before: ViewerState | None = None) -> ViewerState:
+    """The state that a scene's file describes; a head that is the same as before is not loaded again.
+
+    Raises DermisError for a file that is no scene.
+    """
+    table = head_table(path)
+    known = before.scene.head if before and before.head == table and "regions" not in table else None
+    scene, settings = load_scene(path, known)
+    return ViewerState(scene, settings, table, rig="" if scene.lights else NO_LIGHTS)

@@ -1,0 +1,119 @@
+"""What lies on the way to the picture, shown where the picture shows it."""
+
+from __future__ import annotations
+
+import weakref
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.errors import refuse
+from dermis.gpu import Device, Frame, download, make_texture
+from dermis.gpu.device import gpu_failures
+from dermis.gpu.textures import texture_from
+from dermis.rendering.inputs import Inputs
+from dermis.rendering.renderer import Renderer
+from dermis.rendering.stages.opposite import Pairs
+from dermis.rendering.stages.variants import Variants
+from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
+
+PARTS = {"diffuse": "diffuse", "specular": "specular"}
+"""Views that are the picture with some of its light."""
+
+LEVELS = {"irradiance": 0} | {f"blur {k}": k for k in range(1, 7)}
+"""Views of the light on the atlas by its layer."""
+
+VIEWS = ("picture", *PARTS, *LEVELS, "stretch", "thickness", "shadow", "normals")
+"""All that can be looked at."""
+
+_NUMBERS = {"stretch": 1, "thickness": 2, "shadow": 3, "normals": 4}  # as in intermediate.wgsl; levels are 0
+_ATLAS_NEEDED = "Choose a narrower blur, or the technique texture-space"
+
+
+class Views:
+    """Draws intermediates over the pixels that see them."""
+
+    def __init__(self, renderer: Renderer) -> None:
+        self._renderer, device = renderer, renderer.device
+        self._variants = Variants(device, Path(__file__).parent / "intermediate.wgsl")
+        self._nothing = texture_from(device, np.zeros((1, 1, 4), np.float32), "rgba32float")
+        self._image: Any = None
+        self._thick: weakref.WeakKeyDictionary[Pairs, Any] = weakref.WeakKeyDictionary()
+        self._density: weakref.WeakKeyDictionary[Any, float] = weakref.WeakKeyDictionary()
+
+    def draw(self, scene: Scene, settings: Settings, view: str) -> Any:
+        """A texture of bytes that shows an intermediate of the frame drawn last.
+
+        Raises DermisError for what the technique does not make.
+        """
+        device, inputs = self._renderer.device, self._renderer.prepare(scene, settings)
+        switches = tuple(switch for switch in inputs.light_switches if switch[0] == "SHAPES")
+        program = self._variants.program(switches)
+        layer, scale = self._layer(inputs, view, settings)
+        looked = ("eye", "forward", "right", "up", "samples", "jitter")
+        record = program.record("Look", **{name: inputs.view[name] for name in looked})
+        record["what"], record["scale"] = _NUMBERS.get(view, 0), scale
+        bound = {
+            **inputs.lit,
+            "look": record,
+            "seen": inputs.seen.texture,
+            "layer": layer,
+            "bytes": self._space(settings.size),
+        }
+        with gpu_failures(device):
+            frame = Frame(device)
+            frame.compute("view", program, bound, settings.size)
+            frame.submit()
+        return self._image
+
+    def _layer(self, inputs: Inputs, view: str, settings: Settings) -> tuple[Any, float]:
+        """The map of the atlas that a view reads, and how its numbers are scaled."""
+        if view in LEVELS:
+            found = inputs.levels.views if inputs.scatters else []
+            if LEVELS[view] >= len(found):
+                refuse(
+                    f"view {view}", "a level of light on the atlas", f"there are {len(found)}", _ATLAS_NEEDED
+                )
+            scale = inputs.levels.scale if LEVELS[view] else 1.0
+            return found[LEVELS[view]], settings.exposure / scale
+        if view == "stretch":
+            stretch = inputs.layouts[0].atlas.resources["stretch_map"]
+            return stretch, self._mean_density(stretch)
+        return self._thickness(inputs) if view == "thickness" else self._nothing, 1.0
+
+    def _thickness(self, inputs: Inputs) -> Any:
+        thin = inputs.layouts[0].thin
+        if thin is None:
+            refuse("view thickness", "light through thin parts", "there is none", "Set transmission to thin")
+        if thin.pairs not in self._thick:
+            device = self._renderer.device
+            self._thick[thin.pairs] = texture_from(device, thickness_mm(device, thin.pairs), "r32float")
+        return self._thick[thin.pairs]
+
+    def _mean_density(self, stretch: Any) -> float:
+        """Geometric mean of the texels per mm."""
+        if stretch not in self._density:
+            metric = download(self._renderer.device, stretch)[..., :2].astype(np.float64)
+            covered = metric[(metric > 0.0).all(axis=-1)]
+            self._density[stretch] = float(np.exp(np.log(covered).mean())) if len(covered) else 1.0
+        return self._density[stretch]
+
+    def _space(self, size: tuple[int, int]) -> Any:
+        if self._image is None or self._image.size[:2] != size:
+            self._image = make_texture(self._renderer.device, size, "rgba8uint")
+        return self._image
+
+
+def thickness_mm(device: Device, pairs: Pairs) -> NDArray[np.float32]:
+    """(n, n) least depth of what lies opposite each cell of the atlas, at most as far as is looked [mm]."""
+    receiver, first, links = (
+        np.frombuffer(device.handle.queue.read_buffer(buffer), np.uint32)
+        for buffer in (pairs.receiver, pairs.first, pairs.pairs)
+    )
+    depth = (links.reshape(-1, 3)[:, 1] & 0xFFFF) * (pairs.radius_mm / 0xFFFF)
+    least = np.full(len(first) - 1, pairs.radius_mm)
+    np.minimum.at(least, np.repeat(np.arange(len(least)), np.diff(first)), depth[: int(first[-1])])
+    return np.asarray(least[receiver.reshape(pairs.side, pairs.side)], np.float32)

@@ -1,0 +1,86 @@
+"""The three windows of the one viewer."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from typing import Any
+
+from dermis.errors import refuse
+from dermis.viewer.state import ViewerState
+from dermis.viewer.viewer import Viewer
+
+Size = tuple[int, int]
+_TITLE = "dermis"
+_MOST_FPS = 60
+_VIEWER = 'Install it: pip install "dermis[viewer]"'
+_NOTEBOOK = "Install it: pip install anywidget"
+
+
+def show_window(state: ViewerState, adapter: str, size: Size) -> None:
+    """Open a window on the desk and return when it is closed.
+
+    Raises DermisError without a display, a device or the extra `viewer`.
+    """
+    backend = _backend("glfw", ("glfw",), _VIEWER)
+    try:
+        canvas = backend.RenderCanvas(size=size, title=_TITLE, max_fps=_MOST_FPS)
+    except Exception as error:  # whatever glfw makes of a missing display
+        came = f"none opens ({error})"
+        refuse("window", "a display to open it on", came, "Set DISPLAY, or use --browser")
+    viewer = Viewer(state, canvas, adapter)
+    backend.loop.run()
+    _raise_failure(viewer)
+
+
+def serve(
+    state: ViewerState,
+    adapter: str,
+    size: Size,
+    host: str,
+    port: int,
+    announce: Callable[[str, bool], None],
+) -> None:
+    """Serve web pages until interrupted.
+
+    size : of the canvas until a page has told its own
+    port : 0 for any that is free
+    announce : told the page's address, and whether others than this machine can reach it
+
+    Raises DermisError when nothing can listen there, without a device or the extra `viewer`.
+    """
+    _backend("http", ("uvicorn", "websockets"), _VIEWER)
+    from dermis.viewer.browser.canvas import PageCanvas
+    from dermis.viewer.browser.server import bind, server
+
+    listener, address = bind(host, port)
+    with listener:
+        viewer = Viewer(state, PageCanvas(size=size, title=_TITLE, max_fps=_MOST_FPS), adapter)
+        viewer.canvas._size_info.set_physical_size(*size, 1.0)
+        announce(address.url, bool(address.token))
+        server(address).run(sockets=[listener])
+    _raise_failure(viewer)
+
+
+def notebook_viewer(state: ViewerState, adapter: str = "auto", size: Size = (720, 540)) -> Viewer:
+    """A viewer that a notebook's cell displays.
+
+    Raises DermisError without the packages that takes.
+    """
+    backend = _backend("anywidget", ("anywidget",), _NOTEBOOK)
+    return Viewer(state, backend.RenderCanvas(size=size, max_fps=_MOST_FPS), adapter)
+
+
+def _backend(name: str, needed: tuple[str, ...], remedy: str) -> Any:
+    """rendercanvas' module of that name, when the packages that it needs are there."""
+    for package in (*needed, "imgui_bundle", "rendercanvas"):
+        try:
+            importlib.import_module(package)
+        except ImportError:
+            refuse("viewer", f"the package {package.replace('_', '-')}", "it is not installed", remedy)
+    return importlib.import_module(f"rendercanvas.{name}")
+
+
+def _raise_failure(viewer: Viewer) -> None:
+    if viewer.failure:
+        raise viewer.failure

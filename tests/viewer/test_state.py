@@ -1,0 +1,137 @@
+"""States: changes, files, and steps back and forth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from dermis.assets.head import Head
+from dermis.errors import DermisError
+from dermis.scene import Environment, Scene, load_scene
+from dermis.scene.files import preset_lights
+from dermis.scene.skin import Pigments
+from dermis.viewer.history import History
+from dermis.viewer.state import ViewerState, load_state, same, save_state
+
+
+def full_state(state: ViewerState) -> ViewerState:
+    """One that differs from the defaults in every part."""
+    state = state.with_skin(profile="light", roughness=0.21, specular="two-lobe").with_pigments(melanin=0.031)
+    state = state.with_lights(preset_lights("rembrandt")).with_environment(Environment(name="uniform"))
+    state = state.with_settings(tone="filmic", size=(64, 48), seam_colour=(0.25, 0.5, 1e-7))
+    return state.with_camera(state.scene.camera.model_copy(update={"frame_mm": 123.4567}))
+
+
+def test_a_saved_state_comes_back_whole(state: ViewerState, tmp_path: Path) -> None:
+    before = full_state(state)
+    save_state(tmp_path / "scene.toml", before)
+    after = load_state(tmp_path / "scene.toml", before)
+    assert same(replace(before, rig=""), after)
+
+
+def test_render_takes_the_saved_file(state: ViewerState, tmp_path: Path) -> None:
+    before = full_state(state)
+    save_state(tmp_path / "scene.toml", before)
+    scene, settings = load_scene(tmp_path / "scene.toml")
+    assert (scene.skin, scene.camera, settings) == (before.scene.skin, before.scene.camera, before.settings)
+    assert tuple(scene.lights) == tuple(before.scene.lights)
+    assert scene.environment == before.scene.environment
+    assert (scene.head.mesh.positions == before.scene.head.mesh.positions).all()
+
+
+def test_a_scene_without_lights_stays_without(state: ViewerState, tmp_path: Path) -> None:
+    save_state(tmp_path / "dark.toml", state.with_rig("none").with_environment(Environment(name="uniform")))
+    assert load_scene(tmp_path / "dark.toml")[0].lights == ()
+
+
+def test_files_of_a_scene_are_found_from_another_folder(
+    state: ViewerState, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "there").mkdir()
+    (tmp_path / "here").mkdir()
+    text = "variance_mm2,red,green,blue\n0.5,1,1,1\n"
+    (tmp_path / "there" / "mine.csv").write_text(text)
+    monkeypatch.chdir(tmp_path / "there")
+    save_state(tmp_path / "here" / "scene.toml", state.with_skin(profile="mine.csv"))
+    monkeypatch.chdir(tmp_path)
+    scene, _ = load_scene(tmp_path / "here" / "scene.toml")
+    assert scene.skin.profile == str(tmp_path / "there" / "mine.csv")
+
+
+def test_regions_keep_what_they_say(head: Head, head_file: Path, tmp_path: Path) -> None:
+    before = ViewerState(Scene(head), head={"name": str(head_file), "regions": "default"})
+    save_state(tmp_path / "scene.toml", before.with_skin(oiliness=0.5))
+    text = (tmp_path / "scene.toml").read_text()
+    assert "rho_s" not in text and "oiliness = 0.5" in text
+
+
+def test_the_same_head_is_not_loaded_again(state: ViewerState, tmp_path: Path) -> None:
+    save_state(tmp_path / "scene.toml", state)
+    assert load_state(tmp_path / "scene.toml", state).scene.head is state.scene.head
+    assert load_state(tmp_path / "scene.toml").scene.head is not state.scene.head
+
+
+def test_a_head_made_in_memory_cannot_be_saved(head: Head, tmp_path: Path) -> None:
+    with pytest.raises(DermisError, match="it was made in memory"):
+        save_state(tmp_path / "scene.toml", ViewerState(Scene(head)))
+    assert not (tmp_path / "scene.toml").exists()
+
+
+def test_impossible_values_are_refused(state: ViewerState) -> None:
+    with pytest.raises(DermisError, match="roughness"):
+        state.with_skin(roughness=7.0)
+
+
+def test_pigments_add_up(state: ViewerState) -> None:
+    found = state.with_pigments(melanin=0.1).with_pigments(blood=0.02).scene.skin.pigments
+    assert found == Pigments(melanin=0.1, blood=0.02)
+
+
+def test_undo_and_redo_walk_through_the_states(state: ViewerState) -> None:
+    history = History(state)
+    states = [state] + [state.with_skin(mix=mix) for mix in (0.1, 0.2, 0.3)]
+    for one in states[1:]:
+        history.change(one)
+    for one in reversed(states[:-1]):
+        history.undo()
+        assert history.state is one
+    assert not history.can_undo
+    for one in states[1:]:
+        history.redo()
+        assert history.state is one
+    assert not history.can_redo
+
+
+def test_a_gesture_is_one_step(state: ViewerState) -> None:
+    history = History(state)
+    for mix in (0.1, 0.2, 0.3):
+        history.change(state.with_skin(mix=mix), "slide")
+    history.end_gesture()
+    history.change(state.with_skin(mix=0.4), "slide")
+    history.undo()
+    assert history.state.scene.skin.mix == 0.3
+    history.undo()
+    assert history.state is state
+
+
+def test_a_change_forgets_what_was_undone(state: ViewerState) -> None:
+    history = History(state)
+    history.change(state.with_skin(mix=0.1))
+    history.undo()
+    history.change(state.with_skin(mix=0.2))
+    assert not history.can_redo
+
+
+def test_no_change_is_no_step_and_the_past_has_an_end(state: ViewerState) -> None:
+    history = History(state)
+    history.change(state.with_skin(mix=state.scene.skin.mix))
+    assert not history.can_undo
+    for k in range(1000):
+        history.change(state.with_skin(mix=k / 1000))
+    steps = 0
+    while history.can_undo:
+        history.undo()
+        steps += 1
+    assert steps == 200

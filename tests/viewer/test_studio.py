@@ -1,0 +1,182 @@
+"""States to images: nothing is computed twice, and what is kept gives the picture of a new renderer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from offscreen_hands import ADAPTER, SETTINGS
+
+from dermis.images.io import read_image
+from dermis.rendering.renderer import Renderer
+from dermis.scene import Settings
+from dermis.viewer.orbit import orbit
+from dermis.viewer.pace import EFFORTS
+from dermis.viewer.state import ViewerState
+from dermis.viewer.studio import Studio
+from dermis.viewer.views import VIEWS
+
+SIZE = (96, 96)
+LIT = {"irradiance", "diffuse", "combine"}
+
+
+@pytest.fixture(scope="module")
+def studio() -> Studio:
+    return Studio(ADAPTER)
+
+
+@pytest.fixture(scope="module")
+def fresh() -> Renderer:
+    """Draws everything anew each time."""
+    return Renderer(ADAPTER)
+
+
+def image(studio: Studio, state: ViewerState, moving: bool = False) -> Any:
+    return studio.read(studio.image(state, state.scene.camera, SIZE, moving)).astype(int)
+
+
+def stages(studio: Studio) -> set[str]:
+    assert studio.rendered is not None and studio.rendered.gpu_ms is not None
+    return set(studio.rendered.gpu_ms)
+
+
+def turned(state: ViewerState, angle: float = 0.5) -> ViewerState:
+    return state.with_camera(orbit(state.scene.camera, angle, 0.1))
+
+
+def brighter(state: ViewerState) -> ViewerState:
+    return state.with_light(0, position=(0.0, 900.0, 500.0))
+
+
+CHANGES: dict[str, Callable[[ViewerState], ViewerState]] = {
+    "camera": turned,
+    "light": brighter,
+    "roughness": lambda state: state.with_skin(roughness=0.6),
+    "mix": lambda state: state.with_skin(mix=1.0),
+    "energy": lambda state: state.with_skin(energy="none"),
+    "lobe": lambda state: state.with_skin(specular="blinn-phong"),
+    "profile": lambda state: state.with_skin(profile="skin1"),
+    "pigments": lambda state: state.with_skin(profile="light", albedo="profile").with_pigments(melanin=0.05),
+    "one blur": lambda state: state.with_settings(technique="one-blur"),
+    "no stretch": lambda state: state.with_settings(stretch="none"),
+    "cleared seams": lambda state: state.with_settings(seams="clear-colour"),
+    "no transmission": lambda state: state.with_settings(transmission="none"),
+    "exposure": lambda state: state.with_settings(exposure=2.0),
+    "head": lambda state: state,
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_what_is_kept_never_shows(name: str, studio: Studio, fresh: Renderer, state: ViewerState) -> None:
+    image(studio, state)
+    changed = CHANGES[name](state)
+    expected = fresh.draw(
+        changed.scene, changed.settings.model_copy(update={"size": SIZE}), keep_shadows=False
+    )
+    off = np.abs(image(studio, changed) - expected.srgb8().astype(int))
+    assert off.max() <= (1 if name == "pigments" else 0)  # whose fit begins elsewhere
+
+
+def test_a_camera_does_not_light_the_atlas_again(studio: Studio, state: ViewerState) -> None:
+    first = image(studio, state)
+    second = image(studio, turned(state))
+    assert not LIT & stages(studio) and "shade" in stages(studio)
+    assert np.abs(first - second).mean() > 1.0
+
+
+def test_a_light_lights_it_again_and_loads_no_map(studio: Studio, state: ViewerState) -> None:
+    image(studio, state)
+    before = prepared(studio, state)
+    image(studio, brighter(state))
+    assert stages(studio) >= LIT | {"shadows"}
+    assert_same_textures(before, prepared(studio, brighter(state)))
+
+
+def test_pigments_fit_again_and_load_nothing(studio: Studio, state: ViewerState) -> None:
+    skin = state.with_skin(profile="light")
+    before = prepared(studio, skin.with_pigments(melanin=0.02))
+    after = prepared(studio, skin.with_pigments(melanin=0.021))
+    assert not np.array_equal(before.level_weight, after.level_weight)
+    assert_same_textures(before, after)
+    assert before.layouts[0].thin.pairs is after.layouts[0].thin.pairs
+
+
+def prepared(studio: Studio, state: ViewerState) -> Any:
+    return studio.renderer.prepare(state.scene, state.settings.model_copy(update={"size": SIZE}))
+
+
+def assert_same_textures(a: Any, b: Any) -> None:
+    """The maps, the mesh and the atlas are the same objects on the device."""
+    for name in ("colour_map", "slope_map", "relief_map", "vertex_table", "albedo_table"):
+        assert a.lit[name] is b.lit[name], name
+    for name in ("atlas", "stretch_map", "reach_map"):
+        assert a.layouts[0].atlas.resources[name] is b.layouts[0].atlas.resources[name], name
+
+
+def test_going_back_and_forth_between_two_sizes_lights_each_once(
+    studio: Studio, state: ViewerState, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small = replace(EFFORTS[2], atlas=64)
+    monkeypatch.setattr("dermis.viewer.pace.EFFORTS", (EFFORTS[0], small, small, small))
+    moving, still = [(turned(state, 0.1 * k), bool(k % 2)) for k in (1, 2)]
+    for one, moves in (moving, still):
+        image(studio, one, moves)
+    for one, moves in (moving, still):
+        image(studio, turned(one, 0.3), moves)
+        assert not LIT & stages(studio)
+
+
+def test_an_unchanged_state_is_not_drawn_again(studio: Studio, state: ViewerState) -> None:
+    image(studio, state)
+    before = studio.rendered
+    image(studio, state)
+    assert studio.rendered is before
+
+
+def test_the_two_parts_add_up_to_the_picture(fresh: Renderer, state: ViewerState) -> None:
+    whole, below, over = (
+        fresh.render(state.scene, **SETTINGS.model_dump() | {"size": SIZE, "parts": parts})
+        for parts in ("all", "diffuse", "specular")
+    )
+    assert over.max() > 0.01 and below.max() > 0.1
+    assert np.allclose(below + over, whole, atol=1e-5)
+
+
+@pytest.mark.parametrize("view", [view for view in VIEWS if view not in ("picture", "blur 6")])
+def test_each_view_shows_the_head_and_another_picture(view: str, studio: Studio, state: ViewerState) -> None:
+    picture, found = image(studio, state), image(studio, state.in_view(view))
+    head = picture.sum(axis=-1) > 0
+    assert head.mean() > 0.1
+    assert (found[~head] == 0).mean() > 0.99
+    assert np.abs(found - picture)[head].mean() > 0.5
+
+
+def test_a_level_of_light_is_what_the_atlas_holds(studio: Studio, state: ViewerState) -> None:
+    """With no blur to tell them apart, a wider blur is a smoother picture."""
+    rough = [np.abs(np.diff(image(studio, state.in_view(f"blur {k}")), axis=1)).sum() for k in (1, 5)]
+    assert rough[1] < rough[0]
+
+
+def test_normals_are_those_of_the_ellipsoid(studio: Studio, state: ViewerState) -> None:
+    middle = image(studio, state.in_view("normals"))[48, 48]
+    assert np.abs(middle - (127.5, 127.5, 255.0)).max() < 40.0
+
+
+def test_screenshots_have_any_size_and_the_state_s_own_view(
+    studio: Studio, state: ViewerState, tmp_path: Path
+) -> None:
+    studio.screenshot(tmp_path / "a.png", state, (50, 40))
+    studio.screenshot(tmp_path / "a.exr", state, (50, 40))
+    studio.screenshot(tmp_path / "n.png", state.in_view("normals"), (50, 40))
+    found = [read_image(tmp_path / name) for name in ("a.png", "a.exr", "n.png")]
+    assert [one.shape[:2] for one in found] == [(40, 50)] * 3
+    assert found[1].dtype == np.float32 and float(np.abs(found[0] - found[2]).max()) > 0.0
+
+
+def test_settings_of_the_window_are_those_of_the_pace(studio: Studio, state: ViewerState) -> None:
+    image(studio, state.with_settings(size=(4000, 4000)))
+    assert isinstance(studio.settings, Settings) and studio.settings.size == SIZE

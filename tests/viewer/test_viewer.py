@@ -1,0 +1,220 @@
+"""The viewer on an offscreen canvas, moved by the events of a pointer and of keys."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from offscreen_hands import Hands
+
+from dermis.scene.camera import preset
+
+ON_HEAD, TO_THE_LEFT = (300.0, 240.0), (230.0, 240.0)
+
+
+def difference(a: NDArray[np.uint8], b: NDArray[np.uint8], rows: int = 440) -> float:
+    """Mean over the part that neither the panel nor the text at the lower edge covers."""
+    return float(np.abs(a[:rows, 205:].astype(int) - b[:rows, 205:].astype(int)).mean())
+
+
+def place(hands: Hands, label: str) -> tuple[float, float]:
+    """Where a control of the panel is; the panel must be drawn."""
+    hands.frame()
+    return hands.viewer.desk.places[label]
+
+
+def choose(hands: Hands, label: str, name: str) -> None:
+    hands.click(place(hands, label))
+    hands.frame()
+    hands.click(place(hands, f"{label}/{name}"))
+
+
+def test_the_head_is_in_the_window_beside_the_panel(hands: Hands) -> None:
+    image = hands.settled()
+    assert image.shape == (480, 400, 3)
+    assert image[200:280, 210:240].mean() > 20.0
+    assert image[5:20, 380:395].mean() < 2.0
+
+
+def test_a_drag_turns_the_head_and_is_one_step_back(hands: Hands) -> None:
+    before = hands.settled()
+    hands.drag(ON_HEAD, TO_THE_LEFT)
+    after = hands.settled()
+    assert difference(before, after) > 1.0
+    hands.viewer.desk.history.undo()
+    hands.event("pointer_move", x=5.0, y=5.0, button=0, buttons=())
+    assert difference(before, hands.settled()) == 0.0
+    assert not hands.viewer.desk.history.can_undo
+
+
+def test_shift_carries_the_light_and_leaves_the_camera(hands: Hands) -> None:
+    before, state = hands.settled(), hands.viewer.desk.state
+    hands.drag(ON_HEAD, TO_THE_LEFT, modifiers=("Shift",))
+    after = hands.viewer.desk.state
+    assert after.scene.camera == state.scene.camera
+    assert after.scene.lights[0] != state.scene.lights[0] and after.scene.lights[1] == state.scene.lights[1]
+    assert difference(before, hands.settled()) > 0.5
+
+
+def test_the_wheel_comes_nearer_and_a_double_click_turns_around_the_place(hands: Hands) -> None:
+    camera = hands.viewer.desk.state.scene.camera
+    hands.event("wheel", x=300.0, y=240.0, dx=0.0, dy=-200.0)
+    hands.settled()
+    near = hands.viewer.desk.state.scene.camera
+    assert near.frame_mm < 0.9 * camera.frame_mm
+    hands.event("double_click", x=230.0, y=200.0)
+    hands.settled()
+    assert hands.viewer.desk.state.scene.camera.target != near.target
+
+
+def test_two_fingers_that_part_come_nearer(hands: Hands) -> None:
+    camera = hands.viewer.desk.state.scene.camera
+    hands.event("pointer_down", x=300.0, y=240.0, button=1, buttons=(1,))
+    hands.frame()
+    for gap in (20.0, 40.0, 80.0):
+        touches = {"0": {"x": 300.0, "y": 240.0 - gap / 2}, "1": {"x": 300.0, "y": 240.0 + gap / 2}}
+        hands.event("pointer_move", x=300.0, y=240.0, button=1, buttons=(1,), ntouches=2, touches=touches)
+        hands.frame()
+    hands.event("pointer_up", x=300.0, y=240.0, button=1, buttons=())
+    hands.frame()
+    assert hands.viewer.desk.state.scene.camera.frame_mm == pytest.approx(camera.frame_mm / 4.0)
+
+
+def test_keys_are_presets_undo_and_the_panel(hands: Hands) -> None:
+    desk = hands.viewer.desk
+    start, plain = desk.state, hands.settled()
+    hands.event("key_down", key="3")
+    hands.frame()
+    assert desk.state.scene.camera == preset("profile", desk.state.scene.head)
+    hands.event("key_down", key="z", modifiers=("Control",))
+    hands.frame()
+    assert desk.state is start
+    hands.event("key_down", key="y", modifiers=("Control",))
+    hands.frame()
+    assert desk.state is not start
+    hands.event("key_down", key="z", modifiers=("Control",))
+    hands.event("key_down", key="Tab")
+    bare = hands.settled()
+    assert np.abs(bare[:440, :190].astype(int) - plain[:440, :190].astype(int)).mean() > 5.0
+
+
+def test_a_slider_changes_the_picture_and_is_one_step(hands: Hands) -> None:
+    before = hands.settled()
+    x, y = place(hands, "roughness")
+    hands.drag((x, y), (x + 40.0, y))
+    assert hands.viewer.desk.state.scene.skin.roughness > 0.3
+    assert difference(before, hands.settled()) > 0.05
+    hands.viewer.desk.history.undo()
+    assert not hands.viewer.desk.history.can_undo
+
+
+def test_a_choice_changes_the_picture(hands: Hands) -> None:
+    before = hands.settled()
+    choose(hands, "show", "normals")
+    assert hands.viewer.desk.state.view == "normals"
+    assert difference(before, hands.settled()) > 10.0
+
+
+def test_a_drag_that_begins_on_the_panel_stays_there(hands: Hands) -> None:
+    camera = hands.viewer.desk.state.scene.camera
+    x, y = place(hands, "mix")
+    hands.drag((x, y), (380.0, 150.0))
+    assert hands.viewer.desk.state.scene.camera == camera
+
+
+def test_a_touch_on_the_head_right_after_one_on_the_panel_turns_it(hands: Hands) -> None:
+    """No frame is drawn between the two in which the panel could notice that the pointer went away."""
+    camera = hands.viewer.desk.state.scene.camera
+    hands.click((150.0, 243.0))  # a label
+    hands.event("pointer_down", x=300.0, y=240.0, button=1, buttons=(1,))
+    hands.event("pointer_move", x=260.0, y=240.0, button=1, buttons=(1,))
+    hands.event("pointer_up", x=260.0, y=240.0, button=1, buttons=())
+    hands.frame()
+    assert hands.viewer.desk.state.scene.camera != camera
+
+
+def test_melanin_darkens_the_skin(hands: Hands) -> None:
+    desk = hands.viewer.desk
+    desk.change(desk.state.with_skin(profile="light", albedo="profile"))
+    light = hands.settled()
+    desk.change(desk.state.with_pigments(melanin=0.4))
+    dark = hands.settled()
+    assert dark[200:280, 210:240].mean() < 0.7 * light[200:280, 210:240].mean()
+
+
+def test_an_impossible_state_is_told_and_the_last_picture_stays(hands: Hands) -> None:
+    desk = hands.viewer.desk
+    before = hands.settled()
+    desk.change(desk.state.with_skin(profile="nothing.csv"))
+    after = hands.frame()
+    assert "nothing.csv" in desk.messages.said
+    assert difference(before, after, rows=140) == 0.0
+    assert hands.settled() is not None  # it is not tried again and again
+    desk.history.undo()
+    assert difference(before, hands.settled()) == 0.0
+
+
+def test_buttons_save_load_and_take_pictures(hands: Hands, tmp_path: Path) -> None:
+    desk = hands.viewer.desk
+    desk.save(tmp_path / "scene.toml")
+    saved = desk.state
+    desk.change(desk.state.with_skin(mix=0.9))
+    desk.load(tmp_path / "scene.toml")
+    assert desk.state.scene.skin == saved.scene.skin and desk.state.scene.head is saved.scene.head
+    desk.screenshot(tmp_path / "a.png", (32, 32))
+    assert (tmp_path / "a.png").stat().st_size > 100 and "a.png" in desk.messages.said
+
+
+def test_the_window_may_change_its_size_or_have_none(hands: Hands) -> None:
+    hands.settled()
+    hands.canvas.set_logical_size(200, 300)
+    assert hands.settled().shape == (300, 200, 3)
+    hands.canvas._size_info.set_physical_size(0, 0, 1.0)  # minimised
+    hands.canvas.force_draw()
+    hands.canvas.set_logical_size(400, 480)
+    assert hands.settled().shape == (480, 400, 3)
+
+
+def test_a_lost_device_is_opened_again(make_hands: Callable[[], Hands]) -> None:
+    hands = make_hands()
+    before = hands.settled()
+    lost = hands.viewer.desk.studio
+    lost.renderer.device.handle.destroy()
+    hands.viewer.desk.change(hands.viewer.desk.state.with_skin(mix=0.4))
+    hands.frame()
+    assert hands.viewer.desk.studio is not lost and "lost" in hands.viewer.desk.messages.said
+    hands.viewer.desk.history.undo()
+    assert difference(before, hands.settled(), rows=380) == 0.0
+    assert np.abs(hands.frame()[:440, :190].astype(int) - before[:440, :190].astype(int)).max() == 0
+
+
+def test_changes_leave_no_memory_behind(hands: Hands) -> None:
+    """Of the process, where what each frame left behind would add up."""
+    desk = hands.viewer.desk
+    start = desk.state
+    for k in range(30):
+        _change(hands, k)
+    gc.collect()
+    before = _resident_mb()
+    for k in range(60):
+        _change(hands, k)
+    gc.collect()
+    assert _resident_mb() - before < 8.0
+    desk.change(start)
+
+
+def _change(hands: Hands, k: int) -> None:
+    desk = hands.viewer.desk
+    desk.change(
+        desk.state.with_skin(mix=0.2 + 0.004 * (k % 100)).with_light(0, position=(k % 50, 500.0, 900.0))
+    )
+    hands.frame()
+
+
+def _resident_mb() -> float:
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * 4096 / 1e6
