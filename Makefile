@@ -1,6 +1,6 @@
 # Two commands are enough: `make demo` shows the package, `make test` checks it.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo lint test lock clean
+.PHONY: help setup demo lint test docs lock clean
 
 PY := .venv/bin/python
 ARGS ?=
@@ -27,6 +27,9 @@ test: lint ## lint and every test (ARGS="-k blur" chooses some)
 
 lock: ## write requirements.lock anew from pyproject.toml (ARGS=--upgrade for newer versions)
 	@sh tools/lock.sh $(ARGS)
+
+docs: setup ## the documentation as web pages in out/docs
+	@.venv/bin/sphinx-build -q -W --keep-going docs out/docs && echo out/docs/index.html
 
 clean: ## remove what was built and cached here, except .venv
 	rm -rf out dist build .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

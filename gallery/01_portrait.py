@@ -1,9 +1,22 @@
-"""The scanned head with the whole technique, in studio light: python gallery/01_portrait.py OUTPUT."""
+"""The whole technique in studio light.
 
-import sys
+A white rough reflection over light that has spread below the surface: pores stay sharp in the highlights,
+shadow edges turn soft and red, thin parts glow.
+
+Deck: S1, S7, S25
+Equation: L = (1 − ρ_s ρ_dt(N·V)) Σ_k w_k (E ∗ G_k) albedo^(1−mix) / π + Σ_lights E f_r(L, V) max(N·L, 0)
+Sources: dEonLuebke2007, Dudash2007
+"""
 
 import dermis
+from dermis.gallery.picture import main
 
-head = dermis.load_head("lee_perry_smith", subdivide=1)
-scene = dermis.Scene(head, camera=dermis.portrait(head))
-dermis.write_image(sys.argv[1], dermis.render(scene, size=(1024, 1024), atlas=2048, samples=8))
+
+def draw(studio):
+    head = studio.head()
+    scene = dermis.Scene(head, camera=dermis.portrait(head))
+    return {"": studio.render(scene, scale=2, atlas=2048, samples=8)}
+
+
+if __name__ == "__main__":
+    main(draw)

@@ -6,9 +6,12 @@ import sys
 
 COMMANDS = {
     "render": "Render a head to a PNG (sRGB) or EXR (linear float) image.",
+    "view": "Turn a head, its skin and its light in a window or a web page.",
     "profile": "Compute how light spreads below a skin, and fit Gaussians to it.",
     "head": "Make a head with its maps and write it as glTF.",
     "compare": "Compare techniques with the truth, or the models of the surface.",
+    "gallery": "Draw every comparison of the talk, and a page that explains them.",
+    "bench": "Measure how fast frames are on this machine.",
     "doctor": "Show what this machine can do and render a test frame.",
     "cite": "Print BibTeX entries of the works behind a picture.",
 }

@@ -101,6 +101,7 @@ def render(
         thin lets light through thin parts such as ears; none takes all for thick [thin].
     seams:
         stitch lets light cross the map's seams; the others are the talk's remedies, for comparison [stitch].
+        one-blur and published know no stitching: for it they take clear-colour.
     stretch:
         full corrects blurs for the map's stretch and shear; axes takes u and v for at right angles [full].
     profile:
@@ -139,7 +140,7 @@ def render(
     occlusion:
         baked dims the environment's light where the head is in its way; none does not.
     camera:
-        portrait, three-quarter, profile, cheek, or a TOML file with [camera].
+        portrait, three-quarter, profile, ear, cheek, or a TOML file with [camera].
     exposure:
         Factor from radiance to the image [1].
     bloom:

@@ -1,0 +1,27 @@
+"""Sphinx: guide and explanations as they are written; gallery, reference, bibliography from the code."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE)]
+
+project = "dermis"
+author = "The dermis authors"
+extensions = ["myst_parser", "sphinx.ext.autodoc", "made_from_code"]
+exclude_patterns = ["*.in.md", "images"]
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 3
+suppress_warnings = [
+    "myst.xref_missing"
+]  # links from a page to the project's sources, for readers of the repository
+
+html_theme = "furo"
+html_title = "dermis"
+html_theme_options: dict[str, Any] = {"source_repository": ""}
+html_show_sphinx = False
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"

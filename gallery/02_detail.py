@@ -1,0 +1,27 @@
+"""Scanned detail, off and on.
+
+The mesh alone is smooth. Pores and wrinkles come from maps: slopes of the normal map, and heights in mm at
+up to 4096 texels, from which slopes are taken too. What a pixel cannot resolve makes its surface rougher
+instead.
+
+Deck: S1
+Sources: dEonLuebke2007, OlanoBaker2010
+Slider: mesh alone | with its maps
+"""
+
+from dataclasses import replace
+
+import dermis
+from dermis.gallery.picture import main
+
+
+def draw(studio):
+    head = studio.head()
+    smooth = replace(head, maps=replace(head.maps, normal=None, height=None))
+    camera = dermis.three_quarter(head).model_copy(update={"frame_mm": 260})
+    bodies = {"mesh alone": smooth, "with its maps": head}
+    return {name: studio.render(dermis.Scene(body, camera=camera), 1.6) for name, body in bodies.items()}
+
+
+if __name__ == "__main__":
+    main(draw)

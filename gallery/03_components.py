@@ -1,0 +1,24 @@
+"""The two components, taken apart.
+
+What the oily surface reflects is white and shows every pore. What comes back from below has the skin's
+colour and is soft. Their sum is skin.
+
+Deck: S2, S7
+Equation: L = L_reflected + L_scattered
+Sources: Dudash2007, Tuchin2000
+"""
+
+import dermis
+from dermis.gallery.picture import main
+
+PARTS = {"reflected": "specular", "scattered": "diffuse", "both": "all"}
+
+
+def draw(studio):
+    head = studio.head()
+    scene = dermis.Scene(head, camera=dermis.three_quarter(head), skin=dermis.Skin(oiliness=0.3))
+    return {name: studio.render(scene, parts=part) for name, part in PARTS.items()}
+
+
+if __name__ == "__main__":
+    main(draw)

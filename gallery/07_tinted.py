@@ -1,0 +1,28 @@
+"""White reflections, and tinted ones.
+
+Skin is no metal: what its surface reflects has the colour of the light. Multiplied by the colour map it
+looks like painted clay. Shown on oily skin.
+
+Deck: S7
+Sources: Dudash2007
+Slider: white, as it is | tinted, as it is not
+"""
+
+import dermis
+from dermis.gallery.picture import main
+
+
+def draw(studio):
+    head = studio.head()
+    camera = dermis.three_quarter(head)
+    ways = {"white, as it is": "white", "tinted, as it is not": "wrong"}
+    return {
+        name: studio.render(
+            dermis.Scene(head, camera=camera, skin=dermis.Skin(specular_colour=colour, oiliness=0.5)), 1.4
+        )
+        for name, colour in ways.items()
+    }
+
+
+if __name__ == "__main__":
+    main(draw)

@@ -1,0 +1,28 @@
+"""Light from all around.
+
+A hall with many lamps and a room with one large window, each turned about the head. Reflections take a
+panorama that was blurred for each roughness, scattered light its irradiance; peaks as small as a sun become
+lights with shadows.
+
+Deck: S8
+Sources: KautzMcCool2000, RamamoorthiHanrahan2001
+Columns: 3
+"""
+
+import dermis
+from dermis.gallery.picture import main
+
+
+def draw(studio):
+    head = studio.head()
+    panels = {}
+    for name in ("royal_esplanade", "lebombo"):
+        for turn in (0, 120, 240):
+            around = dermis.Environment(name=name, rotation_degrees=turn, visible=True)
+            scene = dermis.Scene(head, camera=dermis.three_quarter(head), environment=around)
+            panels[f"{name}, {turn}°"] = studio.render(scene, tone="filmic")
+    return panels
+
+
+if __name__ == "__main__":
+    main(draw)

@@ -1,0 +1,25 @@
+"""The cheek from close by, 48 mm of it.
+
+Pores stay sharp in what the surface reflects and soften in what has scattered.
+
+Deck: S1, S11
+Sources: dEonLuebke2007
+Slider: dry | scattered
+"""
+
+import dermis
+from dermis.gallery.picture import main
+from dermis.scene.camera import cheek
+
+
+def draw(studio):
+    head = studio.head()
+    scene = dermis.Scene(head, camera=cheek(head))
+    return {
+        "dry": studio.render(scene, 1.6, technique="none"),
+        "scattered": studio.render(scene, 1.6, atlas=2048),
+    }
+
+
+if __name__ == "__main__":
+    main(draw)

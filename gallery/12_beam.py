@@ -1,0 +1,39 @@
+"""A narrow white beam on a slab of skin.
+
+A beam as thin as a hair enters in the middle; red light leaves up to a centimetre away. Above the middle
+photons counted one by one, below it the six Gaussians that a frame uses. Each picture is 8 mm wide, and
+bright and dark parts are drawn together, since the light falls by five powers of ten.
+
+Deck: S14
+Sources: DonnerJensen2005, Wang1995
+"""
+
+import numpy as np
+
+import dermis
+from dermis.gallery.picture import main
+from dermis.reference.counted import counted_profile
+
+HALF_MM, PHOTONS = 4.0, 400_000
+
+
+def draw(studio):
+    panels = {}
+    for name in ("dj3", "skin1", "skin2"):
+        counted = counted_profile(dermis.load_tissue(name).medium, photons=PHOTONS)
+        panels[name] = spot(counted, dermis.load_profile(name), studio.side)
+    return panels
+
+
+def spot(counted, fitted, side):
+    x = (np.arange(side) + 0.5) / side * 2 * HALF_MM - HALF_MM
+    r = np.hypot(x[None, :], x[:, None])
+    photons = [np.interp(r, counted.radius_mm, channel) for channel in counted.reflectance.T]
+    upper = (x < 0)[:, None, None]
+    exitance = np.where(upper, np.stack(photons, axis=-1), fitted.radiant_exitance(r))
+    brightest = exitance.max(axis=-1, keepdims=True)
+    return np.float32(exitance / brightest * (brightest / 3.0) ** 0.4).clip(0, 1)
+
+
+if __name__ == "__main__":
+    main(draw)

@@ -1,0 +1,24 @@
+"""Light on the unwrapped skin.
+
+The head's surface is laid out flat, each texel lit where it lies on the head, and the light is spread
+there. What enters; after a blur of medium width; after the widest one. Gaps between the charts are filled
+by light from across the seam, as far as blurs reach.
+
+Deck: S15
+Equation: E(texel) = Σ_lights E max(N·L, 0) V (1 − ρ_s ρ_dt) albedo^mix
+Sources: Borshukov2003, Green2004, dEonLuebke2007
+"""
+
+import dermis
+from dermis.gallery.picture import main
+
+LEVELS = {"light that enters": 0, "blurred, third level": 3, "blurred, widest level": 5}
+
+
+def draw(studio):
+    scene = dermis.Scene(studio.head())
+    return {label: 0.3 * studio.light_map(scene, level) for label, level in LEVELS.items()}
+
+
+if __name__ == "__main__":
+    main(draw)

@@ -1,0 +1,32 @@
+"""A map stretches skin, so blurs must be stretched too.
+
+A fine grid of light on the ear, under the same Gaussians: with one width for the whole map, with widths
+corrected along u and v, and with the full metric, which knows that u and v are seldom at right angles. Then
+the map's stretch.
+
+Deck: S17
+Equation: σ_u = σ |∂(u,v)/∂x|, slanted where u and v are
+Sources: dEonLuebke2007, Geusebroek2003
+Columns: 4
+"""
+
+import dermis
+from dermis.gallery.picture import main
+
+WAYS = {"uniform": "none", "corrected along u and v": "axes", "full metric": "full"}
+
+
+def draw(studio):
+    head = studio.head()
+    lines = [{"position": (0.0, y, 0.0), "up": (0, 0, 1)} for y in (-40.0, -20.0, 0.0, 20.0)]
+    lines += [{"position": (0.0, 0.0, z), "up": (0, 1, 0)} for z in (-20.0, 0.0, 20.0, 40.0, 60.0)]
+    stripes = [dermis.StripeLight(direction=(-1, 0, 0), irradiance=(30, 30, 30), **line) for line in lines]
+    camera = dermis.profile(head).model_copy(update={"frame_mm": 130})
+    skin = dermis.Skin(profile="skin1", specular="none")
+    scene = dermis.Scene(head, lights=stripes, camera=camera, skin=skin)
+    panels = {label: studio.render(scene, stretch=way, transmission="none") for label, way in WAYS.items()}
+    return panels | {"stretch": studio.view(scene, "stretch")}
+
+
+if __name__ == "__main__":
+    main(draw)

@@ -1,0 +1,27 @@
+"""A laser's line on cheek and ear.
+
+A vertical sheet of light shows how far light spreads on curved skin. Dry, as this package spreads it, and
+the truth: paths of light followed one by one through the medium itself.
+
+Deck: S19
+Sources: Dudash2007, JensenBuhler2002, Jakob2022
+"""
+
+from importlib.util import find_spec
+
+from dermis.comparison.compare import compare
+from dermis.gallery.picture import main
+
+
+def draw(studio):
+    against = "path-traced" if find_spec("mitsuba") else "surface-integral"
+    settings = studio.settings(0.6)
+    techniques = ("none", "texture-space")
+    made = compare(studio.head(), against, techniques, light="laser", region="ear", settings=settings)
+    shown = {"dry": made.images["none"], "texture space": made.images["texture-space"]}
+    shown |= {f"truth ({against})": made.truth.image}
+    return {label: (255 * made.shown(image)).round().astype("uint8") for label, image in shown.items()}
+
+
+if __name__ == "__main__":
+    main(draw)

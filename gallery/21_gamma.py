@@ -1,0 +1,22 @@
+"""Light counted in linear numbers, and in encoded ones.
+
+Colour maps are decoded, light is added linearly, the picture is encoded at the end. Without the first and
+the last, colours are too strong and shading falls off too fast.
+
+Deck: S23
+Sources: SRGB1999, Dudash2007
+Slider: linear, as it is | encoded, as it is not
+"""
+
+import dermis
+from dermis.gallery.picture import main
+
+
+def draw(studio):
+    scene = dermis.Scene(studio.head(), camera=dermis.three_quarter(studio.head()))
+    ways = {"linear, as it is": "right", "encoded, as it is not": "wrong"}
+    return {label: studio.render(scene, 1.4, gamma=gamma) for label, gamma in ways.items()}
+
+
+if __name__ == "__main__":
+    main(draw)

@@ -1,0 +1,35 @@
+"""A light stage: relighting by adding pictures up.
+
+The head under 48 lights around it, one after the other, as a light stage photographs it. Any surroundings
+are then a weighted sum of these pictures, and nothing is rendered. Beside it the same room rendered at
+once.
+
+Deck: S24
+Equation: L = Σ_i E_i L_i
+Sources: Debevec2000
+"""
+
+import numpy as np
+
+import dermis
+from dermis.gallery.picture import main
+from dermis.scene.light_stage import light_stage, stage_weights
+
+ROOM = dermis.Environment(name="lebombo")
+
+
+def draw(studio):
+    head = studio.head()
+    camera, lights = dermis.three_quarter(head), light_stage(48)
+    stage = [studio.linear(dermis.Scene(head, lights=[light], camera=camera), 0.7) for light in lights]
+    relit = np.einsum("lc,lyxc->yxc", stage_weights(lights, ROOM), stage)
+    room = dermis.Scene(head, camera=camera, environment=ROOM)
+    return {
+        "one light after the other": [3 * picture for picture in stage],
+        "48 pictures, added up": np.float32(relit),
+        "rendered at once": studio.linear(room, 0.7),
+    }
+
+
+if __name__ == "__main__":
+    main(draw)

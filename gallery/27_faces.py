@@ -1,0 +1,39 @@
+"""Faces by melanin and blood.
+
+The same head without a colour map, its colour from the profile alone: melanosomes in the epidermis across,
+blood in the dermis down. Melanin takes blue first, blood takes green.
+
+Deck: S24
+Sources: DonnerJensen2006
+Columns: 4
+"""
+
+import tempfile
+from pathlib import Path
+
+import dermis
+from dermis.gallery.picture import main
+from dermis.optics.fits.gaussian import fit_gaussians
+from dermis.optics.profiles import write_profile
+
+MELANIN, BLOOD = (0.005, 0.02, 0.06, 0.2), (0.005, 0.02, 0.06)
+
+
+def draw(studio):
+    head = studio.head()
+    camera = dermis.portrait(head).model_copy(update={"frame_mm": 300})
+    panels = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for blood in BLOOD:
+            for melanin in MELANIN:
+                file = Path(folder) / f"{melanin}-{blood}.toml"
+                tissue = dermis.load_tissue("spectral", pigments={"melanin": melanin, "blood": blood})
+                write_profile(file, fit_gaussians(tissue.profile().rings(), 6).profile, {})
+                skin = dermis.Skin(profile=str(file), albedo="profile")
+                scene = dermis.Scene(head, camera=camera, skin=skin)
+                panels[f"melanin {melanin:.1%}, blood {blood:.1%}"] = studio.render(scene, 0.6, exposure=1.4)
+    return panels
+
+
+if __name__ == "__main__":
+    main(draw)

@@ -1,0 +1,26 @@
+"""The head that the package makes.
+
+From numbers alone: a shape of signed distances, maps of pigments, pores and folds. No scan, no file, no
+network. Scattered above, dry below.
+
+Deck: S11
+Columns: 3
+"""
+
+import dermis
+from dermis.gallery.picture import main
+
+
+def draw(studio):
+    head = studio.head("bust")
+    views = {"front": dermis.portrait, "three-quarter": dermis.three_quarter, "side": dermis.profile}
+    panels = {}
+    for technique, note in {"texture-space": "", "none": ", dry"}.items():
+        for name, camera in views.items():
+            scene = dermis.Scene(head, camera=camera(head))
+            panels[name + note] = studio.render(scene, technique=technique)
+    return panels
+
+
+if __name__ == "__main__":
+    main(draw)

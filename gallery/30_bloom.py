@@ -1,0 +1,26 @@
+"""Light that the lens scatters.
+
+A share of the picture's light, spread by ever wider Gaussians over the whole of it, as lens and eye do
+around what is bright. Overdone here to be seen.
+
+Deck: +
+Sources: dEonLuebke2007
+Slider: without | a tenth of the light
+"""
+
+import dermis
+from dermis.gallery.picture import main
+
+
+def draw(studio):
+    head = studio.head()
+    lights = dermis.load_lights("rim")
+    scene = dermis.Scene(
+        head, lights=lights, camera=dermis.three_quarter(head), skin=dermis.Skin(oiliness=0.4)
+    )
+    shares = {"without": 0.0, "a tenth of the light": 0.1}
+    return {label: studio.render(scene, 1.4, bloom=share, tone="filmic") for label, share in shares.items()}
+
+
+if __name__ == "__main__":
+    main(draw)

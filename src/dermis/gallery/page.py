@@ -1,0 +1,130 @@
+"""The gallery as one HTML file that needs nothing else, no network either."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import html
+import re
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+from string import Template
+
+from dermis import cite
+from dermis.gallery.run import Picture
+from dermis.outputs import replacing
+
+
+def write_page(path: Path, pictures: Sequence[Picture], head: str, adapter: str) -> None:
+    """Write the page, whole or not at all.
+
+    head, adapter : what the pictures show, and what drew them
+    Raises DermisError when that is not possible.
+    """
+    page = Template(_resource("page.html")).substitute(
+        style=_resource("page.css"),
+        script=_resource("page.js"),
+        head=html.escape(head),
+        adapter=html.escape(adapter),
+        contents="".join(_entry(picture) for picture in pictures),
+        pictures="\n".join(_section(picture) for picture in pictures),
+        deck=_deck(pictures),
+        works=_works(pictures),
+    )
+    with replacing(path) as trial:
+        trial.write_text(page, encoding="utf-8")
+
+
+def _entry(picture: Picture) -> str:
+    return f'<li><a href="#{picture.script.name}">{html.escape(picture.script.title)}</a></li>'
+
+
+def _section(picture: Picture) -> str:
+    script = picture.script
+    equation = f'<p class="equation">{html.escape(script.equation)}</p>' if script.equation else ""
+    return (
+        f'<section id="{script.name}"><h2>{html.escape(script.title)}</h2>'
+        f"<p>{html.escape(script.caption)}</p>{equation}{_panels(picture)}"
+        f'<p class="facts">{_facts(picture)}</p></section>'
+    )
+
+
+def _panels(picture: Picture) -> str:
+    if picture.fault:
+        return f'<p class="fault">Not made: {html.escape(picture.fault)}</p>'
+    slider, panels = picture.script.slider, dict(picture.panels)
+    laid_over = ""
+    if slider:
+        laid_over = _slider(slider, [panels.pop(name) for name in slider])
+    columns = picture.script.columns or min(len(panels), 4) or 1
+    figures = "".join(_figure(caption, file) for caption, file in panels.items())
+    return laid_over + (
+        f'<div class="panels" style="--columns: {columns}">{figures}</div>' if figures else ""
+    )
+
+
+def _slider(captions: tuple[str, str], files: Sequence[bytes]) -> str:
+    before, after = (html.escape(caption) for caption in captions)
+    below, above = (_source(file) for file in files)
+    said = f"{before} on the left, {after} on the right"
+    return (
+        f'<figure class="slider"><img src="{above}" alt="{after}">'
+        f'<img class="before" src="{below}" alt="{before}">'
+        f'<input type="range" min="0" max="100" value="50" aria-label="{said}">'
+        f"<figcaption><span>{before}</span><span>{after}</span></figcaption></figure>"
+    )
+
+
+def _figure(caption: str, file: bytes) -> str:
+    text = html.escape(caption)
+    return f'<figure><img src="{_source(file)}" alt="{text}"><figcaption>{text}</figcaption></figure>'
+
+
+def _source(file: bytes) -> str:
+    return "data:image/webp;base64," + base64.b64encode(file).decode("ascii")
+
+
+def _facts(picture: Picture) -> str:
+    script = picture.script
+    width, height = picture.size
+    facts = [f"<code>dermis gallery --only {script.name}</code>"]
+    facts += [f"{width}×{height}"] if width else []
+    facts += [f"{picture.frame_ms:.3g} ms a frame"] if picture.frame_ms else []
+    facts += [f"{picture.seconds:.0f} s in all"]
+    facts += [f'<a href="#{row}">{row}</a>' for row in script.deck]
+    facts += [f'<a href="#{key}">{key}</a>' for key in script.sources]
+    return " · ".join(facts)
+
+
+def _deck(pictures: Sequence[Picture]) -> str:
+    """Each row of the talk with the pictures that show it and the command that makes them."""
+    rows = csv.DictReader(line for line in _resource("deck.csv").splitlines() if not line.startswith("#"))
+    return "".join(_deck_row(row, pictures) for row in rows)
+
+
+def _deck_row(row: dict[str, str], pictures: Sequence[Picture]) -> str:
+    shown = [picture.script for picture in pictures if row["row"] in picture.script.deck]
+    links = ", ".join(f'<a href="#{script.name}">{html.escape(script.title)}</a>' for script in shown)
+    command = row["command"] or " ".join(["dermis gallery", *(f"--only {one.name}" for one in shown)])
+    return (
+        f'<tr id="{row["row"]}"><td>{row["row"]}</td><td>{html.escape(row["shows"])}</td><td>{links}</td>'
+        f"<td><code>{html.escape(command)}</code></td></tr>"
+    )
+
+
+def _works(pictures: Sequence[Picture]) -> str:
+    keys = sorted({key for picture in pictures for key in picture.script.sources})
+    return "".join(f'<dt id="{key}">{key}</dt><dd>{html.escape(_reference(key))}</dd>' for key in keys)
+
+
+def _reference(key: str) -> str:
+    """A work in one line: authors, title, year."""
+    entry = cite.bibtex([key])
+    fields = dict(re.findall(r"(\w+)\s*=\s*\{(.*?)\},?\s*$", entry, re.MULTILINE))
+    known = [fields[name] for name in ("author", "title", "year") if name in fields]
+    return ". ".join(text.replace("{", "").replace("}", "") for text in known)
+
+
+def _resource(name: str) -> str:
+    return (resources.files("dermis.gallery") / name).read_text(encoding="utf-8")

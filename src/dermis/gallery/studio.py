@@ -1,0 +1,96 @@
+"""What a script of the gallery draws with: one renderer and one head for all of them."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.assets.head import Head, load_head
+from dermis.assets.samples import cached
+from dermis.rendering.rendered import Rendered
+from dermis.rendering.renderer import Renderer
+from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
+
+_SCAN = "lee_perry_smith"
+
+
+class Studio:
+    """A renderer, and the head that pictures show.
+
+    name : head to show; the scan where its files are at hand, else the bust
+    side : of a panel [pixel]
+    settings : those of `Settings`, over what a script asks for
+    """
+
+    def __init__(
+        self, name: str | None = None, side: int = 448, adapter: str = "auto", **settings: Any
+    ) -> None:
+        self.name = name or (_SCAN if cached(_SCAN) else "bust")
+        self.side = side
+        self._adapter, self._settings = adapter, settings
+        self.frames_ms: list[float] = []
+        self._open = cache(lambda: Renderer(self._adapter))
+        self._load = cache(load_head)
+
+    @property
+    def renderer(self) -> Renderer:
+        """The renderer, opened when it is first asked for."""
+        return self._open()
+
+    def head(self, name: str | None = None) -> Head:
+        """The head to show, or another one; the scan's outline is rounded once."""
+        name = name or self.name
+        return self._load(name, subdivide=0 if name == "bust" else 1)
+
+    def render(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.uint8]:
+        """(h, w, 3) sRGB bytes.
+
+        scale : of the panel's side
+        settings : those of `Settings`
+        """
+        return self._draw(scene, scale, settings).srgb8()
+
+    def linear(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.float32]:
+        """(h, w, 3) linear Rec. 709, as `render` before the encoding."""
+        return self._draw(scene, scale, settings).linear()
+
+    def view(self, scene: Scene, view: str, scale: float = 1.0, **settings: Any) -> NDArray[np.uint8]:
+        """(h, w, 3) sRGB bytes of an intermediate, where the picture shows it.
+
+        view : one of those that the viewer offers, such as "blur 3"
+        """
+        from dermis.gpu import download
+        from dermis.viewer.views import PARTS, Views
+
+        if view in ("picture", *PARTS):
+            return self.render(scene, scale, parts=PARTS.get(view, "all"), **settings)
+        self._draw(scene, scale, settings)
+        texture = Views(self.renderer).draw(scene, self.settings(scale, **settings), view)
+        return np.asarray(download(self.renderer.device, texture), np.uint8)[..., :3]
+
+    def light_map(self, scene: Scene, level: int, **settings: Any) -> NDArray[np.float32]:
+        """(n, n, 3) light on the atlas, irradiance over pi: level 0 as it enters, then ever more blurred."""
+        from dermis.gpu import download
+
+        chosen = self.settings(**settings)
+        self._draw(scene, 1.0, settings)
+        levels = self.renderer.prepare(scene, chosen).levels
+        if level == 0:
+            return np.asarray(download(self.renderer.device, levels.entered), np.float32)[..., :3]
+        light = download(self.renderer.device, levels.stack, mip=levels.halvings[level], layer=level)
+        return np.asarray(light, np.float32)[..., :3] / np.float32(levels.scale)
+
+    def settings(self, scale: float = 1.0, **settings: Any) -> Settings:
+        """A panel's settings."""
+        side = round(scale * self.side)
+        chosen: dict[str, Any] = {"size": (side, side), "atlas": 1024}
+        return Settings(**(chosen | settings | self._settings))
+
+    def _draw(self, scene: Scene, scale: float, settings: dict[str, Any]) -> Rendered:
+        rendered = self.renderer.draw(scene, self.settings(scale, **settings))
+        self.frames_ms.append(rendered.frame_ms)
+        return rendered

@@ -1,0 +1,64 @@
+"""Every gallery script runs and is described; small, since only people need its picture large."""
+
+from __future__ import annotations
+
+import csv
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dermis import cite
+from dermis.errors import DermisError
+from dermis.gallery.picture import as_bytes, still
+from dermis.gallery.script import Script, find_scripts, read_script
+from dermis.gallery.studio import Studio
+
+SCRIPTS = find_scripts()
+DECK = (resources.files("dermis.gallery") / "deck.csv").read_text(encoding="utf-8").splitlines()
+ROWS = {row["row"]: row for row in csv.DictReader(line for line in DECK if not line.startswith("#"))}
+
+
+@pytest.fixture(scope="module")
+def studio() -> Studio:
+    return Studio("lee_perry_smith", 48, atlas=128, samples=1, shadow_size=256)
+
+
+@pytest.mark.samples
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.name)
+def test_script(script: Script, studio: Studio) -> None:
+    panels = script.draw(studio)
+    for caption, panel in panels.items():
+        picture = as_bytes(still(panel))
+        assert picture.ndim == 3 and picture.shape[2] == 3
+        assert np.ptp(picture) > 20 or "difference" in caption
+    assert script.slider is None or set(script.slider) <= set(panels)
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.name)
+def test_description(script: Script) -> None:
+    assert script.title and len(script.caption) > 40
+    assert set(script.sources) <= cite.keys()
+    assert set(script.deck) <= set(ROWS)
+    assert len(script.path.read_text(encoding="utf-8").splitlines()) <= 40
+
+
+def test_every_row_of_the_talk_has_a_picture_or_a_command() -> None:
+    shown = {row for script in SCRIPTS for row in script.deck}
+    assert [row for row, says in ROWS.items() if not says["command"] and row not in shown] == []
+    assert set(ROWS) == {f"S{number}" for number in range(1, 26)} | {"+"}
+
+
+def test_docstring_is_read_without_running_the_script(tmp_path: Path) -> None:
+    path = tmp_path / "01_one.py"
+    path.write_text('"""A title.\n\nWhat to\nsee.\n\nDeck: S1, S2\nSlider: a | b\n"""\nraise SystemExit\n')
+    script = read_script(path)
+    assert (script.title, script.caption) == ("A title", "What to see.")
+    assert (script.deck, script.slider, script.sources) == (("S1", "S2"), ("a", "b"), ())
+
+
+def test_names_that_no_script_has_are_refused() -> None:
+    with pytest.raises(DermisError, match=r"--only.*'nothing' came.*01_portrait"):
+        find_scripts(["nothing"])
+    assert [script.name for script in find_scripts(["seams", "01"])] == ["01_portrait", "17_seams"]
