@@ -44,6 +44,12 @@ SPREAD_ENERGY = 0.002
 SPREAD_VARIANCE = 0.002
 """Second moment of a blurred point against the one asked for, relative: the stretch map holds halves."""
 
+HALVES = 1e-3
+"""Light in levels of halves against floats, relative: a half has 11 bits."""
+
+HALVED = 0.002
+"""Levels of less resolution against whole ones under hard edges of light, relative RMSE."""
+
 SHEARED_PEAK = 0.03
 """A blurred point on a sheared map against the analytic one, of the peak: light is read between texels."""
 
@@ -77,8 +83,8 @@ PANORAMA = 1e-3
 AREA_LIGHT = 0.01
 """Irradiance of a light with a size, shaded as a few lights, against its closed form, of the largest."""
 
-SLAB_THROUGH = 0.01
-"""Light through a slab against the profile, of all its light: rays feel the depth, atlases hold halves."""
+SLAB_THROUGH = 0.003
+"""Light through a slab against the profile, of all its light: places are a millimetre apart."""
 
 OCCLUSION = 0.04
 """Open share of the sky by 128 directions against closed forms: one direction stands for up to 0.03 of it."""
