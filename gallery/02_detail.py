@@ -13,12 +13,13 @@ from dataclasses import replace
 
 import dermis
 from dermis.gallery.picture import main
+from dermis.scene.camera import cheek
 
 
 def draw(studio):
     head = studio.head()
     smooth = replace(head, maps=replace(head.maps, normal=None, height=None))
-    camera = dermis.three_quarter(head).model_copy(update={"frame_mm": 260})
+    camera = cheek(head).model_copy(update={"frame_mm": 95})
     bodies = {"mesh alone": smooth, "with its maps": head}
     return {name: studio.render(dermis.Scene(body, camera=camera), 1.6) for name, body in bodies.items()}
 

@@ -15,7 +15,7 @@ def draw(studio):
     head = studio.head()
     key = dermis.PointLight(position=(-620, 420, 620), irradiance=(3.4, 3.3, 3.1))
     fill = dermis.RectangleLight(position=(800, 100, 700), irradiance=(0.25, 0.27, 0.3))
-    camera = dermis.portrait(head).model_copy(update={"frame_mm": 290})
+    camera = dermis.portrait(head).model_copy(update={"target": (10.0, -15.0, 60.0), "frame_mm": 170})
     scene = dermis.Scene(head, lights=[key, fill], camera=camera)
     return {
         "dry and hard": studio.render(scene, 1.6, technique="none"),

@@ -1,8 +1,8 @@
 """A narrow white beam on a slab of skin.
 
 A beam as thin as a hair enters in the middle; red light leaves up to a centimetre away. Above the middle
-photons counted one by one, below it the six Gaussians that a frame uses. Each picture is 8 mm wide, and
-bright and dark parts are drawn together, since the light falls by five powers of ten.
+photons counted one by one, below it the six Gaussians that a frame uses. Each picture is 8 mm wide,
+and red is exposed alike a millimetre from the beam.
 
 Deck: S14
 Sources: DonnerJensen2005, Wang1995
@@ -14,7 +14,7 @@ import dermis
 from dermis.gallery.picture import main
 from dermis.reference.counted import counted_profile
 
-HALF_MM, PHOTONS = 4.0, 400_000
+HALF_MM, EXPOSED_MM, PHOTONS = 4.0, 1.0, 400_000
 
 
 def draw(studio):
@@ -31,8 +31,7 @@ def spot(counted, fitted, side):
     photons = [np.interp(r, counted.radius_mm, channel) for channel in counted.reflectance.T]
     upper = (x < 0)[:, None, None]
     exitance = np.where(upper, np.stack(photons, axis=-1), fitted.radiant_exitance(r))
-    brightest = exitance.max(axis=-1, keepdims=True)
-    return np.float32(exitance / brightest * (brightest / 3.0) ** 0.4).clip(0, 1)
+    return np.float32(0.5 * exitance / np.interp(EXPOSED_MM, counted.radius_mm, counted.reflectance[:, 0]))
 
 
 if __name__ == "__main__":

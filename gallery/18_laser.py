@@ -9,18 +9,20 @@ Sources: Dudash2007, JensenBuhler2002, Jakob2022
 
 from importlib.util import find_spec
 
+import numpy as np
+
 from dermis.comparison.compare import compare
 from dermis.gallery.picture import main
 
 
 def draw(studio):
     against = "path-traced" if find_spec("mitsuba") else "surface-integral"
-    settings = studio.settings(0.6)
+    settings = studio.settings(0.8, atlas=2048)
     techniques = ("none", "texture-space")
     made = compare(studio.head(), against, techniques, light="laser", region="ear", settings=settings)
     shown = {"dry": made.images["none"], "texture space": made.images["texture-space"]}
     shown |= {f"truth ({against})": made.truth.image}
-    return {label: (255 * made.shown(image)).round().astype("uint8") for label, image in shown.items()}
+    return {label: np.float32(3 * made.exposure * image) for label, image in shown.items()}
 
 
 if __name__ == "__main__":

@@ -55,3 +55,19 @@ class Hands:
 
     def click(self, place: tuple[float, float]) -> None:
         self.drag(place, place)
+
+    def place(self, label: str) -> tuple[float, float]:
+        """Where a control of the panel is; the panel must be drawn."""
+        self.frame()
+        found: tuple[float, float] = self.viewer.desk.places[label]
+        return found
+
+    def press(self, label: str) -> None:
+        """Click on a control of the panel."""
+        self.click(self.place(label))
+        self.frame()
+
+    def choose(self, label: str, name: str) -> None:
+        """One of the names of a list of the panel."""
+        self.press(label)
+        self.click(self.place(f"{label}/{name}"))

@@ -74,7 +74,7 @@ def test_layouts_and_reaches_are_told_apart(folder: Path, built: list[int]) -> N
 
 @pytest.mark.parametrize(
     "garbage",
-    [b"", b"no archive at all", b"PK\x03\x04 half an archive", "cut", "flipped", "other arrays"],
+    [b"", b"no archive at all", b"PK\x03\x04 half an archive", "cut", "flipped", "packed", "other arrays"],
 )
 def test_a_broken_file_is_made_again(folder: Path, built: list[int], garbage: bytes | str) -> None:
     first = cached_atlas(plane(10.0), 64)
@@ -84,6 +84,9 @@ def test_a_broken_file_is_made_again(folder: Path, built: list[int], garbage: by
         path.write_bytes(whole[: len(whole) // 2])
     elif garbage == "flipped":
         path.write_bytes(whole[:3000] + bytes(b ^ 0xFF for b in whole[3000:3100]) + whole[3100:])
+    elif garbage == "packed":  # by a method that does not exist, which the last directory entry tells
+        place = whole.rindex(b"PK\x01\x02") + 10
+        path.write_bytes(whole[:place] + b"\x63\x00" + whole[place + 2 :])
     elif garbage == "other arrays":
         np.savez(path, triangle=np.zeros(3))
     else:
@@ -115,6 +118,15 @@ def test_a_folder_that_cannot_be_used_does_no_harm(
         monkeypatch.setattr(Path, "mkdir", _refuse)
     assert cached_atlas(plane(10.0), 64).size == 64
     assert not list(tmp_path.rglob("*.part"))
+
+
+def test_a_folder_that_may_only_be_read_is_read(
+    folder: Path, built: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = cached_atlas(plane(10.0), 64)
+    monkeypatch.setattr(Path, "touch", _refuse)
+    assert same(cached_atlas(plane(10.0), 64), first)
+    assert built == [64]
 
 
 def _refuse(*_: object, **__: object) -> None:

@@ -73,6 +73,15 @@ def test_glb_without_material_keeps_its_uv(tmp_path: Path) -> None:
     assert _by_height(mesh)[0][1] == pytest.approx(0.2, abs=1e-6)
 
 
+def test_a_group_without_a_name_is_called_after_the_file(tmp_path: Path) -> None:
+    """Also when a copy of the file was read before under another name."""
+    nameless = _glb(tmp_path / "first.glb", material=None).read_bytes().replace(b'"face"', b'""    ')
+    for name in ("first", "second"):
+        path = tmp_path / f"{name}.glb"
+        path.write_bytes(nameless)
+        assert load_mesh(path).materials[0].name == name
+
+
 def _gltf(path: Path, **changes: object) -> Path:
     """A .gltf with 16-bit integer uv, its numbers in a .bin beside it."""
     numbers = np.array([[0, 0, 0], [0.2, 0, 0], [0, 0.3, 0]], dtype="<f4").tobytes()

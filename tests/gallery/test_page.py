@@ -100,6 +100,13 @@ def test_in_a_browser(page: Path, browser: Any, width: int) -> None:
     assert _colour(view, box, 0.75) == "red"
     view.locator(".panels img").first.click()
     assert view.locator("dialog").is_visible()
+    view.keyboard.press("Escape")
+    assert not view.locator("dialog").is_visible()
+    view.locator(".panels img").nth(1).focus()
+    view.keyboard.press("Enter")
+    assert view.locator("dialog img").get_attribute("alt") == "panel1"
+    view.keyboard.press("Enter")
+    assert not view.locator("dialog").is_visible()
     assert said == []
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from importlib import resources
 from pathlib import Path
 
@@ -62,3 +63,20 @@ def test_names_that_no_script_has_are_refused() -> None:
     with pytest.raises(DermisError, match=r"--only.*'nothing' came.*01_portrait"):
         find_scripts(["nothing"])
     assert [script.name for script in find_scripts(["seams", "01"])] == ["01_portrait", "17_seams"]
+
+
+def test_a_number_means_one_picture() -> None:
+    assert [script.name for script in find_scripts(["1", "01"])] == ["01_portrait"]
+    for nothing in ("", "99"):
+        with pytest.raises(DermisError, match="--only"):
+            find_scripts([nothing])
+
+
+def test_pages_show_pictures_that_scripts_draw() -> None:
+    """Or pictures of something else that lie there, such as the viewer's."""
+    root = Path(__file__).parents[2]
+    drawn = {script.name for script in SCRIPTS}
+    for page in (root / "README.md", *(root / "docs").glob("*.md")):
+        shown = re.findall(r"images/([\w-]+)\.webp", page.read_text(encoding="utf-8"))
+        for name in set(shown) - drawn:
+            assert (root / "docs" / "images" / f"{name}.webp").is_file(), f"{page.name}: {name}"

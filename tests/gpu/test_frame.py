@@ -11,6 +11,7 @@ import pytest
 
 from dermis.errors import DermisError
 from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture
+from dermis.gpu.bind_groups import BindGroups, key_of
 from dermis.gpu.device import gpu_failures
 from dermis.gpu.probe import half_store_rounding
 from dermis.gpu.textures import texture_from
@@ -121,6 +122,20 @@ def test_bind_groups_go_with_what_they_bind(device: Device) -> None:
         del group, into, bound
         assert len(program.kept_groups) == 0 and gone() is None
     assert program.kept_groups.followed <= 2  # the image and the uniforms
+
+
+class Resource:
+    """Something to bind."""
+
+
+def test_resources_that_go_one_after_another_are_followed_no_more() -> None:
+    """Else what takes their place in memory would be taken for them, with groups that bind what is gone."""
+    groups, first, second = BindGroups(), Resource(), Resource()
+    groups.keep(key_of(0, [first, second]), [first, second], "group")
+    del first
+    assert len(groups) == 0 and groups.followed == 1
+    del second
+    assert groups.followed == 0
 
 
 def test_a_forgotten_resource_is_named(device: Device, scale: ComputeProgram) -> None:

@@ -44,8 +44,11 @@ def test_what_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pytest.Monk
     with ImageWriter(threads=1) as writer:
         with pytest.raises(DermisError, match=r"\.jpg: expected"):
             writer.write(tmp_path / "a.jpg", picture)
-        with pytest.raises(DermisError, match="uint8"):
-            writer.write(tmp_path / "a.png", picture.astype(np.float32))
+        for other in (picture.astype(np.float32), picture[..., :2], picture[..., 0]):
+            with pytest.raises(DermisError, match="uint8"):
+                writer.write(tmp_path / "a.png", other)
+        with pytest.raises(DermisError, match="linear floats"):
+            writer.write(tmp_path / "a.exr", picture)
 
     def full(path: Path, levels: object) -> None:
         raise DermisError("no space")

@@ -5,15 +5,23 @@ from __future__ import annotations
 import os
 
 import pytest
+from tolerances import HALVES, TWIN
 
 from dermis.gpu import Device
 from dermis.rendering.frame import Stages
+from dermis.rendering.levels import ENTERED
 from dermis.rendering.renderer import Renderer
 
 
 @pytest.fixture(scope="session")
 def renderer() -> Renderer:
     return Renderer(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
+
+
+@pytest.fixture(scope="session")
+def close(renderer: Renderer) -> float:
+    """How close light is to its twin after the blurs, of its scale."""
+    return TWIN if renderer.stages.diffuse.texel == ENTERED else HALVES
 
 
 @pytest.fixture(scope="session")

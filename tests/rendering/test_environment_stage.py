@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from setups import front_camera, frontal, head_of, probe, run_frame, scene_of, settings_of
-from tolerances import FURNACE, PANORAMA, PREFILTERED, TWIN
+from tolerances import FURNACE, PANORAMA, PREFILTERED
 from twins import DEFAULT_COLOUR, surface, surface_albedo
 
 from dermis.assets.cache import cached_atlas
@@ -150,7 +150,7 @@ def test_a_plain_sky_fills_everything_evenly(renderer: Renderer) -> None:
     assert np.allclose(middle(image), 3.0 * DEFAULT_COLOUR, rtol=PREFILTERED)
 
 
-def test_an_environment_adds_to_lights(renderer: Renderer) -> None:
+def test_an_environment_adds_to_lights(renderer: Renderer, close: float) -> None:
     """And costs nothing when there is none: its stages are not drawn, its texture is a single texel."""
     head = head_of(plane(100.0))
     both = replace(scene_of(head, frontal()), environment=Environment(name="uniform"))
@@ -158,7 +158,7 @@ def test_an_environment_adds_to_lights(renderer: Renderer) -> None:
         download(renderer.device, run_frame(renderer, scene, occlusion="none").picture.exposed)[..., :3]
         for scene in (scene_of(head, frontal()), around(head, Environment(name="uniform")), both)
     )
-    assert np.abs(one + other - sum_).max() < TWIN * sum_.max()
+    assert np.abs(one + other - sum_).max() < close * sum_.max()
     plain = renderer.prepare(scene_of(head, frontal()), settings_of())
     assert plain.switches == plain.light_switches == ()
     lit = plain.lit
@@ -173,7 +173,7 @@ def test_reflections_follow_the_model_in_use(renderer: Renderer, model: str) -> 
     assert np.abs(record["mirrors"][:, :3] - table).max() < 1e-6
 
 
-def test_exposure_is_a_factor_of_suns_too(renderer: Renderer, room: str) -> None:
+def test_exposure_is_a_factor_of_suns_too(renderer: Renderer, room: str, close: float) -> None:
     """Also far beyond what a light that is written down may give."""
     plain, bright = (
         download(
@@ -182,7 +182,7 @@ def test_exposure_is_a_factor_of_suns_too(renderer: Renderer, room: str) -> None
         )[..., :3]
         for e in (1.0, 1e6)
     )
-    assert np.abs(bright / 1e6 - plain).max() < TWIN * plain.max()
+    assert np.abs(bright / 1e6 - plain).max() < close * plain.max()
 
 
 def test_suns_count_among_the_lights(renderer: Renderer, room: str) -> None:

@@ -16,7 +16,7 @@ from dermis.optics.profiles import load_profile
 from dermis.reference.cut_meshes import cut_sphere
 from dermis.rendering.atlas_textures import AtlasTextures, upload_atlas
 from dermis.rendering.coarser import Sheet, halved
-from dermis.rendering.levels import ENTERED, halvings_of
+from dermis.rendering.levels import ENTERED, halvings_of, scale_of
 from dermis.rendering.stages.combine import Combine
 from dermis.rendering.stages.diffuse import Diffuse
 
@@ -47,14 +47,14 @@ def stripes(atlas: Atlas) -> Floats:
 
 
 def combined(
-    device: Device, texel: str, textures: AtlasTextures, light: Floats, exposure: float = 1.0
+    device: Device, texel: str, textures: AtlasTextures, light: Floats, scale: float = 1.0
 ) -> tuple[Floats, tuple[int, ...]]:
     """The sum of the blurred levels, and how often each was halved."""
     diffuse, side = Diffuse(device, texel), len(light)
     space, into = diffuse.make_levels(side, len(BLURRED)), make_texture(device, (side, side), ENTERED)
     upload(device, space.entered, light)
     frame = Frame(device)
-    diffuse.draw(frame, space, textures, BLURRED, exposure=exposure)
+    diffuse.draw(frame, space, textures, BLURRED, scale=scale)
     Combine(device).draw(frame, space, WEIGHT, into)
     frame.submit()
     return download(device, into)[..., :3].astype(float), space.halvings
@@ -85,16 +85,23 @@ def test_constant_light_stays_constant_at_every_resolution(
     assert np.abs(made[atlas.own] / WEIGHT.sum(axis=0) - 1).max() < close
 
 
-@pytest.mark.parametrize("exposure", [1.0, 2e-6, 3e5])
+@pytest.mark.parametrize("brightest", [1.0, 5e5, 3e-6, 1e9])
 def test_halves_keep_the_light(
-    device: Device, atlas: Atlas, textures: AtlasTextures, stripes: Floats, exposure: float
+    device: Device, atlas: Atlas, textures: AtlasTextures, stripes: Floats, brightest: float
 ) -> None:
     """In amount and in place, however bright it is; were they cut off, each pass would lose a 4000th."""
-    light = stripes / [exposure, exposure, exposure, 1.0]
+    light = stripes * [brightest, brightest, brightest, 1.0]
     floats, _ = combined(device, ENTERED, textures, light)
-    halves, _ = combined(device, HALF, textures, light, exposure)
+    halves, _ = combined(device, HALF, textures, light, scale_of(HALF, brightest))
     assert error(halves, floats, atlas.own) < HALVES
     assert halves[atlas.own].sum() == pytest.approx(floats[atlas.own].sum(), rel=HALVES / 4)
+
+
+@pytest.mark.parametrize("brightest", [0.0, 1e-30, 0.3, 3.0, 1e12])
+def test_scales_are_powers_of_two(brightest: float) -> None:
+    scale = scale_of(HALF, brightest)
+    assert np.frexp(scale)[0] == 0.5 and scale * brightest <= 16
+    assert scale_of(ENTERED, brightest) == 1.0
 
 
 @pytest.mark.parametrize(("texels_per_mm", "most"), [(0.5, 3), (3.0, 3), (30.0, 3), (30.0, 1), (1e6, 3)])

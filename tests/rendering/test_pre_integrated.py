@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import twins
 from numpy.typing import NDArray
-from setups import front_camera, head_of, joined, place, run_frame, scene_of
+from setups import front_camera, head_of, joined, place, run_frame, scene_of, settings_of
 from tolerances import TWIN
 
 from dermis.assets.geometry import build_mesh
@@ -209,3 +209,30 @@ def test_long_way_to_the_horizon(renderer: Renderer) -> None:
     z = (63.5 - np.arange(128)) / 128 * 90.0
     assert made[abs(z - 25) < 5].min() > 0.1
     assert made[z < 0].max() < 0.003
+
+
+@pytest.mark.parametrize("number", [0, 4, 5])
+def test_shadows_hold_where_the_surface_faces_the_light(renderer: Renderer, number: int) -> None:
+    """The cosine of a normal that is the light's direction may come out above 1: no reason for light."""
+    n = np.random.default_rng(number).normal(size=3)
+    n /= np.linalg.norm(n)
+    a = np.cross([0, 1, 0], n) / np.linalg.norm(np.cross([0, 1, 0], n))
+    turn = np.stack([a, np.cross(n, a), n], axis=1)
+    both = joined((plane(60.0), (0, 0, 0), (0, 0, 0.5)), (plane(30.0), (0, 0, 15), (0.5, 0, 0.5)))
+    mesh = build_mesh(both.positions @ turn.T, both.uv, both.triangles, both.material, both.materials)
+    head = head_of(mesh)
+    camera = Camera(
+        position=place(head, turn @ (0, -260, 100)),
+        target=place(head, (0, 0, 0)),
+        up=tuple(turn @ (0, 0, 1)),
+        frame_mm=60,
+    )
+    light = DirectionalLight(direction=tuple(-n), irradiance=(1, 1, 1))
+    scene = scene_of(head, light, camera=camera, albedo="profile", specular="none", energy="none")
+    lit = [
+        np.count_nonzero(
+            renderer.draw(scene, settings_of(technique=technique, shadow_size=256)).linear()[..., 0] > 0.02
+        )
+        for technique in ("none", "pre-integrated")
+    ]
+    assert 1.0 < lit[1] / lit[0] < 1.04  # red light spreads a little into the shadow

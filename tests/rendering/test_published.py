@@ -53,3 +53,15 @@ def test_between_seven_taps_there_are_gaps(levels: list[np.ndarray]) -> None:
     row = levels[-1][SIZE // 2]
     exact = np.exp(-((np.arange(SIZE) - SIZE // 2) ** 2) / (2 * VARIANCES[-1] * TEXELS_PER_MM**2))
     assert np.abs(row / row.max() - exact)[SIZE // 2 - 12 : SIZE // 2 + 13].max() > 0.01
+
+
+def test_the_clear_colour_takes_no_light_away(device: Device, stages: Stages) -> None:
+    """Weights of 1.001 make no texel more than covered, which would take that colour's light off."""
+    space = stages.published.make_levels(SIZE, len(VARIANCES))
+    upload(device, space.entered, np.dstack([np.zeros((SIZE, SIZE, 3)), np.ones((SIZE, SIZE))]))
+    frame = Frame(device)
+    atlas = upload_atlas(device, build_atlas(plane(SIZE / TEXELS_PER_MM), SIZE))
+    stages.published.draw(frame, space, atlas, VARIANCES, clear=(0.5, 0.35, 0.3))
+    frame.submit()
+    dark = download(device, space.stack, layer=len(VARIANCES))
+    assert np.abs(dark[8:-8, 8:-8, :3]).max() == 0.0 and dark[8:-8, 8:-8, 3].max() == 1.0

@@ -29,7 +29,9 @@ SLAB = head_of(
 )
 FLAT = uv_sphere(30.0, 24, 12)
 LEAF = head_of(build_mesh(FLAT.positions * (1, 1, 0.1), FLAT.uv, FLAT.triangles, FLAT.material, SKIN))
-LEANING = head_of(bent_plane(50.0, [[0.5, 0.3, 0.1], [0, 0.9, 0]], 2))
+LEANING = head_of(
+    bent_plane(50.0, [[0.5, 0.3, 0.1], [0, 0.9, 0]], 2), colour=np.random.default_rng(1).random((16, 16, 3))
+)
 LIGHT = DirectionalLight(direction=(1, -0.4, -1), irradiance=(2.0, 1.5, 1.0))
 
 
@@ -223,17 +225,17 @@ def test_too_many_lights(renderer: Renderer) -> None:
         drawn(renderer, scene(BALL, *[frontal()] * 65))
 
 
-def test_more_lights_are_more_light(renderer: Renderer) -> None:
+def test_more_lights_are_more_light(renderer: Renderer, close: float) -> None:
     """Light adds up: an image under two lights is the sum of the images under each."""
     one, two = LIGHT, DirectionalLight(direction=(-1, 1, -2), irradiance=(0.5, 1.0, 1.5))
     parts = [drawn(renderer, scene(BALL, light)) for light in (one, two)]
     both = drawn(renderer, scene(BALL, one, two))
-    assert np.abs(both - parts[0] - parts[1]).max() < 1e-5 * both.max()
+    assert np.abs(both - parts[0] - parts[1]).max() < close * both.max()
 
 
 def test_exposure_scales_the_image(renderer: Renderer) -> None:
     plain, bright = (drawn(renderer, scene(), exposure=e) for e in (1.0, 2.5))
-    assert np.allclose(bright, 2.5 * plain, rtol=1e-6)
+    assert np.abs(bright - 2.5 * plain).max() < 1e-6 * bright.max()
 
 
 def test_what_a_frame_reports(renderer: Renderer) -> None:

@@ -85,7 +85,7 @@ def test_dry_plane(renderer: Renderer, name: str, mix: float) -> None:
 
 @pytest.mark.parametrize("technique", ["texture-space", "none"])
 @pytest.mark.parametrize("albedo", ["map", "profile"])
-def test_even_light_spreads_to_itself(renderer: Renderer, albedo: str, technique: str) -> None:
+def test_even_light_spreads_to_itself(renderer: Renderer, albedo: str, technique: str, close: float) -> None:
     """Under one directional light spreading changes nothing, and a profile's weights are its colour."""
     scene = scene_of(
         FLAT, LIGHTS["directional"], camera=front_camera(FLAT, frame_mm=50.0), albedo=albedo, roughness=0.5
@@ -93,7 +93,7 @@ def test_even_light_spreads_to_itself(renderer: Renderer, albedo: str, technique
     colour = WEIGHTS.sum(axis=0) if albedo == "profile" else twins.DEFAULT_COLOUR
     exact = closed_form(scene, colour)
     made = image(renderer, scene, technique=technique, atlas=128)[..., :3]
-    assert np.abs(made - exact).max() < TWIN * exact.max()
+    assert np.abs(made - exact).max() < close * exact.max()
 
 
 def test_a_profile_keeps_its_own_colour(renderer: Renderer, tmp_path: Any) -> None:
@@ -175,13 +175,13 @@ def unmapped_head() -> Head:
 
 
 @pytest.mark.parametrize("albedo", ["map", "profile"])
-def test_unmapped_triangles_keep_all_their_light(renderer: Renderer, albedo: str) -> None:
+def test_unmapped_triangles_keep_all_their_light(renderer: Renderer, albedo: str, close: float) -> None:
     head = unmapped_head()
     scene = scene_of(head, frontal(), camera=front_camera(head, frame_mm=30.0), albedo=albedo, roughness=0.5)
     made = image(renderer, scene, size=(40, 20), atlas=128)[..., :3]
     left, right = made[:, :19], made[:, :20:-1]
     assert left.min() > 0.1
-    assert np.abs(left - right[:, :19]).max() < 2 * TWIN * made.max()
+    assert np.abs(left - right[:, :19]).max() < 2 * close * made.max()
 
 
 def tailed() -> Head:

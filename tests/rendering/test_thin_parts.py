@@ -86,6 +86,15 @@ def test_a_narrow_profile_asks_for_no_more_cells_than_memory_holds() -> None:
     assert len(find_links(mesh, atlas, 0.01).source) == 0
 
 
+@pytest.mark.parametrize("layout", ["mesh", "stitched", "unwrapped"])
+def test_a_ball_smaller_than_the_profile_spreads_has_links(layout: str) -> None:
+    """Its blurs read nearly all texels, aprons included, which show more than nine times its places."""
+    mesh = uv_sphere(3.0, 48, 24)
+    links = find_links(mesh, build_atlas(mesh, 64, layout), SIGMA)
+    assert len(links.source) == links.first[-1] > 1000
+    assert links.source.max() < len(links.texel)
+
+
 def test_twin_of_what_passes(device: Device, stages: Stages, found: tuple[Mesh, Atlas, Links]) -> None:
     links = found[2]
     pairs = upload_pairs(device, links)

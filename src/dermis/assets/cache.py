@@ -122,10 +122,11 @@ def _baked_key(mesh: Mesh, atlas: Atlas, form: str) -> str:
 def _kept(folder: str, key: str, names: list[str], make: Callable[[], Arrays]) -> Arrays:
     """The arrays `names` from the file of that key, or made and stored."""
     path = cache_folder() / folder / f"{key}.npz"
-    with contextlib.suppress(OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+    with contextlib.suppress(OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile):
         with path.open("rb") as file, np.load(file) as stored:
             arrays = {name: stored[name] for name in names}
-        path.touch()
+        with contextlib.suppress(OSError):  # others' folder: to be read only
+            path.touch()
         return arrays
     arrays = make()
     with contextlib.suppress(OSError):

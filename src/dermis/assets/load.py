@@ -56,7 +56,8 @@ def load_mesh(
     data = source.read_bytes() if source.suffix.lower() == ".glb" and source.is_file() else b""
     if not data or b'"uri"' in data:  # what it is made of lies elsewhere
         return load()
-    return cached_mesh(data, repr((unit, v_origin, up, opaque)), load)
+    named = source.stem  # as a group without a name is
+    return cached_mesh(data, repr((named, unit, v_origin, up, opaque)), load)
 
 
 def _loaded(source: Path, unit: float, v_origin: Origin, up: Up, opaque: tuple[str, ...]) -> Mesh:

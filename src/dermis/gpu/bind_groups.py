@@ -45,7 +45,8 @@ class BindGroups:
             this = weakref.ref(self)
 
             def gone(_: Any) -> None:
-                if groups := this():
+                groups = this()
+                if groups is not None:  # they may be none, and the resource still be followed
                     groups._forget(name)
 
             self._users[name] = weakref.ref(resource, gone), set()

@@ -46,8 +46,10 @@ class ImageWriter:
         Raises DermisError when the path cannot be, or when an earlier picture could not be written.
         """
         exr = check_output(path).suffix.lower() == ".exr"
-        if not exr and (picture.dtype != np.uint8 or picture.ndim != 3):
-            came = f"they have shape {picture.shape} and type {picture.dtype}"
+        came = f"they have shape {picture.shape} and type {picture.dtype}"
+        if exr and not np.issubdtype(picture.dtype, np.floating):
+            refuse(path, "linear floats", came, "Take the renderer's linear picture, or write .png")
+        if not exr and (picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] != 3):
             refuse(path, "pixels (H, W, 3) of uint8", came, "Take the renderer's bytes, or write .exr")
         work: Callable[..., None] = write_exr if exr else _write_png
         self._waiting.append(self._pool.submit(work, path, picture))

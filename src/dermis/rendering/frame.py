@@ -12,7 +12,6 @@ from dermis.gpu import Device, Frame
 from dermis.gpu.repeated import Repeated
 from dermis.rendering.inputs import Inputs
 from dermis.rendering.layout import Layout
-from dermis.rendering.levels import scale_of
 from dermis.rendering.scattered import Scattered
 from dermis.rendering.stages.blend import Blend
 from dermis.rendering.stages.bloom import Bloom
@@ -135,7 +134,7 @@ def _spread(frame: Frame, stages: Stages, inputs: Inputs, layout: Layout) -> Non
     """Let the light that has entered spread, through thin parts too, and add up what leaves."""
     levels, spread = inputs.levels, stages.spreading(inputs.settings.technique)
     beyond = inputs.edge, inputs.clear
-    spread.draw(frame, levels, layout.atlas, inputs.blurred_mm2, *beyond, exposure=inputs.settings.exposure)
+    spread.draw(frame, levels, layout.atlas, inputs.blurred_mm2, *beyond, scale=inputs.scale)
     through = stages.transmission.draw(frame, levels, layout.thin) if layout.thin else None
     stages.combine.draw(frame, levels, inputs.level_weight, layout.scattered, through)
 
@@ -145,6 +144,5 @@ def _spreading_key(inputs: Inputs, layout: Layout) -> tuple[Any, ...]:
     arrays = inputs.blurred_mm2, inputs.level_weight, inputs.clear
     textures = [inputs.levels.stack, layout.scattered, *layout.atlas.resources.values()]
     textures += [layout.thin.links, layout.thin.light] if layout.thin else []
-    scale = scale_of(inputs.levels.texel, inputs.settings.exposure)
-    numbers = inputs.settings.technique, inputs.edge, scale
+    numbers = inputs.settings.technique, inputs.edge, inputs.scale
     return (*numbers, *(np.asarray(a).tobytes() for a in arrays), *map(weakref.ref, textures))

@@ -45,6 +45,7 @@ class Inputs:
     layouts : atlases that light is spread on; the first is the one that is looked at
     light_clips, shadow_key : a matrix for each shadow map, and what the maps would show
     scatters : whether light spreads below the surface
+    scale : what light is multiplied with in the blurred levels
     blurred_mm2, level_weight : variances and weights of the blurred levels
     edge, clear : what blurs find beyond a chart's edge, and the light of empty texels
     scattered : texture of the light that leaves below the surface
@@ -63,6 +64,7 @@ class Inputs:
     shadow_key: bytes
     scatters: bool
     levels: Levels
+    scale: float
     blurred_mm2: Floats
     level_weight: Floats
     edge: str

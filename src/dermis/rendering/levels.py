@@ -13,6 +13,7 @@ from dermis.gpu import Device, make_texture
 ENTERED = "rgba32float"
 """Format of the light that enters."""
 MOST_HALVINGS = 3
+_BRIGHT = 16.0  # what the lights are brought to, a 4000th of what halves hold
 SHARP = 0.8  # standard deviations of what is halved, in texels of the result: less would lose detail
 
 
@@ -73,12 +74,14 @@ def make_levels(device: Device, size: int, count: int, texel: str) -> Levels:
     return Levels(stack, scratch, entered, size, texel, (0,) * (count + 1))
 
 
-def scale_of(texel: str, exposure: float) -> float:
-    """What brings light near 1, where halves are at home: a power of two, which rounds nothing; 1 for floats.
+def scale_of(texel: str, brightest: float) -> float:
+    """What brings light to where halves are at home: a power of two, which rounds nothing; 1 for floats.
 
-    exposure : factor from light to the image
+    brightest : irradiance that the lights were given together; skin nearer to one gets more
     """
-    return 1.0 if texel == ENTERED else float(2.0 ** np.round(np.log2(exposure)))
+    if texel == ENTERED or brightest == 0.0:
+        return 1.0
+    return float(2.0 ** np.floor(np.log2(_BRIGHT / brightest)))
 
 
 def halvings_of(variance_mm2: NDArray[np.float64], texels_per_mm: float, most: int) -> tuple[int, ...]:

@@ -104,8 +104,7 @@ def _mipped(
     def chain() -> list[NDArray[Any]]:
         return [level.astype(np.float16) for level in mip_chain(make())]
 
-    large = source is not None and source.size >= _LARGE
-    levels = cached_mips(source, _FORM, chain) if large and source is not None else chain()
+    levels = chain() if source is None or source.size < _LARGE else cached_mips(source, _FORM, chain)
     height, width = levels[0].shape[:2]
     texture = make_texture(device, (width, height), texel, mips=len(levels), use="map")
     for index, level in enumerate(levels):

@@ -21,7 +21,7 @@ from dermis.rendering.geometry import HeadTextures, upload_geometry
 from dermis.rendering.inputs import Inputs
 from dermis.rendering.kept import Kept
 from dermis.rendering.layout import Layout
-from dermis.rendering.levels import Levels
+from dermis.rendering.levels import Levels, scale_of
 from dermis.rendering.lights import light_records, light_switches, light_views
 from dermis.rendering.limits import check_limits
 from dermis.rendering.maps import relief_band, upload_maps
@@ -34,6 +34,7 @@ from dermis.rendering.stages.shadows import ShadowMaps
 from dermis.rendering.stages.transmission import Thin
 from dermis.rendering.surroundings import (
     Surroundings,
+    brightest,
     environment_record,
     is_occluded,
     load_surroundings,
@@ -52,7 +53,7 @@ class Preparation:
 
     def __init__(self, device: Device, stages: Stages, depth: int = 1) -> None:
         self.device, self._stages = device, stages
-        self._profiles = SkinProfiles()
+        self.profile_of = SkinProfiles().of
         kept = Kept(depth)
         self._keep, self.forget_all, self._forget_idle = kept.keep, kept.forget_all, kept.forget_idle
 
@@ -66,7 +67,7 @@ class Preparation:
         return made_now
 
     def _inputs(self, scene: Scene, settings: Settings) -> Inputs:
-        profile = self._profiles.of(scene.skin)
+        profile = self.profile_of(scene.skin)
         split = made.split_profile(profile, settings, white=scene.skin.albedo == "map")
         count, size, stages = len(split.blurred_mm2), settings.size, self._stages
         atlases = laid_out(settings, count, is_occluded(scene, settings))
@@ -79,6 +80,7 @@ class Preparation:
         layouts = self._layouts(scene, settings, split, atlases, views, shadow_maps, surroundings)
         pre = pre_integrated(self._keep, self.device, settings, profile)
         view = made.view_record(stages.shade.program, scene, settings, split, pre)
+        levels = self._levels(settings.technique, settings.atlas if count else 1, count)
         return Inputs(
             head=layouts[0].head,
             layouts=layouts,
@@ -86,7 +88,8 @@ class Preparation:
             light_clips=clips,
             shadow_key=np.array(clips).tobytes(),
             scatters=count > 0,
-            levels=self._levels(settings.technique, settings.atlas if count else 1, count),
+            levels=levels,
+            scale=scale_of(levels.texel, brightest(scene, surroundings)),
             blurred_mm2=split.blurred_mm2,
             level_weight=split.weight,
             edge=remedy_of(settings).edge,

@@ -22,9 +22,7 @@ from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
 _WARMING_FRAMES = 100
-_IN_FLIGHT = (
-    3  # frames submitted and not done: Python and the device work side by side, the picture stays fresh
-)
+_IN_FLIGHT = 3  # frames submitted and not done: Python and the device work side by side, pictures stay fresh
 
 
 class Renderer:
@@ -41,6 +39,7 @@ class Renderer:
             self.stages = Stages(self.device)
         self._preparation = Preparation(self.device, self.stages, depth)
         self.prepare, self.forget = self._preparation.inputs, self._preparation.forget_all
+        self.profile_of = self._preparation.profile_of
         self._frames = 0
         self._in_flight: deque[int] = deque()
         self._opening_ms = 1e3 * (time.perf_counter() - started)
@@ -153,9 +152,13 @@ class Renderer:
         for scene in scenes:
             leaving.append(self._send(scene, chosen))
             if len(leaving) >= _IN_FLIGHT:
-                yield leaving.popleft().image()
+                yield self._arrived(leaving.popleft())
         while leaving:
-            yield leaving.popleft().image()
+            yield self._arrived(leaving.popleft())
+
+    def _arrived(self, leaving: Leaving) -> NDArray[np.uint8]:
+        with gpu_failures(self.device):
+            return leaving.image()
 
     def _send(self, scene: Scene, settings: Settings) -> Leaving:
         """Submit a frame and send its bytes on their way."""

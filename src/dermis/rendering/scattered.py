@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from dermis.rendering.inputs import Inputs
-from dermis.rendering.levels import scale_of
 
 
 class Scattered:
@@ -36,7 +35,7 @@ def scatter_key(inputs: Inputs) -> tuple[Any, ...]:
     """Everything that `scatter` reads: numbers by their bytes, textures and buffers by identity."""
     key: list[Any] = [inputs.settings.technique, inputs.edge, inputs.light_switches, inputs.shadow_key]
     key += [part.tobytes() for part in (inputs.blurred_mm2, inputs.level_weight, inputs.clear)]
-    key += [_identity(inputs.levels.stack), scale_of(inputs.levels.texel, inputs.settings.exposure)]
+    key += [_identity(inputs.levels.stack), inputs.scale]
     for layout in inputs.layouts:
         read = layout.lit | layout.atlas.resources
         key += [(name, _identity(value)) for name, value in sorted(read.items())]

@@ -35,10 +35,12 @@ class Surroundings:
 
     panorama : layers of irradiance and of reflections, black without an environment
     suns : its peaks
+    brightest : irradiance that a surface gets from the rest at most
     """
 
     panorama: Any
     suns: tuple[Sun, ...]
+    brightest: float = 0.0
 
 
 def load_surroundings(device: Device, name: str | None) -> Surroundings:
@@ -54,7 +56,7 @@ def load_surroundings(device: Device, name: str | None) -> Surroundings:
     for index, layer in enumerate(made.layers):
         texels = np.dstack([_bordered(layer), np.ones((height + 2, width + 2))])
         upload(device, texture, np.minimum(texels, _BRIGHTEST), layer=index)
-    return Surroundings(texture, made.suns)
+    return Surroundings(texture, made.suns, float(made.layers[0].max()))
 
 
 def _bordered(layer: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -69,6 +71,15 @@ def with_suns(scene: Scene, surroundings: Surroundings) -> Scene:
     if scene.environment is None or not surroundings.suns:
         return scene
     return replace(scene, lights=(*scene.lights, *sun_lights(surroundings.suns, scene.environment)))
+
+
+def brightest(scene: Scene, surroundings: Surroundings) -> float:
+    """Irradiance that a surface gets from all lights, as they were given, and the environment together.
+
+    scene : with its environment's peaks among its lights
+    """
+    around = surroundings.brightest * scene.environment.exposure if scene.environment else 0.0
+    return around + sum(max(light.irradiance) for light in scene.lights)
 
 
 def environment_record(program: ComputeProgram, scene: Scene, total: Any, occluded: bool) -> Any:

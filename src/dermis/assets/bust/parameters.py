@@ -33,10 +33,10 @@ class BustParameters:
         for field in fields(self):
             low, high = RANGES[field.name]
             value = getattr(self, field.name)
-            whole = field.name == "seed"
-            if not low <= value <= high or (whole and not isinstance(value, Integral)):
-                number = "a whole number" if whole else "a number"
-                refuse(field.name, f"{number} from {low:g} to {high:g}", f"{value!r} came", "Choose within")
+            if not low <= value <= high:
+                refuse(field.name, f"a number from {low:g} to {high:g}", f"{value!r} came", "Choose within")
+        if not isinstance(self.seed, Integral):
+            refuse("seed", "a whole number", f"{self.seed!r} came", "Round it")
 
 
 RANGES = {

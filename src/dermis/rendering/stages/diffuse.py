@@ -11,7 +11,7 @@ from dermis.gpu import ComputeProgram, Device, Frame
 from dermis.gpu.textures import texture_from
 from dermis.rendering.atlas_textures import AtlasTextures
 from dermis.rendering.kernels import ROWS_PER_UNIT, TRUNCATION, WIDEST, kernel_table
-from dermis.rendering.levels import ENTERED, Levels, halvings_of, make_levels, scale_of
+from dermis.rendering.levels import ENTERED, Levels, halvings_of, make_levels
 from dermis.rendering.stages import SOURCE_SHADERS, STAGES, STORE_SHADERS, TILE
 from dermis.rendering.stages.stitch import Stitch
 
@@ -50,21 +50,21 @@ class Diffuse:
         variance_mm2: NDArray[np.float64],
         edge: str = "repeated",
         clear: ArrayLike = (0.0, 0.0, 0.0),
-        exposure: float = 1.0,
+        scale: float = 1.0,
     ) -> None:
         """Fill layer k with the light spread by variance_mm2[k - 1] (increasing).
 
         edge : one of EDGES, what lies beyond a chart's edge and its apron
         clear : the light that empty texels show when the edge is "cleared"
-        exposure : factor from the light to the image
+        scale : what light is multiplied with in the blurred layers
         """
         sheets = (atlas, *(atlas.coarser if edge == "repeated" else ()))
         levels.halvings = halvings_of(variance_mm2, atlas.usual_per_mm, len(sheets) - 1)
-        levels.scale = scale_of(self.texel, exposure)
+        levels.scale = scale
         source, before = levels.entering, 0.0
         for k, variance in enumerate(variance_mm2, start=1):
             finer, here = levels.halvings[k - 1 : k + 1]
-            texel, scale = (ENTERED, 1.0) if k == 1 else (self.texel, levels.scale)
+            texel, held = (ENTERED, 1.0) if k == 1 else (self.texel, scale)
             self._stitch[texel].draw(frame, "diffuse", sheets[finer], source)
             if here > finer:
                 source = self._halved(frame, levels, source, k - 1)
@@ -79,12 +79,12 @@ class Diffuse:
                     before_mm2=before,
                     resampled=_AVERAGED + _READ if here > finer else 0.0,
                     to_come=sum(_READ / 4**times for times in range(here)),
-                    scale=levels.scale / scale,
-                    clear=scale * np.asarray(clear),
+                    scale=scale / held,
+                    clear=held * np.asarray(clear),
                 )
                 bound = {"spread": spread, "kernel_table": self._kernels, "source": source, "stored": blurred}
                 self._run(frame, along, sheets[here].resources | bound, levels.size >> here)
-                source, scale = blurred, levels.scale
+                source, held = blurred, scale
             before = float(variance)
 
     def _halved(self, frame: Frame, levels: Levels, source: Any, k: int) -> Any:

@@ -38,12 +38,12 @@ class Published:
         variance_mm2: NDArray[np.float64],
         edge: str = "cleared",
         clear: ArrayLike = (0.0, 0.0, 0.0),
-        exposure: float = 1.0,
+        scale: float = 1.0,
     ) -> None:
         """Fill layer k with the light spread by variance_mm2[k - 1] (increasing).
 
         edge : "cleared", where empty texels show the light `clear`, or "skipped", where they are left out
-        exposure : of no account; halves hold the light as it comes
+        scale : of no account; halves hold the light as it comes
         """
         sampler = self._device.sampler(mag_filter="linear", min_filter="linear")
         along, (stretch, spare) = self._along(edge), levels.stretch

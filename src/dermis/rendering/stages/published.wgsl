@@ -43,6 +43,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     if (SKIPPED) {
         light = vec4f(light.rgb / max(light.a, LEAST), select(0.0, 1.0, light.a > LEAST));
+    } else {
+        light.a = 1.0; // not the weights' sum, or the next pass would take the clear colour's share off
     }
     textureStore(blurred, id.xy, light);
     textureStore(stretch_blurred, id.xy, wide);

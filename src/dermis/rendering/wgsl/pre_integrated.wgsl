@@ -79,7 +79,7 @@ fn spread_visibility(light: Light, point: Point, l: vec3f) -> vec3f {
 // How much wider the shadow filter's tent is on the surface, across an edge, than on the light's map.
 fn tent_on_surface(normal: vec3f, l: vec3f, along: vec3f) -> f32 {
     let lean = dot(along, l);
-    return sqrt(1.0 - lean * lean) / dot(normal, l);
+    return sqrt(max(0.0, 1.0 - lean * lean)) / dot(normal, l);
 }
 
 struct Around {
@@ -91,7 +91,7 @@ struct Around {
 // in its distance. They are lifted like the filter's points.
 fn light_around(light: Light, point: Point, l: vec3f, lift: f32, unknown: f32) -> Around {
     let axes = shade.pre.penumbra * beside(point.normal);
-    let cosine = dot(point.normal, l);
+    let cosine = clamp(dot(point.normal, l), 0.0, 1.0);
     let lifted = point.lit_position + lift * (sqrt(1.0 - cosine * cosine) * point.normal + 0.75 * l);
     let centre = light.to_map * vec4f(lifted, 1.0);
     let right = light.to_map * vec4f(axes[0], 0.0);

@@ -84,7 +84,8 @@ def link(
     """
     most = len(sources.position)
     found, shape = np.empty(most, np.int32), np.empty((most, 4), np.float32)
-    hits = Hits(np.empty(9 * most, np.int32), np.empty(9 * most, np.float32))
+    texels = int((flat.shown >= 0).sum())  # in aprons any number of them may show one source
+    hits = Hits(np.empty(texels, np.int32), np.empty(texels, np.float32))
     away = Along(np.full(most, np.inf, np.float32), np.zeros(most, np.float32), np.zeros(most, np.int32))
     index, lie = np.empty(1 << 16, np.int32), np.empty((1 << 16, 4), np.float32)
     total = 0
@@ -124,6 +125,8 @@ def _look_around(
         high[k] = min(
             sources.size[k] - 1, math.floor((place[k] + radius_mm - sources.low[k]) / sources.cell_mm)
         )
+        if low[k] > high[k]:  # a place outside the grid
+            return 0
     for z in range(low[2], high[2] + 1):
         for y in range(low[1], high[1] + 1):
             row = sources.size[0] * (y + sources.size[1] * z)

@@ -1,0 +1,22 @@
+"""Works in one line: every one with authors, title and year, and no sign that only TeX reads."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from dermis import cite
+from dermis.gallery.works import reference
+
+
+@pytest.mark.parametrize("key", sorted(cite.keys()))
+def test_every_work_can_be_read(key: str) -> None:
+    text = reference(key)
+    assert re.search(r"^.+\. .+\. \d{4}$", text), text
+    assert not set(text) & set("{}\\$`"), text
+
+
+def test_fields_go_over_lines_and_letters_have_their_accents() -> None:
+    assert reference("Andersson2020").startswith("Andersson, Pontus; Nilsson, Jim; Akenine-Möller, Tomas; ")
+    assert "László" in reference("Kelemen2001")
