@@ -81,7 +81,8 @@ def gallery(
     if as_json:
         print_json({"page": str(page), "pictures": [_row(picture) for picture in pictures]})
     else:
-        print_lines(f"{page}  {len(pictures)} pictures  {sum(one.seconds for one in pictures):.0f} s")
+        number = f"{len(pictures)} picture{'s' * (len(pictures) != 1)}"
+        print_lines(f"{page}  {number}  {sum(one.seconds for one in pictures):.0f} s")
     return 2 if any(picture.fault for picture in pictures) else 0
 
 

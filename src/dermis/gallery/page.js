@@ -6,9 +6,19 @@ for (const range of document.querySelectorAll(".slider input")) {
 }
 const large = document.body.appendChild(document.createElement("dialog"));
 large.addEventListener("click", () => large.close());
+large.addEventListener("keydown", () => large.close());
 for (const image of document.querySelectorAll(".panels img")) {
-  image.addEventListener("click", () => {
-    large.replaceChildren(image.cloneNode());
+  const open = (event) => {
+    event.preventDefault();
+    const copy = document.createElement("img");
+    [copy.src, copy.alt] = [image.src, image.alt];
+    large.setAttribute("aria-label", image.alt);
+    large.replaceChildren(copy);
     large.showModal();
-  });
+  };
+  image.tabIndex = 0;
+  image.setAttribute("role", "button");
+  image.setAttribute("aria-label", image.alt + ", large");
+  image.addEventListener("click", open);
+  image.addEventListener("keydown", (event) => (event.key === "Enter" || event.key === " ") && open(event));
 }

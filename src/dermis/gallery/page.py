@@ -5,14 +5,13 @@ from __future__ import annotations
 import base64
 import csv
 import html
-import re
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 from string import Template
 
-from dermis import cite
 from dermis.gallery.run import Picture
+from dermis.gallery.works import reference
 from dermis.outputs import replacing
 
 
@@ -115,15 +114,7 @@ def _deck_row(row: dict[str, str], pictures: Sequence[Picture]) -> str:
 
 def _works(pictures: Sequence[Picture]) -> str:
     keys = sorted({key for picture in pictures for key in picture.script.sources})
-    return "".join(f'<dt id="{key}">{key}</dt><dd>{html.escape(_reference(key))}</dd>' for key in keys)
-
-
-def _reference(key: str) -> str:
-    """A work in one line: authors, title, year."""
-    entry = cite.bibtex([key])
-    fields = dict(re.findall(r"(\w+)\s*=\s*\{(.*?)\},?\s*$", entry, re.MULTILINE))
-    known = [fields[name] for name in ("author", "title", "year") if name in fields]
-    return ". ".join(text.replace("{", "").replace("}", "") for text in known)
+    return "".join(f'<dt id="{key}">{key}</dt><dd>{html.escape(reference(key))}</dd>' for key in keys)
 
 
 def _resource(name: str) -> str:

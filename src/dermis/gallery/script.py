@@ -86,10 +86,17 @@ def find_scripts(only: Sequence[str] = ()) -> list[Script]:
     """
     scripts = [read_script(path) for path in sorted(scripts_folder().glob("[0-9]*.py"))]
     for wanted in only:
-        if not any(wanted in script.name for script in scripts):
+        if not any(_named(script, wanted) for script in scripts):
             names = ", ".join(script.name for script in scripts)
             refuse("--only", "names of pictures", f"{wanted!r} came", f"Choose from: {names}")
-    return [script for script in scripts if not only or any(name in script.name for name in only)]
+    return [script for script in scripts if not only or any(_named(script, name) for name in only)]
+
+
+def _named(script: Script, wanted: str) -> bool:
+    """Whether a number, or a part of a name, means the script."""
+    if wanted.isdecimal():
+        return int(wanted) == int(script.name.partition("_")[0])
+    return wanted != "" and wanted in script.name
 
 
 def scripts_folder() -> Path:

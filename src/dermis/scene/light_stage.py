@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.errors import refuse
 from dermis.scene.environment import Environment
 from dermis.scene.lights import DirectionalLight
 
@@ -14,8 +15,10 @@ from dermis.scene.lights import DirectionalLight
 def light_stage(count: int) -> list[DirectionalLight]:
     """Lights of irradiance 1, evenly around the head, on a spiral from above to below.
 
-    Source: [Debevec2000].
+    Raises DermisError for less than one. Source: [Debevec2000].
     """
+    if count < 1:
+        refuse("light stage", "at least one light", f"{count} came", "Ask for more")
     y = 1.0 - 2.0 * (np.arange(count) + 0.5) / count
     turn, radius = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count), np.sqrt(1.0 - y**2)
     places = np.stack([radius * np.sin(turn), y, radius * np.cos(turn)], axis=-1)
