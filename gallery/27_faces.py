@@ -16,7 +16,7 @@ from dermis.gallery.picture import main
 from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.profiles import write_profile
 
-MELANIN, BLOOD = (0.005, 0.02, 0.06, 0.2), (0.005, 0.02, 0.06)
+MELANIN, BLOOD = (0.005, 0.04, 0.12, 0.32), (0.01, 0.025, 0.06)
 
 
 def draw(studio):
@@ -27,7 +27,8 @@ def draw(studio):
         for blood in BLOOD:
             for melanin in MELANIN:
                 file = Path(folder) / f"{melanin}-{blood}.toml"
-                tissue = dermis.load_tissue("spectral", pigments={"melanin": melanin, "blood": blood})
+                pigments = {"melanin": melanin, "blood": blood, "epidermis_mm": 0.1}
+                tissue = dermis.load_tissue("spectral", pigments=pigments)
                 write_profile(file, fit_gaussians(tissue.profile().rings(), 6).profile, {})
                 skin = dermis.Skin(profile=str(file), albedo="profile")
                 scene = dermis.Scene(head, camera=camera, skin=skin)
