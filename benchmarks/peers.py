@@ -12,7 +12,7 @@ import json
 import os
 import platform
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from datetime import date
 from importlib.metadata import version
 from pathlib import Path
@@ -43,6 +43,7 @@ def main(
     head: str = "lee_perry_smith",
     lights: str = ",".join(LIGHTS),
     quick: Annotated[bool, Parameter(negative="")] = False,
+    side: int | None = None,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     adapter: str = "cpu",
 ) -> int:
@@ -56,6 +57,8 @@ def main(
         Of front, back and laser, with commas.
     quick:
         A small image with few paths, to see that everything works. Nothing is kept but what -o names.
+    side:
+        Of the images, in pixels [512; 160 with --quick].
     output:
         JSON with the raw figures [benchmarks/results/peers.json, and docs/peers.md beside it].
     adapter:
@@ -66,7 +69,9 @@ def main(
         if target is not None:
             target.parent.mkdir(parents=True, exist_ok=True)
             check_output(target, (".json",), "Choose such a name")
-        report = compare_peers(head, lights.split(","), QUICK if quick else Plan(), adapter)
+        plan = QUICK if quick else Plan()
+        plan = plan if side is None else replace(plan, side=side)
+        report = compare_peers(head, lights.split(","), plan, adapter)
     except DermisError as fault:
         note(f"peers: {fault}")
         return 2

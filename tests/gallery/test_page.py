@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.gallery.page import write_page
+from dermis.gallery.page import _equation, write_page
 from dermis.gallery.picture import sheet
 from dermis.gallery.run import Picture, draw_pictures, encode_webp
 from dermis.gallery.script import Panel, Script, read_script
@@ -46,6 +46,11 @@ def test_page_needs_nothing_else_and_escapes_what_it_says(page: Path) -> None:
     assert "http://" not in text and "https://" not in text
     assert text.count("data:image/webp") == 7
     assert text.count('<tr id="S') == 25 and "dermis gallery --only 01_a" in text
+
+
+def test_equations_have_indices_and_powers() -> None:
+    shown = _equation("E_k = a^(1−mix) & x^2")
+    assert shown == "E<sub>k</sub> = a<sup>1−mix</sup> &amp; x<sup>2</sup>"
 
 
 def test_a_fault_is_told_and_the_others_go_on(tmp_path: Path) -> None:

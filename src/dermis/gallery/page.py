@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import csv
 import html
+import re
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
@@ -41,12 +42,18 @@ def _entry(picture: Picture) -> str:
 
 def _section(picture: Picture) -> str:
     script = picture.script
-    equation = f'<p class="equation">{html.escape(script.equation)}</p>' if script.equation else ""
+    equation = f'<p class="equation">{_equation(script.equation)}</p>' if script.equation else ""
     return (
         f'<section id="{script.name}"><h2>{html.escape(script.title)}</h2>'
         f"<p>{html.escape(script.caption)}</p>{equation}{_panels(picture)}"
         f'<p class="facts">{_facts(picture)}</p></section>'
     )
+
+
+def _equation(text: str) -> str:
+    """HTML of an equation in one line: what follows _ stands low, what follows ^ high."""
+    low = re.sub(r"_(\w+)", r"<sub>\1</sub>", html.escape(text))
+    return re.sub(r"\^\(([^)]*)\)|\^(\w+)", lambda found: f"<sup>{found[1] or found[2]}</sup>", low)
 
 
 def _panels(picture: Picture) -> str:
@@ -89,11 +96,15 @@ def _facts(picture: Picture) -> str:
     width, height = picture.size
     facts = [f"<code>dermis gallery --only {script.name}</code>"]
     facts += [f"{width}×{height}"] if width else []
-    facts += [f"{picture.frame_ms:.3g} ms a frame"] if picture.frame_ms else []
+    facts += [f"{_rounded(picture.frame_ms)} ms a frame"] if picture.frame_ms else []
     facts += [f"{picture.seconds:.0f} s in all"]
     facts += [f'<a href="#{row}">{row}</a>' for row in script.deck]
     facts += [f'<a href="#{key}">{key}</a>' for key in script.sources]
     return " · ".join(facts)
+
+
+def _rounded(value: float) -> str:
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
 
 
 def _deck(pictures: Sequence[Picture]) -> str:
