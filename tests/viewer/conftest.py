@@ -59,5 +59,6 @@ def hands(shared_hands: Hands, caplog: pytest.LogCaptureFixture) -> Iterator[Han
     while history.can_undo:
         history.undo()
     shared_hands.viewer.panel.visible = True
+    shared_hands.viewer.desk.split.release()
     yield shared_hands
     assert [record.message for record in caplog.records if record.levelname == "ERROR"] == []

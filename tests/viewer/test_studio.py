@@ -14,6 +14,7 @@ from offscreen_hands import ADAPTER, SETTINGS
 from dermis.images.io import read_image
 from dermis.rendering.renderer import Renderer
 from dermis.scene import Settings
+from dermis.viewer.chart import ATLAS
 from dermis.viewer.orbit import orbit
 from dermis.viewer.pace import EFFORTS
 from dermis.viewer.state import ViewerState
@@ -146,7 +147,7 @@ def test_the_two_parts_add_up_to_the_picture(fresh: Renderer, state: ViewerState
     assert np.allclose(below + over, whole, atol=1e-5)
 
 
-@pytest.mark.parametrize("view", [view for view in VIEWS if view not in ("picture", "blur 6")])
+@pytest.mark.parametrize("view", [view for view in VIEWS if view not in ("picture", "blur 6", ATLAS)])
 def test_each_view_shows_the_head_and_another_picture(view: str, studio: Studio, state: ViewerState) -> None:
     picture, found = image(studio, state), image(studio, state.in_view(view))
     head = picture.sum(axis=-1) > 0

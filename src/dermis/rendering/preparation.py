@@ -28,6 +28,7 @@ from dermis.rendering.maps import relief_band, upload_maps
 from dermis.rendering.projection import ShadowView
 from dermis.rendering.seams import LaidOut, laid_out, remedy_of, stretch_of
 from dermis.rendering.skin_profiles import SkinProfiles
+from dermis.rendering.stages.nearest import Layers
 from dermis.rendering.stages.opposite import Pairs
 from dermis.rendering.stages.shade import technique_switches
 from dermis.rendering.stages.shadows import ShadowMaps
@@ -95,9 +96,7 @@ class Preparation:
             edge=remedy_of(settings).edge,
             clear=np.pi * np.array(settings.seam_colour) * remedy_of(settings).coloured,
             scattered=pre.table if pre else self._scattered(layouts, settings.atlas),
-            seen=self._keep(
-                "seen", (size, settings.samples), lambda: stages.visibility.make_seen(size, settings.samples)
-            ),
+            seen=self._seen(size, settings.samples),
             camera_clips=made.camera_clips(scene.camera, scene.head, settings),
             view=view,
             switches=surface.switches(scene.skin) + light_switches(scene) + technique_switches(settings),
@@ -164,6 +163,9 @@ class Preparation:
     def _surroundings(self, scene: Scene) -> Surroundings:
         name = scene.environment.name if scene.environment else None
         return self._keep("surroundings", (name,), lambda: load_surroundings(self.device, name))
+
+    def _seen(self, size: tuple[int, int], samples: int) -> Layers:
+        return self._keep("seen", (size, samples), lambda: self._stages.visibility.make_seen(size, samples))
 
     def _views(self, scene: Scene, size: int) -> list[ShadowView | None]:
         return self._keep("views", (scene.head, tuple(scene.lights), size), lambda: light_views(scene, size))

@@ -2,15 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from dermis.gpu import Device
 from dermis.gpu.program import Program
 
+Box = tuple[int, int, int, int]
+"""Left, top, width and height [pixel]."""
+
+
+@dataclass(frozen=True)
+class Patch:
+    """An image, scaled to a box of the target, of which a part is shown.
+
+    image : texture of sRGB bytes
+    """
+
+    image: Any
+    box: Box
+    shown: Box
+
 
 class Blit(Program):
-    """Draws an image of bytes over a whole target of one format."""
+    """Draws images of bytes into targets of one format."""
 
     def __init__(self, device: Device, target: str) -> None:
         super().__init__(device, Path(__file__).parent / "blit.wgsl")
@@ -27,23 +44,26 @@ class Blit(Program):
             primitive={"topology": "triangle-list", "cull_mode": "none"},
         )
 
-    def draw(self, image: Any, view: Any) -> None:
-        """Scale the image to the size of the target.
+    def draw(self, patches: Sequence[Patch], view: Any) -> None:
+        """Patches on black.
 
-        image : texture of sRGB bytes
         view : of the target's texture
         """
-        handle = self.device.handle
-        entry = {"binding": 0, "resource": image.create_view()}
-        group = handle.create_bind_group(layout=self._layouts[0], entries=[entry])
-        encoder = handle.create_command_encoder()
+        encoder = self.device.handle.create_command_encoder()
         whole = {"view": view, "load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 1)}
         one = encoder.begin_render_pass(label="blit", color_attachments=[whole])
         one.set_pipeline(self._pipeline)
-        one.set_bind_group(0, group)
-        one.draw(3)
+        for patch in patches:
+            one.set_viewport(*patch.box, 0.0, 1.0)
+            one.set_scissor_rect(*patch.shown)
+            one.set_bind_group(0, self._group(patch.image))
+            one.draw(3)
         one.end()
-        handle.queue.submit([encoder.finish()])
+        self.device.handle.queue.submit([encoder.finish()])
+
+    def _group(self, image: Any) -> Any:
+        entry = {"binding": 0, "resource": image.create_view()}
+        return self.device.handle.create_bind_group(layout=self._layouts[0], entries=[entry])
 
     def _visibility(self) -> int:
         import wgpu

@@ -7,12 +7,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from dermis.scene.camera import preset
+from dermis.viewer.chart import ATLAS
 from dermis.viewer.history import History
 from dermis.viewer.lamp import drag_light
 from dermis.viewer.orbit import dolly, focus, orbit, pan
 from dermis.viewer.picking import pick
 
 Event = Mapping[str, Any]
+Place = tuple[float, float]
 CAMERAS = ("portrait", "three-quarter", "profile", "ear", "cheek")
 """Presets by the keys 1 to 5."""
 LIGHT_KEY = "Shift"
@@ -49,7 +51,7 @@ class Controls:
         elif kind == "pointer_up":
             self._end()
         elif kind == "wheel":
-            self._dolly(math.exp(_WHEEL * event["dy"]), "wheel")
+            self._nearer(math.exp(_WHEEL * event["dy"]), (event["x"], event["y"]), size, "wheel")
         elif kind == "double_click":
             self._focus(event, size)
         elif kind == "key_down":
@@ -74,11 +76,12 @@ class Controls:
             self._two_fingers(pinch, size)
             self._at = event["x"], event["y"]
             return
-        height = max(1.0, size[1])
-        right, down = (event["x"] - self._at[0]) / height, (event["y"] - self._at[1]) / height
+        state, side = self.history.state, self._side(size)
+        right, down = (event["x"] - self._at[0]) / side, (event["y"] - self._at[1]) / side
         self._at = event["x"], event["y"]
-        state = self.history.state
-        if self._button != _LEFT:
+        if state.view == ATLAS:
+            moved = state.with_chart(state.chart.panned(right, down))
+        elif self._button != _LEFT:
             moved = state.with_camera(pan(state.scene.camera, -right, down))
         elif LIGHT_KEY in event.get("modifiers", ()):
             moved = drag_light(state, self.light, math.pi * right, -math.pi * down)
@@ -90,20 +93,36 @@ class Controls:
         """Fingers that part come nearer, that move together pan; one that leaves ends it without a jump."""
         if pinch and self._pinch:
             (x, y, spread), (x0, y0, spread0) = pinch, self._pinch
-            state, height = self.history.state, max(1.0, size[1])
-            camera = pan(state.scene.camera, (x0 - x) / height, (y - y0) / height)
-            camera = dolly(camera, spread0 / spread)
-            self.history.change(state.with_camera(camera), f"drag {self._gesture}")
+            state, side = self.history.state, self._side(size)
+            right, down = (x - x0) / side, (y - y0) / side
+            if state.view == ATLAS:
+                moved = state.with_chart(state.chart.panned(right, down))
+            else:
+                moved = state.with_camera(pan(state.scene.camera, -right, down))
+            self.history.change(moved, f"drag {self._gesture}")
+            self._nearer(spread0 / spread, (x, y), size, f"drag {self._gesture}")
         self._pinch = pinch
 
-    def _dolly(self, factor: float, gesture: str) -> None:
+    def _nearer(self, factor: float, at: Place, size: Place, gesture: str) -> None:
+        """The camera goes towards its target, the atlas grows around the pointer."""
         state = self.history.state
-        self.history.change(state.with_camera(dolly(state.scene.camera, factor)), gesture)
+        if state.view == ATLAS:
+            x, y = ((a - 0.5 * b) / self._side(size) for a, b in zip(at, size, strict=True))
+            moved = state.with_chart(state.chart.zoomed(factor, x, y))
+        else:
+            moved = state.with_camera(dolly(state.scene.camera, factor))
+        self.history.change(moved, gesture)
+
+    def _side(self, size: Place) -> float:
+        """What shares of a picture are shares of: its height, of the atlas the shorter side."""
+        return max(1.0, min(size) if self.history.state.view == ATLAS else size[1])
 
     def _focus(self, event: Event, size: tuple[float, float]) -> None:
-        width, height = size
+        state, (width, height) = self.history.state, size
+        if state.view == ATLAS:
+            self.history.change(state.with_chart(state.chart.whole()))
+            return
         x, y = 2.0 * event["x"] / width - 1.0, 1.0 - 2.0 * event["y"] / height
-        state = self.history.state
         place = pick(state.scene.head, state.scene.camera, x, y, width / height)
         if place is not None:
             self.history.change(state.with_camera(focus(state.scene.camera, place)))

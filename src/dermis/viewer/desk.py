@@ -7,6 +7,7 @@ from pathlib import Path
 
 from dermis.viewer.controls import Controls
 from dermis.viewer.history import History
+from dermis.viewer.split import Split
 from dermis.viewer.state import ViewerState, load_state, save_state
 from dermis.viewer.studio import Studio
 
@@ -31,6 +32,7 @@ class Names:
 class Desk:
     """A history of states, the hands that change them, and the studio that draws them.
 
+    split : what is compared with, and where its edge is
     places : where the panel's controls are in the window, by their labels
     """
 
@@ -38,6 +40,7 @@ class Desk:
         self.history = History(state)
         self.controls = Controls(self.history)
         self.studio = studio
+        self.split = Split()
         self.messages = Messages()
         self.names = Names()
         self.places: dict[str, tuple[float, float]] = {}

@@ -24,6 +24,11 @@ class History:
         return self._past[-1]
 
     @property
+    def states(self) -> list[ViewerState]:
+        """All that it holds."""
+        return [*self._past, *self._undone]
+
+    @property
     def can_undo(self) -> bool:
         """Whether there is an earlier state."""
         return len(self._past) > 1

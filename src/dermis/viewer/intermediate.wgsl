@@ -1,20 +1,15 @@
 // What lies on the way to the picture, over the pixels that see it: levels of light, stretch, thickness, shadow, normals.
 //#include "geometry.wgsl"
 //#include "bilinear.wgsl"
-//#include "srgb.wgsl"
+//#include "layer_colours.wgsl"
 //#include "skin.wgsl"
 //#include "lights.wgsl"
 
-const LEVEL_VIEW: u32 = 0u;
-const STRETCH_VIEW: u32 = 1u;
-const THICKNESS_VIEW: u32 = 2u;
-const SHADOW_VIEW: u32 = 3u;
-
-const THIN_MM: f32 = 6.0; // thickness at which a third of the brightness is left
+const SHADOW_VIEW: u32 = 3u; // before it the layers of the atlas, after it normals
 
 struct Look {
     eye: vec3f,
-    what: u32, // one of the above; others show normals
+    what: u32, // a layer of the atlas, shadow, or normals
     forward: vec3f,
     samples: u32,
     right: vec3f,
@@ -44,15 +39,6 @@ fn lit_share(point: Point) -> f32 {
     return seen_of_all / max(all, 1e-6);
 }
 
-// More texels than the mean along u are red, along v green; where the two are sheared blue leaves the middle.
-fn stretch_colour(place: vec2f) -> vec3f {
-    let metric = textureLoad(layer, vec2u(place * vec2f(textureDimensions(layer))), 0);
-    if (metric.x <= 0.0) {
-        return vec3f(0.0);
-    }
-    return vec3f(0.5 + 0.25 * log2(metric.xy / look.scale), 0.5 + 0.5 * metric.z);
-}
-
 fn shown(point: Point) -> vec3f {
     let mapped = (point.flags & MAPPED) != 0u && (point.flags & OPAQUE) == 0u;
     if (look.what == SHADOW_VIEW) {
@@ -64,13 +50,11 @@ fn shown(point: Point) -> vec3f {
     if (!mapped) {
         return vec3f(0.0);
     }
-    if (look.what == LEVEL_VIEW) {
-        return encode_srgb(look.scale * load_bilinear(layer, point.place).rgb / PI);
+    if (look.what == STRETCH_VIEW) { // a mean of shears of several charts would mean nothing
+        let texel = vec2u(point.place * vec2f(textureDimensions(layer)));
+        return layer_colour(look.what, textureLoad(layer, texel, 0), look.scale);
     }
-    if (look.what == STRETCH_VIEW) {
-        return stretch_colour(point.place);
-    }
-    return vec3f(exp(-load_bilinear(layer, point.place).x / THIN_MM));
+    return layer_colour(look.what, load_bilinear(layer, point.place), look.scale);
 }
 
 // The point of a triangle under a place of the image.

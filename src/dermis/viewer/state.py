@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from dermis.assets.head import Head
 from dermis.errors import refuse
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
@@ -17,6 +18,7 @@ from dermis.scene.plain import Plain
 from dermis.scene.saving import save_scene
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments
+from dermis.viewer.chart import Chart
 
 P = TypeVar("P", bound=Plain)
 PICTURE = "picture"
@@ -28,8 +30,9 @@ class ViewerState:
 
     settings : `size` is of no account, the window has its own
     head : the [head] table that the head came from
-    view : one of `views.names`: the picture, or something on the way to it
+    view : one of `views.VIEWS`: the picture, or something on the way to it
     rig : the lights' preset, empty when they are no preset's
+    chart : the part of the atlas that the view "atlas" shows
     """
 
     scene: Scene
@@ -37,6 +40,7 @@ class ViewerState:
     head: Mapping[str, Any] = field(default_factory=dict)
     view: str = PICTURE
     rig: str = "studio"
+    chart: Chart = field(default_factory=Chart)
 
     def with_skin(self, **fields: Any) -> ViewerState:
         """With other values of the skin; impossible ones raise DermisError."""
@@ -77,6 +81,19 @@ class ViewerState:
         """Looking at something else."""
         return replace(self, view=name)
 
+    def with_chart(self, chart: Chart) -> ViewerState:
+        """Looking at another part of the atlas."""
+        return replace(self, chart=chart)
+
+    def with_head(self, head: Head, table: Mapping[str, Any], rho_s: float) -> ViewerState:
+        """With another head, or other maps of it.
+
+        table : the [head] table that it came from
+        rho_s : its skin's mean strength of reflection [-]
+        """
+        skin = changed(self.scene.skin, rho_s=rho_s)
+        return replace(self._with_scene(head=head, skin=skin), head=table)
+
     def _with_scene(self, **fields: Any) -> ViewerState:
         return replace(self, scene=replace(self.scene, **fields))
 
@@ -87,7 +104,7 @@ def same(a: ViewerState, b: ViewerState) -> bool:
     def rest(state: ViewerState) -> tuple[Any, ...]:
         scene = state.scene
         seen = tuple(scene.lights), scene.camera, scene.skin, scene.environment
-        return (*seen, state.settings, state.head, state.view, state.rig)
+        return (*seen, state.settings, state.head, state.view, state.rig, state.chart)
 
     return a.scene.head is b.scene.head and rest(a) == rest(b)
 

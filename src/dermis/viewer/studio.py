@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections import deque
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.gpu import download
+from dermis.gpu import Device, download, make_texture
 from dermis.images.io import write_image, write_png
 from dermis.rendering.rendered import Rendered
 from dermis.rendering.renderer import Renderer
 from dermis.scene.camera import Camera
 from dermis.scene.settings import Settings
+from dermis.viewer.chart import ATLAS
 from dermis.viewer.pace import Pace
-from dermis.viewer.state import PICTURE, ViewerState, changed
+from dermis.viewer.state import PICTURE, ViewerState, changed, same
 from dermis.viewer.views import PARTS, Views
 
 _SIZES = 2  # of everything: for frames in motion and for still ones
+_TIMED_FRAMES = 120
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """The image of a state that does not change, as the camera saw it."""
+
+    state: ViewerState
+    camera: Camera
+    settings: Settings
+    image: Any
 
 
 class Studio:
@@ -37,6 +50,27 @@ class Studio:
         self._shown: tuple[ViewerState, Camera, Settings] | None = None
         self.last_image: Any = None
         self._size = (0, 0)
+        self.times: deque[dict[str, float]] = deque(maxlen=_TIMED_FRAMES)
+        self._frozen: Frozen | None = None
+        self._lit: ViewerState | None = None
+
+    def pictures(
+        self,
+        state: ViewerState,
+        before: ViewerState | None,
+        camera: Camera,
+        size: tuple[int, int],
+        moving: bool,
+    ) -> tuple[Any, Any]:
+        """The image of a state as `image` makes it, and that of a frozen one, None without.
+
+        Raises DermisError for states that cannot be rendered and when the device fails.
+        """
+        if before is None:
+            self._frozen = None
+            return self.image(state, camera, size, moving), None
+        image = self._frozen_image(before, camera, size, moving)
+        return self.image(state, camera, size, moving), image
 
     def image(self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool) -> Any:
         """A texture of sRGB bytes, of the window's size or smaller in motion; the last one where it holds.
@@ -44,14 +78,34 @@ class Studio:
         Raises DermisError for states that cannot be rendered and when the device fails.
         """
         self._size = size
-        settings = self.pace.settings(state.settings, size, moving)
+        settings = self._settings(state, size, moving)
         if self._shown and self._shown[0] is state and self._shown[1:] == (camera, settings):
             return self.last_image
+        before = self.rendered
         self.last_image = self._draw(replace(state, settings=settings).with_camera(camera))
         self._shown = state, camera, settings
-        if moving and self.rendered:
-            self.pace.note(self.rendered.frame_ms)
+        if self.rendered and self.rendered is not before:
+            self.times.append(self.rendered.gpu_ms or {})
+            if moving:
+                self.pace.note(self.rendered.frame_ms)
         return self.last_image
+
+    def _frozen_image(self, before: ViewerState, camera: Camera, size: tuple[int, int], moving: bool) -> Any:
+        """A copy, for the renderer has one picture of each size; it is made anew when the camera moves."""
+        settings, frozen = self._settings(before, size, moving), self._frozen
+        finest = self._settings(before, size, moving=False)
+        known = frozen and frozen.state is before and frozen.camera == camera
+        if frozen and known and frozen.settings in (settings, finest):
+            return frozen.image
+        drawn = self._draw(replace(before, settings=settings).with_camera(camera))
+        self._shown = None  # the picture was the live state's
+        copy = copied(self.renderer.device, drawn, frozen.image if frozen else None)
+        self._frozen = Frozen(before, camera, settings, copy)
+        return copy
+
+    def _settings(self, state: ViewerState, size: tuple[int, int], moving: bool) -> Settings:
+        """Those of a frame; the atlas as a flat picture is always the one that the settings ask for."""
+        return self.pace.settings(state.settings, size, moving and state.view != ATLAS)
 
     @property
     def is_current(self) -> bool:
@@ -59,7 +113,7 @@ class Studio:
         if not self._shown:
             return False
         state, _, settings = self._shown
-        return self.pace.settings(state.settings, self._size, moving=False) == settings
+        return self._settings(state, self._size, moving=False) == settings
 
     def screenshot(self, path: Path, state: ViewerState, size: tuple[int, int]) -> None:
         """Write what the state shows at any size: .png with the tone curve, or .exr, linear.
@@ -79,9 +133,30 @@ class Studio:
 
     def _draw(self, state: ViewerState) -> Any:
         parts = PARTS.get(state.view, state.settings.parts)
-        settings = changed(state.settings, parts=parts)
-        self.rendered = self.renderer.draw(state.scene, settings, keep_light=True)
-        self.settings = settings
+        settings = self.settings = changed(state.settings, parts=parts)
+        if state.view == ATLAS and self._shows_light_of(state):
+            return self._views.draw_chart(state.scene, settings, state.chart)
+        self._lit = None
+        self.rendered, self._lit = self.renderer.draw(state.scene, settings, keep_light=True), state
         if state.view in (PICTURE, *PARTS):
             return self.rendered.picture.bytes
+        if state.view == ATLAS:
+            return self._views.draw_chart(state.scene, settings, state.chart)
         return self._views.draw(state.scene, settings, state.view)
+
+    def _shows_light_of(self, state: ViewerState) -> bool:
+        """Whether the atlas holds a state's light: then another part of it takes no frame."""
+        return self._lit is not None and same(replace(self._lit, chart=state.chart), state)
+
+
+def copied(device: Device, image: Any, space: Any = None) -> Any:
+    """A texture of bytes alike.
+
+    space : an older copy, whose place is taken when its size fits
+    """
+    if space is None or space.size != image.size:
+        space = make_texture(device, image.size[:2], "rgba8uint")
+    encoder = device.handle.create_command_encoder()
+    encoder.copy_texture_to_texture({"texture": image}, {"texture": space}, image.size)
+    device.handle.queue.submit([encoder.finish()])
+    return space

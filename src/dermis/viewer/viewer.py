@@ -9,9 +9,10 @@ from typing import Any
 
 from dermis.errors import DermisError
 from dermis.scene.camera import Camera
-from dermis.viewer.blit import Blit
+from dermis.viewer.blit import Blit, Patch
 from dermis.viewer.desk import Desk
 from dermis.viewer.easing import Easing
+from dermis.viewer.panel.input import shifted
 from dermis.viewer.panel.panel import Panel
 from dermis.viewer.state import ViewerState
 from dermis.viewer.studio import Studio
@@ -95,36 +96,57 @@ class Viewer:
         return self.canvas._repr_mimebundle_(**options)
 
     def _draw(self, now: float) -> None:
-        desk, size = self.desk, self.canvas.get_physical_size()
+        desk, size = self.desk, self._free_size()
         state, elapsed = desk.state, min(now - self._last_draw, _LONGEST_STEP_S)
         before = self._easing.camera
         camera = self._easing.advance(state.scene.camera, elapsed)
         if state is not self._last_seen or camera != before or size != self._last_size:
             self._last_change, self._last_seen, self._last_size = now, state, size
         self._last_draw = now
-        image = self._image(state, camera, size, self._is_moving(now))
+        images = self._images(state, camera, size, self._is_moving(now))
         desk.messages.status = self._status(size)
         target = self._context.get_current_texture().create_view()
-        self._blit.draw(image, target)
+        self._blit.draw(self._patches(*images, size), target)
         self.panel.draw(target, self.canvas.get_logical_size(), self.canvas.get_pixel_ratio())
 
-    def _image(self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool) -> Any:
-        """The picture of a state; one that cannot be rendered leaves the last picture, and says why."""
+    def _covered(self) -> int:
+        """Columns at the left that are the panel's [pixel]."""
+        width = self.panel.width(self.canvas.get_logical_size())
+        return round(float(self.canvas.get_pixel_ratio()) * width)
+
+    def _free_size(self) -> tuple[int, int]:
+        """Of the picture, beside the panel [pixel]."""
+        width, height = self.canvas.get_physical_size()
+        return max(1, width - self._covered()), max(1, height)
+
+    def _patches(self, image: Any, frozen: Any, size: tuple[int, int]) -> list[Patch]:
+        """The live picture, and the frozen one left of the divider."""
+        left, box = self._covered(), (self._covered(), 0, *size)
+        if frozen is None:
+            return [Patch(image, box, box)]
+        edge = round(self.desk.split.share * size[0])
+        sides = (frozen, (left, 0, edge, size[1])), (image, (left + edge, 0, size[0] - edge, size[1]))
+        return [Patch(one, box, shown) for one, shown in sides if shown[2]]
+
+    def _images(
+        self, state: ViewerState, camera: Camera, size: tuple[int, int], moving: bool
+    ) -> tuple[Any, Any]:
+        """The pictures of a state and of the frozen one; a state that cannot be rendered leaves the last."""
         import wgpu
 
         studio = self.desk.studio
         if state is not self._refused:
             try:
-                image = studio.image(state, camera, size, moving)
+                images = studio.pictures(state, self.desk.split.before, camera, size, moving)
                 if self._refused:  # what was wrong is so no more
                     self._refused, self.desk.messages.said = None, ""
-                return image
+                return images
             except DermisError as error:
                 if studio.last_image is None or isinstance(error.__cause__, wgpu.GPUError):
                     raise
                 self._refused = state
                 self.desk.messages.said = str(error)
-        return studio.last_image
+        return studio.last_image, None
 
     def _is_moving(self, now: float) -> bool:
         return now - self._last_change < _QUIET_S
@@ -143,15 +165,23 @@ class Viewer:
     def _on_event(self, event: dict[str, Any]) -> None:
         kind = event["event_type"]
         self._echoes = _ECHOES
-        wanted = self.panel.feed(event)
+        wanted = self.panel.feed(event, self.canvas.get_logical_size())
         if kind == "pointer_down":
             self._on_panel = wanted
         ours = not self._on_panel if kind in ("pointer_move", "pointer_up") else not wanted
         if ours:
-            self.desk.controls.handle(event, self.canvas.get_logical_size())
+            self._on_picture(event)
         if kind == "pointer_up":
             self._on_panel = False
         self.canvas.request_draw()
+
+    def _on_picture(self, event: dict[str, Any]) -> None:
+        """An event of the picture, whose left edge is where the panel ends."""
+        width, height = self.canvas.get_logical_size()
+        left = self.panel.width((width, height))
+        moved, size = shifted(event, left), (max(1.0, width - left), height)
+        if not self.desk.split.handle(moved, size[0]):
+            self.desk.controls.handle(moved, size)
 
     def _open(self) -> None:
         """Set the canvas up for the studio's device."""

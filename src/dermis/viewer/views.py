@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
-from dermis.gpu import Device, Frame, download, make_texture
+from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture
 from dermis.gpu.device import gpu_failures
 from dermis.gpu.textures import texture_from
 from dermis.rendering.inputs import Inputs
@@ -19,6 +19,7 @@ from dermis.rendering.stages.opposite import Pairs
 from dermis.rendering.stages.variants import Variants
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
+from dermis.viewer.chart import ATLAS, Chart
 
 PARTS = {"diffuse": "diffuse", "specular": "specular"}
 """Views that are the picture with some of its light."""
@@ -26,7 +27,10 @@ PARTS = {"diffuse": "diffuse", "specular": "specular"}
 LEVELS = {"irradiance": 0} | {f"blur {k}": k for k in range(1, 7)}
 """Views of the light on the atlas by its layer."""
 
-VIEWS = ("picture", *PARTS, *LEVELS, "stretch", "thickness", "shadow", "normals")
+LAYERS = (*LEVELS, "stretch", "thickness")
+"""What the atlas holds."""
+
+VIEWS = ("picture", *PARTS, *LAYERS, "shadow", "normals", ATLAS)
 """All that can be looked at."""
 
 _NUMBERS = {"stretch": 1, "thickness": 2, "shadow": 3, "normals": 4}  # as in intermediate.wgsl; levels are 0
@@ -39,6 +43,7 @@ class Views:
     def __init__(self, renderer: Renderer) -> None:
         self._renderer, device = renderer, renderer.device
         self._variants = Variants(device, Path(__file__).parent / "intermediate.wgsl")
+        self._flat = ComputeProgram(device, Path(__file__).parent / "chart.wgsl")
         self._nothing = texture_from(device, np.zeros((1, 1, 4), np.float32), "rgba32float")
         self._image: Any = None
         self._thick: weakref.WeakKeyDictionary[Pairs, Any] = weakref.WeakKeyDictionary()
@@ -49,7 +54,7 @@ class Views:
 
         Raises DermisError for what the technique does not make.
         """
-        device, inputs = self._renderer.device, self._renderer.prepare(scene, settings)
+        inputs = self._renderer.prepare(scene, settings)
         switches = tuple(switch for switch in inputs.light_switches if switch[0] == "SHAPES")
         program = self._variants.program(switches)
         layer, scale = self._layer(inputs, view, settings)
@@ -63,9 +68,24 @@ class Views:
             "layer": layer,
             "bytes": self._space(settings.size),
         }
-        with gpu_failures(device):
-            frame = Frame(device)
-            frame.compute("view", program, bound, settings.size)
+        return self._computed(program, bound, settings.size)
+
+    def draw_chart(self, scene: Scene, settings: Settings, chart: Chart) -> Any:
+        """A texture of bytes that shows a part of the atlas of the frame drawn last.
+
+        Raises DermisError for what the technique does not make.
+        """
+        inputs = self._renderer.prepare(scene, settings)
+        layer, scale = self._layer(inputs, chart.layer, settings)
+        shown = {"centre": chart.centre, "span": chart.span, "scale": scale}
+        sheet = self._flat.record("Sheet", what=_NUMBERS.get(chart.layer, 0), **shown)
+        bound = {"sheet": sheet, "layer": layer, "bytes": self._space(settings.size)}
+        return self._computed(self._flat, bound, settings.size)
+
+    def _computed(self, program: ComputeProgram, bound: dict[str, Any], size: tuple[int, int]) -> Any:
+        with gpu_failures(self._renderer.device):
+            frame = Frame(self._renderer.device)
+            frame.compute("view", program, bound, size)
             frame.submit()
         return self._image
 

@@ -14,7 +14,7 @@ Size = tuple[int, int]
 _TITLE = "dermis"
 _MOST_FPS = 60
 _VIEWER = 'Install it: pip install "dermis[viewer]"'
-_NOTEBOOK = "Install it: pip install anywidget"
+_NOTEBOOK = 'Install it: pip install "dermis[notebook]"'
 
 
 def show_window(state: ViewerState, adapter: str, size: Size) -> None:

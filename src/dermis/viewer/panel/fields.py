@@ -31,7 +31,7 @@ def slider(
     """A number on a scale; the whole drag is one step of the history."""
     flags = int(_LOG) if log else 0
     moved, found = imgui.slider_float(label, value, low, high, form, flags)
-    _note_place(desk, label)
+    note_place(desk, label)
     if moved:
         attempt(desk, lambda: desk.change(apply(min(high, max(low, found))), f"slide {label}"))
     if imgui.is_item_deactivated():
@@ -43,12 +43,12 @@ def choice(
 ) -> None:
     """One of some names."""
     is_open = imgui.begin_combo(label, current, _ALL_NAMES)
-    _note_place(desk, label)
+    note_place(desk, label)
     if not is_open:
         return
     for name in names:
         clicked, _ = imgui.selectable(name, name == current)
-        _note_place(desk, f"{label}/{name}")
+        note_place(desk, f"{label}/{name}")
         if clicked and name != current:
             attempt(desk, lambda chosen=name: desk.change(apply(chosen)))  # type: ignore[misc]
     imgui.end_combo()
@@ -83,7 +83,7 @@ def whole(
 def tick(desk: Desk, label: str, value: bool, apply: Callable[[bool], ViewerState]) -> None:
     """Yes or no."""
     moved, found = imgui.checkbox(label, value)
-    _note_place(desk, label)
+    note_place(desk, label)
     if moved:
         attempt(desk, lambda: desk.change(apply(found)))
 
@@ -103,12 +103,12 @@ def colour(
 def button(desk: Desk, label: str) -> bool:
     """Whether it was pressed."""
     pressed = imgui.button(label)
-    _note_place(desk, label)
+    note_place(desk, label)
     return bool(pressed)
 
 
-def _note_place(desk: Desk, label: str) -> None:
-    """The left part of the item drawn last, which is never its label."""
+def note_place(desk: Desk, label: str) -> None:
+    """Remember where the item drawn last is: its left part, which is never its label."""
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
     desk.places[label] = float(low.x) + min(20.0, 0.5 * float(high.x - low.x)), 0.5 * float(low.y + high.y)
 

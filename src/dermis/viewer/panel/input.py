@@ -33,6 +33,17 @@ def feed(io: Any, event: Mapping[str, Any], covers: Callable[[float, float], boo
     return False
 
 
+def shifted(event: Mapping[str, Any], left: float) -> dict[str, Any]:
+    """The event as a part of the window sees it that begins so far from its left edge."""
+    found = dict(event)
+    if "x" in found:
+        found["x"] -= left
+    if found.get("touches"):
+        touches = found["touches"].items()
+        found["touches"] = {key: touch | {"x": touch["x"] - left} for key, touch in touches}
+    return found
+
+
 def _feed_key(io: Any, name: str, down: bool) -> None:
     from imgui_bundle import imgui
     from wgpu.utils.imgui import ImguiRenderer

@@ -12,7 +12,7 @@ from dermis.viewer.desk import Desk
 _WIDTH, _FONT_SIZE = 290.0, 15.0
 _MOST_OF_WINDOW = 0.5
 _GREYS = (
-    ("window_bg", 0.08, 0.86),
+    ("window_bg", 0.08, 1.0),
     ("frame_bg", 0.18, 1.0),
     ("frame_bg_hovered", 0.26, 1.0),
     ("frame_bg_active", 0.32, 1.0),
@@ -39,12 +39,11 @@ class Panel:
 
     def __init__(self, desk: Desk) -> None:
         try:
-            from imgui_bundle import imgui
+            from imgui_bundle import imgui, implot
         except ImportError:
             refuse("panel", "the package imgui-bundle", "it is not installed", _INSTALL)
-        self._desk, self._imgui = desk, imgui
+        self._desk, self._imgui, self._implot = desk, imgui, implot
         self.visible = True
-        self._covered = (0.0, 0.0)
         self._is_new, self._has_popup = True, False
         self._context: Any = None
         self._backend: Any = None
@@ -55,26 +54,31 @@ class Panel:
 
         # A context knows its font's texture, which another device's would not be.
         self._context = self._imgui.create_context()
-        self._imgui.set_current_context(self._context)
+        self._plots = self._implot.create_context()
+        self._enter()
         _set_style(self._imgui)
         self._is_new = True
         self._device = device
         self._backend = ImguiWgpuBackend(device.handle, target)
 
-    def feed(self, event: Mapping[str, Any]) -> bool:
+    def width(self, size: tuple[float, float]) -> float:
+        """Columns of a window of that size that it takes from the picture, logical."""
+        return round(min(_WIDTH, _MOST_OF_WINDOW * size[0])) if self.visible else 0.0
+
+    def feed(self, event: Mapping[str, Any], size: tuple[float, float]) -> bool:
         """Take an event in; returns whether it was meant for the panel and for nothing behind it."""
         from dermis.viewer.panel.input import feed
 
-        self._imgui.set_current_context(self._context)
+        self._enter()
         if event["event_type"] == "key_down" and event["key"] == "Tab" and not self._types:
             self.visible = not self.visible
             return True
-        return feed(self._imgui.get_io(), event, self._covers)
+        return feed(self._imgui.get_io(), event, lambda x, _: self._covers(x, size))
 
     @property
     def is_active(self) -> bool:
         """Whether something of it is held or typed into."""
-        self._imgui.set_current_context(self._context)
+        self._enter()
         return bool(self._imgui.is_any_item_active())
 
     def draw(self, target: Any, size: tuple[float, float], pixel_ratio: float) -> None:
@@ -83,7 +87,9 @@ class Panel:
         size : of the window, logical
         """
         imgui = self._imgui
-        imgui.set_current_context(self._context)
+        from dermis.viewer.panel.over import draw_divider, draw_lines
+
+        self._enter()
         io = imgui.get_io()
         io.display_size = imgui.ImVec2(*size)
         io.display_framebuffer_scale = imgui.ImVec2(pixel_ratio, pixel_ratio)
@@ -91,8 +97,12 @@ class Panel:
             self._is_new = False
             imgui.new_frame()
             try:
-                self._covered = self._draw_sections(size) if self.visible else (0.0, 0.0)
-                self._draw_lines(size)
+                if self.visible:
+                    self._draw_sections(size)
+                else:
+                    self._has_popup = False
+                draw_divider(self._desk.split, self.width(size), size)
+                draw_lines(self._lines(), self.width(size), size)
             finally:
                 imgui.render()
         encoder = self._device.handle.create_command_encoder()
@@ -106,54 +116,43 @@ class Panel:
     def _types(self) -> bool:
         return bool(self._imgui.get_io().want_text_input)
 
-    def _covers(self, x: float, y: float) -> bool:
-        """Whether a pointer there is the panel's; Dear ImGui itself knows it only a frame later."""
-        inside = x < self._covered[0] and y < self._covered[1]
-        return inside or self._has_popup or self.is_active
+    def _enter(self) -> None:
+        self._imgui.set_current_context(self._context)
+        self._implot.set_current_context(self._plots)
 
-    def _draw_sections(self, size: tuple[float, float]) -> tuple[float, float]:
-        """Returns the corner of the window that it covers."""
+    def _lines(self) -> list[str]:
+        messages = self._desk.messages
+        hint = "" if self.visible else "Tab shows the panel"
+        return [line for line in (messages.said, messages.status, hint) if line]
+
+    def _covers(self, x: float, size: tuple[float, float]) -> bool:
+        """Whether a pointer there is the panel's; Dear ImGui itself knows it only a frame later."""
+        return x < self.width(size) or self._has_popup or self.is_active
+
+    def _draw_sections(self, size: tuple[float, float]) -> None:
+        from dermis.viewer.panel.fields import note_place
         from dermis.viewer.panel.sections import SECTIONS
 
         imgui = self._imgui
-        width = min(_WIDTH, _MOST_OF_WINDOW * size[0])
+        width = self.width(size)
         imgui.set_next_window_pos(imgui.ImVec2(0.0, 0.0))
-        imgui.set_next_window_size_constraints(imgui.ImVec2(width, 0.0), imgui.ImVec2(width, size[1]))
+        imgui.set_next_window_size(imgui.ImVec2(width, size[1]))
         still = imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_collapse
-        fitted = imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_title_bar
-        imgui.begin("dermis", None, int(still | fitted))
+        imgui.begin("dermis", None, int(still | imgui.WindowFlags_.no_title_bar))
         imgui.push_item_width(0.58 * width)
         for section in SECTIONS:
             flags = int(imgui.TreeNodeFlags_.default_open) if section.OPEN else 0
-            if imgui.collapsing_header(section.TITLE, flags):
+            is_open = imgui.collapsing_header(section.TITLE, flags)
+            note_place(self._desk, section.TITLE)
+            if is_open:
                 section.draw(self._desk)
         imgui.pop_item_width()
         self._has_popup = bool(imgui.is_popup_open("", int(imgui.PopupFlags_.any_popup)))
-        covered = imgui.get_window_size()
         imgui.end()
-        return float(covered.x), float(covered.y)
-
-    def _draw_lines(self, size: tuple[float, float]) -> None:
-        """What the adapter is and what was said last, at the lower edge."""
-        imgui, messages = self._imgui, self._desk.messages
-        lines = [line for line in (messages.said, messages.status) if line]
-        if not lines:
-            return
-        over = imgui.get_foreground_draw_list()
-        left = self._covered[0] + 10.0
-        wrapped = max(80.0, size[0] - left - 10.0)
-        text = "\n".join(lines)
-        box = imgui.calc_text_size(text, False, wrapped)
-        top = size[1] - box.y - 10.0
-        shade, white = imgui.IM_COL32(0, 0, 0, 150), imgui.IM_COL32(235, 235, 235, 255)
-        corners = imgui.ImVec2(left - 6, top - 4), imgui.ImVec2(left + box.x + 6, size[1] - 6)
-        over.add_rect_filled(*corners, shade, 4.0)
-        font, place = imgui.get_font(), imgui.ImVec2(left, top)
-        over.add_text(font, imgui.get_font_size(), place, white, text, wrapped)
 
 
 def _set_style(imgui: Any) -> None:
-    """A legible font on a dark, slightly clear ground."""
+    """A legible font on a dark ground."""
     from pathlib import Path
 
     import imgui_bundle

@@ -6,6 +6,16 @@ the module and name it in `SECTIONS`.
 
 from __future__ import annotations
 
-from dermis.viewer.panel.sections import light, picture, profile, scene, surface, technique, view
+from dermis.viewer.panel.sections import (
+    compare,
+    light,
+    picture,
+    profile,
+    scene,
+    surface,
+    technique,
+    timing,
+    view,
+)
 
-SECTIONS = (view, profile, surface, light, technique, picture, scene)
+SECTIONS = (view, compare, profile, surface, light, technique, picture, timing, scene)

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from dermis.errors import DermisError
 from dermis.optics.pigments.skin import EXAMPLES, SkinParameters
 from dermis.optics.profiles import preset_names
 from dermis.optics.tissue import SPECTRAL
 from dermis.viewer.desk import Desk
 from dermis.viewer.panel.fields import choice, field_choice, slider
+from dermis.viewer.panel.plots import curves
 from dermis.viewer.state import ViewerState
+
+_RADII_MM = np.geomspace(0.01, 30.0, 160)
+CHANNELS = ((0.9, 0.35, 0.3), (0.35, 0.8, 0.4), (0.4, 0.55, 1.0))
 
 TITLE = "Profile"
 OPEN = True
@@ -31,6 +38,7 @@ def draw(desk: Desk) -> None:
     field_choice(desk, "colour from", skin, "albedo", desk.state.with_skin)
     if skin.profile in (SPECTRAL, *EXAMPLES):
         _pigments(desk)
+    _plot(desk)
 
 
 def _pigments(desk: Desk) -> None:
@@ -45,3 +53,15 @@ def _pigments(desk: Desk) -> None:
 
         label = "epidermis [mm]" if name == "epidermis_mm" else name
         slider(desk, label, value, apply, low, high, log=log, form="%.4f" if log else "%.2f")
+
+
+def _plot(desk: Desk) -> None:
+    """r R(r) of the Gaussians that the frame blurs with, by channel."""
+    scene = desk.state.scene
+    try:
+        profile = desk.studio.renderer.profile_of(scene.skin)
+    except DermisError:  # which is told over the picture
+        return
+    r, values = _RADII_MM, profile.radiant_exitance(_RADII_MM)
+    series = {name: r * values[:, k] for k, name in enumerate(("red", "green", "blue"))}
+    curves("profile", r, series, CHANNELS, "r [mm], r R(r) [1/mm]")

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
+from dermis.assets.regions.table import DEFAULT
 from dermis.viewer.desk import Desk
-from dermis.viewer.panel.fields import field_choice, field_slider
+from dermis.viewer.panel.fields import choice, field_choice, field_slider
+from dermis.viewer.regions import NO_REGIONS, regional
 
 TITLE = "Surface"
 OPEN = True
@@ -19,6 +21,7 @@ def draw(desk: Desk) -> None:
         imgui.text_disabled("roughness is the head's own map")
     else:
         field_slider(desk, "roughness", skin, "roughness", apply, 0.05, 1.0)
+    _regions(desk)
     if "regions" in desk.state.head:
         imgui.text_disabled("rho_s is that of the regions")
     else:
@@ -28,3 +31,10 @@ def draw(desk: Desk) -> None:
     field_choice(desk, "Fresnel", skin, "fresnel", apply)
     field_choice(desk, "energy", skin, "energy", apply)
     field_choice(desk, "reflection", skin, "specular_colour", apply)
+
+
+def _regions(desk: Desk) -> None:
+    """Maps by region of the face; a table of one's own is kept in the list while it is the head's."""
+    now = str(desk.state.head.get("regions", NO_REGIONS))
+    names = dict.fromkeys((NO_REGIONS, DEFAULT, now))
+    choice(desk, "regions", now, names, lambda name: regional(desk.state, name, desk.history.states))

@@ -1,0 +1,91 @@
+"""The atlas as a flat picture: its texels, zooming at the cursor, panning."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from offscreen_hands import ADAPTER, Hands
+
+from dermis.gpu import download
+from dermis.viewer.chart import ATLAS, Chart
+from dermis.viewer.state import ViewerState
+from dermis.viewer.studio import Studio
+
+SIDE = 128  # of the tests' atlas
+
+
+def place_at(chart: Chart, x: float, y: float) -> tuple[float, float]:
+    return chart.centre[0] + chart.span * x, chart.centre[1] + chart.span * y
+
+
+def test_zooming_keeps_the_place_under_the_cursor() -> None:
+    chart = Chart(centre=(0.4, 0.6), span=0.3)
+    near = chart.zoomed(0.25, 0.2, -0.3)
+    assert near.span == pytest.approx(0.075)
+    assert place_at(near, 0.2, -0.3) == pytest.approx(place_at(chart, 0.2, -0.3))
+    assert near.whole() == Chart()
+
+
+def test_panning_carries_the_place_along() -> None:
+    chart = Chart(span=0.2)
+    assert place_at(chart.panned(0.1, -0.2), 0.1, -0.2) == pytest.approx(chart.centre)
+
+
+def test_each_texel_is_a_square_with_the_layer_s_own_light(state: ViewerState) -> None:
+    studio = Studio(ADAPTER)
+    shown = state.in_view(ATLAS).with_chart(Chart("irradiance", (0.5, 0.5), 1.0))
+    image = studio.image(shown, state.scene.camera, (2 * SIDE, 2 * SIDE), moving=True)
+    found = studio.read(image).astype(float)
+    assert np.array_equal(found[::2, ::2], found[1::2, 1::2])
+    levels = studio.renderer.prepare(
+        state.scene, state.settings.model_copy(update={"size": (2 * SIDE, 2 * SIDE)})
+    ).levels
+    light = download(studio.renderer.device, levels.stack)
+    light = (light if light.ndim == 3 else light[0])[..., :3] / np.pi
+    assert light.max() > 0.1
+    c = np.clip(light, 0.0, 1.0)
+    expected = 255.0 * np.where(c <= 0.0031308, 12.92 * c, 1.055 * c ** (1 / 2.4) - 0.055)
+    assert np.abs(found[::2, ::2] - expected).max() <= 0.51
+
+
+def test_pixels_over_many_texels_show_their_mean(state: ViewerState) -> None:
+    studio = Studio(ADAPTER)
+    shown = state.in_view(ATLAS).with_chart(Chart("irradiance", (0.5, 0.5), 1.0))
+    fine, coarse = (
+        studio.read(studio.image(shown, state.scene.camera, (side, side), moving=False)).astype(float)
+        for side in (SIDE, SIDE // 4)
+    )
+    mean = fine.reshape(SIDE // 4, 4, SIDE // 4, 4, 3).mean(axis=(1, 3))
+    assert np.abs(coarse - mean).max() <= 1.01
+
+
+def test_another_part_of_the_atlas_takes_no_frame(state: ViewerState) -> None:
+    studio = Studio(ADAPTER)
+    shown = state.in_view(ATLAS)
+    first = studio.read(studio.image(shown, state.scene.camera, (64, 64), moving=False))
+    rendered = studio.rendered
+    near = shown.with_chart(Chart(span=0.2))
+    assert (studio.read(studio.image(near, state.scene.camera, (64, 64), moving=False)) != first).any()
+    assert studio.rendered is rendered
+    dark = near.with_light(0, irradiance=(0.0, 0.0, 0.0))
+    studio.image(dark, state.scene.camera, (64, 64), moving=False)
+    assert studio.rendered is not rendered
+
+
+def test_wheel_and_drag_move_the_atlas_and_not_the_camera(hands: Hands) -> None:
+    desk = hands.viewer.desk
+    hands.choose("show", ATLAS)
+    whole, camera = hands.settled(), desk.state.scene.camera
+    assert whole[60, 202:230].max() == whole[60, 202:230].min() == 33  # beside the atlas
+    hands.event("wheel", x=350.0, y=240.0, dx=0.0, dy=-1000.0)
+    near = hands.settled()
+    assert desk.state.chart.span == pytest.approx(1.05 / np.e)
+    assert near[60, 202:230].max() > 33 or near[60, 202:230].min() < 33
+    hands.drag((350.0, 240.0), (330.0, 250.0))
+    moved = hands.settled()
+    assert np.array_equal(moved[110:400, 210:370], near[100:390, 230:390])
+    hands.choose("layer", "stretch")
+    assert np.abs(hands.settled()[110:400, 210:370].astype(int) - moved[110:400, 210:370]).mean() > 5.0
+    hands.event("double_click", x=300.0, y=240.0)
+    hands.settled()
+    assert desk.state.chart == Chart("stretch") and desk.state.scene.camera == camera

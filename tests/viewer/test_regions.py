@@ -1,0 +1,54 @@
+"""Regions of the face as a choice."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from dermis.assets.bust.regions import REGIONS
+from dermis.errors import DermisError
+from dermis.scene.skin import Skin
+from dermis.viewer.regions import NO_REGIONS, regional
+from dermis.viewer.state import ViewerState
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> str:
+    """A table of regions with a picture of labels: the lower half is another region."""
+    labels = np.zeros((16, 16), np.uint8)
+    labels[8:] = 3
+    Image.fromarray(labels).save(tmp_path / "labels.png")
+    rows = [f'"{name}" = {{ m = 0.3, rho_s = {0.1 + 0.05 * k:.2f} }}' for k, name in enumerate(REGIONS)]
+    (tmp_path / "regions.toml").write_text("\n".join(['labels = "labels.png"', *rows, ""]))
+    return str(tmp_path / "regions.toml")
+
+
+@pytest.fixture(autouse=True)
+def _small(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dermis.assets.regions.apply.SIZE", 64)
+
+
+def test_a_table_gives_maps_and_their_mean_and_none_takes_them_away(state: ViewerState, table: str) -> None:
+    found = regional(state, table)
+    maps = found.scene.head.maps
+    assert maps.specular is not None and np.ptp(maps.specular) > 0.05
+    assert 0.1 < found.scene.skin.rho_s < 0.25 and found.head["regions"] == table
+    bare = regional(found, NO_REGIONS)
+    assert bare.scene.head.maps.specular is None and "regions" not in bare.head
+    assert bare.scene.skin.rho_s == Skin().rho_s
+
+
+def test_heads_that_are_there_are_not_made_again(state: ViewerState, table: str) -> None:
+    found = regional(state, table)
+    assert regional(found, NO_REGIONS, [state, found]).scene.head is state.scene.head
+    assert regional(state, table, [state, found]).scene.head is found.scene.head
+
+
+def test_heads_without_known_regions_are_refused(state: ViewerState) -> None:
+    with pytest.raises(DermisError):
+        regional(state, "default")
+    with pytest.raises(DermisError, match="made in memory"):
+        regional(ViewerState(state.scene), "default")

@@ -1,0 +1,115 @@
+"""Pictures of the viewer for the documentation: its window on a screen in memory, and its page in Chromium.
+
+python tools/viewer_pictures.py [HEAD]
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from PIL import Image, ImageChops, ImageGrab
+
+FOLDER = Path(__file__).parent.parent / "docs" / "images"
+SIZE = 1100, 760
+SCENE = ("--atlas", "1024", "--samples", "4")
+PATIENCE_S = 100.0
+REFINED_S = 15.0  # without a change: a software adapter takes long for a still picture
+ANSWERED_S = 2.0
+VIEW_LIST, IRRADIANCE = (30, 43), (30, 126)
+COMPARE, FREEZE = (100, 118), (30, 143)
+CHROMIUM = "chromium", "chromium-browser", "google-chrome"
+
+
+def main() -> None:
+    """Make both."""
+    head = sys.argv[1] if len(sys.argv) > 1 else "lee_perry_smith"
+    for name, take in (("viewer-window", window), ("viewer-browser", page)):
+        take(head).save(FOLDER / f"{name}.webp", quality=88, method=6)
+
+
+def window(head: str) -> Image.Image:
+    """The window as a screen shows it."""
+    with screen() as display:
+        environment = os.environ | {"DISPLAY": display}
+        environment.pop("WAYLAND_DISPLAY", None)
+        words = ["view", head, "--size", f"{SIZE[0]}x{SIZE[1]}", "--env", "royal_esplanade", *SCENE]
+        with ended(subprocess.Popen([sys.executable, "-m", "dermis", *words], env=environment)):
+            return still(lambda: ImageGrab.grab(xdisplay=display).convert("RGB"))
+
+
+def page(head: str) -> Image.Image:
+    """The page, with the light before it is spread on the right of the divider."""
+    from playwright.sync_api import sync_playwright
+
+    words = ["view", head, "--browser", "--port", "0", "--size", f"{SIZE[0]}x{SIZE[1]}", *SCENE]
+    command = [sys.executable, "-m", "dermis", *words]
+    with (
+        ended(subprocess.Popen(command, stdout=subprocess.PIPE, text=True)) as server,
+        sync_playwright() as play,
+    ):
+        assert server.stdout is not None
+        url = server.stdout.readline().split()[0]
+        found = next(filter(None, map(shutil.which, CHROMIUM)))
+        browser = play.chromium.launch(executable_path=found, args=["--no-sandbox", "--disable-gpu"])
+        tab = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
+        tab.goto(url)
+
+        def shown() -> Image.Image:
+            return Image.open(io.BytesIO(tab.screenshot())).convert("RGB")
+
+        still(shown)
+        for place in (COMPARE, FREEZE, VIEW_LIST, IRRADIANCE):
+            tab.mouse.click(*place)
+            still(shown, ANSWERED_S)
+        tab.mouse.move(SIZE[0] - 5, 5)
+        taken = still(shown)
+        browser.close()
+    return taken
+
+
+@contextmanager
+def screen() -> Iterator[str]:
+    """A screen in memory; gives its name."""
+    read, write = os.pipe()
+    size = f"{SIZE[0]}x{SIZE[1]}x24"
+    command = ["Xvfb", "-displayfd", str(write), "-screen", "0", size, "-nolisten", "tcp", "-noreset"]
+    with ended(subprocess.Popen(command, pass_fds=(write,), stderr=subprocess.DEVNULL)):
+        os.close(write)
+        with os.fdopen(read) as numbers:
+            yield f":{numbers.readline().strip()}"
+
+
+@contextmanager
+def ended(process: subprocess.Popen[str]) -> Iterator[subprocess.Popen[str]]:
+    """A process that does not outlive the block."""
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.wait(20)
+
+
+def still(take: Callable[[], Image.Image], quiet_s: float = REFINED_S) -> Image.Image:
+    """The first picture with something on it that does not change any more."""
+    end = time.monotonic() + PATIENCE_S
+    last, since = take(), time.monotonic()
+    while time.monotonic() < end:
+        time.sleep(0.5)
+        now = take()
+        if ImageChops.difference(now, last).getbbox():
+            last, since = now, time.monotonic()
+        elif now.getextrema() != ((0, 0),) * 3 and time.monotonic() - since > quiet_s:
+            return now
+    raise SystemExit("the viewer does not come to rest")
+
+
+if __name__ == "__main__":
+    main()
