@@ -138,8 +138,7 @@ class Preparation:
         if not (len(split.blurred_mm2) and lets_through(settings)):
             return layout
         head, widest = scene.head, float(np.sqrt(split.blurred_mm2[-1]))
-        if scene.skin.pigments:
-            widest = shared_width(widest)
+        widest = shared_width(widest) if scene.skin.pigments else widest
 
         def find() -> Pairs:
             return pairs_of(self.device, head.mesh, atlas, widest)
