@@ -1,12 +1,13 @@
 """Seams of the map, and what helps.
 
 Blurs know only the map, so light stops or bleeds at its seams: without a remedy, with a colour around the
-charts, with blurs that narrow at their edges, with blurs that leave out what lies beside them, and with
-blurs that go on across the seam on the surface itself. Below each four times its difference from the last.
+charts, with blurs that narrow at their edges, with blurs that leave out what lies beside them, with a
+second map cut elsewhere, and with blurs that go on across the seam on the surface itself. Below each four
+times its difference from the last.
 
 Deck: S18
 Sources: Dudash2007
-Columns: 5
+Columns: 6
 """
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 import dermis
 from dermis.gallery.picture import main
 
-REMEDIES = ("none", "clear-colour", "stretch-map", "alpha", "stitch")
+REMEDIES = ("none", "clear-colour", "stretch-map", "alpha", "multi-uv", "stitch")
 
 
 def draw(studio):
@@ -23,7 +24,7 @@ def draw(studio):
     behind = dermis.Camera(position=(900, -200, -500), target=(52, -62, -28), frame_mm=105)
     skin = dermis.Skin(profile="skin1", specular="none")
     scene = dermis.Scene(head, lights=[light], camera=behind, skin=skin)
-    panels = {name: studio.linear(scene, 0.7, seams=name) for name in REMEDIES}
+    panels = {name: studio.linear(scene, 0.6, seams=name) for name in REMEDIES}
     right = panels["stitch"]
     return panels | {f"{name}: difference": 4 * np.abs(panels[name] - right) for name in REMEDIES}
 

@@ -91,3 +91,7 @@ OCCLUSION = 0.04
 
 SEAM = 0.01
 """Jump of the scattered light across a seam, of the light there."""
+
+PICTURE_MEAN, PICTURE_TAIL = 0.4, 4.0
+"""Whole frames against stored pictures, in bytes, in the mean and at the 99.5th percentile: other versions of
+the software adapter round otherwise."""
