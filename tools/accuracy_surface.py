@@ -20,6 +20,7 @@ from dermis.reference.atlas_reading import Points, lit_at, seam_points, shown
 from dermis.reference.cut_meshes import cut_sphere
 from dermis.rendering.atlas_textures import upload_atlas
 from dermis.rendering.frame import scatter
+from dermis.rendering.levels import Levels
 from dermis.rendering.renderer import Renderer
 from dermis.rendering.seams import REMEDIES
 from dermis.scene import DirectionalLight, Scene, Settings, Skin, StripeLight
@@ -50,7 +51,7 @@ def first_harmonic(renderer: Renderer, radius_mm: float) -> str:
     frame = Frame(renderer.device)
     stage.draw(frame, levels, upload_atlas(renderer.device, atlas), variances)
     frame.submit()
-    left = download(renderer.device, levels.stack, layer=len(variances))[..., :1]
+    left = widest(renderer, levels)
     density = np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
     area = atlas.own[..., None] / density
     map_share = (area * left * light).sum() / (area * light**2).sum()
@@ -58,6 +59,15 @@ def first_harmonic(renderer: Renderer, radius_mm: float) -> str:
     whole = np.exp(-2 / v)
     chords = (1 - whole) - v * (1 - (1 + 2 / v) * whole)
     return f"| {radius_mm:g} | {map_share:.3f} | {np.exp(-v):.3f} | {chords:.3f} |"
+
+
+def widest(renderer: Renderer, levels: Levels) -> np.ndarray:
+    """(n, n, 1) the widest level, read between the texels of its own resolution."""
+    from scipy.ndimage import zoom
+
+    halvings = levels.halvings[-1]
+    layer = download(renderer.device, levels.stack, mip=halvings, layer=len(levels.halvings) - 1)[..., 0]
+    return zoom(layer, 2**halvings, order=1, mode="nearest", grid_mode=True)[..., None] / levels.scale
 
 
 def seams(renderer: Renderer) -> list[str]:
