@@ -56,6 +56,13 @@ def table(head: Head, against: str, medium: str, adapter: str) -> tuple[str, dic
     return "\n".join(rows), made
 
 
+def finer_heat(head: Head, adapter: str) -> str:
+    """The laser's stripe against heat on an atlas of 2048."""
+    settings, only = SETTINGS.model_copy(update={"atlas": 2048}), ("texture-space",)
+    made = compare(head, "heat", only, light="laser", region="ear", settings=settings, adapter=adapter)
+    return line("laser, atlas 2048", made.rows[0])
+
+
 def floor(head: Head, medium: str, traced: Comparison, adapter: str) -> str:
     """The front light on skin that sends what a half space reflects of it in all directions alike."""
     renderer = dermis.Renderer(adapter)
@@ -94,6 +101,7 @@ def main() -> None:
         found[f"floor_{medium}"] = floor(head, medium, made["front"], adapter)
     found["integral"], _ = table(head, "surface-integral", "skin1", adapter)
     found["heat"], _ = table(head, "heat", "skin1", adapter)
+    found["heat"] += "\n" + finer_heat(head, adapter)
     found |= error.tables(head, SETTINGS, adapter) | surface.tables(adapter)
     text = (PAGE.parent / "techniques.in.md").read_text(encoding="utf-8")
     PAGE.write_text(text.format(adapter=made["front"].adapter, **found), encoding="utf-8")
