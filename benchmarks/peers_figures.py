@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from peers_measured import Frames, Measured
+from peers_measured import OURS, PUBLISHED, Frames, Measured
 
 from dermis.reference.cycles_process import CyclesPass
 from dermis.reference.metrics import energy_ratio, relative_rmse
@@ -55,8 +55,9 @@ def figures(measured: Measured) -> dict[str, Any]:
     """All that is told of one scene, ready for JSON."""
     mask = seen(measured)
     means = {method: converged(turns) for method, turns in measured.cycles.items()}
-    ours = [_our_row(measured, name, mask) for name in measured.ours]
-    rows = [*ours, _truth_row(measured, mask)]
+    ours = [_our_row(measured, name, mask) for name in OURS]
+    published = [_our_row(measured, name, mask) for name in PUBLISHED]
+    rows = [*ours, *published, _truth_row(measured, mask)]
     for method, mean in means.items():
         rows += _cycles_rows(measured, method, mean, mask)
     told: dict[str, Any] = {
@@ -65,7 +66,8 @@ def figures(measured: Measured) -> dict[str, Any]:
         "pixels": int(mask.sum()),
         "rows": [asdict(row) for row in rows],
         "left_out": measured.left_out,
-        "ours_energy_put_right": {name: _put_right(measured, name, mask) for name in measured.ours},
+        "ours_energy_put_right": {name: _put_right(measured, name, mask) for name in OURS},
+        "published": {row.setting: _longer(row, ours[0]) for row in published},
     }
     if "random-walk" in means:
         told["as_near"] = {row.setting: _as_near(measured, means["random-walk"], row, mask) for row in ours}
@@ -127,6 +129,12 @@ def _our_row(measured: Measured, name: str, mask: Mask) -> Row:
 
 def _medians(frames: Frames) -> tuple[float, float]:
     return statistics.median(frames.seconds), statistics.median(frames.core_seconds)
+
+
+def _longer(row: Row, ours: Row) -> dict[str, float]:
+    """How often our frame goes into another one, by the clock and by the cores' own time."""
+    assert row.seconds and row.core_seconds and ours.seconds and ours.core_seconds
+    return {"ratio": row.seconds / ours.seconds, "core_ratio": row.core_seconds / ours.core_seconds}
 
 
 def _truth_row(measured: Measured, mask: Mask) -> Row:

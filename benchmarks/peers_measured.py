@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -25,6 +25,7 @@ from dermis.reference.cycles import Method, cycles_passes
 from dermis.reference.cycles_process import CyclesPass
 from dermis.reference.path_traced import SAMPLES_PER_PASS, PathTraced, path_trace
 from dermis.rendering.renderer import Renderer
+from dermis.rendering.stages.published_fragments import published_as_fragments
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
@@ -35,9 +36,12 @@ OURS = {
     "screen space": {"technique": "screen-space", "atlas": 64},
 }
 """Settings that are measured, by what they are called in the table; screen space has no use for an atlas."""
+COMPUTE, FRAGMENTS = "passes of 2007 as compute", "passes of 2007 as fragments"
+PUBLISHED = {name: {"technique": "published", "atlas": 1024} for name in (COMPUTE, FRAGMENTS)}
+"""The published structure in our renderer, to set beside the first of ours."""
 SEEDS = (100, 200)
 """Of the first pass of each turn; the passes of a turn have the following ones."""
-_WORK = {"ours": 20, "random-walk": 5, "burley": 2, "path-traced": 20}
+_WORK = {"ours": 35, "random-walk": 5, "burley": 2, "path-traced": 20}
 """Expected time of a turn of frames and of a path through each pixel, for the progress bar."""
 
 
@@ -79,7 +83,7 @@ class Frames:
 class Measured:
     """What all renderers made of one scene.
 
-    ours : by the names of OURS
+    ours : by the names of OURS and PUBLISHED
     cycles : by method, then for each seed the passes of `Plan.samples`
     left_out : why a method is missing
     truth_core_seconds : of Mitsuba, scene and all
@@ -149,12 +153,17 @@ def _passes(
 
 def _add_frames(ours: dict[str, Frames], renderer: Renderer, scene: Scene, plan: Plan) -> None:
     """Warm frames with everything computed anew, shadows too."""
-    for name, chosen in OURS.items():
+    for name, chosen in (OURS | PUBLISHED).items():
         settings = Settings.model_validate({"size": (plan.side, plan.side), **chosen})
-        drawn = renderer.draw(scene, settings, keep_shadows=False)
-        frames = ours.setdefault(name, Frames(drawn.linear()))
-        for _ in range(plan.frames):
-            began, worked = time.perf_counter(), time.process_time()
-            renderer.draw(scene, settings, keep_shadows=False)
-            frames.seconds.append(time.perf_counter() - began)
-            frames.core_seconds.append(time.process_time() - worked)
+        with _drawn_as(name, renderer):
+            drawn = renderer.draw(scene, settings, keep_shadows=False)
+            frames = ours.setdefault(name, Frames(drawn.linear()))
+            for _ in range(plan.frames):
+                began, worked = time.perf_counter(), time.process_time()
+                renderer.draw(scene, settings, keep_shadows=False)
+                frames.seconds.append(time.perf_counter() - began)
+                frames.core_seconds.append(time.process_time() - worked)
+
+
+def _drawn_as(name: str, renderer: Renderer) -> AbstractContextManager[None]:
+    return published_as_fragments(renderer.device, renderer.stages) if name == FRAGMENTS else nullcontext()

@@ -45,6 +45,11 @@ def _sentences(told: dict[str, Any]) -> list[str]:
     said = [_longer(setting, found) for setting, found in told.get("as_near", {}).items()]
     right = "; ".join(f"{name} {error:.3f}" for name, error in told["ours_energy_put_right"].items())
     said.append(f"Ours, each channel scaled to the truth's energy: {right}.")
+    said += [
+        f"The {name} take {ratio['ratio']:.2f} times as long as the first of ours, "
+        f"{ratio['core_ratio']:.2f} times by the cores' time."
+        for name, ratio in told.get("published", {}).items()
+    ]
     if "burley_against_random_walk" in told:
         said.append(_burley(told))
     return said + [f"Left out: {name}. {why}" for name, why in told["left_out"].items()]

@@ -8,19 +8,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dermis.assets.cache import cached_atlas, cached_links
 from dermis.assets.head import load_head
 from dermis.benchmark import run as running
-from dermis.benchmark.cases import PRESETS, Case
+from dermis.benchmark.cases import FRAGMENTS, PRESETS, PUBLISHED, Case
 from dermis.benchmark.copy_rate import copy_rate
 from dermis.benchmark.floor import moved_by, stage_bytes
-from dermis.benchmark.measure import Effort, Row, measure
-from dermis.benchmark.report import COLUMNS, as_json, cells, stage_cells, write_report
-from dermis.benchmark.run import Benchmark, run
+from dermis.benchmark.measure import ON_CPU, Effort, Row, measure
+from dermis.benchmark.report import COLUMNS, as_json, cells, left_out_lines, stage_table, write_report
+from dermis.benchmark.run import Benchmark, LeftOut, run
 from dermis.benchmark.scenes import scenes_of, settings_of, with_terms
+from dermis.errors import DermisError
 from dermis.gpu import Device
 from dermis.gpu.textures import texel_bytes
 from dermis.optics.profiles import load_profile
 from dermis.rendering.renderer import Renderer
+from dermis.rendering.seams import laid_out
 
 TINY = Case((48, 32), atlas=64, gaussians=2, lights=1, samples=2)
 BRIEF = Effort(warming=1, between=1, timed=2, row=2)
@@ -48,7 +51,8 @@ def row(renderer: Renderer, head_file: str, tmp_path_factory: pytest.TempPathFac
 @pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
 def test_cases_vary_in_one_thing(preset: object) -> None:
     usual, *others = preset.cases()  # type: ignore[attr-defined]
-    assert usual.varies == "" and any(case.technique == "published" for case in others)
+    assert usual.varies == ""
+    assert {PUBLISHED, FRAGMENTS} == {case.technique for case in others if case.varies == "technique"}
     for case in others:
         told = asdict(replace(case, varies=""))
         assert [name for name, value in asdict(usual).items() if told[name] != value] == [case.varies]
@@ -83,9 +87,36 @@ def test_the_floor_by_hand(renderer: Renderer, head_file: str, tmp_path: Path) -
     assert found["shadows"] == settings.shadow_size**2 * 4 + geometry
     assert found["visibility"] == 48 * 32 * 2 * 4 + geometry
     assert found["post"] == 48 * 32 * (16 + 16 + 4)
-    # the narrower of the two is lit again, not blurred
-    assert found["diffuse"] == moved.texels * 2 * 1 * texel_bytes(moved.inputs.levels.stack)
+    # the narrower of the two is lit again, not blurred; the other one's blur knows stretch and reach by texel
+    light = texel_bytes(moved.inputs.levels.stack)
+    apron = moved.inputs.layouts[0].atlas.apron.size // 16
+    assert apron > 0
+    assert found["irradiance"] == moved.texels * (32 + 4 + 16)
+    assert found["diffuse"] == moved.texels * (2 * light + 8 + 8) + apron * (16 + 2 * light)
     assert set(found) >= {"shadows", "irradiance", "diffuse", "combine", "visibility", "shade", "post"}
+
+
+def test_the_floor_of_thin_parts_is_their_buffers(renderer: Renderer, tmp_path: Path) -> None:
+    """Against the links as they lie on disk, which the buffers were made from."""
+    from small_head import obj_text
+
+    vertices = [line.split() for line in obj_text().splitlines()]
+    flat = [[*w[:3], str(0.03 * float(w[3]))] if w[:1] == ["v"] else w for w in vertices]
+    (tmp_path / "leaf.obj").write_text("\n".join(map(" ".join, flat)))
+    head, case = load_head(tmp_path / "leaf.obj"), replace(TINY, gaussians=4)
+    (scene,), settings = scenes_of(case, head, tmp_path, 1), settings_of(case)
+    renderer.draw(scene, settings)
+    moved = moved_by(renderer.device, renderer.prepare(scene, settings), len(head.mesh.positions))
+    atlases = laid_out(settings, len(moved.inputs.blurred_mm2), False)
+    atlas = cached_atlas(head.mesh, atlases.side, atlases.layouts[0])
+    links = cached_links(head.mesh, atlas, float(np.sqrt(moved.inputs.blurred_mm2[-1])))
+    assert len(links.source) > 100
+    pairs = 8 * len(links.source) + 8 * len(links.texel) + 4 * links.receiver.size + 4 * len(links.first)
+    thin, levels = moved.inputs.layouts[0].thin, moved.inputs.levels
+    assert thin is not None
+    light = min(4 * len(links.texel), (levels.size >> levels.halvings[1 + thin.layer]) ** 2)
+    through = links.receiver.size * 16
+    assert stage_bytes(moved)["transmission"] == pairs + light * texel_bytes(levels.stack) + through
 
 
 def test_a_row_is_complete(row: Row) -> None:
@@ -113,14 +144,19 @@ def made(row: Row) -> Benchmark:
     """A benchmark of which one row was measured."""
     others = [
         replace(row, case=replace(TINY, atlas=128, varies="atlas")),
-        replace(row, case=replace(TINY, technique="published", varies="technique"), gpu_ms={"total": 1e3}),
+        replace(row, case=replace(TINY, technique=PUBLISHED, varies="technique"), gpu_ms={"total": 1e3}),
+        replace(row, case=replace(TINY, technique=FRAGMENTS, varies="technique"), gpu_ms={"total": 5e3}),
     ]
-    return Benchmark("head", "an <adapter>", "a driver", {"dermis": "1"}, "now", 2e9, 1.0, (row, *others))
+    left_out = LeftOut(replace(TINY, image=(9999, 32), varies="image"), "size: <too large>")
+    where = "head", "an <adapter>", "a driver", {"dermis": "1"}, "now", 2e9, 1.0
+    return Benchmark(*where, (row, *others), (left_out,))
 
 
 def test_the_published_passes_are_compared(made: Benchmark, row: Row) -> None:
-    assert made.published_ratio == 1e3 / row.gpu_ms["total"]
-    assert replace(made, rows=(row,)).published_ratio is None
+    assert made.ratio(PUBLISHED) == 1e3 / row.gpu_ms["total"]
+    assert made.ratio(FRAGMENTS) == 5e3 / row.gpu_ms["total"]
+    assert replace(made, rows=(row,)).ratio(PUBLISHED) is None
+    assert replace(made, rows=made.rows[1:]).ratio(PUBLISHED) is None
 
 
 def test_the_json_has_what_was_asked_for(made: Benchmark) -> None:
@@ -131,6 +167,12 @@ def test_the_json_has_what_was_asked_for(made: Benchmark) -> None:
     assert all(wanted <= set(one) for one in told["rows"])
     assert told["rows"][0]["image"] == [48, 32] and told["copy_gb_s"] == 2.0
     assert "total" in told["rows"][0]["gpu_ms"]
+    assert (told["published_ratio"], told["published_fragments_ratio"]) == (
+        made.ratio(PUBLISHED),
+        made.ratio(FRAGMENTS),
+    )
+    (left_out,) = told["left_out"]
+    assert (left_out["image"], left_out["reason"]) == ([9999, 32], "size: <too large>")
 
 
 def test_the_report_needs_nothing_else(made: Benchmark, tmp_path: Path) -> None:
@@ -138,10 +180,26 @@ def test_the_report_needs_nothing_else(made: Benchmark, tmp_path: Path) -> None:
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "an &lt;adapter&gt;" in page and page.count("<svg") == 2
     assert "src=" not in page and "<script" not in page and 'href="http' not in page
-    for stage, *_ in stage_cells(made.usual):
+    for stage, *_ in stage_table(made)[1:]:
         assert f"<td>{stage}</td>" in page
-    assert page.count("<tr>") == 1 + len(made.rows) + 1 + len(stage_cells(made.usual))
+    assert page.count("<tr>") == 1 + len(made.rows) + len(stage_table(made))
     assert all(len(cells(row)) == len(COLUMNS) for row in made.rows)
+    assert "2007, fragments" in page and "9999x32" in page and "&lt;too large&gt;" in page
+
+
+def test_a_report_without_the_usual_frame(made: Benchmark, tmp_path: Path) -> None:
+    others = replace(made, rows=made.rows[1:])
+    assert others.usual is None and stage_table(others) == []
+    write_report(tmp_path / "report.html", others)
+    assert "9999x32" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_slow_frames_are_drawn_less_often() -> None:
+    effort = Effort()
+    assert effort.within(30.0, frame_ms=1.0) == effort
+    half = effort.within(0.5 * 1e-3 * (100 + 100 + 9 * 7), frame_ms=1.0)
+    assert half == Effort(warming=50, between=2, timed=4, row=50)
+    assert ON_CPU.within(1.0, frame_ms=1e6) == Effort(warming=0, between=0, timed=1, row=1)
 
 
 def test_a_run_measures_every_case(device: Device, head_file: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -150,12 +208,24 @@ def test_a_run_measures_every_case(device: Device, head_file: str, monkeypatch: 
     steps: list[tuple[int, int]] = []
     cases = [
         TINY,
-        replace(TINY, technique="published", varies="technique"),
+        replace(TINY, technique=PUBLISHED, varies="technique"),
+        replace(TINY, technique=FRAGMENTS, varies="technique"),
+        replace(TINY, atlas=device.max_texture_size + 1, varies="atlas"),
         replace(TINY, subdivide=1, varies="subdivide"),
     ]
     benchmark = run(cases, head_file, device.adapter.name, lambda done, of: steps.append((done, of)))
-    assert steps == [(0, 3), (1, 3), (2, 3)]
-    assert [row.case for row in benchmark.rows] == cases
-    assert benchmark.rows[2].triangles == 4 * benchmark.rows[0].triangles
+    assert steps == [(done, 5) for done in range(5)]
+    assert [row.case for row in benchmark.rows] == [*cases[:3], cases[4]]
+    assert benchmark.rows[3].triangles == 4 * benchmark.rows[0].triangles
     assert benchmark.adapter == device.adapter.name and benchmark.versions["wgpu"]
-    assert benchmark.published_ratio is not None and benchmark.published_ratio > 0
+    for technique in (PUBLISHED, FRAGMENTS):
+        assert (benchmark.ratio(technique) or 0.0) > 0.0
+    (left_out,) = benchmark.left_out
+    assert left_out.case == cases[3] and "atlas" in left_out.reason
+    assert str(device.max_texture_size) in left_out_lines(benchmark)[0]
+
+
+def test_nothing_measured_is_an_error(device: Device, head_file: str) -> None:
+    too_large = replace(TINY, atlas=device.max_texture_size + 1)
+    with pytest.raises(DermisError, match=str(device.max_texture_size)):
+        run([too_large], head_file, device.adapter.name)

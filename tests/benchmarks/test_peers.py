@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -56,10 +58,19 @@ def path_trace(
 class FakeRenderer:
     def __init__(self, adapter: str = "cpu") -> None:
         self.device = SimpleNamespace(adapter=SimpleNamespace(name=adapter))
+        self.stages = "stages"
+        self.techniques: list[str] = []
 
     def draw(self, scene: Any, settings: Any, keep_shadows: bool) -> Any:
         assert not keep_shadows and settings.size == (SIDE, SIDE)
+        self.techniques.append(settings.technique)
         return SimpleNamespace(linear=lambda: picture(1.0 + OURS))
+
+
+@contextmanager
+def as_fragments(device: Any, stages: Any) -> Iterator[None]:
+    assert (device.adapter.name, stages) == ("cpu", "stages")
+    yield
 
 
 @pytest.fixture
@@ -72,6 +83,7 @@ def peers(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     monkeypatch.setattr(peers_measured, "cycles_passes", cycles_passes)
     monkeypatch.setattr(peers_measured, "path_trace", path_trace)
+    monkeypatch.setattr(peers_measured, "published_as_fragments", as_fragments)
     monkeypatch.setattr(peers, "load_mitsuba", lambda: None)
     monkeypatch.setattr(peers, "blender_python", lambda: Path("python"))
     monkeypatch.setattr(peers, "version", lambda name: "1.0")
@@ -116,7 +128,7 @@ def test_all_but_times_is_the_same_again(peers: Any, tmp_path: Path) -> None:
         assert peers.main(lights="front,back", quick=True, output=file) == 0
     first, second = (json.loads(file.read_text())["scenes"] for file in files)
     for one, other in zip(first, second, strict=True):
-        del one["as_near"], other["as_near"]
+        del one["as_near"], other["as_near"], one["published"], other["published"]
         for row in (*one["rows"], *other["rows"]):
             del row["seconds"], row["core_seconds"]
     assert first == second and [one["light"] for one in first] == ["front", "back"]
@@ -149,9 +161,22 @@ def test_without_mitsuba_there_is_no_truth(
 
 def test_bar_ends_with_the_work(peers: Any) -> None:
     done: list[int] = []
-    measured = sys.modules["peers_measured"]
-    measured.measure(BALL, "front", peers.QUICK, FakeRenderer(), done.append)  # type: ignore[attr-defined]
+    measured, renderer = sys.modules["peers_measured"], FakeRenderer()
+    measured.measure(BALL, "front", peers.QUICK, renderer, done.append)  # type: ignore[attr-defined]
     assert sum(done) == peers.QUICK.work
+    assert renderer.techniques.count("published") == 2 * renderer.techniques.count("screen-space")
+
+
+def test_the_passes_of_2007_are_set_beside_ours(peers: Any, tmp_path: Path, capsys: Any) -> None:
+    out = tmp_path / "peers.json"
+    peers.main(lights="front", quick=True, output=out)
+    (told,), said = json.loads(out.read_text())["scenes"], capsys.readouterr().out
+    seconds = {row["setting"]: row["seconds"] for row in told["rows"]}
+    for name in ("passes of 2007 as compute", "passes of 2007 as fragments"):
+        ratio = told["published"][name]["ratio"]
+        assert ratio == pytest.approx(seconds[name] / seconds["texture space, atlas 1024"])
+        assert name not in told["as_near"]
+        assert f"The {name} take {ratio:.2f} times as long" in said
 
 
 def test_unknown_lights_are_named(peers: Any, capsys: Any) -> None:

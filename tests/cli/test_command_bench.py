@@ -11,7 +11,8 @@ import pytest
 
 from dermis.benchmark import cases
 from dermis.benchmark.cases import Case, Preset
-from dermis.benchmark.measure import Effort
+from dermis.benchmark.measure import Effort, measure
+from dermis.errors import DermisError
 
 Run = Callable[..., Any]
 BRIEF = Effort(warming=0, between=0, timed=1, row=1)
@@ -34,7 +35,11 @@ def test_as_json_with_a_report(bench: Run, tmp_path: Path, device: Any) -> None:
     assert (ended.code, ended.stderr) == (0, "")
     told = json.loads(ended.stdout)
     assert told["adapter"] == device.adapter.name and told["head"] == "head.obj"
-    assert [row["technique"] for row in told["rows"]] == ["texture-space", "published"]
+    assert [row["technique"] for row in told["rows"]] == [
+        "texture-space",
+        "published",
+        "published-fragments",
+    ]
     for row in told["rows"]:
         assert row["frame_ms"] > 0 and row["gpu_ms"]["total"] > 0 and row["floor_ratio"] > 0
         assert (row["image"], row["atlas"], row["gaussians"], row["lights"]) == ([32, 32], 64, 2, 1)
@@ -44,13 +49,49 @@ def test_as_json_with_a_report(bench: Run, tmp_path: Path, device: Any) -> None:
 def test_in_words(bench: Run) -> None:
     ended = bench()
     assert (ended.code, ended.stderr) == (0, "")
-    for word in ("GB/s", "floor [ms]", "32x32", "irradiance", "the passes of 2007 take"):
+    for word in ("GB/s", "floor [ms]", "32x32", "irradiance", "times as long as fragments"):
         assert word in ended.stdout
 
 
 def test_an_unwritable_report_is_refused_first(bench: Run) -> None:
     ended = bench("-o", "report.png")
     assert ended.code == 2 and "report.png: expected" in ended.stderr and ended.stdout == ""
+
+
+def test_what_cannot_be_measured_is_told(bench: Run, monkeypatch: pytest.MonkeyPatch, device: Any) -> None:
+    usual = cases.PRESETS["cpu"].usual
+    too_large = Preset(usual, ((32, 32),), (device.max_texture_size + 1,), (2,), (1,), (0,), ())
+    monkeypatch.setitem(cases.PRESETS, "cpu", too_large)
+    ended = bench("--preset", "cpu")
+    assert ended.code == 0
+    assert f"left out: 32x32, atlas {device.max_texture_size + 1}" in ended.stdout
+    assert f"at most {device.max_texture_size}" in ended.stdout
+
+
+def test_interrupted_it_leaves_nothing(bench: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    before = set(tmp_path.rglob("*"))
+
+    def interrupted(renderer: Any, case: Case, *rest: Any) -> Any:
+        if case.technique == "published":
+            raise KeyboardInterrupt
+        return measure(renderer, case, *rest)
+
+    monkeypatch.setattr("dermis.benchmark.run.measure", interrupted)
+    ended = bench("--preset", "cpu", "--json", "-o", "report.html")
+    assert ended.code == 130 and ended.stdout == ""
+    assert set(tmp_path.rglob("*")) == before
+
+
+def test_a_report_that_fails_at_the_end_takes_no_figures_along(
+    bench: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path, made: Any) -> None:
+        raise DermisError(f"{path}: the disk is full")
+
+    monkeypatch.setattr("dermis.benchmark.report.write_report", full)
+    ended = bench("--preset", "cpu", "--json", "-o", "report.html")
+    assert ended.code == 2 and "the disk is full" in ended.stderr
+    assert len(json.loads(ended.stdout)["rows"]) == 3
 
 
 def test_a_head_that_is_not_there(run: Run, opened: None, device: Any) -> None:

@@ -6,6 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 PresetName = Literal["film", "interactive", "cpu"]
+PUBLISHED = "published"
+FRAGMENTS = "published-fragments"
+"""The passes of 2007 in the graphics pipeline; `PUBLISHED` are the same in compute."""
 
 
 @dataclass(frozen=True)
@@ -18,7 +21,7 @@ class Case:
     lights : spots with shadows
     subdivide : levels of subdivision of the head: four times the triangles each
     samples : of a pixel
-    technique : of `Settings`
+    technique : of `Settings`, or `FRAGMENTS`
     varies : what tells it from the usual frame, "" for that itself
     """
 
@@ -42,7 +45,7 @@ class Preset:
     gaussians: tuple[int, ...]
     lights: tuple[int, ...]
     subdivide: tuple[int, ...]
-    technique: tuple[str, ...] = ("published",)
+    technique: tuple[str, ...] = (PUBLISHED, FRAGMENTS)
 
     def cases(self) -> list[Case]:
         """The usual frame, then the others."""

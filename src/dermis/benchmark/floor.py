@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from dermis.gpu import Device, download
 from dermis.gpu.textures import texel_bytes
 from dermis.rendering.inputs import Inputs
+from dermis.rendering.levels import Levels
+from dermis.rendering.stages.surface_texels import SURFACE_BYTES
+from dermis.rendering.stages.transmission import Thin
 
 _MAPS = ("colour_map", "slope_map", "relief_map", "specular_map", "roughness_map")
 _CORNERS, _PLACE = 16, 16  # bytes of a triangle's corners and of a vertex' position in the tables
+_APRON = 16  # bytes of a texel in the list of an apron
+_BILINEAR = 4  # texels that one place between texels reads
 
 
 @dataclass(frozen=True)
@@ -40,7 +46,7 @@ def stage_bytes(moved: Moved) -> dict[str, float]:
     """Bytes by stage: what it needs read once, what it makes written once, in the formats that are used.
 
     Only texels with surface and pixels that show something count where no others are needed. What is read
-    again, scratch space between two passes, and tables that stay in caches do not.
+    again within a stage or a blur, scratch space between two passes, and tables that stay in caches do not.
     """
     inputs, picture = moved.inputs, moved.inputs.picture
     pixels, shadow = picture.size[0] * picture.size[1], inputs.shadow_maps.texture
@@ -64,15 +70,43 @@ def _scattering_bytes(moved: Moved, looked_up: int) -> dict[str, float]:
     inputs, texels, levels = moved.inputs, moved.texels, moved.inputs.levels
     entered = texels * texel_bytes(levels.entered)
     blurred = [texels * texel_bytes(levels.stack) / 4**halved for halved in levels.halvings[1:]]
-    place = texel_bytes(inputs.layouts[0].atlas.resources["atlas"])
     found: dict[str, float] = {
-        "irradiance": texels * (place + looked_up) + entered + _maps(inputs, texels),
-        "diffuse": entered + sum(blurred[:-1]) + sum(blurred),
+        "irradiance": texels * (SURFACE_BYTES + looked_up) + entered,
+        "diffuse": entered + sum(blurred[:-1]) + sum(blurred) + _surface_of_blurs(inputs, texels),
         "combine": sum(blurred) + texels * texel_bytes(inputs.scattered),
     }
     if thin := inputs.layouts[0].thin:
-        found["transmission"] = thin.light.size[0] * thin.light.size[1] * texel_bytes(thin.light)
+        found["transmission"] = _through(thin, levels)
+        found["combine"] += thin.light.size[0] * thin.light.size[1] * texel_bytes(thin.light)
     return found
+
+
+def _surface_of_blurs(inputs: Inputs, texels: int) -> float:
+    """What each blur must know of the surface: stretch, how far the chart reaches, and aprons.
+
+    The passes of 2007 blur a stretch map along instead, which makes another one for each Gaussian.
+    """
+    levels, finest = inputs.levels, inputs.layouts[0].atlas
+    if levels.stretch:
+        stretch = texel_bytes(finest.resources["stretch_map"])
+        return 2.0 * stretch * texels * len(levels.halvings[1:])
+    sheets = (finest, *finest.coarser)
+    moved = 0.0
+    for k, (source, halved) in enumerate(pairwise(levels.halvings)):
+        moved += texel_bytes(sheets[halved].resources["sheet_map"]) * texels / 4**halved
+        if inputs.edge == "repeated" and (apron := sheets[source].apron):
+            light = levels.stack if k else levels.entered
+            moved += apron.size * (1 + 2 * texel_bytes(light) / _APRON)
+    return moved
+
+
+def _through(thin: Thin, levels: Levels) -> float:
+    """Bytes of what comes through: pairs and their places read, the light of the sources, and what leaves."""
+    pairs, halved = thin.pairs, levels.halvings[1 + thin.layer]
+    lists = sum(buffer.size for buffer in (thin.links, pairs.sources, pairs.receiver, pairs.first))
+    level = (levels.size >> halved) ** 2
+    read = min(_BILINEAR * pairs.source_count, level) * texel_bytes(levels.stack)
+    return float(lists + read + thin.light.size[0] * thin.light.size[1] * texel_bytes(thin.light))
 
 
 def _maps(inputs: Inputs, most: int) -> int:

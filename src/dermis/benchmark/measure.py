@@ -5,15 +5,18 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from dermis.assets.head import Head
-from dermis.benchmark.cases import Case
+from dermis.benchmark.cases import FRAGMENTS, Case
 from dermis.benchmark.floor import moved_by, stage_bytes
 from dermis.benchmark.scenes import scenes_of, settings_of
+from dermis.gpu.device import gpu_failures
 from dermis.gpu.memory import held_bytes
 from dermis.rendering.renderer import Renderer
+from dermis.rendering.stages.published_fragments import published_as_fragments
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
@@ -33,8 +36,16 @@ class Effort:
     timed: int = 9
     row: int = 100
 
+    def within(self, seconds: float, frame_ms: float) -> Effort:
+        """The same with fewer frames, where so many of `frame_ms` would take longer than that."""
+        frames = self.warming + self.row + self.timed * (2 + self.between)
+        share = min(1.0, 1e3 * seconds / (frame_ms * frames))
+        wanted = asdict(self).items()
+        return Effort(**{name: min(count, max(1, int(share * count))) for name, count in wanted})
+
 
 ON_CPU = Effort(warming=0, between=0, timed=3, row=3)
+_PATIENCE_S = 30.0  # for the frames of one case
 
 
 @dataclass(frozen=True)
@@ -67,16 +78,30 @@ class Row:
 
 
 def measure(renderer: Renderer, case: Case, head: Head, folder: Path, rate: float, effort: Effort) -> Row:
-    """Draw the case again and again, everything anew.
+    """Draw the case again and again, everything anew; fewer times when that would take long.
 
     rate : bytes a second that a copy moves
+
+    Raises DermisError for frames that the device cannot hold.
     """
+    with gpu_failures(renderer.device), _drawn_as(case, renderer):
+        return _measured(renderer, case, head, folder, rate, effort)
+
+
+def _drawn_as(case: Case, renderer: Renderer) -> AbstractContextManager[None]:
+    if case.technique == FRAGMENTS:
+        return published_as_fragments(renderer.device, renderer.stages)
+    return nullcontext()
+
+
+def _measured(renderer: Renderer, case: Case, head: Head, folder: Path, rate: float, effort: Effort) -> Row:
     settings = settings_of(case)
     scenes = scenes_of(case, head, folder, max(effort.row, effort.timed, 2))
     renderer.draw(scenes[0], settings)
-    _row(renderer, [scenes[k % len(scenes)] for k in range(effort.warming)], settings)
-    frame_ms = _row(renderer, scenes[: effort.row], settings) / effort.row
-    gpu_ms = _stages(renderer, scenes, settings, effort)
+    effort = effort.within(_PATIENCE_S, row_ms(renderer, scenes[1:2], settings))
+    row_ms(renderer, [scenes[k % len(scenes)] for k in range(effort.warming)], settings)
+    frame_ms = row_ms(renderer, scenes[: effort.row], settings) / effort.row
+    gpu_ms = stage_ms(renderer, scenes, settings, effort)
     python_ms, image_ms = _around(renderer, scenes[: effort.timed], settings)
     moved = moved_by(renderer.device, renderer.prepare(scenes[0], settings), len(head.mesh.positions))
     return Row(
@@ -92,8 +117,8 @@ def measure(renderer: Renderer, case: Case, head: Head, folder: Path, rate: floa
     )
 
 
-def _row(renderer: Renderer, scenes: Sequence[Scene], settings: Settings) -> float:
-    """Time of frames that follow each other without a pause [ms]."""
+def row_ms(renderer: Renderer, scenes: Sequence[Scene], settings: Settings) -> float:
+    """Time of frames that follow each other without a pause, everything anew, the last one done [ms]."""
 
     def draw() -> None:
         for scene in scenes:
@@ -103,13 +128,13 @@ def _row(renderer: Renderer, scenes: Sequence[Scene], settings: Settings) -> flo
     return _lasted_ms(draw)
 
 
-def _stages(
+def stage_ms(
     renderer: Renderer, scenes: Sequence[Scene], settings: Settings, effort: Effort
 ) -> dict[str, float]:
-    """Median device time of each stage, and "total" [ms]."""
+    """Median device time of each stage, everything anew, and "total" [ms]."""
     drawn = []
     for scene in scenes[: effort.timed]:
-        _row(renderer, scenes[: effort.between], settings)
+        row_ms(renderer, scenes[: effort.between], settings)
         drawn.append(renderer.draw(scene, settings, keep_shadows=False).gpu_ms or {})
     return {stage: statistics.median(one[stage] for one in drawn) for stage in drawn[0]}
 

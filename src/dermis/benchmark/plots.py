@@ -20,6 +20,11 @@ _AXES: dict[str, tuple[str, Callable[[Row], float]]] = {
 }
 
 
+def plain(number: float) -> str:
+    """Three digits, without powers of ten."""
+    return f"{number:.0f}" if number >= 1000 else f"{number:.3g}"
+
+
 def scaling(made: Benchmark) -> str:
     """Device time over each size that was varied, beside what the floor model says, as SVG text."""
     varied = [name for name in _AXES if any(row.case.varies == name for row in made.rows)]
@@ -77,7 +82,7 @@ def _marks(axis: Any, places: list[float] | None) -> None:
 
     axis.set_major_locator(FixedLocator(places) if places else LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_minor_locator(NullLocator())
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
 
 
 def _svg(figure: Any) -> str:

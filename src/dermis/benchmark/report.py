@@ -9,7 +9,9 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+from dermis.benchmark.cases import FRAGMENTS, PUBLISHED, Case
 from dermis.benchmark.measure import Row
+from dermis.benchmark.plots import plain
 from dermis.benchmark.run import Benchmark
 from dermis.outputs import replacing
 
@@ -24,23 +26,31 @@ def as_json(made: Benchmark) -> dict[str, Any]:
         "date": made.date,
         "seconds": made.seconds,
         "copy_gb_s": made.copied / 1e9,
-        "published_ratio": made.published_ratio,
+        "published_ratio": made.ratio(PUBLISHED),
+        "published_fragments_ratio": made.ratio(FRAGMENTS),
         "rows": [_row(row) for row in made.rows],
+        "left_out": [{**_case(one.case), "reason": one.reason} for one in made.left_out],
+    }
+
+
+def _case(case: Case) -> dict[str, Any]:
+    return {
+        "image": list(case.image),
+        "atlas": case.atlas,
+        "gaussians": case.gaussians,
+        "lights": case.lights,
+        "subdivide": case.subdivide,
+        "samples": case.samples,
+        "technique": case.technique,
+        "varies": case.varies,
     }
 
 
 def _row(row: Row) -> dict[str, Any]:
-    case = row.case
     return {
-        "image": list(case.image),
-        "atlas": case.atlas,
+        **_case(row.case),
         "adapter": row.adapter,
-        "gaussians": case.gaussians,
-        "lights": case.lights,
         "triangles": row.triangles,
-        "samples": case.samples,
-        "technique": case.technique,
-        "varies": case.varies,
         "frame_ms": row.frame_ms,
         "gpu_ms": row.gpu_ms,
         "floor_ms": row.floor_ms,
@@ -51,6 +61,7 @@ def _row(row: Row) -> dict[str, Any]:
     }
 
 
+_OTHERS = {PUBLISHED: "2007, compute [ms]", FRAGMENTS: "2007, fragments [ms]"}
 _CASE = ("image", "atlas", "Gaussians", "lights", "triangles", "technique")
 _TIMES = ("frame [ms]", "device [ms]", "floor [ms]", "ratio", "Python [ms]", "image out [ms]")
 COLUMNS = (*_CASE, *_TIMES, "memory [MB]")
@@ -68,19 +79,46 @@ def cells(row: Row) -> tuple[str, ...]:
         str(case.lights),
         str(row.triangles),
         case.technique,
-        *(f"{number:.3g}" for number in (*times, *rest)),
+        *map(plain, (*times, *rest)),
         f"{row.memory_mb:.0f}",
     )
 
 
-def stage_cells(row: Row) -> list[tuple[str, str, str, str]]:
-    """Each stage: its name, device time, floor, and the ratio of the two."""
-    found = []
-    for stage, ms in row.gpu_ms.items():
-        floor = row.floor_ms.get(stage)
-        ratio = f"{ms / floor:.1f}" if floor else "-"
-        found.append((stage, f"{ms:.3g}", f"{floor:.3g}" if floor else "-", ratio))
-    return found
+def stage_table(made: Benchmark) -> list[tuple[str, ...]]:
+    """The usual frame by stage, titles first: device time, floor, their ratio, and what 2007 took."""
+    if made.usual is None:
+        return []
+    usual, others = made.usual, [row for name in _OTHERS if (row := made.row_of(name))]
+    shown = [name for name in _OTHERS if made.row_of(name)]
+    table = [("stage", "device [ms]", "floor [ms]", "ratio", *(_OTHERS[name] for name in shown))]
+    for stage, ms in usual.gpu_ms.items():
+        floor = usual.floor_ms.get(stage)
+        known = (plain(floor), f"{ms / floor:.1f}") if floor else ("-", "-")
+        table.append((stage, plain(ms), *known, *(_ms(row, stage) for row in others)))
+    return table
+
+
+def _ms(row: Row, stage: str) -> str:
+    return plain(row.gpu_ms[stage]) if stage in row.gpu_ms else "-"
+
+
+def published_text(made: Benchmark) -> str:
+    """How much longer the passes of 2007 take, as far as that was measured."""
+    names = {PUBLISHED: "as compute", FRAGMENTS: "as fragments"}
+    found = {said: made.ratio(name) for name, said in names.items()}
+    told = [f"{ratio:.2f} times as long {said}" for said, ratio in found.items() if ratio is not None]
+    return f"Drawn by the passes of 2007, it takes {' and '.join(told)}." if told else ""
+
+
+def left_out_lines(made: Benchmark) -> list[str]:
+    """What could not be measured, and why."""
+    return [f"left out: {_told(one.case)}: {one.reason}" for one in made.left_out]
+
+
+def _told(case: Case) -> str:
+    width, height = case.image
+    sizes = f"{width}x{height}, atlas {case.atlas}, {case.gaussians} Gaussians, {case.lights} lights"
+    return f"{sizes}, subdivided {case.subdivide} times, {case.technique}"
 
 
 def summary(made: Benchmark) -> str:
@@ -99,21 +137,25 @@ def write_report(path: Path, made: Benchmark) -> None:
     """
     from dermis.benchmark import plots
 
-    ratio = made.published_ratio
     text = Template((resources.files("dermis.benchmark") / "report.html").read_text(encoding="utf-8"))
     page = text.substitute(
         summary=html.escape(summary(made)),
-        published="" if ratio is None else f"The passes of 2007 take {ratio:.2f} times the usual frame.",
-        rows=_table(COLUMNS, [cells(row) for row in made.rows]),
-        stages=_table(("stage", "device [ms]", "floor [ms]", "ratio"), stage_cells(made.usual)),
-        bars=plots.stages(made.usual),
+        published=published_text(made),
+        rows=_table([COLUMNS, *(cells(row) for row in made.rows)]),
+        left_out="".join(f"<p>{html.escape(line)}</p>" for line in left_out_lines(made)),
+        stages=_table(stage_table(made)),
+        bars=plots.stages(made.usual) if made.usual else "",
         scaling=plots.scaling(made),
     )
     with replacing(path) as trial:
         trial.write_text(page, encoding="utf-8")
 
 
-def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
-    titles = "".join(f"<th>{name}</th>" for name in head)
-    body = ["".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in rows]
-    return f"<table><tr>{titles}</tr>" + "".join(f"<tr>{row}</tr>" for row in body) + "</table>"
+def _table(lines: Sequence[tuple[str, ...]]) -> str:
+    """The first line has the titles."""
+    body = [_line(cells, "th" if number == 0 else "td") for number, cells in enumerate(lines)]
+    return f"<table>{''.join(body)}</table>"
+
+
+def _line(cells: tuple[str, ...], tag: str) -> str:
+    return f"<tr>{''.join(f'<{tag}>{html.escape(cell)}</{tag}>' for cell in cells)}</tr>"

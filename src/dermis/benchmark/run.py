@@ -15,10 +15,19 @@ from dermis.assets.head import load_head
 from dermis.benchmark.cases import Case
 from dermis.benchmark.copy_rate import copy_rate
 from dermis.benchmark.measure import ON_CPU, Effort, Row, measure
+from dermis.errors import DermisError
 from dermis.rendering.renderer import Renderer
 
 _LIBRARIES = ("dermis", "wgpu", "numpy")
 Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A case that could not be measured, and why."""
+
+    case: Case
+    reason: str
 
 
 @dataclass(frozen=True)
@@ -27,6 +36,7 @@ class Benchmark:
 
     copied : bytes a second that a copy moves
     seconds : the whole run took [s]
+    left_out : what could not be measured
     """
 
     head: str
@@ -37,17 +47,22 @@ class Benchmark:
     copied: float
     seconds: float
     rows: tuple[Row, ...]
+    left_out: tuple[LeftOut, ...] = ()
 
     @property
-    def usual(self) -> Row:
-        """The frame that all others differ from in one thing."""
-        return self.rows[0]
+    def usual(self) -> Row | None:
+        """The frame that all others differ from in one thing; None when it could not be measured."""
+        return next((row for row in self.rows if not row.case.varies), None)
 
-    @property
-    def published_ratio(self) -> float | None:
-        """Device time of the published passes of 2007 over that of our own, in the same frame."""
-        found = [row for row in self.rows if row.case.technique == "published"]
-        return found[0].gpu_ms["total"] / self.usual.gpu_ms["total"] if found else None
+    def row_of(self, technique: str) -> Row | None:
+        """The usual frame by another technique; None when it was not measured."""
+        found = (row for row in self.rows if row.case.varies == "technique")
+        return next((row for row in found if row.case.technique == technique), None)
+
+    def ratio(self, technique: str) -> float | None:
+        """Device time of another technique over that of our own, in the same frame."""
+        other = self.row_of(technique)
+        return other.gpu_ms["total"] / self.usual.gpu_ms["total"] if other and self.usual else None
 
 
 def run(
@@ -56,18 +71,16 @@ def run(
     """Measure the cases one after another.
 
     progress : told how many of how many are done
+
+    Raises DermisError when none of them could be measured.
     """
     started = datetime.now(UTC)
     renderer = Renderer(adapter)
     device = renderer.device
-    effort = ON_CPU if device.adapter.kind == "CPU" else Effort()
-    subdivided = lru_cache(1)(lambda levels: load_head(head, subdivide=levels))
-    rows, rate = [], copy_rate(device)
-    with tempfile.TemporaryDirectory() as folder:
-        for done, case in enumerate(cases):
-            if progress:
-                progress(done, len(cases))
-            rows.append(measure(renderer, case, subdivided(case.subdivide), Path(folder), rate, effort))
+    rate = copy_rate(device)
+    rows, left_out = _all_of(cases, head, renderer, rate, progress or (lambda done, of: None))
+    if not rows:
+        raise DermisError(left_out[0].reason)
     return Benchmark(
         head,
         device.adapter.name,
@@ -77,4 +90,25 @@ def run(
         rate,
         (datetime.now(UTC) - started).total_seconds(),
         tuple(rows),
+        tuple(left_out),
     )
+
+
+def _all_of(
+    cases: list[Case], head: str, renderer: Renderer, rate: float, progress: Progress
+) -> tuple[list[Row], list[LeftOut]]:
+    """Those that could be measured, and the others."""
+    effort = ON_CPU if renderer.device.adapter.kind == "CPU" else Effort()
+    subdivided = lru_cache(1)(lambda levels: load_head(head, subdivide=levels))
+    rows: list[Row] = []
+    left_out: list[LeftOut] = []
+    subdivided(cases[0].subdivide)  # a head that is none concerns all of them
+    with tempfile.TemporaryDirectory() as folder:
+        for done, case in enumerate(cases):
+            progress(done, len(cases))
+            try:
+                rows.append(measure(renderer, case, subdivided(case.subdivide), Path(folder), rate, effort))
+            except DermisError as fault:
+                left_out.append(LeftOut(case, str(fault)))
+                renderer.forget()  # what was made of it before it failed
+    return rows, left_out

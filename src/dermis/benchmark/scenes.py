@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from dermis.assets.head import Head
-from dermis.benchmark.cases import Case
+from dermis.benchmark.cases import FRAGMENTS, PUBLISHED, Case
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
 from dermis.scene.camera import portrait
@@ -24,11 +24,12 @@ _TURN_DEGREES = 25.0  # between one round of the studio's lights and the next
 
 def settings_of(case: Case) -> Settings:
     """How the case is rendered."""
+    technique = PUBLISHED if case.technique == FRAGMENTS else case.technique
     return Settings(
         size=case.image,
         atlas=case.atlas,
         samples=case.samples,
-        technique=case.technique,  # type: ignore[arg-type]  # checked by the model
+        technique=technique,  # type: ignore[arg-type]  # checked by the model
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -24,7 +25,8 @@ def bench(
 ) -> int:
     """Measure the frame, stage by stage, at several sizes, beside what the memory's speed would allow.
 
-    Camera and lights move and everything is computed anew. The passes of 2007 are measured in the same run.
+    Camera and lights move and everything is computed anew. The passes of 2007 are measured in the same run,
+    in compute and as fragments. A frame that the adapter cannot hold is left out, and told with its reason.
 
     Examples:
 
@@ -61,12 +63,12 @@ def bench(
     cases = PRESETS[preset or ("cpu" if software else "interactive")].cases()
     with progress("measuring") as tell:
         made = run(cases, _head(head), adapter, tell)
-    if output is not None:
-        write_report(output, made)
     if as_json:
         print_json(to_json(made))
     else:
         print_lines(*_lines(made))
+    if output is not None:  # last: where it cannot be written any more, the figures are not lost
+        write_report(output, made)
     return 0
 
 
@@ -79,13 +81,22 @@ def _head(name: str) -> str:
 
 
 def _lines(made: Benchmark) -> list[str]:
-    from dermis.benchmark.report import COLUMNS, cells, stage_cells, summary
+    from dermis.benchmark.report import (
+        COLUMNS,
+        cells,
+        left_out_lines,
+        published_text,
+        stage_table,
+        summary,
+    )
 
-    rows = [COLUMNS, *map(cells, made.rows)]
-    wide = [max(len(row[k]) for row in rows) for k in range(len(COLUMNS))]
-    table = ["  ".join(cell.rjust(width) for cell, width in zip(row, wide, strict=True)) for row in rows]
-    shown = [("stage", "device [ms]", "floor [ms]", "ratio"), *stage_cells(made.usual)]
-    stages = [f"{a:14}{b:>12}{c:>12}{d:>8}" for a, b, c, d in shown]
-    ratio = made.published_ratio
-    note = [] if ratio is None else ["", f"the passes of 2007 take {ratio:.2f} times the usual frame"]
-    return [summary(made), "", *table, "", "the usual frame:", *stages, *note]
+    rows, stages = _aligned([COLUMNS, *map(cells, made.rows)]), _aligned(stage_table(made))
+    usual = ["", "the usual frame:", *stages] if stages else []
+    published = ["", text] if (text := published_text(made)) else []
+    return [summary(made), "", *rows, *left_out_lines(made), *usual, *published]
+
+
+def _aligned(table: Sequence[tuple[str, ...]]) -> list[str]:
+    """Lines of a table whose columns end at the same place."""
+    wide = [max(map(len, column)) for column in zip(*table, strict=True)]
+    return ["  ".join(cell.rjust(width) for cell, width in zip(row, wide, strict=True)) for row in table]

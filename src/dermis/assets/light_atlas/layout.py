@@ -25,6 +25,7 @@ class _Piece(NamedTuple):
 
     part : its triangles, as a surface of their own
     uv : (t, 3, 2) corners, scaled, the least at 0
+    most : (2,) of all corners
     scale : of its uv
     per_mm : scaled uv in a mm of the surface
     border : its sides, by the triangles' number within the piece
@@ -32,6 +33,7 @@ class _Piece(NamedTuple):
 
     part: Surface
     uv: Doubles
+    most: Doubles
     scale: float
     per_mm: float
     border: Border
@@ -83,8 +85,9 @@ def _apart(surface: Surface, piece: Index, own: Index, scale: float) -> _Piece:
     number[own] = np.arange(len(own))
     border = border._replace(triangle=number[border.triangle])
     uv, part = surface.uv[own] * scale, surface.part(own)
+    uv -= uv.min(axis=(0, 1))
     per_mm = scale * float(np.sqrt(np.abs(part.area_uv).sum() / part.area_mm2.sum()))
-    return _Piece(part, uv - uv.min(axis=(0, 1)), scale, per_mm, border)
+    return _Piece(part, uv, uv.max(axis=(0, 1)), scale, per_mm, border)
 
 
 def _search(pieces: list[_Piece], cells: int, width: Apron) -> tuple[float, list[Doubles] | None]:
@@ -112,7 +115,7 @@ def _stow(pieces: list[_Piece], scale: float, cells: int, width: Apron, attempt:
     """
     from dermis.assets.light_atlas.compiled.stow import stow
 
-    if any((one.uv.max(axis=(0, 1)) * scale > cells).any() for one in pieces):
+    if any((one.most * scale > cells).any() for one in pieces):
         return None
     shapes: list[_Shape] = []
     area: list[int] = []
@@ -136,7 +139,7 @@ def _stow(pieces: list[_Piece], scale: float, cells: int, width: Apron, attempt:
 def _shape(one: _Piece, scale: float, width: Apron, by_columns: bool) -> _Shape:
     """All cells in which a texel might be needed; with `by_columns` rows and columns change places."""
     margin = np.ceil(_half_extent(one, scale, width)) + 2
-    across, down = np.ceil(one.uv.max(axis=(0, 1)) * scale + 2 * margin).astype(int) + 1
+    across, down = np.ceil(one.most * scale + 2 * margin).astype(int) + 1
     every = np.ones(len(one.uv))
     places = one.uv * scale + margin - 0.5
     placing = Placing(places, every * one.scale * scale, every * one.per_mm * scale)

@@ -126,7 +126,9 @@ def _strip(surface: Surface, own: Index, slit: Conflicts, half: Flags, reach: fl
     corners = surface.uv[own] * slit.per_uv
     places = np.concatenate((corners, corners.mean(axis=1, keepdims=True)), axis=1)
     tree = KDTree(np.concatenate((slit.one, slit.other)))
-    near = np.isfinite(tree.query(places, distance_upper_bound=reach)[0]).any(axis=1)
+    about = np.logical_and(places >= tree.mins - reach, places <= tree.maxes + reach)
+    near = np.asarray(np.any(np.all(about, axis=2), axis=1))  # the others need no search
+    near[near] = np.isfinite(tree.query(places[near], distance_upper_bound=reach)[0]).any(axis=1)
     area = surface.area_mm2[own]
     return near & (half if area[near & half].sum() < area[near & ~half].sum() else ~half)
 

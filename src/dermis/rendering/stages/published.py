@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -10,7 +12,8 @@ from dermis.rendering.atlas_textures import AtlasTextures
 from dermis.rendering.levels import ENTERED, Levels
 from dermis.rendering.stages import STAGES
 
-_TEXEL = "rgba16float"
+TEXEL = "rgba16float"
+Pair = tuple[Any, Any]
 
 
 class Published:
@@ -20,15 +23,15 @@ class Published:
 
     def __init__(self, device: Device) -> None:
         self._device = device
-        self._made: dict[str, list[ComputeProgram]] = {}
+        self._made: dict[str, list[Any]] = {}
         self._halve = ComputeProgram(device, STAGES / "published_halves.wgsl")
 
     def make_levels(self, size: int, count: int) -> Levels:
         """Space for the unblurred light, as floats, and `count` blurred levels."""
-        stack = make_texture(self._device, (size, size), _TEXEL, layers=max(2, count + 1))
-        scratch, *stretch = (make_texture(self._device, (size, size), _TEXEL) for _ in range(3))
+        stack = make_texture(self._device, (size, size), TEXEL, layers=max(2, count + 1))
+        scratch, *stretch = (make_texture(self._device, (size, size), TEXEL) for _ in range(3))
         light = make_texture(self._device, (size, size), ENTERED)
-        return Levels(stack, scratch, light, size, _TEXEL, (0,) * (count + 1), stretch=tuple(stretch))
+        return Levels(stack, scratch, light, size, TEXEL, (0,) * (count + 1), stretch=tuple(stretch))
 
     def draw(
         self,
@@ -47,27 +50,35 @@ class Published:
         """
         sampler = self._device.sampler(mag_filter="linear", min_filter="linear")
         along, (stretch, spare) = self._along(edge), levels.stretch
-        size = (levels.size, levels.size)
-        frame.compute("diffuse", self._halve, {"light": levels.entered, "halves": levels.layer(0)}, size)
+        self._begin(frame, levels)
         source, before = atlas.resources["stretch_map"], 0.0
         for k, variance in enumerate(variance_mm2, start=1):
             record = along[0].record("Spread", sigma_mm=np.sqrt(variance - before), clear=clear)
             passes = (
-                (levels.layer(k - 1), source, levels.scratch, spare),
-                (levels.scratch, spare, levels.layer(k), stretch),
+                (levels.layer(k - 1), source, levels.spare(), spare),
+                (levels.spare(), spare, levels.layer(k), stretch),
             )
             for program, (light, wide, blurred, wider) in zip(along, passes, strict=True):
                 bound = {"spread": record, "linear": sampler, "source": light, "stretch": wide}
-                bound |= {"blurred": blurred, "stretch_blurred": wider}
-                frame.compute("diffuse", program, bound, size)
+                self._run(frame, program, bound, (blurred, wider), levels.size)
             source, before = stretch, float(variance)
 
-    def _along(self, edge: str) -> list[ComputeProgram]:
+    def _begin(self, frame: Frame, levels: Levels) -> None:
+        """Bring the light that enters into layer 0."""
+        bound = {"light": levels.entered, "halves": levels.layer(0)}
+        frame.compute("diffuse", self._halve, bound, (levels.size, levels.size))
+
+    def _run(self, frame: Frame, program: Any, bound: dict[str, Any], into: Pair, side: int) -> None:
+        """One pass into a texture of light and one of stretch."""
+        bound = bound | {"blurred": into[0], "stretch_blurred": into[1]}
+        frame.compute("diffuse", program, bound, (side, side))
+
+    def _along(self, edge: str) -> list[Any]:
         """The passes along u and along v, made when first asked for."""
         if edge not in self._made:
-            path, skipped = STAGES / "published.wgsl", edge == "skipped"
-            self._made[edge] = [
-                ComputeProgram(self._device, path, constants={"AXIS": axis, "SKIPPED": skipped})
-                for axis in (0, 1)
-            ]
+            skipped = edge == "skipped"
+            self._made[edge] = [self._program({"AXIS": axis, "SKIPPED": skipped}) for axis in (0, 1)]
         return self._made[edge]
+
+    def _program(self, constants: dict[str, float]) -> Any:
+        return ComputeProgram(self._device, STAGES / "published.wgsl", constants=constants)

@@ -1,51 +1,17 @@
-// One axis of one blur as published in 2007: seven bilinear taps of light, and the same of the stretch map.
-// Kept as it was, with the faults that the frame's own blur mends [dEonLuebke2007].
+// One axis of one blur as published in 2007, in compute: light and the stretch map.
+// Kept as it was, with the faults that the frame's own blur mends.
+//#include "published_taps.wgsl"
 
-override AXIS: u32 = 0u; // 0 along u, 1 along v
-override SKIPPED: bool = false; // whether empty texels are left out, as the talk's remedy with alpha does
-
-const LEAST: f32 = 1e-3; // of the weights that may stand for all
-
-struct Spread {
-    sigma_mm: f32, // of the Gaussian to be added
-    clear: vec3f, // the light that empty texels show
-}
-
-@group(0) @binding(0) var<uniform> spread: Spread;
-@group(0) @binding(1) var source: texture_2d<f32>; // filtered
-@group(0) @binding(2) var stretch: texture_2d<f32>; // filtered
-@group(0) @binding(3) var linear: sampler;
 @group(0) @binding(4) var blurred: texture_storage_2d<rgba16float, write>;
 @group(0) @binding(5) var stretch_blurred: texture_storage_2d<rgba16float, write>;
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let size = vec2f(textureDimensions(source));
-    if (any(vec2f(id.xy) >= size)) {
+    let size = textureDimensions(source);
+    if (any(id.xy >= size)) {
         return;
     }
-    var weights = array(0.006, 0.061, 0.242, 0.383, 0.242, 0.061, 0.006); // their sum is 1.001, their variance 1.08
-    let uv = (vec2f(id.xy) + 0.5) / size;
-    let per_mm = textureSampleLevel(stretch, linear, uv, 0.0)[AXIS];
-    let axis = select(vec2f(0.0, 1.0), vec2f(1.0, 0.0), AXIS == 0u);
-    let step = axis * spread.sigma_mm * per_mm / size;
-    var light = vec4f(0.0);
-    var wide = vec4f(0.0);
-    for (var n = 0; n < 7; n++) {
-        let at = uv + f32(n - 3) * step;
-        let tap = textureSampleLevel(source, linear, at, 0.0);
-        if (SKIPPED) {
-            light += weights[n] * vec4f(tap.rgb, tap.a); // empty texels hold no light
-        } else {
-            light += weights[n] * vec4f(tap.rgb + (1.0 - tap.a) * spread.clear, 1.0);
-        }
-        wide += weights[n] * textureSampleLevel(stretch, linear, at, 0.0);
-    }
-    if (SKIPPED) {
-        light = vec4f(light.rgb / max(light.a, LEAST), select(0.0, 1.0, light.a > LEAST));
-    } else {
-        light.a = 1.0; // not the weights' sum, or the next pass would take the clear colour's share off
-    }
-    textureStore(blurred, id.xy, light);
-    textureStore(stretch_blurred, id.xy, wide);
+    let found = blurred_at((vec2f(id.xy) + 0.5) / vec2f(size));
+    textureStore(blurred, id.xy, found.light);
+    textureStore(stretch_blurred, id.xy, found.stretch);
 }

@@ -1,0 +1,140 @@
+"""All that docs/performance.md tells of a GPU, in one go: python benchmarks/gpu_server.py -o result.json
+
+For a server without a screen; it ends within --minutes. Each part is written as soon as it is measured, so
+that what ends early loses little. --quick is a trial of all parts at tiny sizes, on any adapter.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+import sys
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated, Any
+
+import gpu_sections
+from cyclopts import Parameter, run
+from gpu_sections import Plan, plan_of, quick_plan
+
+import dermis
+from dermis.assets.samples import cached
+from dermis.cli.console import note
+from dermis.errors import DermisError
+from dermis.outputs import check_output, replacing
+
+PARTS = ("bench", "sequences", "lights", "options", "start", "lobes", "viewer", "film")
+"""What matters most first; each with the time that it may take on a slow server [s]."""
+_NEEDED_S = {"bench": 0, "film": 120, "viewer": 60}
+_DIGITS = 5
+
+
+def main(
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))],
+    head: str = "auto",
+    adapter: str = "auto",
+    parts: str = ",".join(PARTS),
+    minutes: float = 8.0,
+    quick: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Measure and write the figures.
+
+    Parameters
+    ----------
+    output:
+        JSON to write.
+    head:
+        auto (the scan lee_perry_smith when it is here, else bust), a sample or a file.
+    adapter:
+        auto (the best), cpu (software), or a part of an adapter's name.
+    parts:
+        Of bench, sequences, lights, options, start, lobes, viewer and film, with commas.
+    minutes:
+        No part is begun that would not end within them.
+    quick:
+        Tiny sizes.
+    """
+    try:
+        target = check_output(output, (".json",), "Choose such a name")
+        name = ("lee_perry_smith" if cached("lee_perry_smith") else "bust") if head == "auto" else head
+        plan = (quick_plan if quick else plan_of)(adapter, name)
+        measure(plan, _chosen(parts), minutes, lambda told: _write(target, told))
+    except DermisError as fault:
+        note(f"gpu_server: {fault}")
+        return 2
+    return 0
+
+
+def measure(
+    plan: Plan, parts: list[str], minutes: float, keep: Callable[[dict[str, Any]], None]
+) -> dict[str, Any]:
+    """All figures; `keep` gets those known so far after each part."""
+    began = time.perf_counter()
+    head, renderer = dermis.load_head(plan.head), dermis.Renderer(plan.adapter)
+    told = _about(plan, renderer)
+    for part in parts:
+        note(part)
+        started = time.perf_counter()
+        left = 60.0 * minutes - (started - began)
+        told[part] = _measured(part, plan, head, renderer, left)
+        told["seconds"][part] = time.perf_counter() - started
+        keep(told)
+    return told
+
+
+def _measured(part: str, plan: Plan, head: Any, renderer: Any, left: float) -> Any:
+    """A part's figures, or why there are none."""
+    if left < _NEEDED_S.get(part, 20):
+        return {"left_out": f"{left:.0f} s were left"}
+    try:
+        return getattr(gpu_sections, part)(plan, head, renderer)
+    except DermisError as fault:
+        note(f"left out: {fault}")
+        return {"left_out": str(fault)}
+    finally:
+        renderer.forget()  # the next part may need all of the memory
+
+
+def _about(plan: Plan, renderer: Any) -> dict[str, Any]:
+    device = renderer.device
+    return {
+        "head": plan.head,
+        "adapter": device.adapter.name,
+        "driver": device.adapter.driver,
+        "versions": {name: version(name) for name in ("dermis", "wgpu", "numpy")}
+        | {"python": platform.python_version()},
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "seconds": {},
+    }
+
+
+def _chosen(parts: str) -> list[str]:
+    names = parts.split(",")
+    for name in names:
+        if name not in PARTS:
+            raise DermisError(
+                f"--parts: expected names of {', '.join(PARTS)}, but {name!r} came. Correct it."
+            )
+    return names
+
+
+def _write(path: Path, told: dict[str, Any]) -> None:
+    with replacing(path) as unfinished:
+        unfinished.write_text(json.dumps(_rounded(told), indent=1) + "\n", encoding="utf-8")
+
+
+def _rounded(value: Any) -> Any:
+    """Floats with as many digits as mean something."""
+    if isinstance(value, float):
+        return float(f"{value:.{_DIGITS}g}")
+    if isinstance(value, dict):
+        return {str(key): _rounded(one) for key, one in value.items()}
+    return [_rounded(one) for one in value] if isinstance(value, list | tuple) else value
+
+
+if __name__ == "__main__":
+    sys.exit(run(main))

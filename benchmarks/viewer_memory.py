@@ -1,0 +1,118 @@
+"""What the viewer holds while everything in it is changed again and again."""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from viewer_hands import Hands, Plan
+from viewer_page import resident_mb
+
+from dermis.gpu.memory import held_bytes
+from dermis.scene.environment import Environment
+from dermis.scene.files import light_presets
+from dermis.viewer.controls import CAMERAS
+from dermis.viewer.lamp import drag_light
+from dermis.viewer.orbit import dolly, orbit, pan
+from dermis.viewer.state import ViewerState
+
+Kind = Callable[[ViewerState, random.Random], ViewerState]
+_SAMPLES = 60  # of the memory, over all the time
+_BY_HAND = ("split", "undo", "redo", "size", "panel", "preset", "start again")
+
+
+def _one(chance: random.Random, *names: Any) -> Any:
+    return chance.choice(names)
+
+
+KINDS: dict[str, Kind] = {
+    "turn": lambda s, r: s.with_camera(orbit(s.scene.camera, r.uniform(-1, 1), r.uniform(-0.3, 0.3))),
+    "pan": lambda s, r: s.with_camera(pan(s.scene.camera, r.uniform(-0.1, 0.1), r.uniform(-0.1, 0.1))),
+    "come nearer": lambda s, r: s.with_camera(dolly(s.scene.camera, r.uniform(0.8, 1.25))),
+    "light": lambda s, r: drag_light(s, 0, r.uniform(-0.5, 0.5), r.uniform(-0.2, 0.2)),
+    "rig": lambda s, r: s.with_rig(_one(r, *light_presets())),
+    "environment": lambda s, r: s.with_environment(_one(r, None, Environment(name="uniform", exposure=0.5))),
+    "reflection": lambda s, r: s.with_skin(rho_s=r.uniform(0.05, 0.5), roughness=r.uniform(0.2, 0.6)),
+    "oil": lambda s, r: s.with_skin(oiliness=r.uniform(0.0, 1.0)),
+    "mix": lambda s, r: s.with_skin(mix=r.uniform(0.0, 1.0)),
+    "lobe": lambda s, r: s.with_skin(specular=_one(r, "kelemen", "two-lobe", "phong", "none")),
+    "fresnel": lambda s, r: s.with_skin(fresnel=_one(r, "schlick", "exact")),
+    "energy": lambda s, r: s.with_skin(energy=_one(r, "full", "published", "none")),
+    "profile": lambda s, r: s.with_skin(profile=_one(r, "gpu-gems-3", "dj3", "skin1"), pigments=None),
+    "pigments": lambda s, r: s.with_skin(profile="light").with_pigments(
+        melanin=r.uniform(0.01, 0.2), blood=r.uniform(0.01, 0.1)
+    ),
+    "colour": lambda s, r: s.with_skin(albedo=_one(r, "map", "profile")),
+    "technique": lambda s, r: s.with_settings(
+        technique=_one(r, "texture-space", "one-blur", "published", "screen-space", "pre-integrated", "none")
+    ),
+    "stretch": lambda s, r: s.with_settings(stretch=_one(r, "full", "axes", "none")),
+    "seams": lambda s, r: s.with_settings(seams=_one(r, "stitch", "none", "alpha", "multi-uv")),
+    "transmission": lambda s, r: s.with_settings(transmission=_one(r, "thin", "none")),
+    "gamma": lambda s, r: s.with_settings(gamma=_one(r, "right", "wrong")),
+    "picture": lambda s, r: s.with_settings(exposure=r.uniform(0.5, 2.0), tone=_one(r, "none", "filmic")),
+    "bloom": lambda s, r: s.with_settings(bloom=_one(r, 0.0, 0.1)),
+    "samples": lambda s, r: s.with_settings(samples=_one(r, 1, 2)),
+    "atlas": lambda s, r: s.with_settings(atlas=_one(r, s.settings.atlas, 256, 512)),
+    "view": lambda s, r: s.in_view(_one(r, "picture", "diffuse", "irradiance", "blur 1", "normals", "atlas")),
+}
+"""Changes of a state; what cannot be rendered together leaves the last picture, as it does for a user."""
+
+
+def endured(hands: Hands, plan: Plan, minutes: float, changes: int) -> dict[str, Any]:
+    """The memory over at least so many minutes and changes; each change is drawn."""
+    chance, desk = random.Random(11), hands.viewer.desk
+    done, taken = 0, list[dict[str, float]]()
+    counts = dict.fromkeys((*KINDS, *_BY_HAND), 0)
+    for kind in counts:  # all that is ever compiled and loaded, before anything is counted
+        _change(hands, kind, chance, plan)
+        hands.frame()
+    desk.change(hands.first)
+    begun = time.perf_counter()
+    while (now := time.perf_counter() - begun) < 60.0 * minutes or done < changes:
+        part = min(now / max(1e-9, 60.0 * minutes), done / max(1, changes))
+        if part * _SAMPLES >= len(taken):
+            taken.append(_sample(now, done))
+        kind = chance.choice(list(counts))
+        _change(hands, kind, chance, plan)
+        hands.frame()
+        counts[kind] += 1
+        done += 1
+    taken.append(_sample(time.perf_counter() - begun, done))
+    told = {"plan": plan.__dict__, "minutes": taken[-1]["s"] / 60.0, "changes": done, "kinds": counts}
+    return told | {"samples": taken} | growth(taken)
+
+
+def _sample(seconds: float, changes: int) -> dict[str, float]:
+    return {"s": seconds, "changes": changes, "resident_mb": resident_mb(), "device_mb": held_bytes() / 1e6}
+
+
+def _change(hands: Hands, kind: str, chance: random.Random, plan: Plan) -> None:
+    desk = hands.viewer.desk
+    if kind in KINDS:
+        desk.change(KINDS[kind](desk.state, chance))
+    elif kind == "split":
+        desk.split.release() if desk.split.before else desk.split.freeze(desk.state)
+    elif kind == "undo":
+        desk.history.undo()
+    elif kind == "redo":
+        desk.history.redo()
+    elif kind == "panel":
+        hands.viewer.panel.visible = not hands.viewer.panel.visible
+    elif kind == "size":
+        hands.canvas.set_logical_size(*(round(side * chance.choice((0.5, 0.75, 1.0))) for side in plan.size))
+    elif kind == "preset":
+        desk.controls.look(chance.choice(CAMERAS))
+    else:
+        desk.change(hands.first)
+
+
+def growth(taken: Sequence[dict[str, float]]) -> dict[str, Any]:
+    """Slopes of the second half of the samples [MB per 1000 changes]."""
+    late = taken[len(taken) // 2 :]
+    x = [one["changes"] / 1e3 for one in late]
+    names = ("resident_mb", "device_mb")
+    return {f"{name}_per_1000": float(np.polyfit(x, [one[name] for one in late], 1)[0]) for name in names}

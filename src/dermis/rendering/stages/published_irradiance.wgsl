@@ -1,0 +1,19 @@
+// Light that enters the skin at each texel of the atlas, as irradiance.wgsl has it, as fragments of a render pass.
+//#include "covering.wgsl"
+//#include "lighting.wgsl"
+//#include "packed_surface.wgsl"
+
+@group(1) @binding(0) var surfaces: texture_2d_array<u32>; // as surface_texels.wgsl packs them
+
+@fragment
+fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    let texel = vec2u(at.xy);
+    let packed = Packed(textureLoad(surfaces, texel, 0, 0), textureLoad(surfaces, texel, 1, 0));
+    if (packed.look.w == 0u) {
+        return vec4f(0.0);
+    }
+    let surface = unpack_surface(packed);
+    let open = open_at(at.xy / vec2f(textureDimensions(surfaces)));
+    let lit = light_up(unpack_point(packed), surface, surface.normal, open);
+    return vec4f(lit.entered * share_of(surface.colour, skin.mix), 1.0);
+}

@@ -1,0 +1,94 @@
+"""`benchmarks/gpu_server.py` at tiny sizes: each part has its figures, and what fails or is late is told."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dermis.errors import DermisError
+from dermis.gpu import Device
+
+
+@pytest.fixture
+def server(monkeypatch: pytest.MonkeyPatch) -> Any:
+    # Last, for a name there is also one of the standard library's.
+    monkeypatch.setattr(sys, "path", [*sys.path, str(Path(__file__).parents[2] / "benchmarks")])
+    import gpu_sections
+    import gpu_server
+
+    monkeypatch.setattr(gpu_sections, "ENVIRONMENTS", {"lamps": (True, None), "room": (False, "uniform")})
+    monkeypatch.setattr(gpu_server, "_NEEDED_S", dict.fromkeys(gpu_server.PARTS, 0))
+    return gpu_server
+
+
+@pytest.fixture
+def run(server: Any, device: Device, tmp_path: Path, opened: None) -> Any:
+    """A quick run of some parts; what it wrote."""
+    from small_head import write_head
+
+    head, out = write_head(tmp_path / "head.obj"), tmp_path / "figures.json"
+
+    def told(parts: str, **given: Any) -> Any:
+        words = {"head": str(head), "adapter": device.adapter.name, "parts": parts, "quick": True}
+        assert server.main(output=out, **(words | given)) == 0
+        return json.loads(out.read_text(encoding="utf-8"))
+
+    return told
+
+
+@pytest.fixture
+def opened(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dermis.rendering.renderer.open_device", lambda _: device)
+
+
+def test_all_that_is_measured_here(run: Any, device: Device) -> None:
+    told = run("bench,sequences,lights,options")
+    assert told["adapter"] == device.adapter.name and told["versions"]["wgpu"]
+    assert set(told["seconds"]) == {"bench", "sequences", "lights", "options"}
+    assert [row["technique"] for row in told["bench"]["rows"]] == ["texture-space", "published-fragments"]
+    assert told["bench"]["published_fragments_ratio"] > 0.0
+    assert set(told["sequences"]["per_second"]) == {"bytes", "floats", "png", "exr"}
+    assert min(told["sequences"]["per_second"].values()) > 0.0
+    assert {"lamps", "room"} == set(told["lights"]) and "shade" in told["lights"]["room"]
+    assert told["lights"]["lamps"]["shadows"] > 0.0
+    assert "diffuse" in told["options"]["usual"] and "diffuse" not in told["options"]["none"]
+
+
+def test_what_fails_and_what_would_be_late_is_told(
+    run: Any, server: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: Any) -> Any:
+        raise DermisError("no screen here")
+
+    monkeypatch.setattr(server.gpu_sections, "viewer", broken)
+    monkeypatch.setitem(server._NEEDED_S, "film", 1000)
+    told = run("viewer,film,lobes", minutes=10)
+    assert told["viewer"] == {"left_out": "no screen here"}
+    assert "s were left" in told["film"]["left_out"]
+    assert min(told["lobes"].values()) >= 0.0 and "kelemen, schlick" in told["lobes"]
+
+
+def test_a_program_that_fails_or_hangs_is_told(server: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(DermisError, match="nobody"):
+        server.gpu_sections._lasted_s([sys.executable, "-m", "dermis", "head", "nobody"])
+    monkeypatch.setattr(server.gpu_sections, "_LONGEST_S", 0.1)
+    with pytest.raises(DermisError, match=r"-c import time.*within 0\.1 s"):
+        server.gpu_sections._lasted_s([sys.executable, "-c", "import time; time.sleep(60)"])
+
+
+def test_other_names_are_refused(server: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert server.main(output=tmp_path / "figures.json", parts="bench,sun") == 2
+    assert "--parts: expected names of bench, sequences" in capsys.readouterr().err
+    assert server.main(output=tmp_path / "figures.txt") == 2
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_whole_plan_has_the_tables_of_the_documentation(server: Any) -> None:
+    plan = server.plan_of("auto", "bust")
+    assert plan.usual.image == (1920, 1080) and plan.usual.atlas == 2048 and plan.usual.lights == 3
+    assert {(512, 512), (1024, 1024), (3840, 2160)} <= {case.image for case in plan.cases}
+    assert [case.varies for case in plan.film] == ["", "technique", "subdivide"]
