@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import accuracy_direction as direction
 import accuracy_error as error
 import accuracy_surface as surface
 import numpy as np
@@ -99,6 +100,7 @@ def main() -> None:
     for medium in ("skin1", "skin2"):
         found[f"traced_{medium}"], made = table(head, "path-traced", medium, adapter)
         found[f"floor_{medium}"] = floor(head, medium, made["front"], adapter)
+    found["direction"] = direction.table(head, LIGHTS, SETTINGS, adapter)
     found["integral"], _ = table(head, "surface-integral", "skin1", adapter)
     found["heat"], _ = table(head, "heat", "skin1", adapter)
     found["heat"] += "\n" + finer_heat(head, adapter)

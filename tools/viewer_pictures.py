@@ -20,11 +20,11 @@ from PIL import Image, ImageChops, ImageGrab
 FOLDER = Path(__file__).parent.parent / "docs" / "images"
 SIZE = 1100, 760
 SCENE = ("--atlas", "1024", "--samples", "4")
-PATIENCE_S = 100.0
-REFINED_S = 15.0  # without a change: a software adapter takes long for a still picture
+PATIENCE_S = 300.0
+REFINED_S = 45.0  # without a change: a software adapter takes long for a still picture
 ANSWERED_S = 2.0
-VIEW_LIST, IRRADIANCE = (30, 43), (30, 126)
-COMPARE, FREEZE = (100, 118), (30, 143)
+VIEW_LIST, IRRADIANCE = (30, 68), (30, 151)
+COMPARE, FREEZE = (100, 143), (30, 168)
 CHROMIUM = "chromium", "chromium-browser", "google-chrome"
 
 
@@ -40,7 +40,8 @@ def window(head: str) -> Image.Image:
     with screen() as display:
         environment = os.environ | {"DISPLAY": display}
         environment.pop("WAYLAND_DISPLAY", None)
-        words = ["view", head, "--size", f"{SIZE[0]}x{SIZE[1]}", "--env", "royal_esplanade", *SCENE]
+        light = ["--env", "royal_esplanade", "--profile", "light"]
+        words = ["view", head, "--size", f"{SIZE[0]}x{SIZE[1]}", *light, *SCENE]
         with ended(subprocess.Popen([sys.executable, "-m", "dermis", *words], env=environment)):
             return still(lambda: ImageGrab.grab(xdisplay=display).convert("RGB"))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -12,7 +12,7 @@ from dermis.cli.options import Json, Whole
 from dermis.errors import refuse
 
 _BY_PATHS = ("path-traced", "cycles")
-_OF_HEADS = ("against", "techniques", "light", "region", "medium", "size", "atlas", "samples")
+_OF_HEADS = ("against", "techniques", "light", "region", "medium", "direction", "size", "atlas", "samples")
 
 
 def compare(
@@ -24,6 +24,7 @@ def compare(
     light: str | None = None,
     region: str | None = None,
     medium: str | None = None,
+    direction: Literal["lambertian", "half-space"] | None = None,
     size: str | None = None,
     atlas: Whole = None,
     samples: Whole = None,
@@ -62,6 +63,8 @@ def compare(
         portrait, three-quarter, ear, cheek or nose [where the light shows most].
     medium:
         skin1, skin2 or another medium with a name, index-matched [skin1].
+    direction:
+        How skin returns light: lambertian alike by all directions, or as a half-space [lambertian].
     size:
         WIDTHxHEIGHT in pixels [256x256].
     atlas:
@@ -98,6 +101,7 @@ def _check_used(what: str, given: Mapping[str, Any]) -> None:
         idle = {"roughness": "techniques are compared without surface reflection"}
         if given.get("against") not in _BY_PATHS:
             idle["samples"] = f"only {' and '.join(_BY_PATHS)} trace paths"
+            idle["direction"] = f"only {' and '.join(_BY_PATHS)} know directions"
     for name, why in idle.items():
         if name in given:
             refuse(f"--{name}", "no such option here", f"it came, and {why}", "Leave it out")

@@ -39,6 +39,7 @@ def choose(given: Mapping[str, Any]) -> dict[str, Any]:
         "light": light,
         "region": given.get("region", usual_region(light)),
         "medium": given.get("medium", "skin1"),
+        "direction": given.get("direction", "lambertian"),
         "settings": Settings(**sizes),
         "samples": given.get("samples", 64),
         "adapter": given["adapter"],

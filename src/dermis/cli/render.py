@@ -33,6 +33,7 @@ def render(
     stretch: Literal["full", "axes", "none"] | None = None,
     profile: str | None = None,
     albedo: Literal["map", "profile"] | None = None,
+    direction: Literal["lambertian", "half-space"] | None = None,
     mix: float | None = None,
     roughness: float | None = None,
     rho_s: float | None = None,
@@ -108,6 +109,8 @@ def render(
         Diffusion profile: gpu-gems-3, or a CSV file with variance_mm2,red,green,blue.
     albedo:
         map: profile made white, colour from the map (the deck). profile: the profile's own colour, no map.
+    direction:
+        How skin returns light: lambertian alike by all directions, or as a half-space [lambertian].
     mix:
         Share of the colour map applied before scattering, 0 to 1 [0.5].
     roughness:

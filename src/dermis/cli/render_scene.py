@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _MAP_OPTIONS = ("colour", "normal", "height", "height_mm", "specular_map", "roughness_map")
 _HEAD_OPTIONS = (*_MAP_OPTIONS, "unit_mm", "v_origin", "up", "normal_y", "opaque", "subdivide")
 _SURFACE_OPTIONS = ("roughness", "rho_s", "oiliness", "specular", "fresnel", "specular_colour", "energy")
-_SKIN_OPTIONS = ("profile", "albedo", "mix", *_SURFACE_OPTIONS)
+_SKIN_OPTIONS = ("profile", "albedo", "direction", "mix", *_SURFACE_OPTIONS)
 _POST_OPTIONS = ("exposure", "bloom", "tone", "gamma", "background")
 _SETTINGS = (
     "size",

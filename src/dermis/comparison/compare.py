@@ -5,9 +5,9 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from dermis.optics.profiles import TERMS, write_profile
 from dermis.rendering.renderer import Renderer
 from dermis.rendering.surface_points import surface_points
 from dermis.scene.settings import Settings
+from dermis.scene.skin import Skin
 
 Floats = NDArray[np.float64]
 _SHOWN_PERCENTILE = 99.0
@@ -83,6 +84,7 @@ def compare(
     region: str = "portrait",
     medium: str = "skin1",
     settings: Settings | None = None,
+    direction: Literal["lambertian", "half-space"] = "lambertian",
     samples: int = 64,
     adapter: str = "auto",
     report: Callable[[str], None] = lambda doing: None,
@@ -92,6 +94,7 @@ def compare(
     against : of TRUTHS
     light, region : of `scenes.LIGHTS` and `scenes.REGIONS`
     medium : of the named media, taken without a refracting surface
+    direction : of the techniques' skin; the surface integral and heat know lambertian skin only
     samples : paths through each pixel
     report : told what is being done
 
@@ -104,12 +107,14 @@ def compare(
         report(f"truth: {against}")
         truth = TRUTHS[against](subject, samples)
         check_seen(truth.mask)
+        shown = replace(subject, scene=replace(subject.scene, skin=_turned(subject.scene.skin, direction)))
         images, ms = {}, {}
         for technique in techniques:
             report(technique)
-            images[technique], ms[technique] = _render(subject, technique, truth)
+            images[technique], ms[technique] = _render(shown, technique, truth)
         name = subject.renderer.device.adapter.name
     title = f"{head.name}, {medium}, light: {light}, region: {region}, {settings.size[0]}x{settings.size[1]}"
+    title += f", {direction} skin" if direction != "lambertian" else ""
     made = Comparison(title, name, truth, against, (), images)
     rows = tuple(_row(made, technique, ms[technique]) for technique in techniques)
     return Comparison(title, made.adapter, truth, against, rows, images)
@@ -140,6 +145,10 @@ def check_choices(against: str, light: str, region: str, medium: str) -> None:
     for option, (chosen, known) in choices.items():
         if chosen not in known:
             refuse(f"--{option}", f"one of {', '.join(known)}", f"{chosen!r} came", "Choose one of them")
+
+
+def _turned(skin: Skin, direction: str) -> Skin:
+    return Skin(**(skin.model_dump() | {"direction": direction}))
 
 
 def _render(subject: Subject, technique: str, truth: Truth) -> tuple[Floats, float]:

@@ -1,0 +1,56 @@
+"""Skin by directions against light that was traced through it, on a ball, which shadows itself nowhere."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from dermis.assets.head import Head
+from dermis.assets.maps import Maps
+from dermis.assets.primitives import uv_sphere
+from dermis.comparison.compare import Comparison, compare
+from dermis.scene.settings import Settings
+
+BALL = Head("ball", uv_sphere(100.0, 256, 128), Maps())
+ADAPTER = os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
+SETTINGS = Settings(size=(32, 32), atlas=256, shadow_size=512)
+
+
+def against_paths(direction: str) -> Comparison:
+    """Paths are kept on disk, so that they are traced once."""
+    return compare(
+        BALL,
+        "path-traced",
+        ("none",),
+        light="back",
+        region="ear",
+        settings=SETTINGS,
+        direction=direction,  # type: ignore[arg-type]
+        samples=64,
+        adapter=ADAPTER,
+    )
+
+
+@pytest.fixture(scope="module")
+def both() -> tuple[Comparison, Comparison]:
+    pytest.importorskip("mitsuba")
+    return against_paths("lambertian"), against_paths("half-space")
+
+
+def test_half_space_is_much_nearer_to_the_paths(both: tuple[Comparison, Comparison]) -> None:
+    """Without scattering along the surface: to a ball as large as this, that is nothing."""
+    (lambertian,), (turned,) = (made.rows for made in both)
+    assert lambertian.relrmse > 0.2
+    assert turned.relrmse + turned.relrmse_se < 0.4 * lambertian.relrmse
+
+
+def test_half_space_keeps_the_energy(both: tuple[Comparison, Comparison]) -> None:
+    """Light comes from behind: most of it is aslant on its way in and out."""
+    (lambertian,), (turned,) = (made.rows for made in both)
+    assert lambertian.energy_ratio < 0.8
+    assert turned.energy_ratio == pytest.approx(1.0, abs=0.05)
+
+
+def test_report_says_so(both: tuple[Comparison, Comparison]) -> None:
+    assert both[1].title.endswith("half-space skin") and "skin" not in both[0].title.split("32x32")[1]

@@ -1,0 +1,46 @@
+"""Photons in a half-space under a smooth surface, entering at an angle."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+_LEAST_WEIGHT = 0.01
+
+
+def returned(
+    cosine: float, albedo: float, eta: float, photons: int, rings: int = 4, seed: int = 1
+) -> tuple[float, float, Floats]:
+    """Share of the light entering at a cosine that leaves, its standard error, and that share by direction.
+
+    The last is (rings,) by the square of the cosine of leaving, in which light off a diffuse surface is even.
+    """
+    rng = np.random.default_rng(seed)
+    depth, weight = np.zeros(photons), np.ones(photons)
+    down = np.full(photons, np.sqrt(1.0 - (1.0 - cosine**2) / eta**2))
+    born, given, square = np.arange(photons), np.zeros(photons), np.zeros(rings)
+    while len(depth):
+        depth = depth - np.log(rng.random(len(depth))) * down
+        above = depth < 0.0
+        through = above & (rng.random(len(depth)) > fresnel(-down, eta))
+        given[born[through]] += weight[through]
+        outside = np.clip(1.0 - eta**2 * (1.0 - down[through] ** 2), 0.0, 1.0)
+        square += np.histogram(outside, rings, (0.0, 1.0), weights=weight[through])[0]
+        depth = np.abs(depth)  # thrown back inside, the way goes on below
+        weight = albedo * weight
+        lucky = (weight > _LEAST_WEIGHT) | (rng.random(len(depth)) < 0.1)
+        weight = np.where(weight > _LEAST_WEIGHT, weight, 10.0 * weight)
+        keep = lucky & ~through
+        depth, weight, born = depth[keep], weight[keep], born[keep]
+        down = 2.0 * rng.random(len(depth)) - 1.0
+    return float(given.mean()), float(given.std() / np.sqrt(photons)), square / photons
+
+
+def fresnel(cosine: Floats, eta: float) -> Floats:
+    """Reflectance of unpolarised light from inside, 1 where none leaves."""
+    sine2 = eta**2 * (1.0 - cosine**2)
+    outside = np.sqrt(np.clip(1.0 - sine2, 0.0, None))
+    across = (eta * cosine - outside) / (eta * cosine + outside)
+    along = (cosine - eta * outside) / (cosine + eta * outside)
+    return np.where(sine2 >= 1.0, 1.0, 0.5 * (across**2 + along**2))
