@@ -179,6 +179,43 @@ def test_mips_and_arrays_come_back_from_disk(tmp_path: Path, monkeypatch: pytest
     assert made[2:] == ["again"] * 3
 
 
+def test_the_order_of_sources_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    a, b = np.zeros(3), np.ones(3)
+    made = [
+        cached_array(sources, "sum", lambda k=k: np.full(2, k))[0]  # type: ignore[misc]
+        for k, sources in enumerate([(a, b), (b, a), a, (a, b)])
+    ]
+    assert made == [0, 1, 2, 0]
+
+
+def test_what_the_folder_cannot_hold_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It would drive out all others, and itself, each time."""
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    monkeypatch.setattr(cache, "_MOST_BYTES", 1000)
+    for k in (1, 2):
+        assert cached_array(np.zeros(1), "large", lambda k=k: np.full(200, k))[0] == k  # type: ignore[misc]
+        assert cached_array(np.zeros(1), "small", lambda k=k: np.full(20, k))[0] == 1  # type: ignore[misc]
+
+
+def test_all_kinds_of_arrays_come_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    arrays = {
+        "none": np.zeros((0, 3), np.float16),
+        "one": np.array(2.5),
+        "turned": np.arange(12.0).reshape(3, 4).T,
+        "strided": np.arange(20, dtype=np.uint16)[::3],
+        "odd": np.arange(7, dtype=np.uint8),
+        "true": np.array([True, False]),
+    }
+    for _ in range(2):
+        found = cache.cached_arrays((), "kinds", list(arrays), lambda: arrays)
+    assert found is not arrays
+    for name, array in arrays.items():
+        assert found[name].dtype == array.dtype and found[name].shape == array.shape
+        assert np.array_equal(found[name], array) and found[name].flags.writeable
+
+
 def test_a_mesh_comes_back_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     mesh, made = uv_sphere(20.0), []

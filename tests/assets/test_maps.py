@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from dermis.assets import maps
 from dermis.assets.maps import Maps, load_maps
 from dermis.errors import DermisError
 from dermis.images.filters import derivatives, mip_chain, without_steps
-from dermis.images.io import write_exr, write_png
+from dermis.images.io import read_image, write_exr, write_png
 
 SHAPE = (24, 32)
 
@@ -55,6 +57,50 @@ def test_height_is_one_relief_at_every_depth(tmp_path: Path) -> None:
         np.testing.assert_allclose(load_maps(height=path, height_mm=0.025).height, relief, atol=1e-6)
     eight = load_maps(height=_png(tmp_path / "8.png", levels), height_mm=0.025).height
     np.testing.assert_allclose(eight, without_steps(relief), atol=1e-6)
+
+
+def test_a_large_file_is_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path / "cache"))
+    decoded: list[str] = []
+
+    def counted(path: Path) -> np.ndarray:
+        decoded.append(path.name)
+        return read_image(path)
+
+    monkeypatch.setattr(maps, "read_image", counted)
+    rng = np.random.default_rng(5)
+    noise = rng.integers(0, 256, (256, 256, 3)).astype(np.uint8)
+    up = _png(tmp_path / "n.png", _encoded(np.dstack([0.1 * rng.random((256, 256, 2)), np.ones((256, 256))])))
+    given: list[dict[str, Any]] = [
+        {"colour": _png(tmp_path / "c.png", noise), "normal": up},
+        {
+            "height": _png(tmp_path / "h.png", noise[..., 0]),
+            "height_mm": 0.02,
+            "roughness": tmp_path / "h.png",
+        },
+        {"height": tmp_path / "h.png", "height_mm": 0.03, "specular": tmp_path / "h.png"},
+        {"normal": up, "normal_y": "down", "region": tmp_path / "h.png"},
+    ]
+    first, second = ([load_maps(**one) for one in given] for _ in range(2))
+    assert decoded == ["c.png", "n.png", "h.png", "h.png", "h.png", "n.png", "h.png"]
+    for one, other in zip(first, second, strict=True):
+        for a, b in zip(vars(one).values(), vars(other).values(), strict=True):
+            assert (a is None and b is None) or (a.dtype == b.dtype and np.array_equal(a, b))
+    assert first[1].height is not None and first[2].height is not None
+    np.testing.assert_allclose(first[2].height, 1.5 * first[1].height, rtol=1e-6)
+    assert not np.array_equal(first[0].normal, first[3].normal)
+    _png(tmp_path / "c.png", noise[::-1])
+    np.testing.assert_array_equal(load_maps(colour=tmp_path / "c.png").colour, first[0].colour[::-1])  # type: ignore[index]
+
+
+def test_a_large_file_of_another_kind_is_refused_each_time(tmp_path: Path) -> None:
+    noise = np.random.default_rng(6).integers(0, 256, (128, 128, 3)).astype(np.uint8)
+    path = _png(tmp_path / "c.png", noise)
+    load_maps(colour=path)
+    for _ in range(2):
+        for role in ("normal", "specular"):
+            with pytest.raises(DermisError, match=r"c\.png"):
+                load_maps(**{role: path})  # type: ignore[arg-type]
 
 
 def test_steps_of_8_bits_go_and_slopes_stay() -> None:

@@ -12,9 +12,12 @@ typedef enum Colour { Red, Green, Force = 0x7FFFFFFF } Colour;
 typedef struct DeviceImpl* Device;
 typedef struct Chain { struct Chain *next; Colour colour; } Chain;
 typedef struct Entry { Chain chain; Device device; uint32_t count; double scale; } Entry;
+typedef void (*EntryCallback)(Device const * device, Colour colour, Entry entry, void* userdata);
 """
+CALLBACK = "void(Device const *, Colour, Entry, void *)"
 ASKED = (
     "Entry *",
+    "Entry * ",
     "Entry[]",
     "Chain *",
     "Device[]",
@@ -38,6 +41,11 @@ def test_types_are_cffis_own() -> None:
     entry = told.new("Entry *", {"count": 7, "scale": 0.5})
     assert entry.count == 7 and entry.scale == 0.5 and told.sizeof(entry[0]) == plain.sizeof("Entry")
     assert told.new("Entry[]", 3)[2].count == 0
+    called = []
+    listener = told.callback(CALLBACK)(lambda *given: called.append(given[1]))
+    assert told.typeof(listener) is told.typeof("EntryCallback") and CALLBACK in told._parsed_types  # type: ignore[attr-defined]
+    listener(told.NULL, 1, entry[0], told.NULL)
+    assert called == [1] and str(plain.typeof("EntryCallback")) == str(told.typeof("EntryCallback"))
     # spelled otherwise, cffi finds the same type as before
     assert told.typeof("Entry  *") is told.typeof("Entry *")
     assert told.typeof("Colour []") is told.typeof("Colour[]")
@@ -48,6 +56,8 @@ def test_wgpu_knows_what_it_asks_for(device: object) -> None:
 
     known = set(ffi._parsed_types)
     assert {"WGPUBindGroupEntry *", "WGPUBindGroupEntry[]", "WGPUExtent3D *", "WGPUCommandBuffer[]"} <= known
+    assert "void(WGPUDevice const *, WGPUErrorType, WGPUStringView, void *, void *)" in known
+    assert "void(WGPUMapAsyncStatus, WGPUStringView, void *, void *)" in known
 
 
 @pytest.mark.parametrize("broken", [object(), None])

@@ -60,6 +60,37 @@ def test_another_key_is_recorded_anew(device: Device, scale: ComputeProgram) -> 
     assert chain.recorded == 2
 
 
+def test_going_back_and_forth_records_each_once(device: Device, scale: ComputeProgram) -> None:
+    chain, repeated = Chain(device, scale), Repeated()
+    for _ in range(3):
+        for factor in (2.0, 3.0, 4.0):
+            chain.factor = factor
+            assert drawn(device, repeated, chain, factor, 1.0)[0, 0] == factor**2
+    assert chain.recorded == 3
+
+
+def test_those_used_long_ago_are_recorded_anew(device: Device, scale: ComputeProgram) -> None:
+    chain, repeated = Chain(device, scale), Repeated()
+    for key in (0, 1, 0, 2, 3, 4, 0, 1):  # 1 has gone when 4 came
+        drawn(device, repeated, chain, key, 1.0)
+    assert chain.recorded == 6
+
+
+def test_what_the_recording_returned_comes_again(device: Device, scale: ComputeProgram) -> None:
+    chain, repeated = Chain(device, scale), Repeated()
+
+    def record(frame: Frame) -> int:
+        chain.record(frame)
+        return 10 * chain.recorded
+
+    found = []
+    for key in ("a", "b", "a"):
+        frame = Frame(device)
+        found.append(repeated.draw(frame, "chain", key, record))
+        frame.submit()
+    assert found == [10, 20, 10]
+
+
 def test_numbers_of_other_frames_do_not_come_in_between(device: Device, scale: ComputeProgram) -> None:
     chain, other, repeated = Chain(device, scale), Chain(device, scale, 7.0), Repeated()
     drawn(device, repeated, chain, "one", 1.0)

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import io
 import json
 import os
+import struct
+import threading
 import zipfile
-from collections.abc import Callable
+import zlib
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
@@ -26,6 +30,10 @@ Arrays = dict[str, Array]
 _FORM = 3  # raise when `build_atlas` gives other results for the same mesh
 _MESH_FORM = 1  # raise when `load_mesh` gives other results for the same file
 _MOST_BYTES = 2 << 30
+_DAMAGED: tuple[type[Exception], ...] = (OSError, ValueError, TypeError, KeyError, EOFError, RuntimeError)
+_DAMAGED += (MemoryError, struct.error, zipfile.BadZipFile)
+_NAME_LENGTHS = 26  # where a member of an archive tells how long its name and what follows are
+_MOST_HEAD = 4096  # bytes before an array's own
 
 
 def cached_atlas(mesh: Mesh, size: int, layout: str = "mesh", reach_mm: float = REACH_MM) -> Atlas:
@@ -55,8 +63,12 @@ def cached_links(mesh: Mesh, atlas: Atlas, widest_mm: float) -> Links:
         links = find_links(mesh, atlas, widest_mm)
         return {name: getattr(links, name) for name in names}
 
-    key = _baked_key(mesh, atlas, f"{LINKS_FORM} {widest_mm!r}")
-    return Links(**_kept("opposite", key, names, make))
+    return Links(**_kept("opposite", links_key(mesh, atlas, widest_mm), names, make))
+
+
+def links_key(mesh: Mesh, atlas: Atlas, widest_mm: float) -> str:
+    """What stands for the content of `find_links`' result."""
+    return _baked_key(mesh, atlas, f"{LINKS_FORM} {widest_mm!r}")
 
 
 def cached_mesh(data: bytes, options: str, load: Callable[[], Mesh]) -> Mesh:
@@ -93,18 +105,31 @@ def cached_mips(source: Array, form: str, make: Callable[[], list[Array]]) -> li
     def levels() -> Arrays:
         return dict(zip(names, make(), strict=True))
 
-    made = _kept("mips", _array_key(source, form), names, levels)
+    made = _kept("mips", _array_key([source], form), names, levels)
     return [made[name] for name in names]
 
 
-def cached_array(source: Array, form: str, make: Callable[[], Array]) -> Array:
-    """The array that `make` returns for another one, kept on disk in the same way."""
-    return _kept("arrays", _array_key(source, form), ["array"], lambda: {"array": make()})["array"]
+def cached_array(sources: Array | Sequence[Array], form: str, make: Callable[[], Array]) -> Array:
+    """The array that `make` returns for one or more others, kept on disk in the same way.
+
+    form : all that it depends on besides their content
+    """
+    return cached_arrays(sources, form, ["array"], lambda: {"array": make()})["array"]
 
 
-def _array_key(source: Array, form: str) -> str:
-    digest = hashlib.sha256(f"{form} {source.shape} {source.dtype}".encode())
-    digest.update(np.ascontiguousarray(source).data)
+def cached_arrays(
+    sources: Array | Sequence[Array], form: str, names: list[str], make: Callable[[], Arrays]
+) -> Arrays:
+    """The arrays `names` that `make` returns for others, kept on disk in the same way."""
+    sources = [sources] if isinstance(sources, np.ndarray) else sources
+    return _kept("arrays", _array_key(sources, form), names, make)
+
+
+def _array_key(sources: Sequence[Array], form: str) -> str:
+    digest = hashlib.sha256(form.encode())
+    for source in sources:
+        digest.update(f" {source.shape} {source.dtype}".encode())
+        digest.update(np.ascontiguousarray(source).data)
     return digest.hexdigest()[:40]
 
 
@@ -122,17 +147,31 @@ def _baked_key(mesh: Mesh, atlas: Atlas, form: str) -> str:
 def _kept(folder: str, key: str, names: list[str], make: Callable[[], Arrays]) -> Arrays:
     """The arrays `names` from the file of that key, or made and stored."""
     path = cache_folder() / folder / f"{key}.npz"
-    with contextlib.suppress(OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile):
-        with path.open("rb") as file, np.load(file) as stored:
-            arrays = {name: stored[name] for name in names}
+    with contextlib.suppress(*_DAMAGED):
+        with path.open("rb") as file, zipfile.ZipFile(file) as stored:
+            arrays = {name: _array(file, stored.getinfo(f"{name}.npy")) for name in names}
         with contextlib.suppress(OSError):  # others' folder: to be read only
             path.touch()
         return arrays
     arrays = make()
-    with contextlib.suppress(OSError):
-        _store(path, arrays)
-        _prune(path.parent)
+    if sum(array.nbytes for array in arrays.values()) <= _MOST_BYTES:
+        with contextlib.suppress(OSError):
+            _store(path, arrays)
+            _prune(path.parent)
     return arrays
+
+
+def _array(file: io.BufferedReader, member: zipfile.ZipInfo) -> Array:
+    """An array that `np.savez` has stored; NumPy's own reader takes three times as long for large ones."""
+    file.seek(member.header_offset + _NAME_LENGTHS)
+    file.seek(sum(struct.unpack("<HH", file.read(4))), os.SEEK_CUR)
+    data = np.empty(member.file_size, np.uint8)
+    if file.readinto(data.data) != len(data) or zlib.crc32(data.data) != member.CRC or member.compress_type:
+        raise zipfile.BadZipFile(member.filename)
+    head = io.BytesIO(data[:_MOST_HEAD].tobytes())
+    np.lib.format.read_magic(head)
+    shape, in_columns, kind = np.lib.format.read_array_header_1_0(head)
+    return data[head.tell() :].view(kind).reshape(shape, order="F" if in_columns else "C")
 
 
 def _key(mesh: Mesh, size: int, layout: str = "mesh", reach_mm: float = REACH_MM) -> str:
@@ -145,7 +184,7 @@ def _key(mesh: Mesh, size: int, layout: str = "mesh", reach_mm: float = REACH_MM
 
 def _store(path: Path, arrays: Arrays) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_suffix(f".{os.getpid()}.part")
+    unfinished = path.with_suffix(f".{os.getpid()}.{threading.get_ident()}.part")
     try:
         with unfinished.open("wb") as file:
             np.savez(file, **arrays)  # type: ignore[arg-type]  # its last parameter is no array

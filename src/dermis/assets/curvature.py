@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.assets.cache import cached_array
 from dermis.assets.geometry import edges, sum_at, triangle_areas
 from dermis.assets.mesh import Floats, Mesh
 
@@ -13,10 +14,19 @@ SMOOTH_MM = 3.0
 """Standard deviation of what curvature is averaged over, about the way of light in skin."""
 
 _MOST_STEPS = 256
+_FORM = "curvature 1"  # raise when the same mesh gives other results
 
 
 def vertex_curvature(mesh: Mesh) -> Floats:
-    """Root mean square of the two principal curvatures, smoothed, (v,): 1/r on a sphere [1/mm]."""
+    """Root mean square of the two principal curvatures, smoothed, (v,): 1/r on a sphere [1/mm].
+
+    It is computed once for a mesh and kept on disk.
+    """
+    sources = mesh.positions, mesh.normals, mesh.triangles, mesh.point
+    return cached_array(sources, _FORM, lambda: _curvature(mesh))
+
+
+def _curvature(mesh: Mesh) -> Floats:
     corners = mesh.point[mesh.triangles]
     area = triangle_areas(mesh.positions[mesh.triangles])
     count = int(mesh.point.max()) + 1

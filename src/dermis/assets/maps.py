@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from dermis.errors import refuse
 from dermis.images.colour import decode_srgb8, decode_srgb16
 from dermis.images.filters import without_steps
-from dermis.images.io import Picture, read_image
+from dermis.images.io import Picture, read_bytes, read_image
 
 Floats = NDArray[np.float32]
 PathLike = str | Path | Picture
@@ -20,8 +21,8 @@ PathLike = str | Path | Picture
 MIN_SIZE, MAX_SIZE = 16, 16384
 # A normal this far off its surface (87 degrees) has its slope capped; nothing real leans further.
 _MIN_NORMAL_Z = 0.05
-_LARGE = 1 << 22  # texels
-_SMOOTHING = "without steps 1"  # raise when that gives other results
+_LARGE = 1 << 14  # bytes of a file whose map is kept on disk: it is read back faster than decoded
+_FORM = 1  # raise when maps of the same files become others
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,10 @@ def load_maps(
 
 def load_colour(path: PathLike) -> Floats:
     """(H, W, 3) linear Rec. 709 [-] of a colour map."""
+    return _kept(path, "colour", lambda: _colour(path))
+
+
+def _colour(path: PathLike) -> Floats:
     image = _read(path, "a colour map")
     if image.shape[2] < 3:
         refuse(path, "a colour map with red, green and blue", "it is grey", "Save it as RGB")
@@ -95,20 +100,14 @@ def load_height(path: PathLike, height_mm: float | None) -> Floats:
         came = "none was given" if height_mm is None else f"it is {height_mm}"
         remedy = "Skin maps have about 0.02 to 0.03; the map's author knows"
         refuse(path, "a height map with height_mm, the mm per grey level, above 0", came, remedy)
+    relief_mm = np.float32(255 * height_mm)
+    return _kept(path, f"height {relief_mm!r}", lambda: _height(path) * relief_mm)
+
+
+def _height(path: PathLike) -> Floats:
     image = _read(path, "a height map")
     grey = _grey(path, "a height map", image)
-    if image.dtype == np.uint8:
-        grey = _without_steps(grey)
-    return grey * np.float32(255 * height_mm)
-
-
-def _without_steps(grey: Floats) -> Floats:
-    """Smoothed; a large map is kept on disk."""
-    if grey.size < _LARGE:
-        return without_steps(grey)
-    from dermis.assets.cache import cached_array
-
-    return cached_array(grey, _SMOOTHING, lambda: without_steps(grey))
+    return without_steps(grey) if image.dtype == np.uint8 else grey
 
 
 def load_grey(path: PathLike, role: str) -> Floats:
@@ -116,11 +115,15 @@ def load_grey(path: PathLike, role: str) -> Floats:
 
     role : what the map should be, for the message
     """
-    return _within_unit(path, role, _grey(path, role, _read(path, role)))
+    return _kept(path, "grey", lambda: _within_unit(path, role, _grey(path, role, _read(path, role))))
 
 
 def load_labels(path: PathLike) -> NDArray[np.uint8]:
     """(H, W) labels of a grey picture of 8 bits."""
+    return _kept(path, "labels", lambda: _labels(path))
+
+
+def _labels(path: PathLike) -> NDArray[np.uint8]:
     image = _read(path, "a map of labels")
     if image.dtype != np.uint8 or image.shape[2] != 1:
         refuse(path, "labels in 8-bit grey", f"{image.dtype} x {image.shape[2]} came", "Save it as such")
@@ -137,6 +140,10 @@ def load_normal(path: PathLike, normal_y: Literal["up", "down"] = "up") -> Float
     """
     if normal_y not in ("up", "down"):
         refuse("normal_y", '"up" or "down"', f"it is {normal_y!r}", "Try the other if bumps look like dents")
+    return _kept(path, f"normal {normal_y}", lambda: _slopes(path, normal_y))
+
+
+def _slopes(path: PathLike, normal_y: str) -> Floats:
     image = _read(path, "a normal map")
     if image.shape[2] < 3:
         refuse(path, "a normal map with red, green and blue", "it is grey", "If it is a height map, say so")
@@ -163,6 +170,19 @@ def _check_normals(path: PathLike, normals: Floats) -> None:
         refuse(path, "a tangent-space normal map, which looks light blue", came, "Check which map this is")
 
 
+def _kept(path: PathLike, how: str, load: Callable[[], NDArray[Any]]) -> NDArray[Any]:
+    """What `load` makes of a picture file, kept on disk when the file is large.
+
+    how : all that the map depends on besides the file
+    """
+    data = read_bytes(path)
+    if len(data) < _LARGE:
+        return load()
+    from dermis.assets.cache import cached_array
+
+    return cached_array(np.frombuffer(data, np.uint8), f"map {_FORM} {how}", load)
+
+
 def _read(path: PathLike, role: str) -> NDArray[Any]:
     image = read_image(path)
     rows, columns = image.shape[:2]
@@ -178,7 +198,8 @@ def _grey(path: PathLike, role: str, image: NDArray[Any]) -> Floats:
     """(H, W) in units of the full scale, of a grey picture or of RGB whose channels agree."""
     channels = _as_unit(image[..., :3] if image.shape[2] > 1 else image)
     # JPEG may part the channels of a grey picture by a level or two.
-    apart = max(float(np.abs(channels[..., k] - channels[..., 0]).max()) for k in range(channels.shape[2]))
+    others = range(1, channels.shape[2])
+    apart = max((float(np.abs(channels[..., k] - channels[..., 0]).max()) for k in others), default=0.0)
     if apart > 2.5 / 255:
         came = f"its red, green and blue differ by up to {apart:.2f} of the full scale"
         refuse(path, f"{role} in grey", came, "Check which map this is, or save it as grey")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 from typing import Any
 
@@ -32,7 +34,10 @@ def open_device(adapter: str = "auto") -> Device:
 
 
 class Device:
-    """A logical device; nothing here is shared between two of them."""
+    """A logical device; nothing here is shared between two of them.
+
+    beside : threads for what the driver and the disk do by themselves: compile, read, copy
+    """
 
     def __init__(self, adapter: Adapter, reason: str) -> None:
         self.adapter = adapter
@@ -49,6 +54,7 @@ class Device:
             ) from error
         self.max_texture_size, self.max_storage_bytes = (int(limits[name]) for name in _RAISED_LIMITS[:2])
         self.has_timestamps = "timestamp-query" in adapter.features
+        self.beside = ThreadPoolExecutor(os.cpu_count())
         self._timestamps: tuple[Any, Any] | None = None
         self._uniform_chunks: list[Any] = []
         self._staging: dict[int, list[Any]] = {}

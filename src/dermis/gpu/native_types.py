@@ -1,7 +1,7 @@
 """C types that wgpu asks cffi for by name, told beforehand.
 
 cffi parses each new name together with all typedefs of the header, which takes some ten milliseconds, and
-a first frame asks for seventy. Here they are put together from what cffi has already parsed.
+a first frame asks for seventy five. Here they are put together from what cffi has already parsed.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ def tell_wgpus_types() -> None:
 
 
 def tell_types(ffi: Any) -> int:
-    """Add names of pointers and arrays to those that cffi knows; returns how many.
+    """Add names of pointers, arrays and callbacks to those that cffi knows; returns how many.
 
     This reaches into cffi. Where that is built otherwise it does nothing, and the first frame takes longer.
     """
     try:
         with ffi._lock:  # as its own callers do
-            made = {
-                name: (ffi._get_cached_btype(kind), False) for name, kind in _types(ffi._parser._declarations)
-            }
+            declared = ffi._parser._declarations
+            made = {name: (ffi._get_cached_btype(kind), False) for name, kind in _types(declared)}
+            made |= {name: (ffi._get_cached_btype(kind), True) for name, kind in _callbacks(declared)}
         for name, found in made.items():
             ffi._parsed_types.setdefault(name, found)
     except Exception:  # whatever another cffi makes of it
@@ -46,10 +46,24 @@ def _types(declared: Any) -> Iterator[tuple[str, Any]]:
     named = {name.removeprefix(_TYPEDEF): kind for name, (kind, _) in declared.items() if _TYPEDEF in name}
     for name, kind in named.items():
         if isinstance(kind, model.StructType | model.PrimitiveType):
-            yield f"{name} *", model.PointerType(kind)
+            yield from ((f"{name} *{space}", model.PointerType(kind)) for space in ("", " "))
         if isinstance(kind, model.StructType | model.PointerType | model.EnumType):
             yield f"{name}[]", model.ArrayType(kind, None)
     for name in _NUMBERS:
         yield name, model.PrimitiveType(name)
         yield f"{name} *", model.PointerType(model.PrimitiveType(name))
         yield f"{name} []", model.ArrayType(model.PrimitiveType(name), None)
+
+
+def _callbacks(declared: Any) -> Iterator[tuple[str, Any]]:
+    """Signatures of callbacks as wgpu spells them, with cffi's description of pointers to such functions."""
+    from cffi import model
+
+    named = {name.removeprefix(_TYPEDEF): kind for name, (kind, _) in declared.items() if _TYPEDEF in name}
+    handles = {kind.get_c_name(): name for name, kind in named.items() if isinstance(kind, model.PointerType)}
+    for name, kind in named.items():
+        if name.endswith("Callback"):
+            spelled = ", ".join(argument.get_c_name() for argument in kind.args)
+            for structure, handle in handles.items():
+                spelled = spelled.replace(structure, handle)
+            yield f"{kind.result.get_c_name()}({spelled})", kind

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -126,7 +127,14 @@ class ComputeProgram(Program):
     ) -> None:
         super().__init__(device, path, folders)
         stage = {"module": self._module, "entry_point": "main", "constants": dict(constants or {})}
-        self.pipeline = device.handle.create_compute_pipeline(layout=self._layout, compute=stage)
+        self._compiled = device.beside.submit(
+            device.handle.create_compute_pipeline, layout=self._layout, compute=stage
+        )
+
+    @cached_property
+    def pipeline(self) -> Any:
+        """Compiled from when the program is made, while others load what it is to work on."""
+        return self._compiled.result()
 
     def groups_for(self, size: tuple[int, int], tile: int = 8) -> tuple[int, int]:
         """Workgroups that cover an image of `size` with tiles of `tile` squared."""
@@ -172,3 +180,33 @@ class RasterProgram(Program):
         import wgpu
 
         return int(wgpu.ShaderStage.VERTEX | wgpu.ShaderStage.FRAGMENT)
+
+
+class FragmentProgram(Program):
+    """A shader whose `fragment` fills whole targets; its `vertex` makes the one triangle that covers them.
+
+    targets : their formats
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        path: Path,
+        folders: Sequence[Path] = (),
+        constants: Mapping[str, float] | None = None,
+        *,
+        targets: Sequence[str],
+    ) -> None:
+        super().__init__(device, path, folders)
+        stage = {"module": self._module, "entry_point": "fragment", "constants": dict(constants or {})}
+        self.pipeline = device.handle.create_render_pipeline(
+            layout=self._layout,
+            vertex={"module": self._module, "entry_point": "vertex"},
+            fragment={**stage, "targets": [{"format": texel} for texel in targets]},
+            primitive={"topology": "triangle-list"},
+        )
+
+    def _visibility(self) -> int:
+        import wgpu
+
+        return int(wgpu.ShaderStage.FRAGMENT)

@@ -29,6 +29,9 @@ _FORMATS: dict[str, tuple[type[np.generic], int]] = {
 }
 
 
+_LARGE = 1 << 24  # bytes
+
+
 def make_texture(
     device: Device,
     size: tuple[int, int],
@@ -73,6 +76,8 @@ def upload(device: Device, texture: Any, array: NDArray[Any], *, mip: int = 0, l
         {"bytes_per_row": width * channels * data.itemsize, "rows_per_image": height},
         (width, height, 1),
     )
+    if data.nbytes > _LARGE:
+        device.handle.queue.submit([])  # so that it is copied while Python goes on
 
 
 def texel_bytes(texture: Any) -> int:

@@ -52,7 +52,7 @@ def read_image(path: str | Path | Picture) -> Pixels:
 
     Grey with alpha becomes RGBA. Colour profiles and camera orientation are left aside, as for any texture.
     """
-    data = _read_bytes(path)
+    data = read_bytes(path)
     try:
         if data.startswith(EXR_START) and not isinstance(path, Picture):
             image: Pixels = decode_exr(Path(path))
@@ -130,7 +130,11 @@ def write_exr(
         OpenEXR.File(header, channels).write(str(temporary))
 
 
-def _read_bytes(path: str | Path | Picture) -> bytes:
+def read_bytes(path: str | Path | Picture) -> bytes:
+    """The picture file as it is.
+
+    DermisError : it cannot be read
+    """
     if isinstance(path, Picture):
         return path.data
     try:

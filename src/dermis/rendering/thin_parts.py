@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.assets.atlas import Atlas
-from dermis.assets.cache import cached_links
+from dermis.assets.cache import cached_links, links_key
 from dermis.assets.mesh import Mesh
 from dermis.gpu import Device, make_texture
 from dermis.rendering.stages.opposite import Opposite, Pairs, source_level, upload_pairs
@@ -31,12 +31,14 @@ def shared_width(widest_mm: float) -> float:
     return float(2.0 ** (step / _WIDTHS_TO_DOUBLE))
 
 
-def pairs_of(device: Device, mesh: Mesh, atlas: Atlas, widest_mm: float) -> Pairs:
+def pairs_of(device: Device, mesh: Mesh, atlas: Atlas, widest_mm: float, *, changing: bool) -> Pairs:
     """The places that lie opposite each other, made or read from disk.
 
     widest_mm : standard deviation of the widest Gaussian [mm]
+    changing : whether profiles come and go, so that it is not worth while to keep what each lets pass
     """
-    return upload_pairs(device, cached_links(mesh, atlas, widest_mm))
+    key = "" if changing else links_key(mesh, atlas, widest_mm)
+    return upload_pairs(device, cached_links(mesh, atlas, widest_mm), key)
 
 
 def thin_of(device: Device, stage: Opposite, pairs: Pairs, variance_mm2: Floats, weight: Floats) -> Thin:

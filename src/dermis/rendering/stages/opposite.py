@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.assets.cache import cached_array
 from dermis.assets.thin_parts.links import Links
 from dermis.gpu import ComputeProgram, Device, Frame
 from dermis.optics.gaussians import MOST_GAUSSIANS
@@ -29,6 +31,7 @@ class Pairs:
     receiver, first : buffers, as in `Links`
     pairs, sources : buffers of words, as opposite.wgsl reads them
     count, source_count : of pairs and sources
+    key : what stands for all of it, so that what a profile makes of it can be kept on disk; empty for no key
     """
 
     side: int
@@ -40,10 +43,14 @@ class Pairs:
     sources: Any
     count: int
     source_count: int
+    key: str = ""
 
 
-def upload_pairs(device: Device, links: Links) -> Pairs:
-    """The links as the shaders read them."""
+def upload_pairs(device: Device, links: Links, key: str = "") -> Pairs:
+    """The links as the shaders read them.
+
+    key : what stands for the links, if what passes is to be kept on disk
+    """
     count, number = len(links.source), len(links.texel)
     pairs = np.zeros((max(1, count), 3), np.uint32)
     pairs[:count, 0] = links.source
@@ -61,6 +68,7 @@ def upload_pairs(device: Device, links: Links) -> Pairs:
         sources=device.buffer(sources, "STORAGE"),
         count=len(pairs),
         source_count=len(sources),
+        key=key,
     )
 
 
@@ -75,14 +83,16 @@ class Opposite:
 
     def __init__(self, device: Device) -> None:
         self._device = device
-        self._program: ComputeProgram | None = None
+
+    @cached_property
+    def _program(self) -> ComputeProgram:
+        return ComputeProgram(self._device, STAGES / "opposite.wgsl")
 
     def weigh(self, pairs: Pairs, variance_mm2: Floats, weight: Floats) -> Any:
         """A buffer of the source of each pair and the share of its light, red, green and blue, that passes.
 
         variance_mm2, weight : (k,) and (k, 3) of the blurred levels
         """
-        self._program = self._program or ComputeProgram(self._device, STAGES / "opposite.wgsl")
         gaussian = np.zeros((MOST_GAUSSIANS, 4), np.float32)
         gaussian[: len(weight), :3], gaussian[: len(weight), 3] = weight, variance_mm2
         record = self._program.record(
@@ -94,6 +104,18 @@ class Opposite:
             count=len(weight),
             gaussian=gaussian,
         )
+        adapter = self._device.adapter
+        if not pairs.key or adapter.kind != "CPU":  # GPUs weigh faster than disks are read
+            return self._weighed(pairs, record)
+        told = adapter.name, adapter.driver, self._program.source.text, record.tobytes().hex()
+
+        def weigh() -> NDArray[np.uint8]:
+            links = self._weighed(pairs, record)
+            return np.frombuffer(self._device.handle.queue.read_buffer(links), np.uint8)
+
+        return self._device.buffer(cached_array((), f"passing {pairs.key} {told}", weigh), "STORAGE")
+
+    def _weighed(self, pairs: Pairs, record: Any) -> Any:
         links = self._device.handle.create_buffer(size=8 * pairs.count, usage=pairs.pairs.usage)
         bound = {"opposite": record, "pairs": pairs.pairs, "sources": pairs.sources, "links": links}
         frame = Frame(self._device)

@@ -1,0 +1,34 @@
+"""Render passes that fill whole targets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from dermis.gpu import Device, FragmentProgram, Frame, download, make_texture
+
+SIZE = (37, 21)
+
+
+def test_every_texel_of_all_targets_is_drawn_at_its_place(device: Device) -> None:
+    program = FragmentProgram(
+        device,
+        Path(__file__).parent / "places.wgsl",
+        constants={"TIMES": 2.0},
+        targets=["rgba32float", "rgba16float"],
+    )
+    one = make_texture(device, SIZE, "rgba32float", use="raster")
+    layered = make_texture(device, SIZE, "rgba16float", layers=3, use="raster")
+    view = layered.create_view(dimension="2d", base_array_layer=1, array_layer_count=1)
+    frame = Frame(device)
+    frame.fill("places", program, {"added": program.record("Added", more=(0, 0, 5, 0))}, [one, view])
+    frame.submit()
+    frame.wait()
+    x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5)
+    expected = np.stack([x, y, np.zeros_like(x), np.ones_like(x)], axis=-1)
+    assert np.array_equal(download(device, one), expected)
+    assert np.array_equal(download(device, layered, layer=1), 2.0 * expected + (0, 0, 5, 0))
+    assert not download(device, layered, layer=0).any()
+    times = frame.stage_ms()
+    assert times is None or times["places"] > 0.0
