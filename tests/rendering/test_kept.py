@@ -36,6 +36,16 @@ def test_room_is_made_before_a_thing_is() -> None:
     assert made(kept, "b") == ""
 
 
+@pytest.mark.parametrize(("depth", "rounds"), [(1, 1), (2, 4)])
+def test_a_role_that_nobody_asks_for_goes_after_some_rounds(depth: int, rounds: int) -> None:
+    kept = Kept(depth)
+    for more, expected in ((0, ""), (rounds, "a")):
+        made(kept, "a")
+        for _ in range(more + 1):
+            kept.forget_idle()
+        assert made(kept, "a") == expected
+
+
 def test_forgetting_makes_everything_again() -> None:
     kept = Kept(3)
     made(kept, "abc")
@@ -60,6 +70,14 @@ def test_the_same_pigments_are_not_fitted_again() -> None:
     profiles = SkinProfiles()
     first = profiles.of(skin(melanin=0.02))
     assert profiles.of(skin(melanin=0.02).model_copy(update={"mix": 1.0})) is first
+
+
+def test_skins_in_turn_are_fitted_once() -> None:
+    """As on both sides of the viewer's divider."""
+    profiles = SkinProfiles()
+    first = [profiles.of(skin(melanin=share)) for share in (0.02, 0.05)]
+    again = [profiles.of(skin(melanin=share)) for share in (0.02, 0.05, 0.02)]
+    assert [a is b for a, b in zip(again, [*first, first[0]], strict=True)] == [True] * 3
 
 
 def test_a_table_has_no_pigments() -> None:

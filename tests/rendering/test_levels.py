@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,23 @@ def atlas() -> Atlas:
 @pytest.fixture(scope="module")
 def textures(device: Device, atlas: Atlas) -> AtlasTextures:
     return upload_atlas(device, atlas)
+
+
+def test_halvings_are_the_same_from_disk(
+    device: Device, atlas: Atlas, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    first, second = upload_atlas(device, atlas), upload_atlas(device, atlas)
+    assert len(list(tmp_path.rglob("*.npz"))) == 1 and len(first.coarser) == len(second.coarser) == 3
+    sheet = Sheet(download(device, first.resources["stretch_map"]), atlas.reach, atlas.apron, atlas.source)
+    for one, other in zip(first.coarser, second.coarser, strict=True):
+        sheet = halved(sheet)
+        expected = np.concatenate([part.view(np.uint32) for part in (sheet.metric, sheet.reach)], axis=-1)
+        for made in (one, other):
+            assert np.array_equal(download(device, made.resources["sheet_map"]), expected)
+        aprons = [device.handle.queue.read_buffer(made.apron).tobytes() for made in (one, other)]
+        words = np.concatenate([sheet.source.view(np.uint32), sheet.apron], axis=1, dtype=np.uint32)
+        assert one.sheared == other.sheared and aprons == [words.tobytes()] * 2
 
 
 @pytest.fixture(scope="module")

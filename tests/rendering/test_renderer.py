@@ -16,6 +16,7 @@ from dermis.assets.head import Head
 from dermis.assets.primitives import SKIN, plane, uv_sphere
 from dermis.errors import DermisError
 from dermis.gpu import download
+from dermis.rendering import preparation
 from dermis.rendering.renderer import Renderer, render
 from dermis.rendering.seams import REMEDIES
 from dermis.scene.lights import DirectionalLight
@@ -69,6 +70,21 @@ def test_a_failed_frame_leaves_no_half_drawn_shadows(monkeypatch: pytest.MonkeyP
         patch.setattr(renderer.stages.shade, "draw", fail)
         with pytest.raises(ValueError):
             renderer.draw(scene(), settings_of())
+    assert drawn(renderer, scene()).tobytes() == drawn(Renderer(ADAPTER), scene()).tobytes()
+
+
+def test_maps_that_failed_are_read_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are read on another thread, and what came of it is kept."""
+    renderer = Renderer(ADAPTER)
+
+    def fail(*_: Any) -> None:
+        raise MemoryError("no more of it")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(preparation, "upload_maps", fail)
+        for _ in range(2):
+            with pytest.raises(DermisError, match="no more of it"):
+                renderer.draw(scene(), settings_of())
     assert drawn(renderer, scene()).tobytes() == drawn(Renderer(ADAPTER), scene()).tobytes()
 
 

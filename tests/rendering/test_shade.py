@@ -203,3 +203,21 @@ def test_a_thin_tail_of_a_chart_is_not_left_dark(renderer: Renderer) -> None:
     left, right = made[:, 2:25], made[:, -3:-26:-1]
     assert left.min() > 0.1
     assert np.abs(left - right).max() < 0.01 * made.max()
+
+
+@pytest.mark.parametrize("samples", [1, 4])
+@pytest.mark.parametrize("technique", ["texture-space", "screen-space"])
+def test_software_adapters_get_the_picture_of_gpus(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, technique: str, samples: int
+) -> None:
+    """Strips of pixels, the last one cut off, past what shows nothing; lights from behind passed over."""
+    shade, irradiance = renderer.stages.shade, renderer.stages.irradiance
+    sun = DirectionalLight(direction=(2, -1, 1), shadows=False)
+    scene = scene_of(head_of(uv_sphere(30.0, 24, 12)), sun, LIGHTS["spot"], frontal(), sun)
+    made = []
+    for strip, switches in ((1, ()), (16, (("PASSES_DARK", 1),))):
+        monkeypatch.setattr(shade, "_strip", strip)
+        for stage in (shade, irradiance):
+            monkeypatch.setattr(stage, "_suited", switches)
+        made.append(image(renderer, scene, size=(45, 37), samples=samples, technique=technique))
+    assert made[0].max() > 0.1 and np.array_equal(*made)

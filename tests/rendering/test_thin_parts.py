@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from dermis.optics.profiles import load_profile
 from dermis.rendering.frame import Stages
 from dermis.rendering.levels import ENTERED, make_levels
 from dermis.rendering.renderer import Renderer
-from dermis.rendering.stages.opposite import upload_pairs
+from dermis.rendering.stages.opposite import Opposite, upload_pairs
 from dermis.rendering.thin_parts import thin_of
 from dermis.scene.lights import DirectionalLight
 
@@ -109,6 +110,20 @@ def test_twin_of_what_passes(device: Device, stages: Stages, found: tuple[Mesh, 
     error = np.abs(thin_twins.decoded(words.reshape(-1, 2)[:, 1]) - twin)
     assert twin.max() > 1e-3
     assert (error <= twin.max(axis=1, keepdims=True) / 400 + 1e-6).all()  # nine bits of the brightest
+
+
+def test_what_passes_is_the_same_from_disk(
+    device: Device, found: tuple[Mesh, Atlas, Links], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    variance, weight, made = BLURRED.variance_mm2, BLURRED.weight, 0
+    plain = read_buffer(device, Opposite(device).weigh(upload_pairs(device, found[2]), variance, weight))
+    assert not list(tmp_path.rglob("*.npz"))
+    for key, factor in (("a", 1.0), ("a", 1.0), ("b", 1.0), ("b", 0.5)):
+        words = Opposite(device).weigh(upload_pairs(device, found[2], key), variance, factor * weight)
+        assert np.array_equal(read_buffer(device, words), plain) == (factor == 1.0)
+        made = len(list(tmp_path.rglob("*.npz")))
+    assert made == (3 if device.adapter.kind == "CPU" else 0)
 
 
 def test_twin_of_what_comes_through(device: Device, stages: Stages, found: tuple[Mesh, Atlas, Links]) -> None:

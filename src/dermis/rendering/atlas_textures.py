@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.assets.atlas import GUTTER, Atlas
+from dermis.assets.cache import cached_arrays
 from dermis.gpu import Device
 from dermis.gpu.textures import texture_from
 from dermis.rendering.coarser import Sheet, halved
 from dermis.rendering.levels import MOST_HALVINGS
 from dermis.rendering.seams import FEATHER_MM, REMEDIES, Remedy
 
+_HALVING = "halved 1"  # raise when `halved` gives other results
 _LEAST_SHARE = 1e-3  # of the blur at the edge itself: 0 would mean no surface
 
 
@@ -22,7 +24,8 @@ _LEAST_SHARE = 1e-3  # of the blur at the edge itself: 0 would mean no surface
 class AtlasTextures:
     """What the shaders read of an atlas, by the names they use.
 
-    resources : atlas, stretch_map, reach_map, and edge_map where two layouts are blended
+    resources : atlas, stretch_map, sheet_map, and edge_map where two layouts are blended; sheet_map alone
+        of coarser ones
     sheared : whether u and v meet at other than right angles somewhere
     apron, gathered : the list of texels beyond the charts' edges and space for their light; None without any
     coarser : the same, again and again at half the resolution; only of stitched layouts
@@ -49,7 +52,10 @@ def upload_atlas(
     metric = _metric(atlas, stretch)
     if remedy.feathered:
         metric[..., :2] = _feathered(atlas, metric[..., :2])
-    resources = {"atlas": texture_from(device, texels, "rg32uint")}
+    resources = {
+        "atlas": texture_from(device, texels, "rg32uint"),
+        "stretch_map": texture_from(device, metric, "rgba16float"),
+    }
     if len(remedy.layouts) > 1:
         resources["edge_map"] = texture_from(device, edge_mm(atlas), "r32float")
     sheet = Sheet(metric, atlas.reach, atlas.apron, atlas.source)
@@ -60,10 +66,8 @@ def upload_atlas(
 
 
 def _uploaded(device: Device, sheet: Sheet, resources: dict[str, Any], **more: Any) -> AtlasTextures:
-    resources = resources | {
-        "stretch_map": texture_from(device, sheet.metric, "rgba16float"),
-        "reach_map": texture_from(device, sheet.reach, "rgba16uint"),
-    }
+    words = np.concatenate([part.view(np.uint32) for part in (sheet.metric, sheet.reach)], axis=-1)
+    resources = resources | {"sheet_map": texture_from(device, words, "rgba32uint")}
     sheared = bool(sheet.metric[..., 2].any())
     if not len(sheet.apron):
         return AtlasTextures(resources, sheared, **more)
@@ -74,12 +78,22 @@ def _uploaded(device: Device, sheet: Sheet, resources: dict[str, Any], **more: A
 
 
 def _coarser(device: Device, sheet: Sheet) -> tuple[AtlasTextures, ...]:
-    """The sheet at half, a quarter, ... of its resolution."""
-    made: list[AtlasTextures] = []
-    while len(made) < MOST_HALVINGS and len(sheet.metric) % 2 == 0:
-        sheet = halved(sheet)
-        made.append(_uploaded(device, sheet, {}))
-    return tuple(made)
+    """The sheet at half, a quarter, ... of its resolution, made or read from disk."""
+    parts = [field.name for field in fields(Sheet)]
+    count = 0
+    while count < MOST_HALVINGS and len(sheet.metric) % (2 << count) == 0:
+        count += 1
+
+    def make() -> dict[str, NDArray[Any]]:
+        made = [sheet]
+        for _ in range(count):
+            made.append(halved(made[-1]))
+        return {f"{k} {part}": getattr(one, part) for k, one in enumerate(made[1:]) for part in parts}
+
+    names = [f"{k} {part}" for k in range(count) for part in parts]
+    found = cached_arrays([getattr(sheet, part) for part in parts], _HALVING, names, make)
+    sheets = (Sheet(**{part: found[f"{k} {part}"] for part in parts}) for k in range(count))
+    return tuple(_uploaded(device, one, {}) for one in sheets)
 
 
 def packed_texels(triangle: NDArray[Any], barycentric: NDArray[Any]) -> NDArray[np.uint32]:

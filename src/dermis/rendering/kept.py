@@ -14,14 +14,14 @@ T = TypeVar("T")
 class Kept:
     """Things by role, each made again only when its key changes.
 
-    depth : how many things of each role are kept, and for how many rounds a role that nobody asks for; for
-        who goes back and forth between some
+    depth : how many things of each role are kept, for who goes back and forth between some; a role that
+        nobody asks for is kept for the square of that many rounds, as there may be roles in turn as well
     """
 
     def __init__(self, depth: int = 1) -> None:
         self._depth = depth
         self._things: dict[str, list[tuple[Any, Any]]] = {}
-        self._asked: deque[set[str]] = deque([set()], maxlen=depth)
+        self._asked: deque[set[str]] = deque([set()], maxlen=depth * depth)
 
     def keep(self, role: str, key: Any, make: Callable[[], T]) -> T:
         """The thing of this role and key, made unless it is one of those used last."""
@@ -37,7 +37,7 @@ class Kept:
         return value
 
     def forget_idle(self) -> None:
-        """End a round: let go of roles that nobody has asked for in the last `depth` rounds."""
+        """End a round: let go of roles that nobody has asked for in the last rounds."""
         used = set().union(*self._asked)
         self._things = {role: things for role, things in self._things.items() if role in used}
         self._asked.append(set())

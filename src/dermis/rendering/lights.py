@@ -55,11 +55,16 @@ def sun_lights(suns: tuple[Sun, ...], environment: Environment) -> tuple[Directi
 
 
 def light_switches(scene: Scene) -> Switches:
-    """Values of the `override`s of lights.wgsl and environment.wgsl."""
+    """Values of the `override`s of lighting.wgsl that what is lit and what lights it call for."""
     shapes = StripeLight, RectangleLight, SphereLight
     wide = any(isinstance(light, DirectionalLight) and light.angle_degrees > 0 for light in scene.lights)
     shaped = wide or any(isinstance(light, shapes) for light in scene.lights)
-    return (("SHAPES", 1),) * shaped + (("ENVIRONMENT", 1),) * (scene.environment is not None)
+    named = {
+        "SHAPES": shaped,
+        "ENVIRONMENT": scene.environment,
+        "HALF_SPACE": scene.skin.direction != "lambertian",
+    }
+    return tuple((name, 1) for name, used in named.items() if used)
 
 
 def light_views(scene: Scene, size: int) -> list[ShadowView | None]:

@@ -8,12 +8,13 @@ from dermis.errors import refuse
 from dermis.gpu import Device
 from dermis.rendering.levels import MOST_HALVINGS
 from dermis.rendering.seams import LaidOut
+from dermis.rendering.stages.surface_texels import SURFACE_BYTES
 from dermis.scene.settings import Settings
 
 _DEPTH_BYTES = 4
 _DISTANCE = 4  # of a texel: to the edge of its chart
 _FLOATS, _HALVES = 16, 8  # of a texel
-_GEOMETRY = 8 + 8 + 8  # of a texel of an atlas: place on the mesh, stretch, reach
+_GEOMETRY = 8 + 8 + 16  # of a texel of an atlas: place on the mesh, stretch, both with reach
 _PICTURE, _APART = 36, 64  # of a pixel; of one whose light below is kept apart
 _SAMPLE = 8
 
@@ -51,7 +52,7 @@ def atlas_texel_bytes(technique: str, levels: int, layouts: int) -> float:
     else:
         blurs = _FLOATS * (levels + 2) * sum(0.25**halving for halving in range(MOST_HALVINGS + 1))
     blended = _FLOATS + layouts * _DISTANCE if layouts > 1 else 0
-    return blurs + blended + layouts * (_GEOMETRY + _FLOATS)
+    return blurs + blended + layouts * (_GEOMETRY + SURFACE_BYTES + _FLOATS)
 
 
 def check_shadows(device: Device, layers: int, size: int) -> None:

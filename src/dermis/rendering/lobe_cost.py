@@ -65,6 +65,7 @@ class _Bench:
         self._device, self._load = device, load
         self._bound: dict[str, Any] = {
             "beckmann_table": texture_from(device, beckmann_table(), "r32float"),
+            "nearest_sampler": device.sampler(),
             "albedo_table": texture_from(device, albedo_table(), "rg32float"),
             "sums": make_texture(device, (load.side, load.side), "r32float"),
         }

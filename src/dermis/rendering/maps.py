@@ -21,6 +21,9 @@ from dermis.images.colour import encode_srgb
 from dermis.images.filters import derivatives, mip_chain
 from dermis.specular.beckmann import beckmann_table
 
+DEFAULT_COLOUR = 0.8
+"""Of heads without a colour map."""
+
 _MEAN_TEXELS = 512  # a side of the grid that a map's mean is taken on
 _NO_BAND = -1.0
 _FOUR = "rgba16float"
@@ -36,7 +39,11 @@ def upload_maps(device: Device, head: Head, use_colour: bool, decoded: bool = Tr
     """
     maps = head.maps
     white = np.ones((1, 1, 3), np.float32)
-    colour = maps.colour if use_colour and maps.colour is not None else white * (0.8 if use_colour else 1.0)
+    colour = (
+        maps.colour
+        if use_colour and maps.colour is not None
+        else white * (DEFAULT_COLOUR if use_colour else 1.0)
+    )
     colour = colour if decoded else encode_srgb(colour)
     return {
         "map_sampler": device.sampler(mag_filter="linear", min_filter="linear", mipmap_filter="linear"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from concurrent.futures import Future
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from dermis.assets.atlas import Atlas
 from dermis.assets.cache import cached_atlas
 from dermis.assets.head import Head
-from dermis.gpu import Device, make_texture
+from dermis.gpu import Device
 from dermis.gpu.textures import texture_from
 from dermis.rendering import inputs as made
 from dermis.rendering import surface
@@ -46,6 +46,7 @@ from dermis.rendering.surroundings import (
 from dermis.rendering.thin_parts import lets_through, pairs_of, shared_width, thin_of
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
+from dermis.scene.skin import Skin
 from dermis.specular.albedo import albedo_table
 
 
@@ -58,11 +59,14 @@ class Preparation:
         kept = Kept(depth)
         self._keep, self.forget_all, self._forget_idle = kept.keep, kept.forget_all, kept.forget_idle
 
-    def inputs(self, scene: Scene, settings: Settings) -> Inputs:
+    def inputs(self, scene: Scene, settings: Settings, place: str = "") -> Inputs:
         """Everything that `draw_frame` touches; what it does not is let go of.
+
+        place : scenes that are drawn in turn have light and shadows of their own, by its name
 
         Raises DermisError for sizes over the device's limits.
         """
+        self._place, self._shadow = place, settings.shadow_size  # light that has spread is kept for each size
         made_now = self._inputs(scene, settings)
         self._forget_idle()
         return made_now
@@ -120,41 +124,39 @@ class Preparation:
         surroundings: Surroundings,
     ) -> list[Layout]:
         """The atlases that light is spread on: one, or two that hide each other's seams."""
-        layouts = []
+        layouts, maps = [], self._begin_maps(scene, settings)
+        shared = {"panorama": surroundings.panorama, "albedo_table": self._albedo(scene.skin)}
         for index, name in enumerate(atlases.layouts):
             atlas, textures = self._atlas(scene.head, name, atlases.side, settings, index)
-            head = self._head(scene, atlas, settings, index)
-            lit = self._lit(scene, head, views, shadow_maps) | {"panorama": surroundings.panorama}
+            thin = self._thin(scene, settings, split, atlas, index)
+            head = self._head(scene, atlas, maps, index)
+            lit = self._lit(scene, head, views, shadow_maps) | shared
             around = self._environment(scene, settings, split.total, head, lit, atlas, textures, index)
             space = self._space(f"scattered {index}", settings.atlas if len(split.blurred_mm2) else 1)
-            layout = Layout(head, textures, lit | around, space)
-            layouts.append(self._thin(scene, settings, split, atlas, layout, index))
+            layouts.append(Layout(head, textures, lit | around, space, thin))
         return layouts
 
     def _thin(
-        self, scene: Scene, settings: Settings, split: made.Split, atlas: Atlas, layout: Layout, index: int
-    ) -> Layout:
-        """The layout with what lies opposite its thin parts, and space for the light from there."""
+        self, scene: Scene, settings: Settings, split: made.Split, atlas: Atlas, index: int
+    ) -> Thin | None:
+        """What lies opposite a layout's thin parts, and space for the light from there."""
         if not (len(split.blurred_mm2) and lets_through(settings)):
-            return layout
+            return None
         head, widest = scene.head, float(np.sqrt(split.blurred_mm2[-1]))
-        widest = shared_width(widest) if scene.skin.pigments else widest
+        widest = shared_width(widest) if scene.skin.has_own_tissue else widest
 
         def find() -> Pairs:
-            return pairs_of(self.device, head.mesh, atlas, widest)
+            return pairs_of(self.device, head.mesh, atlas, widest, changing=scene.skin.has_own_tissue)
 
         pairs = self._keep(f"pairs {index}", (head, atlas, repr(widest)), find)
-        profile = split.blurred_mm2, split.weight
-
-        def make() -> Thin:
-            return thin_of(self.device, self._stages.opposite, pairs, *profile)
-
+        profile, stage = (split.blurred_mm2, split.weight), self._stages.opposite
         key = (pairs, *(numbers.tobytes() for numbers in profile))
-        return replace(layout, thin=self._keep(f"thin {index}", key, make))
+        return self._keep(f"thin {index}", key, lambda: thin_of(self.device, stage, pairs, *profile))
 
     def _levels(self, technique: str, side: int, count: int) -> Levels:
         stage = self._stages.spreading(technique)
-        return self._keep("levels", (stage.name, side, count), lambda: stage.make_levels(side, count))
+        key = stage.name, side, count, self._shadow
+        return self._keep("levels" + self._place, key, lambda: stage.make_levels(side, count))
 
     def _scattered(self, layouts: list[Layout], side: int) -> Any:
         return self._space("scattered", side) if len(layouts) > 1 else layouts[0].scattered
@@ -174,16 +176,15 @@ class Preparation:
     ) -> dict[str, Any]:
         """What both lighting passes read: the head, its skin, the lights and their shadows."""
         program = self._stages.shade.program
-        skin = surface.skin_record(program, scene, head)
+        skin = surface.skin_record(program, scene, head, self.profile_of)
         skin["light_count"] = len(views)
         return {
             **head.resources,
             "skin": skin,
-            "albedo_table": self._albedo_table(surface.model_of(scene.skin), scene.skin.fresnel),
             "lights": self._keep("light records", views, lambda: light_records(program, scene, views)),
             "shadow_maps": shadow_maps.texture,
             "shadow_bounds": shadow_maps.bounds,
-            "shadow_sampler": self.device.sampler(),
+            "nearest_sampler": self.device.sampler(),
         }
 
     def _environment(
@@ -209,18 +210,17 @@ class Preparation:
         record = environment_record(self._stages.shade.program, scene, total, occluded)
         return {"environment": record, "occlusion_map": self._keep(f"occlusion {index}", key, make)}
 
-    def _albedo_table(self, model: str, fresnel: str) -> Any:
-        def make() -> Any:
-            return texture_from(self.device, albedo_table(model, fresnel), "rg32float")
-
-        return self._keep("albedo table", (model, fresnel), make)
+    def _albedo(self, skin: Skin) -> Any:
+        key = surface.model_of(skin), skin.fresnel
+        return self._keep("albedo", key, lambda: texture_from(self.device, albedo_table(*key), "rg32float"))
 
     def _shadow_maps(self, head: Head, layers: int, size: int) -> ShadowMaps:
         key = (head, layers, size)  # heads of one size have the same matrices
-        return self._keep("shadows", key, lambda: self._stages.shadows.make_maps(layers, size))
+        return self._keep("shadows" + self._place, key, lambda: self._stages.shadows.make_maps(layers, size))
 
     def _space(self, role: str, side: int) -> Any:
-        return self._keep(role, side, lambda: make_texture(self.device, (side, side), "rgba32float"))
+        stage = self._stages.combine
+        return self._keep(role + self._place, (side, self._shadow, stage), lambda: stage.make_sum(side))
 
     def _atlas(
         self, head: Head, layout: str, size: int, settings: Settings, index: int
@@ -229,22 +229,22 @@ class Preparation:
         atlas = self._keep(
             f"atlas {index}", (head, layout, size), lambda: cached_atlas(head.mesh, size, layout)
         )
+        key = atlas, stretch, remedy
+        return atlas, self._keep(f"atlas textures {index}", key, lambda: upload_atlas(self.device, *key))
 
-        def make() -> AtlasTextures:
-            return upload_atlas(self.device, atlas, stretch, remedy)
+    def _begin_maps(self, scene: Scene, settings: Settings) -> Future[dict[str, Any]]:
+        """The head's maps, which take long to read: on another thread, while the rest is made."""
+        key = scene.head, scene.skin.albedo == "map", settings.gamma == "right"
+        return self._keep("maps", key, lambda: self.device.beside.submit(upload_maps, self.device, *key))
 
-        return atlas, self._keep(f"atlas textures {index}", (atlas, stretch, remedy), make)
-
-    def _head(self, scene: Scene, atlas: Atlas, settings: Settings, index: int) -> HeadTextures:
-        head, use_colour = scene.head, scene.skin.albedo == "map"
-
-        def make_maps() -> dict[str, Any]:
-            return upload_maps(self.device, head, use_colour, decoded=settings.gamma == "right")
-
-        def make_geometry() -> dict[str, Any]:
-            return upload_geometry(self.device, head.mesh, atlas)
-
-        maps = self._keep("maps", (head, use_colour, settings.gamma), make_maps)
-        geometry = self._keep(f"geometry {index}", (head, atlas), make_geometry)
-        unscattered = self._keep(f"unscattered {index}", (head, atlas), lambda: atlas.unscattered(head.mesh))
-        return HeadTextures(maps | geometry, relief_band(head.maps), len(head.mesh.triangles), unscattered)
+    def _head(self, scene: Scene, atlas: Atlas, maps: Future[dict[str, Any]], index: int) -> HeadTextures:
+        head, mesh = scene.head, scene.head.mesh
+        key = head, atlas
+        geometry = self._keep(f"geometry {index}", key, lambda: upload_geometry(self.device, mesh, atlas))
+        unscattered = self._keep(f"unscattered {index}", key, lambda: atlas.unscattered(mesh))
+        try:
+            resources = geometry | maps.result()
+        except Exception:
+            self.forget_all()  # maps that failed must not be found again
+            raise
+        return HeadTextures(resources, relief_band(head.maps), len(mesh.triangles), unscattered)

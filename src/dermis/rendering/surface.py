@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.assets.maps import Maps
 from dermis.gpu import ComputeProgram
+from dermis.optics.directions import directions
+from dermis.optics.gaussians import GaussianSum
 from dermis.rendering.geometry import HeadTextures
+from dermis.rendering.maps import DEFAULT_COLOUR
 from dermis.rendering.stages.variants import Switches
 from dermis.scene.model import Scene
 from dermis.scene.skin import Skin
 from dermis.specular.energy import ENERGY
 from dermis.specular.fresnel import FRESNEL, SKIN_ETA, SKIN_F0
 from dermis.specular.models import MODELS
+
+ProfileOf = Callable[[Skin], GaussianSum]
+_APART = 16  # texels between those whose mean is the colour of the skin
 
 
 def model_of(skin: Skin) -> str:
@@ -25,8 +36,11 @@ def switches(skin: Skin) -> Switches:
     return tuple((name, number) for name, number in numbers.items() if number)
 
 
-def skin_record(program: ComputeProgram, scene: Scene, head: HeadTextures) -> Any:
-    """The skin's parameters; a roughness map replaces the constant."""
+def skin_record(program: ComputeProgram, scene: Scene, head: HeadTextures, profile_of: ProfileOf) -> Any:
+    """The skin's parameters; a roughness map replaces the constant.
+
+    profile_of : the Gaussians of a skin, asked for where directions matter
+    """
     skin, energy = scene.skin, ENERGY[scene.skin.energy]
     mapped = scene.head.maps.roughness is not None
     return program.record(
@@ -41,4 +55,28 @@ def skin_record(program: ComputeProgram, scene: Scene, head: HeadTextures) -> An
         mix=skin.mix,
         relief_band=head.relief_band,
         light_count=len(scene.lights),
+        **(_by_direction(scene, profile_of) if skin.direction == "half-space" else {}),
     )
+
+
+def _by_direction(scene: Scene, profile_of: ProfileOf) -> dict[str, Any]:
+    """What light does by its directions, for half-spaces of the skin's mean colour."""
+    skin = scene.skin
+    colour = _mean_colour(scene.head.maps) if skin.albedo == "map" else profile_of(skin).albedo
+    law = directions(colour, 1.0 if skin.specular == "none" else SKIN_ETA)
+    return {
+        "inner_eta": law.eta,
+        "mean_once": law.mean_once,
+        "once": law.once,
+        "back_from_everywhere": law.from_everywhere,
+        "back": np.pad(law.returned, ((0, 0), (0, 1))),
+    }
+
+
+def _mean_colour(maps: Maps) -> NDArray[np.float64]:
+    """Of texels far enough apart to be quick, black ones, which nobody painted, left out."""
+    if maps.colour is None:
+        return np.full(3, DEFAULT_COLOUR)
+    texels = maps.colour[::_APART, ::_APART].reshape(-1, 3).astype(np.float64)
+    painted = texels[texels.sum(axis=1) > 0.0]
+    return np.asarray(painted.mean(axis=0)) if len(painted) else np.zeros(3)

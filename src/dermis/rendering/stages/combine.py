@@ -22,6 +22,10 @@ class Combine:
         self._nothing = make_texture(device, (1, 1), "rgba32float", use="map")
         self._linear = device.sampler(mag_filter="linear", min_filter="linear")
 
+    def make_sum(self, side: int) -> Any:
+        """Space for the sum."""
+        return make_texture(self._device, (side, side), ENTERED)
+
     def draw(
         self, frame: Frame, levels: Levels, weight: NDArray[np.float64], into: Any, transmitted: Any = None
     ) -> None:

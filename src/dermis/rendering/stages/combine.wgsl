@@ -28,8 +28,13 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     var sum = vec4f(0.0);
-    for (var k = 0u; k < weights.count; k++) {
+    var k = 0u;
+    loop { // left at its end, as in lighting.wgsl
         sum += weights.weight[k] * textureLoad(levels, id.xy, weights.first + k, weights.mip);
+        k++;
+        if (k >= weights.count) {
+            break;
+        }
     }
     let place = (vec2f(id.xy) + 0.5) / vec2f(size);
     if (COARSER) {

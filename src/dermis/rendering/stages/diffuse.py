@@ -34,7 +34,8 @@ class Diffuse:
         self.texel = texel or (ENTERED if device.adapter.kind == "CPU" else "rgba16float")
         self._stitch = {form: Stitch(device, form) for form in {ENTERED, self.texel}}
         self._made: dict[tuple[str, bool, str], list[ComputeProgram]] = {}
-        self._kernels = texture_from(device, kernel_table(), "r32float")
+        table = kernel_table()
+        self._kernels = texture_from(device, np.dstack([table[:-1], table[1:]]), "rg32float")
         self._linear = device.sampler(mag_filter="linear", min_filter="linear")
         self._halve = self._program("diffuse_halve.wgsl", self.texel)
 

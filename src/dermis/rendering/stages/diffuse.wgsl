@@ -39,9 +39,9 @@ struct Kernel {
 }
 
 @group(0) @binding(0) var<uniform> spread: Spread;
-@group(0) @binding(1) var stretch_map: texture_2d<f32>; // texels per mm along u, v; cosine between them; 1 in the apron
-@group(0) @binding(2) var reach_map: texture_2d<u32>; // texels on the same chart: left, right, up, down
-@group(0) @binding(3) var kernel_table: texture_2d<f32>; // row: variance, column: taps on each side
+// Halves: texels per mm along u, v; cosine between them; 1 in the apron. Then texels on the same chart: left, right, up, down.
+@group(0) @binding(1) var sheet_map: texture_2d<u32>;
+@group(0) @binding(3) var kernel_table: texture_2d<f32>; // row: variance, column: taps on each side; here and in the next row
 
 // Any covariance is that of a blur along u and one along a leaning v [Geusebroek2003]: the lower right element is the
 // latter's, and what that leaves of the upper left one is the former's.
@@ -82,9 +82,8 @@ fn first_ratio(taps: i32, variance: f32) -> f32 {
         return exp(-0.5 / variance);
     }
     let row = variance * ROWS_PER_UNIT;
-    let low = textureLoad(kernel_table, vec2i(taps, i32(row)), 0).x;
-    let high = textureLoad(kernel_table, vec2i(taps, i32(row) + 1), 0).x;
-    return mix(low, high, fract(row));
+    let ratio = textureLoad(kernel_table, vec2i(taps, i32(row)), 0).xy;
+    return mix(ratio.x, ratio.y, fract(row));
 }
 
 // Variance that reading between two texels of u will add on the way along v: the mean of f (1 - f) over the taps.
@@ -94,12 +93,17 @@ fn added_by_lean(v: Axis) -> f32 {
     var weight = 1.0;
     var sum = 0.0;
     var total = 1.0;
-    for (var n = 1; n <= kernel.taps; n++) {
+    var n = 1;
+    loop {
         weight *= ratio;
         ratio *= kernel.q * kernel.q;
         let f = fract(v.lean * f32(n * kernel.step));
         sum += 2.0 * weight * f * (1.0 - f);
         total += 2.0 * weight;
+        n++;
+        if (n > kernel.taps) {
+            break;
+        }
     }
     return sum / total;
 }
@@ -133,12 +137,13 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let here = vec2i(id.xy);
     // All that is read here is asked for at once: what follows is short, and would wait for each by itself.
-    let stretch = textureLoad(stretch_map, here, 0);
+    let sheet = textureLoad(sheet_map, here, 0);
+    let stretch = vec4f(unpack2x16float(sheet.x), unpack2x16float(sheet.y));
     var sum = texel(here);
     var limit = vec2f(1e6);
     if (EDGE == REPEATED) {
-        let reach = vec4f(textureLoad(reach_map, here, 0));
-        limit = select(reach.zw, reach.xy, AXIS == 0u);
+        let reach = select(sheet.w, sheet.z, AXIS == 0u);
+        limit = vec2f(vec2u(reach & 0xffffu, reach >> 16u));
     }
     if (AXIS == 1u && stretch.w > 0.0) {
         return; // the apron is filled from where its light belongs
@@ -162,12 +167,17 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var ratio = kernel.q;
     var weight = 1.0;
     var offset = 0.0;
-    for (var n = 0; n < kernel.taps; n++) {
+    var n = 0;
+    loop { // left at its end, as in lighting.wgsl; without taps q is 0
         weight *= ratio;
         ratio *= growth;
         offset += step;
         let reached = min(vec2f(offset), limit);
         sum += weight * (tap(vec2f(here), -reached.x, axis.lean) + tap(vec2f(here), reached.y, axis.lean));
+        n++;
+        if (n >= kernel.taps) {
+            break;
+        }
     }
     store(id.xy, vec4f(spread.scale * sum.rgb / sum.a, 1.0));
 }

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from dermis.gpu import Device, Frame, make_texture
+from dermis.gpu import ComputeProgram, Device, Frame, make_texture
 from dermis.gpu.program import Resources
 from dermis.rendering.stages import STAGES
 from dermis.rendering.stages.nearest import Layers
-from dermis.rendering.stages.variants import Switches, Variants
+from dermis.rendering.stages.variants import Switches, Variants, lighting_switches
 from dermis.scene.settings import Settings
 
+_STRIP = 16  # pixels of an invocation on software adapters, see shade.wgsl
 _TECHNIQUES: dict[str, Switches] = {
     "screen-space": (("SPLIT", 1),),
     "pre-integrated": (("PRE_INTEGRATED", 1),),
@@ -26,8 +27,10 @@ class Shade:
     """Shades every sample of every pixel and averages them."""
 
     def __init__(self, device: Device) -> None:
+        self._strip = _STRIP if device.adapter.kind == "CPU" else 1
+        self._suited = lighting_switches(device)
         self._variants = Variants(device, STAGES / "shade.wgsl")
-        self.program = self._variants.program()
+        self.program = self._program(())
         self._nothing = make_texture(device, (1, 1), "rgba32float", layers=2)
 
     def draw(
@@ -51,4 +54,9 @@ class Shade:
         """
         bound = {**lit, "shade": view, "seen": seen.texture, "scattered": scattered, "image": into}
         bound["apart"] = apart or self._nothing
-        frame.compute("shade", self._variants.program(switches), bound, size)
+        strips = size[0], -(-size[1] // self._strip)
+        frame.compute("shade", self._program(switches), bound, strips)
+
+    def _program(self, switches: Switches) -> ComputeProgram:
+        """The pipeline for these switches on this device."""
+        return self._variants.program((*switches, *self._suited, ("STRIP", self._strip)))

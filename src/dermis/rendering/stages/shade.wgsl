@@ -1,8 +1,12 @@
 // The image: light that scattered below, relit at its finest level, under the white lobe of the surface.
 //#include "lighting.wgsl"
 //#include "pre_integrated.wgsl"
+//#include "sample_bits.wgsl"
 
 override SPLIT: bool = false; // whether light below the skin is kept apart, to spread over the picture
+// Pixels of an invocation, one below the other. Software adapters run both sides of every branch for all of a vector's pixels
+// as long as one of them needs it: there each pixel goes on to the next when it is done, past those that see nothing.
+override STRIP: u32 = 1u;
 
 const EYE_ROUGHNESS: f32 = 0.1; // plain materials are wet: eyeballs, teeth
 const FINEST_RATIO: f32 = 4.0; // longest over shortest side of a footprint that one map sample may stand for
@@ -48,28 +52,23 @@ fn open_sky(point: Point, t: vec4u, w: vec3f) -> f32 {
     return dot(w, vec3f(open_at_vertex(t.x), open_at_vertex(t.y), open_at_vertex(t.z)));
 }
 
-fn shaded_skin(point: Point, v: vec3f, footprint: f32, open: f32) -> Shaded {
-    let surface = surface_at(point, footprint);
-    let lit = light_up(point, surface, v, open);
-    var below = lit.entered * share_of(surface.colour, skin.mix);
+fn shaded_skin(point: Point, surface: Surface, lit: Lit, out: f32, footprint: f32, open: f32) -> Shaded {
+    let share = share_of(surface.colour, skin.mix);
+    var below = lit.entered * share;
     if (PRE_INTEGRATED) {
-        below = shade.total * pre_integrated(point, surface, footprint, open) * share_of(surface.colour, skin.mix);
+        below = shade.total * pre_integrated(point, surface, footprint, open) * share;
     } else if ((point.flags & MAPPED) != 0u) {
         below = shade.relit * below + load_bilinear(scattered, point.place).rgb;
     } else {
         below *= shade.total;
     }
-    let out = leaves(dot(surface.normal, v), surface.roughness, surface.rho_s) / PI;
-    let tint = mix(vec3f(1.0), surface.colour, skin.tint);
-    let depth = dot(point.position - shade.eye, shade.forward);
-    let leaving = shade.shown.x * out * share_of(surface.colour, 1.0 - skin.mix);
-    return Shaded(below, leaving, shade.shown.y * lit.reflected * tint, depth);
+    let over = shade.shown.y * lit.reflected * mix(vec3f(1.0), surface.colour, skin.tint);
+    let leaving = shade.shown.x * out * share_of(surface.colour, 1.0 - skin.mix) * turned(lit, shade.total * share, below);
+    return Shaded(below, leaving, over, dot(point.position - shade.eye, shade.forward));
 }
 
-fn shaded_plain(point: Point, v: vec3f, open: f32) -> Shaded {
-    let colour = shade.material_colour[point.flags >> 8u].rgb;
-    let lit = light_up(point, Surface(point.normal, colour, EYE_ROUGHNESS, 1.0), v, open);
-    let below = lit.entered * colour * leaves(dot(point.normal, v), EYE_ROUGHNESS, 1.0) / PI;
+fn shaded_plain(surface: Surface, lit: Lit, out: f32) -> Shaded {
+    let below = lit.entered * surface.colour * out;
     return Shaded(vec3f(0.0), vec3f(0.0), shade.shown.x * below + shade.shown.y * lit.reflected, 0.0);
 }
 
@@ -106,15 +105,26 @@ fn shaded(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Shaded {
     point.place = place_of_point(triangle, inside);
     let open = open_sky(point, t, inside);
     let v = normalize(shade.eye - point.position);
-    if ((t.w & OPAQUE) != 0u) {
-        return shaded_plain(point, v, open);
-    }
+    let opaque = (t.w & OPAQUE) != 0u;
     let spacing = sqrt(share);
     let wx = meet(weights, ray_through(place + vec2f(spacing, 0.0), size)) - w;
     let wy = meet(weights, ray_through(place + vec2f(0.0, spacing), size)) - w;
     let x = length(wx.x * a.uv + wx.y * b.uv + wx.z * c.uv);
     let y = length(wy.x * a.uv + wy.y * b.uv + wy.z * c.uv);
-    return shaded_skin(point, v, max(min(x, y), max(x, y) / FINEST_RATIO), open);
+    let footprint = max(min(x, y), max(x, y) / FINEST_RATIO);
+    var surface: Surface;
+    if (opaque) {
+        surface = Surface(point.normal, shade.material_colour[point.flags >> 8u].rgb, EYE_ROUGHNESS, 1.0);
+    } else {
+        surface = surface_at(point, footprint);
+    }
+    // Called once: software adapters run both sides of a branch for all pixels.
+    let lit = light_up(point, surface, v, open);
+    let out = leaves(dot(surface.normal, v), surface.roughness, surface.rho_s) / PI;
+    if (opaque) {
+        return shaded_plain(surface, lit, out);
+    }
+    return shaded_skin(point, surface, lit, out, footprint, open);
 }
 
 // The skin of one pixel, each member times the share of its samples.
@@ -138,55 +148,103 @@ fn keep(held: PixelSkin, part: Shaded, share: f32, pixel: f32) -> PixelSkin {
     return held;
 }
 
-// One of 64 bits.
-fn bit_of(index: u32) -> vec2u {
-    return select(vec2u(0u, 1u << (index % 32u)), vec2u(1u << (index % 32u), 0u), index < 32u);
+// What some samples of a pixel see together.
+struct Part {
+    triangle: u32,
+    place: vec2f, // in the image
+    share: f32, // of the pixel; 0 for nothing
 }
 
-// As many bits from the first on.
-fn samples_of(count: u32) -> vec2u {
-    return vec2u(extractBits(~0u, 0u, min(count, 32u)), extractBits(~0u, 0u, max(count, 32u) - 32u));
+// A pixel on its way.
+struct Pixel {
+    at: vec2u,
+    left: vec2u, // samples that have not been looked at
+    sum: vec4f, // radiance and coverage
+    skin: PixelSkin,
+}
+
+fn pixel_at(at: vec2u) -> Pixel {
+    return Pixel(at, samples_of(shade.samples), vec4f(0.0), PixelSkin(vec3f(0.0), vec3f(0.0), 0.0, 0.0));
+}
+
+// Samples that see one triangle are shaded together: its maps are filtered over their part of the pixel.
+fn next_part(pixel: ptr<function, Pixel>) -> Part {
+    let at = (*pixel).at;
+    var left = (*pixel).left;
+    var s = select(32u + firstTrailingBit(left.y), firstTrailingBit(left.x), left.x != 0u);
+    let triangle = textureLoad(seen, at, s, 0).x;
+    var place = vec2f(0.0);
+    var n = 0u;
+    loop {
+        if (textureLoad(seen, at, s, 0).x == triangle) {
+            place += shade.jitter[s].xy;
+            n++;
+            left &= ~bit_of(s);
+        }
+        s++;
+        if (s >= shade.samples) {
+            break;
+        }
+    }
+    (*pixel).left = left;
+    let share = select(0.0, f32(n) / f32(shade.samples), triangle > 0u);
+    return Part(triangle - 1u, vec2f(at) + place / f32(n), share);
+}
+
+// The next part that shows something, here or further down; pixels on the way are finished.
+fn find(pixel: ptr<function, Pixel>, end: u32) -> Part {
+    loop {
+        if (all((*pixel).left == vec2u(0u))) {
+            finish(*pixel);
+            *pixel = pixel_at((*pixel).at + vec2u(0u, 1u));
+            if ((*pixel).at.y >= end) {
+                break;
+            }
+        }
+        let part = next_part(pixel);
+        if (part.share > 0.0) {
+            return part;
+        }
+    }
+    return Part(0u, vec2f(0.0), 0.0);
+}
+
+fn finish(pixel: Pixel) {
+    var sum = pixel.sum;
+    if (SPLIT) {
+        // What is taken out here comes back spread; light of a pixel's lesser surfaces stays where it is.
+        let skin = pixel.skin;
+        let held = max(skin.share, 1e-6);
+        sum -= vec4f(skin.below * skin.leaving / held, 0.0);
+        textureStore(apart, pixel.at, 0, vec4f(skin.below, skin.depth) / held);
+        textureStore(apart, pixel.at, 1, vec4f(skin.leaving, 0.0));
+    }
+    let size = vec2f(textureDimensions(image));
+    let behind = seen_behind(ray_through(vec2f(pixel.at) + 0.5, size), shade.background);
+    textureStore(image, pixel.at, vec4f(sum.rgb + (1.0 - sum.a) * behind, sum.a));
 }
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(image);
-    if (any(id.xy >= size)) {
+    let first = vec2u(id.x, id.y * STRIP);
+    if (any(first >= size)) {
         return;
     }
-    let pixel = vec2f(id.xy);
-    var sum = vec4f(0.0);
-    var skin_below: PixelSkin;
-    var left = samples_of(shade.samples);
-    // Samples that see one triangle are shaded together: its maps are filtered over their part of the pixel.
-    while (any(left != vec2u(0u))) {
-        let first = select(32u + firstTrailingBit(left.y), firstTrailingBit(left.x), left.x != 0u);
-        let triangle = textureLoad(seen, id.xy, first, 0).x;
-        var place = vec2f(0.0);
-        var n = 0u;
-        for (var s = first; s < shade.samples; s++) {
-            if (textureLoad(seen, id.xy, s, 0).x == triangle) {
-                place += shade.jitter[s].xy;
-                n++;
-                left &= ~bit_of(s);
+    let end = min(first.y + STRIP, size.y);
+    var pixel = pixel_at(first);
+    var part = find(&pixel, end);
+    loop {
+        if (part.share > 0.0) {
+            let one = shaded(part.triangle, part.place, part.share, vec2f(size));
+            pixel.sum += part.share * vec4f(one.below * one.leaving + one.over, 1.0);
+            if (SPLIT && one.depth > 0.0) {
+                pixel.skin = keep(pixel.skin, one, part.share, 2.0 * length(shade.up) / f32(size.y));
             }
         }
-        let share = f32(n) / f32(shade.samples);
-        if (triangle > 0u) {
-            let part = shaded(triangle - 1u, pixel + place / f32(n), share, vec2f(size));
-            sum += share * vec4f(part.below * part.leaving + part.over, 1.0);
-            if (SPLIT && part.depth > 0.0) {
-                skin_below = keep(skin_below, part, share, 2.0 * length(shade.up) / f32(size.y));
-            }
+        part = find(&pixel, end);
+        if (part.share == 0.0) {
+            break;
         }
     }
-    if (SPLIT) {
-        // What is taken out here comes back spread; light of a pixel's lesser surfaces stays where it is.
-        let held = max(skin_below.share, 1e-6);
-        sum -= vec4f(skin_below.below * skin_below.leaving / held, 0.0);
-        textureStore(apart, id.xy, 0, vec4f(skin_below.below, skin_below.depth) / held);
-        textureStore(apart, id.xy, 1, vec4f(skin_below.leaving, 0.0));
-    }
-    let behind = seen_behind(ray_through(pixel + 0.5, vec2f(size)), shade.background);
-    textureStore(image, id.xy, vec4f(sum.rgb + (1.0 - sum.a) * behind, sum.a));
 }

@@ -2,13 +2,19 @@
 //#include "geometry.wgsl"
 //#include "bilinear.wgsl"
 //#include "skin.wgsl"
+//#include "direction.wgsl"
 //#include "lobe.wgsl"
 //#include "lights.wgsl"
 //#include "environment.wgsl"
 
+// Whether each point passes over lights from behind its surface by itself. Software adapters shade such points all the same, as
+// long as one beside them sees the light; GPUs read lights faster that are the same for all.
+override PASSES_DARK: bool = false;
+
 struct Lit {
-    entered: vec3f, // irradiance that enters the skin
+    entered: vec3f, // irradiance that enters the skin, times what of it comes back over that of light from above
     reflected: vec3f, // radiance off the surface
+    turned: vec3f, // of `entered` what leaves towards the eye beyond the mean over all directions
 }
 
 // The normal of the facets that are seen: where the relief turns away from the eye, it is turned back to the horizon. A lobe
@@ -18,14 +24,49 @@ fn seen_normal(normal: vec3f, v: vec3f) -> vec3f {
     return turned / max(length(turned), 1e-3);
 }
 
+// What leaves towards the eye of light below the skin, over the mean of all directions. What scattered only once came in here;
+// the rest, from around it, goes all ways alike.
+// share: of `entered` that comes back
+fn turned(lit: Lit, share: vec3f, below: vec3f) -> vec3f {
+    if (!HALF_SPACE) {
+        return vec3f(1.0);
+    }
+    return 1.0 + share * lit.turned / max(max(share * lit.entered, below), vec3f(1e-6));
+}
+
+// The first light from `first` on that a point may see, or the last.
+fn next_that_may_shine(first: u32, p: vec3f, n: vec3f) -> u32 {
+    var i = first;
+    loop {
+        let light = lights.light[i];
+        let towards = select(light.position - p, -light.direction, light.kind == DIRECTIONAL);
+        if (light.kind >= STRIPE || dot(towards, n) > 0.0 || i + 1u >= skin.light_count) {
+            break;
+        }
+        i++;
+    }
+    return i;
+}
+
 // open: share of the sky that the point sees
 fn light_up(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
-    var lit = Lit(vec3f(0.0), vec3f(0.0));
+    var lit = Lit(vec3f(0.0), vec3f(0.0), vec3f(0.0));
     let mirror = seen_normal(surface.normal, v);
-    for (var i = 0u; i < skin.light_count; i++) {
+    let by_direction = HALF_SPACE && (point.flags & OPAQUE) == 0u;
+    let facing = clamp(dot(surface.normal, v), 0.0, 1.0);
+    // Loops are left at their end: software adapters run them through once more for a test at the start.
+    var i = 0u;
+    loop {
+        if (skin.light_count == 0u) {
+            break;
+        }
+        if (PASSES_DARK) {
+            i = next_that_may_shine(i, point.position, surface.normal);
+        }
         let light = lights.light[i];
         var seen = -1.0; // how much of the light: not known yet
-        for (var part = 0u; part < parts_of(light); part++) {
+        var part = 0u;
+        loop {
             let arriving = incident(light, point.position, part);
             let cosine = dot(surface.normal, arriving.direction);
             if (cosine > 0.0) {
@@ -33,16 +74,34 @@ fn light_up(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
                     seen = visibility(light, point, arriving.direction);
                 }
                 let e = arriving.irradiance * seen;
-                lit.entered += e * (cosine * enters(cosine, surface.roughness, surface.rho_s));
+                var entering = e * (cosine * enters(cosine, surface.roughness, surface.rho_s));
+                if (by_direction) {
+                    lit.turned += entering * beyond_mean(cosine, facing);
+                    entering *= coming_back(cosine);
+                }
+                lit.entered += entering;
                 let share = surface.rho_s * max(dot(mirror, arriving.direction), 0.0);
                 lit.reflected += e * (share * lobe(mirror, arriving.direction, v, surface.roughness));
             }
+            part++;
+            if (part >= parts_of(light)) {
+                break;
+            }
+        }
+        i++;
+        if (i >= skin.light_count) {
+            break;
         }
     }
     if (ENVIRONMENT) {
         let around = ambient(surface.normal, open, surface.colour * environment.albedo);
         let albedo = surface.rho_s * surface_albedo(dot(mirror, v), surface.roughness).x;
-        lit.entered += around * enters_from_everywhere(surface.roughness, surface.rho_s);
+        var entering = around * enters_from_everywhere(surface.roughness, surface.rho_s);
+        if (by_direction) {
+            lit.turned += entering * beyond_mean_from_everywhere(facing);
+            entering *= skin.back_from_everywhere;
+        }
+        lit.entered += entering;
         lit.reflected += albedo * mirrored(point, mirror, v, surface.roughness, open);
     }
     return lit;

@@ -44,7 +44,6 @@ struct Lights {
 @group(0) @binding(11) var<uniform> lights: Lights;
 @group(0) @binding(12) var shadow_maps: texture_2d_array<f32>; // depth: 1 near, 0 nothing
 @group(0) @binding(25) var shadow_bounds: texture_2d_array<f32>; // nearest depths in squares, see shadow_bounds.wgsl
-@group(0) @binding(13) var shadow_sampler: sampler; // non-filtering
 
 struct Incident {
     direction: vec3f, // to the light

@@ -51,8 +51,12 @@ fn lobe(n: vec3f, l: vec3f, v: vec3f, m: f32) -> f32 {
 // Share of light from (or to) a direction that the surface reflects, for rho_s = 1, and its mean over directions.
 fn surface_albedo(cos_theta: f32, m: f32) -> vec2f {
     let size = vec2f(textureDimensions(albedo_table));
-    let place = vec2f(sqrt(max(cos_theta, 0.0)), (sqrt(m) - ROOT_OF_FIRST_ROW) / (1.0 - ROOT_OF_FIRST_ROW));
-    return load_bilinear(albedo_table, (place * (size - 1.0) + 0.5) / size).xy;
+    let row = (sqrt(m) - ROOT_OF_FIRST_ROW) / (1.0 - ROOT_OF_FIRST_ROW);
+    let place = vec2f(sqrt(max(cos_theta, 0.0)), row) * (size - 1.0);
+    let corner = (floor(place) + 1.0) / size;
+    let share = textureGather(0, albedo_table, nearest_sampler, corner);
+    let mean = textureGather(1, albedo_table, nearest_sampler, corner);
+    return gather_weights(place) * mat2x4f(share, mean);
 }
 
 // Share of light from a direction that enters the skin.

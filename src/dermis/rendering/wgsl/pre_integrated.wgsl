@@ -179,13 +179,21 @@ fn pre_integrated(point: Point, surface: Surface, footprint: f32, open: f32) -> 
                     seen = spread_visibility(light, point, arriving.direction);
                 }
                 let mean = dot(cosine, vec3f(1.0 / 3.0));
-                sum += arriving.irradiance * cosine * seen * enters(mean, surface.roughness, surface.rho_s);
+                var entering = arriving.irradiance * cosine * seen * enters(mean, surface.roughness, surface.rho_s);
+                if (HALF_SPACE) {
+                    entering *= coming_back(mean);
+                }
+                sum += entering;
             }
         }
     }
     if (ENVIRONMENT) {
         let around = ambient(normals[1], open, surface.colour * environment.albedo);
-        sum += around * enters_from_everywhere(surface.roughness, surface.rho_s);
+        var entering = around * enters_from_everywhere(surface.roughness, surface.rho_s);
+        if (HALF_SPACE) {
+            entering *= skin.back_from_everywhere;
+        }
+        sum += entering;
     }
     return sum;
 }

@@ -140,7 +140,7 @@ fn nearest_around(light: Light, place: vec2f, radius: f32) -> f32 {
     let count = size.y >> level;
     let first = select(vec2u(0u), vec2u(size.y, size.y - 2u * count), level > 0u);
     let corner = clamp(round(place / f32(4u << level)), vec2f(1.0), vec2f(f32(count - 1u)));
-    let found = textureGather(0, shadow_bounds, shadow_sampler, (vec2f(first) + corner) / vec2f(size), light.layer);
+    let found = textureGather(0, shadow_bounds, nearest_sampler, (vec2f(first) + corner) / vec2f(size), light.layer);
     return select(max(max(found.x, found.y), max(found.z, found.w)), 1.0, radius > 32.0);
 }
 

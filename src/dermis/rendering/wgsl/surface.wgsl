@@ -1,4 +1,5 @@
 // The skin's numbers, and the tables of its surface.
+//#include "bilinear.wgsl"
 
 const PI: f32 = 3.14159265358979;
 
@@ -13,8 +14,19 @@ struct Skin {
     mix: f32, // share of the colour map applied before scattering
     relief_band: f32, // mip of the height map from which on the normal map knows the relief, -1 without one
     light_count: u32,
+    inner_eta: f32, // index under the surface for what half-spaces return, 1 without a surface; see direction.wgsl
+    mean_once: f32, // of 1/(a + b) over both directions
+    once: vec3f, // strength of what scattered only once
+    back_from_everywhere: vec3f, // share of light from all directions that comes back, over that from straight above
+    back: array<vec4f, 32>, // the same of light from one, by evenly spaced roots of the cosine
 }
 
 @group(0) @binding(2) var<uniform> skin: Skin;
+@group(0) @binding(13) var nearest_sampler: sampler; // non-filtering, to gather with
 @group(0) @binding(9) var beckmann_table: texture_2d<f32>;
 @group(0) @binding(10) var albedo_table: texture_2d<f32>; // rho_dt and its mean over directions
+
+// Bilinear weights of the four texels in the order in which they are gathered; whole numbers are texel centres.
+fn gather_weights(place: vec2f) -> vec4f {
+    return bilinear_weights(place).zwyx;
+}

@@ -8,8 +8,10 @@ fn beckmann(a: Angles, m: f32) -> f32 {
 
 // From the table that holds half its tenth root. Source: [dEonLuebke2007].
 fn beckmann_by_table(cos_h: f32, m: f32) -> f32 {
-    let columns = f32(textureDimensions(beckmann_table).x); // the first is cos_h = 0, the last 1
-    let t = 2.0 * load_bilinear(beckmann_table, vec2f((cos_h * (columns - 1.0) + 0.5) / columns, m)).x;
+    let size = vec2f(textureDimensions(beckmann_table)); // the first column is cos_h = 0, the last 1
+    let place = vec2f(cos_h * (size.x - 1.0), m * size.y - 0.5);
+    let quad = textureGather(0, beckmann_table, nearest_sampler, (floor(place) + 1.0) / size);
+    let t = 2.0 * dot(gather_weights(place), quad);
     let t2 = t * t;
     let t4 = t2 * t2;
     return t4 * t4 * t2;

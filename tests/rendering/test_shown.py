@@ -35,8 +35,8 @@ def scene(frame_mm: float = 70.0) -> Scene:
     return scene_of(HEAD, frontal(), camera=front_camera(HEAD, frame_mm=frame_mm))
 
 
-def drawn(renderer: Renderer, settings: dict[str, Any], *, keep_light: bool) -> bytes:
-    return renderer.draw(scene(), settings_of(**settings), keep_light=keep_light).linear().tobytes()
+def drawn(renderer: Renderer, settings: dict[str, Any], *, keep_stages: bool) -> bytes:
+    return renderer.draw(scene(), settings_of(**settings), keep_stages=keep_stages).linear().tobytes()
 
 
 @pytest.mark.parametrize("name", SEQUENCES)
@@ -44,9 +44,9 @@ def test_kept_light_never_shows(keeping: Renderer, name: str) -> None:
     anew = []
     for settings in SEQUENCES[name]:
         keeping.forget()
-        anew.append(drawn(keeping, settings, keep_light=False))
+        anew.append(drawn(keeping, settings, keep_stages=False))
     keeping.forget()
-    kept = [drawn(keeping, settings, keep_light=True) for settings in SEQUENCES[name]]
+    kept = [drawn(keeping, settings, keep_stages=True) for settings in SEQUENCES[name]]
     assert [a == b for a, b in zip(kept, anew, strict=True)] == [True] * len(anew)
 
 
@@ -61,7 +61,7 @@ def test_a_camera_that_moves_leaves_the_light(keeping: Renderer, monkeypatch: py
 
     monkeypatch.setattr(keeping.stages.irradiance, "draw", counted)
     for frame_mm in (70.0, 60.0, 50.0):
-        keeping.draw(scene(frame_mm), settings_of(), keep_light=True)
+        keeping.draw(scene(frame_mm), settings_of(), keep_stages=True)
     assert len(lit) == 1
     keeping.draw(scene(), settings_of())
     assert len(lit) == 2
