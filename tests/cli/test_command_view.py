@@ -22,6 +22,7 @@ Run = Callable[..., Any]
     [
         (("--port", "80"), "--port"),
         (("--host", "0.0.0.0"), "--host"),
+        (("--token",), "--token"),
         (("--browser", "--port", "70000"), "--port"),
         (("--size", "wide"), "--size"),
         (("--atlas", "3"), "--atlas"),
@@ -46,6 +47,16 @@ def test_without_the_extra_it_says_what_to_install(
     ended = run("view", "head.obj", *words, "--adapter", "cpu")
     assert ended.code == 2
     assert package.replace("_", "-") in ended.stderr and 'pip install "dermis[viewer]"' in ended.stderr
+
+
+def test_who_exposes_the_page_is_warned(capfd: pytest.CaptureFixture[str]) -> None:
+    from dermis.cli.view import _announce
+
+    _announce("http://gpu.example:8765/secret/", True)
+    told = capfd.readouterr()
+    assert "/secret/" in told.out and "not encrypted" in told.err and "other machines" in told.err
+    _announce("http://127.0.0.1:8765/", False)
+    assert "warning" not in capfd.readouterr().err
 
 
 def test_the_package_imports_without_the_extra() -> None:
@@ -88,10 +99,11 @@ def test_a_notebook_displays_the_same_viewer(folder: Path, monkeypatch: pytest.M
         def _repr_mimebundle_(self, **options: Any) -> dict[str, str]:
             return {"text/plain": "shown"}
 
-    backend: Any = ModuleType("rendercanvas.anywidget")
-    backend.RenderCanvas = Canvas
-    monkeypatch.setitem(sys.modules, "anywidget", ModuleType("anywidget"))
-    monkeypatch.setitem(sys.modules, "rendercanvas.anywidget", backend)
+    cell: Any = ModuleType("dermis.viewer.notebook")
+    cell.CellCanvas = Canvas
+    for name in ("anywidget", "rendercanvas.anywidget"):
+        monkeypatch.setitem(sys.modules, name, ModuleType(name))
+    monkeypatch.setitem(sys.modules, "dermis.viewer.notebook", cell)
     state = ViewerState(Scene(load_head(folder / "head.obj"))).with_settings(atlas=64, samples=1)
     viewer = notebook_viewer(state, "cpu", (64, 48))
     assert viewer._repr_mimebundle_() == {"text/plain": "shown"}

@@ -27,7 +27,7 @@ from dermis.scene.model import Scene
 from dermis.scene.plain import Plain
 from dermis.scene.saving import save_scene, scene_toml
 from dermis.scene.settings import Settings
-from dermis.scene.skin import Pigments, Skin
+from dermis.scene.skin import Pigments, Skin, TissueLayer
 
 HEAD = Head("ball", uv_sphere(100.0, 16, 8), Maps())
 SHARED: dict[str, Any] = {"irradiance": (0.1, 2.0, 1e-7), "shadows": False, "softness_mm": np.float64(2.5)}
@@ -42,7 +42,24 @@ LIGHTS = (
     StripeLight(**SHEET, position=(1.0, 2.0, 3.0), up=(1.0, 0.2, 0.0), width_mm=3.0, length_mm=20.0),
 )
 CAMERA = Camera(position=(1.0, 2.0, 900.0), target=(1e-7, 3.0, 0.0), up=(0.1, 1.0, 0.0), frame_mm=33.0)
-PIGMENTS = Pigments(melanin=0.1, eumelanin=0.2, blood=0.01, oxygen=0.5, epidermis_mm=0.1)
+PIGMENTS = Pigments(
+    structure="donner2008",
+    melanin=0.1,
+    eumelanin=0.2,
+    blood=0.01,
+    oxygen=0.5,
+    epidermis_mm=0.1,
+    epidermal_blood=0.02,
+)
+LAYERS = (
+    TissueLayer(
+        name='epi"dermis',
+        thickness_mm=0.25,
+        absorption_per_mm=(0.2, 1e-7, 0.5),
+        scattering_per_mm=(4.8, 6.0, 6.5),
+    ),
+    TissueLayer(absorption_per_mm=(0.0, 0.1, 0.2), scattering_per_mm=(3.0, 4.0, 5.0)),
+)
 SKIN = Skin(
     profile="medium",
     albedo="profile",
@@ -54,7 +71,9 @@ SKIN = Skin(
     fresnel="exact",
     specular_colour="wrong",
     energy="published",
+    direction="half-space",
     pigments=PIGMENTS,
+    layers=LAYERS,
 )
 ROOM = Environment(name="uniform", rotation_degrees=33.0, exposure=0.5, visible=True)
 SETTINGS = Settings(

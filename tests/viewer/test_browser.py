@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
-import io
 import shutil
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from chromium_hands import (
+    PATIENCE_S,
+    differs_from,
+    drag,
+    head,
+    height,
+    looks_like,
+    pixels,
+    shows_head,
+    still,
+    touch,
+)
 from numpy.typing import NDArray
-from offscreen_hands import ADAPTER
+from offscreen_hands import ADAPTER, Hands
 
 SIZE = {"width": 400, "height": 480}
 _CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -27,7 +37,6 @@ _QUIET = (
     "--disable-component-update",
     "--disable-sync",
 )
-_PATIENCE_S = 25.0
 _GET_IMAGE = (
     "() => { const i = document.querySelector('img'); return i && i.complete && i.naturalWidth === 400 }"
 )
@@ -66,53 +75,11 @@ def page(browser: Any, url: str) -> Iterator[Any]:
     one.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
     one.on("pageerror", lambda error: errors.append(str(error)))
     one.goto(url)
-    one.wait_for_function(_GET_IMAGE, timeout=1000 * _PATIENCE_S)
+    one.wait_for_function(_GET_IMAGE, timeout=1000 * PATIENCE_S)
+    one.keyboard.press("1")  # the portrait, wherever the test before left the camera
     yield one
     one.close()
     assert errors == []
-
-
-def pixels(page: Any) -> NDArray[np.int64]:
-    from PIL import Image
-
-    return np.array(Image.open(io.BytesIO(page.screenshot())).convert("RGB")).astype(np.int64)
-
-
-def still(page: Any, judge: Callable[[NDArray[np.int64]], bool]) -> NDArray[np.int64]:
-    """The first picture that satisfies `judge` and does not change any more."""
-    last, end = pixels(page), time.monotonic() + _PATIENCE_S
-    while time.monotonic() < end:
-        time.sleep(0.4)
-        found = pixels(page)
-        if judge(found) and np.abs(found - last).max() == 0:
-            return found
-        last = found
-    raise AssertionError("the page never shows that")
-
-
-def head(image: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The part that the panel does not cover."""
-    return image[40:430, 205:]
-
-
-def shows_head(image: NDArray[np.int64]) -> bool:
-    return bool(head(image)[150:250, :60].mean() > 15.0 and head(image)[:20, -20:].mean() < 3.0)
-
-
-def differs_from(before: NDArray[np.int64]) -> Callable[[NDArray[np.int64]], bool]:
-    return lambda image: not looks_like(before)(image)
-
-
-def looks_like(before: NDArray[np.int64]) -> Callable[[NDArray[np.int64]], bool]:
-    """Whether an image is the same but for its encoding: a new frame comes as JPEG, then as PNG."""
-    return lambda image: bool(np.abs(head(image) - head(before)).mean() < 0.5)
-
-
-def drag(page: Any, start: tuple[float, float], end: tuple[float, float]) -> None:
-    page.mouse.move(*start)
-    page.mouse.down()
-    page.mouse.move(*end, steps=8)
-    page.mouse.up()
 
 
 def test_the_page_shows_the_head_and_a_drag_turns_it(page: Any) -> None:
@@ -121,16 +88,22 @@ def test_the_page_shows_the_head_and_a_drag_turns_it(page: Any) -> None:
     still(page, differs_from(before))
 
 
-def test_the_panel_alters_the_picture(page: Any) -> None:
+@pytest.fixture(scope="module")
+def places(make_hands: Callable[[], Hands]) -> dict[str, tuple[float, float]]:
+    """Where the panel's controls are in a window of the page's size, with the list of views open."""
+    hands = make_hands()
+    hands.press("show")
+    return hands.viewer.desk.places
+
+
+def test_the_panel_alters_the_picture(page: Any, places: dict[str, tuple[float, float]]) -> None:
     before = still(page, shows_head)
-    page.mouse.click(30, 43)  # the list of views, at the top of the panel
-    page.wait_for_timeout(400)
-    page.mouse.click(30, 126)  # irradiance
-    still(page, differs_from(before))
-    page.mouse.click(30, 43)
-    page.wait_for_timeout(400)
-    page.mouse.click(30, 69)
-    still(page, looks_like(before))
+    for view, judge in (("irradiance", differs_from(before)), ("picture", looks_like(before))):
+        closed = pixels(page)[80:280, :100]
+        page.mouse.click(*places["show"])
+        still(page, lambda image: bool(np.abs(image[80:280, :100] - closed).mean() > 3.0))  # noqa: B023
+        page.mouse.click(*places[f"show/{view}"])
+        still(page, judge)
 
 
 def test_a_lost_connection_comes_back_by_itself(page: Any) -> None:
@@ -145,7 +118,7 @@ def test_a_lost_connection_comes_back_by_itself(page: Any) -> None:
 def test_a_reloaded_page_shows_the_head_again(page: Any) -> None:
     still(page, shows_head)
     page.reload()
-    page.wait_for_function(_GET_IMAGE, timeout=1000 * _PATIENCE_S)
+    page.wait_for_function(_GET_IMAGE, timeout=1000 * PATIENCE_S)
     still(page, shows_head)
 
 
@@ -153,13 +126,97 @@ def test_a_second_page_watches_and_does_not_touch(page: Any, browser: Any, url: 
     before = still(page, shows_head)
     watcher = browser.new_page(viewport=SIZE)
     watcher.goto(url)
-    watcher.wait_for_function(_GET_IMAGE, timeout=1000 * _PATIENCE_S)
-    assert "passive" in watcher.inner_text("#status")
+    watcher.wait_for_function(_GET_IMAGE, timeout=1000 * PATIENCE_S)
+    assert "watching" in watcher.inner_text("#notice")
     drag(watcher, (320, 240), (230, 240))
     watcher.wait_for_timeout(700)
     assert looks_like(before)(pixels(page))
     drag(page, (320, 240), (230, 240))
     still(watcher, differs_from(before))
     page.close()
-    watcher.wait_for_function("() => !document.querySelector('#status').innerText.includes('passive')")
+    watcher.wait_for_function("() => document.querySelector('#notice').innerText === ''")
     watcher.close()
+
+
+def test_one_finger_turns_the_head_and_two_come_nearer_and_pan(browser: Any, url: str) -> None:
+    page = browser.new_context(viewport=SIZE, has_touch=True).new_page()
+    page.goto(url)
+    page.wait_for_function(_GET_IMAGE, timeout=1000 * PATIENCE_S)
+    before = still(page, shows_head)
+    touch(page, [(320, 240)], [(300, 240)], [(270, 250)], [(240, 260)])
+    turned = still(page, differs_from(before))
+    assert abs(height(turned) - height(before)) < 30  # it came no nearer
+    touch(page, [(300, 230)], *([(300, 230 + 5 * k), (300, 270 - 5 * k)] for k in range(4)))
+    farther = still(page, lambda image: height(image) < 0.8 * height(turned))
+    touch(page, [(300, 240)], *([(300, 240 + 30 * k), (330, 240 + 30 * k)] for k in range(4)))
+    panned = still(page, lambda image: lowest(image) > lowest(farther) + 40)
+    for _ in range(2):
+        page.touchscreen.tap(300, 300)
+    still(page, lambda image: lowest(image) < lowest(panned) - 20)  # the place is in the middle now
+    page.context.close()
+
+
+def lowest(image: NDArray[np.int64]) -> int:
+    """The last row of the picture that shows some of the head."""
+    return int(np.flatnonzero(head(image).max(axis=(1, 2)) > 25)[-1])
+
+
+def test_keys_and_the_wheel_work_without_a_click(page: Any) -> None:
+    before = still(page, shows_head)
+    for _ in range(2):  # Tab must not leave the picture
+        page.keyboard.press("Tab")
+        bare = still(page, lambda image: bool(image[100:300, :60].max() < 30))
+        page.keyboard.press("Tab")
+        still(page, looks_like(before))
+    assert bare.shape == before.shape
+    page.mouse.move(300, 240)
+    page.mouse.wheel(0, 400)
+    still(page, lambda image: height(image) < 0.85 * height(before))
+    page.keyboard.press("Control+z")
+    still(page, looks_like(before))
+
+
+def test_a_window_that_changes_its_size_is_filled(page: Any) -> None:
+    still(page, shows_head)
+    page.set_viewport_size({"width": 500, "height": 300})
+    page.wait_for_function("() => document.querySelector('img').naturalWidth === 500")
+    page.set_viewport_size(SIZE)
+    page.wait_for_function(_GET_IMAGE, timeout=1000 * PATIENCE_S)
+
+
+def test_a_watcher_of_another_size_takes_over_with_its_own(page: Any, browser: Any, url: str) -> None:
+    still(page, shows_head)
+    watcher = browser.new_page(viewport={"width": 520, "height": 320})
+    watcher.goto(url)
+    watcher.wait_for_function(_GET_IMAGE, timeout=1000 * PATIENCE_S)
+    page.close()
+    watcher.wait_for_function(
+        "() => document.querySelector('img').naturalWidth === 520", timeout=1000 * PATIENCE_S
+    )
+    watcher.close()
+
+
+_RECORD_SOCKETS = """
+    window.opened = []
+    window.WebSocket = class extends EventTarget {
+        constructor (address) { super(); window.opened.push(address) }
+    }
+"""
+
+
+@pytest.mark.parametrize(("page_at", "socket_at"), [("http:", "ws:"), ("https:", "wss:")])
+def test_a_page_that_came_encrypted_opens_an_encrypted_socket(
+    page_at: str, socket_at: str, browser: Any, url: str
+) -> None:
+    """As behind a proxy, which here hands the server's own files on."""
+    page = browser.new_page()
+    page.add_init_script(_RECORD_SOCKETS)
+    elsewhere = f"{page_at}//skin.example/some/token/"
+    page.route(
+        elsewhere + "**",
+        lambda route: route.fulfill(response=page.request.get(url + route.request.url[len(elsewhere) :])),
+    )
+    page.goto(elsewhere)
+    page.wait_for_function("() => window.opened.length > 0")
+    assert page.evaluate("window.opened") == [f"{socket_at}//skin.example/some/token/"]
+    page.close()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import socket
 from typing import Any
 
 import numpy as np
@@ -84,11 +85,18 @@ def test_pages_of_other_sites_are_refused(kind: str) -> None:
     assert status(ask(guard, kind=kind, origin=f"http://{HOST}")) in (200, "websocket.accept")
 
 
+def test_with_the_token_a_proxy_may_call_the_host_otherwise() -> None:
+    answers = ask(Guard(_app, "secret"), "/secret/", "websocket", HOST, origin="https://skin.example")
+    assert status(answers) == "websocket.accept"
+
+
 @pytest.mark.parametrize(
     ("event", "passes"),
     [
         ({"type": "pointer_down", "x": 1, "y": 2}, True),
         ({"type": "_framefeedback", "index": 3}, True),
+        ({"type": "_framefeedback", "index": "3"}, False),
+        ({"type": "_framefeedback"}, False),
         ({"type": "resize", "pwidth": 1920, "pheight": 1080, "ratio": 1}, True),
         ({"type": "resize", "pwidth": 100000, "pheight": 100000, "ratio": 1}, False),
         ({"type": "resize", "pwidth": "many", "pheight": 1, "ratio": 1}, False),
@@ -143,6 +151,17 @@ def test_other_hosts_get_a_token_that_is_new_each_time() -> None:
     listener, address = bind("127.0.0.1", 0)
     with listener:
         assert address.token == "" and address.url == f"http://127.0.0.1:{address.port}/"
+
+
+def test_this_machine_gets_a_token_when_asked() -> None:
+    listener, address = bind("127.0.0.1", 0, secret=True)
+    with listener:
+        assert len(address.token) >= 20 and address.url.endswith(f"/{address.token}/")
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::"])
+def test_a_server_that_listens_everywhere_goes_by_the_machine_s_name(host: str) -> None:
+    assert Address(host, 80, "secret").url == f"http://{socket.gethostname()}:80/secret/"
 
 
 def test_addresses_of_version_six_are_bracketed() -> None:

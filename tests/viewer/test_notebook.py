@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import io
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -67,3 +68,9 @@ def test_the_widget_shows_the_head_and_a_drag_turns_it(state: ViewerState) -> No
         assert np.abs(after[:150, 165:] - before[:150, 165:]).mean() > 0.5
 
     asyncio.run(visit())
+
+
+def test_a_closed_widget_is_closed_once(head_file: Path) -> None:
+    viewer = notebook_viewer(str(head_file), ADAPTER, SIZE)
+    viewer.canvas.close()
+    assert viewer.canvas.get_closed()

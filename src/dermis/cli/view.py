@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
 
 from dermis.cli.console import note, print_lines, working_on
 from dermis.cli.options import Whole, check, parse_size
@@ -23,6 +25,7 @@ def view(
     browser: bool = False,
     port: Whole = None,
     host: str | None = None,
+    token: Annotated[bool, Parameter(negative="")] = False,
     size: str = "1280x800",
     atlas: Whole = None,
     samples: Whole = None,
@@ -35,8 +38,8 @@ def view(
     """Turn a head, its skin and its light in a window or in a web page.
 
     Drag to turn, right drag to pan, wheel to come nearer, double click to turn around a place, Shift and
-    drag to carry the light. Keys 1 to 5 are the camera presets, Tab hides the panel, Ctrl+Z and Ctrl+Y undo
-    and redo. The panel saves the scene as a TOML file that `dermis render` takes.
+    drag to carry the light. Keys 1 to 5 are the camera presets, Tab hides the panel, ? shows all keys, Ctrl+Z
+    and Ctrl+Y undo and redo. The panel saves the scene as a TOML file that `dermis render` takes.
 
     Examples
     --------
@@ -54,6 +57,8 @@ def view(
         Where the page is served; 0 for any that is free [8765].
     host:
         Address to listen at; others than this machine's own need the token in the printed URL [127.0.0.1].
+    token:
+        Ask for a token in the URL on this machine too: for one with other users, and behind a proxy.
     size:
         WIDTHxHEIGHT of the window [1280x800].
     atlas:
@@ -71,9 +76,9 @@ def view(
     adapter:
         auto (the best), cpu (software), or a part of an adapter's name.
     """
-    given = {name: value for name, value in locals().items() if value is not None}
+    given = {name: value for name, value in locals().items() if value is not None and value is not False}
     if not browser:
-        for name in ("port", "host"):
+        for name in ("port", "host", "token"):
             if name in given:
                 refuse(f"--{name}", "a web page with it", "there is none", "Add --browser")
     _check_port(port)
@@ -83,7 +88,8 @@ def view(
     with working_on("loading"):
         state = _state(head, given, adapter)
     if browser:
-        serve(state, adapter, window, host or _HOST, _PORT if port is None else port, _announce)
+        where = host or _HOST, _PORT if port is None else port
+        serve(state, adapter, window, *where, _announce, secret=token)
     else:
         show_window(state, adapter, window)
     return 0
@@ -100,7 +106,7 @@ def _state(head: str, given: dict[str, Any], adapter: str) -> ViewerState:
     from dermis.gpu.adapters import fitting_adapters
     from dermis.scene import Settings
     from dermis.scene.files import head_table
-    from dermis.viewer.state import ViewerState
+    from dermis.viewer.state import opened
 
     is_scene = Path(head).suffix.lower() == ".toml"
     check(Settings, {name: given[name] for name in ("atlas", "samples") if name in given})
@@ -111,7 +117,7 @@ def _state(head: str, given: dict[str, Any], adapter: str) -> ViewerState:
     name = str(Path(head).resolve()) if Path(head).is_file() else head
     table = head_table(Path(head)) if is_scene else {"name": name}
     rig = given.get("lights", "" if is_scene else "none" if "env" in given else "studio")
-    return ViewerState(scene, settings, table, rig=rig)
+    return opened(scene, settings, table, rig)
 
 
 def _announce(url: str, exposed: bool) -> None:

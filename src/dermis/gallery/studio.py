@@ -64,7 +64,8 @@ class Studio:
         view : one of those that the viewer offers, such as "blur 3"
         """
         from dermis.gpu import download
-        from dermis.viewer.views import PARTS, Views
+        from dermis.viewer.state import PARTS
+        from dermis.viewer.views import Views
 
         if view in ("picture", *PARTS):
             return self.render(scene, scale, parts=PARTS.get(view, "all"), **settings)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from dermis.gpu.compute_pass import ComputePass
 from dermis.gpu.device import Device
-from dermis.gpu.program import ComputeProgram, RasterProgram, Resources
+from dermis.gpu.program import ComputeProgram, FragmentProgram, RasterProgram, Resources
 from dermis.gpu.readback import Fetched
 from dermis.gpu.timing import Timestamps, WallClock
 from dermis.gpu.uniforms import Uniforms
@@ -99,24 +99,24 @@ class Frame:
         layer : the instance index that the shader sees
         far : the depth that the attachment starts at
         """
-        colour = [{"view": target, "load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 0)}]
-        self._end_pass()
-        stamps = self._begin(stage)
-        one = self._encoder.begin_render_pass(
-            label=stage,
-            color_attachments=colour if target is not None else [],
-            depth_stencil_attachment={
-                "view": depth,
-                "depth_load_op": "clear",
-                "depth_store_op": "store",
-                "depth_clear_value": far,
-            },
-            timestamp_writes=stamps,
-        )
-        one.set_pipeline(program.pipeline)
-        for index, (group, offsets) in enumerate(program.bind_groups(resources, self._uniforms)):
-            one.set_bind_group(index, group, offsets)
+        attached = {
+            "view": depth,
+            "depth_load_op": "clear",
+            "depth_store_op": "store",
+            "depth_clear_value": far,
+        }
+        targets = [target] if target is not None else []
+        one = self._render_pass(stage, program, resources, targets, attached)
         one.draw(vertices, 1, 0, layer)
+        one.end()
+
+    def fill(
+        self, stage: str, program: FragmentProgram, resources: Resources, targets: Sequence[Any]
+    ) -> None:
+        """Run `program` for each texel of its targets, textures or views of them, in a render pass."""
+        views = [one.create_view() if hasattr(one, "create_view") else one for one in targets]
+        one = self._render_pass(stage, program, resources, views)
+        one.draw(3)
         one.end()
 
     def submit(self) -> None:
@@ -138,6 +138,29 @@ class Frame:
         """Time of each stage after `submit` [ms], with "total"; None when the device cannot tell."""
         clock = self._wall or self._stamps
         return clock.stage_ms() if clock else None
+
+    def _render_pass(
+        self,
+        stage: str,
+        program: RasterProgram | FragmentProgram,
+        resources: Resources,
+        targets: Sequence[Any],
+        depth: dict[str, Any] | None = None,
+    ) -> Any:
+        """A pass over cleared targets in which `program` is about to draw."""
+        cleared = {"load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 0)}
+        self._end_pass()
+        stamps = self._begin(stage)
+        one = self._encoder.begin_render_pass(
+            label=stage,
+            color_attachments=[{"view": target, **cleared} for target in targets],
+            depth_stencil_attachment=depth,
+            timestamp_writes=stamps,
+        )
+        one.set_pipeline(program.pipeline)
+        for index, (group, offsets) in enumerate(program.bind_groups(resources, self._uniforms)):
+            one.set_bind_group(index, group, offsets)
+        return one
 
     def _compute_pass(self, stage: str) -> ComputePass:
         """The open pass, or a new one where a stage begins whose time is taken."""

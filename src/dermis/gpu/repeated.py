@@ -5,12 +5,15 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable
 from functools import partial
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 from dermis.gpu.device import Device
 from dermis.gpu.frame import Frame, Step
 from dermis.gpu.program import ComputeProgram, Resources
 from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
+
+T = TypeVar("T")
+_MOST = 4  # recordings of a role: two states, each in motion and still
 
 
 class Recording(Frame):
@@ -59,7 +62,7 @@ class Recording(Frame):
         """Dispatches only."""
         raise TypeError("only dispatches can be repeated")
 
-    copy = fetch = draw = clear
+    copy = fetch = draw = fill = clear
 
 
 def _chunk(device: Device, chunks: list[Any], index: int) -> Any:
@@ -69,24 +72,30 @@ def _chunk(device: Device, chunks: list[Any], index: int) -> Any:
 
 
 class Repeated:
-    """For each role the recording made last."""
+    """For each role the recordings used last, for who goes back and forth between some."""
 
     def __init__(self) -> None:
-        self._known: dict[str, tuple[Any, Recording]] = {}
+        self._known: dict[str, list[tuple[Any, Recording, Any]]] = {}
 
-    def draw(self, frame: Frame, role: str, key: Any, record: Callable[[Frame], object]) -> None:
-        """Repeat what `record` did when it was last called for this role, or call it when the key is another.
+    def draw(self, frame: Frame, role: str, key: Any, record: Callable[[Frame], T]) -> T:
+        """Repeat what `record` did for this role and key, or call it when that is not known any more.
 
         key : everything that it reads
+
+        Returns what it returned.
         """
-        known = self._known.get(role)
-        if known and known[0] == key and (steps := known[1].steps()) is not None:
-            frame.repeat(steps)
-            return
-        recording = Recording(frame.device)
-        record(recording)
-        recording.submit()
-        self._known[role] = key, recording
-        steps = recording.steps()
-        assert steps is not None, "what was just bound is gone"
+        known = self._known.setdefault(role, [])
+        index = next((k for k, one in enumerate(known) if one[0] == key), None)
+        found = known.pop(index) if index is not None else None
+        steps = found[1].steps() if found else None
+        if found is None or steps is None:
+            recording = Recording(frame.device)
+            found = key, recording, record(recording)
+            recording.submit()
+            steps = recording.steps()
+            assert steps is not None, "what was just bound is gone"
+        known.insert(0, found)
+        del known[_MOST:]
         frame.repeat(steps)
+        result: T = found[2]
+        return result

@@ -16,7 +16,7 @@ from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats
 from dermis.optics.presets import read_text, read_toml
-from dermis.optics.tissue import load_tissue, names
+from dermis.optics.tissue import Tissue, load_tissue, names
 from dermis.outputs import replacing
 
 PUBLISHED = "gpu-gems-3"
@@ -114,8 +114,17 @@ def _fitted(name: str) -> GaussianSum:
 def _fit(
     name: str | Path, pigments: Mapping[str, float] | None = None, near: GaussianSum | None = None
 ) -> GaussianSum:
-    rings = load_tissue(name, pigments=pigments).profile().rings()
-    return fit_gaussians(rings, TERMS, near=near, name=f"profile {name}").profile
+    return fit_profile(load_tissue(name, pigments=pigments), name, near)
+
+
+def fit_profile(tissue: Tissue, name: str | Path, near: GaussianSum | None = None) -> GaussianSum:
+    """Six Gaussians for the layered diffusion of a tissue.
+
+    near : the fit of a similar tissue to start from, several times faster
+
+    Raises DermisError when its numbers cannot be a profile.
+    """
+    return fit_gaussians(tissue.profile().rings(), TERMS, near=near, name=f"profile {name}").profile
 
 
 @cache

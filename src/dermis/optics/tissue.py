@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
@@ -14,7 +14,7 @@ from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.models import Model, diffusion_profile
 from dermis.optics.diffusion.multipole import Clamp
 from dermis.optics.diffusion.transmission import through_slab
-from dermis.optics.media import Floats, Medium
+from dermis.optics.media import Floats, Layer, Medium
 from dermis.optics.pigments.skin import EXAMPLES, SkinParameters, Structure, spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.presets import media, medium_from_toml, read_toml
@@ -36,6 +36,16 @@ class Tissue:
     medium: Medium
     rgb: Floats | None = None
     parameters: SkinParameters | None = None
+
+    def with_layers(self, layers: Sequence[Layer]) -> Tissue:
+        """A medium of other layers under the same surface.
+
+        Raises DermisError for a skin of pigments, and for layers that no medium can have.
+        """
+        if self.rgb is not None:
+            came = f"{self.medium.name} is a skin made of pigments"
+            refuse("layers", "a medium with a name (skin1, dj3 ...) or of a file", came, "Leave them out")
+        return replace(self, medium=replace(self.medium, layers=tuple(layers)))
 
     def profile(self, model: Model = "layered", clamp: Clamp = "layer") -> RadialProfile:
         """R(r) in linear Rec. 709: per power that enters, or per incident power for wavelengths."""

@@ -12,7 +12,7 @@ from dermis.gpu import Device, Frame
 from dermis.gpu.repeated import Repeated
 from dermis.rendering.inputs import Inputs
 from dermis.rendering.layout import Layout
-from dermis.rendering.scattered import Scattered
+from dermis.rendering.shown import Shown, entered_key, radiance_key, scattered_key, seen_key
 from dermis.rendering.stages.blend import Blend
 from dermis.rendering.stages.bloom import Bloom
 from dermis.rendering.stages.combine import Combine
@@ -34,7 +34,7 @@ class Stages:
 
     def __init__(self, device: Device) -> None:
         self._device = device
-        self.scattered = Scattered()
+        self.shown = Shown()
         self.repeated = Repeated()
         self.shadows = Shadows(device)
         self.irradiance = Irradiance(device)
@@ -80,32 +80,22 @@ class Stages:
         return self.published if technique == "published" else self.diffuse
 
 
-def draw_frame(frame: Frame, stages: Stages, inputs: Inputs, keep_light: bool = False) -> None:
-    """Record all of a frame: light the skin, let it spread below, look at it.
+def draw_frame(frame: Frame, stages: Stages, inputs: Inputs) -> None:
+    """Record a frame: light the skin, let it spread below, look at it.
 
-    keep_light : leave the atlas as it is when it already shows the light
+    What `stages.shown` knows to be there already is left as it is.
     """
     shaped = ("SHAPES", 1) in inputs.light_switches
     stages.shadows.draw(
         frame, inputs.shadow_maps, inputs.light_clips, inputs.head, inputs.shadow_key, bounded=shaped
     )
-    if inputs.scatters and not (keep_light and stages.scattered.holds(inputs)):
-        scatter(frame, stages, inputs)
-        if keep_light:
-            stages.scattered.note(inputs)
-    stages.visibility.draw(frame, inputs.seen, inputs.camera_clips, inputs.head)
-    view, picture = inputs.view, inputs.picture
-    stages.shade.draw(
-        frame,
-        inputs.lit,
-        view,
-        inputs.switches,
-        inputs.seen,
-        inputs.scattered,
-        picture.radiance,
-        picture.size,
-        inputs.spread.apart.layers if inputs.spread else None,
-    )
+    keep, picture, drawn = stages.shown.keep, inputs.picture, (frame, stages, inputs)
+    if inputs.scatters:
+        keep(inputs.scattered, partial(scattered_key, inputs), partial(scatter, *drawn))
+    keep(inputs.seen.texture, partial(seen_key, inputs), partial(_look, *drawn))
+    if inputs.spread:  # the light kept apart is spread in its place
+        stages.shown.forget(picture.radiance)
+    keep(picture.radiance, partial(radiance_key, inputs), partial(_shade, *drawn))
     radiance = picture.radiance
     if inputs.spread:
         radiance = stages.screen_space.draw(frame, inputs.spread, radiance)
@@ -116,27 +106,59 @@ def draw_frame(frame: Frame, stages: Stages, inputs: Inputs, keep_light: bool = 
 
 def scatter(frame: Frame, stages: Stages, inputs: Inputs) -> None:
     """Light the atlas and let the light spread over it."""
+    shown, levels = stages.shown, inputs.levels
     for index, layout in enumerate(inputs.layouts):
-        levels = inputs.levels
-        stages.irradiance.draw(frame, layout, inputs.light_switches, levels.entering, levels.size)
+        lit = partial(entered_key, inputs, layout)
+        shown.keep(levels.entered, lit, partial(_enter, frame, stages, inputs, layout))
+        shown.forget(layout.scattered)
         if inputs.settings.technique == Published.name:
             _spread(frame, stages, inputs, layout)
         else:  # the same, whatever lights and camera do
             key = _spreading_key(inputs, layout)
             record = partial(_spread, stages=stages, inputs=inputs, layout=layout)
-            stages.repeated.draw(frame, f"spread {index}", key, record)
+            levels.halvings, levels.scale = stages.repeated.draw(frame, f"spread {index}", key, record)
     if len(inputs.layouts) > 1:
         first, second = inputs.layouts
         stages.blend.draw(frame, first, second, inputs.scattered)
 
 
-def _spread(frame: Frame, stages: Stages, inputs: Inputs, layout: Layout) -> None:
-    """Let the light that has entered spread, through thin parts too, and add up what leaves."""
+def _enter(frame: Frame, stages: Stages, inputs: Inputs, layout: Layout) -> None:
+    """Light that enters the skin of a layout."""
+    levels = inputs.levels
+    stages.irradiance.draw(frame, layout, inputs.light_switches, levels.entering, levels.size)
+
+
+def _spread(frame: Frame, stages: Stages, inputs: Inputs, layout: Layout) -> tuple[tuple[int, ...], float]:
+    """Let the light that has entered spread, through thin parts too, and add up what leaves.
+
+    Returns the levels' halvings and their scale.
+    """
     levels, spread = inputs.levels, stages.spreading(inputs.settings.technique)
     beyond = inputs.edge, inputs.clear
     spread.draw(frame, levels, layout.atlas, inputs.blurred_mm2, *beyond, scale=inputs.scale)
     through = stages.transmission.draw(frame, levels, layout.thin) if layout.thin else None
     stages.combine.draw(frame, levels, inputs.level_weight, layout.scattered, through)
+    return levels.halvings, levels.scale
+
+
+def _look(frame: Frame, stages: Stages, inputs: Inputs) -> None:
+    """Find what each sample of the picture sees."""
+    stages.visibility.draw(frame, inputs.seen, inputs.camera_clips, inputs.head)
+
+
+def _shade(frame: Frame, stages: Stages, inputs: Inputs) -> None:
+    """The picture, before exposure."""
+    stages.shade.draw(
+        frame,
+        inputs.lit,
+        inputs.view,
+        inputs.switches,
+        inputs.seen,
+        inputs.scattered,
+        inputs.picture.radiance,
+        inputs.picture.size,
+        inputs.spread.apart.layers if inputs.spread else None,
+    )
 
 
 def _spreading_key(inputs: Inputs, layout: Layout) -> tuple[Any, ...]:

@@ -50,25 +50,27 @@ class Renderer:
         settings: Settings | None = None,
         *,
         keep_shadows: bool = True,
-        keep_light: bool = False,
+        keep_stages: bool = False,
         timed: bool = True,
+        place: str = "",
     ) -> Rendered:
         """Render one frame and leave the image on the device.
 
         keep_shadows : False draws the shadow maps again even when no light moved
-        keep_light : True lights the atlas again only when something that it shows has changed
+        keep_stages : True runs only stages whose results are not there already: for still and slow scenes
         timed : False returns as soon as the frame is submitted, so that the device never waits for Python;
             only when it is three frames behind is it waited for
+        place : name of a scene among several drawn in turn: each keeps light and shadows of its own
 
         Raises DermisError for sizes over the device's limits and when the device fails.
         """
         settings = settings or Settings()
         with gpu_failures(self.device):
             started = time.perf_counter()
-            inputs = self.prepare(scene, settings)
+            inputs = self.prepare(scene, settings, place)
             ready = time.perf_counter()
             frame = Frame(self.device, timed=timed)
-            self._submit(frame, inputs, keep_shadows, keep_light)
+            self._submit(frame, inputs, keep_shadows, keep_stages)
             if timed:
                 frame.wait()
             else:
@@ -104,7 +106,7 @@ class Renderer:
         return self.draw(scene, settings, keep_shadows=keep_shadows)
 
     def _submit(
-        self, frame: Frame, inputs: Inputs, keep_shadows: bool, keep_light: bool, *, leaves: bool = False
+        self, frame: Frame, inputs: Inputs, keep_shadows: bool, keep_stages: bool, *, leaves: bool = False
     ) -> Leaving | None:
         """Record and submit; after a failure nobody knows what the shadow maps and the atlas hold.
 
@@ -112,15 +114,14 @@ class Renderer:
         """
         if not keep_shadows:
             inputs.shadow_maps.drawn = b""
-        if not keep_light:
-            self.stages.scattered.forget_all()
+        self.stages.shown.begin(keep_stages)
         try:
-            draw_frame(frame, self.stages, inputs, keep_light)
+            draw_frame(frame, self.stages, inputs)
             leaving = self.stages.pack.draw(frame, inputs.picture) if leaves else None
             frame.submit()
         except Exception:
             inputs.shadow_maps.drawn = b""
-            self.stages.scattered.forget_all()
+            self.stages.shown.forget_all()
             raise
         self._frames += 1
         return leaving

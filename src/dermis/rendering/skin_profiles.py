@@ -1,31 +1,49 @@
-"""The Gaussians of skins whose pigments change from frame to frame."""
+"""The Gaussians of skins whose pigments or layers change from frame to frame."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.profiles import load_profile
-from dermis.scene.skin import Skin
+from dermis.optics.profiles import fit_profile, load_profile
+from dermis.scene.skin import Pigments, Skin
+from dermis.scene.tissue import tissue_of
+
+_KEPT = 4  # the live skin, one to compare with, and those just before
 
 
 class SkinProfiles:
-    """Profiles of skins; each fit of pigments starts from the last one, which is several times faster."""
+    """Profiles of skins; each fit starts from the last one of its kind, which is several times faster."""
 
     def __init__(self) -> None:
-        self._skin: Skin | None = None
-        self._fitted: GaussianSum | None = None
+        self._fits: list[tuple[Skin, GaussianSum]] = []
 
     def of(self, skin: Skin) -> GaussianSum:
         """The skin's Gaussians.
 
-        Raises DermisError for pigments of a profile that is not made of them.
+        Raises DermisError for pigments or layers of a profile that is not made of them.
         """
-        if skin.pigments is None:
+        if not skin.layers and skin.pigments in (None, Pigments()):
             return load_profile(skin.profile)
-        if self._fitted is None or self._skin is None or not _same_pigments(self._skin, skin):
-            self._fitted = load_profile(skin.profile, skin.pigments.given(), self._fitted)
-            self._skin = skin
-        return self._fitted
+        found = self._last(_tissue, skin)
+        if found is None:
+            found = skin, fit_profile(tissue_of(skin), skin.profile, self._near(skin))
+        self._fits = [*(fit for fit in self._fits if fit is not found), found][-_KEPT:]
+        return found[1]
+
+    def _near(self, skin: Skin) -> GaussianSum | None:
+        fit = self._last(_kind, skin)
+        return fit and fit[1]
+
+    def _last(self, of: Callable[[Skin], object], skin: Skin) -> tuple[Skin, GaussianSum] | None:
+        alike = (fit for fit in reversed(self._fits) if of(fit[0]) == of(skin))
+        return next(alike, None)
 
 
-def _same_pigments(a: Skin, b: Skin) -> bool:
-    return (a.profile, a.pigments) == (b.profile, b.pigments)
+def _tissue(skin: Skin) -> tuple[object, ...]:
+    return skin.profile, skin.pigments, skin.layers
+
+
+def _kind(skin: Skin) -> tuple[object, ...]:
+    """What skins share whose profiles are similar."""
+    return skin.profile, skin.pigments and skin.pigments.structure, len(skin.layers)

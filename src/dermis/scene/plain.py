@@ -11,6 +11,7 @@ from pydantic_core import ErrorDetails
 from dermis.errors import DermisError
 
 FARTHEST_MM = 1e6
+_LONGEST = 80  # letters of what came
 
 
 def _direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -67,4 +68,5 @@ def _finding(one: ErrorDetails, known: list[str]) -> str:
     expected = expected.replace("a valid tuple", "a list")
     if expected.startswith(("greater", "less")):
         expected = f"a number {expected}"
-    return f"expected {expected}, but {one['input']!r} came"
+    came = repr(one["input"])
+    return f"expected {expected}, but {came if len(came) <= _LONGEST else came[:_LONGEST] + ' …'} came"

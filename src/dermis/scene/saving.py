@@ -32,9 +32,11 @@ def scene_toml(scene: Scene, settings: Settings, head: Mapping[str, Any]) -> str
     """The text of a scene's file."""
     said = _SAID_BY_REGIONS if "regions" in head else set()
     parts = [] if scene.lights else ['lights = "none"\n']
-    parts += [_table("[head]", head), _plain("[skin]", scene.skin, said | {"pigments"})]
+    parts += [_table("[head]", head), _plain("[skin]", scene.skin, said | {"pigments", "layers"})]
     if scene.skin.pigments:
         parts.append(_plain("[skin.pigments]", scene.skin.pigments))
+    layers = [layer.model_dump(exclude_none=True) for layer in scene.skin.layers]
+    parts += [_table("[[skin.layers]]", layer) for layer in layers]
     parts += [_plain("[[lights]]", light) for light in scene.lights]
     if scene.environment:
         parts.append(_plain("[environment]", scene.environment))

@@ -9,31 +9,54 @@ from pydantic import Field
 from dermis.scene.plain import Plain
 from dermis.specular.names import EnergyName, FresnelName, SpecularName
 
+StructureName = Literal["dj2006", "donner2008", "biospec"]
+MOST_LAYERS = 8
 _OILY_STRENGTH, _OILY_SMOOTHING = 3.0, 0.6
 
 
 _Share = Annotated[float | None, Field(ge=0, le=1)]
+_Absorption = Annotated[float, Field(ge=0, le=1e4)]
+_Scattering = Annotated[float, Field(gt=0, le=1e4)]
 
 
 class Pigments(Plain):
     """What replaces the pigments of a skin made of them; None leaves the skin's own.
 
+    structure : its layers: "dj2006" two, "donner2008" two and a sheet of melanin, "biospec" four
     melanin : share of the epidermis' volume that is melanosomes [-]
     eumelanin : share of the melanosomes that hold eumelanin [-]
     blood : share of the dermis' volume that is blood [-]
     oxygen : share of the haemoglobin that carries oxygen [-]
     epidermis_mm : thickness of the epidermis [mm]
+    epidermal_blood : share of the epidermis' volume that is blood, of "donner2008" only [-]
     """
 
+    structure: StructureName | None = None
     melanin: _Share = None
     eumelanin: _Share = None
     blood: _Share = None
     oxygen: _Share = None
     epidermis_mm: Annotated[float | None, Field(gt=0, le=2)] = None
+    epidermal_blood: _Share = None
 
     def given(self) -> dict[str, float]:
-        """Those that replace something."""
-        return self.model_dump(exclude_none=True)
+        """Shares and thicknesses that replace something."""
+        return self.model_dump(exclude={"structure"}, exclude_none=True)
+
+
+class TissueLayer(Plain):
+    """One layer of a medium, its coefficients for red, green and blue.
+
+    name : what it is
+    thickness_mm : None for a layer without end, which only the last can be [mm]
+    absorption_per_mm : [1/mm]
+    scattering_per_mm : reduced scattering [1/mm]
+    """
+
+    name: str = "layer"
+    thickness_mm: Annotated[float | None, Field(gt=0, le=1000)] = None
+    absorption_per_mm: tuple[_Absorption, _Absorption, _Absorption]
+    scattering_per_mm: tuple[_Scattering, _Scattering, _Scattering]
 
 
 class Skin(Plain):
@@ -52,7 +75,11 @@ class Skin(Plain):
     specular_colour : "white"; "wrong" tints reflections by the colour map, for comparison
     energy : what the surface reflects does not enter: "full"; "published" as the deck has it, with an albedo
         pi times too large; "none"
+    direction : "lambertian" skin returns light alike from and to all directions; "half-space" as one of the
+        skin's mean colour does: more of what comes aslant, and what scattered only once leaves mostly aslant.
+        Without a surface lobe it is index-matched, else of index 1.4
     pigments : what differs from those of the profile's skin: "spectral", "light", "medium", "dark", a file's
+    layers : what the profile's medium consists of instead, topmost first: of "dj3", "skin1", a file's ...
 
     Source: [dEonLuebke2007] sections 14.3-14.5; values of [Dudash2007].
     """
@@ -67,7 +94,14 @@ class Skin(Plain):
     fresnel: FresnelName = "schlick"
     specular_colour: Literal["white", "wrong"] = "white"
     energy: EnergyName = "full"
+    direction: Literal["lambertian", "half-space"] = "lambertian"
     pigments: Pigments | None = None
+    layers: Annotated[tuple[TissueLayer, ...], Field(max_length=MOST_LAYERS)] = ()
+
+    @property
+    def has_own_tissue(self) -> bool:
+        """Whether pigments or layers replace what the profile's name stands for."""
+        return self.pigments is not None or bool(self.layers)
 
     @property
     def strength(self) -> float:

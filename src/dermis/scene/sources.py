@@ -22,6 +22,7 @@ _CUT = ("one-blur", "published")  # which stitch nothing
 _WITH_SEAMS = ("texture-space", *_CUT)
 _WITH_TRANSMISSION = ("texture-space", "published")
 _FRESNEL = {"schlick": ("Schlick1994", "Dudash2007"), "exact": ("CookTorrance1982",)}
+_HALF_SPACE = ("Chandrasekhar1960", "Jensen2001")
 _TONES = {"none": (), "filmic": ("Hable2010",), "neutral": ("Khronos2024",)}
 _SHADOWS = ("Williams1978", "Reeves1987", "Hanika2021")
 _RELIEF = ("Mikkelsen2010", "OlanoBaker2010")
@@ -44,7 +45,8 @@ def sources_of(
     Raises DermisError for a profile that is none.
     """
     keys = [*_FRAME, *scattering_sources(settings), *_surface(skin)]
-    keys += profile_sources(skin.profile)
+    keys += profile_sources(skin)
+    keys += _HALF_SPACE * (skin.direction == "half-space")
     keys += _RELIEF * relief
     keys += _light(lights)
     if environment is not None:
@@ -64,14 +66,14 @@ def scattering_sources(settings: Settings) -> tuple[str, ...]:
     return keys
 
 
-def profile_sources(profile: str) -> tuple[str, ...]:
+def profile_sources(skin: Skin) -> tuple[str, ...]:
     """Of a diffusion profile; a table's numbers are its own, but for the published ones."""
     from dermis.optics.profiles import find_table
-    from dermis.optics.tissue import load_tissue
+    from dermis.scene.tissue import tissue_of
 
-    if find_table(profile) is not None:
-        return ("dEonLuebke2007", "DonnerJensen2005") if profile == "gpu-gems-3" else ()
-    return load_tissue(profile).profile().sources
+    if find_table(skin.profile) is not None:
+        return ("dEonLuebke2007", "DonnerJensen2005") if skin.profile == "gpu-gems-3" else ()
+    return tissue_of(skin).profile().sources
 
 
 def _surface(skin: Skin) -> tuple[str, ...]:

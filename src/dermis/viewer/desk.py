@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from dermis.errors import refuse
 from dermis.viewer.controls import Controls
 from dermis.viewer.history import History
 from dermis.viewer.split import Split
-from dermis.viewer.state import ViewerState, load_state, save_state
+from dermis.viewer.state import PARTS, PICTURE, ViewerState, load_state, save_state
 from dermis.viewer.studio import Studio
 
 
@@ -72,9 +73,14 @@ class Desk:
         self.messages.said = f"loaded {path}"
 
     def screenshot(self, path: Path, size: tuple[int, int]) -> None:
-        """Write the picture at a size.
+        """Write the picture at a size, as .png with the tone curve or as .exr, linear.
 
         Raises DermisError when that is not possible.
         """
+        kind, view = path.suffix.lower(), self.state.view
+        if kind not in (".png", ".exr"):
+            refuse(f"picture {path}", "a name that ends in .png or .exr", f"{path.name!r} came", "Change it")
+        if kind == ".exr" and view not in (PICTURE, *PARTS):
+            refuse(f"view {view} as .exr", "a view of linear light", "its numbers are colours", "Take .png")
         self.studio.screenshot(path, self.state, size)
         self.messages.said = f"wrote {path}, {size[0]} x {size[1]}"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dermis.assets.head import Head
+from dermis.assets.head import Head, load_head
 from dermis.errors import refuse
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
@@ -22,6 +22,8 @@ from dermis.viewer.chart import Chart
 
 P = TypeVar("P", bound=Plain)
 PICTURE = "picture"
+PARTS = {"diffuse": "diffuse", "specular": "specular"}
+"""Views that are the picture with some of its light, as `Settings.parts` names it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,13 +117,25 @@ def changed(values: P, **fields: Any) -> P:
 
 
 def save_state(path: Path, state: ViewerState) -> None:
-    """Write the scene that `dermis render` and `dermis view` take; the view is left out.
+    """Write the scene that `dermis render` and `dermis view` take; views of what is no light are left out.
 
     Raises DermisError when that is not possible.
     """
     if not state.head:
         refuse(path, "a head from a file or a sample", "it was made in memory", "Write it to a file first")
-    save_scene(path, state.scene, state.settings, state.head)
+    parts = state.view if state.view in PARTS else state.settings.parts
+    save_scene(path, state.scene, changed(state.settings, parts=parts), state.head)
+
+
+def named_state(name: str) -> ViewerState:
+    """The built-in bust, a sample or a mesh file in the studio's light, or the scene of a TOML file.
+
+    Raises DermisError for what is none of these.
+    """
+    if Path(name).suffix.lower() == ".toml":
+        return load_state(Path(name))
+    place = str(Path(name).resolve()) if Path(name).is_file() else name
+    return ViewerState(Scene(load_head(name)), head={"name": place})
 
 
 def load_state(path: Path, before: ViewerState | None = None) -> ViewerState:
@@ -132,4 +146,10 @@ def load_state(path: Path, before: ViewerState | None = None) -> ViewerState:
     table = head_table(path)
     known = before.scene.head if before and before.head == table and "regions" not in table else None
     scene, settings = load_scene(path, known)
-    return ViewerState(scene, settings, table, rig="" if scene.lights else NO_LIGHTS)
+    return opened(scene, settings, table, rig="" if scene.lights else NO_LIGHTS)
+
+
+def opened(scene: Scene, settings: Settings, head: Mapping[str, Any], rig: str) -> ViewerState:
+    """A scene as the viewer shows it first: the part of the light that its settings choose is a view."""
+    view = settings.parts if settings.parts in PARTS else PICTURE
+    return ViewerState(scene, changed(settings, parts="all"), head, view, rig)

@@ -20,9 +20,7 @@ from dermis.rendering.stages.variants import Variants
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.viewer.chart import ATLAS, Chart
-
-PARTS = {"diffuse": "diffuse", "specular": "specular"}
-"""Views that are the picture with some of its light."""
+from dermis.viewer.state import PARTS
 
 LEVELS = {"irradiance": 0} | {f"blur {k}": k for k in range(1, 7)}
 """Views of the light on the atlas by its layer."""
@@ -49,12 +47,12 @@ class Views:
         self._thick: weakref.WeakKeyDictionary[Pairs, Any] = weakref.WeakKeyDictionary()
         self._density: weakref.WeakKeyDictionary[Any, float] = weakref.WeakKeyDictionary()
 
-    def draw(self, scene: Scene, settings: Settings, view: str) -> Any:
-        """A texture of bytes that shows an intermediate of the frame drawn last.
+    def draw(self, scene: Scene, settings: Settings, view: str, place: str = "") -> Any:
+        """A texture of bytes that shows an intermediate of the frame drawn last at a place.
 
         Raises DermisError for what the technique does not make.
         """
-        inputs = self._renderer.prepare(scene, settings)
+        inputs = self._renderer.prepare(scene, settings, place)
         switches = tuple(switch for switch in inputs.light_switches if switch[0] == "SHAPES")
         program = self._variants.program(switches)
         layer, scale = self._layer(inputs, view, settings)
@@ -70,12 +68,12 @@ class Views:
         }
         return self._computed(program, bound, settings.size)
 
-    def draw_chart(self, scene: Scene, settings: Settings, chart: Chart) -> Any:
-        """A texture of bytes that shows a part of the atlas of the frame drawn last.
+    def draw_chart(self, scene: Scene, settings: Settings, chart: Chart, place: str = "") -> Any:
+        """A texture of bytes that shows a part of the atlas of the frame drawn last at a place.
 
         Raises DermisError for what the technique does not make.
         """
-        inputs = self._renderer.prepare(scene, settings)
+        inputs = self._renderer.prepare(scene, settings, place)
         layer, scale = self._layer(inputs, chart.layer, settings)
         shown = {"centre": chart.centre, "span": chart.span, "scale": scale}
         sheet = self._flat.record("Sheet", what=_NUMBERS.get(chart.layer, 0), **shown)

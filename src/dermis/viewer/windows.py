@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from dermis.errors import refuse
-from dermis.viewer.state import ViewerState
+from dermis.viewer.state import ViewerState, named_state
 from dermis.viewer.viewer import Viewer
 
 Size = tuple[int, int]
@@ -40,35 +40,46 @@ def serve(
     host: str,
     port: int,
     announce: Callable[[str, bool], None],
+    *,
+    secret: bool = False,
 ) -> None:
     """Serve web pages until interrupted.
 
     size : of the canvas until a page has told its own
     port : 0 for any that is free
     announce : told the page's address, and whether others than this machine can reach it
+    secret : whether the page's address has a token even where only this machine can reach it
 
     Raises DermisError when nothing can listen there, without a device or the extra `viewer`.
     """
     _backend("http", ("uvicorn", "websockets"), _VIEWER)
     from dermis.viewer.browser.canvas import PageCanvas
+    from dermis.viewer.browser.guard import is_local
     from dermis.viewer.browser.server import bind, server
 
-    listener, address = bind(host, port)
+    listener, address = bind(host, port, secret=secret)
     with listener:
         viewer = Viewer(state, PageCanvas(size=size, title=_TITLE, max_fps=_MOST_FPS), adapter)
         viewer.canvas._size_info.set_physical_size(*size, 1.0)
-        announce(address.url, bool(address.token))
+        announce(address.url, not is_local(host))
         server(address).run(sockets=[listener])
     _raise_failure(viewer)
 
 
-def notebook_viewer(state: ViewerState, adapter: str = "auto", size: Size = (720, 540)) -> Viewer:
+def notebook_viewer(
+    shown: ViewerState | str = "bust", adapter: str = "auto", size: Size = (720, 540)
+) -> Viewer:
     """A viewer that a notebook's cell displays.
 
-    Raises DermisError without the packages that takes.
+    shown : a state, or what `dermis view` takes: the built-in bust, a sample, a mesh file, a scene in TOML
+
+    Raises DermisError for what is none of these, and without the packages that a notebook takes.
     """
-    backend = _backend("anywidget", ("anywidget",), _NOTEBOOK)
-    return Viewer(state, backend.RenderCanvas(size=size, max_fps=_MOST_FPS), adapter)
+    _backend("anywidget", ("anywidget",), _NOTEBOOK)
+    from dermis.viewer.notebook import CellCanvas
+
+    state = shown if isinstance(shown, ViewerState) else named_state(shown)
+    return Viewer(state, CellCanvas(size=size, max_fps=_MOST_FPS), adapter)
 
 
 def _backend(name: str, needed: tuple[str, ...], remedy: str) -> Any:

@@ -12,15 +12,18 @@ from rendercanvas.http import HttpRenderCanvas
 
 _QUALITY = 88
 _LOSSLESS_AFTER_S = 0.3
+_NEEDS_FRAME = "_clients_change", "resize"
 
 
 class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
     """A canvas that pages show; a page too slow for all frames gets the newest when it is ready."""
 
     def _on_event(self, event: dict[str, Any], id: int) -> None:
+        if event.get("type") == "_framefeedback":  # a frame that was not sent cannot have been shown
+            event["index"] = min(event["index"], self._frame_info_per_client[id]["sent"])
         super()._on_event(event, id)
-        if event.get("type") == "_clients_change" and event["ids"]:
-            self.request_draw()  # else a page that was loaded again would stay empty until something moves
+        if event.get("type") in _NEEDS_FRAME and self._frame_info_per_client:
+            self.request_draw()  # else a page that was loaded again or resized would wait for some motion
 
     def _encode_frame(self, array: NDArray[np.uint8], is_lossless_redraw: bool = False) -> None:
         """Keep a frame in bytes for the pages: JPEG while things move, then PNG."""

@@ -1,38 +1,87 @@
-// What rendercanvas' page lacks: it connects again by itself, and two fingers zoom and pan.
+// What rendercanvas' page lacks: it connects again by itself, also behind https, two fingers zoom and pan, and a
+// page that becomes active tells its size.
 
 const RETRY_MS = 1000
+const TAPS_MS = 350
+const TAPS_PX = 24
+const WATCHING = 'watching: the page that came first has the head'
+const LOST = 'the connection is lost, trying again …'
+const OUR_KEYS = ['Tab', 'F1']
+const OUR_KEYS_WITH_CONTROL = ['z', 'y', 's']
+
+const notice = document.getElementById('notice')
 
 // The socket opened last, which may still be on its way: two at once would leave this page watching itself.
 let latest = null
 window.WebSocket = class extends window.WebSocket {
-  constructor (...given) {
-    super(...given)
+  constructor (address, ...rest) {
+    super(safe(address), ...rest)
     latest = this
+    this.addEventListener('message', hear)
+    this.addEventListener('close', () => { notice.textContent = LOST })
   }
+}
+
+// A page that came over https, by way of a proxy, may open encrypted sockets only.
+function safe (address) {
+  return window.location.protocol === 'https:' ? address.replace(/^ws:/, 'wss:') : address
 }
 
 setInterval(() => {
   if (latest && latest.readyState === WebSocket.CLOSED) { window.openWebsocketConnection() }
 }, RETRY_MS)
 
-const fingers = new Map()
-let pinching = false
-
-function send (type, x, y) {
-  const touches = {}
-  let index = 0
-  for (const finger of fingers.values()) { touches[index++] = finger }
-  const event = {
-    type, x, y, button: 1, buttons: [1], modifiers: [],
-    ntouches: index, touches, timestamp: performance.now() / 1000
-  }
-  if (window.websocket && window.websocket.readyState === WebSocket.OPEN) {
-    window.websocket.send(JSON.stringify(event))
+function hear (event) {
+  const message = typeof event.data === 'string' ? JSON.parse(event.data) : {}
+  if (message.type !== 'active') { return }
+  notice.textContent = message.value ? '' : WATCHING
+  if (message.value) {
+    tellSize()
+    takeKeys()
   }
 }
 
+// What this page said while it watched was not heard, and another server does not know it.
+function tellSize () {
+  const exactly = new ResizeObserver(([entry], observer) => {
+    observer.disconnect()
+    const ratio = window.devicePixelRatio
+    const box = entry.devicePixelContentBoxSize // which Safari lacks
+    const { width, height } = entry.contentRect
+    const pwidth = box ? box[0].inlineSize : Math.floor(width * ratio)
+    const pheight = box ? box[0].blockSize : Math.floor(height * ratio)
+    tell({ type: 'resize', width: pwidth / ratio, height: pheight / ratio, pwidth, pheight, ratio })
+  })
+  exactly.observe(document.querySelector('#canvas img'))
+}
+
+// Keys and the wheel work without a first click; on a touch screen that would open the keyboard.
+function takeKeys () {
+  const field = document.querySelector('#rendercanvas-focus-element-container input')
+  if (field && window.matchMedia('(hover: hover)').matches) { field.focus({ preventScroll: true }) }
+}
+
+function tell (event) {
+  if (window.websocket && window.websocket.readyState === WebSocket.OPEN) {
+    window.websocket.send(JSON.stringify({ timestamp: performance.now() / 1000, ...event }))
+  }
+}
+
+// Else Tab would leave the picture, and the browser would save the page.
+window.addEventListener('keydown', (event) => {
+  const held = event.ctrlKey || event.metaKey
+  const keys = held ? OUR_KEYS_WITH_CONTROL : OUR_KEYS
+  if (keys.includes(held ? event.key.toLowerCase() : event.key)) { event.preventDefault() }
+}, { capture: true })
+
+const fingers = new Map()
+let pinching = false
+let began = null // where a finger came last
+let tapped = null // where and when one left last
+
 function follow (event) {
   if (event.pointerType !== 'touch') { return }
+  if (event.type === 'pointerdown') { began = { x: event.clientX, y: event.clientY } }
   if (event.type === 'pointerdown' || fingers.has(event.pointerId)) {
     fingers.set(event.pointerId, { x: event.clientX, y: event.clientY, pressure: event.pressure })
   }
@@ -40,11 +89,30 @@ function follow (event) {
   pinching = true
   event.stopImmediatePropagation() // one finger alone is rendercanvas' own
   event.preventDefault()
-  const first = fingers.values().next().value
-  send('pointer_move', first.x, first.y)
+  tellFingers()
+}
+
+function tellFingers () {
+  const touches = Object.fromEntries([...fingers.values()].entries())
+  const { x, y } = touches[0]
+  tell({ type: 'pointer_move', x, y, button: 1, buttons: [1], modifiers: [], ntouches: fingers.size, touches })
+}
+
+// Two taps at a place are a double click, which no browser makes of them here.
+function tap ({ clientX: x, clientY: y }) {
+  const at = performance.now()
+  if (Math.hypot(x - began.x, y - began.y) > TAPS_PX) { // it was a drag
+    tapped = null
+  } else if (tapped && at - tapped.at < TAPS_MS && Math.hypot(x - tapped.x, y - tapped.y) < TAPS_PX) {
+    tell({ type: 'double_click', x, y, button: 1, buttons: [1], modifiers: [] })
+    tapped = null
+  } else {
+    tapped = { at, x, y }
+  }
 }
 
 function leave (event) {
+  if (event.type === 'pointerup' && event.pointerType === 'touch' && !pinching) { tap(event) }
   fingers.delete(event.pointerId)
   if (fingers.size === 0) { pinching = false }
 }

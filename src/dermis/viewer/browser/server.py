@@ -14,6 +14,7 @@ from dermis.viewer.browser.guard import Guard, is_local
 _TOKEN_BYTES = 18
 _MOST_MESSAGE_BYTES = 1 << 16
 _GRACE_S = 1
+_EVERYWHERE = "0.0.0.0", "::"
 
 
 @dataclass(frozen=True)
@@ -29,15 +30,17 @@ class Address:
 
     @property
     def url(self) -> str:
-        """Of the page."""
-        host = f"[{self.host}]" if ":" in self.host else self.host
+        """Of the page; a server that listens everywhere goes by the machine's name."""
+        name = socket.gethostname() if self.host in _EVERYWHERE else self.host
+        host = f"[{name}]" if ":" in name else name
         return f"http://{host}:{self.port}/" + (f"{self.token}/" if self.token else "")
 
 
-def bind(host: str, port: int) -> tuple[socket.socket, Address]:
+def bind(host: str, port: int, *, secret: bool = False) -> tuple[socket.socket, Address]:
     """A socket that listens, and the address that leads to it; every host but this machine gets a token.
 
     port : 0 for any that is free
+    secret : whether this machine gets one as well
 
     Raises DermisError when nothing can listen there.
     """
@@ -46,10 +49,11 @@ def bind(host: str, port: int) -> tuple[socket.socket, Address]:
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((host, port))
+        listener.listen()  # so that a page that comes at once waits for the server
     except OSError as error:
         listener.close()
         refuse(f"{host}:{port}", "an address to listen at", f"{error.strerror}", "Choose another --port")
-    token = "" if is_local(host) else secrets.token_urlsafe(_TOKEN_BYTES)
+    token = "" if is_local(host) and not secret else secrets.token_urlsafe(_TOKEN_BYTES)
     return listener, Address(host, int(listener.getsockname()[1]), token)
 
 

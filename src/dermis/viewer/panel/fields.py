@@ -10,6 +10,7 @@ from imgui_bundle import imgui
 from dermis.errors import DermisError
 from dermis.scene.plain import Plain
 from dermis.viewer.desk import Desk
+from dermis.viewer.panel.meanings import explain
 from dermis.viewer.state import ViewerState
 
 Apply = Callable[..., ViewerState]
@@ -43,8 +44,8 @@ def choice(
 ) -> None:
     """One of some names."""
     is_open = imgui.begin_combo(label, current, _ALL_NAMES)
-    note_place(desk, label)
     if not is_open:
+        note_place(desk, label)
         return
     for name in names:
         clicked, _ = imgui.selectable(name, name == current)
@@ -58,6 +59,7 @@ def field_choice(desk: Desk, label: str, values: Plain, field: str, apply: Apply
     """One of the words that a field may be."""
     names = words_of(type(values), field)
     choice(desk, label, str(getattr(values, field)), names, lambda name: apply(**{field: name}))
+    explain(type(values), field)
 
 
 def words_of(kind: type[Plain], field: str) -> tuple[str, ...]:
@@ -71,6 +73,25 @@ def field_slider(
     """A number of some settings on a scale."""
     value = float(getattr(values, field))
     slider(desk, label, value, lambda found: apply(**{field: found}), low, high, **options)
+    explain(type(values), field)
+
+
+def triple(
+    desk: Desk,
+    label: str,
+    value: tuple[float, float, float],
+    apply: Callable[[tuple[float, ...]], ViewerState],
+    low: float,
+    high: float,
+) -> None:
+    """Red, green and blue on logarithmic scales; the whole drag is one step of the history."""
+    moved, found = imgui.slider_float3(label, list(value), low, high, "%.3g", int(_LOG))
+    note_place(desk, label)
+    if moved:
+        kept = tuple(min(high, max(low, one)) for one in found)
+        attempt(desk, lambda: desk.change(apply(kept), f"slide {label}"))
+    if imgui.is_item_deactivated():
+        desk.history.end_gesture()
 
 
 def whole(
@@ -94,6 +115,7 @@ def colour(
     """Linear Rec. 709; beyond 1 for lights."""
     flags = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.hdr)
     moved, found = imgui.color_edit3(label, list(value), flags)
+    note_place(desk, label)
     if moved:
         attempt(desk, lambda: desk.change(apply(tuple(max(0.0, c) for c in found)), f"colour {label}"))
     if imgui.is_item_deactivated():
@@ -105,6 +127,13 @@ def button(desk: Desk, label: str) -> bool:
     pressed = imgui.button(label)
     note_place(desk, label)
     return bool(pressed)
+
+
+def remark(text: str) -> None:
+    """A grey line that breaks where the panel ends."""
+    imgui.push_style_color(int(imgui.Col_.text), imgui.get_style_color_vec4(int(imgui.Col_.text_disabled)))
+    imgui.text_wrapped(text)
+    imgui.pop_style_color()
 
 
 def note_place(desk: Desk, label: str) -> None:

@@ -1,4 +1,4 @@
-"""Undo, files and screenshots."""
+"""Files and screenshots."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ OPEN = True
 
 
 def draw(desk: Desk) -> None:
-    """Steps back and forth, the scene's file, and pictures of any size."""
-    _steps(desk)
+    """The scene's file, and pictures of any size."""
     names = desk.names
     _, names.scene = imgui.input_text("scene", names.scene)
     if button(desk, "save"):
@@ -28,16 +27,3 @@ def draw(desk: Desk) -> None:
     names.size = max(1, sides[0]), max(1, sides[1])
     if button(desk, "screenshot"):
         attempt(desk, lambda: desk.screenshot(Path(names.picture), names.size))
-
-
-def _steps(desk: Desk) -> None:
-    for label, possible, step in (
-        ("undo", desk.history.can_undo, desk.history.undo),
-        ("redo", desk.history.can_redo, desk.history.redo),
-    ):
-        imgui.begin_disabled(not possible)
-        if button(desk, label):
-            step()
-        imgui.end_disabled()
-        imgui.same_line()
-    imgui.text_disabled("Tab hides the panel")

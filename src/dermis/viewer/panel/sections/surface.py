@@ -30,6 +30,7 @@ def draw(desk: Desk) -> None:
     field_choice(desk, "BRDF", skin, "specular", apply)
     field_choice(desk, "Fresnel", skin, "fresnel", apply)
     field_choice(desk, "energy", skin, "energy", apply)
+    field_choice(desk, "directions", skin, "direction", apply)
     field_choice(desk, "reflection", skin, "specular_colour", apply)
 
 

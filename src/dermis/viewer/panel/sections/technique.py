@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dermis.viewer.desk import Desk
-from dermis.viewer.panel.fields import field_choice, whole
+from dermis.viewer.panel.fields import colour, field_choice, whole
 
 TITLE = "Technique"
 OPEN = False
@@ -22,5 +22,8 @@ def draw(desk: Desk) -> None:
         ("occlusion", "occlusion"),
     ):
         field_choice(desk, label, settings, field, apply)
+    if settings.seams == "clear-colour":
+        colour(desk, "beside charts", settings.seam_colour, lambda found: apply(seam_colour=found))
     whole(desk, "atlas", settings.atlas, _ATLASES, lambda side: apply(atlas=side))
+    whole(desk, "shadow map", settings.shadow_size, _ATLASES, lambda side: apply(shadow_size=side))
     whole(desk, "samples", settings.samples, _SAMPLES, lambda count: apply(samples=count))

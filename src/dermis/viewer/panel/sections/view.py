@@ -25,7 +25,7 @@ def draw(desk: Desk) -> None:
     for index, name in enumerate(CAMERAS):
         if index % _BUTTONS_IN_A_ROW:
             imgui.same_line()
-        if button(desk, name):
+        if button(desk, f"{name}##camera"):
             desk.controls.look(name)
 
 

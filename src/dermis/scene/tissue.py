@@ -1,0 +1,54 @@
+"""The tissue below a skin's surface."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from dermis.optics.media import Layer
+from dermis.optics.tissue import Tissue, load_tissue
+from dermis.scene.skin import Pigments, Skin, TissueLayer
+
+
+def tissue_of(skin: Skin) -> Tissue:
+    """The profile's tissue, with the skin's own pigments or layers in it.
+
+    Raises DermisError for a profile that is no tissue, and for one that has no such pigments or layers.
+    """
+    if skin.layers:
+        return load_tissue(skin.profile).with_layers(_optical(skin.layers))
+    pigments = skin.pigments or Pigments()
+    return load_tissue(skin.profile, pigments.structure, pigments.given())
+
+
+def layers_of(skin: Skin) -> tuple[TissueLayer, ...]:
+    """The layers of a skin that is a medium in red, green and blue; none of any other.
+
+    Raises DermisError for a profile that is no tissue.
+    """
+    if skin.layers:
+        return skin.layers
+    tissue = tissue_of(skin)
+    return () if tissue.rgb is not None else tuple(map(_plain, tissue.medium.layers))
+
+
+def _plain(layer: Layer) -> TissueLayer:
+    return TissueLayer(
+        name=layer.name,
+        thickness_mm=float(layer.thickness_mm) if np.isfinite(layer.thickness_mm) else None,
+        absorption_per_mm=tuple(layer.sigma_a.tolist()),
+        scattering_per_mm=tuple(layer.sigma_s_prime.tolist()),
+    )
+
+
+def _optical(layers: Iterable[TissueLayer]) -> tuple[Layer, ...]:
+    return tuple(
+        Layer(
+            np.array(layer.absorption_per_mm),
+            np.array(layer.scattering_per_mm),
+            float("inf") if layer.thickness_mm is None else layer.thickness_mm,
+            layer.name,
+        )
+        for layer in layers
+    )

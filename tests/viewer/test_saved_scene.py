@@ -1,0 +1,102 @@
+"""A scene saved in the viewer and rendered by the command: the same picture, whatever was set."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from offscreen_hands import ADAPTER
+from PIL import Image
+
+from dermis.assets.bust.regions import REGIONS
+from dermis.cli import main
+from dermis.images.io import read_image
+from dermis.scene import Environment
+from dermis.scene.skin import TissueLayer
+from dermis.viewer.orbit import orbit
+from dermis.viewer.regions import regional
+from dermis.viewer.state import ViewerState, load_state, save_state
+from dermis.viewer.studio import Studio
+
+SIZE = 72, 64
+_LAYERS = [
+    TissueLayer(
+        name="thin", thickness_mm=0.3, absorption_per_mm=(0.1, 0.3, 0.6), scattering_per_mm=(4.0, 5.0, 6.0)
+    ),
+    TissueLayer(name="deep", absorption_per_mm=(0.01, 0.1, 0.2), scattering_per_mm=(2.0, 3.0, 4.0)),
+]
+Change = Callable[[ViewerState, Path], ViewerState]
+
+
+def with_regions(state: ViewerState, folder: Path) -> ViewerState:
+    """A table whose lower half is another region, and what the regions leave to the skin."""
+    labels = np.zeros((16, 16), np.uint8)
+    labels[8:] = 3
+    Image.fromarray(labels).save(folder / "labels.png")
+    rows = [f'"{name}" = {{ m = 0.3, rho_s = {0.1 + 0.05 * k:.2f} }}' for k, name in enumerate(REGIONS)]
+    (folder / "regions.toml").write_text("\n".join(['labels = "labels.png"', *rows, ""]))
+    return regional(state.with_skin(roughness=0.5), str(folder / "regions.toml")).with_skin(oiliness=0.7)
+
+
+def with_surface(state: ViewerState, folder: Path) -> ViewerState:
+    del folder
+    numbers = {"mix": 0.2, "roughness": 0.22, "rho_s": 0.31, "oiliness": 0.4}
+    return state.with_skin(**numbers, specular="two-lobe", fresnel="exact", specular_colour="wrong")
+
+
+def with_light(state: ViewerState, folder: Path) -> ViewerState:
+    del folder
+    state = state.with_rig("window").with_light(1, irradiance=(0.5, 1.0, 2.0), shadows=True, softness_mm=9.0)
+    around = Environment(name="uniform", rotation_degrees=40.0, exposure=0.3, visible=True)
+    return state.with_environment(around).with_camera(orbit(state.scene.camera, 0.6, -0.2))
+
+
+def with_settings(state: ViewerState, folder: Path) -> ViewerState:
+    del folder
+    chosen = {"stretch": "axes", "seams": "clear-colour", "seam_colour": (0.9, 0.1, 0.1), "occlusion": "none"}
+    encoded = {"exposure": 1.7, "bloom": 0.2, "tone": "filmic", "background": (0.1, 0.0, 0.3)}
+    return state.with_settings(technique="one-blur", transmission="none", **chosen, **encoded)
+
+
+STATES: dict[str, Change] = {
+    "surface": with_surface,
+    "light": with_light,
+    "settings": with_settings,
+    "regions": with_regions,
+    "layers": lambda state, _: state.with_skin(profile="skin1", albedo="profile", layers=_LAYERS),
+    "structure": lambda state, _: state.with_skin(profile="light", albedo="profile").with_pigments(
+        structure="donner2008", epidermal_blood=0.02, melanin=0.03
+    ),
+    "part": lambda state, _: state.in_view("specular"),
+}
+
+
+@pytest.fixture(scope="module")
+def studio() -> Studio:
+    return Studio(ADAPTER)
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_the_command_renders_what_the_viewer_shows(
+    name: str, studio: Studio, state: ViewerState, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dermis.assets.regions.apply.SIZE", 64)
+    shown = STATES[name](state, tmp_path).with_settings(size=SIZE)
+    studio.screenshot(tmp_path / "shown.png", shown, SIZE)
+    save_state(tmp_path / "scene.toml", shown)
+    words = ["render", str(tmp_path / "scene.toml"), "-o", str(tmp_path / "made.png"), "--adapter", ADAPTER]
+    monkeypatch.setattr(sys, "argv", ["dermis", *words])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert not ended.value.code
+    seen, made = (read_image(tmp_path / f"{kind}.png") for kind in ("shown", "made"))
+    assert seen.std() > 0.02 and np.array_equal(seen, made)
+
+
+def test_a_part_that_was_looked_at_is_looked_at_again(state: ViewerState, tmp_path: Path) -> None:
+    save_state(tmp_path / "scene.toml", state.in_view("specular"))
+    loaded = load_state(tmp_path / "scene.toml", state)
+    assert loaded.view == "specular" and loaded.settings.parts == "all"

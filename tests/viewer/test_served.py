@@ -1,0 +1,171 @@
+"""The page's socket as a slow, a hostile and a second client meet it, and a device that is lost meanwhile."""
+
+from __future__ import annotations
+
+import io
+import json
+import threading
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from offscreen_hands import ADAPTER, SETTINGS
+
+from dermis.assets.head import Head
+from dermis.scene.model import Scene
+from dermis.viewer.state import ViewerState
+
+pytest.importorskip("imgui_bundle", reason="the extra `viewer` is not installed")
+client = pytest.importorskip("websockets.sync.client", reason="the extra `viewer` is not installed")
+
+SIZE = 400, 300
+_PATIENCE_S, _QUIET_S = 25.0, 0.7
+_AT_ONCE = 2  # frames on the way to a page
+
+
+class Page:
+    """What a page does, without a browser; it confirms only the frames that the test wants."""
+
+    def __init__(self, socket: Any) -> None:
+        self._socket = socket
+        self.active: bool | None = None
+        self.frames: list[tuple[int, str, bytes]] = []
+
+    def tell(self, kind: str, **fields: Any) -> None:
+        self._socket.send(json.dumps({"type": kind, "timestamp": 0.0, **fields}))
+
+    def show(self, size: tuple[int, int] = SIZE) -> None:
+        width, height = size
+        self.frames.clear()
+        self.tell("resize", width=width, height=height, pwidth=width, pheight=height, ratio=1.0)
+
+    def confirm(self, index: int) -> None:
+        self.tell("_framefeedback", index=index, localtime=0.0)
+
+    def drag(self, start: int, end: int) -> None:
+        button = {"button": 1, "buttons": [1], "modifiers": [], "y": 150}
+        self.frames.clear()
+        self.tell("pointer_down", x=start, **button)
+        for x in np.linspace(start, end, 30):
+            self.tell("pointer_move", x=float(x), **button)
+            time.sleep(0.01)
+        self.tell("pointer_up", x=end, **button)
+
+    def hear(self, quiet_s: float = _QUIET_S, *, confirming: bool = False) -> None:
+        """Take what comes until nothing comes any more."""
+        while True:
+            try:
+                message = self._socket.recv(timeout=quiet_s)
+            except TimeoutError:
+                return
+            told = json.loads(message)
+            if told["type"] == "active":
+                self.active = told["value"]
+            elif told["type"] == "framebufferdata":
+                self.frames.append((told["index"], told["mimetype"], self._socket.recv()))
+                if confirming:
+                    self.confirm(told["index"])
+
+    def still(self) -> NDArray[np.int64]:
+        """The picture when it is sent without loss and nothing follows."""
+        from PIL import Image
+
+        end = time.monotonic() + _PATIENCE_S
+        while time.monotonic() < end:
+            self.hear(confirming=True)
+            if self.frames and self.frames[-1][1] == "image/png":
+                image = Image.open(io.BytesIO(self.frames[-1][2])).convert("RGB")
+                return np.array(image).astype(np.int64)
+        raise AssertionError("the page never comes to rest")
+
+
+@pytest.fixture(scope="module")
+def viewer(head: Head) -> Iterator[Any]:
+    """One that a server shows, in a thread of its own; `viewer.url` is its page."""
+    from dermis.viewer.browser.canvas import PageCanvas
+    from dermis.viewer.browser.server import bind, server
+    from dermis.viewer.viewer import Viewer
+
+    listener, address = bind("127.0.0.1", 0)
+    with listener:
+        one: Any = Viewer(ViewerState(Scene(head), SETTINGS), PageCanvas(size=SIZE, max_fps=60), ADAPTER)
+        one.url = address.url
+        running = server(address)
+        thread = threading.Thread(target=running.run, kwargs={"sockets": [listener]}, daemon=True)
+        thread.start()
+        while not running.started:
+            time.sleep(0.05)
+        yield one
+        running.should_exit = True
+        thread.join(20.0)
+
+
+def visit(viewer: Any) -> Any:
+    return client.connect(viewer.url.replace("http", "ws", 1), max_size=None)
+
+
+def difference(a: NDArray[np.int64], b: NDArray[np.int64]) -> float:
+    """Mean over the part that neither the panel nor text covers."""
+    return float(np.abs(a[:200, 205:] - b[:200, 205:]).mean())
+
+
+def test_a_page_that_shows_nothing_gets_two_frames_and_then_the_newest(viewer: Any) -> None:
+    with visit(viewer) as socket:
+        page = Page(socket)
+        page.show()
+        before = page.still()
+        sent = page.frames[-1][0]
+        page.drag(300, 220)
+        page.hear(1.5)
+        assert len(page.frames) <= _AT_ONCE  # of 30 moves
+        page.confirm(sent + len(page.frames))
+        after = page.still()
+        assert difference(before, after) > 0.5
+    with visit(viewer) as socket:
+        other = Page(socket)
+        other.show()
+        assert difference(after, other.still()) < 0.01
+
+
+def test_confirming_frames_that_were_not_sent_opens_no_flood(viewer: Any) -> None:
+    with visit(viewer) as socket:
+        page = Page(socket)
+        page.show()
+        page.still()
+        page.confirm(10**9)
+        page.drag(300, 240)
+        page.hear(1.5)
+        assert len(page.frames) <= _AT_ONCE
+
+
+def test_who_watches_takes_over_with_a_size_of_its_own(viewer: Any) -> None:
+    first = visit(viewer).__enter__()
+    page = Page(first)
+    page.show()
+    page.still()
+    with visit(viewer) as second:
+        watcher = Page(second)
+        watcher.show((320, 200))
+        assert watcher.still().shape == (*SIZE[::-1], 3) and watcher.active is False
+        first.close()
+        watcher.hear(confirming=True)
+        assert watcher.active
+        watcher.show((320, 200))
+        assert watcher.still().shape == (200, 320, 3)
+
+
+def test_a_lost_device_is_told_in_the_page_and_the_head_turns_on(viewer: Any) -> None:
+    with visit(viewer) as socket:
+        page = Page(socket)
+        page.show()
+        before = page.still()
+        viewer.desk.studio.renderer.device.handle.destroy()
+        page.drag(300, 330)
+        after = page.still()
+        assert "lost and opened again" in viewer.desk.messages.said and viewer.failure is None
+        assert difference(before, after) > 0.5
+        lines = np.s_[255:, 205:]  # where messages are
+        assert np.abs(after[lines] - before[lines]).max() > 100
