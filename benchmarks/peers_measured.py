@@ -6,7 +6,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -28,16 +28,29 @@ from dermis.rendering.renderer import Renderer
 from dermis.rendering.stages.published_fragments import published_as_fragments
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
+from dermis.scene.skin import Skin
 
 METHODS: tuple[Method, ...] = ("random-walk", "burley")
+
+
+@dataclass(frozen=True)
+class Way:
+    """One of our ways to draw skin: technique, atlas, and how skin returns light."""
+
+    technique: str
+    atlas: int = 1024
+    direction: str = "lambertian"
+
+
 OURS = {
-    "texture space, atlas 1024": {"technique": "texture-space", "atlas": 1024},
-    "texture space, atlas 512": {"technique": "texture-space", "atlas": 512},
-    "screen space": {"technique": "screen-space", "atlas": 64},
+    "texture space, atlas 1024": Way("texture-space"),
+    "texture space, atlas 512": Way("texture-space", 512),
+    "half-space skin, atlas 512": Way("texture-space", 512, "half-space"),
+    "screen space": Way("screen-space", 64),
 }
-"""Settings that are measured, by what they are called in the table; screen space has no use for an atlas."""
+"""By what they are called in the table; screen space has no use for an atlas."""
 COMPUTE, FRAGMENTS = "passes of 2007 as compute", "passes of 2007 as fragments"
-PUBLISHED = {name: {"technique": "published", "atlas": 1024} for name in (COMPUTE, FRAGMENTS)}
+PUBLISHED = {name: Way("published") for name in (COMPUTE, FRAGMENTS)}
 """The published structure in our renderer, to set beside the first of ours."""
 SEEDS = (100, 200)
 """Of the first pass of each turn; the passes of a turn have the following ones."""
@@ -153,14 +166,18 @@ def _passes(
 
 def _add_frames(ours: dict[str, Frames], renderer: Renderer, scene: Scene, plan: Plan) -> None:
     """Warm frames with everything computed anew, shadows too."""
-    for name, chosen in (OURS | PUBLISHED).items():
-        settings = Settings.model_validate({"size": (plan.side, plan.side), **chosen})
+    for name, way in (OURS | PUBLISHED).items():
+        settings = Settings.model_validate(
+            {"size": (plan.side, plan.side), "technique": way.technique, "atlas": way.atlas}
+        )
+        skin = Skin(**(scene.skin.model_dump() | {"direction": way.direction}))
+        turned = replace(scene, skin=skin)
         with _drawn_as(name, renderer):
-            drawn = renderer.draw(scene, settings, keep_shadows=False)
+            drawn = renderer.draw(turned, settings, keep_shadows=False)
             frames = ours.setdefault(name, Frames(drawn.linear()))
             for _ in range(plan.frames):
                 began, worked = time.perf_counter(), time.process_time()
-                renderer.draw(scene, settings, keep_shadows=False)
+                renderer.draw(turned, settings, keep_shadows=False)
                 frames.seconds.append(time.perf_counter() - began)
                 frames.core_seconds.append(time.process_time() - worked)
 

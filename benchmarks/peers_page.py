@@ -79,10 +79,18 @@ def _short(ratio: float) -> str:
 
 
 def _burley(told: dict[str, Any]) -> str:
-    ours = told["rows"][0]["relrmse"]
+    """How far Burley is from the walk that it stands for, and ours from the paths that it stands for."""
     theirs, error = told["burley_against_random_walk"]
-    reached = "reached" if ours <= theirs else "not reached"
+    ours = {
+        row["setting"]: row["relrmse"]
+        for row in told["rows"]
+        if row["setting"] in told["ours_energy_put_right"]
+    }
+    each = "; ".join(
+        f"{name} {found:.4f}, {'reached' if found <= theirs else 'not reached'}"
+        for name, found in ours.items()
+    )
     return (
-        f"Burley's profile is {theirs:.4f} ± {error:.4f} from the random walk, ours {ours:.4f} from path "
-        f"tracing: no worse is the goal, {reached}."
+        f"Burley's profile is {theirs:.4f} ± {error:.4f} from the random walk; ours shall be no farther "
+        f"from path tracing: {each}."
     )
