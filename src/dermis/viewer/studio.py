@@ -18,11 +18,12 @@ from dermis.scene.camera import Camera
 from dermis.scene.settings import Settings
 from dermis.viewer.chart import ATLAS
 from dermis.viewer.pace import Pace
-from dermis.viewer.state import PICTURE, ViewerState, changed, same
-from dermis.viewer.views import PARTS, Views
+from dermis.viewer.state import PARTS, PICTURE, ViewerState, changed, same
+from dermis.viewer.views import Views
 
 _SIZES = 2  # of everything: for frames in motion and for still ones
 _TIMED_FRAMES = 120
+_BEFORE = "before"  # the frozen state's own light, so that a camera that moves lights neither again
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Studio:
         self._size = (0, 0)
         self.times: deque[dict[str, float]] = deque(maxlen=_TIMED_FRAMES)
         self._frozen: Frozen | None = None
-        self._lit: ViewerState | None = None
+        self._lit: tuple[ViewerState, str] | None = None
 
     def pictures(
         self,
@@ -86,7 +87,9 @@ class Studio:
         self._shown = state, camera, settings
         if self.rendered and self.rendered is not before:
             self.times.append(self.rendered.gpu_ms or {})
-            if moving:
+            if moving and "shade" in (
+                self.rendered.gpu_ms or {"shade"}
+            ):  # others tell nothing of the next one
                 self.pace.note(self.rendered.frame_ms)
         return self.last_image
 
@@ -97,7 +100,7 @@ class Studio:
         known = frozen and frozen.state is before and frozen.camera == camera
         if frozen and known and frozen.settings in (settings, finest):
             return frozen.image
-        drawn = self._draw(replace(before, settings=settings).with_camera(camera))
+        drawn = self._draw(replace(before, settings=settings).with_camera(camera), _BEFORE)
         self._shown = None  # the picture was the live state's
         copy = copied(self.renderer.device, drawn, frozen.image if frozen else None)
         self._frozen = Frozen(before, camera, settings, copy)
@@ -131,22 +134,25 @@ class Studio:
         """(h, w, 3) bytes of an image."""
         return np.ascontiguousarray(download(self.renderer.device, image)[..., :3])
 
-    def _draw(self, state: ViewerState) -> Any:
+    def _draw(self, state: ViewerState, place: str = "") -> Any:
         parts = PARTS.get(state.view, state.settings.parts)
         settings = self.settings = changed(state.settings, parts=parts)
-        if state.view == ATLAS and self._shows_light_of(state):
-            return self._views.draw_chart(state.scene, settings, state.chart)
+        if state.view == ATLAS and self._shows_light_of(state, place):
+            return self._views.draw_chart(state.scene, settings, state.chart, place)
         self._lit = None
-        self.rendered, self._lit = self.renderer.draw(state.scene, settings, keep_light=True), state
+        self.rendered = self.renderer.draw(state.scene, settings, keep_stages=True, place=place)
+        self._lit = state, place
         if state.view in (PICTURE, *PARTS):
             return self.rendered.picture.bytes
         if state.view == ATLAS:
-            return self._views.draw_chart(state.scene, settings, state.chart)
-        return self._views.draw(state.scene, settings, state.view)
+            return self._views.draw_chart(state.scene, settings, state.chart, place)
+        return self._views.draw(state.scene, settings, state.view, place)
 
-    def _shows_light_of(self, state: ViewerState) -> bool:
+    def _shows_light_of(self, state: ViewerState, place: str) -> bool:
         """Whether the atlas holds a state's light: then another part of it takes no frame."""
-        return self._lit is not None and same(replace(self._lit, chart=state.chart), state)
+        if self._lit is None or self._lit[1] != place:
+            return False
+        return same(replace(self._lit[0], chart=state.chart), state)
 
 
 def copied(device: Device, image: Any, space: Any = None) -> Any:
