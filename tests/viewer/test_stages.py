@@ -1,0 +1,223 @@
+"""What each kind of change has the device do, counted in stages; whatever it does not touch stays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from offscreen_hands import ADAPTER
+
+from dermis.gpu.repeated import Recording
+from dermis.scene.environment import Environment
+from dermis.viewer.orbit import orbit
+from dermis.viewer.pace import EFFORTS
+from dermis.viewer.state import ViewerState
+from dermis.viewer.studio import Studio
+
+SIZE = (96, 96)
+SPREAD = {"diffuse", "transmission", "combine"}
+PICTURE = {"shade", "post"}
+
+
+@pytest.fixture(scope="module")
+def studio() -> Studio:
+    return Studio(ADAPTER)
+
+
+def stages(studio: Studio, state: ViewerState, moving: bool = False) -> set[str]:
+    """What ran to show a state."""
+    studio.image(state, state.scene.camera, SIZE, moving)
+    assert studio.rendered is not None and studio.rendered.gpu_ms is not None
+    return set(studio.rendered.gpu_ms) - {"total"}
+
+
+def turned(state: ViewerState, angle: float = 0.3) -> ViewerState:
+    return state.with_camera(orbit(state.scene.camera, angle, 0.1))
+
+
+def skin_of(melanin: float) -> Callable[[ViewerState], ViewerState]:
+    return lambda state: state.with_skin(profile="light").with_pigments(melanin=melanin)
+
+
+CHANGES: dict[str, tuple[Callable[[ViewerState], ViewerState], set[str]]] = {
+    "camera": (turned, {"visibility"} | PICTURE),
+    "light": (
+        lambda state: state.with_light(0, position=(10.0, 900.0, 500.0)),
+        {"shadows", "irradiance"} | SPREAD | PICTURE,
+    ),
+    "light's colour": (
+        lambda state: state.with_light(0, irradiance=(1.0, 2.0, 3.0)),
+        {"irradiance"} | SPREAD | PICTURE,
+    ),
+    "roughness": (lambda state: state.with_skin(roughness=0.6), {"irradiance"} | SPREAD | PICTURE),
+    "mix": (lambda state: state.with_skin(mix=1.0), {"irradiance"} | SPREAD | PICTURE),
+    "profile": (lambda state: state.with_skin(profile="dark"), SPREAD | PICTURE),
+    "fewer Gaussians": (  # which have another space for their levels
+        lambda state: state.with_skin(profile="skin1"),
+        {"irradiance"} | SPREAD | PICTURE,
+    ),
+    "pigments": (skin_of(0.05), SPREAD | PICTURE),
+    "stretch": (lambda state: state.with_settings(stretch="none"), {"irradiance"} | SPREAD | PICTURE),
+    "part": (lambda state: state.in_view("specular"), PICTURE),
+    "background": (lambda state: state.with_settings(background=(0.1, 0.2, 0.3)), PICTURE),
+    "exposure": (lambda state: state.with_settings(exposure=2.0), {"post"}),
+    "tone": (lambda state: state.with_settings(tone="filmic"), {"post"}),
+    "bloom": (lambda state: state.with_settings(bloom=0.2), {"bloom", "post"}),
+    "nothing": (lambda state: replace(state), {"post"}),
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_change_runs_only_what_depends_on_it(name: str, studio: Studio, state: ViewerState) -> None:
+    change, expected = CHANGES[name]
+    stages(studio, state)
+    assert stages(studio, change(state)) == expected
+
+
+def test_light_all_around_is_told_the_profile_and_lights_anew(studio: Studio, state: ViewerState) -> None:
+    """Skin around a place throws light back, the more the paler its profile."""
+    around = state.with_environment(Environment(name="uniform"))
+    stages(studio, around)
+    assert "irradiance" in stages(studio, around.with_skin(profile="skin1"))
+    assert stages(studio, turned(around)) >= {"visibility", "shade"}
+
+
+@pytest.fixture
+def made(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+    """Textures and buffers that are made on the device, and what is written into them."""
+    handle, log = studio.renderer.device.handle, list[str]()
+    for owner, name in (
+        (handle, "create_texture"),
+        (handle, "create_buffer_with_data"),
+        (handle, "create_buffer"),
+        (handle.queue, "write_texture"),
+    ):
+        monkeypatch.setattr(owner, name, _counted(getattr(owner, name), name, log))
+    yield log
+
+
+def _counted(call: Callable[..., Any], name: str, log: list[str]) -> Callable[..., Any]:
+    def counted(*args: Any, **kwargs: Any) -> Any:
+        log.append(name)
+        return call(*args, **kwargs)
+
+    return counted
+
+
+@pytest.mark.parametrize("name", ["camera", "light", "roughness", "mix", "exposure", "nothing"])
+def test_a_move_loads_nothing(name: str, studio: Studio, state: ViewerState, made: list[str]) -> None:
+    change, _ = CHANGES[name]
+    stages(studio, state)
+    stages(studio, change(state))  # what this kind of frame needs once
+    stages(studio, state)
+    made.clear()
+    stages(studio, change(turned(state, -0.2)))
+    assert [one for one in made if one != "create_buffer_with_data"] == []
+    assert len(made) <= 1 + (name == "light")  # the lights' records
+
+
+def test_pigments_load_no_texture(studio: Studio, state: ViewerState, made: list[str]) -> None:
+    stages(studio, skin_of(0.05)(state))
+    stages(studio, skin_of(0.051)(state))
+    made.clear()
+    stages(studio, skin_of(0.052)(state))
+    assert "write_texture" not in made
+
+
+def both(studio: Studio, state: ViewerState, before: ViewerState, moving: bool = True) -> list[set[str]]:
+    """What ran for the frozen state and for the live one."""
+    ran: list[set[str]] = []
+    draw = studio.renderer.draw
+
+    def noted(*args: Any, **kwargs: Any) -> Any:
+        rendered = draw(*args, **kwargs)
+        assert rendered.gpu_ms is not None
+        ran.append(set(rendered.gpu_ms) - {"total"})
+        return rendered
+
+    studio.renderer.draw = noted  # type: ignore[method-assign]
+    try:
+        studio.pictures(state, before, state.scene.camera, SIZE, moving)
+    finally:
+        studio.renderer.draw = draw  # type: ignore[method-assign]
+    return ran
+
+
+@pytest.mark.parametrize("name", ["light", "mix", "pigments", "stretch"])
+def test_a_camera_lights_neither_side_of_the_divider(
+    name: str, studio: Studio, state: ViewerState, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Seen from the same place the second side needs no visibility either."""
+    recorded: list[int] = []
+    begin = Recording.__init__
+
+    def counted(self: Recording, device: Any) -> None:
+        recorded.append(1)
+        begin(self, device)
+
+    live = CHANGES[name][0](state)
+    both(studio, live, state)
+    monkeypatch.setattr(Recording, "__init__", counted)
+    for angle in (0.1, 0.2, 0.3):
+        assert both(studio, turned(live, angle), state) == [{"visibility"} | PICTURE, PICTURE]
+    assert recorded == []
+
+
+def test_shadows_of_another_size_have_light_of_their_own(
+    studio: Studio, state: ViewerState, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where frames in motion differ from still ones in nothing else."""
+    coarse = replace(EFFORTS[2], shadow_size=64)
+    monkeypatch.setattr("dermis.viewer.pace.EFFORTS", (EFFORTS[0], coarse, coarse, coarse))
+    for moving in (True, False):
+        stages(studio, turned(state, 0.1), moving)
+    for angle, moving in ((0.2, True), (0.2, False), (0.3, True)):
+        assert stages(studio, turned(state, angle), moving) == {"visibility"} | PICTURE
+
+
+def test_only_frames_that_shade_set_the_pace(
+    studio: Studio, state: ViewerState, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    noted: list[float] = []
+    monkeypatch.setattr(studio.pace, "note", noted.append)
+    stages(studio, state, moving=True)
+    noted.clear()
+    stages(studio, CHANGES["exposure"][0](state), moving=True)
+    assert noted == []
+    stages(studio, turned(state, 0.7), moving=True)
+    assert len(noted) == 1
+
+
+def test_a_slider_leaves_the_frozen_side(studio: Studio, state: ViewerState) -> None:
+    both(studio, state.with_skin(mix=0.4), state)
+    assert both(studio, state.with_skin(mix=0.3), state) == [{"irradiance"} | SPREAD | PICTURE]
+
+
+def test_states_in_motion_and_still_are_recorded_once(
+    studio: Studio, state: ViewerState, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small = replace(EFFORTS[2], atlas=64)
+    monkeypatch.setattr("dermis.viewer.pace.EFFORTS", (EFFORTS[0], small, small, small))
+    live = state.with_skin(mix=0.9)
+    for moving in (True, False):
+        both(studio, live, state, moving)
+    for angle, moving in ((0.1, True), (0.1, False), (0.2, True), (0.2, False)):
+        ran = both(studio, turned(live, angle), state, moving)
+        assert not any({"irradiance", "diffuse"} & one for one in ran)
+
+
+@pytest.mark.parametrize("view", ["irradiance", "blur 1", "atlas"])
+def test_views_of_levels_show_the_live_state_s_light(view: str, studio: Studio, state: ViewerState) -> None:
+    """Also after another state's light has been spread in between, and after its profile came back."""
+    plain = studio.read(studio.image(state.in_view(view), state.scene.camera, SIZE, False)).astype(int)
+    other = state.with_skin(profile="skin1", mix=1.0).with_light(0, irradiance=(0.1, 0.1, 0.1))
+    both(studio, state, other, moving=False)
+    again = studio.read(studio.image(state.in_view(view), state.scene.camera, SIZE, False)).astype(int)
+    assert np.array_equal(plain, again)
+    studio.image(state.with_skin(profile="dj3"), state.scene.camera, SIZE, False)
+    studio.image(state, state.scene.camera, SIZE, False)
+    back = studio.read(studio.image(state.in_view(view), state.scene.camera, SIZE, False)).astype(int)
+    assert np.array_equal(plain, back)
