@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import dermis
 from dermis.optics.fits.gaussian import fit_gaussians
@@ -46,8 +47,8 @@ def main() -> None:
         moved = neighbour(tissue).profile().rings()
         cells = (
             median_ms(tissue.profile),
-            median_ms(lambda rings=rings: fit_gaussians(rings, 6)),
-            median_ms(lambda moved=moved, near=near: fit_gaussians(moved, 6, near=near)),
+            median_ms(partial(fit_gaussians, rings, 6)),
+            median_ms(partial(fit_gaussians, moved, 6, near=near)),
         )
         rows.append(f"| {name} | {' | '.join(f'{ms:.1f}' for ms in cells)} |")
     sys.stdout.write("\n".join(rows) + "\n")

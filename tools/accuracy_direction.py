@@ -39,7 +39,7 @@ def _rows(head: Head, light: str, region: str, samples: int, settings: Settings,
                 region=region,
                 medium=medium,
                 settings=settings,
-                direction=direction,  # type: ignore[arg-type]
+                direction=direction,
                 samples=samples,
                 adapter=adapter,
             )

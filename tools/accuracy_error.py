@@ -29,7 +29,7 @@ LIGHTS = ("front", "back", "laser")
 ATLASES = (512, 1024, 2048)
 RADIUS_MM = 14.0
 LEAST_MM2 = 1.0  # of Gaussians for which the surface and straight lines differ
-PLACES = {
+PLACES: dict[str, dict[str, tuple[str, ...]]] = {
     "front": {
         "closed lid": ("left inner eye corner", "left outer eye corner"),
         "ear": ("left ear top", "left ear lobe", "left tragus"),

@@ -163,7 +163,7 @@ def occlusion_error(renderer: dermis.Renderer) -> float:
     inputs = renderer.prepare(Scene(head), Settings(size=(64, 64), atlas=512, samples=1))
     few, many = (
         Occlusion(renderer.device, count).bake(
-            head.mesh, inputs.head, inputs.lit, inputs.atlas.resources["atlas"], 512
+            head.mesh, inputs.head, inputs.lit, inputs.layouts[0].atlas.resources["atlas"], 512
         )[:512]
         for count in (DIRECTIONS, 1024)
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import timeit
+from functools import partial
 
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
@@ -39,7 +40,7 @@ def albedo_rows() -> str:
         if name == "kelemen-direct":
             continue
         dense = directional_albedo(c, m, model.lobe, nodes=DENSE)
-        ms = 1e3 * min(timeit.repeat(lambda name=name: albedo_table.__wrapped__(name), number=1, repeat=5))
+        ms = 1e3 * min(timeit.repeat(partial(albedo_table.__wrapped__, name), number=1, repeat=5))
         errors = (directional_albedo(c, m, model.lobe), read_albedo(name, c, m)[..., 0])
         cells = [f"{100 * np.abs(one / dense - 1).max():.1g} %" for one in errors]
         rows.append(f"| {name} | {' | '.join(cells)} | {ms:.0f} ms |")

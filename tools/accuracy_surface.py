@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from dermis.rendering.frame import scatter
 from dermis.rendering.levels import Levels
 from dermis.rendering.renderer import Renderer
 from dermis.rendering.seams import REMEDIES
-from dermis.scene import DirectionalLight, Scene, Settings, Skin, StripeLight
+from dermis.scene import DirectionalLight, Light, Scene, Settings, Skin, StripeLight
 
 Choice = Callable[[np.ndarray], np.ndarray]
 HUMAN = "heads/makehuman/head_young_male_light.obj"
@@ -124,10 +125,10 @@ def banded(head: Head) -> Scene:
     """Bands of light with hard ends from the front and from behind, and a little light besides."""
     x = head.mesh.positions[:, 0] - head.centre_mm[0]
     places = np.arange(max(x.min(), -90.0), min(x.max(), 90.0), SPACING_MM)
-    band = {"up": (0.4, 1, 0), "width_mm": WIDTH_MM, "shadows": False}
-    lights = []
-    for away in ((0, 0, -1), (0, 0, 1)):
-        lights += [StripeLight(direction=away, position=(place, 0, 0), **band) for place in places]
+    stripe = partial(StripeLight, up=(0.4, 1, 0), width_mm=WIDTH_MM, shadows=False)
+    lights: list[Light] = []
+    for away in ((0.0, 0.0, -1.0), (0.0, 0.0, 1.0)):
+        lights += [stripe(direction=away, position=(place, 0, 0)) for place in places]
         lights.append(DirectionalLight(direction=away, irradiance=(1, 1, 1), shadows=False))
     skin = Skin(profile="gpu-gems-3", albedo="profile", specular="none")
     return Scene(replace(head, maps=Maps()), lights=lights, skin=skin)
@@ -135,7 +136,9 @@ def banded(head: Head) -> Scene:
 
 def jumps(renderer: Renderer, scene: Scene, remedy: str, side: int, one: Points, other: Points) -> np.ndarray:
     """Change of red light from one side of each seam to the other, of the light there."""
-    settings = Settings(size=(16, 16), atlas=side, seams=remedy, transmission="none")
+    settings = Settings.model_validate(
+        {"size": (16, 16), "atlas": side, "seams": remedy, "transmission": "none"}
+    )
     inputs = renderer.prepare(scene, settings)
     frame = Frame(renderer.device)
     scatter(frame, renderer.stages, inputs)

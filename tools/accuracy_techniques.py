@@ -23,7 +23,7 @@ from dermis.optics.presets import media
 from dermis.reference.half_space import directional_albedo
 from dermis.reference.metrics import energy_ratio, relative_rmse
 from dermis.rendering.surface_points import irradiance_at, surface_points
-from dermis.scene import Settings
+from dermis.scene import DirectionalLight, Settings
 
 PAGE = Path(__file__).parent.parent / "docs" / "techniques.md"
 TECHNIQUES = ("none", "one-blur", "published", "texture-space", "screen-space", "pre-integrated")
@@ -72,11 +72,13 @@ def floor(head: Head, medium: str, traced: Comparison, adapter: str) -> str:
     mesh = head.mesh
 
     def at(values: np.ndarray) -> np.ndarray:
-        return np.einsum("nk,nkc->nc", seen.barycentric, values[mesh.triangles[seen.triangle]].astype(float))
+        return np.asarray(np.einsum("nk,nkc->nc", seen.barycentric, values[mesh.triangles[seen.triangle]]))
 
     normal, place = at(mesh.normals), at(mesh.positions) - np.array(head.centre_mm)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    towards = np.array(scene.lights[0].position) - place
+    (light,) = scene.lights
+    assert not isinstance(light, DirectionalLight)
+    towards = np.array(light.position) - place
     cosine = np.clip((normal * towards).sum(axis=1) / np.linalg.norm(towards, axis=1), 0.0, 1.0)
     layer = media()[medium].layers[0]
     single = layer.sigma_s_prime / (layer.sigma_a + layer.sigma_s_prime)

@@ -1,0 +1,33 @@
+"""Skin that looks the same from everywhere, and skin that does not.
+
+A Lambertian surface returns light alike by all directions. A half space of tissue returns more of what comes
+aslant, and what scattered only once leaves mostly aslant: cheeks are flatter, outlines and edges of shadow
+brighter. Beside both, paths of light followed one by one, and relative RMSE from them. No surface's lobe.
+
+Deck: +
+Sources: Chandrasekhar1960, Jensen2001, Jakob2022
+"""
+
+from importlib.util import find_spec
+
+from dermis.comparison.compare import compare
+from dermis.gallery.picture import main
+
+TECHNIQUE = "texture-space"
+
+
+def draw(studio):
+    traced = find_spec("mitsuba") is not None
+    against = "path-traced" if traced else "surface-integral"  # which only sets the exposure
+    settings, panels = studio.settings(0.6), {}
+    for direction in ("lambertian", "half-space"):
+        made = compare(studio.head(), against, (TECHNIQUE,), settings=settings, direction=direction)
+        label = f"{direction}: {made.rows[0].relrmse:.1%}" if traced else direction
+        panels[label] = made.shown(made.images[TECHNIQUE])
+    if traced:
+        panels["path traced"] = made.shown(made.truth.image)
+    return {label: (255 * image).round().astype("uint8") for label, image in panels.items()}
+
+
+if __name__ == "__main__":
+    main(draw)
