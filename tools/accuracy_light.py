@@ -97,12 +97,12 @@ def reflected(layers: Array, towards: Array, m: float) -> Array:
     return np.asarray((1 - f) * near + f * far)
 
 
-def furnace(renderer: dermis.Renderer, head: Head, energy: str, occlusion: str) -> Array:
+def furnace(renderer: dermis.Renderer, head: Head, energy: str, **chosen: str) -> Array:
     """Least, mean and largest outgoing over incoming radiance of a white head under light from everywhere."""
     white = replace(head, maps=replace(head.maps, colour=np.ones((4, 4, 3), np.float32)))
     skin = Skin(energy=energy)  # type: ignore[arg-type]
     scene = Scene(white, environment=Environment(name="uniform"), skin=skin)
-    settings = Settings(size=(384, 384), atlas=1024, samples=1, occlusion=occlusion)  # type: ignore[arg-type]
+    settings = Settings.model_validate({"size": (384, 384), "atlas": 1024, "samples": 1, **chosen})
     shown = renderer.draw(scene, settings)
     inside = shown.linear()[shown._read(shown.picture.exposed)[..., 3] == 1][:, 1]
     return np.array([inside.min(), inside.mean(), inside.max()])
@@ -115,14 +115,19 @@ def furnaces(renderer: dermis.Renderer) -> str:
     heads = {"sphere": ball, "scan": dermis.load_head("lee_perry_smith")}
     rows = []
     for name, head in heads.items():
-        for energy, occlusion in (
-            ("none", "none"),
-            ("published", "none"),
-            ("full", "none"),
-            ("full", "baked"),
+        for energy, occlusion, transmission in (
+            ("none", "none", "none"),
+            ("published", "none", "none"),
+            ("full", "none", "none"),
+            ("full", "baked", "none"),
+            ("full", "none", "thin"),
+            ("full", "baked", "thin"),
         ):
-            least, mean, most = furnace(renderer, head, energy, occlusion)
-            rows.append(f"| {name} | {energy} | {occlusion} | {least:.3f} | {mean:.4f} | {most:.3f} |")
+            least, mean, most = furnace(
+                renderer, head, energy, occlusion=occlusion, transmission=transmission
+            )
+            cells = f"{name} | {energy} | {occlusion} | {transmission}"
+            rows.append(f"| {cells} | {least:.3f} | {mean:.4f} | {most:.3f} |")
     return "\n".join(rows)
 
 
