@@ -11,6 +11,7 @@ from pathlib import Path
 
 import accuracy_direction as direction
 import accuracy_error as error
+import accuracy_half_space as half_space
 import accuracy_surface as surface
 import numpy as np
 
@@ -103,6 +104,7 @@ def main() -> None:
         found[f"traced_{medium}"], made = table(head, "path-traced", medium, adapter)
         found[f"floor_{medium}"] = floor(head, medium, made["front"], adapter)
     found["direction"] = direction.table(head, LIGHTS, SETTINGS, adapter)
+    found["half_space"] = half_space.table(head, adapter)
     found["integral"], _ = table(head, "surface-integral", "skin1", adapter)
     found["heat"], _ = table(head, "heat", "skin1", adapter)
     found["heat"] += "\n" + finer_heat(head, adapter)

@@ -215,3 +215,15 @@ def test_head_scan_has_no_other_normal_map() -> None:
     for role in ("colour", "specular"):
         with pytest.raises(DermisError, match=files[role].name):
             load_maps(normal=files[role])
+
+
+@pytest.mark.parametrize("side", [16, 100, 2048])
+def test_mean_colour_is_that_of_painted_texels(side: int) -> None:
+    """Of small maps too; asked for in every frame, it is worked out once."""
+    colour = np.random.default_rng(4).uniform(0.1, 0.9, (side, side, 3)).astype(np.float32)
+    colour[:, side // 2 :] = 0.0
+    maps = Maps(colour=colour)
+    mean = maps.mean_colour
+    assert mean is not None and mean is maps.mean_colour
+    assert np.abs(mean - colour[:, : side // 2].mean(axis=(0, 1))).max() < 0.02
+    assert Maps().mean_colour is None

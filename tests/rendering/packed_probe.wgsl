@@ -17,7 +17,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     point.position = 100.0 * n.yzx;
     point.normal = n;
     point.lit_position = point.position + given.a * n;
-    let gloss = 0.5 + 0.4 * n.xy;
+    let gloss = 0.5 + 0.4 * n.xy; // no constants: of those, Mesa 22.3 unpacks the upper half as 0
     let packed = pack_surface(point, Surface(-n, given.rgb, gloss.x, gloss.y));
     let unpacked = unpack_point(packed);
     let surface = unpack_surface(packed);

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from setups import frontal, head_of, place, run_frame, scene_of
+from setups import frontal, head_of, place, probe, run_frame, scene_of
 from tolerances import TWIN
 
 from dermis.assets.primitives import plane, uv_sphere
 from dermis.gpu import download
-from dermis.optics.directions import ROWS, directions, mean_of_once
+from dermis.gpu.textures import texture_from
+from dermis.optics.directions import ROWS, directions, mean_of_once, refracted
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import write_profile
 from dermis.rendering.renderer import Renderer
@@ -58,6 +59,32 @@ def law(cosine_in: float, cosine_out: float, eta: float, colour: Floats = COLOUR
     back = np.array([np.interp(np.sqrt(cosine_in), rows, told.returned[:, c]) for c in range(3)])
     a, b = (np.sqrt(1.0 - (1.0 - c**2) / eta**2) for c in (cosine_in, cosine_out))
     return np.asarray(back + told.once * (1.0 / (a + b) - mean_of_once(cosine_in, eta)))
+
+
+@pytest.mark.parametrize("surface", [DRY, {}], ids=["matched", "refracting"])
+def test_law_at_all_directions(renderer: Renderer, surface: Any) -> None:
+    """Finite where light comes in along the surface and leaves along it."""
+    eta = 1.0 if surface else 1.4
+    cosines = np.concatenate([[0.0, 1e-7, 1e-4, 3e-3], np.linspace(0.01, 1.0, 12)])
+    pairs = np.stack([*np.meshgrid(cosines, cosines), *np.zeros((2, 16, 16))], axis=-1)
+    turned = scene_of(
+        head_of(plane(100.0), colour=np.tile(COLOUR, (8, 8, 1))), direction="half-space", **surface
+    )
+    bound = run_frame(renderer, turned, technique="none").lit
+    bound |= {"cosines": texture_from(renderer.device, pairs.astype(np.float32), "rgba32float")}
+    back, beyond, around = (
+        made[..., :3]
+        for made in probe(renderer.device, "direction_probe", (16, 16), ["back", "beyond", "around"], **bound)
+    )
+    told = directions(COLOUR, eta)
+    a, b = (np.maximum(refracted(pairs[..., k], eta), 1e-4) for k in (0, 1))
+    rows, place = np.linspace(0.0, 1.0, ROWS), np.sqrt(pairs[..., 0])
+    expected = np.stack([np.interp(place, rows, told.returned[:, c]) for c in range(3)], axis=-1)
+    np.testing.assert_allclose(back, expected, rtol=1e-4)
+    expected = told.once * (1.0 / (a + b) - mean_of_once(pairs[..., 0], eta))[..., None]
+    np.testing.assert_allclose(beyond, expected, rtol=1e-2, atol=2e-3)  # floats round cosines near 0
+    expected = told.once * (mean_of_once(pairs[..., 1], eta) - told.mean_once)[..., None]
+    np.testing.assert_allclose(around, expected, atol=2e-3)
 
 
 @pytest.mark.parametrize("technique", ["none", "texture-space", "screen-space"])
@@ -124,6 +151,31 @@ def test_what_leaves_in_all_directions_together_is_what_came_back(renderer: Rend
             for degrees in angles
         ]
         np.testing.assert_allclose(np.mean(seen, axis=0), COLOUR * expected, rtol=3e-3)
+
+
+@pytest.mark.parametrize("technique", ["texture-space", "screen-space", "pre-integrated"])
+def test_light_from_around_is_not_multiplied_by_what_scattered_once(
+    renderer: Renderer, profile: str, technique: str
+) -> None:
+    """Bumps lit along their surface and seen along it have little below but what came from around."""
+    bumps = np.random.default_rng(1).normal(0.0, 0.5, (256, 256, 2))
+    rough = head_of(uv_sphere(30.0, 128, 64), normal=bumps)
+    light = DirectionalLight(direction=(-1.0, 0.0, 0.1), irradiance=(3.0,) * 3, shadows=False)
+    plain, turned = (
+        download(
+            renderer.device,
+            run_frame(
+                renderer,
+                scene_of(rough, light, profile=profile, albedo="profile", direction=direction, **DRY),
+                size=(192, 192),
+                technique=technique,
+                atlas=256,
+            ).picture.exposed,
+        )[..., :3]
+        for direction in ("lambertian", "half-space")
+    )
+    assert np.isfinite(turned).all() and turned.min() >= 0.0
+    assert (turned.max(axis=(0, 1)) < 1.6 * plain.max(axis=(0, 1))).all()
 
 
 def test_light_that_came_from_beside_leaves_all_ways_alike(renderer: Renderer, profile: str) -> None:

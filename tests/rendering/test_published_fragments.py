@@ -14,6 +14,7 @@ from dermis.assets.geometry import build_mesh
 from dermis.assets.primitives import SKIN, uv_sphere
 from dermis.gpu import Frame, download
 from dermis.rendering.renderer import Renderer
+from dermis.rendering.stages import published_fragments
 from dermis.rendering.stages.published_fragments import published_as_fragments
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.model import Scene
@@ -105,4 +106,18 @@ def test_afterwards_all_is_compute_again(renderer: Renderer, leaf: Scene) -> Non
         assert renderer.stages.combine is not before[2]
         raise KeyError
     assert (renderer.stages.irradiance, renderer.stages.published, renderer.stages.combine) == before
+    assert drawn(renderer, leaf, "alpha").filled == 0
+
+
+def test_what_cannot_be_compiled_changes_nothing(
+    renderer: Renderer, leaf: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Frames that follow are drawn as before, as those of a benchmark that leaves a case out."""
+
+    def fail(*_: Any) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(published_fragments, "FragmentSum", fail)
+    with pytest.raises(MemoryError), published_as_fragments(renderer.device, renderer.stages):
+        pass
     assert drawn(renderer, leaf, "alpha").filled == 0

@@ -14,7 +14,7 @@ from tolerances import TWIN
 from dermis.assets.geometry import build_mesh
 from dermis.assets.head import Head
 from dermis.assets.primitives import SKIN, plane, uv_sphere
-from dermis.gpu import download
+from dermis.gpu import Frame, download, upload
 from dermis.optics.profiles import load_profile
 from dermis.rendering.renderer import Renderer
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
@@ -221,3 +221,19 @@ def test_software_adapters_get_the_picture_of_gpus(
             monkeypatch.setattr(stage, "_suited", switches)
         made.append(image(renderer, scene, size=(45, 37), samples=samples, technique=technique))
     assert made[0].max() > 0.1 and np.array_equal(*made)
+
+
+def test_a_strip_is_left_at_its_end(renderer: Renderer) -> None:
+    """Pixels below one that shows nothing are another invocation's."""
+    head = head_of(plane(20.0))
+    camera = front_camera(head, (0, 10.0, 0), frame_mm=40.0)  # its upper edge is in the middle of the picture
+    scene, size = scene_of(head, frontal(), camera=camera), (16, 256)
+    inputs = run_frame(renderer, scene, size=size, technique="none")
+    radiance = inputs.picture.radiance
+    upload(renderer.device, radiance, np.full((256, 16, 4), 7.0, np.float32))
+    frame, half = Frame(renderer.device), (16, 128)
+    told = inputs.lit, inputs.view, inputs.switches, inputs.seen, inputs.scattered, radiance
+    renderer.stages.shade.draw(frame, *told, half)
+    frame.submit()
+    made = download(renderer.device, radiance)
+    assert not made[:128].any() and (made[128:] == 7.0).all()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -22,6 +23,7 @@ MIN_SIZE, MAX_SIZE = 16, 16384
 # A normal this far off its surface (87 degrees) has its slope capped; nothing real leans further.
 _MIN_NORMAL_Z = 0.05
 _LARGE = 1 << 14  # bytes of a file whose map is kept on disk: it is read back faster than decoded
+_MEAN_TEXELS, _MOST_APART = 64, 16  # a mean is taken of at least as many a side, at most so far apart
 _FORM = 1  # raise when maps of the same files become others
 
 
@@ -43,6 +45,16 @@ class Maps:
     specular: Floats | None = None
     roughness: Floats | None = None
     region: NDArray[np.uint8] | None = None
+
+    @cached_property
+    def mean_colour(self) -> NDArray[np.float64] | None:
+        """(3,) of the colour map, without black texels, which nobody painted [-]."""
+        if self.colour is None:
+            return None
+        apart = int(np.clip(min(self.colour.shape[:2]) // _MEAN_TEXELS, 1, _MOST_APART))
+        texels = self.colour[::apart, ::apart].reshape(-1, 3).astype(np.float64)
+        painted = texels[texels.sum(axis=1) > 0.0]
+        return np.asarray(painted.mean(axis=0)) if len(painted) else np.zeros(3)
 
 
 def load_maps(

@@ -49,9 +49,7 @@ def directions(total: ArrayLike, eta: float) -> Directions:
     """
     channels = [_channel(float(share), eta) for share in np.atleast_1d(np.asarray(total, np.float64))]
     returned, everywhere, once = (np.stack(values, axis=-1) for values in zip(*channels, strict=True))
-    mu, weight = _nodes(0.0, 1.0)
-    mean_once = float((2.0 * weight * mu * mean_of_once(mu, eta)).sum())
-    return Directions(eta, returned, everywhere, once, mean_once)
+    return Directions(eta, returned, everywhere, once, _mean_once(eta))
 
 
 def h_function(cosine: ArrayLike, albedo: float) -> Floats:
@@ -127,6 +125,13 @@ def _channel(total: float, eta: float) -> tuple[Floats, float, float]:
     return table, space.from_everywhere() / above, 0.25 * albedo * float(space.leaving.sum()) / above
 
 
+@lru_cache(maxsize=_KEPT)
+def _mean_once(eta: float) -> float:
+    """Mean of 1/(a + b) over both directions."""
+    mu, weight = _nodes(0.0, 1.0)
+    return float((2.0 * weight * mu * mean_of_once(mu, eta)).sum())
+
+
 def _albedo_of(total: float, eta: float) -> float:
     """Single-scattering albedo of the half-space that returns this share of what enters from above."""
     from scipy.optimize import brentq
@@ -155,5 +160,10 @@ def _critical(eta: float) -> float:
 
 def _nodes(low: float, high: float) -> tuple[Floats, Floats]:
     """Gaussian nodes and weights of an interval."""
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    nodes, weights = _gaussian()
     return low + 0.5 * (high - low) * (nodes + 1.0), 0.5 * (high - low) * weights
+
+
+@lru_cache(maxsize=1)
+def _gaussian() -> tuple[Floats, Floats]:
+    return np.polynomial.legendre.leggauss(_NODES)

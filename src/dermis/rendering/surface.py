@@ -6,9 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dermis.assets.maps import Maps
 from dermis.gpu import ComputeProgram
 from dermis.optics.directions import directions
 from dermis.optics.gaussians import GaussianSum
@@ -22,7 +20,6 @@ from dermis.specular.fresnel import FRESNEL, SKIN_ETA, SKIN_F0
 from dermis.specular.models import MODELS
 
 ProfileOf = Callable[[Skin], GaussianSum]
-_APART = 16  # texels between those whose mean is the colour of the skin
 
 
 def model_of(skin: Skin) -> str:
@@ -62,7 +59,8 @@ def skin_record(program: ComputeProgram, scene: Scene, head: HeadTextures, profi
 def _by_direction(scene: Scene, profile_of: ProfileOf) -> dict[str, Any]:
     """What light does by its directions, for half-spaces of the skin's mean colour."""
     skin = scene.skin
-    colour = _mean_colour(scene.head.maps) if skin.albedo == "map" else profile_of(skin).albedo
+    colour = profile_of(skin).albedo if skin.albedo == "profile" else scene.head.maps.mean_colour
+    colour = np.full(3, DEFAULT_COLOUR) if colour is None else colour
     law = directions(colour, 1.0 if skin.specular == "none" else SKIN_ETA)
     return {
         "inner_eta": law.eta,
@@ -71,12 +69,3 @@ def _by_direction(scene: Scene, profile_of: ProfileOf) -> dict[str, Any]:
         "back_from_everywhere": law.from_everywhere,
         "back": np.pad(law.returned, ((0, 0), (0, 1))),
     }
-
-
-def _mean_colour(maps: Maps) -> NDArray[np.float64]:
-    """Of texels far enough apart to be quick, black ones, which nobody painted, left out."""
-    if maps.colour is None:
-        return np.full(3, DEFAULT_COLOUR)
-    texels = maps.colour[::_APART, ::_APART].reshape(-1, 3).astype(np.float64)
-    painted = texels[texels.sum(axis=1) > 0.0]
-    return np.asarray(painted.mean(axis=0)) if len(painted) else np.zeros(3)

@@ -2,6 +2,7 @@
 //#include "lighting.wgsl"
 //#include "pre_integrated.wgsl"
 //#include "sample_bits.wgsl"
+//#include "shaded.wgsl"
 
 override SPLIT: bool = false; // whether light below the skin is kept apart, to spread over the picture
 // Pixels of an invocation, one below the other. Software adapters run both sides of every branch for all of a vector's pixels
@@ -10,8 +11,6 @@ override STRIP: u32 = 1u;
 
 const EYE_ROUGHNESS: f32 = 0.1; // plain materials are wet: eyeballs, teeth
 const FINEST_RATIO: f32 = 4.0; // longest over shortest side of a footprint that one map sample may stand for
-const ONE_SURFACE: f32 = 4.0; // difference of depth within a pixel over its width that is still one surface
-const CROSSED: f32 = 2.0; // step in depth that light below the skin crosses [mm]: no other surface either
 
 struct Shade {
     eye: vec3f,
@@ -34,13 +33,6 @@ struct Shade {
 @group(1) @binding(3) var image: texture_storage_2d<rgba32float, write>;
 @group(1) @binding(4) var apart: texture_storage_2d_array<rgba32float, write>; // light below, depth; its share that leaves
 
-struct Shaded {
-    below: vec3f, // light below the skin
-    leaving: vec3f, // share of it that leaves towards the eye
-    over: vec3f, // light that does not spread: off the surface, from plain materials
-    depth: f32, // of skin [mm], else 0
-}
-
 // t: corners of the triangle, w: barycentric weights
 fn open_sky(point: Point, t: vec4u, w: vec3f) -> f32 {
     if (!ENVIRONMENT) {
@@ -62,8 +54,15 @@ fn shaded_skin(point: Point, surface: Surface, lit: Lit, out: f32, footprint: f3
     } else {
         below *= shade.total;
     }
-    let over = shade.shown.y * lit.reflected * mix(vec3f(1.0), surface.colour, skin.tint);
-    let leaving = shade.shown.x * out * share_of(surface.colour, 1.0 - skin.mix) * turned(lit, shade.total * share, below);
+    var over = shade.shown.y * lit.reflected * mix(vec3f(1.0), surface.colour, skin.tint);
+    var leaving = shade.shown.x * out * share_of(surface.colour, 1.0 - skin.mix);
+    if (HALF_SPACE) {
+        // What is more than the mean has scattered once and is spread no further: at grazing angles it is many times what
+        // else is below, and light from around must not be multiplied by that.
+        let beyond = turned(lit, shade.total * share, below);
+        over += below * leaving * max(beyond, vec3f(0.0));
+        leaving *= 1.0 + min(beyond, vec3f(0.0));
+    }
     return Shaded(below, leaving, over, dot(point.position - shade.eye, shade.forward));
 }
 
@@ -125,27 +124,6 @@ fn shaded(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Shaded {
         return shaded_plain(surface, lit, out);
     }
     return shaded_skin(point, surface, lit, out, footprint, open);
-}
-
-// The skin of one pixel, each member times the share of its samples.
-struct PixelSkin {
-    below: vec3f,
-    leaving: vec3f,
-    depth: f32,
-    share: f32,
-}
-
-// Adds a part of a pixel to its skin, which is the one surface that most samples see.
-fn keep(held: PixelSkin, part: Shaded, share: f32, pixel: f32) -> PixelSkin {
-    let one = PixelSkin(share * part.below, share * part.leaving, share * part.depth, share);
-    let apart = abs(part.depth - held.depth / max(held.share, 1e-6));
-    if (held.share > 0.0 && apart <= max(ONE_SURFACE * pixel * part.depth, CROSSED)) {
-        return PixelSkin(held.below + one.below, held.leaving + one.leaving, held.depth + one.depth, held.share + share);
-    }
-    if (share > held.share) {
-        return one;
-    }
-    return held;
 }
 
 // What some samples of a pixel see together.
@@ -234,13 +212,14 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let end = min(first.y + STRIP, size.y);
     var pixel = pixel_at(first);
     var part = find(&pixel, end);
+    if (part.share == 0.0) {
+        return; // all of the strip is behind the head, and the next one is another's
+    }
     loop {
-        if (part.share > 0.0) {
-            let one = shaded(part.triangle, part.place, part.share, vec2f(size));
-            pixel.sum += part.share * vec4f(one.below * one.leaving + one.over, 1.0);
-            if (SPLIT && one.depth > 0.0) {
-                pixel.skin = keep(pixel.skin, one, part.share, 2.0 * length(shade.up) / f32(size.y));
-            }
+        let one = shaded(part.triangle, part.place, part.share, vec2f(size));
+        pixel.sum += part.share * vec4f(one.below * one.leaving + one.over, 1.0);
+        if (SPLIT && one.depth > 0.0) {
+            pixel.skin = keep(pixel.skin, one, part.share, 2.0 * length(shade.up) / f32(size.y));
         }
         part = find(&pixel, end);
         if (part.share == 0.0) {

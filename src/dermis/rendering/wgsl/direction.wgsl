@@ -13,16 +13,15 @@ fn coming_back(cosine: f32) -> vec3f {
     return mix(skin.back[low].rgb, skin.back[low + 1u].rgb, row - f32(low));
 }
 
-// Cosine below the surface.
+// Cosine below the surface; never 0, so that neither is a sum of two.
 fn refracted(cosine: f32) -> f32 {
-    return sqrt(1.0 - (1.0 - cosine * cosine) / (skin.inner_eta * skin.inner_eta));
+    return sqrt(max(1.0 - (1.0 - cosine * cosine) / (skin.inner_eta * skin.inner_eta), 1e-8));
 }
 
 // Mean of 1/(a + b) over where light leaves to, a and b the cosines below the surface.
-fn mean_of_once(inside: f32) -> f32 {
-    let a = max(inside, 1e-4);
+fn mean_of_once(a: f32) -> f32 {
     let square = skin.inner_eta * skin.inner_eta;
-    let critical = sqrt(1.0 - 1.0 / square);
+    let critical = sqrt(max(1.0 - 1.0 / square, 0.0)); // a quotient of equals may be more than 1
     return 2.0 * square * (1.0 - critical - a * log((a + 1.0) / (a + critical)));
 }
 

@@ -24,14 +24,11 @@ fn seen_normal(normal: vec3f, v: vec3f) -> vec3f {
     return turned / max(length(turned), 1e-3);
 }
 
-// What leaves towards the eye of light below the skin, over the mean of all directions. What scattered only once came in here;
-// the rest, from around it, goes all ways alike.
+// What leaves towards the eye of light below the skin beyond the mean of all directions, over that light. What scattered only
+// once came in here; the rest, from around it, goes all ways alike.
 // share: of `entered` that comes back
 fn turned(lit: Lit, share: vec3f, below: vec3f) -> vec3f {
-    if (!HALF_SPACE) {
-        return vec3f(1.0);
-    }
-    return 1.0 + share * lit.turned / max(max(share * lit.entered, below), vec3f(1e-6));
+    return share * lit.turned / max(max(share * lit.entered, below), vec3f(1e-12));
 }
 
 // The first light from `first` on that a point may see, or the last.

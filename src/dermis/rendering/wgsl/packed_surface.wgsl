@@ -3,6 +3,7 @@
 //#include "skin.wgsl"
 
 const LEAST_EXPONENT: f32 = 32.0; // colours are at least 2^-32 of 1
+const MOST_HALF: f32 = 65504.0;
 
 struct Packed {
     place: vec4u, // position, interpolated normal
@@ -33,7 +34,7 @@ fn pack_colour(colour: vec3f, height: f32) -> vec2u {
 }
 
 fn pack_surface(point: Point, surface: Surface) -> Packed {
-    let height = max(0.0, dot(point.lit_position - point.position, point.normal));
+    let height = clamp(dot(point.lit_position - point.position, point.normal), 0.0, MOST_HALF);
     let colour = pack_colour(surface.colour, height);
     let gloss = pack2x16float(vec2f(surface.roughness, surface.rho_s));
     return Packed(

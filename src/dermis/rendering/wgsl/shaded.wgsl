@@ -1,0 +1,32 @@
+// What is seen of a surface in a part of a pixel, and all the skin of a pixel together.
+
+const ONE_SURFACE: f32 = 4.0; // difference of depth within a pixel over its width that is still one surface
+const CROSSED: f32 = 2.0; // step in depth that light below the skin crosses [mm]: no other surface either
+
+struct Shaded {
+    below: vec3f, // light below the skin
+    leaving: vec3f, // share of it that leaves towards the eye
+    over: vec3f, // light that does not spread: off the surface, from plain materials, scattered but once
+    depth: f32, // of skin [mm], else 0
+}
+
+// The skin of one pixel, each member times the share of its samples.
+struct PixelSkin {
+    below: vec3f,
+    leaving: vec3f,
+    depth: f32,
+    share: f32,
+}
+
+// Adds a part of a pixel to its skin, which is the one surface that most samples see.
+fn keep(held: PixelSkin, part: Shaded, share: f32, pixel: f32) -> PixelSkin {
+    let one = PixelSkin(share * part.below, share * part.leaving, share * part.depth, share);
+    let apart = abs(part.depth - held.depth / max(held.share, 1e-6));
+    if (held.share > 0.0 && apart <= max(ONE_SURFACE * pixel * part.depth, CROSSED)) {
+        return PixelSkin(held.below + one.below, held.leaving + one.leaving, held.depth + one.depth, held.share + share);
+    }
+    if (share > held.share) {
+        return one;
+    }
+    return held;
+}

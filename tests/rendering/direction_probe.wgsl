@@ -1,0 +1,15 @@
+// What a half-space does by directions, for pairs of cosines.
+//#include "direction.wgsl"
+
+@group(1) @binding(0) var cosines: texture_2d<f32>; // of coming in, of leaving
+@group(1) @binding(1) var back: texture_storage_2d<rgba32float, write>;
+@group(1) @binding(2) var beyond: texture_storage_2d<rgba32float, write>;
+@group(1) @binding(3) var around: texture_storage_2d<rgba32float, write>;
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    let given = textureLoad(cosines, id.xy, 0);
+    textureStore(back, id.xy, vec4f(coming_back(given.x), 0.0));
+    textureStore(beyond, id.xy, vec4f(beyond_mean(given.x, given.y), 0.0));
+    textureStore(around, id.xy, vec4f(beyond_mean_from_everywhere(given.y), 0.0));
+}
