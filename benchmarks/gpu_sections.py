@@ -92,7 +92,7 @@ def quick_plan(adapter: str, head: str) -> Plan:
     cases = [usual, replace(usual, technique=FRAGMENTS, varies="technique")]
     effort = Effort(warming=0, between=0, timed=1, row=1)
     image = {"size": (32, 32), "atlas": 64}
-    small = ("--size", "96x72", "--atlas", "64", "--frames", "2")
+    small = ("--size", "240x160", "--atlas", "64", "--frames", "2")
     return Plan(adapter, head, usual, cases, cases[:1], effort, 4, image, small)
 
 

@@ -159,6 +159,16 @@ def test_the_longest_unused_are_forgotten(folder: Path, monkeypatch: pytest.Monk
     assert first in left and second not in left and len(left) == 2
 
 
+def test_what_a_killed_process_left_goes_after_a_day(folder: Path) -> None:
+    folder.mkdir()
+    old, new = folder / "a.1.2.part", folder / "b.1.2.part"
+    for path in (old, new):
+        path.write_bytes(b"half of it")
+    os.utime(old, (1, 1))
+    cached_atlas(plane(10.0), 64)
+    assert not old.exists() and new.exists()
+
+
 def test_mips_and_arrays_come_back_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     source = np.random.default_rng(1).random((6, 9)).astype(np.float32)
@@ -196,6 +206,29 @@ def test_what_the_folder_cannot_hold_is_not_kept(tmp_path: Path, monkeypatch: py
     for k in (1, 2):
         assert cached_array(np.zeros(1), "large", lambda k=k: np.full(200, k))[0] == k  # type: ignore[misc]
         assert cached_array(np.zeros(1), "small", lambda k=k: np.full(20, k))[0] == 1  # type: ignore[misc]
+
+
+def test_of_what_the_folder_cannot_hold_at_once_some_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The maps of one head may be too many: each start would make and write all of them again."""
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    monkeypatch.setattr(cache, "_MOST_BYTES", 100_000)
+    made: list[int] = []
+
+    def start(first: int) -> None:
+        made.clear()
+        for k in range(first, first + 4):
+            cached_array(np.array([k]), "map", lambda k=k: made.append(k) or np.zeros(30_000, np.uint8))  # type: ignore[misc]
+
+    start(0)
+    start(0)
+    assert made == [3]
+    for path in tmp_path.rglob("*.npz"):  # another day
+        os.utime(path, (1, 1))
+    start(10)
+    start(10)
+    assert made == [13]
 
 
 def test_all_kinds_of_arrays_come_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

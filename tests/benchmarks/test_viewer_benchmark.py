@@ -12,8 +12,9 @@ import pytest
 from offscreen_hands import ADAPTER
 from small_head import write_head
 
+from dermis.cli.options import parse_size
+
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
-SIZE = (240, 160)  # its middle is beside what brings the panel back
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -26,10 +27,15 @@ def found_modules() -> Any:
 
 @pytest.fixture(scope="module")
 def plan(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """At the sizes of the quick trial: a pointer in the middle must be beside what brings the panel back."""
+    from gpu_sections import quick_plan
     from viewer_hands import Plan
 
     head = write_head(tmp_path_factory.mktemp("benchmark") / "head.obj")
-    return Plan(str(head), ADAPTER, SIZE, atlas=64, samples=1, frames=2)
+    words = quick_plan(ADAPTER, str(head)).viewer
+    given = dict(zip(words[::2], words[1::2], strict=True))
+    size, atlas, frames = parse_size(given["--size"]), int(given["--atlas"]), int(given["--frames"])
+    return Plan(str(head), ADAPTER, size, atlas=atlas, samples=1, frames=frames)
 
 
 @pytest.fixture(scope="module")

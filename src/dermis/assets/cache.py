@@ -9,6 +9,7 @@ import json
 import os
 import struct
 import threading
+import time
 import zipfile
 import zlib
 from collections.abc import Callable, Sequence
@@ -29,7 +30,9 @@ Array = NDArray[Any]
 Arrays = dict[str, Array]
 _FORM = 3  # raise when `build_atlas` gives other results for the same mesh
 _MESH_FORM = 1  # raise when `load_mesh` gives other results for the same file
-_MOST_BYTES = 2 << 30
+_MOST_BYTES = 2 << 30  # of each folder
+_START_S = 300.0  # longer than a process takes to read all that it wants
+_LONGEST_S = 24 * 3600.0  # after that nobody is still writing a file
 _DAMAGED: tuple[type[Exception], ...] = (OSError, ValueError, TypeError, KeyError, EOFError, RuntimeError)
 _DAMAGED += (MemoryError, struct.error, zipfile.BadZipFile)
 _NAME_LENGTHS = 26  # where a member of an archive tells how long its name and what follows are
@@ -154,11 +157,18 @@ def _kept(folder: str, key: str, names: list[str], make: Callable[[], Arrays]) -
             path.touch()
         return arrays
     arrays = make()
-    if sum(array.nbytes for array in arrays.values()) <= _MOST_BYTES:
-        with contextlib.suppress(OSError):
+    with contextlib.suppress(OSError):
+        if _has_room(path.parent, sum(array.nbytes for array in arrays.values())):
             _store(path, arrays)
             _prune(path.parent)
     return arrays
+
+
+def _has_room(folder: Path, size: int) -> bool:
+    """Whether that many bytes fit beside what was just used; in turn, they would drive each other out."""
+    now = time.time()
+    stored = (path.stat() for path in folder.glob("*.npz"))
+    return size + sum(one.st_size for one in stored if now - one.st_mtime < _START_S) <= _MOST_BYTES
 
 
 def _array(file: io.BufferedReader, member: zipfile.ZipInfo) -> Array:
@@ -194,10 +204,13 @@ def _store(path: Path, arrays: Arrays) -> None:
 
 
 def _prune(folder: Path) -> None:
-    """Forget the files used longest ago while the folder holds more than its share."""
+    """Forget the files used longest ago while the folder holds more than its share, and unfinished ones."""
     stored = sorted(folder.glob("*.npz"), key=lambda p: p.stat().st_mtime, reverse=True)
     total = 0
     for path in stored:
         total += path.stat().st_size
         if total > _MOST_BYTES:
+            path.unlink(missing_ok=True)
+    for path in folder.glob("*.part"):  # of processes that were killed
+        if time.time() - path.stat().st_mtime > _LONGEST_S:
             path.unlink(missing_ok=True)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
-PresetName = Literal["film", "interactive", "cpu"]
 PUBLISHED = "published"
 FRAGMENTS = "published-fragments"
 """The passes of 2007 in the graphics pipeline; `PUBLISHED` are the same in compute."""

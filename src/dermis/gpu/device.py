@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import weakref
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
@@ -36,7 +37,8 @@ def open_device(adapter: str = "auto") -> Device:
 class Device:
     """A logical device; nothing here is shared between two of them.
 
-    beside : threads for what the driver and the disk do by themselves: compile, read, copy
+    beside : threads for what the driver and the disk do by themselves: compile, read, copy; what they have
+        not begun when the device is dropped is left
     """
 
     def __init__(self, adapter: Adapter, reason: str) -> None:
@@ -55,6 +57,7 @@ class Device:
         self.max_texture_size, self.max_storage_bytes = (int(limits[name]) for name in _RAISED_LIMITS[:2])
         self.has_timestamps = "timestamp-query" in adapter.features
         self.beside = ThreadPoolExecutor(os.cpu_count())
+        weakref.finalize(self, self.beside.shutdown, wait=False, cancel_futures=True)
         self._timestamps: tuple[Any, Any] | None = None
         self._uniform_chunks: list[Any] = []
         self._staging: dict[int, list[Any]] = {}

@@ -32,8 +32,8 @@ def published_as_fragments(device: Device, stages: Stages) -> Iterator[None]:
     The results are those of compute up to the rounding of halves. Other techniques cannot be drawn meanwhile.
     """
     usual = stages.irradiance, stages.published, stages.combine
-    stages.irradiance = FragmentIrradiance(device)
-    stages.published, stages.combine = FragmentBlurs(device), FragmentSum(device)
+    drawn = FragmentIrradiance(device), FragmentBlurs(device), FragmentSum(device)
+    stages.irradiance, stages.published, stages.combine = drawn
     try:
         yield
     finally:

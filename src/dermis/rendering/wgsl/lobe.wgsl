@@ -1,5 +1,4 @@
 // The rough white surface over the skin: the model in use, and how light shares itself out between it and the skin.
-//#include "bilinear.wgsl"
 //#include "surface.wgsl"
 //#include "lobes/angles.wgsl"
 //#include "lobes/fresnel.wgsl"
