@@ -22,7 +22,9 @@ BRIEF = Effort(warming=0, between=0, timed=1, row=1)
 def bench(run: Run, folder: Path, opened: None, device: Any, monkeypatch: pytest.MonkeyPatch) -> Run:
     """`dermis bench` with presets of two tiny frames."""
     usual = Case((32, 32), atlas=64, gaussians=2, lights=1, samples=1)
-    tiny = Preset(usual, image=((32, 32),), atlas=(64,), gaussians=(2,), lights=(1,), subdivide=(0,))
+    tiny = Preset(
+        usual, image=((32, 32),), atlas=(64,), gaussians=(2,), lights=(1,), subdivide=(0,), environment=()
+    )
     for name in cases.PRESETS:
         monkeypatch.setitem(cases.PRESETS, name, tiny)
     monkeypatch.setattr("dermis.benchmark.run.ON_CPU", BRIEF)

@@ -17,6 +17,7 @@ class Case:
     atlas : side of the irradiance map [texel]
     gaussians : terms of the profile
     lights : spots with shadows
+    environment : name of the light around, "" for none beside the lights
     subdivide : levels of subdivision of the head: four times the triangles each
     samples : of a pixel
     technique : of `Settings`, or `FRAGMENTS`
@@ -27,6 +28,7 @@ class Case:
     atlas: int = 2048
     gaussians: int = 6
     lights: int = 3
+    environment: str = ""
     subdivide: int = 0
     samples: int = 4
     technique: str = "texture-space"
@@ -43,12 +45,13 @@ class Preset:
     gaussians: tuple[int, ...]
     lights: tuple[int, ...]
     subdivide: tuple[int, ...]
+    environment: tuple[str, ...] = ("uniform",)
     technique: tuple[str, ...] = (PUBLISHED, FRAGMENTS)
 
     def cases(self) -> list[Case]:
         """The usual frame, then the others."""
         found = [self.usual]
-        for name in ("technique", "image", "atlas", "gaussians", "lights", "subdivide"):
+        for name in ("technique", "image", "atlas", "gaussians", "lights", "environment", "subdivide"):
             for value in getattr(self, name):
                 if value != getattr(self.usual, name):
                     found.append(replace(self.usual, varies=name, **{name: value}))
@@ -73,7 +76,7 @@ PRESETS: dict[str, Preset] = {
         subdivide=(0, 1, 2, 3),
     ),
     "cpu": Preset(
-        Case((512, 512), atlas=512),
+        Case((1024, 1024), atlas=1024),
         image=((256, 256), (512, 512), (1024, 1024)),
         atlas=(256, 512, 1024),
         gaussians=(1, 3, 6, 8),

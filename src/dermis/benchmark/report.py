@@ -39,6 +39,7 @@ def _case(case: Case) -> dict[str, Any]:
         "atlas": case.atlas,
         "gaussians": case.gaussians,
         "lights": case.lights,
+        "environment": case.environment,
         "subdivide": case.subdivide,
         "samples": case.samples,
         "technique": case.technique,
@@ -62,7 +63,7 @@ def _row(row: Row) -> dict[str, Any]:
 
 
 _OTHERS = {PUBLISHED: "2007, compute [ms]", FRAGMENTS: "2007, fragments [ms]"}
-_CASE = ("image", "atlas", "Gaussians", "lights", "triangles", "technique")
+_CASE = ("image", "atlas", "Gaussians", "lights", "around", "triangles", "technique")
 _TIMES = ("frame [ms]", "device [ms]", "floor [ms]", "ratio", "Python [ms]", "image out [ms]")
 COLUMNS = (*_CASE, *_TIMES, "memory [MB]")
 
@@ -77,6 +78,7 @@ def cells(row: Row) -> tuple[str, ...]:
         str(case.atlas),
         str(case.gaussians),
         str(case.lights),
+        case.environment or "-",
         str(row.triangles),
         case.technique,
         *map(plain, (*times, *rest)),
@@ -118,7 +120,8 @@ def left_out_lines(made: Benchmark) -> list[str]:
 def _told(case: Case) -> str:
     width, height = case.image
     sizes = f"{width}x{height}, atlas {case.atlas}, {case.gaussians} Gaussians, {case.lights} lights"
-    return f"{sizes}, subdivided {case.subdivide} times, {case.technique}"
+    around = f", environment {case.environment}" if case.environment else ""
+    return f"{sizes}{around}, subdivided {case.subdivide} times, {case.technique}"
 
 
 def summary(made: Benchmark) -> str:

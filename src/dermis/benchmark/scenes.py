@@ -12,6 +12,7 @@ from dermis.benchmark.cases import FRAGMENTS, PUBLISHED, Case
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
 from dermis.scene.camera import portrait
+from dermis.scene.environment import Environment
 from dermis.scene.lights import PointLight, studio
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
@@ -40,12 +41,13 @@ def scenes_of(case: Case, head: Head, folder: Path, count: int) -> list[Scene]:
     """
     skin, camera = Skin(profile=str(_profile_file(case.gaussians, folder))), portrait(head)
     lights = _lights(case.lights)
+    around = Environment(name=case.environment) if case.environment else None
     scenes = []
     for k in range(count):
         sway = _SWAY_MM * math.sin(1.0 + k)
         moved = [light.model_copy(update={"position": _aside(light.position, sway)}) for light in lights]
         eye = camera.model_copy(update={"position": _aside(camera.position, sway)})
-        scenes.append(Scene(head, lights=tuple(moved), camera=eye, skin=skin))
+        scenes.append(Scene(head, lights=tuple(moved), environment=around, camera=eye, skin=skin))
     return scenes
 
 

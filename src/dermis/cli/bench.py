@@ -40,7 +40,7 @@ def bench(
     ----------
     preset:
         interactive (around 1920x1080, atlas 2048), film (around 3840x2160, atlas 4096), or cpu (around
-        512x512; some minutes on two cores) [by the adapter].
+        1024x1024; some minutes on two cores) [by the adapter].
     head:
         auto (the scan lee_perry_smith when it is here, else bust), or what `dermis render` takes.
     output:
