@@ -110,6 +110,12 @@ def test_heads_look_like_skin(subject: Subject) -> None:
     assert image.max() < 4
 
 
+def test_the_scan_names_its_author_and_licence(subjects: dict[str, Subject]) -> None:
+    told = {name: subject.head.attribution for name, subject in subjects.items()}
+    assert "Lee Perry-Smith" in told.pop("scan") and subjects["scan"].head.attribution.endswith("CC BY 3.0")
+    assert set(told.values()) == {""}
+
+
 def test_dark_skin_is_darker_than_light_skin(subjects: dict[str, Subject]) -> None:
     means = {
         name: subject.renderer.render(dermis.Scene(subject.head), **SIZES).mean()

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
+import urllib.request
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -65,14 +68,47 @@ def test_the_package_imports_without_the_extra() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_without_a_display_it_names_the_way_out(
-    run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_a_display_it_names_the_way_out(folder: Path) -> None:
+    """In a process of its own: glfw ends the one in which a window is asked for after its warning."""
     pytest.importorskip("glfw", reason="the extra `viewer` is not installed")
-    monkeypatch.setenv("DISPLAY", ":4294")
-    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    ended = run("view", "head.obj", "--adapter", "cpu")
-    assert ended.code == 2 and "--browser" in ended.stderr and "Traceback" not in ended.stderr
+    environment = {name: value for name, value in os.environ.items() if name != "WAYLAND_DISPLAY"}
+    command = [sys.executable, "-m", "dermis", "view", "head.obj", "--adapter", "cpu"]
+    ended = subprocess.run(
+        command, env=environment | {"DISPLAY": ":4294"}, capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 2
+    assert ended.stderr.startswith("dermis: window: ") and "--browser" in ended.stderr
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Ctrl+C is sent as a signal")
+def test_one_ctrl_c_ends_the_page(folder: Path) -> None:
+    pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
+    command = [
+        sys.executable,
+        "-m",
+        "dermis",
+        "view",
+        "head.obj",
+        "--browser",
+        "--port",
+        "0",
+        "--adapter",
+        "cpu",
+    ]
+    # A shell's background job ignores Ctrl+C, and so would what it starts.
+    default = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        served = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    finally:
+        signal.signal(signal.SIGINT, default)
+    with served:
+        try:
+            assert served.stdout is not None
+            urllib.request.urlopen(served.stdout.readline().split()[0], timeout=60).close()
+            served.send_signal(signal.SIGINT)
+            assert served.wait(timeout=60) == 0
+        finally:
+            served.kill()
 
 
 def test_the_options_make_the_state(run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -44,6 +44,7 @@ PLAIN_GPU = fake("Old", "DiscreteGPU", features=())
         ((fake("softpipe", "CPU", features=WANTED_FEATURES[:1]), CPU), "llvmpipe"),
         ((CPU, PLAIN_GPU), "Old"),
         ((fake("GL", "DiscreteGPU", "OpenGL"), GPU), "GeForce"),
+        ((fake("GL", "DiscreteGPU", "OpenGL"), CPU), "llvmpipe"),
         ((CPU, fake("Odd", "SomethingNew")), "Odd"),
     ],
 )
@@ -75,6 +76,15 @@ def test_no_adapter_at_all(machine: Any, wanted: str) -> None:
     with pytest.raises(DermisError, match="Vulkan") as caught:
         fitting_adapters(wanted)
     assert INSTALL_HINT in str(caught.value)
+
+
+@pytest.mark.parametrize("wanted", ["auto", "cpu"])
+def test_opengl_alone_is_taken_only_by_its_name(machine: Any, wanted: str) -> None:
+    machine(fake("Mesa", "CPU", "OpenGL"))
+    with pytest.raises(DermisError, match="OpenGL") as caught:
+        fitting_adapters(wanted)
+    assert INSTALL_HINT in str(caught.value)
+    assert fitting_adapters("mesa")[0][0].backend == "OpenGL"
 
 
 def test_no_software_adapter(machine: Any) -> None:

@@ -120,7 +120,8 @@ def load_head(
         came = f"{height_mm} came without a height map"
         refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
     maps = load_maps(**chosen, height_mm=height_mm, normal_y=normal_y)
-    return Head(name, subdivided(mesh, subdivide), maps, sample.attribution if sample else "")
+    thanks = f"{sample.attribution}, {sample.licence}" if sample else ""
+    return Head(name, subdivided(mesh, subdivide), maps, thanks)
 
 
 def _chosen(given: dict[str, MapFile], files: dict[str, Any]) -> dict[str, Any]:

@@ -106,7 +106,8 @@ def render(
     stretch:
         full corrects blurs for the map's stretch and shear; axes takes u and v for at right angles [full].
     profile:
-        Diffusion profile: gpu-gems-3, or a CSV file with variance_mm2,red,green,blue.
+        Diffusion profile: gpu-gems-3 [the default], a medium or skin (dj3, skin1, light ...), a .toml file
+        such as `dermis profile -o` writes, or a CSV file with variance_mm2,red,green,blue.
     albedo:
         map: profile made white, colour from the map (the deck). profile: the profile's own colour, no map.
     direction:

@@ -63,12 +63,15 @@ def fitting_adapters(wanted: str) -> tuple[list[Adapter], str]:
     Raises DermisError when there is none.
     """
     adapters = list_adapters()
-    if not adapters:
-        refuse("adapter", "a Vulkan, Metal or DX12 adapter", "this machine shows none", INSTALL_HINT)
+    # OpenGL draws wrong pictures, if any: it is taken only by its name.
+    right = [a for a in adapters if a.backend != "OpenGL"]
+    if not adapters or (wanted in ("auto", "cpu") and not right):
+        came = "this machine shows only OpenGL's" if adapters else "this machine shows none"
+        refuse("adapter", "a Vulkan, Metal or DX12 adapter", came, INSTALL_HINT)
     if wanted == "auto":
-        return adapters, "it is the fastest kind, with the most features"
+        return right, "it is the fastest kind, with the most features"
     if wanted == "cpu":
-        fitting, reason = [a for a in adapters if a.kind == "CPU"], "software was asked for"
+        fitting, reason = [a for a in right if a.kind == "CPU"], "software was asked for"
     else:
         fitting = [a for a in adapters if wanted.lower() in f"{a.name} {a.driver} {a.backend}".lower()]
         reason = f"its name contains {wanted!r}"

@@ -69,4 +69,6 @@ def _finding(one: ErrorDetails, known: list[str]) -> str:
     if expected.startswith(("greater", "less")):
         expected = f"a number {expected}"
     came = repr(one["input"])
+    if not one["loc"] and isinstance(one["input"], dict):  # values that do not go together
+        came = ", ".join(f"{name} {value}" for name, value in one["input"].items())
     return f"expected {expected}, but {came if len(came) <= _LONGEST else came[:_LONGEST] + ' …'} came"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -23,6 +24,7 @@ def show_window(state: ViewerState, adapter: str, size: Size) -> None:
     Raises DermisError without a display, a device or the extra `viewer`.
     """
     backend = _backend("glfw", ("glfw",), _VIEWER)
+    _find_display(backend.glfw)
     try:
         canvas = backend.RenderCanvas(size=size, title=_TITLE, max_fps=_MOST_FPS)
     except Exception as error:  # whatever glfw makes of a missing display
@@ -31,6 +33,16 @@ def show_window(state: ViewerState, adapter: str, size: Size) -> None:
     viewer = Viewer(state, canvas, adapter)
     backend.loop.run()
     _raise_failure(viewer)
+
+
+def _find_display(glfw: Any) -> None:
+    """Refuse without a display: glfw only warns of it, and ends the process once a window is asked for."""
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        opens = glfw.init()
+    if not opens:
+        came = f"none opens ({'; '.join(str(one.message) for one in told)})"
+        refuse("window", "a display to open it on", came, "Set DISPLAY, or use --browser")
 
 
 def serve(
@@ -62,7 +74,10 @@ def serve(
         viewer = Viewer(state, PageCanvas(size=size, title=_TITLE, max_fps=_MOST_FPS), adapter)
         viewer.canvas._size_info.set_physical_size(*size, 1.0)
         announce(address.url, not is_local(host))
-        server(address).run(sockets=[listener])
+        pages = server(address)
+        # Ctrl+C comes to rendercanvas, which closes the canvas and would leave the server running.
+        viewer.canvas.add_event_handler(lambda event: setattr(pages, "should_exit", True), "close")
+        pages.run(sockets=[listener])
     _raise_failure(viewer)
 
 

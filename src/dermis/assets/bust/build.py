@@ -26,7 +26,7 @@ from dermis.errors import refuse
 from dermis.images.codecs import encode_png8, encode_png16
 from dermis.images.colour import encode_srgb8
 from dermis.images.fill import fill_empty
-from dermis.outputs import refuse_output, replacing
+from dermis.outputs import reason, replacing
 
 Floats = NDArray[np.float32]
 Report = Callable[[int, int], None]
@@ -66,7 +66,8 @@ def cached_bust(name: str) -> Path:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as fault:
-            refuse_output(path, fault)
+            came = f"it cannot be made ({reason(fault)})"
+            refuse(path.parent, "a folder for what is kept", came, "Name a writable one in DERMIS_CACHE")
         write_bust(path, recipe)
     return path
 

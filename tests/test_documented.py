@@ -1,0 +1,98 @@
+"""What the pages show can be typed: commands, Python, files; and the scripts beside the package start."""
+
+from __future__ import annotations
+
+import ast
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from cyclopts import App
+
+import dermis
+from dermis.cli import COMMANDS
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = [ROOT / "README.md", ROOT / "benchmarks" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+SCRIPTS = [path for folder in ("tools", "benchmarks") for path in sorted((ROOT / folder).glob("*.py"))]
+FENCE = re.compile(r"^ *```(?P<kind>\w*)\n(?P<text>.*?)^ *```$", re.MULTILINE | re.DOTALL)
+INLINE = re.compile(r"`(dermis [^`]+)`")
+FILE = re.compile(r"`(?:python )?([\w./-]+/[\w.-]+\.(?:py|wgsl|toml|csv|json|bib|md))`")
+LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")
+MADE_UP = {"src/dermis/viewer/panel/sections/name.py"}  # an example's name
+
+
+def commands(page: Path) -> list[str]:
+    """Lines that begin with `dermis` in fences, and such code inside of text."""
+    text = page.read_text(encoding="utf-8")
+    fenced = [line.strip() for found in FENCE.finditer(text) for line in found["text"].splitlines()]
+    return [line for line in [*fenced, *INLINE.findall(FENCE.sub("", text))] if line.startswith("dermis ")]
+
+
+def app() -> App:
+    """The command line as `dermis.cli` makes it."""
+    made = App(name="dermis", result_action="return_value")
+    for name in COMMANDS:
+        made.command(f"dermis.cli.{name}:{name}", name=name)
+    return made
+
+
+def words(command: str) -> list[str]:
+    """What is typed: no comment, no dots for more, no brackets around what may be left out."""
+    shown = command.replace("\\|", "|").split("...")[0]
+    typed = shlex.split(re.sub(r"[\[\]]", "", shown), comments=True)[1:]
+    return ["8765" if word == "N" else word for word in typed]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_commands_are_understood(page: Path) -> None:
+    made, refused = app(), []
+    for command in commands(page):
+        name, *rest = words(command)
+        if not rest or rest == ["--help"] or name == "X":
+            assert name in COMMANDS, command
+            continue
+        try:
+            made.parse_args([name, *rest], exit_on_error=False, print_error=False)
+        except Exception as error:
+            refused.append(f"{command}: {error}")
+    assert refused == []
+
+
+def test_an_option_that_is_none_would_be_found() -> None:
+    with pytest.raises(Exception, match="frobnicate"):
+        app().parse_args(["render", "--frobnicate"], exit_on_error=False, print_error=False)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_python_names_what_there_is(page: Path) -> None:
+    blocks = [found["text"] for found in FENCE.finditer(page.read_text("utf-8")) if found["kind"] == "python"]
+    for node in (node for block in blocks for node in ast.walk(ast.parse(block))):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "dermis":
+            assert node.attr in dermis.__all__
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_files_are_there(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    folders = [ROOT, ROOT / "src" / "dermis", page.parent]
+    folders += [folder for folder in (ROOT / "src" / "dermis").iterdir() if folder.is_dir()]
+    missing = [
+        name
+        for name in set(FILE.findall(text)) - MADE_UP
+        if not any((folder / name).is_file() for folder in folders)
+    ]
+    missing += [link for link in LINK.findall(text) if not (page.parent / link).exists()]
+    assert missing == []
+
+
+@pytest.mark.parametrize("folder", ["tools", "benchmarks"])
+def test_scripts_import(folder: str) -> None:
+    """All of a folder in one process; extras that a script needs, it asks for when it runs."""
+    names = [path.stem for path in SCRIPTS if path.parent.name == folder]
+    code = f"import sys; sys.path.insert(0, {str(ROOT / folder)!r})\nfor name in {names}: __import__(name)"
+    run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert names and run.returncode == 0, run.stderr
