@@ -11,22 +11,20 @@ import thin_twins
 from numpy.typing import NDArray
 from setups import head_of, run_frame, scene_of
 from thin_truth import hook, straight
-from tolerances import SLAB_THROUGH, TWIN
+from tolerances import SLAB_THROUGH
 
 from dermis.assets.atlas import Atlas, build_atlas
 from dermis.assets.mesh import Mesh
 from dermis.assets.primitives import uv_sphere, wedge
 from dermis.assets.thin_parts.links import Links, _in_cells, find_links
 from dermis.assets.thin_parts.samples import giving, taking
-from dermis.gpu import Device, Frame, download, upload
+from dermis.gpu import Device, download
 from dermis.optics.diffusion.transmission import through_gaussians
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
 from dermis.rendering.frame import Stages
-from dermis.rendering.levels import ENTERED, make_levels
 from dermis.rendering.renderer import Renderer
 from dermis.rendering.stages.opposite import Opposite, upload_pairs
-from dermis.rendering.thin_parts import thin_of
 from dermis.scene.lights import DirectionalLight
 
 Floats = NDArray[np.float64]
@@ -124,28 +122,6 @@ def test_what_passes_is_the_same_from_disk(
         assert np.array_equal(read_buffer(device, words), plain) == (factor == 1.0)
         made = len(list(tmp_path.rglob("*.npz")))
     assert made == (3 if device.adapter.kind == "CPU" else 0)
-
-
-def test_twin_of_what_comes_through(device: Device, stages: Stages, found: tuple[Mesh, Atlas, Links]) -> None:
-    links, k = found[2], len(BLURRED.weight)
-    space = make_levels(device, 64, k, ENTERED)
-    levels = np.random.default_rng(8).random((k, 64, 64, 3)).astype(np.float32)
-    for layer, level in enumerate(levels, start=1):
-        upload(device, space.stack, np.dstack([level, np.ones((64, 64))]), layer=layer)
-    pairs = upload_pairs(device, links)
-    thin = thin_of(device, stages.opposite, pairs, BLURRED.variance_mm2, BLURRED.weight)
-    share = thin_twins.decoded(read_buffer(device, thin.links).reshape(-1, 2)[:, 1])
-    frame = Frame(device)
-    stages.transmission.draw(frame, space, thin)
-    frame.submit()
-    x, y = links.texel[links.source].astype(int).T
-    light = share * levels[thin.layer, y, x]
-    sums = np.concatenate([np.zeros((1, 3)), np.cumsum(light, axis=0)])[links.first.astype(int)]
-    twin = np.diff(sums, axis=0)[links.receiver]
-    made = download(device, thin.light)
-    assert twin.max() > 0.1
-    assert np.abs(made[..., :3] - twin).max() < TWIN * twin.max()
-    assert ((made[..., 3] == 1) == (links.receiver > 0)).all()
 
 
 def read_buffer(device: Device, buffer: Any) -> NDArray[np.uint32]:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.assets.atlas import Atlas
 from dermis.assets.cache import cached_links, links_key
 from dermis.assets.mesh import Mesh
-from dermis.gpu import Device, make_texture
+from dermis.gpu import Device
 from dermis.rendering.stages.opposite import Opposite, Pairs, source_level, upload_pairs
 from dermis.rendering.stages.transmission import Thin
 from dermis.scene.settings import Settings
@@ -46,7 +44,6 @@ def thin_of(device: Device, stage: Opposite, pairs: Pairs, variance_mm2: Floats,
 
     variance_mm2, weight : (k,) and (k, 3) of the blurred levels
     """
-    gathered = device.buffer(np.zeros((pairs.source_count, 4), np.float32), "STORAGE")
-    light: Any = make_texture(device, (pairs.side, pairs.side), "rgba32float")
+    gathered = device.buffer(np.zeros((pairs.source_count, 2), np.uint32), "STORAGE")
     links = stage.weigh(pairs, variance_mm2, weight)
-    return Thin(pairs, links, source_level(pairs, variance_mm2), gathered, light)
+    return Thin(pairs, links, source_level(pairs, variance_mm2), gathered)

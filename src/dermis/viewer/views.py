@@ -127,11 +127,13 @@ class Views:
 
 def thickness_mm(device: Device, pairs: Pairs) -> NDArray[np.float32]:
     """(n, n) least depth of what lies opposite each cell of the atlas, at most as far as is looked [mm]."""
-    receiver, first, links = (
-        np.frombuffer(device.handle.queue.read_buffer(buffer), np.uint32)
-        for buffer in (pairs.receiver, pairs.first, pairs.pairs)
+    receivers, links = (
+        np.frombuffer(device.handle.queue.read_buffer(buffer), np.uint32).reshape(-1, 3)
+        for buffer in (pairs.receivers, pairs.pairs)
     )
-    depth = (links.reshape(-1, 3)[:, 1] & 0xFFFF) * (pairs.radius_mm / 0xFFFF)
-    least = np.full(len(first) - 1, pairs.radius_mm)
-    np.minimum.at(least, np.repeat(np.arange(len(least)), np.diff(first)), depth[: int(first[-1])])
-    return np.asarray(least[receiver.reshape(pairs.side, pairs.side)], np.float32)
+    depth = (links[:, 1] & 0xFFFF) * (pairs.radius_mm / 0xFFFF)
+    cell, first, end = receivers[np.argsort(receivers[:, 1])].T  # in the order of their links
+    least = np.full((pairs.side, pairs.side), pairs.radius_mm, np.float32)
+    at = np.repeat(cell, end - first)
+    np.minimum.at(least, (at >> 16, at & 0xFFFF), depth[: len(at)])
+    return least

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.assets.cache import cached_array
 from dermis.assets.thin_parts.links import Links
-from dermis.gpu import ComputeProgram, Device, Frame
+from dermis.gpu import ComputeProgram, Device, Frame, make_texture, upload
 from dermis.optics.gaussians import MOST_GAUSSIANS
 from dermis.rendering.stages import STAGES
 
@@ -28,21 +28,23 @@ class Pairs:
     """Pairs of places on a device, and how they lie.
 
     side : of the coarse atlas
-    receiver, first : buffers, as in `Links`
+    receivers : buffer of cells that take light, as transmission.wgsl reads them
     pairs, sources : buffers of words, as opposite.wgsl reads them
-    count, source_count : of pairs and sources
+    count, source_count, receiver_count : of pairs, sources and receivers
+    light : texture of the coarse atlas for what comes through, none yet, and 1 where there is surface
     key : what stands for all of it, so that what a profile makes of it can be kept on disk; empty for no key
     """
 
     side: int
     radius_mm: float
     spacing_mm: float
-    receiver: Any
-    first: Any
+    receivers: Any
     pairs: Any
     sources: Any
     count: int
     source_count: int
+    receiver_count: int
+    light: Any
     key: str = ""
 
 
@@ -58,18 +60,42 @@ def upload_pairs(device: Device, links: Links, key: str = "") -> Pairs:
     sources = np.zeros((max(1, number), 2), np.uint32)
     sources[:number, 0] = np.ascontiguousarray(links.texel).view(np.uint32)[:, 0]
     sources[:number, 1] = links.area_mm2.view(np.uint32)
+    receivers = _receivers(links)
     return Pairs(
         side=len(links.receiver),
         radius_mm=float(links.radius_mm),
         spacing_mm=float(links.spacing_mm),
-        receiver=device.buffer(links.receiver.astype(np.uint32), "STORAGE"),
-        first=device.buffer(links.first, "STORAGE"),
+        receivers=device.buffer(receivers, "STORAGE"),
         pairs=device.buffer(pairs, "STORAGE"),
         sources=device.buffer(sources, "STORAGE"),
         count=len(pairs),
         source_count=len(sources),
+        receiver_count=len(receivers),
+        light=_unlit(device, links.receiver > 0),
         key=key,
     )
+
+
+def _receivers(links: Links) -> NDArray[np.uint32]:
+    """(m, 3) cell, x and y packed, where its links begin, and where they end; one without links for none.
+
+    Those with most links come first: invocations that run side by side, and workgroups that are left for the
+    end, then have little to wait for.
+    """
+    y, x = np.nonzero(links.receiver > 1)
+    which = links.receiver[y, x]
+    first, end = links.first[which], links.first[which + 1]
+    order = np.argsort(first.astype(np.int64) - end, kind="stable")
+    listed = np.stack([x | (y << 16), first, end], axis=-1)[order].astype(np.uint32)
+    return listed if len(listed) else np.zeros((1, 3), np.uint32)
+
+
+def _unlit(device: Device, surface: NDArray[np.bool_]) -> Any:
+    light = np.zeros((*surface.shape, 4), np.float32)
+    light[..., 3] = surface
+    texture = make_texture(device, surface.shape, "rgba32float")
+    upload(device, texture, light)
+    return texture
 
 
 def source_level(pairs: Pairs, variance_mm2: Floats) -> int:

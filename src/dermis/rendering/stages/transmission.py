@@ -8,7 +8,13 @@ from typing import Any
 from dermis.gpu import ComputeProgram, Device, Frame
 from dermis.rendering.levels import Levels
 from dermis.rendering.stages import STAGES
-from dermis.rendering.stages.opposite import ROW, Pairs
+from dermis.rendering.stages.opposite import Pairs
+from dermis.rendering.stages.variants import Switches
+
+_TEAMS: Switches = (("SIZE", 128), ("TEAM", 32), ("ROUND", 4))
+_ALONE: Switches = (("SIZE", 128), ("TEAM", 1), ("ROUND", 1))  # software adapters pay for barriers
+_GATHERING = 64  # invocations of a workgroup, as in transmission_gather.wgsl
+_ROW = 1024  # workgroups, of which no more than 65535 fit in a row
 
 
 @dataclass(frozen=True)
@@ -19,45 +25,60 @@ class Thin:
     links : what `Opposite.weigh` made of them
     layer : blurred level, counted from 0, whose light passes
     gathered : buffer for the light of the sources
-    light : texture of the coarse atlas for what comes through
     """
 
     pairs: Pairs
     links: Any
     layer: int
     gathered: Any
-    light: Any
+
+    @property
+    def light(self) -> Any:
+        """Texture of the coarse atlas for what comes through."""
+        return self.pairs.light
 
 
 class Transmission:
-    """Sums what passes from all places opposite [JensenBuhler2002; dEonLuebke2007]."""
+    """Sums what passes from all places opposite [JensenBuhler2002; dEonLuebke2007].
 
-    def __init__(self, device: Device) -> None:
-        path = STAGES / "transmission.wgsl"
-        self._gather, self._sum = (ComputeProgram(device, path, constants={"SUM": s}) for s in (0, 1))
+    switches : of transmission.wgsl, what suits the device if left out
+    """
+
+    def __init__(self, device: Device, switches: Switches = ()) -> None:
+        chosen = dict((_ALONE if device.adapter.kind == "CPU" else _TEAMS) + switches)
+        self._receivers = int(chosen["SIZE"]) // int(chosen["TEAM"])  # of a workgroup
+        self._gather = ComputeProgram(device, STAGES / "transmission_gather.wgsl")
+        self._sum = ComputeProgram(device, STAGES / "transmission.wgsl", constants=chosen)
 
     def draw(self, frame: Frame, levels: Levels, thin: Thin) -> Any:
         """The light that comes through, from the blurred layers, which start after the unblurred one."""
         pairs = thin.pairs
         layer = 1 + thin.layer
-        record = self._sum.record(
-            "Through",
+        record = self._gather.record(
+            "Entering",
             layer=layer,
-            side=pairs.side,
             sources=pairs.source_count,
             mip=levels.halvings[layer],
             scale=1.0 / levels.scale,
         )
-        bound = {
-            "through": record,
+        entering = {
+            "entering": record,
             "levels": levels.stack,
             "sources": pairs.sources,
-            "receiver": pairs.receiver,
-            "first": pairs.first,
+            "gathered": thin.gathered,
+        }
+        leaving = {
+            "receivers": pairs.receivers,
             "links": thin.links,
             "gathered": thin.gathered,
-            "transmitted": thin.light,
+            "transmitted": pairs.light,
         }
-        frame.compute("transmission", self._gather, bound, (ROW, -(-pairs.source_count // ROW)))
-        frame.compute("transmission", self._sum, bound, (pairs.side, pairs.side))
-        return thin.light
+        frame.dispatch("transmission", self._gather, entering, _rows(pairs.source_count, _GATHERING))
+        frame.dispatch("transmission", self._sum, leaving, _rows(pairs.receiver_count, self._receivers))
+        return pairs.light
+
+
+def _rows(count: int, each: int) -> tuple[int, int, int]:
+    """Rows of workgroups that take `each` of `count`."""
+    groups = -(-count // each)
+    return min(groups, _ROW), -(-groups // _ROW), 1

@@ -1,66 +1,73 @@
-// Light that comes through thin parts: gathered where it enters, then summed where it leaves.
-//#include "bilinear.wgsl"
+// Light that comes through thin parts, summed where it leaves: a team of invocations for each receiver.
+//#include "light_words.wgsl"
 
-override SUM: bool = false; // false: gather; true: sum
+override SIZE: u32 = 128u; // invocations of a workgroup
+override TEAM: u32 = 32u; // a power of two up to SIZE; 1: no team
+override ROUND: u32 = 4u; // links that an invocation has on their way at once: 1, 2 or 4
 
-struct Through {
-    layer: u32, // blurred level that the sources show
-    side: u32, // of the coarse atlas
-    sources: u32,
-    mip: u32, // that holds the level
-    scale: f32, // of the light over what the level holds
+struct Receiver {
+    cell: u32, // of the coarse atlas, x and y packed
+    first: u32, // link
+    end: u32, // of its links
 }
 
-@group(0) @binding(0) var<uniform> through: Through;
-@group(0) @binding(1) var levels: texture_2d_array<f32>;
-@group(0) @binding(2) var<storage, read> sources: array<vec2u>; // texel, x and y packed; area
-@group(0) @binding(3) var<storage, read> receiver: array<u32>; // of each cell: 0 without surface, else which one
-@group(0) @binding(4) var<storage, read> first: array<u32>; // where each receiver's links begin
-@group(0) @binding(5) var<storage, read> links: array<vec2u>; // source, and the share of its light, as in opposite.wgsl
-@group(0) @binding(6) var<storage, read_write> gathered: array<vec4f>;
-@group(0) @binding(7) var transmitted: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(0) var<storage, read> receivers: array<Receiver>; // those with most links first
+@group(0) @binding(1) var<storage, read> links: array<vec2u>; // source, and the share of its light, as in opposite.wgsl
+@group(0) @binding(2) var<storage, read> gathered: array<vec2u>; // as in light_words.wgsl
+@group(0) @binding(3) var transmitted: texture_storage_2d<rgba32float, write>;
 
-const ROW: u32 = 1024u; // of the sources, as they are spread over invocations
-
-fn level_at(at: vec2i) -> vec4f {
-    let most = vec2i(textureDimensions(levels, through.mip)) - 1;
-    return textureLoad(levels, clamp(at, vec2i(0), most), through.layer, through.mip);
-}
-
-fn gather(index: u32) {
-    let texel = sources[index].x;
-    let place = (vec2f(f32(texel & 0xffffu), f32(texel >> 16u)) + 0.5) / f32(1u << through.mip) - 0.5;
-    let a = vec2i(floor(place));
-    let w = through.scale * bilinear_weights(place);
-    gathered[index] = w.x * level_at(a) + w.y * level_at(a + vec2i(1, 0)) + w.z * level_at(a + vec2i(0, 1))
-        + w.w * level_at(a + vec2i(1, 1));
-}
+var<workgroup> part: array<vec3f, SIZE>;
 
 // Three shares with one exponent.
 fn decoded(word: u32) -> vec3f {
-    return exp2(f32(word >> 27u) - 24.0) * vec3f(f32(word & 511u), f32((word >> 9u) & 511u), f32((word >> 18u) & 511u));
+    let unit = bitcast<f32>(((word >> 27u) + 103u) << 23u); // 2^(exponent - 24)
+    return unit * vec3f(f32(word & 511u), f32((word >> 9u) & 511u), f32((word >> 18u) & 511u));
 }
 
-fn add_up(at: vec2u) {
-    let which = receiver[at.y * through.side + at.x];
+fn passed(k: u32, end: u32) -> vec3f {
+    let link = links[min(k, end - 1u)];
+    return select(0.0, 1.0, k < end) * decoded(link.y) * light_of(gathered[link.x]);
+}
+
+// Loads that do not wait for each other: memory is far.
+fn passed_together(k: u32, end: u32) -> vec3f {
+    var sum = passed(k, end);
+    if (ROUND > 1u) {
+        sum += passed(k + TEAM, end);
+    }
+    if (ROUND > 2u) {
+        sum += passed(k + 2u * TEAM, end) + passed(k + 3u * TEAM, end);
+    }
+    return sum;
+}
+
+@compute @workgroup_size(SIZE)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) number: u32,
+) {
+    let which = (group.y * groups.x + group.x) * (SIZE / TEAM) + number / TEAM;
+    let member = number % TEAM;
+    var receiver = Receiver();
+    if (which < arrayLength(&receivers)) {
+        receiver = receivers[which];
+    }
     var sum = vec3f(0.0);
-    for (var k = first[which]; k < first[which + 1u]; k++) {
-        let link = links[k];
-        sum += decoded(link.y) * gathered[link.x].rgb;
+    for (var k = receiver.first + member; k < receiver.end; k += ROUND * TEAM) {
+        sum += passed_together(k, receiver.end);
     }
-    textureStore(transmitted, at, vec4f(sum, select(0.0, 1.0, which > 0u)));
-}
-
-@compute @workgroup_size(8, 8)
-fn main(@builtin(global_invocation_id) id: vec3u) {
-    if (SUM) {
-        if (all(id.xy < vec2u(through.side))) {
-            add_up(id.xy);
+    if (TEAM > 1u) {
+        part[number] = sum;
+        for (var apart = TEAM / 2u; apart > 0u; apart /= 2u) {
+            workgroupBarrier();
+            if (member < apart) {
+                part[number] += part[number + apart];
+            }
         }
-        return;
+        sum = part[number];
     }
-    let index = id.y * ROW + id.x;
-    if (id.x < ROW && index < through.sources) {
-        gather(index);
+    if (member == 0u && receiver.end > 0u) {
+        textureStore(transmitted, vec2u(receiver.cell & 0xffffu, receiver.cell >> 16u), vec4f(sum, 1.0));
     }
 }

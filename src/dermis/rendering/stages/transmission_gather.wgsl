@@ -1,0 +1,41 @@
+// Light that comes through thin parts, gathered where it enters.
+//#include "bilinear.wgsl"
+//#include "light_words.wgsl"
+
+struct Entering {
+    layer: u32, // blurred level that the sources show
+    sources: u32,
+    mip: u32, // that holds the level
+    scale: f32, // of the light over what the level holds
+}
+
+@group(0) @binding(0) var<uniform> entering: Entering;
+@group(0) @binding(1) var levels: texture_2d_array<f32>;
+@group(0) @binding(2) var<storage, read> sources: array<vec2u>; // texel, x and y packed; area
+@group(0) @binding(3) var<storage, read_write> gathered: array<vec2u>; // as in light_words.wgsl
+
+const SIZE: u32 = 64u; // of a workgroup
+
+fn level_at(at: vec2i) -> vec4f {
+    let most = vec2i(textureDimensions(levels, entering.mip)) - 1;
+    return textureLoad(levels, clamp(at, vec2i(0), most), entering.layer, entering.mip);
+}
+
+@compute @workgroup_size(SIZE)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) number: u32,
+) {
+    let index = (group.y * groups.x + group.x) * SIZE + number;
+    if (index >= entering.sources) {
+        return;
+    }
+    let texel = sources[index].x;
+    let place = (vec2f(f32(texel & 0xffffu), f32(texel >> 16u)) + 0.5) / f32(1u << entering.mip) - 0.5;
+    let a = vec2i(floor(place));
+    let w = entering.scale * bilinear_weights(place);
+    let light = w.x * level_at(a) + w.y * level_at(a + vec2i(1, 0)) + w.z * level_at(a + vec2i(0, 1))
+        + w.w * level_at(a + vec2i(1, 1));
+    gathered[index] = light_words(light.rgb);
+}
