@@ -2,7 +2,8 @@
 
 No screen is needed: an offscreen canvas takes the place of the window, and a client that speaks as the page
 does that of the browser. About a quarter of an hour, most of it for memory; --minutes 0.5 --changes 50 is a
-quick look.
+quick look, --minutes 0 --changes 0 --seconds 90 leaves the memory out and measures the rest in so long. The
+figures are written as they come: what ends early leaves those known so far, and why there are no more.
 """
 
 from __future__ import annotations
@@ -10,14 +11,19 @@ from __future__ import annotations
 import json
 import platform
 import resource
+import sys
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from cyclopts import run
-from viewer_hands import Plan, delays, offscreen, speeds
+from viewer_clock import Clock
+from viewer_delays import delays
+from viewer_hands import Plan, offscreen, slider_place, speeds
 from viewer_memory import endured
 from viewer_page import through_the_page
 from viewer_tables import tables
@@ -28,7 +34,8 @@ from dermis.gpu import Device, open_device
 from dermis.outputs import check_output, replacing
 
 RESULTS = Path(__file__).resolve().parent / "results" / "viewer.json"
-_PACKAGES = ("dermis", "wgpu", "rendercanvas", "numpy")
+_PACKAGES = ("dermis", "wgpu", "rendercanvas", "numpy", "pillow")
+_SHARES = {"speed": 0.25, "delay": 0.2, "page": 1.0}  # of the time that is left
 
 
 def main(
@@ -41,6 +48,7 @@ def main(
     frames: int | None = None,
     minutes: float = 10.0,
     changes: int = 1000,
+    seconds: float | None = None,
     browser: bool = True,
     output: Path = RESULTS,
 ) -> int:
@@ -63,12 +71,15 @@ def main(
     minutes, changes:
         What the memory is watched over, at least, on software adapters with half the sides; 0 for both
         leaves it out.
+    seconds:
+        What all but the memory may take, about [as long as it takes].
     browser:
         Whether the page is measured too.
     output:
         Where the figures go.
     """
     check_output(output, (".json",))
+    clock = Clock(seconds)
     device = open_device(adapter)
     software = device.adapter.kind == "CPU"
     plan = Plan(
@@ -79,26 +90,56 @@ def main(
         samples or (1 if software else 4),
         frames or (16 if software else 300),
     )
-    found = _about(device, plan)
+    found = Found(_about(device, plan), output, clock)
     del device
     hands = offscreen(plan)
-    note("motion")
-    found["speed"] = speeds(hands, plan)
-    note("delay")
-    found["delay"] = delays(hands, plan)
+    found.take("speed", partial(speeds, hands, plan))
+    found.take("delay", partial(delays, hands, plan))
     if browser:
-        note("page")
-        found["page"] = through_the_page(plan)
+        found.take("page", partial(through_the_page, plan, slider_place(hands, "melanin")))
+    del hands
     if minutes or changes:
-        note("memory")
-        del hands
         watched = _halved(plan) if software else plan  # a thousand changes in ten minutes
-        found["memory"] = endured(offscreen(watched), watched, minutes, changes)
-    found["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    with replacing(output) as whole:
-        whole.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    print_lines(tables(found))
-    return 0
+        found.take("memory", lambda _: endured(offscreen(watched), watched, minutes, changes).items())
+    found.told["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    found.keep()
+    print_lines(tables(found.told))
+    return 1 if found.ended else 0
+
+
+class Found:
+    """Figures as they come; each is written at once.
+
+    told : all so far
+    ended : sections that ended early; the reason is among their figures
+    """
+
+    def __init__(self, told: dict[str, Any], output: Path, clock: Clock) -> None:
+        self.told, self.ended = told, list[str]()
+        self._output, self._clock = output, clock
+
+    def take(self, section: str, measured: Callable[[Clock], Iterable[tuple[str, Any]]]) -> None:
+        """The figures of a section; a fault ends it and leaves what came before."""
+        figures = self.told[section] = dict[str, Any]()
+        self._say(section)
+        try:
+            for name, figure in measured(self._clock.share(_SHARES.get(section, 1.0))):
+                figures[name] = figure
+                self._say(f"{section}, {name}")
+                self.keep()
+        except Exception as fault:  # whatever ends one section leaves the others
+            figures["ended"] = f"{type(fault).__name__}: {fault}"
+            self.ended.append(section)
+            self._say(f"{section} ended: {figures['ended']}")
+            self.keep()
+
+    def keep(self) -> None:
+        """Write all."""
+        with replacing(self._output) as whole:
+            whole.write_text(json.dumps(self.told, indent=1) + "\n", encoding="utf-8")
+
+    def _say(self, what: str) -> None:
+        note(f"{self._clock.gone_s:6.1f} s  {what}")
 
 
 def _halved(plan: Plan) -> Plan:
@@ -119,4 +160,4 @@ def _about(device: Device, plan: Plan) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    run(main)
+    sys.exit(run(main))

@@ -1,17 +1,16 @@
-"""Motion in a viewer without a window: how many frames a second, and how late what a hand does is seen."""
+"""Motion in a viewer without a window: how many frames a second."""
 
 from __future__ import annotations
 
 import math
-import random
 import resource
-import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from viewer_clock import Clock
 
 from dermis.assets.head import load_head
 from dermis.scene.model import Scene
@@ -24,9 +23,10 @@ from dermis.viewer.viewer import Viewer
 
 Change = Callable[[ViewerState, int], ViewerState]
 _SETTLING = 2  # frames before any is counted
-_STEP = 0.02  # of turns [rad]
-_PATIENCE = 100  # frames
-_PIXELS = 6.0  # of a drag between two frames
+PIGMENTED = "light"  # a profile that sliders of pigments move
+STEP = 0.02  # of turns [rad]
+_REST_S = 30.0  # at most, which some tenths of a second are enough for
+FEWEST = 3  # that a median is made of, however little time is left
 
 
 @dataclass(frozen=True)
@@ -69,11 +69,37 @@ class Hands:
 
     def __init__(self, viewer: Viewer, canvas: Any) -> None:
         self.viewer, self.canvas, self.first = viewer, canvas, viewer.desk.state
+        self._fault: Exception | None = None
+        canvas.request_draw(self._draw)
+
+    def _draw(self) -> None:
+        try:
+            self.viewer.draw()
+        except Exception as fault:  # which the canvas only logs
+            self._fault = fault
+            raise
 
     def frame(self) -> np.ndarray[Any, Any]:
-        """The next picture, after what has happened since the last one."""
+        """The next picture, after what has happened since the last one.
+
+        Raises what went wrong, for the canvas would show its last picture for ever.
+        """
         self.canvas._process_events()
-        return np.asarray(self.canvas.draw())
+        picture = np.asarray(self.canvas.draw())
+        if fault := self._fault or self.viewer.failure:
+            raise fault
+        return picture
+
+    def rest(self) -> None:
+        """Draw until nothing moves any more.
+
+        Raises RuntimeError when that takes too long.
+        """
+        clock = Clock(_REST_S)
+        while not self.viewer.is_still:
+            if clock.over:
+                raise RuntimeError(f"the picture does not come to rest within {_REST_S:.0f} s")
+            self.frame()
 
     def go_on(self, state: ViewerState) -> None:
         """Another state, in a gesture, so that the history does not grow."""
@@ -98,6 +124,17 @@ def offscreen(plan: Plan) -> Hands:
     return Hands(viewer, canvas)
 
 
+def slider_place(hands: Hands, name: str) -> tuple[float, float] | None:
+    """Where a slider of skin with pigments is in the window, None where one had to scroll to it."""
+    hands.viewer.panel.visible = True
+    hands.go_on(hands.first.with_skin(profile=PIGMENTED))
+    for _ in range(FEWEST):
+        hands.frame()
+    hands.viewer.panel.visible = False
+    place = hands.viewer.desk.places[name]
+    return place if place[1] < hands.canvas.get_logical_size()[1] else None
+
+
 def _unmapped(state: ViewerState) -> ViewerState:
     """With a roughness that is one number, for its slider to move."""
     head = state.scene.head
@@ -114,96 +151,53 @@ def _same(state: ViewerState) -> ViewerState:
 
 
 MOTIONS: dict[str, Motion] = {
-    "camera": Motion(_same, lambda state, k: state.with_camera(orbit(state.scene.camera, _STEP, 0.0))),
-    "light": Motion(_same, lambda state, k: drag_light(state, 0, _STEP, 0.0)),
+    "camera": Motion(_same, lambda state, k: state.with_camera(orbit(state.scene.camera, STEP, 0.0))),
+    "light": Motion(_same, lambda state, k: drag_light(state, 0, STEP, 0.0)),
     "roughness": Motion(_unmapped, lambda state, k: state.with_skin(roughness=0.2 + 0.3 * _to_and_fro(k))),
     "melanin": Motion(
-        lambda state: state.with_skin(profile="light").with_pigments(melanin=0.05),
+        lambda state: state.with_skin(profile=PIGMENTED).with_pigments(melanin=0.05),
         lambda state, k: state.with_pigments(melanin=0.05 + 0.01 * _to_and_fro(k)),
     ),
     "exposure": Motion(_same, lambda state, k: state.with_settings(exposure=1.0 + 0.2 * _to_and_fro(k))),
 }
 
 
-def speeds(hands: Hands, plan: Plan) -> dict[str, dict[str, Any]]:
-    """Of each kind of motion."""
-    return {name: _speed(hands, motion, plan.frames) for name, motion in MOTIONS.items()}
+def speeds(hands: Hands, plan: Plan, clock: Clock) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Of each kind of motion, one after the other."""
+    for done, (name, motion) in enumerate(MOTIONS.items()):
+        yield name, _speed(hands, motion, plan.frames, clock.share(1.0 / (len(MOTIONS) - done)))
 
 
-def _speed(hands: Hands, motion: Motion, frames: int) -> dict[str, Any]:
+def _speed(hands: Hands, motion: Motion, frames: int, clock: Clock) -> dict[str, Any]:
     desk = hands.viewer.desk
     hands.go_on(motion.start(hands.first))
     for k in range(_SETTLING):
         hands.go_on(motion.change(desk.state, k))
         hands.frame()
     times, prepared, processor = [], [], processor_s()
-    for k in range(_SETTLING, _SETTLING + frames):
+    for k in counted(frames, clock):
         began = time.perf_counter()
-        hands.go_on(motion.change(desk.state, k))
+        hands.go_on(motion.change(desk.state, _SETTLING + k))
         hands.frame()
         times.append(time.perf_counter() - began)
         prepared.append(desk.studio.rendered.setup_ms if desk.studio.rendered else 0.0)
     rendered = desk.studio.rendered
     return {
-        "frames_per_s": frames / sum(times),
+        "frames": len(times),
+        "frames_per_s": len(times) / sum(times),
         "frame_ms": 1e3 * float(np.median(times)),
-        "processor_ms": 1e3 * (processor_s() - processor) / frames,
+        "processor_ms": 1e3 * (processor_s() - processor) / len(times),
         "prepared_ms": float(np.median(prepared)),
         "stages": [name for name in (rendered.gpu_ms or {} if rendered else {}) if name != "total"],
     }
 
 
-def delays(hands: Hands, plan: Plan) -> dict[str, dict[str, float]]:
-    """From a pointer's move to the picture that shows it [ms]."""
-    hands.go_on(hands.first)
-    x, y = (0.5 * side for side in plan.size)
-    hands.event("pointer_down", x, y)
-    hands.frame()
-    rest, drag = [], []
-    chance = random.Random(7)
-    for k in range(plan.frames):
-        rest.append(_delay(hands, x + _PIXELS * (1 - k % 2), y))
-    for k in range(plan.frames):
-        drag.append(_delay_in_frame(hands, x + _PIXELS * (k % 9), y, chance.random() * min(rest)))
-    hands.event("pointer_up", x, y)
-    hands.frame()
-    return {"from rest": spread(rest), "in a drag": spread(drag)}
-
-
-def _delay(hands: Hands, x: float, y: float) -> float:
-    """Of a move after which the camera has come to rest [s]."""
-    while not hands.viewer.is_still:
-        hands.frame()
-    before, began = hands.frame(), time.perf_counter()
-    hands.event("pointer_move", x, y)
-    for _ in range(_PATIENCE):  # quick frames show the camera when it has hardly begun to glide
-        if not np.array_equal(before, hands.frame()):
-            return time.perf_counter() - began
-    raise RuntimeError("the picture does not follow")
-
-
-def _delay_in_frame(hands: Hands, x: float, y: float, wait_s: float) -> float:
-    """Of a move that comes while a frame is drawn [s]."""
-    came: list[float] = []
-
-    def move() -> None:
-        time.sleep(wait_s)
-        came.append(time.perf_counter())
-        hands.event("pointer_move", x, y)
-
-    mover = threading.Thread(target=move)
-    mover.start()
-    hands.go_on(hands.viewer.desk.state.with_camera(orbit(hands.viewer.desk.state.scene.camera, _STEP, 0.0)))
-    hands.frame()
-    mover.join()
-    hands.frame()
-    return time.perf_counter() - came[0]
-
-
-def spread(seconds: Sequence[float]) -> dict[str, float]:
-    """Median and 95th percentile [ms], and of how many."""
-    middle, late = np.percentile(seconds, (50, 95))
-    return {"median_ms": 1e3 * float(middle), "late_ms": 1e3 * float(late), "count": len(seconds)}
+def counted(most: int, clock: Clock) -> Iterator[int]:
+    """0, 1, 2 and so on as long as there is time."""
+    for k in range(most):
+        if k >= FEWEST and clock.over:
+            return
+        yield k
 
 
 def processor_s() -> float:

@@ -5,23 +5,26 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import subprocess
-import sys
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from viewer_hands import Plan, spread
+from viewer_clock import Clock
+from viewer_delays import spread
+from viewer_hands import Plan
+from viewer_server import served
 
 from dermis.viewer.browser.canvas import encoded
 
-_QUIET_S, _PATIENCE_S = 1.5, 120.0
+_QUIET_S, _PATIENCE_S = 0.6, 120.0
 _MOVES_PER_S = 50.0  # what rendercanvas' page sends at most
 _WATCHED_S = 8.0
 _REPEATS = 20
 _PIXELS = 6.0
+Place = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -44,9 +47,9 @@ class Picture:
 class Page:
     """A client that asks, moves and confirms as rendercanvas' page does."""
 
-    def __init__(self, url: str, size: tuple[int, int]) -> None:
-        self._socket = _connected(url.replace("http", "ws", 1))
-        self.size = size
+    def __init__(self, url: str, size: tuple[int, int], clock: Clock) -> None:
+        self._socket = _connected(url.replace("http", "ws", 1), clock)
+        self.size, self.clock = size, clock
         self._last: Picture | None = None
         self.send("resize", width=size[0], height=size[1], pwidth=size[0], pheight=size[1], ratio=1.0)
         self.send("key_down", key="Tab", modifiers=[])  # hides the panel
@@ -81,98 +84,130 @@ class Page:
     def settle(self) -> Picture:
         """The picture when none follows for a while, which is the lossless one."""
         first = time.perf_counter()
-        while time.perf_counter() - first < _PATIENCE_S:
+        while time.perf_counter() - first < self.patience_s:
             if self.next_picture(_QUIET_S) is None and self._last and self._last.kind == "image/png":
                 return self._last
-        raise RuntimeError("the page does not come to rest")
+        kind = self._last.kind if self._last else "none"
+        raise RuntimeError(f"the page does not come to rest: the last picture is {kind}")
+
+    @property
+    def patience_s(self) -> float:
+        """How long anything is waited for."""
+        return min(_PATIENCE_S, self.clock.left_s)
 
     def close(self) -> None:
         """Leave."""
         self._socket.close()
 
 
-def _connected(url: str) -> Any:
+def _connected(url: str, clock: Clock) -> Any:
     """A socket; the server tells its address a moment before it listens."""
     from websockets.sync.client import connect
 
-    until = time.perf_counter() + _PATIENCE_S
     while True:
         try:
-            return connect(url, max_size=None)
+            return connect(url, max_size=None, open_timeout=min(_PATIENCE_S, clock.left_s))
         except ConnectionRefusedError:
-            if time.perf_counter() > until:
+            if clock.over:
                 raise
             time.sleep(0.1)
 
 
-def through_the_page(plan: Plan) -> dict[str, Any]:
-    """Motion and delay with all that lies between a page and the picture, at the viewer's own pace."""
-    size = "x".join(map(str, plan.size))
-    words = ["view", plan.head, "--browser", "--port", "0", "--size", size, "--atlas", str(plan.atlas)]
-    words += ["--samples", str(plan.samples), "--adapter", plan.adapter]
-    server = subprocess.Popen([sys.executable, "-m", "dermis", *words], stdout=subprocess.PIPE, text=True)
-    try:
-        assert server.stdout is not None
-        page = Page(server.stdout.readline().split()[0], plan.size)
+def through_the_page(plan: Plan, slider: Place | None, clock: Clock) -> Iterator[tuple[str, Any]]:
+    """Motion and delay with all that lies between a page and the picture, at the viewer's own pace.
+
+    slider : where melanin is moved in the panel, if it can be seen
+    """
+    with served(plan, clock) as (url, pid):
+        page = Page(url, plan.size, clock)
         still = page.settle()
-        begun = resident_mb(server.pid)
-        found: dict[str, Any] = {
-            "camera": _motion(page),
-            "light": _motion(page, "Shift"),
-            "delay": spread(_delays(page)),
-            "resident_mb": [begun, resident_mb(server.pid)],
-            "encoding": _encoding(still),
-        }
+        yield "start_s", clock.gone_s
+        begun = resident_mb(pid)
+        middle = 0.5 * plan.size[0], 0.5 * plan.size[1]
+        yield "camera", _motion(page, middle)
+        yield "light", _motion(page, middle, "Shift")
+        if slider:
+            yield "melanin", _slide(page, slider)
+        yield "encoding", _encoding(still)
+        yield "delay", spread(_delays(page, middle))
+        yield "resident_mb", [begun, resident_mb(pid)]
         page.close()
-    finally:
-        server.terminate()
-        server.wait(timeout=30)
-    return found
 
 
-def _motion(page: Page, *modifiers: str) -> dict[str, float]:
-    """A drag to and fro for some seconds."""
-    x, y = (0.5 * side for side in page.size)
+def _motion(page: Page, place: Place, *modifiers: str) -> dict[str, float]:
+    """A drag to and fro for some seconds, of few that are left a part; repeated frames do not count."""
+    watched_s = min(_WATCHED_S, 0.13 * page.clock.left_s)
+    x, y = place
     page.pointer("pointer_down", x, y, *modifiers)
     began = time.perf_counter()
     frames: list[Picture] = []
     moves = 0
-    while (now := time.perf_counter() - began) < _WATCHED_S:
+    while (now := time.perf_counter() - began) < watched_s:
         if now >= moves / _MOVES_PER_S:
             moves += 1
-            page.pointer("pointer_move", x + 1.5 * abs(moves % 200 - 100), y, *modifiers)
+            page.pointer("pointer_move", x + 1.5 * (100 - abs(moves % 200 - 100)), y, *modifiers)
         came = page.next_picture(moves / _MOVES_PER_S - now)
-        frames += [came] if came else []
+        if came and not (frames and came.name == frames[-1].name):
+            frames.append(came)
     page.pointer("pointer_up", x, y, *modifiers)
     page.settle()
-    sizes = [len(frame.data) for frame in frames]
-    return {"frames_per_s": len(frames) / _WATCHED_S, "kilobytes": float(np.median(sizes)) / 1e3}
+    if not frames:
+        raise RuntimeError(f"no picture comes within {watched_s:.1f} s")
+    gaps = np.diff([frame.at for frame in frames]) if len(frames) > 1 else [watched_s]
+    return {
+        "frames_per_s": len(frames) / watched_s,
+        "watched_s": watched_s,
+        "late_frame_ms": 1e3 * float(np.percentile(gaps, 95)),
+        "kilobytes": float(np.median([len(frame.data) for frame in frames])) / 1e3,
+    }
 
 
-def _delays(page: Page) -> list[float]:
-    """From a move out of rest to the first picture that is another [s]."""
-    x, y = (0.5 * side for side in page.size)
+def _slide(page: Page, place: Place) -> dict[str, float]:
+    """A slider of the panel to and fro.
+
+    Raises RuntimeError when the skin stays as it was.
+    """
+    page.send("key_down", key="Tab", modifiers=[])
+    page.send("pointer_move", x=place[0], y=place[1], button=0, buttons=[], modifiers=[])
+    before = _pixels(page.settle())
+    found = _motion(page, place)
+    after, half = _pixels(page.settle()), page.size[0] // 2
+    if np.array_equal(before[:, half:], after[:, half:]):
+        raise RuntimeError("the slider does not alter the skin")
+    page.send("key_down", key="Tab", modifiers=[])
+    page.settle()
+    return found
+
+
+def _pixels(picture: Picture) -> np.ndarray[Any, Any]:
+    from PIL import Image
+
+    return np.array(Image.open(io.BytesIO(picture.data)).convert("RGBA"))
+
+
+def _delays(page: Page, place: Place) -> list[float]:
+    """From a move out of rest to the first picture that is another [s]; fewer when little time is left."""
+    x, y = place
     page.pointer("pointer_down", x, y)
-    found = []
-    for k in range(_REPEATS):
+    found, one_s = list[float](), 0.0
+    while len(found) < _REPEATS and (not found or page.clock.left_s > 2.0 * one_s):
+        first = time.perf_counter()
         seen = {page.settle().name}
         began = time.perf_counter()
-        page.pointer("pointer_move", x + _PIXELS * (1 - k % 2), y)
-        while (came := page.next_picture(_PATIENCE_S)) and came.name in seen:
+        page.pointer("pointer_move", x + _PIXELS * (1 - len(found) % 2), y)
+        while (came := page.next_picture(page.patience_s)) and came.name in seen:
             pass
-        assert came is not None, "no picture comes"
+        if came is None:
+            raise RuntimeError("no picture comes")
         found.append(came.at - began)
+        one_s = time.perf_counter() - first
     page.pointer("pointer_up", x, y)
-    page.settle()
     return found
 
 
 def _encoding(still: Picture) -> dict[str, float]:
     """What it takes to make bytes of a picture [ms]."""
-    from PIL import Image
-
-    array = np.array(Image.open(io.BytesIO(still.data)).convert("RGBA"))
-    times = {}
+    array, times = _pixels(still), {}
     for name, lossless in (("jpeg_ms", False), ("png_ms", True)):
         runs = []
         for _ in range(9):

@@ -4,13 +4,23 @@ from __future__ import annotations
 
 from typing import Any
 
+_SECTIONS = ("speed", "delay", "page", "memory")
+
 
 def tables(found: dict[str, Any]) -> str:
-    """All of it."""
-    parts = [_speed(found), _delay(found)]
-    if "memory" in found:
+    """All of it that there is."""
+    parts = [_title(found), _speed(found), _delay(found)]
+    if "samples" in found.get("memory", {}):
         parts.append(_memory(found["memory"]))
-    return "\n\n".join([_title(found), *parts])
+    ended = [
+        f"{name} ended early: {found[name]['ended']}" for name in _SECTIONS if "ended" in found.get(name, {})
+    ]
+    return "\n\n".join([*parts, *ended])
+
+
+def _figures(found: dict[str, Any], section: str) -> dict[str, Any]:
+    """A section's, without the reason why it ended."""
+    return {name: one for name, one in found.get(section, {}).items() if name != "ended"}
 
 
 def _title(found: dict[str, Any]) -> str:
@@ -22,23 +32,26 @@ def _title(found: dict[str, Any]) -> str:
 
 def _speed(found: dict[str, Any]) -> str:
     rows = ["| what moves | frames/s | frame [ms] | processor time [ms] | stages |", "|---|---|---|---|---|"]
-    for name, one in found["speed"].items():
-        numbers = f"{one['frames_per_s']:.1f} | {one['frame_ms']:.0f} | {one['processor_ms']:.0f}"
+    for name, one in _figures(found, "speed").items():
+        numbers = f"{one['frames_per_s']:.1f} | {one['frame_ms']:.1f} | {one['processor_ms']:.1f}"
         rows.append(f"| {name} | {numbers} | {', '.join(one['stages'])} |")
-    for name in ("camera", "light") if "page" in found else ():
-        one = found["page"][name]
-        rows.append(
-            f"| {name}, in the page | {one['frames_per_s']:.1f} | | | {one['kilobytes']:.0f} kB a frame |"
-        )
+    page = _figures(found, "page")
+    for name in ("camera", "light", "melanin"):
+        if name in page:
+            rate, size = page[name]["frames_per_s"], page[name]["kilobytes"]
+            rows.append(f"| {name}, in the page | {rate:.1f} | | | {size:.0f} kB a frame |")
     return "\n".join(rows)
 
 
 def _delay(found: dict[str, Any]) -> str:
     rows = ["| from a move to the picture | median [ms] | 95 % within [ms] |", "|---|---|---|"]
-    several = found["delay"] | ({"in the page, from rest": found["page"]["delay"]} if "page" in found else {})
-    rows += [f"| {name} | {one['median_ms']:.0f} | {one['late_ms']:.0f} |" for name, one in several.items()]
-    if "page" in found:
-        coding = found["page"]["encoding"]
+    page, several = _figures(found, "page"), _figures(found, "delay")
+    if "delay" in page:
+        several["in the page, from rest"] = page["delay"]
+    for name, one in several.items():
+        rows.append(f"| {name} | {one['median_ms']:.1f} | {one['late_ms']:.1f} |")
+    if "encoding" in page:
+        coding = page["encoding"]
         rows.append(
             f"| of which JPEG, and PNG when still | {coding['jpeg_ms']:.1f}, {coding['png_ms']:.1f} | |"
         )

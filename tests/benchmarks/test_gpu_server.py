@@ -72,12 +72,48 @@ def test_what_fails_and_what_would_be_late_is_told(
     assert min(told["lobes"].values()) >= 0.0 and "kelemen, schlick" in told["lobes"]
 
 
-def test_a_program_that_fails_or_hangs_is_told(server: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_program_that_fails_is_told_with_its_last_words(
+    server: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from other_program import lasted_s
+
     with pytest.raises(DermisError, match="nobody"):
-        server.gpu_sections._lasted_s([sys.executable, "-m", "dermis", "head", "nobody"])
-    monkeypatch.setattr(server.gpu_sections, "_LONGEST_S", 0.1)
-    with pytest.raises(DermisError, match=r"-c import time.*within 0\.1 s"):
-        server.gpu_sections._lasted_s([sys.executable, "-c", "import time; time.sleep(60)"])
+        lasted_s([sys.executable, "-m", "dermis", "head", "nobody"])
+    assert "nobody" in capsys.readouterr().err
+    assert 0.0 < lasted_s([sys.executable, "-c", "pass"]) < 60.0
+
+
+def test_a_program_that_hangs_ends_with_all_that_it_started(server: Any, tmp_path: Path) -> None:
+    from other_program import lasted_s
+
+    other = tmp_path / "other"
+    words = ["/bin/sh", "-c", f"sleep 600 & echo $! > {other}; echo still at it >&2; wait"]
+    with pytest.raises(DermisError, match=r"-c sleep .*within 2 s.*Last words: still at it"):
+        lasted_s(words, 2.0)
+    assert not _runs(int(other.read_text(encoding="utf-8")))
+
+
+def _runs(process: int) -> bool:
+    """Whether a process is there and is no zombie."""
+    status = Path(f"/proc/{process}/stat")
+    try:
+        return status.read_text(encoding="utf-8").rsplit(")", 1)[1].split()[0] not in "ZX"
+    except FileNotFoundError:
+        return False
+
+
+def test_a_viewer_that_is_stopped_leaves_what_it_has(
+    run: Any, server: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stopped(words: list[str], longest_s: float) -> float:
+        asked = dict(zip(words[2::2], words[3::2], strict=True))
+        assert float(asked["--seconds"]) < longest_s <= 120.0
+        Path(asked["--output"]).write_text('{"speed": {"camera": {"frames_per_s": 50.0}}}', encoding="utf-8")
+        raise DermisError("viewer.py: too late. Last words: page")
+
+    monkeypatch.setattr(server.gpu_sections, "lasted_s", stopped)
+    told = run("viewer")["viewer"]
+    assert told["speed"]["camera"]["frames_per_s"] == 50.0 and "Last words: page" in told["ended"]
 
 
 def test_other_names_are_refused(server: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

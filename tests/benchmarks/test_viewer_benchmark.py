@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import random
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,7 @@ from offscreen_hands import ADAPTER
 from small_head import write_head
 
 from dermis.cli.options import parse_size
+from dermis.errors import DermisError
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 
@@ -46,23 +49,88 @@ def hands(plan: Any) -> Any:
 
 
 def test_each_motion_moves_the_picture_and_nothing_else_is_computed(hands: Any, plan: Any) -> None:
+    from viewer_clock import Clock
     from viewer_hands import MOTIONS, speeds
 
-    found = speeds(hands, plan)
+    found = dict(speeds(hands, plan, Clock()))
     assert list(found) == list(MOTIONS)
     ran = {name: set(one["stages"]) for name, one in found.items()}
     assert ran["camera"] == {"visibility", "shade", "post"} and ran["exposure"] == {"post"}
     assert "shadows" in ran["light"] and "irradiance" in ran["roughness"] - ran["melanin"]
     assert "diffuse" in ran["melanin"]
     assert all(one["frames_per_s"] > 0.0 and one["processor_ms"] > 0.0 for one in found.values())
+    assert {one["frames"] for one in found.values()} == {plan.frames}
 
 
 def test_delays_are_those_of_pictures_that_follow(hands: Any, plan: Any) -> None:
-    from viewer_hands import delays
+    from viewer_clock import Clock
+    from viewer_delays import delays
 
-    found = delays(hands, plan)
+    found = dict(delays(hands, plan, Clock()))
     assert [one["count"] for one in found.values()] == [plan.frames] * 2
     assert all(0.0 < one["median_ms"] <= one["late_ms"] for one in found.values())
+
+
+def test_no_time_leaves_a_few_frames_of_everything(hands: Any, plan: Any) -> None:
+    from viewer_clock import Clock
+    from viewer_delays import delays
+    from viewer_hands import speeds
+
+    many = replace(plan, frames=1000)
+    assert {one["frames"] for _, one in speeds(hands, many, Clock(0.0))} == {3}
+    assert [one["count"] for _, one in delays(hands, many, Clock(0.0))] == [3, 3]
+
+
+def test_a_viewer_that_fails_is_no_quick_one(hands: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hands.viewer, "failure", DermisError("no device"))
+    with pytest.raises(DermisError, match="no device"):
+        hands.frame()
+    monkeypatch.undo()
+
+    def broken() -> None:
+        raise ValueError("a fault of the viewer")
+
+    monkeypatch.setattr(hands, "_fault", None)
+    monkeypatch.setattr(hands.viewer, "draw", broken)
+    with pytest.raises(ValueError, match="a fault of the viewer"):
+        hands.frame()
+
+
+def test_a_picture_that_never_rests_ends_the_wait(hands: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("viewer_hands._REST_S", 0.0)
+    monkeypatch.setattr(type(hands.viewer), "is_still", False)
+    with pytest.raises(RuntimeError, match="does not come to rest"):
+        hands.rest()
+
+
+def test_a_section_that_fails_leaves_what_came_before_and_the_reason(tmp_path: Path) -> None:
+    from viewer import Found
+    from viewer_clock import Clock
+    from viewer_tables import tables
+
+    def broken(clock: Any) -> Any:
+        assert clock.left_s <= 10.0
+        one = {"frames_per_s": 50.0, "frame_ms": 20.0, "processor_ms": 10.0, "stages": ["post"]}
+        yield "camera", one
+        raise RuntimeError("the page does not come to rest")
+
+    plan = {"head": "bust", "size": (240, 160), "atlas": 64, "samples": 1}
+    found = Found(
+        {"plan": plan, "adapter": "none", "date": "2026-01-01"}, tmp_path / "told.json", Clock(10.0)
+    )
+    found.take("speed", broken)
+    written = json.loads((tmp_path / "told.json").read_text(encoding="utf-8"))
+    assert written["speed"]["camera"]["frame_ms"] == 20.0
+    assert "RuntimeError: the page does not come to rest" in written["speed"]["ended"]
+    assert "| camera | 50.0 |" in tables(written) and "speed ended early" in tables(written)
+
+
+def test_a_server_that_tells_no_address_is_told_with_its_last_words(plan: Any) -> None:
+    from viewer_clock import Clock
+    from viewer_page import through_the_page
+
+    with pytest.raises(RuntimeError, match=r"tells no address; dermis view: .*no such head"):
+        dict(through_the_page(replace(plan, head="no such head"), None, Clock(60.0)))
 
 
 def test_all_kinds_of_change_are_drawn_and_the_memory_is_watched(

@@ -141,6 +141,59 @@ def test_confirming_frames_that_were_not_sent_opens_no_flood(viewer: Any) -> Non
         assert len(page.frames) <= _AT_ONCE
 
 
+def test_a_lossless_frame_keeps_nothing_waiting_and_is_not_sent_late(
+    viewer: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from dermis.viewer.browser import canvas
+
+    begun, gate, encoded = threading.Event(), threading.Event(), canvas.encoded
+
+    def slowly(array: NDArray[np.uint8], *, lossless: bool) -> bytes:
+        if lossless:
+            begun.set()
+            gate.wait(_PATIENCE_S)
+        return encoded(array, lossless=lossless)
+
+    with visit(viewer) as socket:
+        page = Page(socket)
+        page.show()
+        page.still()
+        monkeypatch.setattr(canvas, "encoded", slowly)
+        page.drag(300, 260)
+        while not begun.is_set():
+            page.hear(confirming=True)
+        page.drag(260, 300)
+        while not page.frames:
+            page.hear(confirming=True)
+        assert {kind for _, kind, _ in page.frames} == {"image/jpeg"}
+        gate.set()
+        page.still()
+        assert [kind for _, kind, _ in page.frames].count("image/png") == 1
+
+
+def test_frames_are_not_compressed_a_second_time(viewer: Any) -> None:
+    with visit(viewer) as socket:
+        assert socket.protocol.extensions == []
+
+
+def test_a_page_that_was_not_ready_for_the_still_picture_gets_it_when_it_is(viewer: Any) -> None:
+    with visit(viewer) as socket:
+        page = Page(socket)
+        page.show()
+        page.still()
+        page.drag(300, 270)
+        page.hear()
+        confirmed, kind = page.frames[0][0], "image/jpeg"
+        while kind == "image/jpeg":  # always one too few, so that the last frame fills what a page may get
+            page.frames.clear()
+            page.confirm(confirmed)
+            confirmed, end = confirmed + 1, time.monotonic() + _PATIENCE_S
+            while not page.frames:
+                assert time.monotonic() < end, "no picture without loss comes"
+                page.hear(0.2)
+            kind = page.frames[-1][1]
+
+
 def test_who_watches_takes_over_with_a_size_of_its_own(viewer: Any) -> None:
     first = visit(viewer).__enter__()
     page = Page(first)

@@ -69,6 +69,7 @@ def server(address: Address) -> Any:
         Guard(asgi, address.token),
         log_level="warning",
         ws_max_size=_MOST_MESSAGE_BYTES,
+        ws_per_message_deflate=False,  # pictures are compressed already
         timeout_graceful_shutdown=_GRACE_S,
         server_header=False,
     )
