@@ -11,7 +11,7 @@ from scipy.ndimage import map_coordinates
 from dermis.assets.atlas import Atlas
 from dermis.assets.head import Head
 from dermis.optics.gaussians import GaussianSum
-from dermis.rendering.kernels import ROWS_PER_UNIT, TRUNCATION, WIDEST, kernel_table
+from dermis.rendering.kernels import ROWS_PER_UNIT, SUMMED_TRUNCATION, WIDEST, kernel_table
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
 from dermis.scene.model import Scene
 from dermis.specular.albedo import albedo_table
@@ -26,7 +26,7 @@ DEFAULT_COLOUR = float(np.float16(0.8))  # maps are stored as halves
 
 def _table_ratio(relative: Floats) -> Floats:
     """The kernel table between its rows."""
-    taps = np.ceil(TRUNCATION * np.sqrt(relative)).astype(int)
+    taps = np.ceil(SUMMED_TRUNCATION * np.sqrt(relative)).astype(int)
     row = relative * ROWS_PER_UNIT
     table = kernel_table().astype(np.float64)
     low, high = table[row.astype(int), taps], table[row.astype(int) + 1, taps]
@@ -45,7 +45,7 @@ class Kernel(NamedTuple):
         """variance : [texel^2]"""
         relative = variance / step**2
         wide = relative > WIDEST
-        taps = np.ceil(np.where(wide, WIDE_TRUNCATION, TRUNCATION) * np.sqrt(relative)).astype(int)
+        taps = np.ceil(np.where(wide, WIDE_TRUNCATION, SUMMED_TRUNCATION) * np.sqrt(relative)).astype(int)
         narrow = _table_ratio(np.minimum(relative, WIDEST))
         return cls(step.astype(int), taps, np.where(wide, np.exp(-0.5 / np.maximum(relative, 1)), narrow))
 

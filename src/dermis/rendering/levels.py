@@ -14,7 +14,7 @@ ENTERED = "rgba32float"
 """Format of the light that enters."""
 MOST_HALVINGS = 3
 _BRIGHT = 16.0  # what the lights are brought to, a 4000th of what halves hold
-SHARP = 0.8  # standard deviations of what is halved, in texels of the result: less would lose detail
+SHARP = 0.45  # least standard deviation [mm] of what is halved, over the square of the result's texels [mm]
 
 
 @dataclass
@@ -87,11 +87,15 @@ def scale_of(texel: str, brightest: float) -> float:
 def halvings_of(variance_mm2: NDArray[np.float64], texels_per_mm: float, most: int) -> tuple[int, ...]:
     """How often the resolution of each layer may be halved, the unblurred one included.
 
+    Twice as large texels want four times as wide a blur before: what they lose in the sparse parts of a map is a
+    larger share of their own width, and light of that width is a larger share of what is seen
+    (docs/performance.md has the errors).
+
     variance_mm2 : of the blurred layers, increasing
     texels_per_mm : of the map
     """
     found = [0]
     for before in (0.0, *variance_mm2[:-1]):
-        smooth = np.sqrt(before) * texels_per_mm / SHARP
+        smooth = texels_per_mm * np.sqrt(np.sqrt(before) / SHARP)
         found.append(int(np.clip(np.log2(max(smooth, 1.0)), found[-1], min(most, found[-1] + 1))))
     return tuple(found)

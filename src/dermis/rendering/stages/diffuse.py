@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.gpu import ComputeProgram, Device, Frame
 from dermis.gpu.textures import texture_from
 from dermis.rendering.atlas_textures import AtlasTextures
-from dermis.rendering.kernels import ROWS_PER_UNIT, TRUNCATION, WIDEST, kernel_table
+from dermis.rendering.kernels import ROWS_PER_UNIT, SUMMED_TRUNCATION, TRUNCATION, WIDEST, kernel_table
 from dermis.rendering.levels import ENTERED, Levels, halvings_of, make_levels
 from dermis.rendering.stages import SOURCE_SHADERS, STAGES, STORE_SHADERS, TILE
 from dermis.rendering.stages.stitch import Stitch
@@ -63,6 +63,7 @@ class Diffuse:
         levels.halvings = halvings_of(variance_mm2, atlas.usual_per_mm, len(sheets) - 1)
         levels.scale = scale
         source, before = levels.entering, 0.0
+        owed, paid = 0.0, 0.0
         for k, variance in enumerate(variance_mm2, start=1):
             finer, here = levels.halvings[k - 1 : k + 1]
             texel, held = (ENTERED, 1.0) if k == 1 else (self.texel, scale)
@@ -80,12 +81,16 @@ class Diffuse:
                     before_mm2=before,
                     resampled=_AVERAGED + _READ if here > finer else 0.0,
                     to_come=sum(_READ / 4**times for times in range(here)),
+                    owed=owed / 4.0 ** (here - finer),
+                    paid_mm2=paid,
+                    truncation=SUMMED_TRUNCATION if len(variance_mm2) > 1 else TRUNCATION,
                     scale=scale / held,
                     clear=held * np.asarray(clear),
                 )
                 bound = {"spread": spread, "kernel_table": self._kernels, "source": source, "stored": blurred}
                 self._run(frame, along, sheets[here].resources | bound, levels.size >> here)
                 source, held = blurred, scale
+            owed, paid = (_AVERAGED + _READ, variance - before) if here > finer else (0.0, 0.0)
             before = float(variance)
 
     def _halved(self, frame: Frame, levels: Levels, source: Any, k: int) -> Any:
@@ -101,7 +106,7 @@ class Diffuse:
     def _along(self, texel: str, sheared: bool, edge: str) -> list[ComputeProgram]:
         """The passes along u, from texels of a format, and along v, made when first asked for."""
         if (texel, sheared, edge) not in self._made:
-            table = {"ROWS_PER_UNIT": ROWS_PER_UNIT, "WIDEST": WIDEST, "TRUNCATION": TRUNCATION}
+            table = {"ROWS_PER_UNIT": ROWS_PER_UNIT, "WIDEST": WIDEST}
             chosen = {**table, "SHEARED": sheared, "EDGE": EDGES.index(edge)}
             self._made[texel, sheared, edge] = [
                 self._program("diffuse.wgsl", source, {"AXIS": axis, **chosen})

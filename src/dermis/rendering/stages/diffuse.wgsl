@@ -8,7 +8,6 @@ override EDGE: u32 = 0u; // what lies beyond a chart's edge
 
 override ROWS_PER_UNIT: f32; // rows of the kernel table per unit of variance
 override WIDEST: f32; // variance of the table's last row [step^2]
-override TRUNCATION: f32; // taps reach this many standard deviations
 
 const REPEATED: u32 = 0u; // the edge repeats itself: nothing from beyond it bleeds in
 const CLEARED: u32 = 1u; // whatever the texture holds, the clear colour where that is nothing
@@ -21,6 +20,9 @@ struct Spread {
     before_mm2: f32, // already in the source
     resampled: f32, // of it what going to this resolution and back adds [texel^2]
     to_come: f32, // what reading between texels at the end will add to the source [texel^2]
+    owed: f32, // what the same added to the level before [texel^2]
+    paid_mm2: f32, // and the variance it was taken off; the rest is taken off now
+    truncation: f32, // taps reach this many standard deviations
     scale: f32, // of what is stored over the source
     clear: vec3f, // the light that empty texels show
 }
@@ -43,16 +45,22 @@ struct Kernel {
 @group(0) @binding(1) var sheet_map: texture_2d<u32>;
 @group(0) @binding(3) var kernel_table: texture_2d<f32>; // row: variance, column: taps on each side; here and in the next row
 
+// Variance that is there already, or will be, where mm^2 have so many texel^2: where texels are large, halving the
+// resolution adds more than the blur it is part of may have.
+fn taken_off(upright: f32) -> f32 {
+    return spread.resampled + max(spread.owed - spread.paid_mm2 * upright, 0.0);
+}
+
 // Any covariance is that of a blur along u and one along a leaning v [Geusebroek2003]: the lower right element is the
 // latter's, and what that leaves of the upper left one is the former's.
 fn along_v(stretch: vec4f) -> Axis {
     let upright = stretch.xy * stretch.xy / (1.0 - stretch.z * stretch.z);
     var variance = spread.variance_mm2 * upright.y;
     var lean = -stretch.z * stretch.x / stretch.y;
-    if (spread.resampled > 0.0) {
+    if (spread.resampled + spread.owed > 0.0) {
         let covariance = lean * variance;
-        variance = max(variance - spread.resampled, 0.0);
-        let most = sqrt(max(spread.variance_mm2 * upright.x - spread.resampled, 0.0) * variance);
+        variance = max(variance - taken_off(upright.y), 0.0);
+        let most = sqrt(max(spread.variance_mm2 * upright.x - taken_off(upright.x), 0.0) * variance);
         lean = clamp(covariance, -most, most) / max(variance, 1e-12);
     }
     return Axis(variance, max(upright.y * spread.before_mm2 - spread.to_come, 0.0), lean);
@@ -60,7 +68,8 @@ fn along_v(stretch: vec4f) -> Axis {
 
 fn along_u(stretch: vec4f, v: Axis) -> Axis {
     let square = stretch.x * stretch.x;
-    let all = square / (1.0 - stretch.z * stretch.z) * spread.variance_mm2 - spread.resampled;
+    let upright = square / (1.0 - stretch.z * stretch.z);
+    let all = upright * spread.variance_mm2 - taken_off(upright);
     let rest = max(all - v.lean * v.lean * v.variance, 0.0);
     return Axis(rest, max(square * spread.before_mm2 - spread.to_come, 0.0), 0.0);
 }
@@ -72,7 +81,7 @@ fn tap_step(axis: Axis) -> f32 {
 
 fn kernel_of(variance: f32, step: f32) -> Kernel {
     let scaled = variance / (step * step);
-    let taps = i32(ceil(select(TRUNCATION, WIDE_TRUNCATION, scaled > WIDEST) * sqrt(scaled)));
+    let taps = i32(ceil(select(spread.truncation, WIDE_TRUNCATION, scaled > WIDEST) * sqrt(scaled)));
     return Kernel(taps, i32(step), first_ratio(taps, scaled));
 }
 
