@@ -26,12 +26,14 @@ class Moved:
 
     texels : of the atlas that show the surface
     seen : pixels that show something
+    shadowing : texels of all shadow maps that do
     vertices : of the mesh
     """
 
     inputs: Inputs
     texels: int
     seen: int
+    shadowing: int
     vertices: int
 
 
@@ -39,7 +41,9 @@ def moved_by(device: Device, inputs: Inputs, vertices: int) -> Moved:
     """Counts after a frame was drawn."""
     texels = np.count_nonzero(download(device, inputs.layouts[0].atlas.resources["atlas"])[..., 0])
     seen = np.count_nonzero(download(device, inputs.picture.bytes)[..., 3])
-    return Moved(inputs, int(texels), int(seen), vertices)
+    maps, layers = inputs.shadow_maps.texture, range(len(inputs.light_clips))
+    shadowing = sum(int(np.count_nonzero(download(device, maps, layer=layer))) for layer in layers)
+    return Moved(inputs, int(texels), int(seen), shadowing, vertices)
 
 
 def stage_bytes(moved: Moved) -> dict[str, float]:
@@ -50,16 +54,15 @@ def stage_bytes(moved: Moved) -> dict[str, float]:
     """
     inputs, picture = moved.inputs, moved.inputs.picture
     pixels, shadow = picture.size[0] * picture.size[1], inputs.shadow_maps.texture
+    samples = inputs.settings.samples * texel_bytes(inputs.seen.texture)
     geometry = _CORNERS * inputs.head.triangles + _PLACE * moved.vertices
-    maps_drawn = len(inputs.light_clips) * shadow.size[0] * shadow.size[1]
-    seen = pixels * inputs.settings.samples * texel_bytes(inputs.seen.texture)
     looked_up = len(inputs.light_clips) * texel_bytes(shadow)
     radiance = texel_bytes(picture.radiance)
     shaded = moved.seen * (looked_up + texel_bytes(inputs.scattered)) + _maps(inputs, moved.seen)
     found: dict[str, float] = {
-        "shadows": maps_drawn * texel_bytes(shadow) + geometry,
-        "visibility": seen + geometry,
-        "shade": seen + shaded + pixels * radiance,
+        "shadows": moved.shadowing * texel_bytes(shadow) + geometry,
+        "visibility": moved.seen * samples + geometry,
+        "shade": pixels * samples + shaded + pixels * radiance,
         "post": pixels * (radiance + texel_bytes(picture.exposed) + texel_bytes(picture.bytes)),
     }
     return (found | _scattering_bytes(moved, looked_up)) if inputs.scatters else found

@@ -16,14 +16,18 @@ from dermis.gpu import ComputeProgram, Device, Frame, RasterProgram, make_textur
 from dermis.rendering.geometry import HeadTextures
 from dermis.rendering.projection import Matrix
 from dermis.rendering.stages import SHARED_SHADERS, STAGES
-from dermis.rendering.stages.variants import Variants
+from dermis.rendering.stages.variants import Switches, Variants
 
-_TAKEN = 4  # triangles of a workgroup, in nearest.wgsl
+_GROUPS = 2048  # workgroups that keep a GPU busy; where there are more triangles, each takes more of them
+_TAKEN = (8, 128)  # triangles of a workgroup of nearest.wgsl: fewest and most
+_RUN = 16  # of them that follow each other, where they are many and so small
 _GROUPS_PER_ROW = 32768
-_TILE = (32, 8)  # pixels that a workgroup of resolve_*.wgsl takes
+_TILE = (64, 32)  # pixels, in tiles.wgsl
+_DEPTH, _FOUND, _BOTH = 0, 1, 2  # what nearest.wgsl records
+_COARSEST_MM = 0.1  # steps of depth at which a sample's depth and triangle share a word
 
 
-@dataclass(frozen=True)
+@dataclass
 class Layers:
     """A texture array with a layer for each view, and what it takes to fill it.
 
@@ -32,7 +36,7 @@ class Layers:
     texture : depth (1 near, 0 nothing) as float, or triangle + 1 as uint
     depth : the rasteriser's depth attachments, one a layer, or one for all when triangles are wanted
     targets : the rasteriser's colour targets, one a layer
-    nearness, found : the compute pass' buffers
+    nearness, found, tiles : the compute pass' buffers; triangles found get theirs when a frame needs it
     """
 
     texture: Any
@@ -42,6 +46,7 @@ class Layers:
     targets: list[Any]
     nearness: Any = None
     found: Any = None
+    tiles: Any = None
 
 
 class Nearest:
@@ -81,10 +86,12 @@ class Nearest:
     def _compute_layers(self, size: tuple[int, int], count: int) -> Layers:
         texel = "r32uint" if self._triangles else "r32float"
         texture = make_texture(self._device, size, texel, layers=max(2, count))
-        words = np.zeros(size[0] * size[1] * count, np.uint32)
-        nearness = self._device.buffer(words, "STORAGE")
-        found = self._device.buffer(words if self._triangles else words[:1], "STORAGE")
-        return Layers(texture, size, count, [], [], nearness, found)
+        across, down = _tiles(size)
+        nearness, found, tiles = map(self._words, (size[0] * size[1] * count, 1, across * down * count))
+        return Layers(texture, size, count, [], [], nearness, found, tiles)
+
+    def _words(self, count: int) -> Any:
+        return self._device.buffer(np.zeros(count, np.uint32), "STORAGE")
 
     def _raster_layers(self, size: tuple[int, int], count: int) -> Layers:
         def layered(texel: str, number: int) -> tuple[Any, list[Any]]:
@@ -106,20 +113,33 @@ class Nearest:
         record = self._views(self._resolve, layers, views, head)
         record["sample"][: len(places), :2] = places
         record["reach"] = *places.min(axis=0), *places.max(axis=0)
+        recorded = self._recorded(head.triangles, views)
+        if _FOUND in recorded and layers.found.size < layers.nearness.size:
+            layers.found = self._words(layers.nearness.size // 4)
+        record["index_bits"] = head.triangles.bit_length() if recorded == (_BOTH,) else 0
         resources = {
             **head.resources,
             "views": record,
             "nearness": layers.nearness,
             "found": layers.found,
+            "tiles": layers.tiles,
             "layers": layers.texture,
         }
-        count = -(-head.triangles // _TAKEN)
+        shared = _shared_out(head.triangles * len(views), len(places))
+        count = -(-head.triangles // dict(shared)["TAKEN"])
         groups = (min(count, _GROUPS_PER_ROW), -(-count // _GROUPS_PER_ROW), len(views))
-        for find in range(2 if self._triangles else 1):
-            finder = self._finders.program((("FIND_TRIANGLE", find), ("SAMPLES", len(places))))
+        for what in recorded:
+            finder = self._finders.program((("RECORDED", what), ("SAMPLES", len(places)), *shared))
             frame.dispatch(stage, finder, resources, groups)
-        across, down = (-(-side // tile) for side, tile in zip(layers.size, _TILE, strict=True))
-        frame.dispatch(stage, self._resolve, resources, (across, down, layers.count))
+        frame.dispatch(stage, self._resolve, resources, (*_tiles(layers.size), layers.count))
+
+    def _recorded(self, triangles: int, views: list[Matrix]) -> tuple[int, ...]:
+        """What is recorded, time after time: depth and triangle in one word where that is fine enough."""
+        if not self._triangles:
+            return (_DEPTH,)
+        steps = 2.0 ** (32 - triangles.bit_length())
+        fine = max(map(_depth_range_mm, views)) <= _COARSEST_MM * steps
+        return (_BOTH,) if fine else (_DEPTH, _FOUND)
 
     def _draw_raster(
         self, frame: Frame, stage: str, layers: Layers, clips: list[Matrix], head: HeadTextures
@@ -146,10 +166,37 @@ class Nearest:
 
 def _views_and_places(clips: list[Matrix], size: tuple[int, int]) -> tuple[list[Matrix], NDArray[np.float64]]:
     """One view and (n, 2) places in its pixels when the matrices differ by no more, else all views."""
-    base, way = np.array(clips[0]), clips[0][3] / (clips[0][3] @ clips[0][3])
-    moved = np.array(clips) - base
-    shift = moved[:, :2] @ way
-    apart = np.abs(moved[:, :2] - shift[..., None] * base[3]).max()
-    if apart <= 1e-9 * (1.0 + np.abs(base).max()) and not moved[:, 2:].any():
-        return clips[:1], 0.5 + shift * [-0.5, 0.5] * size
+    every, base = np.array(clips), clips[0]
+    if (every[:, 2:] != base[2:]).any():
+        return clips, np.full((1, 2), 0.5)
+    moved = every[:, :2] - base[:2]
+    shift = moved @ (base[3] / (base[3] @ base[3]))
+    apart = np.abs(moved - shift[..., None] * base[3]).max()
+    if apart <= 1e-9 * (1.0 + np.abs(base).max()):
+        return clips[:1], 0.5 + shift * (-0.5 * size[0], 0.5 * size[1])
     return clips, np.full((1, 2), 0.5)
+
+
+def _depth_range_mm(clip: Matrix) -> float:
+    """How far apart depths 0 and 1 would be if all depths were as coarse as the coarsest [mm]."""
+    away, depth = clip[3], clip[2]
+    scale = away[:3] @ away[:3]
+    if scale == 0.0:  # parallel rays
+        return float(1.0 / np.linalg.norm(depth[:3]))
+    slope = depth[:3] @ away[:3] / scale  # depth = slope + rise / distance
+    rise = depth[3] - slope * away[3]
+    return float(rise / slope**2 / np.sqrt(scale))
+
+
+def _shared_out(triangles: int, samples: int) -> Switches:
+    """What a workgroup takes when there are so many triangles in all, as one H200 was fastest."""
+    fewest, most = _TAKEN
+    taken = min(most, max(fewest, 1 << (triangles // _GROUPS).bit_length() >> 1))
+    many = taken == most  # and small
+    threads = 256 if many or samples > 1 else 128
+    return ("TAKEN", taken), ("RUN", _RUN if many else 1), ("SMALL", 32 if many else 16), ("THREADS", threads)
+
+
+def _tiles(size: tuple[int, int]) -> tuple[int, int]:
+    """Tiles across and down."""
+    return -(-size[0] // _TILE[0]), -(-size[1] // _TILE[1])

@@ -1,151 +1,202 @@
-// Rasterises triangles in compute: the nearest depth of each pixel, then which triangle it belongs to.
-// One workgroup takes some triangles of one view: each is set up by one invocation and drawn by teams of them, which take
-// turns at its rows of squares, one pixel an invocation.
-//#include "geometry.wgsl"
-//#include "views.wgsl"
+// Rasterises triangles in compute: the nearest depth of each sample, and which triangle it belongs to.
+// A workgroup takes some triangles of one view, an invocation sets each of them up. Small ones it draws at once; of the others it
+// lists the blocks of pixels that they may cover, and teams of invocations draw those.
+//#include "projected_triangle.wgsl"
+//#include "record_nearest.wgsl"
+//#include "tiles.wgsl"
 
-override FIND_TRIANGLE: bool = false; // false: write depths; true: write indices where the depth is theirs
-override SAMPLES: u32 = 1u; // places in a pixel at which each view is seen, a layer each
+override TAKEN: u32 = 32u; // triangles of a workgroup, at most as many as its invocations
+override RUN: u32 = 1u; // of them that follow each other in the mesh
+override SMALL: u32 = 16u; // pixels of a box that one invocation draws
+override MOST_BLOCKS: u32 = 16u; // that one invocation tests and lists, at most 32
+override LISTED: u32 = 8u * TAKEN; // blocks that a workgroup can list
 
-const TAKEN: u32 = 4u; // triangles of a workgroup
-const TEAMS: u32 = 4u;
-const SIDE: u32 = 8u; // of the square that a team covers
-const EXTENT: f32 = 7.0; // from the first to the last pixel of its side
-const ROUNDING: u32 = 4u; // the two passes may round differently
-const SLACK: f32 = 1e-5; // covers rounding, so that no pixel falls between two triangles
+override THREADS: u32 = 128u;
+override TEAMS: u32 = THREADS / TEAM;
 
-@group(1) @binding(1) var<storage, read_write> nearness: array<atomic<u32>>; // bits of the depth, 0 empty
-@group(1) @binding(2) var<storage, read_write> found: array<atomic<u32>>; // triangle + 1
+const TEAM: u32 = 16u; // invocations that draw a block
 
-// Corner in homogeneous pixels: place times w, w; and its clip depth.
-struct Projected {
-    place: vec3f,
-    z: f32,
-}
-
-struct Box {
-    low: vec2f,
-    size: vec2u,
-}
-
-// A triangle to draw: its barycentric weights and its depth, linear in the place within its box.
-struct Drawn {
-    box: Box,
-    along_x: vec4f, // of a, b, c and the depth, per pixel
-    along_y: vec4f,
-    at_low: vec4f, // at the corner of the box's first pixel
-    most: vec3f, // that the weights grow within a square
-}
+@group(1) @binding(4) var<storage, read_write> tiles: array<atomic<u32>>;
 
 var<workgroup> taken: array<Drawn, TAKEN>;
+var<workgroup> blocks: array<u32, LISTED>; // place of the triangle, then x and y from the box's first block
+var<workgroup> block_count: atomic<u32>;
+var<workgroup> large: array<u32, TAKEN>; // places of triangles with more blocks
+var<workgroup> large_count: atomic<u32>;
 
-fn project(vertex: u32, view: u32) -> Projected {
-    let clip = views.clip[view] * vec4f(position_of(vertex), 1.0);
-    let size = vec2f(f32(views.width), f32(views.height));
-    return Projected(vec3f((vec2f(0.5, -0.5) * clip.xy + 0.5 * clip.w) * size, clip.w), clip.z);
-}
-
-// Pixels whose samples may lie in the triangle: all of them where it reaches behind the eye.
-fn bounds(a: vec3f, b: vec3f, c: vec3f) -> Box {
-    let last = vec2f(f32(views.width), f32(views.height)) - 1.0;
-    if (min(min(a.z, b.z), c.z) <= 0.0) {
-        return Box(vec2f(0.0), vec2u(last) + 1u);
-    }
-    let pa = a.xy / a.z;
-    let pb = b.xy / b.z;
-    let pc = c.xy / c.z;
-    let low = clamp(ceil(min(min(pa, pb), pc) - views.reach.zw), vec2f(0.0), last + 1.0);
-    let high = clamp(floor(max(max(pa, pb), pc) - views.reach.xy), vec2f(-1.0), last);
-    return Box(low, vec2u(max(high - low + 1.0, vec2f(0.0))));
-}
-
-// Seen from the box's corner, for precision: weights that combine the corners into a pixel, linear in it
-// [OlanoGreer1997]. Each times its corner's distance they are all positive inside.
-fn set_up(index: u32, view: u32) -> Drawn {
-    let t = triangle_at(index);
-    let a = project(t.x, view);
-    let b = project(t.y, view);
-    let c = project(t.z, view);
-    let w = vec3f(a.place.z, b.place.z, c.place.z);
-    let box = bounds(a.place, b.place, c.place);
-    let pa = a.place - vec3f(box.low * w.x, 0.0);
-    let pb = b.place - vec3f(box.low * w.y, 0.0);
-    let pc = c.place - vec3f(box.low * w.z, 0.0);
-    let volume = dot(pa, cross(pb, pc));
-    if (volume == 0.0) {
-        return Drawn(Box(vec2f(0.0), vec2u(0u)), vec4f(0.0), vec4f(0.0), vec4f(0.0), vec3f(0.0));
-    }
-    let weights = transpose(mat3x3f(cross(pb, pc) / volume, cross(pc, pa) / volume, cross(pa, pb) / volume));
-    let z = vec3f(a.z, b.z, c.z);
-    let x = weights[0] * abs(w);
-    let y = weights[1] * abs(w);
-    let low = weights[2] * abs(w);
-    let most = max(x * views.reach.x, x * (views.reach.z + EXTENT)) + max(y * views.reach.y, y * (views.reach.w + EXTENT));
-    return Drawn(
-        box,
-        vec4f(x, dot(weights[0], z)),
-        vec4f(y, dot(weights[1], z)),
-        vec4f(low, dot(weights[2], z)),
-        most + SLACK,
-    );
-}
-
-@compute @workgroup_size(SIDE, SIDE, TEAMS)
+@compute @workgroup_size(THREADS)
 fn main(
     @builtin(workgroup_id) group: vec3u,
     @builtin(num_workgroups) groups: vec3u,
-    @builtin(local_invocation_id) lane: vec3u,
     @builtin(local_invocation_index) number: u32,
 ) {
-    // Triangles far from each other in the list: neighbours are often all large, and one workgroup would have them all.
     let first = group.y * groups.x + group.x;
     let step = groups.x * groups.y;
-    let index = first + number * step;
-    if (number < TAKEN && index < views.triangles) {
-        taken[number] = set_up(index, group.z);
+    let index = triangle_of(number, first, step);
+    if (number == 0u) { // some software adapters leave what the workgroup before counted
+        atomicStore(&block_count, 0u);
+        atomicStore(&large_count, 0u);
     }
     workgroupBarrier();
-    for (var k = 0u; k < TAKEN; k++) {
-        if (first + k * step < views.triangles) {
-            draw(first + k * step, taken[k], lane.xy, (lane.z + k) % TEAMS, group.z);
+    if (number < TAKEN && index < views.triangles) {
+        take(index, number, group.z);
+    }
+    workgroupBarrier();
+    let lane = number % TEAM;
+    let count = min(atomicLoad(&block_count), LISTED);
+    for (var k = number / TEAM; k < count; k += TEAMS) {
+        let block = blocks[k];
+        let place = block & 0xffu;
+        let at = first_block(taken[place].box) + vec2u((block >> 8u) & 0xffu, block >> 16u);
+        draw_block(triangle_of(place, first, step), taken[place], at, lane, group.z);
+    }
+    let larger = atomicLoad(&large_count);
+    for (var k = 0u; k < larger; k++) {
+        let place = large[k];
+        draw_large(triangle_of(place, first, step), taken[place], (number / TEAM + k) % TEAMS, lane, group.z);
+    }
+}
+
+// Runs of triangles far from each other in the list: neighbours share corners, but are often all large.
+fn triangle_of(place: u32, first: u32, step: u32) -> u32 {
+    return (place / RUN * step + first) * RUN + place % RUN;
+}
+
+fn take(index: u32, place: u32, view: u32) {
+    let triangle = set_up(index, view);
+    let pixels = triangle.box.size.x * triangle.box.size.y;
+    if (pixels > 0u && pixels <= SMALL) {
+        draw_small(index, triangle, view);
+    }
+    if (pixels > SMALL) {
+        taken[place] = triangle;
+        list_blocks(triangle, place);
+    }
+}
+
+// Those that the triangle may cover. Where there is no space it counts as large: what is drawn twice is the same.
+fn list_blocks(triangle: Drawn, place: u32) {
+    let first = first_block(triangle.box);
+    let size = blocks_of(triangle.box);
+    if (size.x * size.y > MOST_BLOCKS) {
+        large[atomicAdd(&large_count, 1u)] = place;
+        return;
+    }
+    let most = most_within_block(triangle);
+    var covered = 0u;
+    for (var k = vec2u(0u); k.y < size.y; k = wrapped(k + vec2u(1u, 0u), size.x)) {
+        covered |= select(0u, 1u << (k.y * size.x + k.x), may_cover(triangle, most, first + k));
+    }
+    let count = countOneBits(covered);
+    var at = atomicAdd(&block_count, count);
+    if (at + count > LISTED) {
+        large[atomicAdd(&large_count, 1u)] = place;
+    }
+    for (var k = vec2u(0u); k.y < size.y && at < LISTED; k = wrapped(k + vec2u(1u, 0u), size.x)) {
+        if ((covered & (1u << (k.y * size.x + k.x))) != 0u) {
+            blocks[at] = place | (k.x << 8u) | (k.y << 16u);
+            at++;
         }
     }
 }
 
-// turn: of the team, so that small triangles keep all of them busy
-fn draw(index: u32, triangle: Drawn, lane: vec2u, turn: u32, view: u32) {
-    let within = f32(lane.x) * triangle.along_x + f32(lane.y) * triangle.along_y;
-    for (var y = turn * SIDE; y < triangle.box.size.y; y += TEAMS * SIDE) {
-        for (var x = 0u; x < triangle.box.size.x; x += SIDE) {
-            let here = triangle.at_low + f32(x) * triangle.along_x + f32(y) * triangle.along_y;
-            let best = here.xyz + triangle.most;
-            if (min(min(best.x, best.y), best.z) >= 0.0) {
-                draw_samples(index, triangle, here + within, vec2u(x, y) + lane, view);
+// The block so many further on in its row, or in one of those below.
+fn wrapped(k: vec2u, width: u32) -> vec2u {
+    var at = k;
+    while (at.x >= width) {
+        at = vec2u(at.x - width, at.y + 1u);
+    }
+    return at;
+}
+
+// turn: of the team, another one for each triangle
+fn draw_large(index: u32, triangle: Drawn, turn: u32, lane: u32, view: u32) {
+    let most = most_within_block(triangle);
+    let first = first_block(triangle.box);
+    let size = blocks_of(triangle.box);
+    for (var k = wrapped(vec2u(turn, 0u), size.x); k.y < size.y; k = wrapped(k + vec2u(TEAMS, 0u), size.x)) {
+        if (may_cover(triangle, most, first + k)) {
+            draw_block(index, triangle, first + k, lane, view);
+        }
+    }
+}
+
+// One invocation's part of a block: a pixel, or one in every few rows where each has but one sample.
+fn draw_block(index: u32, triangle: Drawn, block: vec2u, lane: u32, view: u32) {
+    let pixel = block * BLOCK + vec2u(lane % BLOCK, lane / BLOCK);
+    for (var s = lane; s < SAMPLES; s += TEAM) {
+        mark(block * BLOCK / TILE, view * SAMPLES + s);
+    }
+    let at = pixel - triangle.box.low; // left of and above the box it is greater than any size
+    if (SAMPLES > 1u) {
+        draw_samples(index, triangle, at, all(at < triangle.box.size), view);
+        return;
+    }
+    let rows = vec4u(0u, 1u, 2u, 3u) * (TEAM / BLOCK);
+    let inside = vec4<bool>(at.x < triangle.box.size.x) & (vec4u(at.y) + rows < vec4u(triangle.box.size.y));
+    let place = vec2f(vec2i(at)) + views.sample[0].xy;
+    let texels = vec4u(texel_of(pixel, view)) + rows * views.width;
+    draw_four(index, triangle, vec4f(place.x), place.y + vec4f(rows), inside, texels);
+}
+
+fn draw_small(index: u32, triangle: Drawn, view: u32) {
+    let low = triangle.box.low;
+    let size = triangle.box.size;
+    for (var y = 0u; y < size.y; y++) {
+        if (SAMPLES > 1u) {
+            for (var x = 0u; x < size.x; x++) {
+                draw_samples(index, triangle, vec2u(x, y), true, view);
+            }
+        } else {
+            for (var x = 0u; x < size.x; x += 4u) {
+                let four = x + vec4u(0u, 1u, 2u, 3u);
+                let texels = texel_of(low + vec2u(0u, y), view) + four;
+                let place = views.sample[0].xy;
+                draw_four(index, triangle, place.x + vec4f(four), vec4f(place.y + f32(y)), four < vec4u(size.x), texels);
+            }
+        }
+    }
+    let first = low / TILE;
+    let last = (low + size - 1u) / TILE;
+    for (var y = first.y; y <= last.y; y++) {
+        for (var x = first.x; x <= last.x; x++) {
+            for (var s = 0u; s < SAMPLES; s++) {
+                mark(vec2u(x, y), view * SAMPLES + s);
             }
         }
     }
 }
 
-// here: weights and depth at the pixel's corner
-fn draw_samples(index: u32, triangle: Drawn, here: vec4f, at: vec2u, view: u32) {
-    if (any(at >= triangle.box.size)) {
-        return;
-    }
-    let pixel = vec2u(triangle.box.low) + at;
-    for (var s = 0u; s < SAMPLES; s++) {
-        let place = views.sample[s].xy;
-        let part = here + place.x * triangle.along_x + place.y * triangle.along_y;
-        if (min(min(part.x, part.y), part.z) >= -SLACK && part.w > 0.0 && part.w <= 1.0) {
-            let layer = view * SAMPLES + s;
-            record(index, (layer * views.height + pixel.y) * views.width + pixel.x, bitcast<u32>(part.w));
-        }
+// at: the pixel in the triangle's box
+fn draw_samples(index: u32, triangle: Drawn, at: vec2u, inside: bool, view: u32) {
+    let texel = texel_of(triangle.box.low + at, view * SAMPLES);
+    let place = vec2f(vec2i(at));
+    for (var s = 0u; s < SAMPLES; s += 4u) {
+        let four = s + vec4u(0u, 1u, 2u, 3u);
+        let x = vec4f(views.sample[s].x, views.sample[s + 1u].x, views.sample[s + 2u].x, views.sample[s + 3u].x);
+        let y = vec4f(views.sample[s].y, views.sample[s + 1u].y, views.sample[s + 2u].y, views.sample[s + 3u].y);
+        let wanted = vec4<bool>(inside) & (four < vec4u(SAMPLES));
+        draw_four(index, triangle, place.x + x, place.y + y, wanted, texel + four * (views.width * views.height));
     }
 }
 
-fn record(index: u32, at: u32, near: u32) {
-    if (!FIND_TRIANGLE) {
-        atomicMax(&nearness[at], near); // positive floats sort like their bits
-    } else if (near + ROUNDING >= atomicLoad(&nearness[at])) {
-        atomicMax(&found[at], index + 1u); // of two triangles at one depth the later one, always
+// Four places in the triangle's box and where they are recorded.
+fn draw_four(index: u32, triangle: Drawn, x: vec4f, y: vec4f, wanted: vec4<bool>, texels: vec4u) {
+    let a = triangle.at_low.x + x * triangle.along_x.x + y * triangle.along_y.x;
+    let b = triangle.at_low.y + x * triangle.along_x.y + y * triangle.along_y.y;
+    let c = triangle.at_low.z + x * triangle.along_x.z + y * triangle.along_y.z;
+    let depth = triangle.at_low.w + x * triangle.along_x.w + y * triangle.along_y.w;
+    let between = (min(min(a, b), c) >= vec4f(-SLACK)) & (depth > vec4f(0.0)) & (depth <= vec4f(1.0)) & wanted;
+    record_four(index, depth, between, texels);
+}
+
+fn texel_of(pixel: vec2u, layer: u32) -> u32 {
+    return (layer * views.height + pixel.y) * views.width + pixel.x;
+}
+
+// Something is drawn in a tile.
+fn mark(tile: vec2u, layer: u32) {
+    if (RECORDED != AS_FOUND) {
+        atomicStore(&tiles[tile_at(tile, layer)], DRAWN);
     }
 }

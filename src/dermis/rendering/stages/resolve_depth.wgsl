@@ -1,15 +1,17 @@
 // Depths from the buffer where they were found into the layers of a texture; the buffer is left empty for the next time.
-//#include "views.wgsl"
+//#include "resolve.wgsl"
 
 @group(1) @binding(1) var<storage, read_write> nearness: array<u32>;
 @group(1) @binding(3) var layers: texture_storage_2d_array<r32float, write>;
 
-@compute @workgroup_size(32, 8)
-fn main(@builtin(global_invocation_id) id: vec3u) {
-    if (id.x >= views.width || id.y >= views.height) {
-        return;
-    }
-    let at = (id.z * views.height + id.y) * views.width + id.x;
-    textureStore(layers, id.xy, id.z, vec4f(bitcast<f32>(nearness[at])));
+fn found_at(at: u32) -> u32 {
+    return nearness[at];
+}
+
+fn empty(at: u32) {
     nearness[at] = 0u;
+}
+
+fn store(pixel: vec2u, layer: u32, bits: u32) {
+    textureStore(layers, pixel, layer, vec4f(bitcast<f32>(bits)));
 }

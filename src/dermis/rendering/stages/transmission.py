@@ -7,11 +7,11 @@ from typing import Any
 
 from dermis.gpu import ComputeProgram, Device, Frame
 from dermis.rendering.levels import Levels
-from dermis.rendering.stages import STAGES
+from dermis.rendering.stages import SHARED_SHADERS, STAGES
 from dermis.rendering.stages.opposite import Pairs
 from dermis.rendering.stages.variants import Switches
 
-_TEAMS: Switches = (("SIZE", 128), ("TEAM", 32), ("ROUND", 4))
+_TEAMS: Switches = (("SIZE", 128), ("TEAM", 16), ("ROUND", 4))
 _ALONE: Switches = (("SIZE", 128), ("TEAM", 1), ("ROUND", 1))  # software adapters pay for barriers
 _GATHERING = 64  # invocations of a workgroup, as in transmission_gather.wgsl
 _ROW = 1024  # workgroups, of which no more than 65535 fit in a row
@@ -47,8 +47,8 @@ class Transmission:
     def __init__(self, device: Device, switches: Switches = ()) -> None:
         chosen = dict((_ALONE if device.adapter.kind == "CPU" else _TEAMS) + switches)
         self._receivers = int(chosen["SIZE"]) // int(chosen["TEAM"])  # of a workgroup
-        self._gather = ComputeProgram(device, STAGES / "transmission_gather.wgsl")
-        self._sum = ComputeProgram(device, STAGES / "transmission.wgsl", constants=chosen)
+        self._gather = ComputeProgram(device, STAGES / "transmission_gather.wgsl", (SHARED_SHADERS,))
+        self._sum = ComputeProgram(device, STAGES / "transmission.wgsl", (SHARED_SHADERS,), chosen)
 
     def draw(self, frame: Frame, levels: Levels, thin: Thin) -> Any:
         """The light that comes through, from the blurred layers, which start after the unblurred one."""

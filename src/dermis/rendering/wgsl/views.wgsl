@@ -7,6 +7,7 @@ struct Views {
     triangles: u32,
     width: u32,
     height: u32,
+    index_bits: u32, // of a triangle below its depth, 0 where each has a buffer of its own
 }
 
 @group(1) @binding(0) var<uniform> views: Views;
