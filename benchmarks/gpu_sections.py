@@ -134,13 +134,12 @@ def options(plan: Plan, head: Head, renderer: Renderer) -> Any:
 def sequences(plan: Plan, head: Head, renderer: Renderer) -> Any:
     """Images a second, camera and lights of their own each: handed out, as PNG files, and as EXR files."""
     scenes = _scenes(replace(plan.usual, lights=1), head, plan.images)
-    settings = Settings(**plan.image)
 
     def bytes_of() -> Iterable[Any]:
         return renderer.render_many(scenes, **plan.image)
 
     def floats_of() -> Iterable[Any]:
-        return (renderer.draw(scene, settings, timed=False).linear() for scene in scenes)
+        return renderer.render_many(scenes, linear=True, **plan.image)
 
     ways = {"bytes": (bytes_of, ""), "floats": (floats_of, ""), "png": (bytes_of, ".png")}
     ways["exr"] = floats_of, ".exr"

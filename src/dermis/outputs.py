@@ -44,11 +44,12 @@ def replacing(path: str | Path) -> Iterator[Path]:
     try:
         yield temporary
         temporary.replace(target)
-    except (OSError, RuntimeError) as fault:  # OpenEXR reports a full disk as a RuntimeError
-        refuse_output(path, fault)
-    finally:
-        with suppress(OSError):  # moved already, or never made
+    except BaseException as fault:
+        with suppress(OSError):  # it was never made
             temporary.unlink()
+        if isinstance(fault, OSError | RuntimeError):  # OpenEXR reports a full disk as a RuntimeError
+            refuse_output(path, fault)
+        raise
 
 
 def refuse_output(path: str | Path, fault: Exception) -> NoReturn:

@@ -19,7 +19,7 @@ from dermis.benchmark.report import COLUMNS, as_json, cells, left_out_lines, sta
 from dermis.benchmark.run import Benchmark, LeftOut, run
 from dermis.benchmark.scenes import scenes_of, settings_of, with_terms
 from dermis.errors import DermisError
-from dermis.gpu import Device
+from dermis.gpu import Device, download
 from dermis.gpu.textures import texel_bytes
 from dermis.optics.profiles import load_profile
 from dermis.rendering.renderer import Renderer
@@ -84,8 +84,11 @@ def test_the_floor_by_hand(renderer: Renderer, head_file: str, tmp_path: Path) -
     assert 0 < moved.texels < 64 * 64
     found = stage_bytes(moved)
     geometry = 16 * len(head.mesh.triangles) + 16 * len(head.mesh.positions)
-    assert found["shadows"] == settings.shadow_size**2 * 4 + geometry
-    assert found["visibility"] == 48 * 32 * 2 * 4 + geometry
+    depth = download(renderer.device, moved.inputs.shadow_maps.texture)
+    drawn = int((depth > 0).sum())
+    assert 0.1 < drawn / settings.shadow_size**2 < 0.9
+    assert found["shadows"] == drawn * 4 + geometry
+    assert found["visibility"] == moved.seen * 2 * 4 + geometry
     assert found["post"] == 48 * 32 * (16 + 16 + 4)
     # the narrower of the two is lit again, not blurred; the other one's blur knows stretch and reach by texel
     light = texel_bytes(moved.inputs.levels.stack)
@@ -132,7 +135,7 @@ def test_more_work_moves_more_bytes(renderer: Renderer, row: Row, head_file: str
     larger = replace(TINY, image=(96, 64), atlas=128, lights=2, gaussians=4)
     more = measure(renderer, larger, load_head(head_file), tmp_path, 1e9, BRIEF)
     for stage in ("shadows", "irradiance", "diffuse", "combine", "visibility", "shade", "post"):
-        assert more.floor_ms[stage] > 1.5 * row.floor_ms[stage], stage
+        assert more.floor_ms[stage] > 1.25 * row.floor_ms[stage], stage
 
 
 def test_copies_take_time(device: Device) -> None:
@@ -197,7 +200,7 @@ def test_a_report_without_the_usual_frame(made: Benchmark, tmp_path: Path) -> No
 def test_slow_frames_are_drawn_less_often() -> None:
     effort = Effort()
     assert effort.within(30.0, frame_ms=1.0) == effort
-    half = effort.within(0.5 * 1e-3 * (100 + 100 + 9 * 7), frame_ms=1.0)
+    half = effort.within(0.5 * 1e-3 * (100 + 2 * 100 + 2 * 9 * 6), frame_ms=1.0)
     assert half == Effort(warming=50, between=2, timed=4, row=50)
     assert ON_CPU.within(1.0, frame_ms=1e6) == Effort(warming=0, between=0, timed=1, row=1)
 

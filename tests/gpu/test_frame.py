@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import weakref
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from dermis.errors import DermisError
 from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture
 from dermis.gpu.bind_groups import BindGroups, key_of
 from dermis.gpu.device import gpu_failures
+from dermis.gpu.frame import Timed
 from dermis.gpu.probe import half_store_rounding
 from dermis.gpu.textures import texture_from
 from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
@@ -58,6 +60,38 @@ def test_stage_times_add_up_to_the_total(device: Device, scale: ComputeProgram) 
     assert times["one"] + times["two"] == pytest.approx(times["total"])
 
 
+def staged_times(device: Device, scale: ComputeProgram, timed: Timed) -> tuple[dict[str, float] | None, int]:
+    """Times of a frame of two stages in turn, and how many timestamps it took."""
+    image, into = (make_texture(device, SIZE, "r32float") for _ in range(2))
+    frame = Frame(device, timed=timed)
+    for stage in ("one", "two", "one"):
+        bound = {"factor": scale.record("Factor", value=1), "image": image, "scaled": into}
+        frame.compute(stage, scale, bound, SIZE)
+    frame.submit()
+    frame.wait()
+    return frame.stage_ms(), len(frame._stamps._stages) if frame._stamps else 0
+
+
+def test_a_frame_timed_as_a_whole_is_not_divided(
+    device: Device, scale: ComputeProgram, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two timestamps, whatever the device makes of them; those of software adapters are wrong."""
+    if not device.has_timestamps:
+        pytest.skip("no timestamps")
+    monkeypatch.setattr(device, "adapter", replace(device.adapter, kind="DiscreteGPU"))
+    times, stamps = staged_times(device, scale, "whole")
+    assert times is not None and set(times) == {"total"} and stamps == 2
+    times, stamps = staged_times(device, scale, True)
+    assert times is not None and set(times) == {"one", "two", "total"} and stamps == 4
+
+
+def test_software_adapters_time_stages_even_so(device: Device, scale: ComputeProgram) -> None:
+    if device.adapter.kind != "CPU":
+        pytest.skip("a GPU")
+    times, _ = staged_times(device, scale, "whole")
+    assert times is not None and set(times) == {"one", "two", "total"}
+
+
 def test_an_empty_frame_takes_no_time(device: Device) -> None:
     frame = Frame(device)
     frame.submit()
@@ -69,10 +103,23 @@ def record_of(scale: ComputeProgram, value: float) -> Any:
     return scale.record("Factor", value=value)
 
 
-def test_equal_uniforms_share_a_place(device: Device, scale: ComputeProgram) -> None:
-    uniforms = Uniforms(device)
-    first, same, other = (uniforms.place(record_of(scale, value)) for value in (1.25, 1.25, 1.5))
-    assert first == same and first != other
+def test_a_record_keeps_its_place_and_no_other_one_gets_it(device: Device, scale: ComputeProgram) -> None:
+    uniforms, record = Uniforms(device), record_of(scale, 1.25)
+    first, same = (uniforms.place(record) for _ in range(2))
+    others = [uniforms.place(record_of(scale, 1.5)) for _ in range(4)]  # each gone when the next one is made
+    assert first == same and len({first, *others}) == 5
+
+
+def test_memory_for_records_is_used_again(device: Device, scale: ComputeProgram) -> None:
+    image, into = (make_texture(device, SIZE, "r32float") for _ in range(2))
+    spare = []
+    for value in range(3):
+        frame = Frame(device, timed=False)
+        bound = {"factor": record_of(scale, value), "image": image, "scaled": into}
+        frame.compute("scale", scale, bound, SIZE)
+        frame.submit()
+        spare.append(len(device.spare_records))
+    assert spare[0] > 0 and len(set(spare)) == 1
 
 
 def test_one_frame_may_have_more_uniforms_than_a_buffer_holds(device: Device, scale: ComputeProgram) -> None:
@@ -122,6 +169,19 @@ def test_bind_groups_go_with_what_they_bind(device: Device) -> None:
         del group, into, bound
         assert len(program.kept_groups) == 0 and gone() is None
     assert program.kept_groups.followed <= 2  # the image and the uniforms
+
+
+def test_what_goes_before_the_submit_is_still_read(device: Device, scale: ComputeProgram) -> None:
+    """The library holds on to what a pass binds; here only the result is."""
+    into, frame = make_texture(device, SIZE, "r32float"), Frame(device, timed=False)
+    image = texture_from(device, np.full(SIZE[::-1], 3.0, np.float32), "r32float")
+    bound = {"factor": record_of(scale, 2.0), "image": image, "scaled": into}
+    frame.compute("scale", scale, bound, SIZE)
+    gone = weakref.ref(image)
+    del image, bound
+    assert gone() is None
+    frame.submit()
+    assert np.array_equal(download(device, into), np.full(SIZE[::-1], 6.0))
 
 
 class Resource:

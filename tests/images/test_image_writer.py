@@ -39,6 +39,29 @@ def test_many_pictures_are_all_written(tmp_path: Path) -> None:
     assert len(list(tmp_path.iterdir())) == 41  # and nothing half-written
 
 
+def test_a_folder_is_tried_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A trial makes a file and removes it, which takes longer than a frame."""
+    tried: list[Path] = []
+    check = writing.check_output
+    monkeypatch.setattr(writing, "check_output", lambda path: tried.append(path) or check(path))
+    picture = np.zeros((2, 2, 3), np.uint8)
+    with ImageWriter(threads=1) as writer:
+        for name in ("a.png", "b.png", "c.exr"):
+            writer.write(tmp_path / name, picture.astype(np.float32) if name[0] == "c" else picture)
+        with pytest.raises(DermisError, match="no folder"):
+            writer.write(tmp_path / "missing" / "d.png", picture)
+    assert [path.name for path in tried] == ["a.png", "c.exr", "d.png"]
+
+
+def test_a_place_that_is_taken_is_told_later(tmp_path: Path) -> None:
+    picture = np.zeros((2, 2, 3), np.uint8)
+    (tmp_path / "b.png").mkdir()
+    with pytest.raises(DermisError, match=r"b\.png"), ImageWriter(threads=1) as writer:
+        for name in ("a.png", "b.png"):
+            writer.write(tmp_path / name, picture)
+    assert {path.name for path in tmp_path.iterdir()} == {"a.png", "b.png"}  # and nothing half-written
+
+
 def test_what_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     picture = np.zeros((2, 2, 3), np.uint8)
     with ImageWriter(threads=1) as writer:

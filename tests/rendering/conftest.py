@@ -9,7 +9,7 @@ from tolerances import HALVES, TWIN
 
 from dermis.gpu import Device
 from dermis.rendering.frame import Stages
-from dermis.rendering.levels import ENTERED
+from dermis.rendering.levels import FLOATS
 from dermis.rendering.renderer import Renderer
 
 
@@ -21,7 +21,7 @@ def renderer() -> Renderer:
 @pytest.fixture(scope="session")
 def close(renderer: Renderer) -> float:
     """How close light is to its twin after the blurs, of its scale."""
-    return TWIN if renderer.stages.diffuse.texel == ENTERED else HALVES
+    return TWIN if renderer.stages.diffuse.texel == FLOATS else HALVES
 
 
 @pytest.fixture(scope="session")

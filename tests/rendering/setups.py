@@ -33,6 +33,12 @@ Floats = NDArray[np.float64]
 AnyLight = PointLight | SpotLight | DirectionalLight
 
 
+def entered_light(renderer: Renderer, inputs: Inputs) -> NDArray[np.float64]:
+    """(n, n, 4) light that has entered the skin, and 1 where there is any; as halves on GPUs."""
+    made = download(renderer.device, inputs.levels.stack).astype(float)
+    return made / [*(3 * [inputs.scale]), 1.0]
+
+
 def head_of(mesh: Mesh, **maps: Any) -> Head:
     """A mesh with the given maps as a head."""
     return Head("test", mesh, Maps(**{role: np.asarray(m, np.float32) for role, m in maps.items()}))

@@ -8,7 +8,7 @@ import light_twins
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from setups import head_of, joined, place, probe, run_frame, scene_of, settings_of
+from setups import entered_light, head_of, joined, place, probe, run_frame, scene_of, settings_of
 from tolerances import AREA_LIGHT, LIT, TWIN
 from twins import surface
 
@@ -65,7 +65,7 @@ def test_parts_of_a_rectangle_are_the_whole(size: tuple[float, float]) -> None:
 def entered(renderer: Renderer, head: Any, light: Light) -> tuple[Floats, Floats]:
     """Irradiance of each texel, and their places."""
     inputs = run_frame(renderer, scene_of(head, light, rho_s=0.0, mix=0.0), atlas=64)
-    made = download(renderer.device, inputs.levels.entered)[..., :3].astype(float)
+    made = entered_light(renderer, inputs)[..., :3]
     return made, surface(cached_atlas(head.mesh, 64), head)[0]
 
 

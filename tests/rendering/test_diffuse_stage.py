@@ -18,7 +18,7 @@ from dermis.gpu import Device, Frame, download, make_texture, upload
 from dermis.optics.profiles import load_profile
 from dermis.rendering.atlas_textures import AtlasTextures, upload_atlas
 from dermis.rendering.frame import Stages
-from dermis.rendering.levels import ENTERED, make_levels
+from dermis.rendering.levels import FLOATS, make_levels
 from dermis.rendering.stages.diffuse import Diffuse
 
 Floats = NDArray[np.float64]
@@ -29,7 +29,7 @@ BLURRED = PROFILE.variance_mm2[1:]
 @pytest.fixture(scope="module")
 def diffuse(device: Device) -> Diffuse:
     """The stage with levels of 32-bit floats, whatever the adapter's frame takes."""
-    return Diffuse(device, ENTERED)
+    return Diffuse(device, FLOATS)
 
 
 def blur(
@@ -43,7 +43,7 @@ def blur(
     """Levels of the stage over an (n, n, 3) source, or (n, n, 4) with its coverage."""
     size = len(source)
     space = diffuse.make_levels(size, len(variances))
-    upload(device, space.entered, np.dstack([source, np.ones((size, size))])[..., :4])
+    upload(device, space.stack, np.dstack([source, np.ones((size, size))])[..., :4])
     frame = Frame(device)
     diffuse.draw(frame, space, atlas, variances, **edge)
     frame.submit()
@@ -96,7 +96,7 @@ def test_empty_texels_show_the_clear_colour(device: Device, diffuse: Diffuse) ->
 
 def test_combined_twin(device: Device, stages: Stages) -> None:
     rng = np.random.default_rng(4)
-    space = make_levels(device, 64, 5, ENTERED)
+    space = make_levels(device, 64, 5, FLOATS)
     values = rng.random((5, 64, 64, 4)).astype(np.float32)
     for k, value in enumerate(values):
         upload(device, space.stack, value, layer=k + 1)
@@ -175,8 +175,8 @@ def test_the_order_of_the_axes_does_not_matter(device: Device, diffuse: Diffuse)
     """Where the stretch is the same everywhere, first along v and then along u is the same blur."""
     atlas = build_atlas(plane(40.0), 64)
     source = np.random.default_rng(9).random((64, 64, 3))
-    other, resources = Diffuse(device, ENTERED), upload_atlas(device, atlas)
-    other._along(ENTERED, resources.sheared, "repeated").reverse()
+    other, resources = Diffuse(device, FLOATS), upload_atlas(device, atlas)
+    other._along(resources.sheared, "repeated").reverse()
     first, swapped = (blur(device, stage, source, resources) for stage in (diffuse, other))
     assert max(np.abs(a - b).max() for a, b in zip(first, swapped, strict=True)) < TWIN
 

@@ -10,7 +10,7 @@ import light_twins as twins
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from setups import front_camera, frontal, head_of, probe, run_frame, scene_of, settings_of
+from setups import entered_light, front_camera, frontal, head_of, probe, run_frame, scene_of, settings_of
 from tolerances import FURNACE, PANORAMA, PREFILTERED
 from twins import DEFAULT_COLOUR, surface, surface_albedo
 
@@ -97,7 +97,7 @@ def test_what_enters_is_the_sum_over_all_directions(renderer: Renderer, room: st
     )
     inputs = run_frame(renderer, scene, occlusion="none", shadow_size=1024)
     assert inputs.suns == 1
-    entered = download(renderer.device, inputs.levels.entered)[..., :3].astype(float)
+    entered = entered_light(renderer, inputs)[..., :3]
     atlas = cached_atlas(BALL, 64)
     _, normals = surface(atlas, scene.head)
     radiance = 2.0 * np.asarray(_read(room))

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 import twins
 from numpy.typing import NDArray
-from setups import AnyLight, head_of, place, run_frame, scene_of
+from setups import AnyLight, entered_light, head_of, place, run_frame, scene_of
 from tolerances import TWIN
 
 from dermis.assets.cache import cached_atlas
 from dermis.assets.primitives import uv_sphere
-from dermis.gpu import download
 from dermis.rendering.renderer import Renderer
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
 from dermis.scene.model import Scene
@@ -35,24 +34,23 @@ LIGHTS: dict[str, AnyLight] = {
 
 def entered(renderer: Renderer, scene: Scene) -> NDArray[np.float64]:
     """Layer 0 of the levels: what the irradiance stage wrote."""
-    inputs = run_frame(renderer, scene, atlas=SIZE)
-    return download(renderer.device, inputs.levels.entered).astype(float)
+    return entered_light(renderer, run_frame(renderer, scene, atlas=SIZE))
 
 
 @pytest.mark.parametrize("rho_s", [0.0, 0.18, 1.0])
 @pytest.mark.parametrize("names", [(name,) for name in LIGHTS] + [tuple(LIGHTS)], ids="+".join)
-def test_lights_on_a_sphere(renderer: Renderer, names: tuple[str, ...], rho_s: float) -> None:
+def test_lights_on_a_sphere(renderer: Renderer, names: tuple[str, ...], rho_s: float, close: float) -> None:
     scene = scene_of(PLAIN, *(LIGHTS[name] for name in names), rho_s=rho_s, roughness=0.35, mix=0.5)
     atlas = cached_atlas(SPHERE, SIZE)
     twin = twins.entering(scene, *twins.surface(atlas, PLAIN)) * twins.DEFAULT_COLOUR**0.5
     made = entered(renderer, scene)
     assert twin.max() > 0.1
-    assert np.abs(made[..., :3] - np.where(atlas.own[..., None], twin, 0.0)).max() < TWIN * twin.max()
+    assert np.abs(made[..., :3] - np.where(atlas.own[..., None], twin, 0.0)).max() < close * twin.max()
     assert np.array_equal(made[..., 3] > 0, atlas.own)
 
 
 @pytest.mark.parametrize("mix", [0.0, 0.5, 1.0])
-def test_share_of_the_colour_map(renderer: Renderer, mix: float) -> None:
+def test_share_of_the_colour_map(renderer: Renderer, mix: float, close: float) -> None:
     """A map of the atlas' size: its texel centres are the atlas' texel centres."""
     v, u = (np.mgrid[:SIZE, :SIZE] + 0.5) / SIZE
     wave = np.stack([0.5 + 0.3 * np.cos(2 * np.pi * u), 0.4 + 0.2 * np.sin(3 * v), 0.3 + 0 * u], axis=-1)
@@ -62,15 +60,15 @@ def test_share_of_the_colour_map(renderer: Renderer, mix: float) -> None:
     atlas = cached_atlas(SPHERE, SIZE)
     rows = slice(6, SIZE - 6)  # away from the poles, where texels lie beside their triangles
     twin = (twins.entering(scene, *twins.surface(atlas, head)) * wave**mix)[rows]
-    assert np.abs(entered(renderer, scene)[rows, :, :3] - twin).max() < 5 * TWIN * twin.max()
+    assert np.abs(entered(renderer, scene)[rows, :, :3] - twin).max() < 5 * close * twin.max()
 
 
-def test_profile_colour_uses_no_map(renderer: Renderer) -> None:
+def test_profile_colour_uses_no_map(renderer: Renderer, close: float) -> None:
     head = head_of(SPHERE, colour=np.full((4, 4, 3), 0.2))
     scene = scene_of(head, LIGHTS["point"], albedo="profile")
     atlas = cached_atlas(SPHERE, SIZE)
     twin = np.where(atlas.own[..., None], twins.entering(scene, *twins.surface(atlas, head)), 0.0)
-    assert np.abs(entered(renderer, scene)[..., :3] - twin).max() < TWIN * twin.max()
+    assert np.abs(entered(renderer, scene)[..., :3] - twin).max() < close * twin.max()
 
 
 def test_specular_map_is_a_factor_with_mean_one(renderer: Renderer) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from dermis.errors import DermisError
@@ -78,6 +80,22 @@ def test_skins_in_turn_are_fitted_once() -> None:
     first = [profiles.of(skin(melanin=share)) for share in (0.02, 0.05)]
     again = [profiles.of(skin(melanin=share)) for share in (0.02, 0.05, 0.02)]
     assert [a is b for a, b in zip(again, [*first, first[0]], strict=True)] == [True] * 3
+
+
+def test_a_file_that_changes_is_read_again_for_another_skin(tmp_path: Path) -> None:
+    path, profiles = tmp_path / "own.csv", SkinProfiles()
+
+    def written(green: float) -> None:
+        path.write_text(f"variance_mm2,red,green,blue\n1.0,0.5,{green},0.2\n", encoding="utf-8")
+
+    written(0.25)
+    first, second = (Skin(profile=str(path)) for _ in range(2))
+    found = profiles.of(first)
+    written(0.125)
+    assert profiles.of(first) is found  # not read for each frame
+    changed = profiles.of(second)
+    assert (found.albedo[1], changed.albedo[1]) == (0.25, 0.125)
+    assert profiles.of(Skin(profile=str(path))) is changed
 
 
 def test_a_table_has_no_pigments() -> None:

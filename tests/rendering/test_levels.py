@@ -17,7 +17,7 @@ from dermis.optics.profiles import load_profile
 from dermis.reference.cut_meshes import cut_sphere
 from dermis.rendering.atlas_textures import AtlasTextures, upload_atlas
 from dermis.rendering.coarser import Sheet, halved
-from dermis.rendering.levels import ENTERED, halvings_of, scale_of
+from dermis.rendering.levels import FLOATS, halvings_of, scale_of
 from dermis.rendering.stages.combine import Combine
 from dermis.rendering.stages.diffuse import Diffuse
 
@@ -69,8 +69,8 @@ def combined(
 ) -> tuple[Floats, tuple[int, ...]]:
     """The sum of the blurred levels, and how often each was halved."""
     diffuse, side = Diffuse(device, texel), len(light)
-    space, into = diffuse.make_levels(side, len(BLURRED)), make_texture(device, (side, side), ENTERED)
-    upload(device, space.entered, light)
+    space, into = diffuse.make_levels(side, len(BLURRED)), make_texture(device, (side, side), FLOATS)
+    upload(device, space.stack, light * [scale, scale, scale, 1.0])
     frame = Frame(device)
     diffuse.draw(frame, space, textures, BLURRED, scale=scale)
     Combine(device).draw(frame, space, WEIGHT, into)
@@ -83,23 +83,23 @@ def error(made: Floats, exact: Floats, own: NDArray[np.bool_]) -> float:
     return float(np.sqrt(((made - exact)[own] ** 2).mean() / (exact[own] ** 2).mean()))
 
 
-@pytest.mark.parametrize("texel", [ENTERED, HALF])
+@pytest.mark.parametrize("texel", [FLOATS, HALF])
 def test_coarser_levels_show_the_same(
     device: Device, atlas: Atlas, textures: AtlasTextures, stripes: Floats, texel: str
 ) -> None:
-    whole, once = combined(device, ENTERED, replace(textures, coarser=()), stripes)
+    whole, once = combined(device, FLOATS, replace(textures, coarser=()), stripes)
     made, halvings = combined(device, texel, textures, stripes)
     assert max(once) == 0 and max(halvings) == 2
     assert error(made, whole, atlas.own) < HALVED
     assert made[atlas.own].sum() == pytest.approx(whole[atlas.own].sum(), rel=SPREAD_ENERGY)
 
 
-@pytest.mark.parametrize("texel", [ENTERED, HALF])
+@pytest.mark.parametrize("texel", [FLOATS, HALF])
 def test_constant_light_stays_constant_at_every_resolution(
     device: Device, atlas: Atlas, textures: AtlasTextures, texel: str
 ) -> None:
     made, _ = combined(device, texel, textures, np.ones((256, 256, 4)) * atlas.own[..., None])
-    close = FLAT if texel == ENTERED else HALVES
+    close = FLAT if texel == FLOATS else HALVES
     assert np.abs(made[atlas.own] / WEIGHT.sum(axis=0) - 1).max() < close
 
 
@@ -109,7 +109,7 @@ def test_halves_keep_the_light(
 ) -> None:
     """In amount and in place, however bright it is; were they cut off, each pass would lose a 4000th."""
     light = stripes * [brightest, brightest, brightest, 1.0]
-    floats, _ = combined(device, ENTERED, textures, light)
+    floats, _ = combined(device, FLOATS, textures, light)
     halves, _ = combined(device, HALF, textures, light, scale_of(HALF, brightest))
     assert error(halves, floats, atlas.own) < HALVES
     assert halves[atlas.own].sum() == pytest.approx(floats[atlas.own].sum(), rel=HALVES / 4)
@@ -119,7 +119,7 @@ def test_halves_keep_the_light(
 def test_scales_are_powers_of_two(brightest: float) -> None:
     scale = scale_of(HALF, brightest)
     assert np.frexp(scale)[0] == 0.5 and scale * brightest <= 16
-    assert scale_of(ENTERED, brightest) == 1.0
+    assert scale_of(FLOATS, brightest) == 1.0
 
 
 @pytest.mark.parametrize(("texels_per_mm", "most"), [(0.5, 3), (3.0, 3), (30.0, 3), (30.0, 1), (1e6, 3)])

@@ -24,7 +24,7 @@ def levels(device: Device, stages: Stages) -> list[np.ndarray]:
     light = np.zeros((SIZE, SIZE, 4))
     light[..., 3] = 1.0
     light[SIZE // 2, SIZE // 2, :3] = 1000.0
-    upload(device, space.entered, light)
+    upload(device, space.stack, light)
     frame = Frame(device)
     stages.published.draw(frame, space, upload_atlas(device, atlas), VARIANCES)
     frame.submit()
@@ -58,7 +58,7 @@ def test_between_seven_taps_there_are_gaps(levels: list[np.ndarray]) -> None:
 def test_the_clear_colour_takes_no_light_away(device: Device, stages: Stages) -> None:
     """Weights of 1.001 make no texel more than covered, which would take that colour's light off."""
     space = stages.published.make_levels(SIZE, len(VARIANCES))
-    upload(device, space.entered, np.dstack([np.zeros((SIZE, SIZE, 3)), np.ones((SIZE, SIZE))]))
+    upload(device, space.stack, np.dstack([np.zeros((SIZE, SIZE, 3)), np.ones((SIZE, SIZE))]))
     frame = Frame(device)
     atlas = upload_atlas(device, build_atlas(plane(SIZE / TEXELS_PER_MM), SIZE))
     stages.published.draw(frame, space, atlas, VARIANCES, clear=(0.5, 0.35, 0.3))

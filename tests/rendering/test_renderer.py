@@ -16,7 +16,7 @@ from dermis.assets.head import Head
 from dermis.assets.primitives import SKIN, plane, uv_sphere
 from dermis.errors import DermisError
 from dermis.gpu import download
-from dermis.rendering import preparation
+from dermis.rendering import standing
 from dermis.rendering.renderer import Renderer, render
 from dermis.rendering.seams import REMEDIES
 from dermis.scene.lights import DirectionalLight
@@ -81,7 +81,7 @@ def test_maps_that_failed_are_read_again(monkeypatch: pytest.MonkeyPatch) -> Non
         raise MemoryError("no more of it")
 
     with monkeypatch.context() as patch:
-        patch.setattr(preparation, "upload_maps", fail)
+        patch.setattr(standing, "upload_maps", fail)
         for _ in range(2):
             with pytest.raises(DermisError, match="no more of it"):
                 renderer.draw(scene(), settings_of())
@@ -200,9 +200,23 @@ def moving(count: int) -> list[Scene]:
 def test_many_images_are_the_images_one_by_one(renderer: Renderer) -> None:
     scenes = moving(7)
     one_by_one = [renderer.draw(one, settings_of()).srgb8() for one in scenes]
+    linear = [renderer.draw(one, settings_of()).linear() for one in scenes]
     many = list(renderer.render_many(iter(scenes), **settings_of().model_dump()))
+    floats = list(renderer.render_many(iter(scenes), linear=True, **settings_of().model_dump()))
     assert [image.tobytes() for image in many] == [image.tobytes() for image in one_by_one]
     assert len({image.tobytes() for image in many}) == 7
+    assert all(np.array_equal(*pair) for pair in zip(floats, linear, strict=True))
+
+
+def test_more_floats_than_a_buffer_holds_are_refused(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = settings_of().model_dump() | {"size": (20, 10)}
+    next(renderer.render_many(moving(1), **settings))
+    monkeypatch.setattr(renderer.device, "max_storage_bytes", 12 * 199)
+    assert next(renderer.render_many(moving(1), **settings)).shape == (10, 20, 3)  # bytes are fewer
+    with pytest.raises(DermisError, match=r"size: expected at most 199 pixels.* 200"):
+        next(renderer.render_many(moving(1), linear=True, **settings))
 
 
 def test_who_asks_for_many_images_may_stop(renderer: Renderer) -> None:
@@ -273,6 +287,7 @@ def test_one_call_is_enough(renderer: Renderer) -> None:
 def test_more_than_the_memory_is_refused(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     if renderer.device.adapter.kind != "CPU":
         pytest.skip("a GPU's driver tells by itself")
+    renderer.forget()  # for what is there already there is space
     monkeypatch.setattr("os.sysconf", lambda name: 100)
     with pytest.raises(DermisError, match="GB"):
         renderer.draw(scene(), settings_of())

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from setups import frontal, head_of, probe, run_frame, scene_of
+from setups import entered_light, frontal, head_of, probe, run_frame, scene_of
 
 from dermis.assets.primitives import uv_sphere
-from dermis.gpu import download
 from dermis.gpu.textures import texture_from
 from dermis.rendering.renderer import Renderer
 from dermis.rendering.stages.surface_texels import SURFACE_BYTES, SurfaceTexels
@@ -90,7 +89,7 @@ def test_what_changed_is_seen(renderer: Renderer) -> None:
     coloured = head_of(HEAD.mesh, colour=np.full((4, 4, 3), 0.25))
     changed = [scene_of(coloured, frontal(), mix=1.0), scene_of(HEAD, frontal(), mix=1.0, rho_s=0.9)]
     first, *_, last = found = [
-        download(renderer.device, run_frame(renderer, scene, atlas=SIZE).levels.entered)
+        entered_light(renderer, run_frame(renderer, scene, atlas=SIZE))
         for scene in (scene_of(HEAD, frontal(), mix=1.0), *changed, scene_of(HEAD, frontal(), mix=1.0))
     ]
     assert np.array_equal(first, last)

@@ -13,7 +13,7 @@ from dermis.assets.primitives import uv_sphere, wedge
 from dermis.assets.thin_parts.links import Links, find_links
 from dermis.gpu import Device, Frame, download, upload
 from dermis.rendering.frame import Stages
-from dermis.rendering.levels import ENTERED, make_levels
+from dermis.rendering.levels import FLOATS, make_levels
 from dermis.rendering.stages import transmission
 from dermis.rendering.stages.opposite import upload_pairs
 from dermis.rendering.stages.transmission import Transmission
@@ -40,7 +40,7 @@ def summed(
 
     levels : (2, 64, 64, 3) blurred light
     """
-    space = make_levels(device, 64, 2, ENTERED)
+    space = make_levels(device, 64, 2, FLOATS)
     for layer, level in enumerate(levels, start=1):
         upload(device, space.stack, np.dstack([level, np.ones((64, 64))]), layer=layer)
     thin = thin_of(device, stages.opposite, upload_pairs(device, links), VARIANCE, WEIGHT)
@@ -87,7 +87,7 @@ def test_a_head_without_thin_parts_gets_nothing(device: Device, stages: Stages) 
     pairs = upload_pairs(device, links)
     thin = thin_of(device, stages.opposite, pairs, VARIANCE, WEIGHT)
     frame = Frame(device)
-    stages.transmission.draw(frame, make_levels(device, 64, 2, ENTERED), thin)
+    stages.transmission.draw(frame, make_levels(device, 64, 2, FLOATS), thin)
     frame.submit()
     light = download(device, thin.light)
     assert len(links.source) == 0

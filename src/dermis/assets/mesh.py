@@ -64,6 +64,17 @@ class Mesh:
 
         return cached_array(self.positions, "outline 1", lambda: _outline(self.positions))
 
+    @cached_property
+    def outline_columns(self) -> NDArray[np.float64]:
+        """(4, n) the outline as columns, each with a 1 below, for matrices from its left [mm]."""
+        return np.vstack([self.outline.T, np.ones(len(self.outline))])
+
+    @cached_property
+    def middle_mm(self) -> tuple[float, float, float]:
+        """Halfway between the least and the largest coordinates [mm]."""
+        x, y, z = 0.5 * (self.outline.min(axis=0) + self.outline.max(axis=0))
+        return float(x), float(y), float(z)
+
 
 def _outline(positions: Floats) -> NDArray[np.float64]:
     from scipy.spatial import ConvexHull, QhullError

@@ -71,7 +71,7 @@ def stage_bytes(moved: Moved) -> dict[str, float]:
 def _scattering_bytes(moved: Moved, looked_up: int) -> dict[str, float]:
     """Of the stages that light the atlas and spread the light."""
     inputs, texels, levels = moved.inputs, moved.texels, moved.inputs.levels
-    entered = texels * texel_bytes(levels.entered)
+    entered = texels * texel_bytes(levels.stack)
     blurred = [texels * texel_bytes(levels.stack) / 4**halved for halved in levels.halvings[1:]]
     found: dict[str, float] = {
         "irradiance": texels * (SURFACE_BYTES + looked_up) + entered,
@@ -95,11 +95,10 @@ def _surface_of_blurs(inputs: Inputs, texels: int) -> float:
         return 2.0 * stretch * texels * len(levels.halvings[1:])
     sheets = (finest, *finest.coarser)
     moved = 0.0
-    for k, (source, halved) in enumerate(pairwise(levels.halvings)):
+    for source, halved in pairwise(levels.halvings):
         moved += texel_bytes(sheets[halved].resources["sheet_map"]) * texels / 4**halved
         if inputs.edge == "repeated" and (apron := sheets[source].apron):
-            light = levels.stack if k else levels.entered
-            moved += apron.size * (1 + 2 * texel_bytes(light) / _APRON)
+            moved += apron.size * (1 + 2 * texel_bytes(levels.stack) / _APRON)
     return moved
 
 

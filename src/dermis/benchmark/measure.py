@@ -14,6 +14,7 @@ from dermis.benchmark.cases import FRAGMENTS, Case
 from dermis.benchmark.floor import moved_by, stage_bytes
 from dermis.benchmark.scenes import scenes_of, settings_of
 from dermis.gpu.device import gpu_failures
+from dermis.gpu.frame import Timed
 from dermis.gpu.memory import held_bytes
 from dermis.rendering.renderer import Renderer
 from dermis.rendering.stages.published_fragments import published_as_fragments
@@ -38,7 +39,7 @@ class Effort:
 
     def within(self, seconds: float, frame_ms: float) -> Effort:
         """The same with fewer frames, where so many of `frame_ms` would take longer than that."""
-        frames = self.warming + self.row + self.timed * (2 + self.between)
+        frames = self.warming + 2 * self.row + 2 * self.timed * (1 + self.between)
         share = min(1.0, 1e3 * seconds / (frame_ms * frames))
         wanted = asdict(self).items()
         return Effort(**{name: min(count, max(1, int(share * count))) for name, count in wanted})
@@ -54,7 +55,8 @@ class Row:
 
     triangles : of the head
     frame_ms : by the clock, of one frame in a row of them with several in flight
-    gpu_ms : device time by stage, and "total"
+    gpu_ms : device time by stage, each in a pass of its own, and "total"; that is on GPUs of other frames,
+        whose stages share one pass as they do when nobody asks for their times, and less than the sum
     floor_ms : the stage's bytes at the rate of a copy, and "total"
     python_ms : preparing, recording and submitting a frame, while the device has nothing to do
     image_ms : from the end of a frame to its bytes in NumPy
@@ -102,7 +104,7 @@ def _measured(renderer: Renderer, case: Case, head: Head, folder: Path, rate: fl
     row_ms(renderer, [scenes[k % len(scenes)] for k in range(effort.warming)], settings)
     frame_ms = row_ms(renderer, scenes[: effort.row], settings) / effort.row
     gpu_ms = stage_ms(renderer, scenes, settings, effort)
-    python_ms, image_ms = _around(renderer, scenes[: effort.timed], settings)
+    python_ms, image_ms = _around(renderer, scenes[: max(effort.row, effort.timed)], settings, effort.timed)
     moved = moved_by(renderer.device, renderer.prepare(scenes[0], settings), len(head.mesh.positions))
     return Row(
         case,
@@ -131,24 +133,34 @@ def row_ms(renderer: Renderer, scenes: Sequence[Scene], settings: Settings) -> f
 def stage_ms(
     renderer: Renderer, scenes: Sequence[Scene], settings: Settings, effort: Effort
 ) -> dict[str, float]:
-    """Median device time of each stage, everything anew, and "total" [ms]."""
-    drawn = []
+    """Median device time of each stage, everything anew, and of the whole frame as "total" [ms]."""
+    software = renderer.device.adapter.kind == "CPU"
+    ways: tuple[Timed, ...] = (True,) if software else (True, "whole")
+    drawn: dict[Timed, list[dict[str, float]]] = {way: [] for way in ways}
     for scene in scenes[: effort.timed]:
-        row_ms(renderer, scenes[: effort.between], settings)
-        drawn.append(renderer.draw(scene, settings, keep_shadows=False).gpu_ms or {})
-    return {stage: statistics.median(one[stage] for one in drawn) for stage in drawn[0]}
+        for way in ways:
+            row_ms(renderer, scenes[: effort.between], settings)
+            drawn[way].append(renderer.draw(scene, settings, keep_shadows=False, timed=way).gpu_ms or {})
+    found = {stage: statistics.median(one[stage] for one in drawn[True]) for stage in drawn[True][0]}
+    return found | {"total": statistics.median(one["total"] for one in drawn[ways[-1]])}
 
 
-def _around(renderer: Renderer, scenes: Sequence[Scene], settings: Settings) -> tuple[float, float]:
-    """What Python takes before a frame, and the image after it [ms]."""
+def _around(
+    renderer: Renderer, scenes: Sequence[Scene], settings: Settings, images: int
+) -> tuple[float, float]:
+    """Medians of what Python takes before a frame, and of the image after it [ms].
+
+    images : how many frames' images are taken
+    """
     before, after = [], []
-    for scene in scenes:
+    for k, scene in enumerate(scenes):
         renderer.device.wait()
         started = time.perf_counter()
         rendered = renderer.draw(scene, settings, keep_shadows=False, timed=False)
         before.append(1e3 * (time.perf_counter() - started))
-        renderer.device.wait()
-        after.append(_lasted_ms(rendered.srgb8))
+        if k < images:
+            renderer.device.wait()
+            after.append(_lasted_ms(rendered.srgb8))
     return statistics.median(before), statistics.median(after)
 
 

@@ -28,6 +28,9 @@ def bench(
     Camera and lights move and everything is computed anew. The passes of 2007 are measured in the same run,
     in compute and as fragments. A frame that the adapter cannot hold is left out, and told with its reason.
 
+    A GPU's time of a stage is that of a pass of its own; the time of a whole frame, on the device, is that of
+    frames whose stages share one pass, as they do when nobody asks, and less than the sum of its stages.
+
     Examples:
 
         dermis bench

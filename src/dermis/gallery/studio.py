@@ -80,8 +80,6 @@ class Studio:
         chosen = self.settings(**settings)
         self._draw(scene, 1.0, settings)
         levels = self.renderer.prepare(scene, chosen).levels
-        if level == 0:
-            return np.asarray(download(self.renderer.device, levels.entered), np.float32)[..., :3]
         light = download(self.renderer.device, levels.stack, mip=levels.halvings[level], layer=level)
         return np.asarray(light, np.float32)[..., :3] / np.float32(levels.scale)
 

@@ -2,45 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+
+class Step(NamedTuple):
+    """A dispatch as the native library takes it.
+
+    bound : each bind group, how many uniforms it has, and their offsets
+    groups : workgroups along each axis
+    """
+
+    stage: str
+    pipeline: Any
+    bound: Sequence[tuple[Any, int, Any]]
+    groups: tuple[int, int, int]
 
 
 class ComputePass:
     """Dispatches in order.
 
     wgpu wraps each call in Python to catch its errors. Here they are caught all the same: the library keeps
-    what is wrong in a pass until the encoder finishes.
+    what is wrong in a pass until the encoder finishes. It also holds on to what a pass binds.
     """
 
     def __init__(self, encoder: Any, label: str, timestamps: Any) -> None:
-        from wgpu.backends.wgpu_native import lib
+        from wgpu.backends.wgpu_native import ffi, lib
 
         self._lib = lib
-        self._pass = encoder.begin_compute_pass(label=label, timestamp_writes=timestamps)
-        self._handle = self._pass._internal
-        self._pipeline: Any = None
-        self._kept: list[Any] = []  # until the pass ends
+        if timestamps is None:
+            begun = lib.wgpuCommandEncoderBeginComputePass(encoder._internal, ffi.NULL)
+            self._handle = ffi.gc(begun, lib.wgpuComputePassEncoderRelease)
+        else:
+            self._pass = encoder.begin_compute_pass(label=label, timestamp_writes=timestamps)
+            self._handle = self._pass._internal
 
-    def set_pipeline(self, pipeline: Any) -> None:
-        """Choose what the next dispatches run."""
-        if pipeline is not self._pipeline:
-            self._lib.wgpuComputePassEncoderSetPipeline(self._handle, pipeline._internal)
-            self._pipeline = pipeline
-            self._kept.append(pipeline)
-
-    def set_bind_group(self, index: int, group: Any, offsets: Sequence[int]) -> None:
-        """Choose what the next dispatches read and write; `offsets` of its uniforms."""
-        self._lib.wgpuComputePassEncoderSetBindGroup(
-            self._handle, index, group._internal, len(offsets), offsets
-        )
-        self._kept.append(group)
-
-    def dispatch(self, groups: tuple[int, int, int]) -> None:
-        """Run a number of workgroups along each axis."""
-        self._lib.wgpuComputePassEncoderDispatchWorkgroups(self._handle, *groups)
+    def run(self, steps: Iterable[Step]) -> None:
+        """Run pipelines one after the other."""
+        handle, set_pipeline = self._handle, self._lib.wgpuComputePassEncoderSetPipeline
+        set_bind_group = self._lib.wgpuComputePassEncoderSetBindGroup
+        dispatch = self._lib.wgpuComputePassEncoderDispatchWorkgroups
+        for _, pipeline, bound, (x, y, z) in steps:
+            set_pipeline(handle, pipeline)
+            for index, (group, count, offsets) in enumerate(bound):
+                set_bind_group(handle, index, group, count, offsets)
+            dispatch(handle, x, y, z)
 
     def end(self) -> None:
         """Close the pass."""
-        self._pass.end()
-        self._kept.clear()
+        self._lib.wgpuComputePassEncoderEnd(self._handle)

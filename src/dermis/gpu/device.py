@@ -39,6 +39,7 @@ class Device:
 
     beside : threads for what the driver and the disk do by themselves: compile, read, copy; what they have
         not begun when the device is dropped is left
+    spare_records : memory in which no frame gathers its numbers at the moment; new memory takes longer
     """
 
     def __init__(self, adapter: Adapter, reason: str) -> None:
@@ -60,6 +61,7 @@ class Device:
         weakref.finalize(self, self.beside.shutdown, wait=False, cancel_futures=True)
         self._timestamps: tuple[Any, Any] | None = None
         self._uniform_chunks: list[Any] = []
+        self.spare_records: list[bytearray] = []
         self._staging: dict[int, list[Any]] = {}
         self.fetching: set[Any] = set()
         self._samplers: dict[tuple[tuple[str, str], ...], Any] = {}

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, Literal
 
-from dermis.gpu.compute_pass import ComputePass
+from dermis.gpu.compute_pass import ComputePass, Step
 from dermis.gpu.device import Device
 from dermis.gpu.program import ComputeProgram, FragmentProgram, RasterProgram, Resources
 from dermis.gpu.readback import Fetched
 from dermis.gpu.timing import Timestamps, WallClock
 from dermis.gpu.uniforms import Uniforms
 
-Step = tuple[str, Any, list[tuple[Any, list[int]]], tuple[int, int, int]]
-"""A dispatch: its stage, its pipeline, bind groups with offsets of their uniforms, and workgroups."""
+Timed = bool | Literal["whole"]
+"""Whether stages are timed, each in a pass of its own, or the frame as it is when nobody asks, as a whole."""
 
 
 class Frame:
@@ -22,21 +22,25 @@ class Frame:
 
     On software adapters each stage is submitted and waited for by itself, to time it.
 
-    timed : False leaves the stages' times out; dispatches then share passes across stages
+    timed : False leaves the stages' times out; dispatches then share passes across stages, as they do in
+        frames that are timed as a "whole", from the start of their first pass to the end of the last one.
+        Software adapters can only time stages
     submitted : number of the last submit, for `Device.wait`
     """
 
-    def __init__(self, device: Device, *, timed: bool = True) -> None:
+    def __init__(self, device: Device, *, timed: Timed = True) -> None:
         self.device = device
-        self._encoder = device.handle.create_command_encoder()
+        self._open: Any = None
         self._uniforms = Uniforms(device)
         self._fetched: list[Fetched] = []
         self.submitted = 0
         self._stage = ""
         self._pass: ComputePass | None = None
-        software = device.adapter.kind == "CPU"
+        software, whole = device.adapter.kind == "CPU", timed == "whole"
         self._wall = WallClock() if software and timed else None
-        self._stamps = Timestamps(device) if device.has_timestamps and timed and not software else None
+        stamped = device.has_timestamps and timed and not software
+        self._stamps = Timestamps(device, whole=whole) if stamped else None
+        self._divided = self._wall is not None or (stamped and not whole)  # into a pass for each stage
 
     def compute(
         self, stage: str, program: ComputeProgram, resources: Resources, size: tuple[int, int], tile: int = 8
@@ -48,16 +52,15 @@ class Frame:
         self, stage: str, program: ComputeProgram, resources: Resources, groups: tuple[int, int, int]
     ) -> None:
         """Run `program` for a number of workgroups along each axis."""
-        self.repeat([(stage, program.pipeline, program.bind_groups(resources, self._uniforms), groups)])
+        self.repeat([step_of(stage, program, program.bind_groups(resources, self._uniforms), groups)])
 
-    def repeat(self, steps: Iterable[Step]) -> None:
+    def repeat(self, steps: Sequence[Step]) -> None:
         """Run dispatches whose bind groups are known."""
-        for stage, pipeline, bound, groups in steps:
-            one = self._compute_pass(stage)
-            one.set_pipeline(pipeline)
-            for index, (group, offsets) in enumerate(bound):
-                one.set_bind_group(index, group, offsets)
-            one.dispatch(groups)
+        if self._divided:
+            for step in steps:
+                self._compute_pass(step.stage).run([step])
+        elif steps:
+            self._compute_pass(steps[0].stage).run(steps)
 
     def clear(self, buffer: Any) -> None:
         """Fill a buffer with zeros."""
@@ -129,6 +132,7 @@ class Frame:
             self._flush()
         else:
             self._flush()
+        self._uniforms.finish()
 
     def wait(self) -> None:
         """Return when the device has done what was submitted."""
@@ -162,9 +166,16 @@ class Frame:
             one.set_bind_group(index, group, offsets)
         return one
 
+    @property
+    def _encoder(self) -> Any:
+        """Takes commands; made for the first one after each submit."""
+        if self._open is None:
+            self._open = self.device.handle.create_command_encoder()
+        return self._open
+
     def _compute_pass(self, stage: str) -> ComputePass:
         """The open pass, or a new one where a stage begins whose time is taken."""
-        if self._pass and stage != self._stage and (self._wall or self._stamps):
+        if self._divided and self._pass and stage != self._stage:
             self._end_pass()
         if not self._pass:
             stamps = self._begin(stage)
@@ -195,4 +206,15 @@ class Frame:
         for one in self._fetched:
             one.begin(self.submitted)
         self._fetched.clear()
-        self._encoder = self.device.handle.create_command_encoder()
+        self._open = None
+
+
+def step_of(
+    stage: str,
+    program: ComputeProgram,
+    bound: Iterable[tuple[Any, Sequence[int]]],
+    groups: tuple[int, int, int],
+) -> Step:
+    """A dispatch of bind groups with the offsets of their uniforms."""
+    handles = [(group._internal, len(offsets), offsets) for group, offsets in bound]
+    return Step(stage, program.pipeline._internal, handles, groups)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,44 @@ _TOOLKIT_SHADERS = Path(__file__).parent / "wgsl"
 _UNIFORM = {"type": "uniform"}
 
 
+class _Group:
+    """One of a shader's groups of bindings.
+
+    uniforms, names : those that are uniforms, and all, these last
+    read : takes the others out of what is given
+    """
+
+    def __init__(self, found: list[Binding]) -> None:
+        self.bindings = found
+        self.uniforms = [b.name for b in found if _is_uniform(b)]
+        others = [b.name for b in found if not _is_uniform(b)]
+        self.names = [*others, *self.uniforms]
+        self.read: Callable[[Resources], Sequence[Any]]
+        if len(others) > 1:
+            self.read = itemgetter(*others)
+        else:  # of one name it would give no sequence
+            self.read = lambda resources: [resources[name] for name in others]
+
+
+def _is_uniform(binding: Binding) -> bool:
+    return binding.entry.get("buffer") == _UNIFORM
+
+
+def _entry(binding: Binding, value: Any, given: Any) -> Any:
+    """What is bound, as wgpu takes it.
+
+    given : the record whose place the value is, or the value itself
+    """
+    if _is_uniform(binding):
+        return {"buffer": value, "offset": 0, "size": given.nbytes}
+    if "buffer" in binding.entry:
+        return {"buffer": value, "offset": 0, "size": value.size}
+    texture = binding.entry.get("texture") or binding.entry.get("storage_texture")
+    if texture and hasattr(value, "create_view"):
+        return value.create_view(dimension=texture["view_dimension"])
+    return value
+
+
 class Program:
     """What compute and raster programs share: the composed text, its bindings and their layouts."""
 
@@ -32,12 +71,9 @@ class Program:
         self.bindings: tuple[Binding, ...] = bindings(self.source.text)
         self._module = self._compile(path)
         count = 1 + max((b.group for b in self.bindings), default=-1)
-        self._groups = [
-            [(b, b.name, b.entry.get("buffer") == _UNIFORM) for b in self.bindings if b.group == group]
-            for group in range(count)
-        ]
+        self._groups = [_Group([b for b in self.bindings if b.group == group]) for group in range(count)]
         self.kept_groups = BindGroups()
-        self._layouts = [self._group_layout(slots) for slots in self._groups]
+        self._layouts = [self._group_layout(group.bindings) for group in self._groups]
         self._layout = device.handle.create_pipeline_layout(bind_group_layouts=self._layouts)
 
     def record(self, struct: str, **values: Any) -> np.ndarray[Any, Any]:
@@ -55,42 +91,26 @@ class Program:
         """
         found = []
         try:
-            for number, slots in enumerate(self._groups):
-                bound, offsets = [], []
-                for _, name, is_uniform in slots:
-                    value = resources[name]
-                    if is_uniform:
-                        value, offset = uniforms.place(value)
-                        offsets.append(offset)
-                    bound.append(value)
+            for number, one in enumerate(self._groups):
+                placed = [uniforms.place(resources[name]) for name in one.uniforms]
+                bound = [*one.read(resources), *(buffer for buffer, _ in placed)]
                 key = key_of(number, bound)
                 group = self.kept_groups.find(key)
                 if group is None:
-                    group = self._make_group(number, bound, resources)
+                    group = self._make_group(number, dict(zip(one.names, bound, strict=True)), resources)
                     self.kept_groups.keep(key, bound, group)
-                found.append((group, offsets))
+                found.append((group, [offset for _, offset in placed]))
         except KeyError as missing:
             message = f"{self.name}.wgsl declares {missing.args[0]!r}, and nothing is bound to it"
             raise KeyError(message) from None
         return found
 
-    def _make_group(self, number: int, bound: list[Any], resources: Resources) -> Any:
+    def _make_group(self, number: int, bound: Mapping[str, Any], resources: Resources) -> Any:
         entries = [
-            {"binding": binding.index, "resource": self._entry(binding, is_uniform, value, resources)}
-            for (binding, _, is_uniform), value in zip(self._groups[number], bound, strict=True)
+            {"binding": b.index, "resource": _entry(b, bound[b.name], resources[b.name])}
+            for b in self._groups[number].bindings
         ]
         return self.device.handle.create_bind_group(layout=self._layouts[number], entries=entries)
-
-    @staticmethod
-    def _entry(binding: Binding, is_uniform: bool, value: Any, resources: Resources) -> Any:
-        if is_uniform:
-            return {"buffer": value, "offset": 0, "size": resources[binding.name].nbytes}
-        if "buffer" in binding.entry:
-            return {"buffer": value, "offset": 0, "size": value.size}
-        texture = binding.entry.get("texture") or binding.entry.get("storage_texture")
-        if texture and hasattr(value, "create_view"):
-            return value.create_view(dimension=texture["view_dimension"])
-        return value
 
     def _compile(self, path: Path) -> Any:
         try:
@@ -100,14 +120,14 @@ class Program:
                 f"{path.name}: the shader did not compile.\n{self.source.locate(str(error))}"
             ) from error
 
-    def _group_layout(self, slots: list[tuple[Binding, str, bool]]) -> Any:
+    def _group_layout(self, slots: list[Binding]) -> Any:
         entries = [
             {
-                "binding": binding.index,
+                "binding": slot.index,
                 "visibility": self._visibility(),
-                **({"buffer": {**_UNIFORM, "has_dynamic_offset": True}} if is_uniform else binding.entry),
+                **({"buffer": {**_UNIFORM, "has_dynamic_offset": True}} if _is_uniform(slot) else slot.entry),
             }
-            for binding, _, is_uniform in slots
+            for slot in slots
         ]
         return self.device.handle.create_bind_group_layout(entries=entries)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +24,7 @@ class Fetched:
     def __init__(self, device: Device, size: int) -> None:
         self._device, self._size, self._submitted = device, size, 0
         self._status: int | None = None
+        self._name: Any = None  # by which the driver knows it
         self.buffer = device.staging(size)
 
     def begin(self, submitted: int) -> None:
@@ -30,16 +32,17 @@ class Fetched:
         from wgpu.backends.wgpu_native import ffi, lib
         from wgpu.backends.wgpu_native._api import libf
 
-        @ffi.callback("void(WGPUMapAsyncStatus, WGPUStringView, void *, void *)")  # type: ignore[untyped-decorator]
-        def mapped(status: int, *_: Any) -> None:
-            self._status = status
-            self._device.fetching.discard(self)
-
         info = ffi.new("WGPUBufferMapCallbackInfo *")
-        info.mode, info.callback = lib.WGPUCallbackMode_AllowProcessEvents, mapped
-        self._called, self._submitted = mapped, submitted
+        info.mode, info.callback = lib.WGPUCallbackMode_AllowProcessEvents, _when_mapped()
+        self._submitted, self._name = submitted, ffi.new_handle(self)
+        info.userdata1 = self._name
         self._device.fetching.add(self)  # the driver calls back even when nobody wants the bytes any more
         libf.wgpuBufferMapAsync(self.buffer._internal, lib.WGPUMapMode_Read, 0, self.buffer.size, info[0])
+
+    def arrive(self, status: int) -> None:
+        """The driver's answer to `begin`."""
+        self._status, self._name = status, None
+        self._device.fetching.discard(self)
 
     def array(self) -> NDArray[np.uint8]:
         """The bytes; waits until they are here. To be called once.
@@ -60,3 +63,15 @@ class Fetched:
         libf.wgpuBufferUnmap(self.buffer._internal)
         self._device.give_back(self.buffer)
         return copied
+
+
+@cache
+def _when_mapped() -> Any:
+    """What the driver calls: one function for all, for making one takes as long as a stage of a frame."""
+    from wgpu.backends.wgpu_native import ffi
+
+    @ffi.callback("void(WGPUMapAsyncStatus, WGPUStringView, void *, void *)")  # type: ignore[untyped-decorator]
+    def mapped(status: int, _: Any, fetched: Any, __: Any) -> None:
+        ffi.from_handle(fetched).arrive(status)
+
+    return mapped

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NoReturn, TypeVar
 
+from dermis.gpu.compute_pass import Step
 from dermis.gpu.device import Device
-from dermis.gpu.frame import Frame, Step
+from dermis.gpu.frame import Frame, step_of
 from dermis.gpu.program import ComputeProgram, Resources
 from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
 
@@ -27,42 +28,48 @@ class Recording(Frame):
         self.device = device
         self._chunks: list[Any] = []
         self._uniforms = Uniforms(device, partial(_chunk, device, self._chunks))
-        self._steps: list[
-            tuple[str, Any, list[tuple[weakref.ref[Any], list[int]]], tuple[int, int, int]]
-        ] = []
+        self._steps: list[Step] = []
+        self._pipelines: list[Any] = []
+        self._bound: list[weakref.ref[Any]] = []
 
     def dispatch(
         self, stage: str, program: ComputeProgram, resources: Resources, groups: tuple[int, int, int]
     ) -> None:
         """Keep a dispatch."""
-        chunks = self._chunks  # and not the recording, which would keep itself alive
+        chunks, steps = self._chunks, self._steps  # and not the recording, which would keep itself alive
 
         def void(_: Any) -> None:
             chunks.clear()
+            steps.clear()
 
         bound = program.bind_groups(resources, self._uniforms)
-        weak = [(weakref.ref(group, void), offsets) for group, offsets in bound]
-        self._steps.append((stage, program.pipeline, weak, groups))
+        self._bound += [weakref.ref(group, void) for group, _ in bound]
+        self._pipelines.append(program.pipeline)
+        told = [(group, _offsets(offsets)) for group, offsets in bound]
+        steps.append(step_of(stage, program, told, groups))
 
     def submit(self) -> None:
         """Put the numbers in their place; the dispatches run where a frame repeats them."""
         self._uniforms.upload()
+        self._uniforms.finish()
         del self._uniforms  # it holds on to the buffers
 
-    def steps(self) -> list[Step] | None:
+    def steps(self) -> Sequence[Step] | None:
         """The dispatches; None when something they bind is gone."""
-        steps = [
-            (stage, pipeline, [(group(), offsets) for group, offsets in weak], groups)
-            for stage, pipeline, weak, groups in self._steps
-        ]
-        alive = all(group is not None for _, _, bound, _ in steps for group, _ in bound)
-        return steps if alive else None
+        return self._steps if len(self._steps) == len(self._pipelines) else None
 
     def clear(self, *_: Any, **__: Any) -> NoReturn:
         """Dispatches only."""
         raise TypeError("only dispatches can be repeated")
 
     copy = fetch = draw = fill = clear
+
+
+def _offsets(offsets: Sequence[int]) -> Any:
+    """Offsets as the native library takes them, so that no frame needs to convert them."""
+    from wgpu.backends.wgpu_native import ffi
+
+    return ffi.new("uint32_t[]", offsets)
 
 
 def _chunk(device: Device, chunks: list[Any], index: int) -> Any:

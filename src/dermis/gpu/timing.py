@@ -11,28 +11,35 @@ from dermis.gpu.device import Device
 
 
 class Timestamps:
-    """A timestamp at the start of each pass; a pass lasts until the next one begins, so stages add up."""
+    """A timestamp at the start of each pass; a pass lasts until the next one begins, so stages add up.
 
-    def __init__(self, device: Device) -> None:
-        self._device = device
+    whole : True leaves out all but the first and the one at the end, which take time themselves
+    """
+
+    def __init__(self, device: Device, *, whole: bool = False) -> None:
+        self._device, self._whole = device, whole
         self._queries, self._resolved = device.timestamp_pool()
         self._stages: list[str] = []
 
     def begin(self, stage: str) -> dict[str, Any] | None:
         """What a pass descriptor takes as timestamp_writes."""
-        if len(self._stages) >= self._queries.count:
+        full = len(self._stages) >= self._queries.count - 1  # the last one is for the end
+        if full or (self._whole and self._stages):
             return None
+        return self._mark(stage)
+
+    def _mark(self, stage: str) -> dict[str, Any]:
         self._stages.append(stage)
         return {"query_set": self._queries, "beginning_of_pass_write_index": len(self._stages) - 1}
 
     def end(self, encoder: Any) -> None:
         """Mark the end of the last pass and fetch the timestamps."""
         if self._stages:
-            encoder.begin_compute_pass(label="end", timestamp_writes=self.begin("end")).end()
+            encoder.begin_compute_pass(label="end", timestamp_writes=self._mark("end")).end()
             encoder.resolve_query_set(self._queries, 0, len(self._stages), self._resolved, 0)
 
     def stage_ms(self) -> dict[str, float]:
-        """Time of each stage, and "total" [ms]."""
+        """Time of each stage, unless only the whole is timed, and "total" [ms]."""
         if not self._stages:
             return {"total": 0.0}
         raw = self._device.handle.queue.read_buffer(self._resolved, 0, 8 * len(self._stages))
@@ -41,6 +48,7 @@ class Timestamps:
         times: dict[str, float] = {}
         for stage, lasted in zip(self._stages, np.diff(ticks), strict=False):
             times[stage] = times.get(stage, 0.0) + float(lasted) * ms
+        times = {} if self._whole else times
         times["total"] = float(ticks[-1] - ticks[0]) * ms
         return times
 

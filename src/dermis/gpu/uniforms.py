@@ -27,15 +27,17 @@ class Uniforms:
         self._chunk = chunk or device.uniform_chunk
         self._staged: list[bytearray] = []
         self._end = CHUNK_BYTES
-        self._placed: dict[bytes, tuple[Any, int]] = {}
+        self._placed: dict[int, tuple[tuple[Any, int], NDArray[Any]]] = {}  # which keeps the records' names
 
     def place(self, record: NDArray[Any]) -> tuple[Any, int]:
-        """The buffer and the offset [byte] at which the record will be; equal records share a place."""
-        data = record.tobytes()
-        found = self._placed.get(data)
+        """The buffer and the offset [byte] at which the record will be.
+
+        A record is taken as it is when it comes first, and must not be changed until the frame is submitted.
+        """
+        found = self._placed.get(id(record))
         if found is None:
-            found = self._placed[data] = self._add(data)
-        return found
+            found = self._placed[id(record)] = self._add(record), record
+        return found[0]
 
     def upload(self) -> None:
         """Write all records for the next submit."""
@@ -44,12 +46,19 @@ class Uniforms:
             part = memoryview(staged)[: self._end if last else CHUNK_BYTES]
             self._device.handle.queue.write_buffer(self._chunk(index), 0, part)
 
-    def _add(self, data: bytes) -> tuple[Any, int]:
-        size = -(-len(data) // _STEP) * _STEP
+    def finish(self) -> None:
+        """Begin anew after the last submit."""
+        self._device.spare_records.extend(self._staged)
+        self._staged, self._end = [], CHUNK_BYTES
+        self._placed.clear()
+
+    def _add(self, record: NDArray[Any]) -> tuple[Any, int]:
+        size = -(-record.nbytes // _STEP) * _STEP
         if self._end + size > CHUNK_BYTES:
-            self._staged.append(bytearray(CHUNK_BYTES))
+            spare = self._device.spare_records
+            self._staged.append(spare.pop() if spare else bytearray(CHUNK_BYTES))
             self._end = 0
         start = self._end
-        self._staged[-1][start : start + len(data)] = data
+        self._staged[-1][start : start + record.nbytes] = record.tobytes()
         self._end += size
         return self._chunk(len(self._staged) - 1), start

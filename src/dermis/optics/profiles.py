@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ PUBLISHED = "gpu-gems-3"
 TERMS = 6
 _HEADER = ["variance_mm2", "red", "green", "blue"]
 _FILE_FORM = "a CSV file with the columns " + ",".join(_HEADER)
+_KEPT_FILES = 16
 _MEND = "Mend the profile's table"
 
 
@@ -60,23 +61,35 @@ def find_table(name: str | Path) -> GaussianSum | None:
     """
     if str(name) == PUBLISHED:
         return _published()
-    path = Path(name)
     if str(name) in names():
         return None
+    path = Path(name)
+    written = _written(path)
+    if not written and path.suffix.lower() != ".toml":
+        expected = f"a preset ({', '.join(preset_names())}), a .toml file of a tissue, or {_FILE_FORM}"
+        refuse(f"profile {name}", expected, "there is no such file", "Check the name")
+    return _table(path, written)
+
+
+@lru_cache(_KEPT_FILES)
+def _table(path: Path, written: tuple[int, ...]) -> GaussianSum | None:
+    """The Gaussians of a file, which each frame asks for.
+
+    written : what tells this file from others of its name
+    """
     if path.suffix.lower() == ".toml":
         document = read_toml(path)
         return _from_toml(path, document) if "variances_mm2" in document else None
-    if not _exists(path):
-        expected = f"a preset ({', '.join(preset_names())}), a .toml file of a tissue, or {_FILE_FORM}"
-        refuse(f"profile {name}", expected, "there is no such file", "Check the name")
     return _parse(str(path), read_text(path, _FILE_FORM))
 
 
-def _exists(path: Path) -> bool:
+def _written(path: Path) -> tuple[int, ...]:
+    """When a file was written, how large and which one it is; nothing when there is none."""
     try:
-        return path.exists()
-    except OSError:  # a name too long, or a folder that is not ours
-        return False
+        found = path.stat()
+    except OSError:  # none, a name too long, or a folder that is not ours
+        return ()
+    return found.st_mtime_ns, found.st_size, found.st_ino
 
 
 def write_profile(path: Path, profile: GaussianSum, remarks: Mapping[str, Any]) -> None:

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
-
-import numpy as np
 
 from dermis.gpu import Device
 from dermis.optics.fits.separable import preintegrate
 from dermis.optics.gaussians import GaussianSum
+from dermis.rendering.kept import Keep
 from dermis.rendering.pre_integrated import PreIntegrated, pre_integrate
 from dermis.rendering.stages.screen_space import Kernel, ScreenSpace, ScreenSpread
 from dermis.scene.settings import Settings
-
-Keep = Callable[[str, Any, Callable[[], Any]], Any]
-"""`Kept.keep`."""
 
 
 def pre_integrated(
@@ -29,12 +24,11 @@ def pre_integrated(
 
 
 def screen_spread(
-    keep: Keep, stage_of: Callable[[], ScreenSpace], settings: Settings, profile: GaussianSum, view: Any
+    keep: Keep, stage_of: Callable[[], ScreenSpace], settings: Settings, profile: GaussianSum
 ) -> ScreenSpread | None:
-    """Space and kernel for light that spreads over the picture, None for other techniques.
+    """Space and kernel for light that spreads over a picture of no camera yet, None for other techniques.
 
     stage_of : the stage, asked for only when it is needed
-    view : record of the shading pass
     """
     if settings.technique != "screen-space":
         return None
@@ -44,8 +38,7 @@ def screen_spread(
         return stage.make_kernel(preintegrate(profile))
 
     apart = keep("apart", settings.size, lambda: stage.make_apart(settings.size))
-    half = (float(np.linalg.norm(view[axis])) for axis in ("right", "up"))
-    return ScreenSpread(apart, keep("kernel", _content(profile), make), (next(half), next(half)))
+    return ScreenSpread(apart, keep("kernel", _content(profile), make), (0.0, 0.0))
 
 
 def _content(profile: GaussianSum) -> bytes:

@@ -37,8 +37,8 @@ class Stages:
         self.shown = Shown()
         self.repeated = Repeated()
         self.shadows = Shadows(device)
-        self.irradiance = Irradiance(device)
         self.diffuse = Diffuse(device)
+        self.irradiance = Irradiance(device, self.diffuse.texel)
         self.combine = Combine(device)
         self.visibility = Visibility(device)
         self.shade = Shade(device)
@@ -109,7 +109,7 @@ def scatter(frame: Frame, stages: Stages, inputs: Inputs) -> None:
     shown, levels = stages.shown, inputs.levels
     for index, layout in enumerate(inputs.layouts):
         lit = partial(entered_key, inputs, layout)
-        shown.keep(levels.entered, lit, partial(_enter, frame, stages, inputs, layout))
+        shown.keep(levels.stack, lit, partial(_enter, frame, stages, inputs, layout))
         shown.forget(layout.scattered)
         if inputs.settings.technique == Published.name:
             _spread(frame, stages, inputs, layout)
@@ -125,7 +125,8 @@ def scatter(frame: Frame, stages: Stages, inputs: Inputs) -> None:
 def _enter(frame: Frame, stages: Stages, inputs: Inputs, layout: Layout) -> None:
     """Light that enters the skin of a layout."""
     levels = inputs.levels
-    stages.irradiance.draw(frame, layout, inputs.light_switches, levels.entering, levels.size)
+    into = levels.layer(0), levels.size, levels.texel
+    stages.irradiance.draw(frame, layout, inputs.light_switches, *into, inputs.scale)
 
 
 def _spread(frame: Frame, stages: Stages, inputs: Inputs, layout: Layout) -> tuple[tuple[int, ...], float]:

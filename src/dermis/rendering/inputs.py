@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.assets.head import Head
+from dermis.assets.mesh import Mesh
 from dermis.errors import refuse
 from dermis.gpu import ComputeProgram
 from dermis.optics.fits.single import single_gaussian
@@ -17,7 +20,17 @@ from dermis.rendering.geometry import HeadTextures
 from dermis.rendering.layout import Layout
 from dermis.rendering.levels import Levels
 from dermis.rendering.pre_integrated import PreIntegrated
-from dermis.rendering.projection import Matrix, depth_range, frame_of, perspective
+from dermis.rendering.projection import (
+    Axes,
+    Matrix,
+    Triple,
+    axes_of,
+    between,
+    depth_range,
+    perspective,
+    place_of,
+    rows_of,
+)
 from dermis.rendering.samples import pixel_samples
 from dermis.rendering.stages.bloom import Glow
 from dermis.rendering.stages.nearest import Layers
@@ -26,7 +39,6 @@ from dermis.rendering.stages.screen_space import ScreenSpread
 from dermis.rendering.stages.shadows import ShadowMaps
 from dermis.rendering.stages.variants import Switches
 from dermis.scene.camera import Camera
-from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
@@ -39,18 +51,15 @@ WITHOUT_ATLAS = ("none", "screen-space", "pre-integrated")
 
 
 @dataclass(frozen=True)
-class Inputs:
-    """Everything `draw_frame` touches.
+class Standing:
+    """What a frame reads that cameras and lights leave as it is.
 
     layouts : atlases that light is spread on; the first is the one that is looked at
-    light_clips, shadow_key : a matrix for each shadow map, and what the maps would show
     scatters : whether light spreads below the surface
-    scale : what light is multiplied with in the blurred levels
     blurred_mm2, level_weight : variances and weights of the blurred levels
     edge, clear : what blurs find beyond a chart's edge, and the light of empty texels
     scattered : texture of the light that leaves below the surface
     view, switches : record of the shading pass, and the values of its `override`s
-    light_switches : those of the irradiance pass
     suns : lights that the environment adds
     gaussians : terms of the profile
     spread : how light spreads over the picture, None when it does not
@@ -60,21 +69,16 @@ class Inputs:
     head: HeadTextures
     layouts: list[Layout]
     shadow_maps: ShadowMaps
-    light_clips: list[Matrix]
-    shadow_key: bytes
     scatters: bool
     levels: Levels
-    scale: float
     blurred_mm2: Floats
     level_weight: Floats
     edge: str
     clear: Floats
     scattered: Any
     seen: Layers
-    camera_clips: list[Matrix]
     view: Any
     switches: Switches
-    light_switches: Switches
     suns: int
     gaussians: int
     picture: Picture
@@ -86,6 +90,34 @@ class Inputs:
     def lit(self) -> dict[str, Any]:
         """Of the layout that is looked at."""
         return self.layouts[0].lit
+
+
+@dataclass(frozen=True)
+class Inputs(Standing):
+    """Everything `draw_frame` touches.
+
+    light_clips, shadow_key : a matrix for each shadow map, and what the maps would show
+    scale : what light is multiplied with in the blurred levels
+    light_switches : values of the irradiance pass' `override`s
+    """
+
+    light_clips: list[Matrix]
+    shadow_key: bytes
+    scale: float
+    camera_clips: list[Matrix]
+    light_switches: Switches
+
+
+class Pinhole(NamedTuple):
+    """Where a camera is and what it sees.
+
+    axes : right, up and forward
+    half : tangents of the half angles of view, across and up
+    """
+
+    eye: Triple
+    axes: Axes
+    half: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -118,41 +150,50 @@ def split_profile(profile: GaussianSum, settings: Settings, white: bool) -> Spli
     return Split(np.zeros(3), total, profile.variance_mm2, weight)
 
 
-def camera_clips(camera: Camera, head: Head, settings: Settings) -> list[Matrix]:
-    """World to clip space for each sample of the pixel."""
-    eye, axes, half = _pinhole(camera, head, settings)
-    whole = perspective(eye, axes, half, *depth_range(head.mesh, eye, axes[2]))
+def pinhole(camera: Camera, head: Head, settings: Settings) -> Pinhole:
+    """The camera as the renderer takes it."""
+    eye, path = place_of(camera.position, head.centre_mm), between(camera.position, camera.target)
+    half = 0.5 * camera.frame_mm / math.hypot(*path)
     width, height = settings.size
-    shift = (pixel_samples(settings.samples) - 0.5) * (-2.0 / width, 2.0 / height)
-    clips = np.repeat(whole[None], len(shift), axis=0)
-    clips[:, :2] += shift[..., None] * whole[3]
+    return Pinhole(eye, axes_of(path, camera.up), (half * width / height, half))
+
+
+def camera_clips(pinhole: Pinhole, mesh: Mesh, settings: Settings) -> list[Matrix]:
+    """World to clip space for each sample of the pixel."""
+    rows = rows_of(pinhole.eye, pinhole.axes)
+    whole = perspective(rows, pinhole.half, *depth_range(mesh, rows))
+    clips = np.repeat(whole[None], settings.samples, axis=0)
+    clips[:, :2] += _shifts(settings.samples, *settings.size) * whole[3]
     return list(clips)
 
 
+@lru_cache(16)
+def _shifts(samples: int, width: int, height: int) -> Floats:
+    """(samples, 2, 1) how far each sample moves the picture, which is 2 wide and high."""
+    moved = (pixel_samples(samples) - 0.5) * (-2.0 / width, 2.0 / height)
+    moved.flags.writeable = False
+    return moved[..., None]
+
+
 def view_record(
-    shade: ComputeProgram, scene: Scene, settings: Settings, split: Split, pre: PreIntegrated | None = None
+    shade: ComputeProgram, head: Head, settings: Settings, split: Split, pre: PreIntegrated | None = None
 ) -> Any:
-    """The shading pass' record: rays, samples and weights.
+    """The shading pass' record without the camera: samples and weights.
 
     pre : tables of pre-integrated skin and their scales
     """
-    eye, axes, half = _pinhole(scene.camera, scene.head, settings)
     jitter = np.zeros((64, 4), np.float32)
     jitter[: settings.samples, :2] = pixel_samples(settings.samples)
     colours = np.zeros((_MOST_MATERIALS, 4), np.float32)
-    materials = scene.head.mesh.materials
+    materials = head.mesh.materials
     if len(materials) > _MOST_MATERIALS:
         count = f"it has {len(materials)}"
-        refuse(scene.head.name, f"at most {_MOST_MATERIALS} materials", count, "Join some groups")
+        refuse(head.name, f"at most {_MOST_MATERIALS} materials", count, "Join some groups")
     for index, material in enumerate(materials):
         colours[index, :3] = material.colour
     record = shade.record(
         "Shade",
-        eye=eye,
         samples=settings.samples,
-        forward=axes[2],
-        right=axes[0] * half[0],
-        up=axes[1] * half[1],
         relit=split.relit,
         total=split.total,
         shown=_PARTS[settings.parts],
@@ -165,10 +206,11 @@ def view_record(
     return record
 
 
-def _pinhole(camera: Camera, head: Head, settings: Settings) -> tuple[Floats, Any, tuple[float, float]]:
-    """Eye, axes, and the tangents of the half angles of view."""
-    eye = np.array(camera.position) + head.centre_mm
-    path = np.subtract(camera.target, camera.position)
-    half = 0.5 * camera.frame_mm / float(np.linalg.norm(path))
-    width, height = settings.size
-    return eye, frame_of(path, np.array(camera.up)), (half * width / height, half)
+def seen_by(view: Any, pinhole: Pinhole) -> Any:
+    """A shading pass' record with the rays of a camera."""
+    eye, (right, up, forward), half = pinhole
+    record = np.zeros((), view.dtype)  # a copy would have anything between its members, and keys have it all
+    record[...] = view
+    record["eye"], record["forward"] = eye, forward
+    record["right"], record["up"] = tuple(half[0] * c for c in right), tuple(half[1] * c for c in up)
+    return record

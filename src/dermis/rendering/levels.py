@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from dermis.gpu import Device, make_texture
 
-ENTERED = "rgba32float"
-"""Format of the light that enters."""
+FLOATS = "rgba32float"
+"""Format of light that is neither blurred nor rounded to halves."""
 MOST_HALVINGS = 3
 _BRIGHT = 16.0  # what the lights are brought to, a 4000th of what halves hold
 SHARP = 0.45  # least standard deviation [mm] of what is halved, over the square of the result's texels [mm]
@@ -21,17 +21,14 @@ SHARP = 0.45  # least standard deviation [mm] of what is halved, over the square
 class Levels:
     """Light and its blurred levels, layer 0 not blurred, and the space between two passes.
 
-    entered : texture whose first layer the light enters: the stack itself, or its own where that has
-        another format
-    texel : format of the other textures
+    texel : format of the textures
     halvings : how often the resolution of each layer is halved; its light is in that mip level
-    scale : what light is multiplied with in the blurred layers
+    scale : what light is multiplied with
     stretch : space for a stretch map that is blurred along with the light
     """
 
     stack: Any
     scratch: Any
-    entered: Any
     size: int
     texel: str
     halvings: tuple[int, ...]
@@ -40,14 +37,9 @@ class Levels:
     _views: dict[tuple[int, int], Any] = field(default_factory=dict)
 
     @property
-    def entering(self) -> Any:
-        """The light that enters."""
-        return self.layer(0) if self.entered is self.stack else self.entered
-
-    @property
     def views(self) -> list[Any]:
         """What each layer shows, the light that enters first."""
-        return [self.entering, *(self.layer(k, h) for k, h in enumerate(self.halvings) if k)]
+        return [self.layer(k, h) for k, h in enumerate(self.halvings)]
 
     def layer(self, k: int, halvings: int = 0) -> Any:
         """A view of one layer."""
@@ -70,8 +62,7 @@ def make_levels(device: Device, size: int, count: int, texel: str) -> Levels:
     mips = 1 + sum(size % 2**times == 0 for times in range(1, MOST_HALVINGS + 1))
     stack = make_texture(device, (size, size), texel, layers=max(2, count + 1), mips=mips)
     scratch = make_texture(device, (size, size), texel, mips=mips)
-    entered = stack if texel == ENTERED else make_texture(device, (size, size), ENTERED)
-    return Levels(stack, scratch, entered, size, texel, (0,) * (count + 1))
+    return Levels(stack, scratch, size, texel, (0,) * (count + 1))
 
 
 def scale_of(texel: str, brightest: float) -> float:
@@ -79,7 +70,7 @@ def scale_of(texel: str, brightest: float) -> float:
 
     brightest : irradiance that the lights were given together; skin nearer to one gets more
     """
-    if texel == ENTERED or brightest == 0.0:
+    if texel == FLOATS or brightest == 0.0:
         return 1.0
     return float(2.0 ** np.floor(np.log2(_BRIGHT / brightest)))
 
@@ -87,9 +78,8 @@ def scale_of(texel: str, brightest: float) -> float:
 def halvings_of(variance_mm2: NDArray[np.float64], texels_per_mm: float, most: int) -> tuple[int, ...]:
     """How often the resolution of each layer may be halved, the unblurred one included.
 
-    Twice as large texels want four times as wide a blur before: what they lose in the sparse parts of a map is a
-    larger share of their own width, and light of that width is a larger share of what is seen
-    (docs/performance.md has the errors).
+    Twice as large texels want four times as wide a blur before: what they lose in the sparse parts of a map
+    is then as small a part of what is seen (docs/performance.md has the errors).
 
     variance_mm2 : of the blurred layers, increasing
     texels_per_mm : of the map

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cache
 from typing import Any
 
@@ -12,7 +13,7 @@ from dermis.assets.environment.suns import Sun
 from dermis.assets.head import Head
 from dermis.errors import refuse
 from dermis.gpu import ComputeProgram
-from dermis.rendering.projection import ShadowView, frame_of, shadow_view
+from dermis.rendering.projection import ShadowView, Triple, between, frame_of, place_of, shadow_view
 from dermis.rendering.rectangles import facing_irradiance, parts_of
 from dermis.rendering.stages.variants import Switches
 from dermis.scene.environment import Environment
@@ -82,13 +83,13 @@ def light_views(scene: Scene, size: int) -> list[ShadowView | None]:
 
 
 def _view(head: Head, light: Light, size: int, culprit: str) -> ShadowView | None:
-    centre = np.array(head.centre_mm)
     if isinstance(light, SphereLight):
-        near = float(np.linalg.norm(head.mesh.positions - (centre + light.position), axis=1).min())
+        middle = place_of(light.position, head.centre_mm)
+        near = float(np.linalg.norm(head.mesh.positions - np.array(middle), axis=1).min())
         if near <= light.radius_mm:
             came = f"the head is {near:.0f} mm from its middle"
             refuse(culprit, f"a head outside the sphere of {light.radius_mm:g} mm", came, "Move it away")
-    return shadow_view(light, centre, head.mesh, size, culprit) if light.shadows else None
+    return shadow_view(light, head.centre_mm, head.mesh, size, culprit) if light.shadows else None
 
 
 def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView | None]) -> Any:
@@ -96,14 +97,13 @@ def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView 
 
     views : one for each part of each light
     """
-    centre = np.array(scene.head.centre_mm)
     record = program.record("Lights")
     record["place"] = places_on_lights()
     divided = [(part, len(parts)) for parts in map(parts_of, scene.lights) for part in parts]
     layer = 0
     for index, ((light, siblings), view) in enumerate(zip(divided, views, strict=True)):
         one = record["light"][index]
-        _fill(one, light, centre, view)
+        _fill(one, light, scene.head.centre_mm, view)
         one["layer"] = layer if view else -1
         few = isinstance(light, DirectionalLight)
         one["lines"] = _SUN_LINES if few else max(_LEAST_LINES, _LINES // siblings)
@@ -121,16 +121,18 @@ def places_on_lights() -> Floats:
     return np.hstack([disc, 2.0 * even - 1.0])
 
 
-def _fill(record: Any, light: Light, centre: Floats, view: ShadowView | None) -> None:
+def _fill(record: Any, light: Light, centre: Triple, view: ShadowView | None) -> None:
     """A light's element of the shader's array."""
     record["kind"], record["irradiance"] = _KINDS.index(type(light)), light.irradiance
     distance, texel = 1.0, view.texel if view else 1.0
     if isinstance(light, DirectionalLight):
-        record["direction"] = np.array(light.direction) / np.linalg.norm(light.direction)
+        length = math.hypot(*light.direction)
+        record["direction"] = tuple(c / length for c in light.direction)
     else:
-        path = np.subtract(light.target, light.position)
-        distance = float(np.linalg.norm(path))
-        record["position"], record["direction"] = np.array(light.position) + centre, path / distance
+        path = between(light.position, light.target)
+        distance = math.hypot(*path)
+        record["direction"] = tuple(c / distance for c in path)
+        record["position"] = place_of(light.position, centre)
     record["reference_mm"] = distance
     if view:
         record["position"] = view.origin
@@ -144,14 +146,14 @@ def _fill(record: Any, light: Light, centre: Floats, view: ShadowView | None) ->
     record["half_width"] = min(max(half_width, 1), _WIDEST_SHADOW_FILTER)
 
 
-def _add_shape(record: Any, light: Light, centre: Floats, distance: float) -> None:
+def _add_shape(record: Any, light: Light, centre: Triple, distance: float) -> None:
     """What only some kinds have: a cone, a stripe, or a size; lights of some size carry their radiance."""
     if isinstance(light, SpotLight):
-        record["cos_inner"] = np.cos(np.radians(light.inner_degrees))
-        record["cos_outer"] = np.cos(np.radians(light.outer_degrees))
+        record["cos_inner"] = math.cos(math.radians(light.inner_degrees))
+        record["cos_outer"] = math.cos(math.radians(light.outer_degrees))
     elif isinstance(light, StripeLight):
         right, up, _ = frame_of(record["direction"].astype(float), np.array(light.up))
-        record["position"] = np.array(light.position) + centre
+        record["position"] = place_of(light.position, centre)
         record["half_u"], record["half_v"] = 2.0 * right / light.width_mm, 2.0 * up / light.length_mm
     elif isinstance(light, DirectionalLight):
         record["extent"] = np.tan(0.5 * np.radians(light.angle_degrees))

@@ -45,10 +45,8 @@ def atlas_texel_bytes(technique: str, levels: int, layouts: int) -> float:
     """
     if not levels:
         return layouts * _GEOMETRY
-    if (
-        technique == "published"
-    ):  # besides, the light before it is made halves, and a stretch map between passes
-        blurs = float(_HALVES * (levels + 2) + _FLOATS + 2 * _HALVES)
+    if technique == "published":  # besides, a stretch map between passes
+        blurs = float(_HALVES * (levels + 2) + 2 * _HALVES)
     else:
         blurs = _FLOATS * (levels + 2) * sum(0.25**halving for halving in range(MOST_HALVINGS + 1))
     blended = _FLOATS + layouts * _DISTANCE if layouts > 1 else 0

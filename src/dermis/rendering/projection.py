@@ -16,7 +16,11 @@ from dermis.scene.lights import DirectionalLight, Light
 Vec = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Triple = tuple[float, float, float]
+Axes = tuple[Triple, Triple, Triple]
+Row = tuple[float, float, float, float]
+Rows = tuple[Row, Row, Row]
 _WIDEST_LIGHT_DEGREES = 80.0
+_UP = 0.0, 1.0, 0.0
 
 
 @dataclass(frozen=True)
@@ -32,22 +36,40 @@ class ShadowView:
 
     clip: Matrix
     texel: float
-    origin: Vec
-    right: Vec
-    up: Vec
+    origin: Triple
+    right: Triple
+    up: Triple
     near: float
     far: float
 
 
 def frame_of(forward: Vec, up: Vec) -> tuple[Vec, Vec, Vec]:
     """Right, up and forward as unit vectors."""
-    # In plain floats: numpy takes ten times as long for so few numbers, and a frame has many of them.
-    f = _unit(forward.tolist())
-    r = _cross(f, up.tolist())
+    right, upward, ahead = axes_of(forward.tolist(), up.tolist())
+    return np.array(right), np.array(upward), np.array(ahead)
+
+
+def axes_of(forward: Sequence[float], up: Sequence[float] = _UP) -> Axes:
+    """The same in plain floats: numpy takes ten times as long for so few numbers, and a frame has many."""
+    f = _unit(forward)
+    r = _cross(f, up)
     if math.hypot(*r) < 1e-6:
         r = _cross(f, (1.0, 0.0, 0.0) if abs(f[0]) < 0.9 else (0.0, 0.0, 1.0))
     r = _unit(r)
-    return np.array(r), np.array(_cross(r, f)), np.array(f)
+    return r, _cross(r, f), f
+
+
+def place_of(position: Sequence[float], centre: Sequence[float]) -> Triple:
+    """A place in the world.
+
+    position : relative to the head's centre
+    """
+    return position[0] + centre[0], position[1] + centre[1], position[2] + centre[2]
+
+
+def between(start: Sequence[float], end: Sequence[float]) -> Triple:
+    """The way from one place to another."""
+    return end[0] - start[0], end[1] - start[1], end[2] - start[2]
 
 
 def _unit(v: Sequence[float]) -> Triple:
@@ -56,63 +78,73 @@ def _unit(v: Sequence[float]) -> Triple:
     return x / length, y / length, z / length
 
 
+def _dot(a: Sequence[float], b: Sequence[float]) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
 def _cross(a: Sequence[float], b: Sequence[float]) -> Triple:
     (ax, ay, az), (bx, by, bz) = a, b
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
-def perspective(
-    eye: Vec, axes: tuple[Vec, Vec, Vec], half: tuple[float, float], near: float, far: float
-) -> Matrix:
-    """Looking along axes[2] with the tangents `half` of the half angles; depth 1 at near, 0 at far.
+def rows_of(eye: Triple, axes: Axes) -> Rows:
+    """The upper three rows of the matrix from the world to what an eye sees: to the right, up, and depth."""
+    right, up, forward = axes
+    return (*right, -_dot(right, eye)), (*up, -_dot(up, eye)), (*forward, -_dot(forward, eye))
+
+
+def perspective(rows: Rows, half: tuple[float, float], near: float, far: float) -> Matrix:
+    """From `rows_of` with the tangents `half` of the half angles; depth 1 at near, 0 at far.
 
     Floats are densest at 0: depths turned round are even over the whole range.
     """
-    view = np.empty((3, 4))
-    view[:, :3] = axes
-    view[:, 3] = -view[:, :3] @ eye
-    clip = np.empty((4, 4))
-    clip[0], clip[1], clip[3] = view[0] / half[0], view[1] / half[1], view[2]
-    clip[2] = view[2] * (-near / (far - near))
-    clip[2, 3] += far * near / (far - near)
-    return clip
+    scale = -near / (far - near)
+    depth = [scale * c for c in rows[2]]
+    depth[3] -= far * scale
+    return np.array([[c / half[0] for c in rows[0]], [c / half[1] for c in rows[1]], depth, rows[2]])
 
 
-def depth_range(mesh: Mesh, eye: Vec, forward: Vec) -> tuple[float, float]:
+def depth_range(mesh: Mesh, rows: Rows) -> tuple[float, float]:
     """Nearest and farthest depth of the mesh before the eye, a little widened [mm]."""
-    z = (mesh.outline - eye) @ forward
+    z = np.array(rows[2]) @ mesh.outline_columns
     near, far = float(z.min()), float(z.max())
     return max(near - 1.0, 0.5, 1e-3 * far), max(far + 1.0, 2.0)
 
 
-def shadow_view(light: Light, centre: Vec, mesh: Mesh, size: int, culprit: str) -> ShadowView:
+def shadow_view(light: Light, centre: Triple, mesh: Mesh, size: int, culprit: str) -> ShadowView:
     """The tightest map of `size` texels from the light around the whole mesh.
 
     Raises DermisError when a point light stands inside the mesh's bounds: one map cannot look all around.
     """
     if isinstance(light, DirectionalLight):
         return parallel_view(np.array(light.direction), mesh, size)
-    eye = np.array(light.position) + centre
-    points = mesh.outline
-    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    axes = frame_of(middle - eye, np.array([0.0, 1.0, 0.0]))
-    x, y, z = np.array(axes) @ (points - eye).T
-    near, far = float(z.min()), float(z.max())
-    half = float(np.abs((x / z, y / z)).max()) if near > 0.0 else math.inf
+    eye = place_of(light.position, centre)
+    axes = axes_of(between(eye, mesh.middle_mm))
+    rows = rows_of(eye, axes)
+    seen = np.array(rows) @ mesh.outline_columns
+    near, far = float(seen[2].min()), float(seen[2].max())
+    half = _steepest(seen) if near > 0.0 else math.inf
     if near <= 1.0 or half > math.tan(math.radians(_WIDEST_LIGHT_DEGREES)):
         place = [round(c) for c in light.position]
         refuse(
             culprit, "a place outside the head", f"it is at {place} mm", "Move it away or set shadows = false"
         )
     half, near, far = 1.02 * half, 0.98 * near, 1.02 * far
-    clip = perspective(eye, axes, (half, half), near, far)
+    clip = perspective(rows, (half, half), near, far)
     return ShadowView(clip, 2.0 * half / size, eye, axes[0], axes[1], near, far)
+
+
+def _steepest(seen: Matrix) -> float:
+    """The largest tangent of what an eye sees, which is overwritten: new memory takes longer than sums."""
+    sides = seen[:2]
+    sides /= seen[2]
+    return float(np.abs(sides, out=sides).max())
 
 
 def parallel_view(direction: Vec, mesh: Mesh, size: int) -> ShadowView:
     """The tightest map of `size` texels around the whole mesh in parallel light."""
     points = mesh.outline
-    axes = frame_of(direction, np.array([0.0, 1.0, 0.0]))
+    axes = frame_of(direction, np.array(_UP))
     local = points @ np.stack(axes, axis=1)
     low, high = local.min(axis=0) - 1.0, local.max(axis=0) + 1.0
     half = 0.51 * float(max(high[0] - low[0], high[1] - low[1]))
@@ -122,4 +154,5 @@ def parallel_view(direction: Vec, mesh: Mesh, size: int) -> ShadowView:
     clip[0, 3], clip[1, 3] = -0.5 * (low[0] + high[0]) / half, -0.5 * (low[1] + high[1]) / half
     clip[2, 3] = high[2] / (high[2] - low[2])
     middle = 0.5 * (low[0] + high[0]) * axes[0] + 0.5 * (low[1] + high[1]) * axes[1]
-    return ShadowView(clip, 2.0 * half / size, middle, axes[0], axes[1], float(low[2]), float(high[2]))
+    origin, right, up = ((float(x), float(y), float(z)) for x, y, z in (middle, axes[0], axes[1]))
+    return ShadowView(clip, 2.0 * half / size, origin, right, up, float(low[2]), float(high[2]))

@@ -19,7 +19,7 @@ from dermis.rendering.stages.post import Picture
 class Rendered:
     """An image, still on the device, until its renderer draws the next one.
 
-    gpu_ms : device time of each stage and "total" [ms]; None when the adapter has no timestamps
+    gpu_ms : device time of each stage that was timed, and "total" [ms]; None without timestamps
     frame_ms : from recording the frame to its end [ms]
     setup_ms : what was made for this scene before: loading to the device, atlas, shaders [ms]
     gaussians : levels of the profile

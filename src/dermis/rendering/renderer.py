@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.gpu import Frame, open_device
 from dermis.gpu.device import gpu_failures
+from dermis.gpu.frame import Timed
 from dermis.rendering.frame import Stages, draw_frame
 from dermis.rendering.inputs import Inputs
 from dermis.rendering.preparation import Preparation
@@ -39,7 +41,7 @@ class Renderer:
             self.stages = Stages(self.device)
         self._preparation = Preparation(self.device, self.stages, depth)
         self.prepare, self.forget = self._preparation.inputs, self._preparation.forget_all
-        self.profile_of = self._preparation.profile_of
+        self.profile_of, self.thin_parts = self._preparation.profile_of, self._preparation.thin_parts
         self._frames = 0
         self._in_flight: deque[int] = deque()
         self._opening_ms = 1e3 * (time.perf_counter() - started)
@@ -51,15 +53,17 @@ class Renderer:
         *,
         keep_shadows: bool = True,
         keep_stages: bool = False,
-        timed: bool = True,
+        timed: Timed = True,
         place: str = "",
     ) -> Rendered:
         """Render one frame and leave the image on the device.
 
         keep_shadows : False draws the shadow maps again even when no light moved
         keep_stages : True runs only stages whose results are not there already: for still and slow scenes
-        timed : False returns as soon as the frame is submitted, so that the device never waits for Python;
-            only when it is three frames behind is it waited for
+        timed : True times each stage in a pass of its own, which takes longer than the frame otherwise does;
+            "whole" times only the frame, with its stages in one pass; False returns as soon as the frame is
+            submitted, so that the device never waits for Python; only when it is three frames behind is it
+            waited for
         place : name of a scene among several drawn in turn: each keeps light and shadows of its own
 
         Raises DermisError for sizes over the device's limits and when the device fails.
@@ -106,18 +110,23 @@ class Renderer:
         return self.draw(scene, settings, keep_shadows=keep_shadows)
 
     def _submit(
-        self, frame: Frame, inputs: Inputs, keep_shadows: bool, keep_stages: bool, *, leaves: bool = False
+        self,
+        frame: Frame,
+        inputs: Inputs,
+        keep_shadows: bool,
+        keep_stages: bool,
+        leave: Callable[[Frame, Picture], Leaving] | None = None,
     ) -> Leaving | None:
         """Record and submit; after a failure nobody knows what the shadow maps and the atlas hold.
 
-        leaves : whether the picture's bytes go on their way to NumPy at once
+        leave : sends the picture on its way to NumPy at once
         """
         if not keep_shadows:
             inputs.shadow_maps.drawn = b""
         self.stages.shown.begin(keep_stages)
         try:
             draw_frame(frame, self.stages, inputs)
-            leaving = self.stages.pack.draw(frame, inputs.picture) if leaves else None
+            leaving = leave(frame, inputs.picture) if leave else None
             frame.submit()
         except Exception:
             inputs.shadow_maps.drawn = b""
@@ -142,30 +151,43 @@ class Renderer:
         """(h, w, 3) float32 linear Rec. 709 image; `settings` are those of `Settings`."""
         return self.draw(scene, Settings(**settings)).linear()
 
-    def render_many(self, scenes: Iterable[Scene], **settings: Any) -> Iterator[NDArray[np.uint8]]:
+    @overload
+    def render_many(
+        self, scenes: Iterable[Scene], *, linear: Literal[False] = False, **settings: Any
+    ) -> Iterator[NDArray[np.uint8]]: ...
+
+    @overload
+    def render_many(
+        self, scenes: Iterable[Scene], *, linear: Literal[True], **settings: Any
+    ) -> Iterator[NDArray[np.float32]]: ...
+
+    def render_many(
+        self, scenes: Iterable[Scene], *, linear: bool = False, **settings: Any
+    ) -> Iterator[NDArray[Any]]:
         """(h, w, 3) sRGB bytes of each scene in turn, each handed out while the next ones are drawn.
 
+        linear : float32 linear Rec. 709 instead, as of `render`
         settings : those of `Settings`, for all of them; heads and textures that scenes share are loaded once
 
         Raises DermisError as `draw` does.
         """
         chosen, leaving = Settings(**settings), deque[Leaving]()
         for scene in scenes:
-            leaving.append(self._send(scene, chosen))
+            leaving.append(self._send(scene, chosen, linear))
             if len(leaving) >= _IN_FLIGHT:
                 yield self._arrived(leaving.popleft())
         while leaving:
             yield self._arrived(leaving.popleft())
 
-    def _arrived(self, leaving: Leaving) -> NDArray[np.uint8]:
+    def _arrived(self, leaving: Leaving) -> NDArray[Any]:
         with gpu_failures(self.device):
             return leaving.image()
 
-    def _send(self, scene: Scene, settings: Settings) -> Leaving:
-        """Submit a frame and send its bytes on their way."""
+    def _send(self, scene: Scene, settings: Settings, linear: bool) -> Leaving:
+        """Submit a frame and send its picture on its way."""
         with gpu_failures(self.device):
             inputs, frame = self.prepare(scene, settings), Frame(self.device, timed=False)
-            leaving = self._submit(frame, inputs, True, False, leaves=True)
+            leaving = self._submit(frame, inputs, True, False, partial(self.stages.pack.draw, linear=linear))
         assert leaving is not None
         return leaving
 

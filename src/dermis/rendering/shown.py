@@ -51,12 +51,12 @@ def entered_key(inputs: Inputs, layout: Layout) -> tuple[Any, ...]:
     Numbers count by their bytes, textures and buffers by identity.
     """
     read = layout.lit | layout.atlas.resources
-    return inputs.light_switches, inputs.shadow_key, _identities(read)
+    return inputs.light_switches, inputs.shadow_key, inputs.scale, _identities(read)
 
 
 def scattered_key(inputs: Inputs) -> tuple[Any, ...]:
     """Everything that the light which leaves is made from."""
-    key: list[Any] = [inputs.settings.technique, inputs.edge, inputs.scale, _identity(inputs.levels.stack)]
+    key: list[Any] = [inputs.settings.technique, inputs.edge, _identity(inputs.levels.stack)]
     key += [part.tobytes() for part in (inputs.blurred_mm2, inputs.level_weight, inputs.clear)]
     for layout in inputs.layouts:
         key += [entered_key(inputs, layout), _identity(layout.scattered)]

@@ -13,16 +13,25 @@ _KEPT = 4  # the live skin, one to compare with, and those just before
 
 
 class SkinProfiles:
-    """Profiles of skins; each fit starts from the last one of its kind, which is several times faster."""
+    """Profiles of skins; each fit starts from the last one of its kind, which is several times faster.
+
+    A file is read, if it has changed, when another skin is asked for, and not for each frame of the same one.
+    """
 
     def __init__(self) -> None:
         self._fits: list[tuple[Skin, GaussianSum]] = []
+        self._newest: tuple[Skin, GaussianSum] | None = None
 
     def of(self, skin: Skin) -> GaussianSum:
         """The skin's Gaussians.
 
         Raises DermisError for pigments or layers of a profile that is not made of them.
         """
+        if self._newest is None or self._newest[0] is not skin:
+            self._newest = skin, self._found(skin)
+        return self._newest[1]
+
+    def _found(self, skin: Skin) -> GaussianSum:
         if not skin.layers and skin.pigments in (None, Pigments()):
             return load_profile(skin.profile)
         found = self._last(_tissue, skin)

@@ -19,6 +19,7 @@ from dermis.gpu.program import Resources
 from dermis.gpu.textures import texture_from
 from dermis.rendering.atlas_textures import AtlasTextures
 from dermis.rendering.geometry import HeadTextures
+from dermis.rendering.kept import Keep
 from dermis.rendering.lights import sun_lights
 from dermis.rendering.stages.occlusion import FORM, Occlusion, whole_map
 from dermis.rendering.surface import model_of
@@ -66,11 +67,14 @@ def _bordered(layer: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.concatenate([rows[:, -1:], rows, rows[:, :1]], axis=1)
 
 
-def with_suns(scene: Scene, surroundings: Surroundings) -> Scene:
+def with_suns(keep: Keep, scene: Scene, surroundings: Surroundings) -> Scene:
     """The scene with its environment's peaks among its lights."""
-    if scene.environment is None or not surroundings.suns:
+    environment = scene.environment
+    if environment is None or not surroundings.suns:
         return scene
-    return replace(scene, lights=(*scene.lights, *sun_lights(surroundings.suns, scene.environment)))
+    key = surroundings, environment
+    suns = keep("suns", key, lambda: sun_lights(surroundings.suns, environment))
+    return replace(scene, lights=(*scene.lights, *suns))
 
 
 def brightest(scene: Scene, surroundings: Surroundings) -> float:

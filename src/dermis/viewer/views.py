@@ -95,8 +95,7 @@ class Views:
                 refuse(
                     f"view {view}", "a level of light on the atlas", f"there are {len(found)}", _ATLAS_NEEDED
                 )
-            scale = inputs.levels.scale if LEVELS[view] else 1.0
-            return found[LEVELS[view]], settings.exposure / scale
+            return found[LEVELS[view]], settings.exposure / inputs.scale
         if view == "stretch":
             stretch = inputs.layouts[0].atlas.resources["stretch_map"]
             return stretch, self._mean_density(stretch)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dermis.gpu import ComputeProgram, Device, Frame, make_texture
 from dermis.optics.gaussians import MOST_GAUSSIANS
-from dermis.rendering.levels import ENTERED, Levels
+from dermis.rendering.levels import FLOATS, Levels
 from dermis.rendering.stages import SOURCE_SHADERS, STAGES, STORE_SHADERS, TILE
 
 
@@ -24,7 +24,7 @@ class Combine:
 
     def make_sum(self, side: int) -> Any:
         """Space for the sum."""
-        return make_texture(self._device, (side, side), ENTERED)
+        return make_texture(self._device, (side, side), FLOATS)
 
     def draw(
         self, frame: Frame, levels: Levels, weight: NDArray[np.float64], into: Any, transmitted: Any = None
@@ -63,7 +63,7 @@ class Combine:
         """The pass into the space between, or into the sum of 32-bit floats; made when first asked for."""
         key = (texel, between, coarser, transmitted)
         if key not in self._programs:
-            shaders = SOURCE_SHADERS[texel], STORE_SHADERS[texel if between else ENTERED]
+            shaders = SOURCE_SHADERS[texel], STORE_SHADERS[texel if between else FLOATS]
             chosen = {"COARSER": coarser, "TRANSMITTED": transmitted}
             self._programs[key] = ComputeProgram(self._device, STAGES / "combine.wgsl", shaders, chosen)
         return self._programs[key]

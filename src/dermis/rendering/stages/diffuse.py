@@ -11,7 +11,7 @@ from dermis.gpu import ComputeProgram, Device, Frame
 from dermis.gpu.textures import texture_from
 from dermis.rendering.atlas_textures import AtlasTextures
 from dermis.rendering.kernels import ROWS_PER_UNIT, SUMMED_TRUNCATION, TRUNCATION, WIDEST, kernel_table
-from dermis.rendering.levels import ENTERED, Levels, halvings_of, make_levels
+from dermis.rendering.levels import FLOATS, Levels, halvings_of, make_levels
 from dermis.rendering.stages import SOURCE_SHADERS, STAGES, STORE_SHADERS, TILE
 from dermis.rendering.stages.stitch import Stitch
 
@@ -31,13 +31,13 @@ class Diffuse:
 
     def __init__(self, device: Device, texel: str | None = None) -> None:
         self._device = device
-        self.texel = texel or (ENTERED if device.adapter.kind == "CPU" else "rgba16float")
-        self._stitch = {form: Stitch(device, form) for form in {ENTERED, self.texel}}
-        self._made: dict[tuple[str, bool, str], list[ComputeProgram]] = {}
+        self.texel = texel or (FLOATS if device.adapter.kind == "CPU" else "rgba16float")
+        self._stitch = Stitch(device, self.texel)
+        self._made: dict[tuple[bool, str], list[ComputeProgram]] = {}
         table = kernel_table()
         self._kernels = texture_from(device, np.dstack([table[:-1], table[1:]]), "rg32float")
         self._linear = device.sampler(mag_filter="linear", min_filter="linear")
-        self._halve = self._program("diffuse_halve.wgsl", self.texel)
+        self._halve = self._program("diffuse_halve.wgsl")
 
     def make_levels(self, size: int, count: int) -> Levels:
         """Space for the unblurred light and `count` blurred levels."""
@@ -57,21 +57,20 @@ class Diffuse:
 
         edge : one of EDGES, what lies beyond a chart's edge and its apron
         clear : the light that empty texels show when the edge is "cleared"
-        scale : what light is multiplied with in the blurred layers
+        scale : what light is multiplied with in the layers
         """
         sheets = (atlas, *(atlas.coarser if edge == "repeated" else ()))
         levels.halvings = halvings_of(variance_mm2, atlas.usual_per_mm, len(sheets) - 1)
         levels.scale = scale
-        source, before = levels.entering, 0.0
+        source, before = levels.layer(0), 0.0
         owed, paid = 0.0, 0.0
         for k, variance in enumerate(variance_mm2, start=1):
             finer, here = levels.halvings[k - 1 : k + 1]
-            texel, held = (ENTERED, 1.0) if k == 1 else (self.texel, scale)
-            self._stitch[texel].draw(frame, "diffuse", sheets[finer], source)
+            self._stitch.draw(frame, "diffuse", sheets[finer], source)
             if here > finer:
                 source = self._halved(frame, levels, source, k - 1)
             for along, blurred in zip(
-                self._along(texel, atlas.sheared, edge),
+                self._along(atlas.sheared, edge),
                 (levels.spare(here), levels.layer(k, here)),
                 strict=True,
             ):
@@ -84,12 +83,11 @@ class Diffuse:
                     owed=owed / 4.0 ** (here - finer),
                     paid_mm2=paid,
                     truncation=SUMMED_TRUNCATION if len(variance_mm2) > 1 else TRUNCATION,
-                    scale=scale / held,
-                    clear=held * np.asarray(clear),
+                    clear=scale * np.asarray(clear),
                 )
                 bound = {"spread": spread, "kernel_table": self._kernels, "source": source, "stored": blurred}
                 self._run(frame, along, sheets[here].resources | bound, levels.size >> here)
-                source, held = blurred, scale
+                source = blurred
             owed, paid = (_AVERAGED + _READ, variance - before) if here > finer else (0.0, 0.0)
             before = float(variance)
 
@@ -103,17 +101,15 @@ class Diffuse:
     def _run(self, frame: Frame, program: ComputeProgram, bound: dict[str, Any], side: int) -> None:
         frame.compute("diffuse", program, bound | {"linear": self._linear}, (side, side), TILE)
 
-    def _along(self, texel: str, sheared: bool, edge: str) -> list[ComputeProgram]:
-        """The passes along u, from texels of a format, and along v, made when first asked for."""
-        if (texel, sheared, edge) not in self._made:
+    def _along(self, sheared: bool, edge: str) -> list[ComputeProgram]:
+        """The passes along u and along v, made when first asked for."""
+        if (sheared, edge) not in self._made:
             table = {"ROWS_PER_UNIT": ROWS_PER_UNIT, "WIDEST": WIDEST}
             chosen = {**table, "SHEARED": sheared, "EDGE": EDGES.index(edge)}
-            self._made[texel, sheared, edge] = [
-                self._program("diffuse.wgsl", source, {"AXIS": axis, **chosen})
-                for axis, source in enumerate((texel, self.texel))
-            ]
-        return self._made[texel, sheared, edge]
+            passes = [self._program("diffuse.wgsl", {"AXIS": axis, **chosen}) for axis in (0, 1)]
+            self._made[sheared, edge] = passes
+        return self._made[sheared, edge]
 
-    def _program(self, name: str, source: str, constants: dict[str, float] | None = None) -> ComputeProgram:
-        shaders = SOURCE_SHADERS[source], STORE_SHADERS[self.texel]
+    def _program(self, name: str, constants: dict[str, float] | None = None) -> ComputeProgram:
+        shaders = SOURCE_SHADERS[self.texel], STORE_SHADERS[self.texel]
         return ComputeProgram(self._device, STAGES / name, shaders, constants)

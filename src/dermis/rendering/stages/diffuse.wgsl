@@ -23,8 +23,7 @@ struct Spread {
     owed: f32, // what the same added to the level before [texel^2]
     paid_mm2: f32, // and the variance it was taken off; the rest is taken off now
     truncation: f32, // taps reach this many standard deviations
-    scale: f32, // of what is stored over the source
-    clear: vec3f, // the light that empty texels show
+    clear: vec3f, // the light that empty texels show, as the levels have light
 }
 
 // One of the two blurs that make the Gaussian, in texels.
@@ -188,5 +187,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             break;
         }
     }
-    store(id.xy, vec4f(spread.scale * sum.rgb / sum.a, 1.0));
+    store(id.xy, vec4f(sum.rgb / sum.a, 1.0));
 }

@@ -6,25 +6,52 @@ from typing import Any
 
 from dermis.gpu import Device, Frame
 from dermis.rendering.layout import Layout
-from dermis.rendering.stages import STAGES
+from dermis.rendering.levels import FLOATS
+from dermis.rendering.stages import STAGES, STORE_SHADERS
 from dermis.rendering.stages.surface_texels import SurfaceTexels
 from dermis.rendering.stages.variants import Switches, Variants, lighting_switches
 
 
 class Irradiance:
-    """Lights each texel of the atlas."""
+    """Lights each texel of the atlas.
 
-    def __init__(self, device: Device) -> None:
+    texel : format of the levels that the light is usually for
+    """
+
+    def __init__(self, device: Device, texel: str) -> None:
+        self._device, self._variants = device, dict[str, Variants]()
         self._surfaces = SurfaceTexels(device)
-        self._variants = Variants(device, STAGES / "irradiance.wgsl")
         self._suited = lighting_switches(device)
-        self._variants.program(self._suited)
+        self._into(texel).program(self._suited)
 
-    def draw(self, frame: Frame, layout: Layout, switches: Switches, into: Any, size: int) -> None:
+    def draw(
+        self,
+        frame: Frame,
+        layout: Layout,
+        switches: Switches,
+        into: Any,
+        side: int,
+        texel: str = FLOATS,
+        scale: float = 1.0,
+    ) -> None:
         """Irradiance that passes the surface, times albedo^mix, into a texture of the atlas' size.
 
         switches : of the lights
+        texel : the texture's format
+        scale : what light is multiplied with there
         """
-        program = self._variants.program(switches + self._suited)
-        bound = {**layout.lit, "surfaces": self._surfaces.of(layout), "entered": into}
-        frame.compute("irradiance", program, bound, (size, size))
+        program = self._into(texel).program(switches + self._suited)
+        bound = {
+            **layout.lit,
+            "surfaces": self._surfaces.of(layout),
+            "entering": program.record("Entering", scale=scale),
+            "stored": into,
+        }
+        frame.compute("irradiance", program, bound, (side, side))
+
+    def _into(self, texel: str) -> Variants:
+        """The pipelines that store light in a format."""
+        if texel not in self._variants:
+            path, stores = STAGES / "irradiance.wgsl", (STORE_SHADERS[texel],)
+            self._variants[texel] = Variants(self._device, path, stores)
+        return self._variants[texel]

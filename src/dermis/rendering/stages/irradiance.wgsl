@@ -1,9 +1,14 @@
 // Light that enters the skin at each texel of the atlas, times the share of the colour map applied before scattering.
 //#include "lighting.wgsl"
 //#include "packed_surface.wgsl"
+//#include "store.wgsl"
+
+struct Entering {
+    scale: f32, // of what is stored over the light
+}
 
 @group(1) @binding(0) var surfaces: texture_2d_array<u32>; // as surface_texels.wgsl packs them
-@group(1) @binding(1) var entered: texture_storage_2d<rgba32float, write>;
+@group(1) @binding(1) var<uniform> entering: Entering;
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -13,12 +18,12 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let packed = Packed(textureLoad(surfaces, id.xy, 0, 0), textureLoad(surfaces, id.xy, 1, 0));
     if (packed.look.w == 0u) {
-        textureStore(entered, id.xy, vec4f(0.0));
+        store(id.xy, vec4f(0.0));
         return;
     }
     let surface = unpack_surface(packed);
     let open = open_at((vec2f(id.xy) + 0.5) / vec2f(size));
     // The view is of no account: what is reflected is left out, and the compiler leaves out its computation.
     let lit = light_up(unpack_point(packed), surface, surface.normal, open);
-    textureStore(entered, id.xy, vec4f(lit.entered * share_of(surface.colour, skin.mix), 1.0));
+    store(id.xy, vec4f(entering.scale * lit.entered * share_of(surface.colour, skin.mix), 1.0));
 }

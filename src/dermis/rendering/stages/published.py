@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dermis.gpu import ComputeProgram, Device, Frame, make_texture
 from dermis.rendering.atlas_textures import AtlasTextures
-from dermis.rendering.levels import ENTERED, Levels
+from dermis.rendering.levels import Levels
 from dermis.rendering.stages import STAGES
 
 TEXEL = "rgba16float"
@@ -24,14 +24,12 @@ class Published:
     def __init__(self, device: Device) -> None:
         self._device = device
         self._made: dict[str, list[Any]] = {}
-        self._halve = ComputeProgram(device, STAGES / "published_halves.wgsl")
 
     def make_levels(self, size: int, count: int) -> Levels:
-        """Space for the unblurred light, as floats, and `count` blurred levels."""
+        """Space for the unblurred light and `count` blurred levels."""
         stack = make_texture(self._device, (size, size), TEXEL, layers=max(2, count + 1))
         scratch, *stretch = (make_texture(self._device, (size, size), TEXEL) for _ in range(3))
-        light = make_texture(self._device, (size, size), ENTERED)
-        return Levels(stack, scratch, light, size, TEXEL, (0,) * (count + 1), stretch=tuple(stretch))
+        return Levels(stack, scratch, size, TEXEL, (0,) * (count + 1), stretch=tuple(stretch))
 
     def draw(
         self,
@@ -46,14 +44,16 @@ class Published:
         """Fill layer k with the light spread by variance_mm2[k - 1] (increasing).
 
         edge : "cleared", where empty texels show the light `clear`, or "skipped", where they are left out
-        scale : of no account; halves hold the light as it comes
+        scale : what light is multiplied with in the layers
         """
         sampler = self._device.sampler(mag_filter="linear", min_filter="linear")
         along, (stretch, spare) = self._along(edge), levels.stretch
-        self._begin(frame, levels)
+        levels.scale = scale
         source, before = atlas.resources["stretch_map"], 0.0
         for k, variance in enumerate(variance_mm2, start=1):
-            record = along[0].record("Spread", sigma_mm=np.sqrt(variance - before), clear=clear)
+            record = along[0].record(
+                "Spread", sigma_mm=np.sqrt(variance - before), clear=scale * np.asarray(clear)
+            )
             passes = (
                 (levels.layer(k - 1), source, levels.spare(), spare),
                 (levels.spare(), spare, levels.layer(k), stretch),
@@ -62,11 +62,6 @@ class Published:
                 bound = {"spread": record, "linear": sampler, "source": light, "stretch": wide}
                 self._run(frame, program, bound, (blurred, wider), levels.size)
             source, before = stretch, float(variance)
-
-    def _begin(self, frame: Frame, levels: Levels) -> None:
-        """Bring the light that enters into layer 0."""
-        bound = {"light": levels.entered, "halves": levels.layer(0)}
-        frame.compute("diffuse", self._halve, bound, (levels.size, levels.size))
 
     def _run(self, frame: Frame, program: Any, bound: dict[str, Any], into: Pair, side: int) -> None:
         """One pass into a texture of light and one of stretch."""

@@ -13,7 +13,7 @@ from dermis.gpu import Device, FragmentProgram, Frame, make_texture
 from dermis.optics.gaussians import MOST_GAUSSIANS
 from dermis.rendering.geometry import mesh_switches
 from dermis.rendering.layout import Layout
-from dermis.rendering.levels import ENTERED, Levels
+from dermis.rendering.levels import FLOATS, Levels
 from dermis.rendering.stages import SHARED_SHADERS, STAGES
 from dermis.rendering.stages.combine import Combine
 from dermis.rendering.stages.irradiance import Irradiance
@@ -47,14 +47,25 @@ class FragmentIrradiance(Irradiance):
         self._device, self._surfaces = device, SurfaceTexels(device)
         self._programs: dict[Switches, FragmentProgram] = {}
 
-    def draw(self, frame: Frame, layout: Layout, switches: Switches, into: Any, size: int) -> None:
+    def draw(
+        self,
+        frame: Frame,
+        layout: Layout,
+        switches: Switches,
+        into: Any,
+        side: int,
+        texel: str = TEXEL,
+        scale: float = 1.0,
+    ) -> None:
         """As `Irradiance.draw` does, into halves."""
         if switches not in self._programs:
             path, chosen = STAGES / "published_irradiance.wgsl", dict(switches + mesh_switches(self._device))
-            program = FragmentProgram(self._device, path, (SHARED_SHADERS,), chosen, targets=[TEXEL])
-            self._programs[switches] = program
-        bound = {**layout.lit, "surfaces": self._surfaces.of(layout)}
-        frame.fill("irradiance", self._programs[switches], bound, [into])
+            made = FragmentProgram(self._device, path, (SHARED_SHADERS,), chosen, targets=[TEXEL])
+            self._programs[switches] = made
+        program = self._programs[switches]
+        entering = program.record("Entering", scale=scale)
+        bound = {**layout.lit, "surfaces": self._surfaces.of(layout), "entering": entering}
+        frame.fill("irradiance", program, bound, [into])
 
 
 class FragmentBlurs(Published):
@@ -72,10 +83,7 @@ class FragmentBlurs(Published):
         stack = make_texture(self._device, (size, size), TEXEL, layers=layers, use="raster")
         scratch, *stretch = (make_texture(self._device, (size, size), TEXEL, use="raster") for _ in range(3))
         views = tuple(texture.create_view() for texture in stretch)
-        return Levels(stack, scratch, stack, size, TEXEL, (0,) * (count + 1), stretch=views)
-
-    def _begin(self, frame: Frame, levels: Levels) -> None:
-        """Layer 0 has what enters."""
+        return Levels(stack, scratch, size, TEXEL, (0,) * (count + 1), stretch=views)
 
     def _run(self, frame: Frame, program: Any, bound: dict[str, Any], into: Pair, side: int) -> None:
         frame.fill("diffuse", program, bound, into)
@@ -90,21 +98,21 @@ class FragmentSum(Combine):
 
     def __init__(self, device: Device) -> None:
         self._device = device
-        self._nothing = make_texture(device, (1, 1), ENTERED, use="map")
+        self._nothing = make_texture(device, (1, 1), FLOATS, use="map")
         self._sum = FragmentProgram(
-            device, STAGES / "published_sum.wgsl", (SHARED_SHADERS,), targets=[ENTERED]
+            device, STAGES / "published_sum.wgsl", (SHARED_SHADERS,), targets=[FLOATS]
         )
 
     def make_sum(self, side: int) -> Any:
         """Space for the sum."""
-        return make_texture(self._device, (side, side), ENTERED, use="raster")
+        return make_texture(self._device, (side, side), FLOATS, use="raster")
 
     def draw(
         self, frame: Frame, levels: Levels, weight: NDArray[np.float64], into: Any, transmitted: Any = None
     ) -> None:
         """As `Combine.draw` does, of levels that all have the whole resolution."""
         padded = np.zeros((MOST_GAUSSIANS, 4), np.float32)
-        padded[: len(weight), :3] = weight
+        padded[: len(weight), :3] = weight / levels.scale
         padded[0, 3] = 1.0
         through = transmitted is not None
         bound = {

@@ -3,7 +3,12 @@
 //#include "lighting.wgsl"
 //#include "packed_surface.wgsl"
 
+struct Entering {
+    scale: f32, // of what is stored over the light
+}
+
 @group(1) @binding(0) var surfaces: texture_2d_array<u32>; // as surface_texels.wgsl packs them
+@group(1) @binding(1) var<uniform> entering: Entering;
 
 @fragment
 fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
@@ -15,5 +20,5 @@ fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let surface = unpack_surface(packed);
     let open = open_at(at.xy / vec2f(textureDimensions(surfaces)));
     let lit = light_up(unpack_point(packed), surface, surface.normal, open);
-    return vec4f(lit.entered * share_of(surface.colour, skin.mix), 1.0);
+    return vec4f(entering.scale * lit.entered * share_of(surface.colour, skin.mix), 1.0);
 }

@@ -21,10 +21,13 @@ _MOST = 12  # pipelines of a shader: a software adapter's take some 7 MB each
 
 
 class Variants:
-    """The pipelines of a shader that computes from the mesh, by its switches: those that were used last."""
+    """The pipelines of a shader that computes from the mesh, by its switches: those that were used last.
 
-    def __init__(self, device: Device, path: Path) -> None:
-        self._device, self._path = device, path
+    folders : of the shaders that it includes, besides those that all share
+    """
+
+    def __init__(self, device: Device, path: Path, folders: tuple[Path, ...] = ()) -> None:
+        self._device, self._path, self._folders = device, path, (SHARED_SHADERS, *folders)
         self._programs: dict[Switches, ComputeProgram] = {}
 
     def program(self, switches: Switches = ()) -> ComputeProgram:
@@ -32,7 +35,7 @@ class Variants:
         made = self._programs.pop(switches, None)
         if made is None:
             every = dict(switches + mesh_switches(self._device))
-            made = ComputeProgram(self._device, self._path, (SHARED_SHADERS,), every)
+            made = ComputeProgram(self._device, self._path, self._folders, every)
         self._programs[switches] = made  # the last one
         for oldest in list(self._programs)[:-_MOST]:
             del self._programs[oldest]
