@@ -94,7 +94,7 @@ def test_the_floor_by_hand(renderer: Renderer, head_file: str, tmp_path: Path) -
     light = texel_bytes(moved.inputs.levels.stack)
     apron = moved.inputs.layouts[0].atlas.apron.size // 16
     assert apron > 0
-    assert found["irradiance"] == moved.texels * (32 + 4 + 16)
+    assert found["irradiance"] == moved.texels * (32 + 4 + light)
     assert found["diffuse"] == moved.texels * (2 * light + 8 + 8) + apron * (16 + 2 * light)
     assert set(found) >= {"shadows", "irradiance", "diffuse", "combine", "visibility", "shade", "post"}
 

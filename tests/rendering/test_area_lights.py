@@ -129,7 +129,7 @@ def test_parts_are_numpys(renderer: Renderer, kind: str, part: int) -> None:
     assert (towards[..., 3] == 1).all()
 
 
-def test_a_stripe_is_as_wide_as_asked(renderer: Renderer) -> None:
+def test_a_stripe_is_as_wide_as_asked(renderer: Renderer, close: float) -> None:
     """1/e^2 of the middle at half its width, nothing beyond its ends."""
     light = StripeLight(
         direction=(0, 0, -1),
@@ -142,7 +142,7 @@ def test_a_stripe_is_as_wide_as_asked(renderer: Renderer) -> None:
     made, points = entered(renderer, FLOOR, light)
     exact = 2 * np.exp(-2 * ((points[..., 0] - 10) / 12) ** 2) * (np.abs(points[..., 1]) < 50)
     inside = np.abs(np.abs(points[..., 1]) - 50) > 3
-    assert np.abs(made[..., 0] - exact)[inside].max() < TWIN * 2
+    assert np.abs(made[..., 0] - exact)[inside].max() < close * 2
 
 
 def visibility(renderer: Renderer, head: Any, light: Light, size: int = 1024) -> tuple[Floats, Floats]:

@@ -17,7 +17,7 @@ from dermis.assets.atlas import Atlas, build_atlas
 from dermis.assets.mesh import Mesh
 from dermis.assets.primitives import uv_sphere, wedge
 from dermis.assets.thin_parts.links import Links, _in_cells, find_links
-from dermis.assets.thin_parts.samples import giving, taking
+from dermis.assets.thin_parts.samples import Samples, giving, surface, taking, texels
 from dermis.gpu import Device, download
 from dermis.optics.diffusion.transmission import through_gaussians
 from dermis.optics.gaussians import GaussianSum
@@ -42,9 +42,14 @@ def found() -> tuple[Mesh, Atlas, Links]:
     return mesh, atlas, find_links(mesh, atlas, SIGMA)
 
 
+def given_by(mesh: Mesh, atlas: Atlas, side: int) -> Samples:
+    """All that give light, whether something lies opposite or not."""
+    return giving(mesh, atlas, texels(atlas), side, np.ones(len(mesh.triangles), bool))
+
+
 def test_the_places_stand_for_all_of_the_surface(found: tuple[Mesh, Atlas, Links]) -> None:
     mesh, atlas, links = found
-    given = giving(mesh, atlas, len(links.receiver))
+    given = given_by(mesh, atlas, len(links.receiver))
     corners = mesh.positions[mesh.triangles].astype(float)
     area = np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
@@ -56,8 +61,10 @@ def test_the_places_stand_for_all_of_the_surface(found: tuple[Mesh, Atlas, Links
 
 def test_twin_of_what_lies_opposite(found: tuple[Mesh, Atlas, Links]) -> None:
     mesh, atlas, links = found
-    given = giving(mesh, atlas, len(links.receiver))
-    taken, radius = taking(mesh, atlas, given), float(links.radius_mm)
+    given = given_by(mesh, atlas, len(links.receiver))
+    held = surface(atlas, texels(atlas), given.side)
+    taken = taking(mesh, atlas, held, np.ones(len(mesh.triangles), bool))
+    radius = float(links.radius_mm)
     shape = thin_twins.lie(taken, given, radius)
     far = np.stack([thin_twins.along(atlas, taken, given, radius, same) for same in (1.6, 0.4)])
     far[1] += 2.0 / atlas.stretch[atlas.own].min()  # what nine texels' mean may add
@@ -80,7 +87,7 @@ def test_twin_of_what_lies_opposite(found: tuple[Mesh, Atlas, Links]) -> None:
 def test_a_narrow_profile_asks_for_no_more_cells_than_memory_holds() -> None:
     mesh = uv_sphere(100.0, 8)
     atlas = build_atlas(mesh, 64, "stitched")
-    sources = _in_cells(giving(mesh, atlas, 64), 0.01)
+    sources = _in_cells(given_by(mesh, atlas, 64), 0.01)
     assert sources.size.prod() < 2**22
     assert len(find_links(mesh, atlas, 0.01).source) == 0
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -62,9 +64,9 @@ class Diffuse:
         sheets = (atlas, *(atlas.coarser if edge == "repeated" else ()))
         levels.halvings = halvings_of(variance_mm2, atlas.usual_per_mm, len(sheets) - 1)
         levels.scale = scale
-        source, before = levels.layer(0), 0.0
-        owed, paid = 0.0, 0.0
-        for k, variance in enumerate(variance_mm2, start=1):
+        source = levels.layer(0)
+        truncation = SUMMED_TRUNCATION if len(variance_mm2) > 1 else TRUNCATION
+        for k, added in enumerate(_added(variance_mm2, levels.halvings), start=1):
             finer, here = levels.halvings[k - 1 : k + 1]
             self._stitch.draw(frame, "diffuse", sheets[finer], source)
             if here > finer:
@@ -75,21 +77,11 @@ class Diffuse:
                 strict=True,
             ):
                 spread = along.record(
-                    "Spread",
-                    variance_mm2=variance - before,
-                    before_mm2=before,
-                    resampled=_AVERAGED + _READ if here > finer else 0.0,
-                    to_come=sum(_READ / 4**times for times in range(here)),
-                    owed=owed / 4.0 ** (here - finer),
-                    paid_mm2=paid,
-                    truncation=SUMMED_TRUNCATION if len(variance_mm2) > 1 else TRUNCATION,
-                    clear=scale * np.asarray(clear),
+                    "Spread", truncation=truncation, clear=scale * np.asarray(clear), **added
                 )
                 bound = {"spread": spread, "kernel_table": self._kernels, "source": source, "stored": blurred}
                 self._run(frame, along, sheets[here].resources | bound, levels.size >> here)
                 source = blurred
-            owed, paid = (_AVERAGED + _READ, variance - before) if here > finer else (0.0, 0.0)
-            before = float(variance)
 
     def _halved(self, frame: Frame, levels: Levels, source: Any, k: int) -> Any:
         """Layer k at half its resolution."""
@@ -113,3 +105,19 @@ class Diffuse:
     def _program(self, name: str, constants: dict[str, float] | None = None) -> ComputeProgram:
         shaders = SOURCE_SHADERS[self.texel], STORE_SHADERS[self.texel]
         return ComputeProgram(self._device, STAGES / name, shaders, constants)
+
+
+def _added(variance_mm2: NDArray[np.float64], halvings: tuple[int, ...]) -> Iterator[dict[str, float]]:
+    """What each level adds to the one before, and halving to both, as the shader's struct Spread has it."""
+    before = owed = paid = 0.0
+    for variance, (finer, here) in zip(variance_mm2, pairwise(halvings), strict=True):
+        halved = _AVERAGED + _READ if here > finer else 0.0
+        yield {
+            "variance_mm2": variance - before,
+            "before_mm2": before,
+            "resampled": halved,
+            "to_come": sum(_READ / 4**times for times in range(here)),
+            "owed": owed / 4 ** (here - finer),
+            "paid_mm2": paid,
+        }
+        owed, paid, before = halved, variance - before, float(variance)
