@@ -67,15 +67,16 @@ fn take(index: u32, place: u32, view: u32) {
     let pixels = triangle.box.size.x * triangle.box.size.y;
     if (pixels > 0u && pixels <= SMALL) {
         draw_small(index, triangle, view);
+        mark_box(triangle.box, view);
     }
     if (pixels > SMALL) {
         taken[place] = triangle;
-        list_blocks(triangle, place);
+        list_blocks(triangle, place, view);
     }
 }
 
 // Those that the triangle may cover. Where there is no space it counts as large: what is drawn twice is the same.
-fn list_blocks(triangle: Drawn, place: u32) {
+fn list_blocks(triangle: Drawn, place: u32, view: u32) {
     let first = first_block(triangle.box);
     let size = blocks_of(triangle.box);
     if (size.x * size.y > MOST_BLOCKS) {
@@ -87,6 +88,7 @@ fn list_blocks(triangle: Drawn, place: u32) {
     for (var k = vec2u(0u); k.y < size.y; k = wrapped(k + vec2u(1u, 0u), size.x)) {
         covered |= select(0u, 1u << (k.y * size.x + k.x), may_cover(triangle, most, first + k));
     }
+    mark_box(triangle.box, view); // once, for many blocks lie in one tile
     let count = countOneBits(covered);
     var at = atomicAdd(&block_count, count);
     if (at + count > LISTED) {
@@ -116,6 +118,9 @@ fn draw_large(index: u32, triangle: Drawn, turn: u32, lane: u32, view: u32) {
     let size = blocks_of(triangle.box);
     for (var k = wrapped(vec2u(turn, 0u), size.x); k.y < size.y; k = wrapped(k + vec2u(TEAMS, 0u), size.x)) {
         if (may_cover(triangle, most, first + k)) {
+            for (var s = lane; s < SAMPLES; s += TEAM) {
+                mark((first + k) * BLOCK / TILE, view * SAMPLES + s);
+            }
             draw_block(index, triangle, first + k, lane, view);
         }
     }
@@ -124,9 +129,6 @@ fn draw_large(index: u32, triangle: Drawn, turn: u32, lane: u32, view: u32) {
 // One invocation's part of a block: a pixel, or one in every few rows where each has but one sample.
 fn draw_block(index: u32, triangle: Drawn, block: vec2u, lane: u32, view: u32) {
     let pixel = block * BLOCK + vec2u(lane % BLOCK, lane / BLOCK);
-    for (var s = lane; s < SAMPLES; s += TEAM) {
-        mark(block * BLOCK / TILE, view * SAMPLES + s);
-    }
     let at = pixel - triangle.box.low; // left of and above the box it is greater than any size
     if (SAMPLES > 1u) {
         draw_samples(index, triangle, at, all(at < triangle.box.size), view);
@@ -153,15 +155,6 @@ fn draw_small(index: u32, triangle: Drawn, view: u32) {
                 let texels = texel_of(low + vec2u(0u, y), view) + four;
                 let place = views.sample[0].xy;
                 draw_four(index, triangle, place.x + vec4f(four), vec4f(place.y + f32(y)), four < vec4u(size.x), texels);
-            }
-        }
-    }
-    let first = low / TILE;
-    let last = (low + size - 1u) / TILE;
-    for (var y = first.y; y <= last.y; y++) {
-        for (var x = first.x; x <= last.x; x++) {
-            for (var s = 0u; s < SAMPLES; s++) {
-                mark(vec2u(x, y), view * SAMPLES + s);
             }
         }
     }
@@ -194,7 +187,19 @@ fn texel_of(pixel: vec2u, layer: u32) -> u32 {
     return (layer * views.height + pixel.y) * views.width + pixel.x;
 }
 
-// Something is drawn in a tile.
+fn mark_box(box: Box, view: u32) {
+    let first = box.low / TILE;
+    let last = (box.low + box.size - 1u) / TILE;
+    for (var y = first.y; y <= last.y; y++) {
+        for (var x = first.x; x <= last.x; x++) {
+            for (var s = 0u; s < SAMPLES; s++) {
+                mark(vec2u(x, y), view * SAMPLES + s);
+            }
+        }
+    }
+}
+
+// Something may be drawn in a tile.
 fn mark(tile: vec2u, layer: u32) {
     if (RECORDED != AS_FOUND) {
         atomicStore(&tiles[tile_at(tile, layer)], DRAWN);
