@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,6 +34,8 @@ class Hands:
         """The picture when nothing moves any more."""
         for _ in range(60):
             self.frame()
+            while self.viewer.desk.studio.is_searching:  # which takes time, not frames
+                time.sleep(0.005)
             if self.viewer.is_still:
                 return self.frame()
         raise AssertionError("the viewer does not come to rest")

@@ -60,6 +60,7 @@ def test_each_motion_moves_the_picture_and_nothing_else_is_computed(hands: Any, 
     assert "diffuse" in ran["melanin"]
     assert all(one["frames_per_s"] > 0.0 and one["processor_ms"] > 0.0 for one in found.values())
     assert {one["frames"] for one in found.values()} == {plan.frames}
+    assert all(one["frame_ms"] <= one["late_frame_ms"] <= one["longest_frame_ms"] for one in found.values())
 
 
 def test_delays_are_those_of_pictures_that_follow(hands: Any, plan: Any) -> None:
@@ -110,8 +111,8 @@ def test_a_section_that_fails_leaves_what_came_before_and_the_reason(tmp_path: P
 
     def broken(clock: Any) -> Any:
         assert clock.left_s <= 10.0
-        one = {"frames_per_s": 50.0, "frame_ms": 20.0, "processor_ms": 10.0, "stages": ["post"]}
-        yield "camera", one
+        one = {"frames_per_s": 50.0, "frame_ms": 20.0, "late_frame_ms": 25.0, "longest_frame_ms": 90.0}
+        yield "camera", one | {"processor_ms": 10.0, "stages": ["post"]}
         raise RuntimeError("the page does not come to rest")
 
     plan = {"head": "bust", "size": (240, 160), "atlas": 64, "samples": 1}
@@ -122,7 +123,8 @@ def test_a_section_that_fails_leaves_what_came_before_and_the_reason(tmp_path: P
     written = json.loads((tmp_path / "told.json").read_text(encoding="utf-8"))
     assert written["speed"]["camera"]["frame_ms"] == 20.0
     assert "RuntimeError: the page does not come to rest" in written["speed"]["ended"]
-    assert "| camera | 50.0 |" in tables(written) and "speed ended early" in tables(written)
+    told = tables(written)
+    assert "| camera | 50.0 | 20.0 | 25.0, 90.0 | 10.0 | post |" in told and "speed ended early" in told
 
 
 def test_a_server_that_tells_no_address_is_told_with_its_last_words(plan: Any) -> None:

@@ -32,13 +32,15 @@ class SkinProfiles:
         return self._newest[1]
 
     def _found(self, skin: Skin) -> GaussianSum:
+        known = self._last(_tissue, skin)
         if not skin.layers and skin.pigments in (None, Pigments()):
-            return load_profile(skin.profile)
-        found = self._last(_tissue, skin)
-        if found is None:
-            found = skin, fit_profile(tissue_of(skin), skin.profile, self._near(skin))
-        self._fits = [*(fit for fit in self._fits if fit is not found), found][-_KEPT:]
-        return found[1]
+            profile = load_profile(skin.profile)
+        elif known:
+            profile = known[1]
+        else:
+            profile = fit_profile(tissue_of(skin), skin.profile, self._near(skin))
+        self._fits = [*(fit for fit in self._fits if fit is not known), (skin, profile)][-_KEPT:]
+        return profile
 
     def _near(self, skin: Skin) -> GaussianSum | None:
         fit = self._last(_kind, skin)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Future
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.assets.atlas import Atlas
 from dermis.assets.cache import cached_links, links_key
+from dermis.assets.head import Head
 from dermis.assets.mesh import Mesh
 from dermis.gpu import Device
+from dermis.rendering.kept import Kept
 from dermis.rendering.stages.opposite import Opposite, Pairs, source_level, upload_pairs
 from dermis.rendering.stages.transmission import Thin
 from dermis.scene.settings import Settings
@@ -37,6 +42,67 @@ def pairs_of(device: Device, mesh: Mesh, atlas: Atlas, widest_mm: float, *, chan
     """
     key = "" if changing else links_key(mesh, atlas, widest_mm)
     return upload_pairs(device, cached_links(mesh, atlas, widest_mm), key)
+
+
+@dataclass
+class Latest:
+    """What was found last for a head and an atlas, and the search that was begun last."""
+
+    pairs: Pairs | None = None
+    search: Future[Pairs] | None = None
+
+
+class ThinParts:
+    """The places of heads that lie opposite each other, looked for on another thread.
+
+    patient : whether frames wait for it; else those of the last skin stand in while the search goes on
+    """
+
+    def __init__(self, device: Device, kept: Kept) -> None:
+        self._device, self._kept = device, kept
+        self.patient = True
+        self._awaited: Future[Pairs] | None = None
+
+    @property
+    def provisional(self) -> bool:
+        """Whether something stood in for what is looked for in the frame that was begun last."""
+        return self._awaited is not None
+
+    @property
+    def searching(self) -> bool:
+        """Whether what that frame should have shown is still looked for."""
+        return self._awaited is not None and not self._awaited.done()
+
+    def begin(self) -> None:
+        """Begin a frame."""
+        self._awaited = None
+
+    def pairs(self, index: int, head: Head, atlas: Atlas, widest_mm: float, *, changing: bool) -> Pairs:
+        """What `pairs_of` says, or a skin's of other width.
+
+        index : of the layout
+        """
+
+        def search() -> Future[Pairs]:
+            return self._device.beside.submit(
+                pairs_of, self._device, head.mesh, atlas, widest_mm, changing=changing
+            )
+
+        latest = self._kept.keep(f"latest pairs {index}", (head, atlas), Latest)
+        if latest.pairs is None or latest.search is None or self.patient or latest.search.done():
+            latest.search = self._kept.keep(f"pairs {index}", (head, atlas, repr(widest_mm)), search)
+            if latest.pairs is None or self.patient or latest.search.done():
+                latest.pairs = self._result(latest.search)
+                return latest.pairs
+        self._awaited = latest.search
+        return latest.pairs
+
+    def _result(self, search: Future[Pairs]) -> Pairs:
+        try:
+            return search.result()
+        except Exception:
+            self._kept.forget_all()  # a search that failed must not be found again
+            raise
 
 
 def thin_of(device: Device, stage: Opposite, pairs: Pairs, variance_mm2: Floats, weight: Floats) -> Thin:

@@ -18,10 +18,10 @@ struct Look {
     jitter: array<vec4f, 64>,
 }
 
-@group(1) @binding(0) var<uniform> look: Look;
-@group(1) @binding(1) var seen: texture_2d_array<u32>;
-@group(1) @binding(2) var layer: texture_2d<f32>; // of the atlas: light, stretch, or thickness [mm]
-@group(1) @binding(3) var bytes: texture_storage_2d<rgba8uint, write>;
+@group(0) @binding(30) var<uniform> look: Look;
+@group(0) @binding(31) var seen: texture_2d_array<u32>;
+@group(0) @binding(32) var layer: texture_2d<f32>; // of the atlas: light, stretch, or thickness [mm]
+@group(0) @binding(33) var bytes: texture_storage_2d<rgba8uint, write>;
 
 // Share of the lights' own light that arrives; back faces see none.
 fn lit_share(point: Point) -> f32 {

@@ -122,10 +122,15 @@ class Studio:
     @property
     def is_current(self) -> bool:
         """Whether the last image is a still one, with all that its settings ask for."""
-        if not self._shown or self._provisional:
+        if not self._shown or self._provisional or (self._frozen and self._frozen.provisional):
             return False
         state, _, settings = self._shown
         return self._settings(state, self._size, moving=False) == settings
+
+    @property
+    def is_searching(self) -> bool:
+        """Whether a still image would have to wait for what stands in now."""
+        return self._provisional and self._thin_parts.searching
 
     def screenshot(self, path: Path, state: ViewerState, size: tuple[int, int]) -> None:
         """Write what the state shows at any size: .png with the tone curve, or .exr, linear.

@@ -103,7 +103,8 @@ class Viewer:
         if state is not self._last_seen or camera != before or size != self._last_size:
             self._last_change, self._last_seen, self._last_size = now, state, size
         self._last_draw = now
-        images = self._images(state, camera, size, self._is_moving(now))
+        moving = self._is_moving(now) or desk.studio.is_searching
+        images = self._images(state, camera, size, moving)
         desk.messages.status = self._status(size)
         target = self._context.get_current_texture().create_view()
         self._blit.draw(self._patches(*images, size), target)

@@ -13,18 +13,20 @@ from numpy.typing import NDArray
 
 from dermis.assets.atlas import Atlas
 from dermis.assets.mesh import Mesh
-from dermis.assets.thin_parts.samples import Samples, giving, shown, taking, texel_mm
+from dermis.assets.thin_parts.facing import facing
+from dermis.assets.thin_parts.samples import Samples, giving, shown, surface, taking, texel_mm, texels
 
 if TYPE_CHECKING:
     from dermis.assets.thin_parts.compiled.linking import Sources
 
-Found = tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float32]]
-FORM = 10
+Found = tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.uint16]]
+FORM = 11
 """Differs when finding gives other results."""
 _REACH = 3.2  # standard deviations of the widest Gaussian that two places are apart at most
 _SPACING = 0.36  # of the places, in the same unit: what is read between them is smooth
 _WIDEST_MM = 10.0  # pairs through wax, which spreads light farther, would be too many
 _MOST_CELLS = 2**21  # of the grid that is searched; narrow profiles would ask for thousands of times more
+_ROOM = 3.0  # spacings that a place may be away from the triangle that it stands for
 _PARTS = 16  # of the search, shared by the processor's cores
 
 
@@ -61,20 +63,33 @@ def find_links(mesh: Mesh, atlas: Atlas, widest_mm: float) -> Links:
     widest = min(widest_mm, _WIDEST_MM)
     radius, fine = _REACH * widest, texel_mm(atlas)
     side = min(atlas.size, int(np.ceil(atlas.size * fine / (_SPACING * widest))))
-    given = giving(mesh, atlas, side)
-    taken = taking(mesh, atlas, given)
-    found = _search(atlas, given, taken, radius)
-    return _packed(given, taken, *found, radius, fine * atlas.size / side)
+    seen = texels(atlas)
+    held = surface(atlas, seen, side)
+    spacing = fine * atlas.size / side
+    thin = facing(mesh, _mapped(mesh, atlas), radius + _ROOM * spacing)
+    given = giving(mesh, atlas, seen, side, thin)
+    taken = taking(mesh, atlas, held, thin)
+    found = _search(atlas, given, taken, shown(atlas, seen, given), radius)
+    return _packed(given, taken, held, *found, radius, spacing)
 
 
-def _search(atlas: Atlas, given: Samples, taken: Samples, radius_mm: float) -> Found:
+def _mapped(mesh: Mesh, atlas: Atlas) -> NDArray[np.bool_]:
+    """(f,) triangles that the atlas shows."""
+    found = np.zeros(len(mesh.triangles) + 1, bool)
+    found[atlas.triangle] = True  # the last one for none
+    return found[:-1]
+
+
+def _search(
+    atlas: Atlas, given: Samples, taken: Samples, shown: NDArray[np.int32], radius_mm: float
+) -> Found:
     """How many links each place has that takes light, where they begin, and how they lie."""
     from dermis.assets.thin_parts.compiled.linking import Map, Receivers, link
 
-    receivers = Receivers(taken.position, taken.normal, taken.texel)
-    sources = _in_cells(given, radius_mm / 3.0)
-    stretch, shear = atlas.stretch.astype(np.float32), atlas.shear.astype(np.float32)
-    flat = Map(stretch, shear, atlas.reach.astype(np.int32), shown(atlas, given))
+    x, y = taken.texel.T
+    stretch, shear = (array[y, x].astype(np.float32) for array in (atlas.stretch, atlas.shear))
+    receivers = Receivers(taken.position, taken.normal, taken.texel, stretch, shear)
+    sources, flat = _in_cells(given, radius_mm / 3.0), Map(atlas.reach, shown)
     count = np.zeros(len(taken.cell), np.int64)
     ends = [len(count) * k // _PARTS for k in range(_PARTS + 1)]
     # The compiled loop releases the interpreter, so that threads share the work.
@@ -89,24 +104,25 @@ def _search(atlas: Atlas, given: Samples, taken: Samples, radius_mm: float) -> F
 def _packed(
     given: Samples,
     taken: Samples,
+    surface: NDArray[np.bool_],
     count: NDArray[np.int64],
     index: NDArray[np.int32],
-    lie: NDArray[np.float32],
+    lie: NDArray[np.uint16],
     radius_mm: float,
     spacing_mm: float,
 ) -> Links:
     """The links without what nobody uses."""
-    used, source = np.unique(index, return_inverse=True)
-    thin = count > 0
-    receiver = np.zeros((given.side, given.side), np.int32)
-    receiver[taken.cell[:, 1], taken.cell[:, 0]] = np.where(thin, np.cumsum(thin) + 1, 1)
+    asked, thin = np.zeros(len(given.cell), bool), count > 0
+    asked[index] = True
+    used, number = np.flatnonzero(asked), np.cumsum(asked, dtype=np.uint32) - np.uint32(1)
+    receiver = surface.astype(np.int32)
+    receiver[taken.cell[thin, 1], taken.cell[thin, 0]] = np.arange(2, 2 + thin.sum())
     first = np.concatenate([[0, 0, 0], np.cumsum(count[thin])])
-    unit = np.array([radius_mm, radius_mm, radius_mm, 1.0])
     return Links(
         receiver,
         first.astype(np.uint32),
-        source.astype(np.uint32),
-        np.rint(np.minimum(lie / unit, 1.0) * 65535.0).astype(np.uint16),
+        number[index],
+        lie,
         given.texel[used].astype(np.uint16),
         given.area_mm2[used].astype(np.float32),
         np.array(radius_mm),
@@ -129,4 +145,4 @@ def _in_cells(given: Samples, cell_mm: float) -> Sources:
     index = place[:, 0] + size[0] * (place[:, 1] + size[1] * place[:, 2])
     order = np.argsort(index, kind="stable")
     first = np.searchsorted(index[order], np.arange(size.prod() + 1))
-    return Sources(given.position, given.normal, low, cell_mm, size, first, order)
+    return Sources(given.position[order], given.normal[order], low, cell_mm, size, first, order)

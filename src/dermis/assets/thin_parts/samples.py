@@ -12,7 +12,7 @@ from dermis.assets.mesh import Mesh
 
 Index = NDArray[np.int64]
 Floats = NDArray[np.float64]
-_INSIDE = 0.1  # texels; the place of a texel beside a chart is on its edge, or in another chart
+Chosen = NDArray[np.bool_]
 _ENOUGH = 1024  # texels a side among which the cells' places are chosen
 
 
@@ -40,18 +40,48 @@ def texel_mm(atlas: Atlas) -> float:
     return float(1.0 / np.sqrt(np.median(density))) if len(density) else 1.0
 
 
-def giving(mesh: Mesh, atlas: Atlas, side: int) -> Samples:
-    """For each cell that holds surface of its own, all of that, and the texel nearest the middle."""
-    stride = max(1, atlas.size // max(_ENOUGH, side))
-    y, x = (stride * axis for axis in np.nonzero(atlas.own[::stride, ::stride]))
-    inside = np.abs(_place(atlas, x, y) - np.stack([x, y], axis=-1)).max(axis=1) < _INSIDE
-    x, y = x[inside], y[inside]
+@dataclass(frozen=True)
+class Texels:
+    """What the texels of an atlas show.
+
+    nearest : (n, n, 2) the texel, x and y from -1 to n, at or beside which the surface is
+    inside : (n, n) those that own it, but for the edges of charts
+    """
+
+    nearest: NDArray[np.int16]
+    inside: NDArray[np.bool_]
+
+
+def texels(atlas: Atlas) -> Texels:
+    """Of an atlas."""
+    from dermis.assets.thin_parts.compiled.texels import places
+
+    nearest, inside = places(atlas.triangle, atlas.barycentric, atlas.place)
+    return Texels(nearest, inside & atlas.own)
+
+
+def surface(atlas: Atlas, seen: Texels, side: int) -> NDArray[np.bool_]:
+    """(side, side) cells that hold surface, and those beside them that show where it goes on."""
+    held, middle = np.zeros((side, side), bool), middles(atlas.size, side)
+    every = _stride(atlas, side)
+    y, x = (every * axis * side // atlas.size for axis in np.nonzero(seen.inside[::every, ::every]))
+    held[y, x] = True
+    return _widened(held) & (atlas.triangle[np.ix_(middle, middle)] >= 0)
+
+
+def giving(mesh: Mesh, atlas: Atlas, seen: Texels, side: int, thin: Chosen) -> Samples:
+    """For each cell that holds surface of its own, all of that, and the texel nearest the middle.
+
+    thin : (f,) triangles; cells without them, and without a neighbour that has some, are left out
+    """
+    every = _stride(atlas, side)
+    y, x = (every * axis for axis in np.nonzero(_asked(atlas, seen, side, thin)[::every, ::every]))
     column, row = x * side // atlas.size, y * side // atlas.size
     cell, ratio = row * side + column, atlas.size / side
     off = np.hypot(x + 0.5 - (column + 0.5) * ratio, y + 0.5 - (row + 0.5) * ratio)
     order = np.lexsort((off, cell))
     kept = order[np.flatnonzero(np.diff(cell[order], prepend=-1))]
-    mm2 = stride**2 * _texel_mm2(mesh, atlas)[atlas.triangle[y, x]]
+    mm2 = every**2 * _texel_mm2(mesh, atlas)[atlas.triangle[y, x]]
     weighed = mm2[:, None] * np.column_stack([np.ones(len(x)), _position(mesh, atlas, x, y)])
     area, *moment = (np.bincount(cell, part)[cell[kept]] for part in weighed.T)
     normal = _normal(mesh, atlas, x[kept], y[kept])
@@ -60,23 +90,30 @@ def giving(mesh: Mesh, atlas: Atlas, side: int) -> Samples:
     return Samples(side, *chosen, centre, normal, area)
 
 
-def taking(mesh: Mesh, atlas: Atlas, given: Samples) -> Samples:
-    """The middles of cells that hold surface, and of those beside them that show where it goes on."""
-    from scipy.ndimage import binary_dilation
+def _asked(atlas: Atlas, seen: Texels, side: int, thin: Chosen) -> Chosen:
+    """(n, n) texels in cells with chosen triangles, or beside such."""
+    cell = np.arange(atlas.size) * side // atlas.size
+    y, x = np.nonzero(thin[atlas.triangle] & seen.inside)
+    held = np.zeros((side, side), bool)
+    held[cell[y], cell[x]] = True
+    return _widened(held)[np.ix_(cell, cell)] & seen.inside
 
-    held = np.zeros((given.side, given.side), bool)
-    held[given.cell[:, 1], given.cell[:, 0]] = True
-    middle = middles(atlas.size, given.side)
-    row, column = np.nonzero(
-        binary_dilation(held, np.ones((3, 3), bool)) & atlas.coverage[np.ix_(middle, middle)]
-    )
+
+def taking(mesh: Mesh, atlas: Atlas, surface: Chosen, thin: Chosen) -> Samples:
+    """The middles of cells with surface.
+
+    thin : (f,) triangles; cells that show another are left out
+    """
+    side = len(surface)
+    middle = middles(atlas.size, side)
+    row, column = np.nonzero(surface & thin[atlas.triangle[np.ix_(middle, middle)]])
     cell = np.stack([column, row], axis=-1)
     x, y = middle[cell].T
     at = _position(mesh, atlas, x, y), _normal(mesh, atlas, x, y)
-    return Samples(given.side, cell, middle[cell], *at, np.zeros(len(cell)))
+    return Samples(side, cell, middle[cell], *at, np.zeros(len(cell)))
 
 
-def shown(atlas: Atlas, given: Samples) -> NDArray[np.int32]:
+def shown(atlas: Atlas, seen: Texels, given: Samples) -> NDArray[np.int32]:
     """(n, n) the sample at or beside whose texel each texel's light is; -1 where none is.
 
     In the aprons that is one from elsewhere.
@@ -85,11 +122,19 @@ def shown(atlas: Atlas, given: Samples) -> NDArray[np.int32]:
     x, y = given.texel.T + 1
     for dy, dx in (*np.ndindex(3, 3), (1, 1)):  # a sample's own texel last
         beside[y + dy - 1, x + dx - 1] = np.arange(len(x))
-    y, x = np.nonzero(atlas.coverage)
-    place = np.clip(np.rint(_place(atlas, x, y)).astype(np.int64) + 1, 0, atlas.size + 1)
-    found = np.full((atlas.size, atlas.size), -1, np.int32)
-    found[y, x] = beside[place[:, 1], place[:, 0]]
-    return found
+    return np.where(atlas.coverage, beside[seen.nearest[..., 1] + 1, seen.nearest[..., 0] + 1], -1)
+
+
+def _widened(cells: Chosen) -> Chosen:
+    """Cells, and all around them."""
+    padded = np.pad(cells, 1)
+    rows = padded[:-2] | padded[1:-1] | padded[2:]
+    return np.asarray(rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:])
+
+
+def _stride(atlas: Atlas, side: int) -> int:
+    """Between the texels that cells are made of."""
+    return max(1, atlas.size // max(_ENOUGH, side))
 
 
 def middles(size: int, side: int) -> Index:
@@ -100,13 +145,6 @@ def middles(size: int, side: int) -> Index:
 def _position(mesh: Mesh, atlas: Atlas, x: Index, y: Index) -> Floats:
     """(n, 3) of texels [mm]."""
     return _interpolated(mesh, atlas, x, y, mesh.positions)
-
-
-def _place(atlas: Atlas, x: Index, y: Index) -> Floats:
-    """(n, 2) where in the atlas the surface is that texels show [texel], whole numbers at texel centres."""
-    b = atlas.barycentric[y, x] / 65535.0
-    a, *rest = (atlas.place[:, k][atlas.triangle[y, x]].astype(np.float64) for k in range(3))
-    return np.asarray((a + sum(b[:, k, None] * (rest[k] - a) for k in range(2))) * atlas.size - 0.5)
 
 
 def _normal(mesh: Mesh, atlas: Atlas, x: Index, y: Index) -> Floats:

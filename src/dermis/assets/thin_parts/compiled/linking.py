@@ -12,14 +12,21 @@ from dermis.assets.machine_code import compiled
 
 Doubles = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Metric = tuple[float, float, float]  # texels per mm along u and v, and the cosine between these
 
-_ASKEW, _OPPOSED = 0.5, -0.2  # cosines of two normals from which and to which a place counts more and more
+ASKEW = 0.5
+"""Cosine of two normals from which a place counts."""
+
+_OPPOSED = -0.2  # to which it counts more and more
 _NEIGHBOURS = 3.0  # texels within which nine around one lie
 _ACROSS_AIR = -0.5  # mean cosine to the inward normals at which two places only see each other from outside
 
 
 class Sources(NamedTuple):
-    """Places that give light: position, normal (n, 3), and the cells of a grid that list them."""
+    """Places that give light: position, normal (n, 3), in the order in which the cells of a grid list them.
+
+    listed : (n,) the number of each
+    """
 
     position: Doubles
     normal: Doubles
@@ -31,22 +38,26 @@ class Sources(NamedTuple):
 
 
 class Receivers(NamedTuple):
-    """Places that take light: position, normal (m, 3), and texel (m, 2) of the atlas (x, y)."""
+    """Places that take light: position, normal (m, 3), and texel (m, 2) of the atlas (x, y).
+
+    stretch, shear : (m, 2) and (m,) there, as `Atlas` has them
+    """
 
     position: Doubles
     normal: Doubles
     texel: Integers
+    stretch: NDArray[np.float32]
+    shear: NDArray[np.float32]
 
 
 class Map(NamedTuple):
-    """How the surface lies in the atlas, as `Atlas` has it.
+    """What the atlas shows.
 
+    reach : as `Atlas` has it
     shown : (n, n) the source whose light each texel shows, -1 for none
     """
 
-    stretch: NDArray[np.float32]
-    shear: NDArray[np.float32]
-    reach: NDArray[np.int32]
+    reach: NDArray[np.uint16]
     shown: NDArray[np.int32]
 
 
@@ -73,11 +84,11 @@ def link(
     flat: Map,
     radius_mm: float,
     count: Integers,
-) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+) -> tuple[NDArray[np.int32], NDArray[np.uint16]]:
     """Sources (l,) of some receivers, one after the other, and (l, 4) how they lie.
 
     That is: depth under the source's tangent plane, distance beside its normal, distance along the surface
-    (infinite where no blur leads there) [mm]; share that counts, from 0 to 1.
+    [1/65535 of the radius; 65535 where no blur leads there]; share that counts [1/65535].
 
     part : first receiver, and the one after the last
     count : (m,) sources of each receiver, to be written
@@ -87,14 +98,15 @@ def link(
     texels = int((flat.shown >= 0).sum())  # in aprons any number of them may show one source
     hits = Hits(np.empty(texels, np.int32), np.empty(texels, np.float32))
     away = Along(np.full(most, np.inf, np.float32), np.zeros(most, np.float32), np.zeros(most, np.int32))
-    index, lie = np.empty(1 << 16, np.int32), np.empty((1 << 16, 4), np.float32)
+    index, lie = np.empty(1 << 16, np.int32), np.empty((1 << 16, 4), np.uint16)
     total = 0
     for i in range(part[0], part[1]):
         n = _look_around(receivers.position[i], receivers.normal[i], sources, radius_mm, found, shape)
         count[i] = n
         if n == 0:
             continue
-        marked = _spread(receivers.texel[i], flat, radius_mm, hits, away)
+        metric = receivers.stretch[i, 0], receivers.stretch[i, 1], receivers.shear[i]
+        marked = _spread(receivers.texel[i], metric, flat, radius_mm, hits, away)
         for k in range(n):
             j = found[k]
             shape[k, 2] = away.sum[j] / away.number[j] if away.number[j] else np.inf
@@ -103,9 +115,18 @@ def link(
             index = np.concatenate((index, np.empty_like(index)))
             lie = np.concatenate((lie, np.empty_like(lie)))
         index[total : total + n] = found[:n]
-        lie[total : total + n] = shape[:n]
+        for k in range(n):
+            for m in range(3):
+                lie[total + k, m] = _part(shape[k, m] / radius_mm)
+            lie[total + k, 3] = _part(shape[k, 3])
         total += n
     return index[:total], lie[:total]
+
+
+@compiled
+def _part(share: float) -> int:
+    """A number of 0 to 1 [1/65535]."""
+    return int(np.rint(min(share, 1.0) * 65535.0))
 
 
 @compiled
@@ -131,9 +152,8 @@ def _look_around(
         for y in range(low[1], high[1] + 1):
             row = sources.size[0] * (y + sources.size[1] * z)
             for q in range(sources.first[row + low[0]], sources.first[row + high[0] + 1]):
-                j = sources.listed[q]
-                if _opposite(place, normal, sources.position[j], sources.normal[j], radius_mm, shape[n]):
-                    found[n] = j
+                if _opposite(place, normal, sources.position[q], sources.normal[q], radius_mm, shape[n]):
+                    found[n] = sources.listed[q]
                     n += 1
     return n
 
@@ -148,17 +168,19 @@ def _opposite(
     shape: NDArray[np.float32],
 ) -> bool:
     """Whether a place lies opposite through flesh; writes depth, distance beside and share."""
-    square, below, depth, cosine = 0.0, 0.0, 0.0, 0.0
+    cosine = normal[0] * its_normal[0] + normal[1] * its_normal[1] + normal[2] * its_normal[2]
+    if cosine >= ASKEW:  # as on most of the surface around
+        return False
+    square, below, depth = 0.0, 0.0, 0.0
     for k in range(3):
         to = other[k] - place[k]
         square += to * to
         below -= to * normal[k]
         depth += to * its_normal[k]
-        cosine += normal[k] * its_normal[k]
-    if square >= radius_mm * radius_mm or cosine >= _ASKEW:
+    if square >= radius_mm * radius_mm:
         return False
     inward = 0.5 * (below + depth) / math.sqrt(max(square, 1e-12))
-    share = _rise(_ASKEW, _OPPOSED, cosine) * _rise(_ACROSS_AIR, 0.0, inward)
+    share = _rise(ASKEW, _OPPOSED, cosine) * _rise(_ACROSS_AIR, 0.0, inward)
     shape[0] = abs(depth)
     shape[1] = math.sqrt(max(0.0, square - depth * depth))
     shape[3] = share
@@ -173,15 +195,15 @@ def _rise(start: float, end: float, x: float) -> float:
 
 
 @compiled
-def _spread(texel: Integers, flat: Map, radius_mm: float, hits: Hits, away: Along) -> int:
+def _spread(texel: Integers, metric: Metric, flat: Map, radius_mm: float, hits: Hits, away: Along) -> int:
     """Distance in the map to every source that a blur brings light from; returns how many texels show one.
 
     Up to nine texels show a source, each from a little off: the mean over those around the nearest counts.
     """
-    n = _texels_around(texel, flat, radius_mm, hits)
+    n = _texels_around(texel, metric, flat, radius_mm, hits)
     for k in range(n):
         away.nearest[hits.source[k]] = min(away.nearest[hits.source[k]], hits.distance[k])
-    apart = _NEIGHBOURS / min(flat.stretch[texel[1], texel[0], 0], flat.stretch[texel[1], texel[0], 1])
+    apart = _NEIGHBOURS / min(metric[0], metric[1])
     for k in range(n):
         j = hits.source[k]
         if hits.distance[k] <= away.nearest[j] + apart:
@@ -191,11 +213,11 @@ def _spread(texel: Integers, flat: Map, radius_mm: float, hits: Hits, away: Alon
 
 
 @compiled
-def _texels_around(texel: Integers, flat: Map, radius_mm: float, hits: Hits) -> int:
+def _texels_around(texel: Integers, metric: Metric, flat: Map, radius_mm: float, hits: Hits) -> int:
     """How many texels that a blur reads show a source; writes which, and the distance in the map."""
     n, size = 0, len(flat.shown)
     x, y = texel[0], texel[1]
-    u, v, cosine = flat.stretch[y, x, 0], flat.stretch[y, x, 1], flat.shear[y, x]
+    u, v, cosine = metric
     straight = math.sqrt(max(1e-3, 1.0 - cosine * cosine))
     wide, high = int(radius_mm * u / straight), int(radius_mm * v / straight)
     for dv in range(-min(high, flat.reach[y, x, 2], y), min(high, flat.reach[y, x, 3], size - 1 - y) + 1):
