@@ -16,7 +16,7 @@ from dermis.assets.head import Head
 from dermis.assets.maps import Maps
 from dermis.assets.mesh import Mesh
 from dermis.assets.primitives import wedge
-from dermis.assets.thin_parts.samples import giving
+from dermis.assets.thin_parts.samples import giving, texels
 from dermis.gpu import Frame, download
 from dermis.optics.diffusion.transmission import through_gaussians
 from dermis.optics.gaussians import GaussianSum
@@ -83,7 +83,8 @@ def slabs(renderer: dermis.Renderer) -> str:
 
 def across_air(mesh: Mesh, way: Array, places: Array, normals: Array) -> Array:
     """Red light that the sum brings to places from others which face them and not their inside."""
-    given = giving(mesh, cached_atlas(mesh, ATLAS, "stitched"), ATLAS // 2)
+    atlas = cached_atlas(mesh, ATLAS, "stitched")
+    given = giving(mesh, atlas, texels(atlas), ATLAS // 2, np.ones(len(mesh.triangles), bool))
     flux = given.area_mm2 * np.maximum(given.normal @ -way, 0.0)
     lit = np.flatnonzero(flux)
     near = cKDTree(given.position[lit]).query_ball_point(places, 4.0 * np.sqrt(BLURRED.variance_mm2[-1]))
