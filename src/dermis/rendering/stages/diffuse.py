@@ -12,7 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.gpu import ComputeProgram, Device, Frame
 from dermis.gpu.textures import texture_from
 from dermis.rendering.atlas_textures import AtlasTextures
-from dermis.rendering.kernels import ROWS_PER_UNIT, SUMMED_TRUNCATION, TRUNCATION, WIDEST, kernel_table
+from dermis.rendering.kernels import (
+    NARROW,
+    ROWS_PER_UNIT,
+    SUMMED_TRUNCATION,
+    TRUNCATION,
+    WIDEST,
+    kernel_table,
+)
 from dermis.rendering.levels import FLOATS, Levels, halvings_of, make_levels
 from dermis.rendering.stages import SOURCE_SHADERS, STAGES, STORE_SHADERS, TILE
 from dermis.rendering.stages.stitch import Stitch
@@ -65,7 +72,8 @@ class Diffuse:
         levels.halvings = halvings_of(variance_mm2, atlas.usual_per_mm, len(sheets) - 1)
         levels.scale = scale
         source = levels.layer(0)
-        truncation = SUMMED_TRUNCATION if len(variance_mm2) > 1 else TRUNCATION
+        first = np.sqrt(variance_mm2[0]) * atlas.usual_per_mm  # [texel]
+        alone = len(variance_mm2) == 1 or first > NARROW
         for k, added in enumerate(_added(variance_mm2, levels.halvings), start=1):
             finer, here = levels.halvings[k - 1 : k + 1]
             self._stitch.draw(frame, "diffuse", sheets[finer], source)
@@ -76,9 +84,8 @@ class Diffuse:
                 (levels.spare(here), levels.layer(k, here)),
                 strict=True,
             ):
-                spread = along.record(
-                    "Spread", truncation=truncation, clear=scale * np.asarray(clear), **added
-                )
+                cut = TRUNCATION if alone and k == 1 else SUMMED_TRUNCATION
+                spread = along.record("Spread", truncation=cut, clear=scale * np.asarray(clear), **added)
                 bound = {"spread": spread, "kernel_table": self._kernels, "source": source, "stored": blurred}
                 self._run(frame, along, sheets[here].resources | bound, levels.size >> here)
                 source = blurred
