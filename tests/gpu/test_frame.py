@@ -152,7 +152,7 @@ def test_bind_groups_are_kept(device: Device, scale: ComputeProgram) -> None:
     image, into = (make_texture(device, SIZE, "r32float") for _ in range(2))
     bound = [{"factor": record_of(scale, value), "image": image, "scaled": into} for value in (1, 2)]
     uniforms = Uniforms(device)
-    (first, _), (second, _) = (scale.bind_groups(one, uniforms)[0] for one in bound)
+    (first, _), (second, _) = (scale.bind_group(one, uniforms) for one in bound)
     assert first is second  # other numbers, the same group
 
 
@@ -163,7 +163,7 @@ def test_bind_groups_go_with_what_they_bind(device: Device) -> None:
     for _ in range(3):
         into = make_texture(device, SIZE, "r32float")
         bound = {"factor": record_of(program, 1), "image": image, "scaled": into}
-        (group, _), *_ = program.bind_groups(bound, uniforms)
+        group, _ = program.bind_group(bound, uniforms)
         assert len(program.kept_groups) == 1
         gone = weakref.ref(group)
         del group, into, bound
@@ -191,7 +191,7 @@ class Resource:
 def test_resources_that_go_one_after_another_are_followed_no_more() -> None:
     """Else what takes their place in memory would be taken for them, with groups that bind what is gone."""
     groups, first, second = BindGroups(), Resource(), Resource()
-    groups.keep(key_of(0, [first, second]), [first, second], "group")
+    groups.keep(key_of([first, second]), [first, second], "group")
     del first
     assert len(groups) == 0 and groups.followed == 1
     del second
@@ -200,7 +200,7 @@ def test_resources_that_go_one_after_another_are_followed_no_more() -> None:
 
 def test_a_forgotten_resource_is_named(device: Device, scale: ComputeProgram) -> None:
     with pytest.raises(KeyError, match=r"scale\.wgsl declares 'image'"):
-        scale.bind_groups({"factor": record_of(scale, 1)}, Uniforms(device))
+        scale.bind_group({"factor": record_of(scale, 1)}, Uniforms(device))
 
 
 def test_untimed_frames_tell_no_times(device: Device, scale: ComputeProgram) -> None:

@@ -1,10 +1,10 @@
 // What a half-space does by directions, for pairs of cosines.
 //#include "direction.wgsl"
 
-@group(1) @binding(0) var cosines: texture_2d<f32>; // of coming in, of leaving
-@group(1) @binding(1) var back: texture_storage_2d<rgba32float, write>;
-@group(1) @binding(2) var beyond: texture_storage_2d<rgba32float, write>;
-@group(1) @binding(3) var around: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(30) var cosines: texture_2d<f32>; // of coming in, of leaving
+@group(0) @binding(31) var back: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(32) var beyond: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(33) var around: texture_storage_2d<rgba32float, write>;
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {

@@ -4,11 +4,11 @@
 //#include "skin.wgsl"
 //#include "environment.wgsl"
 
-@group(1) @binding(0) var normals: texture_2d<f32>; // and the open share of the sky
-@group(1) @binding(1) var smooth_normals: texture_2d<f32>; // and the albedo
-@group(1) @binding(2) var views: texture_2d<f32>; // and the roughness
-@group(1) @binding(3) var around: texture_storage_2d<rgba32float, write>;
-@group(1) @binding(4) var mirror: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(30) var normals: texture_2d<f32>; // and the open share of the sky
+@group(0) @binding(31) var smooth_normals: texture_2d<f32>; // and the albedo
+@group(0) @binding(32) var views: texture_2d<f32>; // and the roughness
+@group(0) @binding(33) var around: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(34) var mirror: texture_storage_2d<rgba32float, write>;
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {

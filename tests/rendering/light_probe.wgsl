@@ -7,11 +7,11 @@ struct Part {
     index: u32,
 }
 
-@group(1) @binding(0) var<uniform> part: Part;
-@group(1) @binding(1) var points: texture_2d<f32>;
-@group(1) @binding(2) var normals: texture_2d<f32>;
-@group(1) @binding(3) var towards: texture_storage_2d<rgba32float, write>; // and the visibility
-@group(1) @binding(4) var arriving: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(30) var<uniform> part: Part;
+@group(0) @binding(31) var points: texture_2d<f32>;
+@group(0) @binding(32) var normals: texture_2d<f32>;
+@group(0) @binding(33) var towards: texture_storage_2d<rgba32float, write>; // and the visibility
+@group(0) @binding(34) var arriving: texture_storage_2d<rgba32float, write>;
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {

@@ -1,9 +1,9 @@
 // What the surface reflects of the scene's lights, for given normals, views and roughness.
 //#include "lighting.wgsl"
 
-@group(1) @binding(0) var normals: texture_2d<f32>;
-@group(1) @binding(1) var views: texture_2d<f32>; // and the roughness
-@group(1) @binding(2) var mirror: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(30) var normals: texture_2d<f32>;
+@group(0) @binding(31) var views: texture_2d<f32>; // and the roughness
+@group(0) @binding(32) var mirror: texture_storage_2d<rgba32float, write>;
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {

@@ -4,10 +4,10 @@
 //#include "skin.wgsl"
 //#include "lobe.wgsl"
 
-@group(1) @binding(0) var to_light: texture_2d<f32>; // and the roughness
-@group(1) @binding(1) var to_eye: texture_2d<f32>; // and rho_s
-@group(1) @binding(2) var reflected: texture_storage_2d<rgba32float, write>;
-@group(1) @binding(3) var passed: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(30) var to_light: texture_2d<f32>; // and the roughness
+@group(0) @binding(31) var to_eye: texture_2d<f32>; // and rho_s
+@group(0) @binding(32) var reflected: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(33) var passed: texture_storage_2d<rgba32float, write>;
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {

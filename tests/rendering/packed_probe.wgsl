@@ -2,12 +2,12 @@
 //#include "lighting.wgsl"
 //#include "packed_surface.wgsl"
 
-@group(1) @binding(0) var directions: texture_2d<f32>; // normals
-@group(1) @binding(1) var colours: texture_2d<f32>; // and the height over the facet
-@group(1) @binding(2) var normal: texture_storage_2d<rgba32float, write>;
-@group(1) @binding(3) var bent: texture_storage_2d<rgba32float, write>;
-@group(1) @binding(4) var colour: texture_storage_2d<rgba32float, write>;
-@group(1) @binding(5) var places: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(30) var directions: texture_2d<f32>; // normals
+@group(0) @binding(31) var colours: texture_2d<f32>; // and the height over the facet
+@group(0) @binding(32) var normal: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(33) var bent: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(34) var colour: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(35) var places: texture_storage_2d<rgba32float, write>;
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {

@@ -9,10 +9,10 @@ struct Footprint {
     side: f32, // of the uv square's side
 }
 
-@group(1) @binding(0) var atlas: texture_2d<u32>;
-@group(1) @binding(1) var<uniform> footprint: Footprint;
-@group(1) @binding(2) var relief: texture_storage_2d<rgba32float, write>; // normal, roughness
-@group(1) @binding(3) var arriving: texture_storage_2d<rgba32float, write>; // visibility, cosine of the smooth normal
+@group(0) @binding(30) var atlas: texture_2d<u32>;
+@group(0) @binding(31) var<uniform> footprint: Footprint;
+@group(0) @binding(32) var relief: texture_storage_2d<rgba32float, write>; // normal, roughness
+@group(0) @binding(33) var arriving: texture_storage_2d<rgba32float, write>; // visibility, cosine of the smooth normal
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {

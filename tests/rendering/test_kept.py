@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 
 from dermis.errors import DermisError
-from dermis.optics.profiles import load_profile
+from dermis.optics.gaussians import GaussianSum
+from dermis.optics.profiles import fit_profile, load_profile
+from dermis.optics.tissue import Tissue
 from dermis.rendering.kept import Kept
 from dermis.rendering.skin_profiles import SkinProfiles
 from dermis.rendering.thin_parts import shared_width
@@ -66,6 +68,22 @@ def test_pigments_are_fitted_near_what_a_fresh_fit_finds() -> None:
     radius = [0.1, 0.5, 2.0]
     assert near.albedo == pytest.approx(fresh.albedo, rel=2e-3)
     assert near.within(radius) == pytest.approx(fresh.within(radius), rel=5e-3, abs=1e-4)
+
+
+def test_the_first_move_of_a_slider_starts_from_the_profile_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    starts, profiles = list[GaussianSum | None](), SkinProfiles()
+
+    def fit(tissue: Tissue, name: str, near: GaussianSum | None) -> GaussianSum:
+        starts.append(near)
+        return fit_profile(tissue, name, near)
+
+    monkeypatch.setattr("dermis.rendering.skin_profiles.fit_profile", fit)
+    plain = profiles.of(Skin(profile="light"))
+    first, fresh = profiles.of(skin(melanin=0.03)), load_profile("light", {"melanin": 0.03})
+    assert starts == [plain]
+    assert first.albedo == pytest.approx(fresh.albedo, rel=1e-4)
+    profiles.of(Skin(profile="dark", pigments=Pigments(melanin=0.03)))
+    assert starts[1] is None
 
 
 def test_the_same_pigments_are_not_fitted_again() -> None:

@@ -77,10 +77,10 @@ def shown(
     settings = settings_of(size=SIZE, samples=samples)
     inputs = renderer.prepare(scene_of(head, frontal(), camera=camera), settings)
     frame = Frame(renderer.device)
-    finder.draw(frame, "nearest", layers, inputs.camera_clips, inputs.head)
+    finder.draw(frame, "nearest", layers, inputs.camera, inputs.head)
     frame.submit()
     made = [download(renderer.device, layers.texture, layer=k) for k in range(layers.count)]
-    return made, inputs.camera_clips
+    return made, inputs.camera.matrices(SIZE)
 
 
 SOUP = soup(600)

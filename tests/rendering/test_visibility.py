@@ -83,7 +83,7 @@ def nearest(
     inputs = run_frame(renderer, scene, size=SIZE, samples=samples)
     finder = Nearest(renderer.device, triangles=triangles, compute=compute)
     layers, frame = finder.make_layers(SIZE, samples), Frame(renderer.device)
-    finder.draw(frame, "nearest", layers, inputs.camera_clips, inputs.head)
+    finder.draw(frame, "nearest", layers, inputs.camera, inputs.head)
     frame.submit()
     return [download(renderer.device, layers.texture, layer=k) for k in range(samples)]
 
@@ -147,7 +147,7 @@ def test_nothing_is_left_of_the_view_before(renderer: Renderer, triangles: bool)
     for turned, layers in ((False, used), (True, used), (True, fresh)):
         inputs = run_frame(renderer, view_of(HEADS["sphere"], turned), size=SIZE, samples=2)
         frame = Frame(renderer.device)
-        finder.draw(frame, "nearest", layers, inputs.camera_clips, inputs.head)
+        finder.draw(frame, "nearest", layers, inputs.camera, inputs.head)
         frame.submit()
     for layer in range(2):
         left, right = (download(renderer.device, layers.texture, layer=layer) for layers in (used, fresh))

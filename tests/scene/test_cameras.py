@@ -7,7 +7,7 @@ import pytest
 from small_head import SIZE, write_head
 
 from dermis.assets.head import Head, load_head
-from dermis.rendering.inputs import camera_clips, pinhole
+from dermis.rendering.inputs import camera_views, pinhole
 from dermis.scene import Camera, Settings
 from dermis.scene.camera import PRESETS
 
@@ -19,8 +19,7 @@ def head(tmp_path_factory: pytest.TempPathFactory) -> Head:
 
 def _seen(camera: Camera, head: Head, points: np.ndarray) -> np.ndarray:
     """Places of points [mm, relative to the head's centre] in the image: x to the right, y up, -1..1."""
-    settings = Settings(size=(64, 64), samples=1)
-    clip = camera_clips(pinhole(camera, head, settings), head.mesh, settings)[0]
+    (clip,) = camera_views(pinhole(camera, head, Settings(size=(64, 64))), head.mesh, 1).clips
     world = np.column_stack((points + head.centre_mm, np.ones(len(points))))
     x, y, _, w = clip @ world.T
     assert (w > 0).all()

@@ -41,7 +41,7 @@ def moved_by(device: Device, inputs: Inputs, vertices: int) -> Moved:
     """Counts after a frame was drawn."""
     texels = np.count_nonzero(download(device, inputs.layouts[0].atlas.resources["atlas"])[..., 0])
     seen = np.count_nonzero(download(device, inputs.picture.bytes)[..., 3])
-    maps, layers = inputs.shadow_maps.texture, range(len(inputs.light_clips))
+    maps, layers = inputs.shadow_maps.texture, range(len(inputs.shadow_views.clips))
     shadowing = sum(int(np.count_nonzero(download(device, maps, layer=layer))) for layer in layers)
     return Moved(inputs, int(texels), int(seen), shadowing, vertices)
 
@@ -56,7 +56,7 @@ def stage_bytes(moved: Moved) -> dict[str, float]:
     pixels, shadow = picture.size[0] * picture.size[1], inputs.shadow_maps.texture
     samples = inputs.settings.samples * texel_bytes(inputs.seen.texture)
     geometry = _CORNERS * inputs.head.triangles + _PLACE * moved.vertices
-    looked_up = len(inputs.light_clips) * texel_bytes(shadow)
+    looked_up = len(inputs.shadow_views.clips) * texel_bytes(shadow)
     radiance = texel_bytes(picture.radiance)
     shaded = moved.seen * (looked_up + texel_bytes(inputs.scattered)) + _maps(inputs, moved.seen)
     found: dict[str, float] = {

@@ -10,7 +10,7 @@ Key = tuple[int, ...]
 
 
 class BindGroups:
-    """Bind groups by the identity of what they bind.
+    """A program's bind groups by the identity of all that they bind.
 
     A group lets go of its resources' memory only when it goes itself, so it is forgotten as soon as one of
     them is no longer held elsewhere.
@@ -56,13 +56,10 @@ class BindGroups:
         _, keys = self._users.pop(name)
         for key in keys:
             self._groups.pop(key, None)
-            for other in set(key[1:]) & self._users.keys():
+            for other in set(key) & self._users.keys():
                 self._users[other][1].discard(key)
 
 
-def key_of(number: int, resources: Sequence[Any]) -> Key:
-    """What tells a group from others.
-
-    number : which of a program's groups it is
-    """
-    return (number, *map(id, resources))
+def key_of(resources: Sequence[Any]) -> Key:
+    """What tells a program's group for these resources from its others."""
+    return tuple(map(id, resources))

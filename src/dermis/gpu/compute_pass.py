@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any, NamedTuple
+
+from dermis.gpu.device import Device
 
 
 class Step(NamedTuple):
     """A dispatch as the native library takes it.
 
-    bound : each bind group, how many uniforms it has, and their offsets
+    bound, uniforms, offsets : the bind group, how many uniforms it has, and their offsets
     groups : workgroups along each axis
     """
 
     stage: str
     pipeline: Any
-    bound: Sequence[tuple[Any, int, Any]]
+    bound: Any
+    uniforms: int
+    offsets: Any
     groups: tuple[int, int, int]
 
 
@@ -26,13 +30,11 @@ class ComputePass:
     what is wrong in a pass until the encoder finishes. It also holds on to what a pass binds.
     """
 
-    def __init__(self, encoder: Any, label: str, timestamps: Any) -> None:
-        from wgpu.backends.wgpu_native import ffi, lib
-
-        self._lib = lib
+    def __init__(self, device: Device, encoder: Any, label: str, timestamps: Any) -> None:
+        self._lib = lib = device.lib
         if timestamps is None:
-            begun = lib.wgpuCommandEncoderBeginComputePass(encoder._internal, ffi.NULL)
-            self._handle = ffi.gc(begun, lib.wgpuComputePassEncoderRelease)
+            begun = lib.wgpuCommandEncoderBeginComputePass(encoder._internal, device.ffi.NULL)
+            self._handle = device.ffi.gc(begun, lib.wgpuComputePassEncoderRelease)
         else:
             self._pass = encoder.begin_compute_pass(label=label, timestamp_writes=timestamps)
             self._handle = self._pass._internal
@@ -42,10 +44,9 @@ class ComputePass:
         handle, set_pipeline = self._handle, self._lib.wgpuComputePassEncoderSetPipeline
         set_bind_group = self._lib.wgpuComputePassEncoderSetBindGroup
         dispatch = self._lib.wgpuComputePassEncoderDispatchWorkgroups
-        for _, pipeline, bound, (x, y, z) in steps:
+        for _, pipeline, bound, uniforms, offsets, (x, y, z) in steps:
             set_pipeline(handle, pipeline)
-            for index, (group, count, offsets) in enumerate(bound):
-                set_bind_group(handle, index, group, count, offsets)
+            set_bind_group(handle, 0, bound, uniforms, offsets)
             dispatch(handle, x, y, z)
 
     def end(self) -> None:

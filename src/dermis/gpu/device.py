@@ -39,10 +39,16 @@ class Device:
 
     beside : threads for what the driver and the disk do by themselves: compile, read, copy; what they have
         not begun when the device is dropped is left
+    ffi, lib, checked : the native library, for the calls of every frame, without what wgpu's Python adds;
+        calls of `checked` raise what the library finds wrong, in passes when their encoder is submitted
     spare_records : memory in which no frame gathers its numbers at the moment; new memory takes longer
     """
 
     def __init__(self, adapter: Adapter, reason: str) -> None:
+        from wgpu.backends.wgpu_native import ffi, lib
+        from wgpu.backends.wgpu_native._api import libf
+
+        self.ffi, self.lib, self.checked = ffi, lib, libf
         self.adapter = adapter
         self.reason = reason
         try:
@@ -66,29 +72,28 @@ class Device:
         self.fetching: set[Any] = set()
         self._samplers: dict[tuple[tuple[str, str], ...], Any] = {}
 
-    def submit(self, commands: Any) -> int:
-        """Hand a command buffer over; returns its number, to wait for."""
-        from wgpu.backends.wgpu_native import ffi
-        from wgpu.backends.wgpu_native._api import libf
+    def write(self, buffer: Any, data: bytearray, size: int) -> None:
+        """Put the first `size` bytes of the data into a buffer before the next submit."""
+        start = self.ffi.from_buffer(data)
+        self.checked.wgpuQueueWriteBuffer(self.handle.queue._internal, buffer._internal, 0, start, size)
 
+    def submit(self, encoder: Any) -> int:
+        """Hand over what an encoder has recorded; returns its number, to wait for."""
+        done = self.checked.wgpuCommandEncoderFinish(encoder._internal, self.ffi.NULL)
+        commands = self.ffi.gc(done, self.lib.wgpuCommandBufferRelease)
+        listed = self.ffi.new("WGPUCommandBuffer[]", [commands])
         # wgpu's own submit does not tell the number, without which there is only waiting for everything.
-        listed = ffi.new("WGPUCommandBuffer[]", [commands._internal])
-        return int(libf.wgpuQueueSubmitForIndex(self.handle.queue._internal, 1, listed))
+        return int(self.checked.wgpuQueueSubmitForIndex(self.handle.queue._internal, 1, listed))
 
     def wait(self, submitted: int | None = None) -> None:
         """Return when the device has done what was submitted up to a number from `submit`, or all."""
-        from wgpu.backends.wgpu_native import ffi
-        from wgpu.backends.wgpu_native._api import libf
-
-        number = ffi.NULL if submitted is None else ffi.new("WGPUSubmissionIndex *", submitted)
-        libf.wgpuDevicePoll(self.handle._internal, True, number)
+        number = self.ffi.NULL if submitted is None else self.ffi.new("WGPUSubmissionIndex *", submitted)
+        self.checked.wgpuDevicePoll(self.handle._internal, True, number)
 
     @cached_property
     def timestamp_period_ns(self) -> float:
         """Length of a timestamp's tick [ns]; wgpu hands out the native API's ticks."""
-        from wgpu.backends.wgpu_native import lib
-
-        return float(lib.wgpuQueueGetTimestampPeriod(self.handle.queue._internal))
+        return float(self.lib.wgpuQueueGetTimestampPeriod(self.handle.queue._internal))
 
     def uniform_chunk(self, index: int) -> Any:
         """One of the buffers for the records of frames; made when first asked for."""

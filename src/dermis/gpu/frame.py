@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, Literal
 
 from dermis.gpu.compute_pass import ComputePass, Step
@@ -52,7 +52,7 @@ class Frame:
         self, stage: str, program: ComputeProgram, resources: Resources, groups: tuple[int, int, int]
     ) -> None:
         """Run `program` for a number of workgroups along each axis."""
-        self.repeat([step_of(stage, program, program.bind_groups(resources, self._uniforms), groups)])
+        self.repeat([step_of(stage, program, *program.bind_group(resources, self._uniforms), groups)])
 
     def repeat(self, steps: Sequence[Step]) -> None:
         """Run dispatches whose bind groups are known."""
@@ -162,8 +162,7 @@ class Frame:
             timestamp_writes=stamps,
         )
         one.set_pipeline(program.pipeline)
-        for index, (group, offsets) in enumerate(program.bind_groups(resources, self._uniforms)):
-            one.set_bind_group(index, group, offsets)
+        one.set_bind_group(0, *program.bind_group(resources, self._uniforms))
         return one
 
     @property
@@ -179,7 +178,7 @@ class Frame:
             self._end_pass()
         if not self._pass:
             stamps = self._begin(stage)
-            self._pass = ComputePass(self._encoder, stage, stamps)
+            self._pass = ComputePass(self.device, self._encoder, stage, stamps)
         return self._pass
 
     def _end_pass(self) -> None:
@@ -202,7 +201,7 @@ class Frame:
 
     def _flush(self) -> None:
         self._uniforms.upload()
-        self.submitted = self.device.submit(self._encoder.finish())
+        self.submitted = self.device.submit(self._encoder)
         for one in self._fetched:
             one.begin(self.submitted)
         self._fetched.clear()
@@ -210,11 +209,7 @@ class Frame:
 
 
 def step_of(
-    stage: str,
-    program: ComputeProgram,
-    bound: Iterable[tuple[Any, Sequence[int]]],
-    groups: tuple[int, int, int],
+    stage: str, program: ComputeProgram, group: Any, offsets: Sequence[int], groups: tuple[int, int, int]
 ) -> Step:
-    """A dispatch of bind groups with the offsets of their uniforms."""
-    handles = [(group._internal, len(offsets), offsets) for group, offsets in bound]
-    return Step(stage, program.pipeline._internal, handles, groups)
+    """A dispatch of a bind group with the offsets of its uniforms."""
+    return Step(stage, program.pipeline._internal, group._internal, len(offsets), offsets, groups)

@@ -19,7 +19,7 @@ _COMMENT = re.compile(r"//[^\n]*")
 _STRUCT = re.compile(r"struct\s+(\w+)\s*\{([^}]*)\}")
 _MEMBER = re.compile(r"(\w+)\s*:\s*(array<\s*\w+\s*,\s*\d+\s*>|\w+(?:<\w+>)?)")
 _BINDING = re.compile(
-    r"@group\((\d+)\)\s*@binding\((\d+)\)\s*var(?:<([\w, ]+)>)?\s+(\w+)\s*:\s*([\w<>, ]+?)\s*;([^\n]*)"
+    r"@group\(0\)\s*@binding\((\d+)\)\s*var(?:<([\w, ]+)>)?\s+(\w+)\s*:\s*([\w<>, ]+?)\s*;([^\n]*)"
 )
 
 # name -> (numpy base, shape, alignment, size) in bytes
@@ -41,7 +41,6 @@ _TYPES: dict[str, tuple[str, tuple[int, ...], int, int]] = {
 class Binding:
     """One resource of a shader: where it is bound and what wgpu's layout entry for it holds."""
 
-    group: int
     index: int
     name: str
     entry: dict[str, Any]
@@ -95,18 +94,16 @@ def _round_up(value: int, step: int) -> int:
 
 
 def bindings(text: str) -> tuple[Binding, ...]:
-    """Every resource that the shader declares, in order of group and index.
+    """Every resource that the shader declares, in order: all in group 0, as binding takes time in each frame.
 
     A float texture is taken as one that is only loaded; `// filtered` after its declaration says that a
     sampler filters it. `// non-filtering` after a sampler says that it does not filter.
     """
     found = [
-        Binding(
-            int(group), int(index), name, _entry((space or "").replace(" ", ""), kind.replace(" ", ""), note)
-        )
-        for group, index, space, name, kind, note in _BINDING.findall(text)
+        Binding(int(index), name, _entry((space or "").replace(" ", ""), kind.replace(" ", ""), note))
+        for index, space, name, kind, note in _BINDING.findall(text)
     ]
-    return tuple(sorted(found, key=lambda b: (b.group, b.index)))
+    return tuple(sorted(found, key=lambda b: b.index))
 
 
 def _entry(space: str, kind: str, note: str) -> dict[str, Any]:

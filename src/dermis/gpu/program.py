@@ -23,23 +23,11 @@ _TOOLKIT_SHADERS = Path(__file__).parent / "wgsl"
 _UNIFORM = {"type": "uniform"}
 
 
-class _Group:
-    """One of a shader's groups of bindings.
-
-    uniforms, names : those that are uniforms, and all, these last
-    read : takes the others out of what is given
-    """
-
-    def __init__(self, found: list[Binding]) -> None:
-        self.bindings = found
-        self.uniforms = [b.name for b in found if _is_uniform(b)]
-        others = [b.name for b in found if not _is_uniform(b)]
-        self.names = [*others, *self.uniforms]
-        self.read: Callable[[Resources], Sequence[Any]]
-        if len(others) > 1:
-            self.read = itemgetter(*others)
-        else:  # of one name it would give no sequence
-            self.read = lambda resources: [resources[name] for name in others]
+def _reader(names: Sequence[str]) -> Callable[[Resources], Sequence[Any]]:
+    """Takes what is named out of what is given."""
+    if len(names) > 1:
+        return itemgetter(*names)
+    return lambda resources: [resources[name] for name in names]  # of one name it would give no sequence
 
 
 def _is_uniform(binding: Binding) -> bool:
@@ -70,11 +58,12 @@ class Program:
         self.source: Source = compose(path, (*folders, _TOOLKIT_SHADERS))
         self.bindings: tuple[Binding, ...] = bindings(self.source.text)
         self._module = self._compile(path)
-        count = 1 + max((b.group for b in self.bindings), default=-1)
-        self._groups = [_Group([b for b in self.bindings if b.group == group]) for group in range(count)]
+        self._uniforms = [b for b in self.bindings if _is_uniform(b)]
+        self._others = [b for b in self.bindings if not _is_uniform(b)]
+        self._read = _reader([b.name for b in self._others])
         self.kept_groups = BindGroups()
-        self._layouts = [self._group_layout(group.bindings) for group in self._groups]
-        self._layout = device.handle.create_pipeline_layout(bind_group_layouts=self._layouts)
+        self._group_layout = device.handle.create_bind_group_layout(entries=self._layout_entries())
+        self._layout = device.handle.create_pipeline_layout(bind_group_layouts=[self._group_layout])
 
     def record(self, struct: str, **values: Any) -> np.ndarray[Any, Any]:
         """A zeroed record of one of the shader's structs with the given members filled in."""
@@ -83,34 +72,32 @@ class Program:
             record[member] = value
         return record
 
-    def bind_groups(self, resources: Resources, uniforms: Uniforms) -> list[tuple[Any, list[int]]]:
-        """Bind groups for resources by their name in the shader, each with the offsets of its uniforms.
+    def bind_group(self, resources: Resources, uniforms: Uniforms) -> tuple[Any, list[int]]:
+        """A bind group of resources by their name in the shader, and the offsets of its uniforms.
 
         A resource is a buffer, a texture, a texture view, a sampler, or a numpy record, which finds a place
         among the uniforms.
         """
-        found = []
         try:
-            for number, one in enumerate(self._groups):
-                placed = [uniforms.place(resources[name]) for name in one.uniforms]
-                bound = [*one.read(resources), *(buffer for buffer, _ in placed)]
-                key = key_of(number, bound)
-                group = self.kept_groups.find(key)
-                if group is None:
-                    group = self._make_group(number, dict(zip(one.names, bound, strict=True)), resources)
-                    self.kept_groups.keep(key, bound, group)
-                found.append((group, [offset for _, offset in placed]))
+            placed = [uniforms.place(resources[one.name]) for one in self._uniforms]
+            bound = [*self._read(resources), *(buffer for buffer, _ in placed)]
         except KeyError as missing:
             message = f"{self.name}.wgsl declares {missing.args[0]!r}, and nothing is bound to it"
             raise KeyError(message) from None
-        return found
+        key = key_of(bound)
+        group = self.kept_groups.find(key)
+        if group is None:
+            group = self._make_group(bound, resources)
+            self.kept_groups.keep(key, bound, group)
+        return group, [offset for _, offset in placed]
 
-    def _make_group(self, number: int, bound: Mapping[str, Any], resources: Resources) -> Any:
+    def _make_group(self, bound: Sequence[Any], resources: Resources) -> Any:
+        """The group of what the others are, and then the uniforms' buffers."""
         entries = [
-            {"binding": b.index, "resource": _entry(b, bound[b.name], resources[b.name])}
-            for b in self._groups[number].bindings
+            {"binding": one.index, "resource": _entry(one, value, resources[one.name])}
+            for one, value in zip((*self._others, *self._uniforms), bound, strict=True)
         ]
-        return self.device.handle.create_bind_group(layout=self._layouts[number], entries=entries)
+        return self.device.handle.create_bind_group(layout=self._group_layout, entries=entries)
 
     def _compile(self, path: Path) -> Any:
         try:
@@ -120,16 +107,16 @@ class Program:
                 f"{path.name}: the shader did not compile.\n{self.source.locate(str(error))}"
             ) from error
 
-    def _group_layout(self, slots: list[Binding]) -> Any:
-        entries = [
+    def _layout_entries(self) -> list[dict[str, Any]]:
+        offset = {"buffer": {**_UNIFORM, "has_dynamic_offset": True}}
+        return [
             {
-                "binding": slot.index,
+                "binding": one.index,
                 "visibility": self._visibility(),
-                **({"buffer": {**_UNIFORM, "has_dynamic_offset": True}} if _is_uniform(slot) else slot.entry),
+                **(offset if _is_uniform(one) else one.entry),
             }
-            for slot in slots
+            for one in self.bindings
         ]
-        return self.device.handle.create_bind_group_layout(entries=entries)
 
     def _visibility(self) -> int:
         raise NotImplementedError

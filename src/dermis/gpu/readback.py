@@ -29,15 +29,14 @@ class Fetched:
 
     def begin(self, submitted: int) -> None:
         """Ask for the copy to be readable when the submit of that number is done."""
-        from wgpu.backends.wgpu_native import ffi, lib
-        from wgpu.backends.wgpu_native._api import libf
-
+        ffi, lib = self._device.ffi, self._device.lib
         info = ffi.new("WGPUBufferMapCallbackInfo *")
         info.mode, info.callback = lib.WGPUCallbackMode_AllowProcessEvents, _when_mapped()
         self._submitted, self._name = submitted, ffi.new_handle(self)
         info.userdata1 = self._name
         self._device.fetching.add(self)  # the driver calls back even when nobody wants the bytes any more
-        libf.wgpuBufferMapAsync(self.buffer._internal, lib.WGPUMapMode_Read, 0, self.buffer.size, info[0])
+        asked = self.buffer._internal, lib.WGPUMapMode_Read, 0, self.buffer.size, info[0]
+        self._device.checked.wgpuBufferMapAsync(*asked)
 
     def arrive(self, status: int) -> None:
         """The driver's answer to `begin`."""
@@ -49,18 +48,16 @@ class Fetched:
 
         Raises DermisError when the device fails.
         """
-        from wgpu.backends.wgpu_native import ffi, lib
-        from wgpu.backends.wgpu_native._api import libf
-
+        ffi, checked = self._device.ffi, self._device.checked
         self._device.wait(self._submitted)
-        if self._status != lib.WGPUMapAsyncStatus_Success:
+        if self._status != self._device.lib.WGPUMapAsyncStatus_Success:
             name = self._device.adapter.name
             raise DermisError(
                 f"{name}: expected to read what it computed, but its driver refuses. Try again."
             )
-        start = libf.wgpuBufferGetConstMappedRange(self.buffer._internal, 0, self.buffer.size)
+        start = checked.wgpuBufferGetConstMappedRange(self.buffer._internal, 0, self.buffer.size)
         copied = np.frombuffer(ffi.buffer(start, self._size), np.uint8).copy()
-        libf.wgpuBufferUnmap(self.buffer._internal)
+        checked.wgpuBufferUnmap(self.buffer._internal)
         self._device.give_back(self.buffer)
         return copied
 

@@ -42,11 +42,12 @@ class Recording(Frame):
             chunks.clear()
             steps.clear()
 
-        bound = program.bind_groups(resources, self._uniforms)
-        self._bound += [weakref.ref(group, void) for group, _ in bound]
+        group, offsets = program.bind_group(resources, self._uniforms)
+        self._bound.append(weakref.ref(group, void))
         self._pipelines.append(program.pipeline)
-        told = [(group, _offsets(offsets)) for group, offsets in bound]
-        steps.append(step_of(stage, program, told, groups))
+        # as the native library takes them, so that no frame needs to convert them
+        kept = program.device.ffi.new("uint32_t[]", offsets)
+        steps.append(step_of(stage, program, group, kept, groups))
 
     def submit(self) -> None:
         """Put the numbers in their place; the dispatches run where a frame repeats them."""
@@ -63,13 +64,6 @@ class Recording(Frame):
         raise TypeError("only dispatches can be repeated")
 
     copy = fetch = draw = fill = clear
-
-
-def _offsets(offsets: Sequence[int]) -> Any:
-    """Offsets as the native library takes them, so that no frame needs to convert them."""
-    from wgpu.backends.wgpu_native import ffi
-
-    return ffi.new("uint32_t[]", offsets)
 
 
 def _chunk(device: Device, chunks: list[Any], index: int) -> Any:

@@ -26,7 +26,7 @@ class Uniforms:
         self._device = device
         self._chunk = chunk or device.uniform_chunk
         self._staged: list[bytearray] = []
-        self._end = CHUNK_BYTES
+        self._end, self._buffer = CHUNK_BYTES, None
         self._placed: dict[int, tuple[tuple[Any, int], NDArray[Any]]] = {}  # which keeps the records' names
 
     def place(self, record: NDArray[Any]) -> tuple[Any, int]:
@@ -43,8 +43,7 @@ class Uniforms:
         """Write all records for the next submit."""
         for index, staged in enumerate(self._staged):
             last = index == len(self._staged) - 1
-            part = memoryview(staged)[: self._end if last else CHUNK_BYTES]
-            self._device.handle.queue.write_buffer(self._chunk(index), 0, part)
+            self._device.write(self._chunk(index), staged, self._end if last else CHUNK_BYTES)
 
     def finish(self) -> None:
         """Begin anew after the last submit."""
@@ -53,12 +52,12 @@ class Uniforms:
         self._placed.clear()
 
     def _add(self, record: NDArray[Any]) -> tuple[Any, int]:
-        size = -(-record.nbytes // _STEP) * _STEP
+        size = record.nbytes
         if self._end + size > CHUNK_BYTES:
             spare = self._device.spare_records
             self._staged.append(spare.pop() if spare else bytearray(CHUNK_BYTES))
-            self._end = 0
+            self._end, self._buffer = 0, self._chunk(len(self._staged) - 1)
         start = self._end
-        self._staged[-1][start : start + record.nbytes] = record.tobytes()
-        self._end += size
-        return self._chunk(len(self._staged) - 1), start
+        self._staged[-1][start : start + size] = record.tobytes()
+        self._end += -(-size // _STEP) * _STEP
+        return self._buffer, start

@@ -87,7 +87,7 @@ def draw_frame(frame: Frame, stages: Stages, inputs: Inputs) -> None:
     """
     shaped = ("SHAPES", 1) in inputs.light_switches
     stages.shadows.draw(
-        frame, inputs.shadow_maps, inputs.light_clips, inputs.head, inputs.shadow_key, bounded=shaped
+        frame, inputs.shadow_maps, inputs.shadow_views, inputs.head, inputs.shadow_key, bounded=shaped
     )
     keep, picture, drawn = stages.shown.keep, inputs.picture, (frame, stages, inputs)
     if inputs.scatters:
@@ -144,7 +144,7 @@ def _spread(frame: Frame, stages: Stages, inputs: Inputs, layout: Layout) -> tup
 
 def _look(frame: Frame, stages: Stages, inputs: Inputs) -> None:
     """Find what each sample of the picture sees."""
-    stages.visibility.draw(frame, inputs.seen, inputs.camera_clips, inputs.head)
+    stages.visibility.draw(frame, inputs.seen, inputs.camera, inputs.head)
 
 
 def _shade(frame: Frame, stages: Stages, inputs: Inputs) -> None:

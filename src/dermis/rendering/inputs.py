@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,8 +21,8 @@ from dermis.rendering.levels import Levels
 from dermis.rendering.pre_integrated import PreIntegrated
 from dermis.rendering.projection import (
     Axes,
-    Matrix,
     Triple,
+    Views,
     axes_of,
     between,
     depth_range,
@@ -96,15 +95,16 @@ class Standing:
 class Inputs(Standing):
     """Everything `draw_frame` touches.
 
-    light_clips, shadow_key : a matrix for each shadow map, and what the maps would show
+    shadow_views, shadow_key : how the shadow maps see the head, and what they would show
+    camera : how the picture's samples see it
     scale : what light is multiplied with in the blurred levels
     light_switches : values of the irradiance pass' `override`s
     """
 
-    light_clips: list[Matrix]
+    shadow_views: Views
     shadow_key: bytes
     scale: float
-    camera_clips: list[Matrix]
+    camera: Views
     light_switches: Switches
 
 
@@ -158,21 +158,11 @@ def pinhole(camera: Camera, head: Head, settings: Settings) -> Pinhole:
     return Pinhole(eye, axes_of(path, camera.up), (half * width / height, half))
 
 
-def camera_clips(pinhole: Pinhole, mesh: Mesh, settings: Settings) -> list[Matrix]:
-    """World to clip space for each sample of the pixel."""
+def camera_views(pinhole: Pinhole, mesh: Mesh, samples: int) -> Views:
+    """What the camera sees at each sample of the pixel."""
     rows = rows_of(pinhole.eye, pinhole.axes)
-    whole = perspective(rows, pinhole.half, *depth_range(mesh, rows))
-    clips = np.repeat(whole[None], settings.samples, axis=0)
-    clips[:, :2] += _shifts(settings.samples, *settings.size) * whole[3]
-    return list(clips)
-
-
-@lru_cache(16)
-def _shifts(samples: int, width: int, height: int) -> Floats:
-    """(samples, 2, 1) how far each sample moves the picture, which is 2 wide and high."""
-    moved = (pixel_samples(samples) - 0.5) * (-2.0 / width, 2.0 / height)
-    moved.flags.writeable = False
-    return moved[..., None]
+    clip = perspective(rows, pinhole.half, *depth_range(mesh, rows))
+    return Views(np.array([clip]), pixel_samples(samples))
 
 
 def view_record(
@@ -209,8 +199,8 @@ def view_record(
 def seen_by(view: Any, pinhole: Pinhole) -> Any:
     """A shading pass' record with the rays of a camera."""
     eye, (right, up, forward), half = pinhole
-    record = np.zeros((), view.dtype)  # a copy would have anything between its members, and keys have it all
-    record[...] = view
+    # Its own copy would have anything between its members, and keys have it all.
+    record: Any = np.ndarray((), view.dtype, bytearray(view.tobytes()))
     record["eye"], record["forward"] = eye, forward
     record["right"], record["up"] = tuple(half[0] * c for c in right), tuple(half[1] * c for c in up)
     return record

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cache
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -13,7 +15,16 @@ from dermis.assets.environment.suns import Sun
 from dermis.assets.head import Head
 from dermis.errors import refuse
 from dermis.gpu import ComputeProgram
-from dermis.rendering.projection import ShadowView, Triple, between, frame_of, place_of, shadow_view
+from dermis.rendering.projection import (
+    ShadowView,
+    Triple,
+    between,
+    frame_of,
+    parallel_view,
+    place_of,
+    point_views,
+    unit,
+)
 from dermis.rendering.rectangles import facing_irradiance, parts_of
 from dermis.rendering.stages.variants import Switches
 from dermis.scene.environment import Environment
@@ -79,17 +90,27 @@ def light_views(scene: Scene, size: int) -> list[ShadowView | None]:
     if len(numbered) > _MOST_LIGHTS:
         came = f"there are {len(numbered)}, with the environment's suns and each part of a large rectangle"
         refuse("lights", f"at most {_MOST_LIGHTS}", came, "Leave some out")
-    return [_view(scene.head, light, size, culprit) for culprit, light in numbered]
+    head = scene.head
+    for culprit, light in numbered:
+        if isinstance(light, SphereLight):
+            _check_outside(head, light, culprit)
+    points = [(name, one) for name, one in numbered if one.shadows and isinstance(one, PointLight)]
+    found = iter(point_views(points, head.centre_mm, head.mesh, size))
+
+    def view(light: Light) -> ShadowView:
+        if isinstance(light, DirectionalLight):
+            return parallel_view(np.array(light.direction), head.mesh, size)
+        return next(found)
+
+    return [view(light) if light.shadows else None for _, light in numbered]
 
 
-def _view(head: Head, light: Light, size: int, culprit: str) -> ShadowView | None:
-    if isinstance(light, SphereLight):
-        middle = place_of(light.position, head.centre_mm)
-        near = float(np.linalg.norm(head.mesh.positions - np.array(middle), axis=1).min())
-        if near <= light.radius_mm:
-            came = f"the head is {near:.0f} mm from its middle"
-            refuse(culprit, f"a head outside the sphere of {light.radius_mm:g} mm", came, "Move it away")
-    return shadow_view(light, head.centre_mm, head.mesh, size, culprit) if light.shadows else None
+def _check_outside(head: Head, light: SphereLight, culprit: str) -> None:
+    middle = place_of(light.position, head.centre_mm)
+    near = float(np.linalg.norm(head.mesh.positions - np.array(middle), axis=1).min())
+    if near <= light.radius_mm:
+        came = f"the head is {near:.0f} mm from its middle"
+        refuse(culprit, f"a head outside the sphere of {light.radius_mm:g} mm", came, "Move it away")
 
 
 def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView | None]) -> Any:
@@ -97,18 +118,22 @@ def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView 
 
     views : one for each part of each light
     """
-    record = program.record("Lights")
-    record["place"] = places_on_lights()
+    record = program.record("Lights", place=places_on_lights())
+    lights = record["light"]
     divided = [(part, len(parts)) for parts in map(parts_of, scene.lights) for part in parts]
-    layer = 0
-    for index, ((light, siblings), view) in enumerate(zip(divided, views, strict=True)):
-        one = record["light"][index]
-        _fill(one, light, scene.head.centre_mm, view)
-        one["layer"] = layer if view else -1
+    none, layers = dict.fromkeys(lights.dtype.names or (), 0), count()
+    made = []
+    for (light, siblings), view in zip(divided, views, strict=True):
         few = isinstance(light, DirectionalLight)
-        one["lines"] = _SUN_LINES if few else max(_LEAST_LINES, _LINES // siblings)
-        one["side"] = _PART_SIDE if siblings > 1 else _SIDE
-        layer += view is not None
+        one = {
+            **none,
+            **_members(light, scene.head.centre_mm, view),
+            "layer": next(layers) if view else -1,
+            "lines": _SUN_LINES if few else max(_LEAST_LINES, _LINES // siblings),
+            "side": _PART_SIDE if siblings > 1 else _SIDE,
+        }
+        made.append(tuple(one.values()))
+    lights[: len(made)] = made  # at once: each place in a record takes as long as a light's arithmetic
     return record
 
 
@@ -121,51 +146,59 @@ def places_on_lights() -> Floats:
     return np.hstack([disc, 2.0 * even - 1.0])
 
 
-def _fill(record: Any, light: Light, centre: Triple, view: ShadowView | None) -> None:
-    """A light's element of the shader's array."""
-    record["kind"], record["irradiance"] = _KINDS.index(type(light)), light.irradiance
-    distance, texel = 1.0, view.texel if view else 1.0
+def _members(light: Light, centre: Triple, view: ShadowView | None) -> dict[str, Any]:
+    """A light's members in the shader's array, without those that are 0."""
+    distance, texel, place = 1.0, 1.0, (0.0, 0.0, 0.0)
     if isinstance(light, DirectionalLight):
-        length = math.hypot(*light.direction)
-        record["direction"] = tuple(c / length for c in light.direction)
+        along: Sequence[float] = light.direction
     else:
-        path = between(light.position, light.target)
-        distance = math.hypot(*path)
-        record["direction"] = tuple(c / distance for c in path)
-        record["position"] = place_of(light.position, centre)
-    record["reference_mm"] = distance
+        along, place = between(light.position, light.target), place_of(light.position, centre)
+        distance = math.hypot(*along)
+    seen: dict[str, Any] = {}
     if view:
-        record["position"] = view.origin
-        record["to_map"], record["texel"] = view.clip.T, texel
-        record["map_right"], record["map_up"] = view.right, view.up
-        record["map_near"], record["map_far"] = view.near, view.far
-    _add_shape(record, light, centre, distance)
-    # A tent of half width h fades over 2 h texels.
-    record["softness"] = 0.5 * light.softness_mm
+        clip, texel, place, right, up, near, far = view
+        seen = {"to_map": clip.T, "map_right": right, "map_up": up, "map_near": near, "map_far": far}
     half_width = round(0.5 * light.softness_mm / (texel * distance))
-    record["half_width"] = min(max(half_width, 1), _WIDEST_SHADOW_FILTER)
+    plain = {
+        "kind": _KINDS.index(type(light)),
+        "irradiance": light.irradiance,
+        "direction": unit(along),
+        "position": place,
+        "reference_mm": distance,
+        "texel": texel if view else 0.0,
+        # A tent of half width h fades over 2 h texels.
+        "softness": 0.5 * light.softness_mm,
+        "half_width": min(max(half_width, 1), _WIDEST_SHADOW_FILTER),
+    }
+    return plain | seen | _shape(light, centre, distance)
 
 
-def _add_shape(record: Any, light: Light, centre: Triple, distance: float) -> None:
+def _shape(light: Light, centre: Triple, distance: float) -> dict[str, Any]:
     """What only some kinds have: a cone, a stripe, or a size; lights of some size carry their radiance."""
     if isinstance(light, SpotLight):
-        record["cos_inner"] = math.cos(math.radians(light.inner_degrees))
-        record["cos_outer"] = math.cos(math.radians(light.outer_degrees))
-    elif isinstance(light, StripeLight):
-        right, up, _ = frame_of(record["direction"].astype(float), np.array(light.up))
-        record["position"] = place_of(light.position, centre)
-        record["half_u"], record["half_v"] = 2.0 * right / light.width_mm, 2.0 * up / light.length_mm
-    elif isinstance(light, DirectionalLight):
-        record["extent"] = np.tan(0.5 * np.radians(light.angle_degrees))
-    elif isinstance(light, RectangleLight):
-        _add_sides(record, 0.5 * light.width_mm, 0.5 * light.height_mm)
-        record["irradiance"] /= facing_irradiance(light.width_mm, light.height_mm, distance)
-    elif isinstance(light, SphereLight):
-        _add_sides(record, light.radius_mm, light.radius_mm)
-        record["irradiance"] /= np.pi * (light.radius_mm / distance) ** 2
+        inner, outer = math.radians(light.inner_degrees), math.radians(light.outer_degrees)
+        return {"cos_inner": math.cos(inner), "cos_outer": math.cos(outer)}
+    if isinstance(light, StripeLight):
+        right, up, _ = frame_of(np.array(light.direction), np.array(light.up))
+        across, along = 2.0 * right / light.width_mm, 2.0 * up / light.length_mm
+        return {"position": place_of(light.position, centre), "half_u": across, "half_v": along}
+    if isinstance(light, DirectionalLight):
+        return {"extent": math.tan(0.5 * math.radians(light.angle_degrees))}
+    if isinstance(light, RectangleLight):
+        radiance = 1.0 / facing_irradiance(light.width_mm, light.height_mm, distance)
+        return _sided(light, radiance, 0.5 * light.width_mm, 0.5 * light.height_mm)
+    if isinstance(light, SphereLight):
+        radiance = 1.0 / (math.pi * (light.radius_mm / distance) ** 2)
+        return _sided(light, radiance, light.radius_mm, light.radius_mm)
+    return {}
 
 
-def _add_sides(record: Any, half_width: float, half_height: float) -> None:
-    right, up, _ = frame_of(record["direction"].astype(float), _UP)
-    record["half_u"], record["half_v"] = half_width * right, half_height * up
-    record["extent"] = half_width, half_height
+def _sided(light: PointLight, radiance: float, half_width: float, half_height: float) -> dict[str, Any]:
+    """radiance : for an irradiance of 1"""
+    right, up, _ = frame_of(np.array(between(light.position, light.target)), _UP)
+    return {
+        "half_u": half_width * right,
+        "half_v": half_height * up,
+        "extent": (half_width, half_height),
+        "irradiance": radiance * np.array(light.irradiance),
+    }

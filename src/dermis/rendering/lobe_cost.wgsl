@@ -4,7 +4,7 @@
 override LIGHTS: u32 = 16u; // for each point
 override IDLE: bool = false; // leave the lobe out: what remains is not its cost
 
-@group(1) @binding(0) var sums: texture_storage_2d<r32float, write>;
+@group(0) @binding(30) var sums: texture_storage_2d<r32float, write>;
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {

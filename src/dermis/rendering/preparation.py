@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from dermis.gpu import Device
 from dermis.optics.gaussians import GaussianSum
 from dermis.rendering import inputs as made
@@ -17,7 +15,7 @@ from dermis.rendering.layout import Layout
 from dermis.rendering.levels import scale_of
 from dermis.rendering.lights import light_records, light_switches, light_views
 from dermis.rendering.limits import check_limits
-from dermis.rendering.projection import ShadowView
+from dermis.rendering.projection import ShadowView, shadow_layers
 from dermis.rendering.seams import laid_out
 from dermis.rendering.skin_profiles import SkinProfiles
 from dermis.rendering.standing import StandingMaker
@@ -67,14 +65,15 @@ class Preparation:
         scene = with_suns(self._keep, scene, surroundings)
         views = self._views(scene, settings.shadow_size)
         lights = self._keep("light records", views, lambda: self._light_records(scene, views))
-        clips = [view.clip for view in views if view]
+        layers = shadow_layers(views)
         drawn_by = self._stages.spreading(settings.technique), self._stages.combine
-        given = scene.head, scene.skin, profile, settings, scene.environment, place, len(views), len(clips)
+        given = scene.head, scene.skin, profile, settings, scene.environment, place
+        key = *given, len(views), len(layers.clips), *drawn_by
 
         def stand() -> Standing:
             return self._maker.make(scene, settings, place, profile, split, surroundings, views, lights)
 
-        standing = self._standing((*given, *drawn_by), stand)
+        standing = self._standing(key, stand)
         seen_from, shone_on = made.pinhole(scene.camera, scene.head, settings), light_switches(scene)
         moved = {
             "layouts": [under(layout, lights) for layout in standing.layouts],
@@ -84,10 +83,10 @@ class Preparation:
         }
         return Inputs(
             **(vars(standing) | moved),
-            light_clips=clips,
-            shadow_key=np.array(clips).tobytes(),
+            shadow_views=layers,
+            shadow_key=layers.clips.tobytes(),
             scale=scale_of(standing.levels.texel, brightest(scene, surroundings)),
-            camera_clips=made.camera_clips(seen_from, scene.head.mesh, settings),
+            camera=made.camera_views(seen_from, scene.head.mesh, settings.samples),
             light_switches=shone_on,
         )
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.assets.mesh import Mesh
 from dermis.errors import refuse
-from dermis.scene.lights import DirectionalLight, Light
+from dermis.scene.lights import PointLight
 
 Vec = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -19,12 +19,34 @@ Triple = tuple[float, float, float]
 Axes = tuple[Triple, Triple, Triple]
 Row = tuple[float, float, float, float]
 Rows = tuple[Row, Row, Row]
-_WIDEST_LIGHT_DEGREES = 80.0
+_WIDEST_LIGHT = math.tan(math.radians(80.0))
+_NEAREST_MM = 1.0
 _UP = 0.0, 1.0, 0.0
+_MIDDLE = np.full((1, 2), 0.5)
 
 
-@dataclass(frozen=True)
-class ShadowView:
+class Views(NamedTuple):
+    """How layers of a texture array see the world: a layer for each place of each view.
+
+    clips : (k, 4, 4) world to clip space
+    places : (n, 2) in a pixel, from 0 to 1 to the right and down
+    """
+
+    clips: Matrix
+    places: Matrix
+
+    def matrices(self, size: tuple[int, int]) -> Matrix:
+        """(k n, 4, 4) from the world to clip space where each layer's place is the middle of the pixel.
+
+        size : of the picture [pixel]
+        """
+        moved = (self.places - 0.5) * (-2.0 / size[0], 2.0 / size[1])  # of a picture 2 wide and high
+        each = np.repeat(self.clips[:, None], len(moved), axis=1)
+        each[:, :, :2] += moved[..., None] * self.clips[:, None, 3:]
+        return each.reshape(-1, 4, 4)
+
+
+class ShadowView(NamedTuple):
     """How a light sees the head.
 
     clip : (4, 4) world to clip space
@@ -43,6 +65,11 @@ class ShadowView:
     far: float
 
 
+def shadow_layers(views: Sequence[ShadowView | None]) -> Views:
+    """A layer for each view that there is, of the middles of its pixels."""
+    return Views(np.array([view.clip for view in views if view]).reshape(-1, 4, 4), _MIDDLE)
+
+
 def frame_of(forward: Vec, up: Vec) -> tuple[Vec, Vec, Vec]:
     """Right, up and forward as unit vectors."""
     right, upward, ahead = axes_of(forward.tolist(), up.tolist())
@@ -51,11 +78,11 @@ def frame_of(forward: Vec, up: Vec) -> tuple[Vec, Vec, Vec]:
 
 def axes_of(forward: Sequence[float], up: Sequence[float] = _UP) -> Axes:
     """The same in plain floats: numpy takes ten times as long for so few numbers, and a frame has many."""
-    f = _unit(forward)
+    f = unit(forward)
     r = _cross(f, up)
     if math.hypot(*r) < 1e-6:
         r = _cross(f, (1.0, 0.0, 0.0) if abs(f[0]) < 0.9 else (0.0, 0.0, 1.0))
-    r = _unit(r)
+    r = unit(r)
     return r, _cross(r, f), f
 
 
@@ -72,7 +99,8 @@ def between(start: Sequence[float], end: Sequence[float]) -> Triple:
     return end[0] - start[0], end[1] - start[1], end[2] - start[2]
 
 
-def _unit(v: Sequence[float]) -> Triple:
+def unit(v: Sequence[float]) -> Triple:
+    """The direction of a vector."""
     x, y, z = v
     length = math.hypot(x, y, z)
     return x / length, y / length, z / length
@@ -93,52 +121,66 @@ def rows_of(eye: Triple, axes: Axes) -> Rows:
     return (*right, -_dot(right, eye)), (*up, -_dot(up, eye)), (*forward, -_dot(forward, eye))
 
 
-def perspective(rows: Rows, half: tuple[float, float], near: float, far: float) -> Matrix:
-    """From `rows_of` with the tangents `half` of the half angles; depth 1 at near, 0 at far.
+def perspective(rows: Rows, half: tuple[float, float], near: float, far: float) -> list[Sequence[float]]:
+    """The matrix' rows from `rows_of` with the tangents `half` of the half angles; depth 1 at near, 0 at far.
 
     Floats are densest at 0: depths turned round are even over the whole range.
     """
     scale = -near / (far - near)
     depth = [scale * c for c in rows[2]]
     depth[3] -= far * scale
-    return np.array([[c / half[0] for c in rows[0]], [c / half[1] for c in rows[1]], depth, rows[2]])
+    return [[c / half[0] for c in rows[0]], [c / half[1] for c in rows[1]], depth, rows[2]]
 
 
 def depth_range(mesh: Mesh, rows: Rows) -> tuple[float, float]:
     """Nearest and farthest depth of the mesh before the eye, a little widened [mm]."""
-    z = np.array(rows[2]) @ mesh.outline_columns
+    z = np.array(rows[2], np.float32) @ mesh.outline_columns
     near, far = float(z.min()), float(z.max())
     return max(near - 1.0, 0.5, 1e-3 * far), max(far + 1.0, 2.0)
 
 
-def shadow_view(light: Light, centre: Triple, mesh: Mesh, size: int, culprit: str) -> ShadowView:
-    """The tightest map of `size` texels from the light around the whole mesh.
+def point_views(
+    lights: Sequence[tuple[str, PointLight]], centre: Triple, mesh: Mesh, size: int
+) -> list[ShadowView]:
+    """The tightest maps of `size` texels from lights around the whole mesh, all of them in a few products.
 
-    Raises DermisError when a point light stands inside the mesh's bounds: one map cannot look all around.
+    lights : each after what it is called
+
+    Raises DermisError when one stands inside the mesh's bounds: one map cannot look all around.
     """
-    if isinstance(light, DirectionalLight):
-        return parallel_view(np.array(light.direction), mesh, size)
-    eye = place_of(light.position, centre)
-    axes = axes_of(between(eye, mesh.middle_mm))
-    rows = rows_of(eye, axes)
-    seen = np.array(rows) @ mesh.outline_columns
-    near, far = float(seen[2].min()), float(seen[2].max())
-    half = _steepest(seen) if near > 0.0 else math.inf
-    if near <= 1.0 or half > math.tan(math.radians(_WIDEST_LIGHT_DEGREES)):
-        place = [round(c) for c in light.position]
-        refuse(
-            culprit, "a place outside the head", f"it is at {place} mm", "Move it away or set shadows = false"
-        )
-    half, near, far = 1.02 * half, 0.98 * near, 1.02 * far
-    clip = perspective(rows, (half, half), near, far)
-    return ShadowView(clip, 2.0 * half / size, eye, axes[0], axes[1], near, far)
+    if not lights:
+        return []
+    eyes = [place_of(light.position, centre) for _, light in lights]
+    axes = [axes_of(between(eye, mesh.middle_mm)) for eye in eyes]
+    rows = [rows_of(*one) for one in zip(eyes, axes, strict=True)]
+    stacked = np.array(list(zip(*rows, strict=True)), np.float32).reshape(-1, 4)
+    seen = (stacked @ mesh.outline_columns).reshape(3, len(rows), -1)
+    depth = seen[2]
+    near, far = depth.min(axis=1).tolist(), depth.max(axis=1).tolist()
+    _check_outside(lights, [one > _NEAREST_MM for one in near])
+    steepest = _steepest(seen[:2], depth)
+    _check_outside(lights, [one <= _WIDEST_LIGHT for one in steepest])
+    bounds = [(1.02 * h, 0.98 * n, 1.02 * f) for h, n, f in zip(steepest, near, far, strict=True)]
+    clips = [perspective(r, (h, h), n, f) for r, (h, n, f) in zip(rows, bounds, strict=True)]
+    return [
+        ShadowView(clip, 2.0 * h / size, eye, right, up, n, f)
+        for clip, eye, (right, up, _), (h, n, f) in zip(np.array(clips), eyes, axes, bounds, strict=True)
+    ]
 
 
-def _steepest(seen: Matrix) -> float:
-    """The largest tangent of what an eye sees, which is overwritten: new memory takes longer than sums."""
-    sides = seen[:2]
-    sides /= seen[2]
-    return float(np.abs(sides, out=sides).max())
+def _check_outside(lights: Sequence[tuple[str, PointLight]], outside: Sequence[bool]) -> None:
+    if not all(outside):
+        culprit, light = lights[outside.index(False)]
+        came = f"it is at {[round(c) for c in light.position]} mm"
+        refuse(culprit, "a place outside the head", came, "Move it away or set shadows = false")
+
+
+def _steepest(sides: NDArray[Any], depth: NDArray[Any]) -> list[float]:
+    """The largest tangent that each eye sees; sides are overwritten: new memory takes longer than sums."""
+    for side in sides:
+        side /= depth  # one by one: to divide them at once has numpy make buffers
+    found: list[float] = np.abs(sides, out=sides).max(axis=(0, 2)).tolist()
+    return found
 
 
 def parallel_view(direction: Vec, mesh: Mesh, size: int) -> ShadowView:

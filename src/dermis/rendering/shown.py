@@ -66,7 +66,8 @@ def scattered_key(inputs: Inputs) -> tuple[Any, ...]:
 
 def seen_key(inputs: Inputs) -> tuple[Any, ...]:
     """Everything that tells which triangle is seen where."""
-    return np.array(inputs.camera_clips).tobytes(), _identities(inputs.head.resources)
+    clips, places = inputs.camera
+    return clips.tobytes(), places.tobytes(), _identities(inputs.head.resources)
 
 
 def radiance_key(inputs: Inputs) -> tuple[Any, ...]:

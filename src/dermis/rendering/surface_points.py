@@ -40,7 +40,7 @@ def surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> Surf
     single = settings.model_copy(update={"samples": 1, "technique": "none"})
     inputs = renderer.prepare(scene, single)
     frame = Frame(renderer.device)
-    renderer.stages.visibility.draw(frame, inputs.seen, inputs.camera_clips, inputs.head)
+    renderer.stages.visibility.draw(frame, inputs.seen, inputs.camera, inputs.head)
     frame.submit()
     seen = download(renderer.device, inputs.seen.texture).astype(np.int64)
     mask = seen > 0
@@ -85,7 +85,7 @@ def irradiance_at(
     lit = make_texture(device, (side, side), "rgba32float")
     frame = Frame(device)
     renderer.stages.shadows.draw(
-        frame, inputs.shadow_maps, inputs.light_clips, inputs.head, inputs.shadow_key
+        frame, inputs.shadow_maps, inputs.shadow_views, inputs.head, inputs.shadow_key
     )
     layout = Layout(first.head, listed, first.lit, lit)
     renderer.stages.irradiance.draw(frame, layout, inputs.light_switches, lit, side)

@@ -63,7 +63,7 @@ class Blit(Program):
 
     def _group(self, image: Any) -> Any:
         entry = {"binding": 0, "resource": image.create_view()}
-        return self.device.handle.create_bind_group(layout=self._layouts[0], entries=[entry])
+        return self.device.handle.create_bind_group(layout=self._group_layout, entries=[entry])
 
     def _visibility(self) -> int:
         import wgpu

@@ -4,11 +4,11 @@
 
 override FADE_MM: f32; // width over which one gives way to the other
 
-@group(1) @binding(0) var atlas: texture_2d<u32>; // of the first layout: triangle + 1, two barycentric weights packed
-@group(1) @binding(1) var edge_map: texture_2d<f32>; // distance to the nearest seam [mm]
-@group(1) @binding(2) var first: texture_2d<f32>;
-@group(1) @binding(3) var second: texture_2d<f32>; // in the layout that the triangle table tells
-@group(1) @binding(4) var blended: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(30) var atlas: texture_2d<u32>; // of the first layout: triangle + 1, two barycentric weights packed
+@group(0) @binding(31) var edge_map: texture_2d<f32>; // distance to the nearest seam [mm]
+@group(0) @binding(32) var first: texture_2d<f32>;
+@group(0) @binding(33) var second: texture_2d<f32>; // in the layout that the triangle table tells
+@group(0) @binding(34) var blended: texture_storage_2d<rgba32float, write>;
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {

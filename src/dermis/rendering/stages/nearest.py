@@ -6,15 +6,15 @@ software adapters rasterise faster than they compute.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dermis.gpu import ComputeProgram, Device, Frame, RasterProgram, make_texture
 from dermis.rendering.geometry import HeadTextures
-from dermis.rendering.projection import Matrix
+from dermis.rendering.projection import Matrix, Views
 from dermis.rendering.stages import SHARED_SHADERS, STAGES
 from dermis.rendering.stages.variants import Switches, Variants
 
@@ -76,12 +76,12 @@ class Nearest:
         make = self._compute_layers if self._compute and fits else self._raster_layers
         return make(size, max(1, count))
 
-    def draw(self, frame: Frame, stage: str, layers: Layers, clips: list[Matrix], head: HeadTextures) -> None:
-        """Fill a layer for each matrix; depth 1 is near and 0 far."""
+    def draw(self, frame: Frame, stage: str, layers: Layers, views: Views, head: HeadTextures) -> None:
+        """Fill a layer for each place of each view; depth 1 is near and 0 far."""
         if layers.nearness is not None:
-            self._draw_compute(frame, stage, layers, clips, head)
+            self._draw_compute(frame, stage, layers, views, head)
         else:
-            self._draw_raster(frame, stage, layers, clips, head)
+            self._draw_raster(frame, stage, layers, views.matrices(layers.size), head)
 
     def _compute_layers(self, size: tuple[int, int], count: int) -> Layers:
         texel = "r32uint" if self._triangles else "r32float"
@@ -107,16 +107,16 @@ class Nearest:
         return Layers(texture, size, count, depth * count, targets)
 
     def _draw_compute(
-        self, frame: Frame, stage: str, layers: Layers, clips: list[Matrix], head: HeadTextures
+        self, frame: Frame, stage: str, layers: Layers, views: Views, head: HeadTextures
     ) -> None:
-        views, places = _views_and_places(clips, layers.size)
-        record = self._views(self._resolve, layers, views, head)
+        triangles, (clips, places) = head.triangles, views
+        record, recorded = self._views(self._resolve, layers, clips, head), self._recorded(triangles, clips)
         record["sample"][: len(places), :2] = places
-        record["reach"] = *places.min(axis=0), *places.max(axis=0)
-        recorded = self._recorded(head.triangles, views)
+        across, down = places.T.tolist()
+        record["reach"] = min(across), min(down), max(across), max(down)
+        record["index_bits"] = triangles.bit_length() if recorded == (_BOTH,) else 0
         if _FOUND in recorded and layers.found.size < layers.nearness.size:
             layers.found = self._words(layers.nearness.size // 4)
-        record["index_bits"] = head.triangles.bit_length() if recorded == (_BOTH,) else 0
         resources = {
             **head.resources,
             "views": record,
@@ -125,24 +125,23 @@ class Nearest:
             "tiles": layers.tiles,
             "layers": layers.texture,
         }
-        shared = _shared_out(head.triangles * len(views), len(places))
-        count = -(-head.triangles // dict(shared)["TAKEN"])
-        groups = (min(count, _GROUPS_PER_ROW), -(-count // _GROUPS_PER_ROW), len(views))
+        shared, count = _shared_out(triangles, len(clips), len(places))
+        groups = (min(count, _GROUPS_PER_ROW), -(-count // _GROUPS_PER_ROW), len(clips))
         for what in recorded:
             finder = self._finders.program((("RECORDED", what), ("SAMPLES", len(places)), *shared))
             frame.dispatch(stage, finder, resources, groups)
         frame.dispatch(stage, self._resolve, resources, (*_tiles(layers.size), layers.count))
 
-    def _recorded(self, triangles: int, views: list[Matrix]) -> tuple[int, ...]:
+    def _recorded(self, triangles: int, clips: Matrix) -> tuple[int, ...]:
         """What is recorded, time after time: depth and triangle in one word where that is fine enough."""
         if not self._triangles:
             return (_DEPTH,)
         steps = 2.0 ** (32 - triangles.bit_length())
-        fine = max(map(_depth_range_mm, views)) <= _COARSEST_MM * steps
+        fine = max(map(_depth_range_mm, clips)) <= _COARSEST_MM * steps
         return (_BOTH,) if fine else (_DEPTH, _FOUND)
 
     def _draw_raster(
-        self, frame: Frame, stage: str, layers: Layers, clips: list[Matrix], head: HeadTextures
+        self, frame: Frame, stage: str, layers: Layers, clips: Matrix, head: HeadTextures
     ) -> None:
         resources = {**head.resources, "views": self._views(self._raster, layers, clips, head)}
         for layer, (depth, target) in enumerate(zip(layers.depth, layers.targets, strict=True)):
@@ -157,44 +156,33 @@ class Nearest:
                 target=target,
             )
 
-    def _views(self, program: Any, layers: Layers, clips: list[Matrix], head: HeadTextures) -> Any:
+    def _views(self, program: Any, layers: Layers, clips: Matrix, head: HeadTextures) -> Any:
         record = program.record("Views", triangles=head.triangles)
         record["width"], record["height"] = layers.size
-        record["clip"][: len(clips)] = np.swapaxes(np.array(clips, np.float32), 1, 2)
+        record["clip"][: len(clips)] = clips.swapaxes(1, 2)
         return record
-
-
-def _views_and_places(clips: list[Matrix], size: tuple[int, int]) -> tuple[list[Matrix], NDArray[np.float64]]:
-    """One view and (n, 2) places in its pixels when the matrices differ by no more, else all views."""
-    every, base = np.array(clips), clips[0]
-    if (every[:, 2:] != base[2:]).any():
-        return clips, np.full((1, 2), 0.5)
-    moved = every[:, :2] - base[:2]
-    shift = moved @ (base[3] / (base[3] @ base[3]))
-    apart = np.abs(moved - shift[..., None] * base[3]).max()
-    if apart <= 1e-9 * (1.0 + np.abs(base).max()):
-        return clips[:1], 0.5 + shift * (-0.5 * size[0], 0.5 * size[1])
-    return clips, np.full((1, 2), 0.5)
 
 
 def _depth_range_mm(clip: Matrix) -> float:
     """How far apart depths 0 and 1 would be if all depths were as coarse as the coarsest [mm]."""
-    away, depth = clip[3], clip[2]
-    scale = away[:3] @ away[:3]
+    rows: list[list[float]] = clip.tolist()
+    _, _, (*depth, start), (*away, before) = rows
+    scale = sum(a * a for a in away)
     if scale == 0.0:  # parallel rays
-        return float(1.0 / np.linalg.norm(depth[:3]))
-    slope = depth[:3] @ away[:3] / scale  # depth = slope + rise / distance
-    rise = depth[3] - slope * away[3]
-    return float(rise / slope**2 / np.sqrt(scale))
+        return 1.0 / math.hypot(*depth)
+    slope = sum(d * a for d, a in zip(depth, away, strict=True)) / scale  # depth = slope + rise / distance
+    rise = start - slope * before
+    return rise / (slope * slope) / math.sqrt(scale)
 
 
-def _shared_out(triangles: int, samples: int) -> Switches:
-    """What a workgroup takes when there are so many triangles in all, as one H200 was fastest."""
+def _shared_out(triangles: int, views: int, samples: int) -> tuple[Switches, int]:
+    """What a workgroup takes when there are so many triangles, as one H200 was fastest, and their number."""
     fewest, most = _TAKEN
-    taken = min(most, max(fewest, 1 << (triangles // _GROUPS).bit_length() >> 1))
+    taken = min(most, max(fewest, 1 << (triangles * views // _GROUPS).bit_length() >> 1))
     many = taken == most  # and small
     threads = 256 if many or samples > 1 else 128
-    return ("TAKEN", taken), ("RUN", _RUN if many else 1), ("SMALL", 32 if many else 16), ("THREADS", threads)
+    run, small = (_RUN, 32) if many else (1, 16)
+    return (("TAKEN", taken), ("RUN", run), ("SMALL", small), ("THREADS", threads)), -(-triangles // taken)
 
 
 def _tiles(size: tuple[int, int]) -> tuple[int, int]:

@@ -16,7 +16,7 @@ override TEAMS: u32 = THREADS / TEAM;
 
 const TEAM: u32 = 16u; // invocations that draw a block
 
-@group(1) @binding(4) var<storage, read_write> tiles: array<atomic<u32>>;
+@group(0) @binding(34) var<storage, read_write> tiles: array<atomic<u32>>;
 
 var<workgroup> taken: array<Drawn, TAKEN>;
 var<workgroup> blocks: array<u32, LISTED>; // place of the triangle, then x and y from the box's first block

@@ -11,7 +11,7 @@ from dermis.assets.mesh import Mesh
 from dermis.gpu import ComputeProgram, Device, Frame
 from dermis.gpu.program import Resources
 from dermis.rendering.geometry import HeadTextures
-from dermis.rendering.projection import ShadowView, parallel_view
+from dermis.rendering.projection import ShadowView, parallel_view, shadow_layers
 from dermis.rendering.stages import SHARED_SHADERS, STAGES
 from dermis.rendering.stages.nearest import Nearest
 
@@ -50,7 +50,7 @@ class Occlusion:
         frame = Frame(self._device)
         for first in range(0, len(self._towards), _BATCH):
             views = [parallel_view(-d, mesh, self._map_size) for d in self._towards[first : first + _BATCH]]
-            self._nearest.draw(frame, "occlusion", layers, [view.clip for view in views], head)
+            self._nearest.draw(frame, "occlusion", layers, shadow_layers(views), head)
             sky = self._program.record("Sky", directions=len(views), side=side, vertices=len(mesh.positions))
             bound = {
                 **lit,

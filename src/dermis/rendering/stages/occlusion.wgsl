@@ -9,9 +9,9 @@ struct Sky {
     vertices: u32,
 }
 
-@group(1) @binding(0) var<uniform> sky: Sky;
-@group(1) @binding(1) var atlas: texture_2d<u32>;
-@group(1) @binding(2) var<storage, read_write> open: array<vec2f>; // sums so far
+@group(0) @binding(30) var<uniform> sky: Sky;
+@group(0) @binding(31) var atlas: texture_2d<u32>;
+@group(0) @binding(32) var<storage, read_write> open: array<vec2f>; // sums so far
 
 fn texel_point(place: vec2u) -> Point {
     let at = vec2u((vec2f(place) + 0.5) * vec2f(textureDimensions(atlas)) / f32(sky.side));

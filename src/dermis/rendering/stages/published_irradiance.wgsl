@@ -7,8 +7,8 @@ struct Entering {
     scale: f32, // of what is stored over the light
 }
 
-@group(1) @binding(0) var surfaces: texture_2d_array<u32>; // as surface_texels.wgsl packs them
-@group(1) @binding(1) var<uniform> entering: Entering;
+@group(0) @binding(30) var surfaces: texture_2d_array<u32>; // as surface_texels.wgsl packs them
+@group(0) @binding(31) var<uniform> entering: Entering;
 
 @fragment
 fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {

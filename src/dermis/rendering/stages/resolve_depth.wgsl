@@ -1,8 +1,8 @@
 // Depths from the buffer where they were found into the layers of a texture; the buffer is left empty for the next time.
 //#include "resolve.wgsl"
 
-@group(1) @binding(1) var<storage, read_write> nearness: array<u32>;
-@group(1) @binding(3) var layers: texture_storage_2d_array<r32float, write>;
+@group(0) @binding(31) var<storage, read_write> nearness: array<u32>;
+@group(0) @binding(33) var layers: texture_storage_2d_array<r32float, write>;
 
 fn found_at(at: u32) -> u32 {
     return nearness[at];

@@ -1,9 +1,9 @@
 // Triangles from the buffer where they were found into the layers of a texture; the buffers are left empty for next time.
 //#include "resolve.wgsl"
 
-@group(1) @binding(1) var<storage, read_write> nearness: array<u32>;
-@group(1) @binding(2) var<storage, read_write> found: array<u32>;
-@group(1) @binding(3) var layers: texture_storage_2d_array<r32uint, write>;
+@group(0) @binding(31) var<storage, read_write> nearness: array<u32>;
+@group(0) @binding(32) var<storage, read_write> found: array<u32>;
+@group(0) @binding(33) var layers: texture_storage_2d_array<r32uint, write>;
 
 fn found_at(at: u32) -> u32 {
     if (views.index_bits > 0u) {

@@ -27,11 +27,11 @@ struct Shade {
     jitter: array<vec4f, 64>, // sample places in the pixel, 0..1
 }
 
-@group(1) @binding(0) var<uniform> shade: Shade;
-@group(1) @binding(1) var seen: texture_2d_array<u32>;
-@group(1) @binding(2) var scattered: texture_2d<f32>; // per texel of the atlas, blurred and combined; or pre-integrated
-@group(1) @binding(3) var image: texture_storage_2d<rgba32float, write>;
-@group(1) @binding(4) var apart: texture_storage_2d_array<rgba32float, write>; // light below, depth; its share that leaves
+@group(0) @binding(30) var<uniform> shade: Shade;
+@group(0) @binding(31) var seen: texture_2d_array<u32>;
+@group(0) @binding(32) var scattered: texture_2d<f32>; // per texel of the atlas, blurred and combined; or pre-integrated
+@group(0) @binding(33) var image: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(34) var apart: texture_storage_2d_array<rgba32float, write>; // light below, depth; its share that leaves
 
 // t: corners of the triangle, w: barycentric weights
 fn open_sky(point: Point, t: vec4u, w: vec3f) -> f32 {

@@ -8,7 +8,7 @@ from typing import Any
 from dermis.gpu import ComputeProgram, Device, Frame, make_texture
 from dermis.rendering.geometry import HeadTextures
 from dermis.rendering.limits import check_shadows
-from dermis.rendering.projection import Matrix
+from dermis.rendering.projection import Views
 from dermis.rendering.stages import STAGES
 from dermis.rendering.stages.nearest import Layers, Nearest
 
@@ -53,7 +53,7 @@ class Shadows:
         self,
         frame: Frame,
         maps: ShadowMaps,
-        clips: list[Matrix],
+        views: Views,
         head: HeadTextures,
         key: bytes,
         bounded: bool = True,
@@ -63,10 +63,10 @@ class Shadows:
         bounded : whether some light has a size, so that the bounds are read
         """
         key += b"bounded" * bounded
-        if clips and maps.drawn != key:
-            self._nearest.draw(frame, "shadows", maps.layers, clips, head)
+        if len(views.clips) and maps.drawn != key:
+            self._nearest.draw(frame, "shadows", maps.layers, views, head)
             if bounded:
-                self._draw_bounds(frame, maps, len(clips))
+                self._draw_bounds(frame, maps, len(views.clips))
             maps.drawn = key
 
     def _draw_bounds(self, frame: Frame, maps: ShadowMaps, count: int) -> None:

@@ -1,8 +1,8 @@
 // The surface at each texel of the atlas: where it is, its normals, its colour and its gloss.
 //#include "packed_surface.wgsl"
 
-@group(1) @binding(0) var atlas: texture_2d<u32>; // triangle + 1, two barycentric weights packed
-@group(1) @binding(1) var surfaces: texture_storage_2d_array<rgba32uint, write>;
+@group(0) @binding(30) var atlas: texture_2d<u32>; // triangle + 1, two barycentric weights packed
+@group(0) @binding(31) var surfaces: texture_storage_2d_array<rgba32uint, write>;
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dermis.gpu import Device, Frame
 from dermis.rendering.geometry import HeadTextures
-from dermis.rendering.projection import Matrix
+from dermis.rendering.projection import Views
 from dermis.rendering.stages.nearest import Layers, Nearest
 
 
@@ -18,6 +18,6 @@ class Visibility:
         """Space for a layer of triangle indices for each sample of a pixel."""
         return self._nearest.make_layers(size, samples)
 
-    def draw(self, frame: Frame, seen: Layers, clips: list[Matrix], head: HeadTextures) -> None:
-        """One layer for each matrix, which differ by the sample's place in the pixel."""
-        self._nearest.draw(frame, "visibility", seen, clips, head)
+    def draw(self, frame: Frame, seen: Layers, views: Views, head: HeadTextures) -> None:
+        """One layer for each sample of the camera."""
+        self._nearest.draw(frame, "visibility", seen, views, head)

@@ -8,8 +8,8 @@ const AS_FOUND: u32 = 1u; // its triangle, where the depths recorded before are 
 const AS_BOTH: u32 = 2u; // its depth in fewer bits above its triangle
 const ROUNDING: u32 = 4u; // depths are computed twice and may be rounded differently
 
-@group(1) @binding(1) var<storage, read_write> nearness: array<atomic<u32>>; // depth, or depth and triangle + 1; 0 empty
-@group(1) @binding(2) var<storage, read_write> found: array<atomic<u32>>; // triangle + 1
+@group(0) @binding(31) var<storage, read_write> nearness: array<atomic<u32>>; // depth, or depth and triangle + 1; 0 empty
+@group(0) @binding(32) var<storage, read_write> found: array<atomic<u32>>; // triangle + 1
 
 // Of two triangles at one depth the later one, always.
 fn record_four(index: u32, depth: vec4f, inside: vec4<bool>, texels: vec4u) {

@@ -2,7 +2,7 @@
 // hold something from the time before are emptied, the others are as they should be.
 //#include "tiles.wgsl"
 
-@group(1) @binding(4) var<storage, read_write> tiles: array<u32>;
+@group(0) @binding(34) var<storage, read_write> tiles: array<u32>;
 
 const ROWS: u32 = 4u; // that a workgroup takes at a time
 

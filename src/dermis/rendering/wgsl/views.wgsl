@@ -10,4 +10,4 @@ struct Views {
     index_bits: u32, // of a triangle below its depth, 0 where each has a buffer of its own
 }
 
-@group(1) @binding(0) var<uniform> views: Views;
+@group(0) @binding(30) var<uniform> views: Views;

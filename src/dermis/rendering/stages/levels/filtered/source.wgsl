@@ -1,7 +1,7 @@
 // A level whose texels every GPU can filter.
 
-@group(1) @binding(0) var source: texture_2d<f32>; // filtered; light, and 1 where there is surface
-@group(1) @binding(1) var linear: sampler;
+@group(0) @binding(30) var source: texture_2d<f32>; // filtered; light, and 1 where there is surface
+@group(0) @binding(31) var linear: sampler;
 
 fn source_at(uv: vec2f) -> vec4f {
     return textureSampleLevel(source, linear, uv, 0.0);

@@ -1,7 +1,7 @@
 // Light stored as halves. Some adapters cut floats off when they store them, so that each pass would lose energy: here
 // they are rounded before, and nothing is left to be cut off.
 
-@group(1) @binding(2) var stored: texture_storage_2d<rgba16float, write>;
+@group(0) @binding(32) var stored: texture_storage_2d<rgba16float, write>;
 
 const LARGEST: f32 = 65504.0; // half
 

@@ -1,7 +1,7 @@
 // A level whose texels many GPUs cannot filter.
 //#include "bilinear.wgsl"
 
-@group(1) @binding(0) var source: texture_2d<f32>; // light, and 1 where there is surface
+@group(0) @binding(30) var source: texture_2d<f32>; // light, and 1 where there is surface
 
 fn source_at(uv: vec2f) -> vec4f {
     return load_bilinear(source, uv);
