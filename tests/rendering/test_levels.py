@@ -139,10 +139,12 @@ def test_halves_keep_the_light(
     assert halves[atlas.own].sum() == pytest.approx(floats[atlas.own].sum(), rel=HALVES / 4)
 
 
-@pytest.mark.parametrize("brightest", [0.0, 1e-30, 0.3, 3.0, 1e12])
+@pytest.mark.parametrize("brightest", [0.0, 5e-324, 1e-40, 1e-30, 0.3, 3.0, 1e12])
 def test_scales_are_powers_of_two(brightest: float) -> None:
+    """Those that a shader's float holds, however little light there is."""
     scale = scale_of(HALF, brightest)
     assert np.frexp(scale)[0] == 0.5 and scale * brightest <= 16
+    assert scale < np.finfo(np.float32).max and 1 / scale > np.finfo(np.float32).tiny
     assert scale_of(FLOATS, brightest) == 1.0
 
 

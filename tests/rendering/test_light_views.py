@@ -9,6 +9,7 @@ from setups import head_of, place, scene_of
 from dermis.assets.primitives import uv_sphere
 from dermis.errors import DermisError
 from dermis.rendering.lights import light_views
+from dermis.rendering.projection import axes_of
 from dermis.scene.lights import DirectionalLight, Light, PointLight, SpotLight
 
 BALL = head_of(uv_sphere(30.0, 24, 12))
@@ -47,3 +48,11 @@ def test_one_within_the_head_is_named(inside: tuple[float, ...]) -> None:
     lamp = PointLight(position=place(BALL, inside), target=(100.0, 0.0, 0.0))
     with pytest.raises(DermisError, match=r"light 2.*a place outside the head"):
         light_views(scene_of(BALL, LIGHTS[0], lamp), 64)
+
+
+@pytest.mark.parametrize("length", [1e-6, 1.0, 1e6])
+def test_up_counts_however_short(length: float) -> None:
+    """The least that scenes allow, up to the longest; only one along the view is replaced."""
+    tilted = axes_of((0.0, 0.6, -0.8), (0.0, 0.9 * length, 0.2 * length))
+    assert np.allclose(tilted, [(1.0, 0.0, 0.0), (0.0, 0.8, 0.6), (0.0, 0.6, -0.8)])
+    assert np.allclose(axes_of((0.0, 1.0, 0.0), (0.0, length, 0.0))[2], (0.0, 1.0, 0.0))

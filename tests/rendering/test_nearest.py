@@ -150,3 +150,18 @@ def test_steps_of_depth() -> None:
     assert nearest._depth_range_mm(seen) == pytest.approx(little / step, rel=1e-4)
     parallel = parallel_view(np.array([0.0, 0.6, -0.8]), BALL.mesh, 64)
     assert nearest._depth_range_mm(parallel.clip) == pytest.approx(parallel.far - parallel.near)
+
+
+@pytest.mark.parametrize(("eye", "ahead"), [((1, 0, 0), (0, 0, -50)), ((30, 120, 1), (0, -50, 0))])
+def test_corners_on_the_plane_of_the_eye(renderer: Renderer, eye: Any, ahead: Any) -> None:
+    """No triangle goes on beyond the edge opposite a corner beside the eye: the rasteriser's silhouettes."""
+    ball = head_of(uv_sphere(60.0, 24, 12))
+    target = tuple(np.add(eye, ahead).tolist())
+    camera = Camera(position=eye, target=target, up=(0.1, 1, 0.2), frame_mm=60.0)
+    covered = []
+    for compute in (True, False):
+        finder = Nearest(renderer.device, triangles=False, compute=compute)
+        (layer,), _ = shown(finder, finder.make_layers(SIZE, 1), renderer, ball, camera, 1)
+        covered.append(layer > 0)
+    assert 0.1 < covered[1].mean() < 0.95
+    assert (covered[0] != covered[1]).mean() < 1e-3

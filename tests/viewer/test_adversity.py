@@ -19,6 +19,12 @@ PICTURE = slice(0, 380), slice(205, 400)  # neither the panel nor the text at th
 FEW_BYTES = 1.02  # of what was held: a picture of another size may have taken the place of a small one
 
 
+@pytest.fixture(autouse=True)
+def steady(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures in motion that are alike, and take the same memory, on quick and on busy machines."""
+    monkeypatch.setattr("dermis.viewer.pace.Pace.note", lambda *_: None)
+
+
 def resized(hands: Hands, width: int, height: int) -> None:
     """As windows tell it, before anything is drawn."""
     hands.canvas._size_info.set_physical_size(width, height, 1.0)

@@ -29,6 +29,7 @@ class Held:
     widths : of those that were begun [mm]
     """
 
+    begun: threading.Event = field(default_factory=threading.Event)
     may_go_on: threading.Event = field(default_factory=threading.Event)
     widths: list[float] = field(default_factory=list)
 
@@ -39,6 +40,7 @@ def held(monkeypatch: pytest.MonkeyPatch) -> Iterator[Held]:
 
     def waiting(mesh: Any, atlas: Any, widest_mm: float) -> Any:
         found.widths.append(widest_mm)
+        found.begun.set()
         assert found.may_go_on.wait(60.0)
         return search(mesh, atlas, widest_mm)
 
@@ -48,12 +50,14 @@ def held(monkeypatch: pytest.MonkeyPatch) -> Iterator[Held]:
 
 
 @pytest.fixture
-def studio(held: Held, state: ViewerState) -> Studio:
+def studio(held: Held, state: ViewerState, monkeypatch: pytest.MonkeyPatch) -> Studio:
     """With the picture of pale skin, after which searches wait."""
     studio = Studio(ADAPTER)
+    monkeypatch.setattr(studio.pace, "note", lambda _: None)  # a busy machine would get smaller pictures
     held.may_go_on.set()
     image(studio, skin(state, PALE))
     held.may_go_on.clear()
+    held.begun.clear()
     held.widths.clear()
     return studio
 
@@ -75,6 +79,7 @@ def test_pigments_move_on_while_the_search_goes_on(studio: Studio, held: Held, s
     pale, dark = image(studio, skin(state, PALE), True), skin(state, DARK)
     moved = [image(studio, skin(state, melanin), True) for melanin in (0.1, 0.15, DARK)]
     assert all(np.abs(one - pale).mean() > 1.0 for one in moved)
+    assert held.begun.wait(60.0)
     assert len(held.widths) == 1  # one after the other
     assert not studio.is_current
     held.may_go_on.set()

@@ -6,7 +6,7 @@ import io
 import json
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -68,6 +68,15 @@ class Page:
                 self.frames.append((told["index"], told["mimetype"], self._socket.recv()))
                 if confirming:
                     self.confirm(told["index"])
+
+    def wait(
+        self, reached: Callable[[], Any], quiet_s: float = _QUIET_S, *, confirming: bool = False
+    ) -> None:
+        """Take what comes until something has happened."""
+        end = time.monotonic() + _PATIENCE_S
+        while not reached():
+            assert time.monotonic() < end, "what the page waits for never comes"
+            self.hear(quiet_s, confirming=confirming)
 
     def still(self) -> NDArray[np.int64]:
         """The picture when it is sent without loss and nothing follows."""
@@ -160,11 +169,9 @@ def test_a_lossless_frame_keeps_nothing_waiting_and_is_not_sent_late(
         page.still()
         monkeypatch.setattr(canvas, "encoded", slowly)
         page.drag(300, 260)
-        while not begun.is_set():
-            page.hear(confirming=True)
+        page.wait(begun.is_set, confirming=True)
         page.drag(260, 300)
-        while not page.frames:
-            page.hear(confirming=True)
+        page.wait(lambda: page.frames, confirming=True)
         assert {kind for _, kind, _ in page.frames} == {"image/jpeg"}
         gate.set()
         page.still()
@@ -183,14 +190,13 @@ def test_a_page_that_was_not_ready_for_the_still_picture_gets_it_when_it_is(view
         page.still()
         page.drag(300, 270)
         page.hear()
+        page.wait(lambda: page.frames)
         confirmed, kind = page.frames[0][0], "image/jpeg"
         while kind == "image/jpeg":  # always one too few, so that the last frame fills what a page may get
             page.frames.clear()
             page.confirm(confirmed)
-            confirmed, end = confirmed + 1, time.monotonic() + _PATIENCE_S
-            while not page.frames:
-                assert time.monotonic() < end, "no picture without loss comes"
-                page.hear(0.2)
+            confirmed += 1
+            page.wait(lambda: page.frames, 0.2)
             kind = page.frames[-1][1]
 
 
@@ -204,8 +210,7 @@ def test_who_watches_takes_over_with_a_size_of_its_own(viewer: Any) -> None:
         watcher.show((320, 200))
         assert watcher.still().shape == (*SIZE[::-1], 3) and watcher.active is False
         first.close()
-        watcher.hear(confirming=True)
-        assert watcher.active
+        watcher.wait(lambda: watcher.active, confirming=True)
         watcher.show((320, 200))
         assert watcher.still().shape == (200, 320, 3)
 

@@ -27,7 +27,10 @@ LIT = {"irradiance", "diffuse", "combine"}
 
 @pytest.fixture(scope="module")
 def studio() -> Studio:
-    return Studio(ADAPTER)
+    """Whose pictures in motion are alike on quick and on busy machines."""
+    studio = Studio(ADAPTER)
+    studio.pace.note = lambda _: None  # type: ignore[method-assign]
+    return studio
 
 
 @pytest.fixture(scope="module")

@@ -14,6 +14,7 @@ FLOATS = "rgba32float"
 """Format of light that is neither blurred nor rounded to halves."""
 MOST_HALVINGS = 3
 _BRIGHT = 16.0  # what the lights are brought to, a 4000th of what halves hold
+_MOST_SCALED = 2.0**100  # it and its inverse are floats; light that would need more is none
 SHARP = 0.45  # least standard deviation [mm] of what is halved, over the square of the result's texels [mm]
 
 
@@ -72,7 +73,7 @@ def scale_of(texel: str, brightest: float) -> float:
     """
     if texel == FLOATS or brightest == 0.0:
         return 1.0
-    return float(2.0 ** np.floor(np.log2(_BRIGHT / brightest)))
+    return float(2.0 ** np.floor(np.log2(min(_BRIGHT / brightest, _MOST_SCALED))))
 
 
 def halvings_of(variance_mm2: NDArray[np.float64], texels_per_mm: float, most: int) -> tuple[int, ...]:

@@ -80,7 +80,7 @@ def axes_of(forward: Sequence[float], up: Sequence[float] = _UP) -> Axes:
     """The same in plain floats: numpy takes ten times as long for so few numbers, and a frame has many."""
     f = unit(forward)
     r = _cross(f, up)
-    if math.hypot(*r) < 1e-6:
+    if math.hypot(*r) <= 1e-6 * math.hypot(*up):
         r = _cross(f, (1.0, 0.0, 0.0) if abs(f[0]) < 0.9 else (0.0, 0.0, 1.0))
     r = unit(r)
     return r, _cross(r, f), f

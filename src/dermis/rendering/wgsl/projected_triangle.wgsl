@@ -6,6 +6,7 @@ override SAMPLES: u32 = 1u; // places in a pixel at which each view is seen, a l
 override BLOCK: u32 = select(8u, 4u, SAMPLES > 1u); // pixels along a side of a block
 
 const SLACK: f32 = 1e-5; // covers rounding, so that no pixel falls between two triangles
+const LEAST: f32 = 0.1; // of the greatest distance: less, beside the eye, would let slack reach far beyond an edge
 
 // Corner in homogeneous pixels: place times w, w; and its clip depth.
 struct Projected {
@@ -66,11 +67,13 @@ fn set_up(index: u32, view: u32) -> Drawn {
     }
     let weights = transpose(mat3x3f(cross(pb, pc) / volume, cross(pc, pa) / volume, cross(pa, pb) / volume));
     let z = vec3f(a.z, b.z, c.z);
+    let away = abs(w);
+    let scale = max(away, vec3f(LEAST * max(max(away.x, away.y), away.z)));
     return Drawn(
         box,
-        vec4f(weights[0] * abs(w), dot(weights[0], z)),
-        vec4f(weights[1] * abs(w), dot(weights[1], z)),
-        vec4f(weights[2] * abs(w), dot(weights[2], z)),
+        vec4f(weights[0] * scale, dot(weights[0], z)),
+        vec4f(weights[1] * scale, dot(weights[1], z)),
+        vec4f(weights[2] * scale, dot(weights[2], z)),
     );
 }
 
