@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 from types import SimpleNamespace
 from typing import Any
 
@@ -22,6 +23,8 @@ def fake(name: str, kind: str, backend: str = "Vulkan", features: tuple[str, ...
 @pytest.fixture
 def machine(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Give this machine other adapters: machine(handle, ...)."""
+    import_module("wgpu.backends.wgpu_native")  # which a device asks for, whatever stands for its package
+
 
     def pretend(*handles: Any) -> None:
         source = SimpleNamespace(enumerate_adapters_sync=lambda: list(handles))
