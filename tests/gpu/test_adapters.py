@@ -25,7 +25,6 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Give this machine other adapters: machine(handle, ...)."""
     import_module("wgpu.backends.wgpu_native")  # which a device asks for, whatever stands for its package
 
-
     def pretend(*handles: Any) -> None:
         source = SimpleNamespace(enumerate_adapters_sync=lambda: list(handles))
         monkeypatch.setitem(sys.modules, "wgpu", SimpleNamespace(gpu=source))
