@@ -122,7 +122,7 @@ def test_a_viewer_that_is_stopped_leaves_what_it_has(
 
 def test_other_names_are_refused(server: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert server.main(output=tmp_path / "figures.json", parts="bench,sun") == 2
-    assert "--parts: expected names of bench, sequences" in capsys.readouterr().err
+    assert "--parts: expected names of bench, lobes" in capsys.readouterr().err
     assert server.main(output=tmp_path / "figures.txt") == 2
     assert not list(tmp_path.iterdir())
 
