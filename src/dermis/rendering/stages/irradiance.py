@@ -22,7 +22,7 @@ class Irradiance:
         self._device, self._variants = device, dict[str, Variants]()
         self._surfaces = SurfaceTexels(device)
         self._suited = lighting_switches(device)
-        self._into(texel).program(self._suited)
+        self._program((), texel)
 
     def draw(
         self,
@@ -40,18 +40,20 @@ class Irradiance:
         texel : the texture's format
         scale : what light is multiplied with there
         """
-        program = self._into(texel).program(switches + self._suited)
+        program = self._program(switches, texel)
         bound = {
             **layout.lit,
             "surfaces": self._surfaces.of(layout),
             "entering": program.record("Entering", scale=scale),
-            "stored": into,
         }
-        frame.compute("irradiance", program, bound, (side, side))
+        self._run(frame, program, bound, into, side)
 
-    def _into(self, texel: str) -> Variants:
-        """The pipelines that store light in a format."""
+    def _program(self, switches: Switches, texel: str) -> Any:
+        """What stores light in a format, made when first asked for."""
         if texel not in self._variants:
             path, stores = STAGES / "irradiance.wgsl", (STORE_SHADERS[texel],)
             self._variants[texel] = Variants(self._device, path, stores)
-        return self._variants[texel]
+        return self._variants[texel].program(switches + self._suited)
+
+    def _run(self, frame: Frame, program: Any, bound: dict[str, Any], into: Any, side: int) -> None:
+        frame.compute("irradiance", program, bound | {"stored": into}, (side, side))

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from dermis.gpu import Device, FragmentProgram, Frame, make_texture
 from dermis.optics.gaussians import MOST_GAUSSIANS
 from dermis.rendering.geometry import mesh_switches
-from dermis.rendering.layout import Layout
 from dermis.rendering.levels import FLOATS, Levels
 from dermis.rendering.stages import SHARED_SHADERS, STAGES
 from dermis.rendering.stages.combine import Combine
@@ -41,30 +40,20 @@ def published_as_fragments(device: Device, stages: Stages) -> Iterator[None]:
 
 
 class FragmentIrradiance(Irradiance):
-    """Lights each texel of the atlas."""
+    """Lights each texel of the atlas; all levels of this technique have one format."""
 
     def __init__(self, device: Device) -> None:
         self._device, self._surfaces = device, SurfaceTexels(device)
         self._programs: dict[Switches, FragmentProgram] = {}
 
-    def draw(
-        self,
-        frame: Frame,
-        layout: Layout,
-        switches: Switches,
-        into: Any,
-        side: int,
-        texel: str = TEXEL,
-        scale: float = 1.0,
-    ) -> None:
-        """As `Irradiance.draw` does, into halves."""
+    def _program(self, switches: Switches, texel: str) -> Any:
         if switches not in self._programs:
             path, chosen = STAGES / "published_irradiance.wgsl", dict(switches + mesh_switches(self._device))
-            made = FragmentProgram(self._device, path, (SHARED_SHADERS,), chosen, targets=[TEXEL])
-            self._programs[switches] = made
-        program = self._programs[switches]
-        entering = program.record("Entering", scale=scale)
-        bound = {**layout.lit, "surfaces": self._surfaces.of(layout), "entering": entering}
+            program = FragmentProgram(self._device, path, (SHARED_SHADERS,), chosen, targets=[texel])
+            self._programs[switches] = program
+        return self._programs[switches]
+
+    def _run(self, frame: Frame, program: Any, bound: dict[str, Any], into: Any, side: int) -> None:
         frame.fill("irradiance", program, bound, [into])
 
 
