@@ -21,9 +21,9 @@ from cyclopts import Parameter, run
 from gpu_sections import Plan, plan_of, quick_plan
 
 import dermis
-from dermis.assets.samples import cached
 from dermis.cli.console import note
 from dermis.errors import DermisError
+from dermis.mesh.samples import cached
 from dermis.outputs import check_output, replacing
 
 PARTS = ("bench", "lobes", "sequences", "lights", "options", "start", "viewer", "film")

@@ -12,10 +12,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.head import Head
 from dermis.comparison.scenes import comparison_scene, usual_region
 from dermis.comparison.truths import matched
 from dermis.errors import DermisError
+from dermis.frame.passes.gpu_gems_3_fragments import published_as_fragments
+from dermis.frame.renderer import Renderer
+from dermis.mesh.head import Head
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.media import Medium
@@ -24,8 +26,6 @@ from dermis.optics.profiles import TERMS, write_profile
 from dermis.reference.cycles import Method, cycles_passes
 from dermis.reference.cycles_process import CyclesPass
 from dermis.reference.path_traced import SAMPLES_PER_PASS, PathTraced, path_trace
-from dermis.rendering.renderer import Renderer
-from dermis.rendering.stages.published_fragments import published_as_fragments
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin

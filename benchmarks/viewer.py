@@ -23,7 +23,7 @@ from typing import Any
 from cyclopts import run
 from viewer_clock import Clock
 from viewer_delays import delays
-from viewer_hands import Plan, offscreen, slider_place, speeds
+from viewer_input import Plan, offscreen, slider_place, speeds
 from viewer_memory import endured
 from viewer_page import through_the_page
 from viewer_tables import tables
@@ -92,12 +92,12 @@ def main(
     )
     found = Found(_about(device, plan), output, clock)
     del device
-    hands = offscreen(plan)
-    found.take("speed", partial(speeds, hands, plan))
-    found.take("delay", partial(delays, hands, plan))
+    driver = offscreen(plan)
+    found.take("speed", partial(speeds, driver, plan))
+    found.take("delay", partial(delays, driver, plan))
     if browser:
-        found.take("page", partial(through_the_page, plan, slider_place(hands, "melanin")))
-    del hands
+        found.take("page", partial(through_the_page, plan, slider_place(driver, "melanin")))
+    del driver
     if minutes or changes:
         watched = _halved(plan) if software else plan  # a thousand changes in ten minutes
         found.take("memory", lambda _: endured(offscreen(watched), watched, minutes, changes).items())

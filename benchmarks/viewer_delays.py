@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from viewer_clock import Clock
-from viewer_hands import FEWEST, MOTIONS, STEP, Hands, Plan, counted
+from viewer_input import FEWEST, MOTIONS, STEP, InputDriver, Plan, counted
 
 from dermis.viewer.orbit import orbit
 
@@ -17,63 +17,65 @@ _PATIENCE = 100  # frames
 _PIXELS = 6.0  # of a drag between two frames
 
 
-def delays(hands: Hands, plan: Plan, clock: Clock) -> Iterator[tuple[str, dict[str, float]]]:
+def delays(driver: InputDriver, plan: Plan, clock: Clock) -> Iterator[tuple[str, dict[str, float]]]:
     """From a pointer's move to the picture that shows it [ms]: in a drag, then out of rest.
 
     A camera takes some tenths of a second to come to rest, however quick the frames are.
     """
-    hands.go_on(hands.first)
+    driver.go_on(driver.first)
     x, y = (0.5 * side for side in plan.size)
-    hands.event("pointer_down", x, y)
-    hands.frame()
-    frame_s, chance = _frame_s(hands), random.Random(7)
+    driver.event("pointer_down", x, y)
+    driver.frame()
+    frame_s, chance = _frame_s(driver), random.Random(7)
     waits = (chance.random() * frame_s for _ in range(plan.frames))
     drags = zip(counted(plan.frames, clock.share(0.3)), waits, strict=False)
-    yield "in a drag", spread([_delay_in_frame(hands, x - _PIXELS * (k % 9), y, wait) for k, wait in drags])
+    yield "in a drag", spread([_delay_in_frame(driver, x - _PIXELS * (k % 9), y, wait) for k, wait in drags])
     rests = counted(plan.frames, clock)
-    yield "from rest", spread([_delay(hands, x + _PIXELS * (1 - k % 2), y) for k in rests])
-    hands.event("pointer_up", x, y)
-    hands.frame()
+    yield "from rest", spread([_delay(driver, x + _PIXELS * (1 - k % 2), y) for k in rests])
+    driver.event("pointer_up", x, y)
+    driver.frame()
 
 
-def _frame_s(hands: Hands) -> float:
+def _frame_s(driver: InputDriver) -> float:
     """The quickest of some frames of a camera that turns [s]."""
     times = []
     for _ in range(FEWEST):
         began = time.perf_counter()
-        hands.go_on(MOTIONS["camera"].change(hands.viewer.desk.state, 0))
-        hands.frame()
+        driver.go_on(MOTIONS["camera"].change(driver.viewer.desk.state, 0))
+        driver.frame()
         times.append(time.perf_counter() - began)
     return min(times)
 
 
-def _delay(hands: Hands, x: float, y: float) -> float:
+def _delay(driver: InputDriver, x: float, y: float) -> float:
     """Of a move after which the camera has come to rest [s]."""
-    hands.rest()
-    before, began = hands.frame(), time.perf_counter()
-    hands.event("pointer_move", x, y)
+    driver.rest()
+    before, began = driver.frame(), time.perf_counter()
+    driver.event("pointer_move", x, y)
     for _ in range(_PATIENCE):  # quick frames show the camera when it has hardly begun to glide
-        picture, now = hands.frame(), time.perf_counter()
+        picture, now = driver.frame(), time.perf_counter()
         if not np.array_equal(before, picture):
             return now - began
     raise RuntimeError("the picture does not follow")
 
 
-def _delay_in_frame(hands: Hands, x: float, y: float, wait_s: float) -> float:
+def _delay_in_frame(driver: InputDriver, x: float, y: float, wait_s: float) -> float:
     """Of a move that comes while a frame is drawn [s]."""
     came: list[float] = []
 
     def move() -> None:
         time.sleep(wait_s)
         came.append(time.perf_counter())
-        hands.event("pointer_move", x, y)
+        driver.event("pointer_move", x, y)
 
     mover = threading.Thread(target=move)
     mover.start()
-    hands.go_on(hands.viewer.desk.state.with_camera(orbit(hands.viewer.desk.state.scene.camera, STEP, 0.0)))
-    hands.frame()
+    driver.go_on(
+        driver.viewer.desk.state.with_camera(orbit(driver.viewer.desk.state.scene.camera, STEP, 0.0))
+    )
+    driver.frame()
     mover.join()
-    hands.frame()
+    driver.frame()
     return time.perf_counter() - came[0]
 
 

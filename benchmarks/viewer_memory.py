@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from viewer_hands import Hands, Plan
+from viewer_input import InputDriver, Plan
 from viewer_page import resident_mb
 
 from dermis.gpu.memory import held_bytes
@@ -62,23 +62,23 @@ KINDS: dict[str, Kind] = {
 """Changes of a state; what cannot be rendered together leaves the last picture, as it does for a user."""
 
 
-def endured(hands: Hands, plan: Plan, minutes: float, changes: int) -> dict[str, Any]:
+def endured(driver: InputDriver, plan: Plan, minutes: float, changes: int) -> dict[str, Any]:
     """The memory over at least so many minutes and changes; each change is drawn."""
-    chance, desk = random.Random(11), hands.viewer.desk
+    chance, desk = random.Random(11), driver.viewer.desk
     done, taken = 0, list[dict[str, float]]()
     counts = dict.fromkeys((*KINDS, *_BY_HAND), 0)
     for kind in counts:  # all that is ever compiled and loaded, before anything is counted
-        _change(hands, kind, chance, plan)
-        hands.frame()
-    desk.change(hands.first)
+        _change(driver, kind, chance, plan)
+        driver.frame()
+    desk.change(driver.first)
     begun = time.perf_counter()
     while (now := time.perf_counter() - begun) < 60.0 * minutes or done < changes:
         part = min(now / max(1e-9, 60.0 * minutes), done / max(1, changes))
         if part * _SAMPLES >= len(taken):
             taken.append(_sample(now, done))
         kind = chance.choice(list(counts))
-        _change(hands, kind, chance, plan)
-        hands.frame()
+        _change(driver, kind, chance, plan)
+        driver.frame()
         counts[kind] += 1
         done += 1
     taken.append(_sample(time.perf_counter() - begun, done))
@@ -90,8 +90,8 @@ def _sample(seconds: float, changes: int) -> dict[str, float]:
     return {"s": seconds, "changes": changes, "resident_mb": resident_mb(), "device_mb": held_bytes() / 1e6}
 
 
-def _change(hands: Hands, kind: str, chance: random.Random, plan: Plan) -> None:
-    desk = hands.viewer.desk
+def _change(driver: InputDriver, kind: str, chance: random.Random, plan: Plan) -> None:
+    desk = driver.viewer.desk
     if kind in KINDS:
         desk.change(KINDS[kind](desk.state, chance))
     elif kind == "split":
@@ -101,13 +101,13 @@ def _change(hands: Hands, kind: str, chance: random.Random, plan: Plan) -> None:
     elif kind == "redo":
         desk.history.redo()
     elif kind == "panel":
-        hands.viewer.panel.visible = not hands.viewer.panel.visible
+        driver.viewer.panel.visible = not driver.viewer.panel.visible
     elif kind == "size":
-        hands.canvas.set_logical_size(*(round(side * chance.choice((0.5, 0.75, 1.0))) for side in plan.size))
+        driver.canvas.set_logical_size(*(round(side * chance.choice((0.5, 0.75, 1.0))) for side in plan.size))
     elif kind == "preset":
         desk.controls.look(chance.choice(CAMERAS))
     else:
-        desk.change(hands.first)
+        desk.change(driver.first)
 
 
 def growth(taken: Sequence[dict[str, float]]) -> dict[str, Any]:

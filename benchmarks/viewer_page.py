@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from viewer_clock import Clock
 from viewer_delays import spread
-from viewer_hands import Plan
+from viewer_input import Plan
 from viewer_server import served
 
 from dermis.viewer.browser.canvas import encoded

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from typing import IO
 
 from viewer_clock import Clock
-from viewer_hands import PIGMENTED, Plan
+from viewer_input import PIGMENTED, Plan
 
 _START_S = 120.0
 

@@ -9,10 +9,10 @@ import tempfile
 from pathlib import Path
 
 import dermis
-from dermis.assets.bust.build import BustRecipe, write_bust
-from dermis.assets.bust.parameters import BustParameters
-from dermis.assets.skin_maps.look import SkinLook
 from dermis.gallery.picture import main
+from dermis.human.bust.build import BustRecipe, write_bust
+from dermis.human.bust.parameters import BustParameters
+from dermis.human.skin_maps.look import SkinLook
 
 FAMILY = [
     (BustParameters(seed=1), SkinLook(seed=1)),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from dermis.assets.primitives import uv_sphere
+from dermis.mesh.primitives import uv_sphere
 
 HEIGHT_MM = 240.0
 SIZE = (160.0, HEIGHT_MM, 190.0)

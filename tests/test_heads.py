@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion, median_filter
 
 import dermis
-from dermis.assets.maps import Maps
 from dermis.gpu.device import Device
+from dermis.mesh.maps import Maps
 
 pytestmark = pytest.mark.samples
 
@@ -59,7 +59,7 @@ def subjects(sample_folder: Path, device: Device) -> Iterator[dict[str, Subject]
     }
     heads["scan"] = dermis.load_head("lee_perry_smith")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("dermis.rendering.renderer.open_device", lambda adapter: device)
+        patch.setattr("dermis.frame.renderer.open_device", lambda adapter: device)
         yield {
             name: Subject(head, dermis.Renderer(), replace(head, maps=Maps()), dermis.Renderer())
             for name, head in heads.items()

@@ -45,7 +45,7 @@ def test_import_by_star_gives_what_is_promised() -> None:
 def test_the_lines_of_the_description(
     tmp_path: Path, device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dermis.rendering.renderer.open_device", lambda adapter: device)
+    monkeypatch.setattr("dermis.frame.renderer.open_device", lambda adapter: device)
     head = dermis.load_head(write_head(tmp_path / "head.obj"))
     scene = dermis.Scene(head, lights=dermis.studio(), camera=dermis.portrait(head))
     image = dermis.render(scene, size=(48, 32), atlas=64)
@@ -58,7 +58,7 @@ def test_the_lines_of_the_description(
 def test_a_renderer_is_kept_for_many_frames(
     tmp_path: Path, device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dermis.rendering.renderer.open_device", lambda adapter: device)
+    monkeypatch.setattr("dermis.frame.renderer.open_device", lambda adapter: device)
     head = dermis.load_head(write_head(tmp_path / "head.obj"))
     renderer = dermis.Renderer()
     front = dermis.Scene(head)

@@ -11,16 +11,16 @@ import accuracy_specular as specular
 import accuracy_thin as thin
 import numpy as np
 
-from dermis.assets.atlas import build_atlas
-from dermis.assets.geometry import build_mesh
-from dermis.assets.mesh import Mesh
-from dermis.assets.primitives import plane, uv_sphere
+from dermis.atlas.atlas import build_atlas
+from dermis.frame.atlas_textures import upload_atlas
+from dermis.frame.passes.diffuse import Diffuse
 from dermis.gpu import Device, Frame, download, open_device, upload
 from dermis.gpu.probe import half_store_rounding
+from dermis.mesh.geometry import build_mesh
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.primitives import plane, uv_sphere
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
-from dermis.rendering.atlas_textures import upload_atlas
-from dermis.rendering.stages.diffuse import Diffuse
 
 PAGE = Path(__file__).parent.parent / "docs" / "accuracy.md"
 SIZE = 256

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dermis.assets.head import Head
-from dermis.assets.maps import Maps
-from dermis.assets.primitives import uv_sphere
 from dermis.comparison.compare import by_channel, compare
 from dermis.comparison.report import cells
 from dermis.comparison.scenes import usual_region
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.primitives import uv_sphere
 from dermis.scene import Settings
 
 HEAD = """|  |  |  | relative RMSE | in red, green, blue | FLIP | energy ratio | in red, green, blue |

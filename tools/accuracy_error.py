@@ -6,8 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from dermis.assets.head import Head
-from dermis.assets.regions.landmarks import known_landmarks
 from dermis.comparison.compare import subject_of
 from dermis.comparison.scenes import usual_region
 from dermis.comparison.truths import (
@@ -18,11 +16,13 @@ from dermis.comparison.truths import (
     positions,
     surface_integral,
 )
+from dermis.frame.surface_points import surface_points
+from dermis.human.regions.landmarks import known_landmarks
+from dermis.mesh.head import Head
 from dermis.optics.gaussians import GaussianSum
 from dermis.reference.metrics import energy_ratio, relative_rmse
 from dermis.reference.surface_integral import GaussianSum as Profile
 from dermis.reference.surface_integral import integrate
-from dermis.rendering.surface_points import surface_points
 from dermis.scene.settings import Settings
 
 LIGHTS = ("front", "back", "laser")

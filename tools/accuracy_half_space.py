@@ -12,12 +12,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.head import Head, load_head
+from dermis.frame.renderer import Renderer
+from dermis.mesh.head import Head
 from dermis.optics.directions import directional_albedo, directions, mean_of_once, refracted
 from dermis.optics.presets import media
 from dermis.reference.half_space import reflected_radiance
-from dermis.rendering.renderer import Renderer
 from dermis.scene import Scene, Settings, Skin
+from dermis.scene.heads import load_head
 
 Floats = NDArray[np.float64]
 ETA, ASLANT = 1.4, 0.15  # the cosine of 81 degrees

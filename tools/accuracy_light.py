@@ -11,15 +11,15 @@ from dataclasses import replace
 import numpy as np
 
 import dermis
-from dermis.assets.environment.mirrors import ROUGHEST, SIDE, SMOOTHEST, equivalent_mirrors
-from dermis.assets.environment.panorama import directions, load_panorama, resampled, solid_angles
-from dermis.assets.environment.prefilter import ROUGHNESSES, Prefiltered, prefilter
-from dermis.assets.environment.suns import split_suns
-from dermis.assets.head import Head
-from dermis.assets.primitives import uv_sphere
-from dermis.rendering.projection import frame_of
-from dermis.rendering.rectangles import facing_irradiance
-from dermis.rendering.stages.occlusion import DIRECTIONS, Occlusion
+from dermis.environment.mirrors import ROUGHEST, SIDE, SMOOTHEST, equivalent_mirrors
+from dermis.environment.panorama import directions, load_panorama, resampled, solid_angles
+from dermis.environment.prefilter import ROUGHNESSES, Prefiltered, prefilter
+from dermis.environment.suns import split_suns
+from dermis.frame.passes.occlusion import DIRECTIONS, Occlusion
+from dermis.frame.projection import frame_of
+from dermis.frame.rectangles import facing_irradiance
+from dermis.mesh.head import Head
+from dermis.mesh.primitives import uv_sphere
 from dermis.scene import Environment, PointLight, RectangleLight, Scene, Settings, Skin, load_lights
 from dermis.specular.albedo import directional_albedo
 from dermis.specular.cosines import cosines

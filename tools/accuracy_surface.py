@@ -11,19 +11,19 @@ from pathlib import Path
 import numpy as np
 
 import dermis
-from dermis.assets.atlas import build_atlas
-from dermis.assets.cache import cached_atlas
-from dermis.assets.head import Head
-from dermis.assets.maps import Maps
+from dermis.atlas.atlas import build_atlas
+from dermis.atlas.cached import cached_atlas
+from dermis.frame.atlas_textures import upload_atlas
+from dermis.frame.frame import scatter
+from dermis.frame.levels import Levels
+from dermis.frame.renderer import Renderer
+from dermis.frame.seams import REMEDIES
 from dermis.gpu import Frame, download, upload
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
 from dermis.optics.profiles import load_profile
 from dermis.reference.atlas_reading import Points, lit_at, seam_points, shown
 from dermis.reference.cut_meshes import cut_sphere
-from dermis.rendering.atlas_textures import upload_atlas
-from dermis.rendering.frame import scatter
-from dermis.rendering.levels import Levels
-from dermis.rendering.renderer import Renderer
-from dermis.rendering.seams import REMEDIES
 from dermis.scene import DirectionalLight, Light, Scene, Settings, Skin, StripeLight
 
 Choice = Callable[[np.ndarray], np.ndarray]

@@ -16,14 +16,14 @@ import accuracy_surface as surface
 import numpy as np
 
 import dermis
-from dermis.assets.head import Head
 from dermis.comparison.compare import Comparison, Row, compare
 from dermis.comparison.report import cells
 from dermis.comparison.scenes import comparison_scene, usual_region
+from dermis.frame.surface_points import irradiance_at, surface_points
+from dermis.mesh.head import Head
 from dermis.optics.presets import media
 from dermis.reference.half_space import directional_albedo
 from dermis.reference.metrics import energy_ratio, relative_rmse
-from dermis.rendering.surface_points import irradiance_at, surface_points
 from dermis.scene import DirectionalLight, Settings
 
 PAGE = Path(__file__).parent.parent / "docs" / "techniques.md"

@@ -11,19 +11,19 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import dermis
-from dermis.assets.cache import cached_atlas
-from dermis.assets.head import Head
-from dermis.assets.maps import Maps
-from dermis.assets.mesh import Mesh
-from dermis.assets.primitives import wedge
-from dermis.assets.thin_parts.samples import giving, texels
+from dermis.atlas.cached import cached_atlas
+from dermis.atlas.translucency.samples import giving, texels
+from dermis.frame.frame import draw_frame
 from dermis.gpu import Frame, download
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.primitives import wedge
 from dermis.optics.diffusion.transmission import through_gaussians
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
 from dermis.reference import surface_integral
 from dermis.reference.irradiance_samples import Places
-from dermis.rendering.frame import draw_frame
 from dermis.scene import DirectionalLight, Scene, Settings, Skin
 
 Array = np.ndarray

@@ -11,16 +11,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from dermis.assets.head import Head, load_head
-    from dermis.assets.regions.apply import with_regions
     from dermis.errors import DermisError
+    from dermis.frame.renderer import Renderer, render
+    from dermis.human.regions.apply import with_regions
     from dermis.images.io import write_image
+    from dermis.mesh.head import Head
     from dermis.optics.profiles import load_profile
     from dermis.optics.tissue import Tissue, load_tissue
-    from dermis.rendering.renderer import Renderer, render
     from dermis.scene.camera import Camera, portrait, profile, three_quarter
     from dermis.scene.environment import Environment
     from dermis.scene.files import load_lights, load_scene
+    from dermis.scene.heads import load_head
     from dermis.scene.lights import (
         DirectionalLight,
         PointLight,
@@ -35,16 +36,16 @@ if TYPE_CHECKING:
     from dermis.scene.skin import Skin
 
 _HOME = {
-    "Head": "assets.head",
-    "load_head": "assets.head",
-    "with_regions": "assets.regions.apply",
+    "Head": "mesh.head",
+    "load_head": "scene.heads",
+    "with_regions": "human.regions.apply",
     "DermisError": "errors",
     "write_image": "images.io",
     "load_profile": "optics.profiles",
     "Tissue": "optics.tissue",
     "load_tissue": "optics.tissue",
-    "Renderer": "rendering.renderer",
-    "render": "rendering.renderer",
+    "Renderer": "frame.renderer",
+    "render": "frame.renderer",
     "Camera": "scene.camera",
     "portrait": "scene.camera",
     "profile": "scene.camera",

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.assets.cache import cached_atlas, cached_links
-from dermis.assets.head import load_head
+from dermis.atlas.cached import cached_atlas, cached_links
 from dermis.benchmark import run as running
 from dermis.benchmark.cases import FRAGMENTS, PRESETS, PUBLISHED, Case
 from dermis.benchmark.copy_rate import copy_rate
@@ -19,11 +18,12 @@ from dermis.benchmark.report import COLUMNS, as_json, cells, left_out_lines, sta
 from dermis.benchmark.run import Benchmark, LeftOut, run
 from dermis.benchmark.scenes import scenes_of, settings_of, with_terms
 from dermis.errors import DermisError
+from dermis.frame.renderer import Renderer
+from dermis.frame.seams import laid_out
 from dermis.gpu import Device, download
 from dermis.gpu.textures import texel_bytes
 from dermis.optics.profiles import load_profile
-from dermis.rendering.renderer import Renderer
-from dermis.rendering.seams import laid_out
+from dermis.scene.heads import load_head
 
 TINY = Case((48, 32), atlas=64, gaussians=2, lights=1, samples=2)
 BRIEF = Effort(warming=1, between=1, timed=2, row=2)
@@ -92,10 +92,10 @@ def test_the_floor_by_hand(renderer: Renderer, head_file: str, tmp_path: Path) -
     assert found["post"] == 48 * 32 * (16 + 16 + 4)
     # the narrower of the two is lit again, not blurred; the other one's blur knows stretch and reach by texel
     light = texel_bytes(moved.inputs.levels.stack)
-    apron = moved.inputs.layouts[0].atlas.apron.size // 16
-    assert apron > 0
+    gutter = moved.inputs.layouts[0].atlas.gutter.size // 16
+    assert gutter > 0
     assert found["irradiance"] == moved.texels * (32 + 4 + light)
-    assert found["diffuse"] == moved.texels * (2 * light + 8 + 8) + apron * (16 + 2 * light)
+    assert found["diffuse"] == moved.texels * (2 * light + 8 + 8) + gutter * (16 + 2 * light)
     assert set(found) >= {"shadows", "irradiance", "diffuse", "combine", "visibility", "shade", "post"}
 
 

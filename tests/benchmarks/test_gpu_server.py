@@ -43,7 +43,7 @@ def run(server: Any, device: Device, tmp_path: Path, opened: None) -> Any:
 
 @pytest.fixture
 def opened(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dermis.rendering.renderer.open_device", lambda _: device)
+    monkeypatch.setattr("dermis.frame.renderer.open_device", lambda _: device)
 
 
 def test_all_that_is_measured_here(run: Any, device: Device) -> None:

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 import dermis
-from dermis.assets.head import Head
-from dermis.assets.maps import Maps
-from dermis.assets.primitives import uv_sphere
 from dermis.errors import DermisError, refuse
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.primitives import uv_sphere
 from dermis.reference.cycles_process import CyclesPass
 from dermis.reference.path_traced import PathTraced
 

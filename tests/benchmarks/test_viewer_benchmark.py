@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from offscreen_hands import ADAPTER
+from offscreen_input import ADAPTER
 from small_head import write_head
 
 from dermis.cli.options import parse_size
@@ -32,7 +32,7 @@ def found_modules() -> Any:
 def plan(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """At the sizes of the quick trial: a pointer in the middle must be beside what brings the panel back."""
     from gpu_sections import quick_plan
-    from viewer_hands import Plan
+    from viewer_input import Plan
 
     head = write_head(tmp_path_factory.mktemp("benchmark") / "head.obj")
     words = quick_plan(ADAPTER, str(head)).viewer
@@ -42,17 +42,17 @@ def plan(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 @pytest.fixture(scope="module")
-def hands(plan: Any) -> Any:
-    from viewer_hands import offscreen
+def driver(plan: Any) -> Any:
+    from viewer_input import offscreen
 
     return offscreen(plan)
 
 
-def test_each_motion_moves_the_picture_and_nothing_else_is_computed(hands: Any, plan: Any) -> None:
+def test_each_motion_moves_the_picture_and_nothing_else_is_computed(driver: Any, plan: Any) -> None:
     from viewer_clock import Clock
-    from viewer_hands import MOTIONS, speeds
+    from viewer_input import MOTIONS, speeds
 
-    found = dict(speeds(hands, plan, Clock()))
+    found = dict(speeds(driver, plan, Clock()))
     assert list(found) == list(MOTIONS)
     ran = {name: set(one["stages"]) for name, one in found.items()}
     assert ran["camera"] == {"visibility", "shade", "post"} and ran["exposure"] == {"post"}
@@ -63,45 +63,45 @@ def test_each_motion_moves_the_picture_and_nothing_else_is_computed(hands: Any, 
     assert all(one["frame_ms"] <= one["late_frame_ms"] <= one["longest_frame_ms"] for one in found.values())
 
 
-def test_delays_are_those_of_pictures_that_follow(hands: Any, plan: Any) -> None:
+def test_delays_are_those_of_pictures_that_follow(driver: Any, plan: Any) -> None:
     from viewer_clock import Clock
     from viewer_delays import delays
 
-    found = dict(delays(hands, plan, Clock()))
+    found = dict(delays(driver, plan, Clock()))
     assert [one["count"] for one in found.values()] == [plan.frames] * 2
     assert all(0.0 < one["median_ms"] <= one["late_ms"] for one in found.values())
 
 
-def test_no_time_leaves_a_few_frames_of_everything(hands: Any, plan: Any) -> None:
+def test_no_time_leaves_a_few_frames_of_everything(driver: Any, plan: Any) -> None:
     from viewer_clock import Clock
     from viewer_delays import delays
-    from viewer_hands import speeds
+    from viewer_input import speeds
 
     many = replace(plan, frames=1000)
-    assert {one["frames"] for _, one in speeds(hands, many, Clock(0.0))} == {3}
-    assert [one["count"] for _, one in delays(hands, many, Clock(0.0))] == [3, 3]
+    assert {one["frames"] for _, one in speeds(driver, many, Clock(0.0))} == {3}
+    assert [one["count"] for _, one in delays(driver, many, Clock(0.0))] == [3, 3]
 
 
-def test_a_viewer_that_fails_is_no_quick_one(hands: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hands.viewer, "failure", DermisError("no device"))
+def test_a_viewer_that_fails_is_no_quick_one(driver: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(driver.viewer, "failure", DermisError("no device"))
     with pytest.raises(DermisError, match="no device"):
-        hands.frame()
+        driver.frame()
     monkeypatch.undo()
 
     def broken() -> None:
         raise ValueError("a fault of the viewer")
 
-    monkeypatch.setattr(hands, "_fault", None)
-    monkeypatch.setattr(hands.viewer, "draw", broken)
+    monkeypatch.setattr(driver, "_fault", None)
+    monkeypatch.setattr(driver.viewer, "draw", broken)
     with pytest.raises(ValueError, match="a fault of the viewer"):
-        hands.frame()
+        driver.frame()
 
 
-def test_a_picture_that_never_rests_ends_the_wait(hands: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("viewer_hands._REST_S", 0.0)
-    monkeypatch.setattr(type(hands.viewer), "is_still", False)
+def test_a_picture_that_never_rests_ends_the_wait(driver: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("viewer_input._REST_S", 0.0)
+    monkeypatch.setattr(type(driver.viewer), "is_still", False)
     with pytest.raises(RuntimeError, match="does not come to rest"):
-        hands.rest()
+        driver.rest()
 
 
 def test_a_section_that_fails_leaves_what_came_before_and_the_reason(tmp_path: Path) -> None:
@@ -136,26 +136,26 @@ def test_a_server_that_tells_no_address_is_told_with_its_last_words(plan: Any) -
 
 
 def test_all_kinds_of_change_are_drawn_and_the_memory_is_watched(
-    hands: Any, plan: Any, monkeypatch: pytest.MonkeyPatch
+    driver: Any, plan: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     import viewer_memory
 
     some = {name: viewer_memory.KINDS[name] for name in ("turn", "light", "mix", "view")}
     monkeypatch.setattr(viewer_memory, "KINDS", some)
-    found = viewer_memory.endured(hands, plan, minutes=0.0, changes=3)
+    found = viewer_memory.endured(driver, plan, minutes=0.0, changes=3)
     assert found["changes"] == 3 == sum(found["kinds"].values())
     assert set(some) < set(found["kinds"])
     assert found["samples"][0]["changes"] == 0 and found["samples"][-1]["changes"] == 3
     assert min(one["device_mb"] for one in found["samples"]) > 0.0
 
 
-def test_each_kind_of_change_makes_another_state(hands: Any) -> None:
+def test_each_kind_of_change_makes_another_state(driver: Any) -> None:
     from viewer_memory import KINDS
 
     from dermis.viewer.state import same
 
     for kind in KINDS.values():
-        assert any(not same(kind(hands.first, random.Random(seed)), hands.first) for seed in range(6))
+        assert any(not same(kind(driver.first, random.Random(seed)), driver.first) for seed in range(6))
 
 
 def test_growth_is_that_of_the_second_half() -> None:

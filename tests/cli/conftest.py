@@ -47,7 +47,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> R
 @pytest.fixture
 def opened(monkeypatch: pytest.MonkeyPatch, device: object) -> None:
     """Commands use the session's device instead of opening one each."""
-    monkeypatch.setattr("dermis.rendering.renderer.open_device", lambda adapter: device)
+    monkeypatch.setattr("dermis.frame.renderer.open_device", lambda adapter: device)
 
 
 @pytest.fixture

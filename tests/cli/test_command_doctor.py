@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from dermis.frame.renderer import Rendered
 from dermis.gpu.adapters import WANTED_FEATURES, Adapter
-from dermis.rendering.renderer import Rendered
 
 Run = Callable[..., Any]
 KEYS = {"healthy", "used", "self_test", "problem", "adapters"} | {

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from dermis.assets.head import load_head
+from dermis.scene.heads import load_head
 
 Run = Callable[..., Any]
 

@@ -128,7 +128,7 @@ def test_a_notebook_displays_the_same_viewer(folder: Path, monkeypatch: pytest.M
     pytest.importorskip("imgui_bundle", reason="the extra `viewer` is not installed")
     from rendercanvas.offscreen import OffscreenRenderCanvas
 
-    from dermis.assets.head import load_head
+    from dermis.scene.heads import load_head
     from dermis.viewer.windows import notebook_viewer
 
     class Canvas(OffscreenRenderCanvas):  # type: ignore[misc]

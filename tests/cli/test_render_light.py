@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.assets.environment.panorama import directions
+from dermis.environment.panorama import directions
 from dermis.images.io import read_image, write_exr
 
 Run = Callable[..., Any]

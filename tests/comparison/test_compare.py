@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.assets.geometry import build_mesh
-from dermis.assets.head import Head, load_head
-from dermis.assets.maps import Maps
-from dermis.assets.primitives import SKIN, uv_sphere
 from dermis.comparison.compare import Comparison, compare
 from dermis.comparison.report import write_report
 from dermis.comparison.scenes import LIGHTS, REGIONS, comparison_scene
 from dermis.comparison.truths import TRUTHS
 from dermis.errors import DermisError
+from dermis.mesh.geometry import build_mesh
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.primitives import SKIN, uv_sphere
+from dermis.scene.heads import load_head
 from dermis.scene.settings import Settings
 
 BALL = Head("ball", uv_sphere(100.0, 96, 48), Maps())

@@ -6,10 +6,10 @@ import os
 
 import pytest
 
-from dermis.assets.head import Head
-from dermis.assets.maps import Maps
-from dermis.assets.primitives import uv_sphere
 from dermis.comparison.compare import Comparison, compare
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.primitives import uv_sphere
 from dermis.scene.settings import Settings
 
 BALL = Head("ball", uv_sphere(100.0, 256, 128), Maps())

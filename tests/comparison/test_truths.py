@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dermis.assets.head import Head
-from dermis.assets.maps import Maps
-from dermis.assets.primitives import uv_sphere
 from dermis.comparison.compare import subject_of
 from dermis.comparison.truths import Subject, heat_around, irradiance_samples, surface_integral
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.primitives import uv_sphere
 from dermis.optics.gaussians import GaussianSum
 from dermis.reference.metrics import energy_ratio, relative_rmse
 from dermis.scene.settings import Settings

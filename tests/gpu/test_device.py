@@ -12,8 +12,8 @@ def test_a_device_that_is_dropped_begins_nothing_more(device: Device) -> None:
     """What is compiled for nobody would hold memory and cores, and the end of the process up."""
     gate = threading.Event()
     dropped = open_device(device.adapter.name)
-    busy = [dropped.beside.submit(gate.wait) for _ in range(os.cpu_count() or 1)]
-    waiting = dropped.beside.submit(int)
+    busy = [dropped.executor.submit(gate.wait) for _ in range(os.cpu_count() or 1)]
+    waiting = dropped.executor.submit(int)
     try:
         del dropped
         assert waiting.cancelled()

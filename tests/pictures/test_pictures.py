@@ -9,8 +9,8 @@ import pytest
 from pictured import STORED, drawn, pictured
 from tolerances import PICTURE_MEAN, PICTURE_TAIL
 
+from dermis.frame.renderer import Renderer
 from dermis.images.io import read_image, write_png
-from dermis.rendering.renderer import Renderer
 
 NAMES = ("studio", "dry", "window", "ear")
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.geometry import build_mesh
-from dermis.assets.head import Head
-from dermis.assets.maps import Maps
-from dermis.assets.primitives import SKIN, plane
+from dermis.mesh.geometry import build_mesh
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.primitives import SKIN, plane
 from dermis.optics.media import Layer, Medium
 from dermis.reference.path_traced import PathTraced, path_trace
 from dermis.scene.camera import Camera

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.special import eval_legendre
 
-from dermis.assets.primitives import uv_sphere
 from dermis.errors import DermisError
+from dermis.mesh.primitives import uv_sphere
 from dermis.reference.map_error import MapError, map_error, patch_of
 
 Floats = NDArray[np.float64]

@@ -10,13 +10,14 @@ import pytest
 from lit_balls import COLOUR, DRY, LIGHTS, ball_scene
 from numpy.typing import NDArray
 
-from dermis.assets.head import Head, load_head
-from dermis.assets.maps import Maps
+from dermis.frame.renderer import Renderer
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
 from dermis.optics.profiles import load_profile
 from dermis.reference.path_traced import Lambertian, PathTraced, path_trace
-from dermis.rendering.renderer import Renderer
 from dermis.scene.camera import Camera, portrait
 from dermis.scene.environment import Environment
+from dermis.scene.heads import load_head
 from dermis.scene.lights import PointLight
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings

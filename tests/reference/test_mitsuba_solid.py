@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from half_spaces import pan
 
-from dermis.assets.geometry import build_mesh, edges
-from dermis.assets.mesh import Material, Mesh
-from dermis.assets.primitives import SKIN, uv_sphere
 from dermis.errors import DermisError
+from dermis.mesh.geometry import build_mesh, edges
+from dermis.mesh.mesh import Material, Mesh
+from dermis.mesh.primitives import SKIN, uv_sphere
 from dermis.reference.mitsuba_solid import Solid, inwards, skin_solid
 
 

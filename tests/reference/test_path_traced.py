@@ -10,10 +10,10 @@ import pytest
 from half_spaces import mean_and_error, pan, traced
 from tolerances import STANDARD_ERRORS
 
-from dermis.assets.head import Head
-from dermis.assets.maps import Maps
-from dermis.assets.primitives import plane, uv_sphere
 from dermis.errors import DermisError
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.primitives import plane, uv_sphere
 from dermis.optics.media import Layer, Medium
 from dermis.optics.presets import media
 from dermis.reference.half_space import directional_albedo, reflected_radiance

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import eval_legendre
 
-from dermis.assets.primitives import plane, uv_sphere
 from dermis.errors import DermisError
+from dermis.mesh.primitives import plane, uv_sphere
 from dermis.reference.surface_diffusion import (
     STEPS,
     diffuse_on_surface,

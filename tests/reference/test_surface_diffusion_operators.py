@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.assets.primitives import plane
+from dermis.mesh.primitives import plane
 from dermis.reference.surface_diffusion import vertex_areas, welded
 from dermis.reference.surface_diffusion_operators import delaunay, intrinsic, mass_and_stiffness
 

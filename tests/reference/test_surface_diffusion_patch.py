@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.assets.geometry import edges, triangle_areas
-from dermis.assets.head import load_head
-from dermis.assets.primitives import plane, uv_sphere
 from dermis.errors import DermisError
+from dermis.mesh.geometry import edges, triangle_areas
+from dermis.mesh.primitives import plane, uv_sphere
 from dermis.reference.refine import Patch, refine_patch
 from dermis.reference.surface_diffusion import (
     diffuse_on_surface,
@@ -19,6 +18,7 @@ from dermis.reference.surface_diffusion import (
     vertex_areas,
     welded,
 )
+from dermis.scene.heads import load_head
 
 Floats = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.geometry import build_mesh
-from dermis.assets.mesh import Mesh
-from dermis.assets.primitives import SKIN
+from dermis.mesh.geometry import build_mesh
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.primitives import SKIN
 from dermis.reference.surface_diffusion import diffuse_on_surface, welded
 
 Floats = NDArray[np.float64]

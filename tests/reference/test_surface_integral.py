@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from dermis.assets.geometry import triangle_areas
-from dermis.assets.primitives import plane, uv_sphere
 from dermis.errors import DermisError
+from dermis.mesh.geometry import triangle_areas
+from dermis.mesh.primitives import plane, uv_sphere
 from dermis.reference.surface_integral import (
     GaussianSum,
     IrradianceSamples,

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.assets.geometry import edges, triangle_areas
-from dermis.assets.mesh import Material
-from dermis.assets.primitives import plane, uv_sphere
 from dermis.errors import DermisError
+from dermis.mesh.geometry import edges, triangle_areas
+from dermis.mesh.mesh import Material
+from dermis.mesh.primitives import plane, uv_sphere
 from dermis.reference.irradiance_samples import IrradianceSamples, Places, sample_irradiance
 from dermis.reference.octree import Tree, build_tree
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from small_head import SIZE, write_head
 
-from dermis.assets.head import Head, load_head
-from dermis.rendering.inputs import camera_views, pinhole
+from dermis.frame.inputs import camera_views, pinhole
+from dermis.mesh.head import Head
 from dermis.scene import Camera, Settings
 from dermis.scene.camera import PRESETS
+from dermis.scene.heads import load_head
 
 
 @pytest.fixture(scope="module")

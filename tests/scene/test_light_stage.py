@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.assets.environment.panorama import solid_angles
+from dermis.environment.panorama import solid_angles
 from dermis.errors import DermisError
 from dermis.images.io import write_exr
 from dermis.scene.environment import Environment

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dermis.assets.head import Head
-from dermis.assets.maps import Maps
-from dermis.assets.primitives import uv_sphere
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.primitives import uv_sphere
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.files import load_scene

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from small_head import HEIGHT_MM, write_head
 
-from dermis.assets.bust.regions import REGIONS
-from dermis.assets.head import load_head
 from dermis.errors import DermisError
+from dermis.human.bust.regions import REGIONS
 from dermis.images.io import write_png
 from dermis.scene import (
     Camera,
@@ -27,6 +26,7 @@ from dermis.scene import (
     studio,
     three_quarter,
 )
+from dermis.scene.heads import load_head
 
 WHOLE = """
 [head]

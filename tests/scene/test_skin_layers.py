@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dermis.errors import DermisError
+from dermis.frame.skin_profiles import SkinProfiles
 from dermis.optics.profiles import load_profile
-from dermis.rendering.skin_profiles import SkinProfiles
 from dermis.scene.plain import ImpossibleError
 from dermis.scene.skin import Pigments, Skin, TissueLayer
 from dermis.scene.tissue import layers_of, tissue_of

@@ -6,10 +6,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from offscreen_hands import ADAPTER, SETTINGS, Hands
+from offscreen_input import ADAPTER, SETTINGS, InputDriver
 from small_head import write_head
 
-from dermis.assets.head import Head, load_head
+from dermis.mesh.head import Head
+from dermis.scene.heads import load_head
 from dermis.scene.model import Scene
 from dermis.viewer.state import ViewerState
 
@@ -30,35 +31,35 @@ def state(head: Head, head_file: Path) -> ViewerState:
 
 
 @pytest.fixture(scope="module")
-def make_hands(head: Head, head_file: Path) -> Callable[[], Hands]:
+def make_driver(head: Head, head_file: Path) -> Callable[[], InputDriver]:
     """A viewer of 400 x 480 pixels."""
     pytest.importorskip("imgui_bundle", reason="the extra `viewer` is not installed")
     from rendercanvas.offscreen import OffscreenRenderCanvas
 
     from dermis.viewer.viewer import Viewer
 
-    def make() -> Hands:
+    def make() -> InputDriver:
         canvas = OffscreenRenderCanvas(size=(400, 480))
         first = ViewerState(Scene(head), SETTINGS, {"name": str(head_file)})
-        hands = Hands(None, canvas)
-        hands.viewer = Viewer(first, canvas, ADAPTER, clock=lambda: hands.now)
-        return hands
+        driver = InputDriver(None, canvas)
+        driver.viewer = Viewer(first, canvas, ADAPTER, clock=lambda: driver.now)
+        return driver
 
     return make
 
 
 @pytest.fixture(scope="module")
-def shared_hands(make_hands: Callable[[], Hands]) -> Hands:
-    return make_hands()
+def shared_driver(make_driver: Callable[[], InputDriver]) -> InputDriver:
+    return make_driver()
 
 
 @pytest.fixture
-def hands(shared_hands: Hands, caplog: pytest.LogCaptureFixture) -> Iterator[Hands]:
+def driver(shared_driver: InputDriver, caplog: pytest.LogCaptureFixture) -> Iterator[InputDriver]:
     """The module's viewer, back at its first state; errors that rendercanvas only logs fail the test."""
-    history = shared_hands.viewer.desk.history
+    history = shared_driver.viewer.desk.history
     while history.can_undo:
         history.undo()
-    shared_hands.viewer.panel.visible = True
-    shared_hands.viewer.desk.split.release()
-    yield shared_hands
+    shared_driver.viewer.panel.visible = True
+    shared_driver.viewer.desk.split.release()
+    yield shared_driver
     assert [record.message for record in caplog.records if record.levelname == "ERROR"] == []

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from chromium_hands import (
+from chromium_input import (
     PATIENCE_S,
     differs_from,
     drag,
@@ -24,7 +24,7 @@ from chromium_hands import (
     touch,
 )
 from numpy.typing import NDArray
-from offscreen_hands import ADAPTER, Hands
+from offscreen_input import ADAPTER, InputDriver
 
 SIZE = {"width": 400, "height": 480}
 _CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -89,11 +89,11 @@ def test_the_page_shows_the_head_and_a_drag_turns_it(page: Any) -> None:
 
 
 @pytest.fixture(scope="module")
-def places(make_hands: Callable[[], Hands]) -> dict[str, tuple[float, float]]:
+def places(make_driver: Callable[[], InputDriver]) -> dict[str, tuple[float, float]]:
     """Where the panel's controls are in a window of the page's size, with the list of views open."""
-    hands = make_hands()
-    hands.press("show")
-    return hands.viewer.desk.places
+    driver = make_driver()
+    driver.press("show")
+    return driver.viewer.desk.places
 
 
 def test_the_panel_alters_the_picture(page: Any, places: dict[str, tuple[float, float]]) -> None:
@@ -208,7 +208,7 @@ _RECORD_SOCKETS = """
 def test_a_page_that_came_encrypted_opens_an_encrypted_socket(
     page_at: str, socket_at: str, browser: Any, url: str
 ) -> None:
-    """As behind a proxy, which here hands the server's own files on."""
+    """As behind a proxy, which here driver the server's own files on."""
     page = browser.new_page()
     page.add_init_script(_RECORD_SOCKETS)
     elsewhere = f"{page_at}//skin.example/some/token/"

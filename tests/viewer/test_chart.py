@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from offscreen_hands import ADAPTER, Hands
+from offscreen_input import ADAPTER, InputDriver
 
 from dermis.gpu import download
 from dermis.viewer.chart import ATLAS, Chart
@@ -72,20 +72,20 @@ def test_another_part_of_the_atlas_takes_no_frame(state: ViewerState) -> None:
     assert studio.rendered is not rendered
 
 
-def test_wheel_and_drag_move_the_atlas_and_not_the_camera(hands: Hands) -> None:
-    desk = hands.viewer.desk
-    hands.choose("show", ATLAS)
-    whole, camera = hands.settled(), desk.state.scene.camera
+def test_wheel_and_drag_move_the_atlas_and_not_the_camera(driver: InputDriver) -> None:
+    desk = driver.viewer.desk
+    driver.choose("show", ATLAS)
+    whole, camera = driver.settled(), desk.state.scene.camera
     assert whole[60, 202:230].max() == whole[60, 202:230].min() == 33  # beside the atlas
-    hands.event("wheel", x=350.0, y=240.0, dx=0.0, dy=-1000.0)
-    near = hands.settled()
+    driver.event("wheel", x=350.0, y=240.0, dx=0.0, dy=-1000.0)
+    near = driver.settled()
     assert desk.state.chart.span == pytest.approx(1.05 / np.e)
     assert near[60, 202:230].max() > 33 or near[60, 202:230].min() < 33
-    hands.drag((350.0, 240.0), (330.0, 250.0))
-    moved = hands.settled()
+    driver.drag((350.0, 240.0), (330.0, 250.0))
+    moved = driver.settled()
     assert np.array_equal(moved[110:400, 210:370], near[100:390, 230:390])
-    hands.choose("layer", "stretch")
-    assert np.abs(hands.settled()[110:400, 210:370].astype(int) - moved[110:400, 210:370]).mean() > 5.0
-    hands.event("double_click", x=300.0, y=240.0)
-    hands.settled()
+    driver.choose("layer", "stretch")
+    assert np.abs(driver.settled()[110:400, 210:370].astype(int) - moved[110:400, 210:370]).mean() > 5.0
+    driver.event("double_click", x=300.0, y=240.0)
+    driver.settled()
     assert desk.state.chart == Chart("stretch") and desk.state.scene.camera == camera

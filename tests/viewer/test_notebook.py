@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from offscreen_hands import ADAPTER
+from offscreen_input import ADAPTER
 
 from dermis.viewer.state import ViewerState
 from dermis.viewer.windows import notebook_viewer

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from dermis.assets.head import Head
+from dermis.mesh.head import Head
 from dermis.scene import Camera, Environment
 from dermis.scene.camera import PRESETS, preset
 from dermis.scene.lights import DirectionalLight, SpotLight

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from offscreen_hands import Hands
+from offscreen_input import InputDriver
 
 from dermis.viewer.panel.sections.profile import CHANNELS
 from dermis.viewer.panel.sections.timing import stage_series
@@ -23,33 +23,33 @@ def test_stages_without_a_time_in_a_frame_have_none_there() -> None:
     assert {name: values.tolist() for name, values in found.items()} == {"shade": [2, 3], "blur": [0, 1]}
 
 
-def test_the_studio_keeps_the_times_of_the_last_frames(hands: Hands) -> None:
-    times, desk = hands.viewer.desk.studio.times, hands.viewer.desk
+def test_the_studio_keeps_the_times_of_the_last_frames(driver: InputDriver) -> None:
+    times, desk = driver.viewer.desk.studio.times, driver.viewer.desk
     for k in range(130):
         times.append({"shade": float(k)})
     assert len(times) == 120
     desk.change(desk.state.with_settings(exposure=1.5))
-    hands.frame()
+    driver.frame()
     assert len(times) == 120 and desk.studio.rendered is not None
     assert times[-1] == (desk.studio.rendered.gpu_ms or {})
 
 
-def test_the_profile_is_drawn_in_three_colours_and_follows_it(hands: Hands) -> None:
-    wide = hands.settled()
+def test_the_profile_is_drawn_in_three_colours_and_follows_it(driver: InputDriver) -> None:
+    wide = driver.settled()
     for colour in CHANNELS:
         assert count_of(wide, colour) > 15
-    hands.viewer.desk.change(hands.viewer.desk.state.with_skin(profile="dark"))
-    assert np.abs(hands.settled()[PANEL].astype(int) - wide[PANEL]).max() > 50
+    driver.viewer.desk.change(driver.viewer.desk.state.with_skin(profile="dark"))
+    assert np.abs(driver.settled()[PANEL].astype(int) - wide[PANEL]).max() > 50
 
 
-def test_the_graph_of_times_is_drawn_with_numbers(hands: Hands) -> None:
+def test_the_graph_of_times_is_drawn_with_numbers(driver: InputDriver) -> None:
     for title in ("View", "Profile", "Surface"):
-        hands.press(title)
-    closed = hands.settled()
-    hands.press("Timing")
-    hands.event("pointer_move", x=390.0, y=5.0, button=0, buttons=())
-    shown = hands.settled()
+        driver.press(title)
+    closed = driver.settled()
+    driver.press("Timing")
+    driver.event("pointer_move", x=390.0, y=5.0, button=0, buttons=())
+    shown = driver.settled()
     coloured = np.ptp(shown[PANEL].astype(int), axis=-1) > 40
     assert coloured.sum() > 300 > (np.ptp(closed[PANEL].astype(int), axis=-1) > 40).sum()
     for title in ("Timing", "Surface", "Profile", "View"):
-        hands.press(title)
+        driver.press(title)

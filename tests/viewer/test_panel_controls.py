@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from offscreen_hands import Hands
+from offscreen_input import InputDriver
 
 from dermis.scene.environment import Environment
 from dermis.scene.skin import Skin
@@ -36,50 +36,50 @@ EXPECTED = {
 
 
 @pytest.fixture(scope="module")
-def tall(make_hands: Callable[[], Hands]) -> Hands:
+def tall(make_driver: Callable[[], InputDriver]) -> InputDriver:
     """A window that holds the whole panel, whose picture is not drawn again: the panel alone is looked at."""
-    hands = make_hands()
-    hands.settled()
-    studio: Any = hands.viewer.desk.studio
+    driver = make_driver()
+    driver.settled()
+    studio: Any = driver.viewer.desk.studio
     image = studio.last_image
     studio.pictures = lambda *_: (image, None)
-    hands.canvas.set_logical_size(400, 1500)
+    driver.canvas.set_logical_size(400, 1500)
     for section in SECTIONS:
         if not section.OPEN and section.TITLE != "Timing":
-            hands.press(section.TITLE)
-    return hands
+            driver.press(section.TITLE)
+    return driver
 
 
-def names_of(hands: Hands, label: str) -> list[str]:
+def names_of(driver: InputDriver, label: str) -> list[str]:
     """What an open list offers."""
-    return [place for place in hands.viewer.desk.places if place.startswith(f"{label}/")]
+    return [place for place in driver.viewer.desk.places if place.startswith(f"{label}/")]
 
 
-def move(hands: Hands, label: str) -> None:
+def move(driver: InputDriver, label: str) -> None:
     """Drag a slider, press a button, tick a box, or take another entry of a list."""
-    desk = hands.viewer.desk
+    desk = driver.viewer.desk
     desk.controls.light = 0
-    hands.frame()
-    before, (x, y) = desk.state, hands.place(label)
-    hands.event("pointer_move", x=x, y=y, button=0, buttons=())
+    driver.frame()
+    before, (x, y) = desk.state, driver.place(label)
+    driver.event("pointer_move", x=x, y=y, button=0, buttons=())
     for kind, way in (("pointer_down", 0.0), ("pointer_move", 23.0), ("pointer_up", 23.0)):
-        hands.event(kind, x=x + way, y=y, button=1, buttons=(1,))
-        hands.frame()
-    hands.frame()
-    if same(desk.state, before) and not names_of(hands, label):
-        hands.press(label)  # a button, which the drag left
-    for name in names_of(hands, label)[1::-1]:
+        driver.event(kind, x=x + way, y=y, button=1, buttons=(1,))
+        driver.frame()
+    driver.frame()
+    if same(desk.state, before) and not names_of(driver, label):
+        driver.press(label)  # a button, which the drag left
+    for name in names_of(driver, label)[1::-1]:
         if same(desk.state, before):
-            hands.click(desk.places[name])
-            hands.frame()
+            driver.click(desk.places[name])
+            driver.frame()
         if same(desk.state, before):  # it is what was chosen already
-            hands.press(label)
-    for key in names_of(hands, label):
+            driver.press(label)
+    for key in names_of(driver, label):
         del desk.places[key]
 
 
 @pytest.mark.parametrize("start", STARTS)
-def test_every_control_is_a_step_that_undo_takes_back(start: str, tall: Hands) -> None:
+def test_every_control_is_a_step_that_undo_takes_back(start: str, tall: InputDriver) -> None:
     desk = tall.viewer.desk
     desk.change(STARTS[start](desk.history.states[0]))
     desk.controls.light = 0
@@ -110,29 +110,29 @@ def test_controls_are_explained_by_the_settings_own_words() -> None:
     assert {"mix", "roughness", "rho_s", "oiliness", "specular", "energy"} <= said.keys()
 
 
-def test_the_panel_can_be_hidden_and_brought_back_without_keys(hands: Hands) -> None:
-    hands.press("hide")
-    assert not hands.viewer.panel.visible
-    camera = hands.viewer.desk.state.scene.camera
-    hands.press("panel")
-    assert hands.viewer.panel.visible and hands.viewer.desk.state.scene.camera == camera
+def test_the_panel_can_be_hidden_and_brought_back_without_keys(driver: InputDriver) -> None:
+    driver.press("hide")
+    assert not driver.viewer.panel.visible
+    camera = driver.viewer.desk.state.scene.camera
+    driver.press("panel")
+    assert driver.viewer.panel.visible and driver.viewer.desk.state.scene.camera == camera
 
 
-def test_a_finger_scrolls_the_panel_beside_its_controls(hands: Hands) -> None:
-    _, y = hands.place("mix")
-    hands.drag((170.0, y), (170.0, y - 90.0))  # on the label
-    assert hands.place("mix")[1] == pytest.approx(y - 90.0, abs=2.0)
-    hands.drag((170.0, y - 90.0), (170.0, y))
-    assert hands.place("mix")[1] == pytest.approx(y, abs=2.0)
+def test_a_finger_scrolls_the_panel_beside_its_controls(driver: InputDriver) -> None:
+    _, y = driver.place("mix")
+    driver.drag((170.0, y), (170.0, y - 90.0))  # on the label
+    assert driver.place("mix")[1] == pytest.approx(y - 90.0, abs=2.0)
+    driver.drag((170.0, y - 90.0), (170.0, y))
+    assert driver.place("mix")[1] == pytest.approx(y, abs=2.0)
 
 
-def test_help_lies_over_the_picture_and_goes_at_the_next_touch(hands: Hands) -> None:
-    before = hands.settled()
-    hands.event("key_down", key="?")
-    shown = hands.settled()
+def test_help_lies_over_the_picture_and_goes_at_the_next_touch(driver: InputDriver) -> None:
+    before = driver.settled()
+    driver.event("key_down", key="?")
+    shown = driver.settled()
     assert (shown[150:330, 215:385].astype(int) != before[150:330, 215:385]).mean() > 0.5
-    hands.click((300.0, 400.0))
-    assert (hands.settled()[150:330, 215:385] == before[150:330, 215:385]).all()
+    driver.click((300.0, 400.0))
+    assert (driver.settled()[150:330, 215:385] == before[150:330, 215:385]).all()
 
 
 @pytest.mark.parametrize(
@@ -146,18 +146,18 @@ def test_help_lies_over_the_picture_and_goes_at_the_next_touch(hands: Hands) -> 
     ],
 )
 def test_a_screenshot_that_cannot_be_is_told_and_the_viewer_goes_on(
-    name: str, view: str, size: tuple[int, int], said: str, hands: Hands, tmp_path: Path
+    name: str, view: str, size: tuple[int, int], said: str, driver: InputDriver, tmp_path: Path
 ) -> None:
-    desk = hands.viewer.desk
+    desk = driver.viewer.desk
     desk.change(desk.state.in_view(view))
-    before = hands.settled()
+    before = driver.settled()
     desk.names.picture, desk.names.size = str(tmp_path / name), size
     for section in ("Profile", "Surface"):  # closed, else the button would be below the window's edge
-        hands.press(section)
-    hands.press("screenshot")
+        driver.press(section)
+    driver.press("screenshot")
     for section in ("Surface", "Profile"):
-        hands.press(section)
+        driver.press(section)
     assert said in desk.messages.said and len(desk.messages.said) < 400
     assert not list(tmp_path.iterdir())
-    after = hands.settled()
+    after = driver.settled()
     assert (after[:200, 205:] == before[:200, 205:]).all()

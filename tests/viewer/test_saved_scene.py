@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from offscreen_hands import ADAPTER
+from offscreen_input import ADAPTER
 from PIL import Image
 
-from dermis.assets.bust.regions import REGIONS
 from dermis.cli import main
+from dermis.human.bust.regions import REGIONS
 from dermis.images.io import read_image
 from dermis.scene import Environment
 from dermis.scene.skin import TissueLayer
@@ -83,7 +83,7 @@ def studio() -> Studio:
 def test_the_command_renders_what_the_viewer_shows(
     name: str, studio: Studio, state: ViewerState, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dermis.assets.regions.apply.SIZE", 64)
+    monkeypatch.setattr("dermis.human.regions.apply.SIZE", 64)
     shown = STATES[name](state, tmp_path).with_settings(size=SIZE)
     studio.screenshot(tmp_path / "shown.png", shown, SIZE)
     save_state(tmp_path / "scene.toml", shown)

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from offscreen_hands import ADAPTER, SETTINGS
+from offscreen_input import ADAPTER, SETTINGS
 
-from dermis.assets.head import Head
+from dermis.mesh.head import Head
 from dermis.scene.model import Scene
 from dermis.viewer.state import ViewerState
 

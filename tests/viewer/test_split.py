@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from offscreen_hands import Hands
+from offscreen_input import InputDriver
 
 LEFT, RIGHT = 200, 400  # of the picture, beside the panel
 ROWS = slice(40, 230)  # neither labels, nor the divider's handle, nor text
@@ -23,53 +23,53 @@ def assert_halves(
     assert np.array_equal(found[1], sides(after, edge)[1])
 
 
-def frozen(hands: Hands) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+def frozen(driver: InputDriver) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """The pictures of two states, of which the first is frozen and the second is live."""
-    before = hands.settled()
-    hands.press("Before and after")
-    hands.press("freeze")
-    hands.press("Before and after")
-    assert hands.viewer.desk.split.before is hands.viewer.desk.state
-    hands.viewer.desk.split.release()
-    hands.viewer.desk.change(hands.viewer.desk.state.with_skin(mix=0.0, roughness=0.7))
-    after = hands.settled()
-    hands.viewer.desk.split.freeze(hands.viewer.desk.history.states[-2])
-    hands.viewer.desk.split.share = 0.5
+    before = driver.settled()
+    driver.press("Before and after")
+    driver.press("freeze")
+    driver.press("Before and after")
+    assert driver.viewer.desk.split.before is driver.viewer.desk.state
+    driver.viewer.desk.split.release()
+    driver.viewer.desk.change(driver.viewer.desk.state.with_skin(mix=0.0, roughness=0.7))
+    after = driver.settled()
+    driver.viewer.desk.split.freeze(driver.viewer.desk.history.states[-2])
+    driver.viewer.desk.split.share = 0.5
     return before, after
 
 
-def test_left_is_what_was_frozen_right_is_live_and_the_divider_is_dragged(hands: Hands) -> None:
-    before, after = frozen(hands)
+def test_left_is_what_was_frozen_right_is_live_and_the_divider_is_dragged(driver: InputDriver) -> None:
+    before, after = frozen(driver)
     assert np.abs(before[ROWS, LEFT:].astype(int) - after[ROWS, LEFT:]).mean() > 0.5
-    assert_halves(hands.settled(), before, after, 300)
-    camera = hands.viewer.desk.state.scene.camera
-    hands.drag((302.0, 150.0), (252.0, 300.0))
-    assert_halves(hands.settled(), before, after, 252)
-    assert hands.viewer.desk.state.scene.camera == camera
-    hands.viewer.desk.split.release()
-    assert np.array_equal(hands.settled()[ROWS, LEFT:], after[ROWS, LEFT:])
+    assert_halves(driver.settled(), before, after, 300)
+    camera = driver.viewer.desk.state.scene.camera
+    driver.drag((302.0, 150.0), (252.0, 300.0))
+    assert_halves(driver.settled(), before, after, 252)
+    assert driver.viewer.desk.state.scene.camera == camera
+    driver.viewer.desk.split.release()
+    assert np.array_equal(driver.settled()[ROWS, LEFT:], after[ROWS, LEFT:])
 
 
-def test_the_camera_turns_both_sides(hands: Hands) -> None:
-    frozen(hands)
-    split, desk = hands.viewer.desk.split, hands.viewer.desk
-    still = hands.settled()
-    hands.drag((350.0, 240.0), (310.0, 240.0))
-    turned = hands.settled()
+def test_the_camera_turns_both_sides(driver: InputDriver) -> None:
+    frozen(driver)
+    split, desk = driver.viewer.desk.split, driver.viewer.desk
+    still = driver.settled()
+    driver.drag((350.0, 240.0), (310.0, 240.0))
+    turned = driver.settled()
     for old, new in zip(sides(still, 300), sides(turned, 300), strict=True):
         assert np.abs(old.astype(int) - new).mean() > 0.5
     live, was = desk.state, split.before
     assert was is not None
     split.release()
-    after = hands.settled()
+    after = driver.settled()
     desk.change(was.with_camera(live.scene.camera))
-    assert_halves(turned, hands.settled(), after, 300)
+    assert_halves(turned, driver.settled(), after, 300)
 
 
-def test_a_divider_at_the_edge_shows_one_side(hands: Hands) -> None:
-    before, after = frozen(hands)
+def test_a_divider_at_the_edge_shows_one_side(driver: InputDriver) -> None:
+    before, after = frozen(driver)
     for share, whole in ((0.0, after), (1.0, before)):
-        hands.viewer.desk.split.share = share
-        hands.event("pointer_move", x=5.0, y=5.0, button=0, buttons=())
-        found = hands.settled()[ROWS, LEFT + 2 : RIGHT - 2]
+        driver.viewer.desk.split.share = share
+        driver.event("pointer_move", x=5.0, y=5.0, button=0, buttons=())
+        found = driver.settled()[ROWS, LEFT + 2 : RIGHT - 2]
         assert np.array_equal(found, whole[ROWS, LEFT + 2 : RIGHT - 2])

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from offscreen_hands import ADAPTER
+from offscreen_input import ADAPTER
 
 from dermis.gpu.repeated import Recording
 from dermis.scene.environment import Environment

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from dermis.assets.head import Head
 from dermis.errors import DermisError
+from dermis.mesh.head import Head
 from dermis.scene import Environment, Scene, load_scene
 from dermis.scene.files import preset_lights
 from dermis.scene.skin import Pigments

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from offscreen_hands import ADAPTER, SETTINGS
+from offscreen_input import ADAPTER, SETTINGS
 
+from dermis.frame.renderer import Renderer
 from dermis.images.io import read_image
-from dermis.rendering.renderer import Renderer
 from dermis.scene import Settings
 from dermis.viewer.chart import ATLAS
 from dermis.viewer.orbit import orbit

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from offscreen_hands import Hands
+from offscreen_input import InputDriver
 
 from dermis.scene.camera import preset
 
@@ -27,136 +27,136 @@ def middle(image: NDArray[np.uint8]) -> float:
     return 0.5 * float(columns[0] + columns[-1])
 
 
-def test_the_head_is_in_the_window_beside_the_panel(hands: Hands) -> None:
-    image = hands.settled()
+def test_the_head_is_in_the_window_beside_the_panel(driver: InputDriver) -> None:
+    image = driver.settled()
     assert image.shape == (480, 400, 3)
     assert image[200:280, 280:320].mean() > 20.0
     assert image[5:20, 380:395].mean() < 2.0
 
 
-def test_a_drag_turns_the_head_and_is_one_step_back(hands: Hands) -> None:
-    before = hands.settled()
-    hands.drag(ON_HEAD, TO_THE_LEFT)
-    after = hands.settled()
+def test_a_drag_turns_the_head_and_is_one_step_back(driver: InputDriver) -> None:
+    before = driver.settled()
+    driver.drag(ON_HEAD, TO_THE_LEFT)
+    after = driver.settled()
     assert difference(before, after) > 1.0
-    hands.viewer.desk.history.undo()
-    hands.event("pointer_move", x=5.0, y=5.0, button=0, buttons=())
-    assert difference(before, hands.settled()) == 0.0
-    assert not hands.viewer.desk.history.can_undo
+    driver.viewer.desk.history.undo()
+    driver.event("pointer_move", x=5.0, y=5.0, button=0, buttons=())
+    assert difference(before, driver.settled()) == 0.0
+    assert not driver.viewer.desk.history.can_undo
 
 
-def test_shift_carries_the_light_and_leaves_the_camera(hands: Hands) -> None:
-    before, state = hands.settled(), hands.viewer.desk.state
-    hands.drag(ON_HEAD, TO_THE_LEFT, modifiers=("Shift",))
-    after = hands.viewer.desk.state
+def test_shift_carries_the_light_and_leaves_the_camera(driver: InputDriver) -> None:
+    before, state = driver.settled(), driver.viewer.desk.state
+    driver.drag(ON_HEAD, TO_THE_LEFT, modifiers=("Shift",))
+    after = driver.viewer.desk.state
     assert after.scene.camera == state.scene.camera
     assert after.scene.lights[0] != state.scene.lights[0] and after.scene.lights[1] == state.scene.lights[1]
-    assert difference(before, hands.settled()) > 0.5
+    assert difference(before, driver.settled()) > 0.5
 
 
-def test_the_wheel_comes_nearer_and_a_double_click_turns_around_the_place(hands: Hands) -> None:
-    camera = hands.viewer.desk.state.scene.camera
-    hands.event("wheel", x=300.0, y=240.0, dx=0.0, dy=-200.0)
-    hands.settled()
-    near = hands.viewer.desk.state.scene.camera
+def test_the_wheel_comes_nearer_and_a_double_click_turns_around_the_place(driver: InputDriver) -> None:
+    camera = driver.viewer.desk.state.scene.camera
+    driver.event("wheel", x=300.0, y=240.0, dx=0.0, dy=-200.0)
+    driver.settled()
+    near = driver.viewer.desk.state.scene.camera
     assert near.frame_mm < 0.9 * camera.frame_mm
-    hands.event("double_click", x=230.0, y=200.0)
-    hands.settled()
-    assert hands.viewer.desk.state.scene.camera.target != near.target
+    driver.event("double_click", x=230.0, y=200.0)
+    driver.settled()
+    assert driver.viewer.desk.state.scene.camera.target != near.target
 
 
-def test_two_fingers_that_part_come_nearer(hands: Hands) -> None:
-    camera = hands.viewer.desk.state.scene.camera
-    hands.event("pointer_down", x=300.0, y=240.0, button=1, buttons=(1,))
-    hands.frame()
+def test_two_fingers_that_part_come_nearer(driver: InputDriver) -> None:
+    camera = driver.viewer.desk.state.scene.camera
+    driver.event("pointer_down", x=300.0, y=240.0, button=1, buttons=(1,))
+    driver.frame()
     for gap in (20.0, 40.0, 80.0):
         touches = {"0": {"x": 300.0, "y": 240.0 - gap / 2}, "1": {"x": 300.0, "y": 240.0 + gap / 2}}
-        hands.event("pointer_move", x=300.0, y=240.0, button=1, buttons=(1,), ntouches=2, touches=touches)
-        hands.frame()
-    hands.event("pointer_up", x=300.0, y=240.0, button=1, buttons=())
-    hands.frame()
-    assert hands.viewer.desk.state.scene.camera.frame_mm == pytest.approx(camera.frame_mm / 4.0)
+        driver.event("pointer_move", x=300.0, y=240.0, button=1, buttons=(1,), ntouches=2, touches=touches)
+        driver.frame()
+    driver.event("pointer_up", x=300.0, y=240.0, button=1, buttons=())
+    driver.frame()
+    assert driver.viewer.desk.state.scene.camera.frame_mm == pytest.approx(camera.frame_mm / 4.0)
 
 
-def test_keys_are_presets_undo_and_the_panel(hands: Hands) -> None:
-    desk = hands.viewer.desk
-    start, plain = desk.state, hands.settled()
-    hands.event("key_down", key="3")
-    hands.frame()
+def test_keys_are_presets_undo_and_the_panel(driver: InputDriver) -> None:
+    desk = driver.viewer.desk
+    start, plain = desk.state, driver.settled()
+    driver.event("key_down", key="3")
+    driver.frame()
     assert desk.state.scene.camera == preset("profile", desk.state.scene.head)
-    hands.event("key_down", key="z", modifiers=("Control",))
-    hands.frame()
+    driver.event("key_down", key="z", modifiers=("Control",))
+    driver.frame()
     assert desk.state is start
-    hands.event("key_down", key="y", modifiers=("Control",))
-    hands.frame()
+    driver.event("key_down", key="y", modifiers=("Control",))
+    driver.frame()
     assert desk.state is not start
-    hands.event("key_down", key="z", modifiers=("Control",))
-    hands.event("key_down", key="Tab")
-    bare = hands.settled()
+    driver.event("key_down", key="z", modifiers=("Control",))
+    driver.event("key_down", key="Tab")
+    bare = driver.settled()
     assert np.abs(bare[:440, :190].astype(int) - plain[:440, :190].astype(int)).mean() > 5.0
     assert middle(bare) == pytest.approx(200.0, abs=4.0) and middle(plain[:, 200:]) == pytest.approx(
         100.0, abs=4.0
     )
 
 
-def test_a_slider_changes_the_picture_and_is_one_step(hands: Hands) -> None:
-    before = hands.settled()
-    x, y = hands.place("roughness")
-    hands.drag((x, y), (x + 40.0, y))
-    assert hands.viewer.desk.state.scene.skin.roughness > 0.3
-    assert difference(before, hands.settled()) > 0.05
-    hands.viewer.desk.history.undo()
-    assert not hands.viewer.desk.history.can_undo
+def test_a_slider_changes_the_picture_and_is_one_step(driver: InputDriver) -> None:
+    before = driver.settled()
+    x, y = driver.place("roughness")
+    driver.drag((x, y), (x + 40.0, y))
+    assert driver.viewer.desk.state.scene.skin.roughness > 0.3
+    assert difference(before, driver.settled()) > 0.05
+    driver.viewer.desk.history.undo()
+    assert not driver.viewer.desk.history.can_undo
 
 
-def test_a_choice_changes_the_picture(hands: Hands) -> None:
-    before = hands.settled()
-    hands.choose("show", "normals")
-    assert hands.viewer.desk.state.view == "normals"
-    assert difference(before, hands.settled()) > 10.0
+def test_a_choice_changes_the_picture(driver: InputDriver) -> None:
+    before = driver.settled()
+    driver.choose("show", "normals")
+    assert driver.viewer.desk.state.view == "normals"
+    assert difference(before, driver.settled()) > 10.0
 
 
-def test_a_drag_that_begins_on_the_panel_stays_there(hands: Hands) -> None:
-    camera = hands.viewer.desk.state.scene.camera
-    x, y = hands.place("mix")
-    hands.drag((x, y), (380.0, 150.0))
-    assert hands.viewer.desk.state.scene.camera == camera
+def test_a_drag_that_begins_on_the_panel_stays_there(driver: InputDriver) -> None:
+    camera = driver.viewer.desk.state.scene.camera
+    x, y = driver.place("mix")
+    driver.drag((x, y), (380.0, 150.0))
+    assert driver.viewer.desk.state.scene.camera == camera
 
 
-def test_a_touch_on_the_head_right_after_one_on_the_panel_turns_it(hands: Hands) -> None:
+def test_a_touch_on_the_head_right_after_one_on_the_panel_turns_it(driver: InputDriver) -> None:
     """No frame is drawn between the two in which the panel could notice that the pointer went away."""
-    camera = hands.viewer.desk.state.scene.camera
-    hands.click((150.0, 243.0))  # a label
-    hands.event("pointer_down", x=300.0, y=240.0, button=1, buttons=(1,))
-    hands.event("pointer_move", x=260.0, y=240.0, button=1, buttons=(1,))
-    hands.event("pointer_up", x=260.0, y=240.0, button=1, buttons=())
-    hands.frame()
-    assert hands.viewer.desk.state.scene.camera != camera
+    camera = driver.viewer.desk.state.scene.camera
+    driver.click((150.0, 243.0))  # a label
+    driver.event("pointer_down", x=300.0, y=240.0, button=1, buttons=(1,))
+    driver.event("pointer_move", x=260.0, y=240.0, button=1, buttons=(1,))
+    driver.event("pointer_up", x=260.0, y=240.0, button=1, buttons=())
+    driver.frame()
+    assert driver.viewer.desk.state.scene.camera != camera
 
 
-def test_melanin_darkens_the_skin(hands: Hands) -> None:
-    desk = hands.viewer.desk
+def test_melanin_darkens_the_skin(driver: InputDriver) -> None:
+    desk = driver.viewer.desk
     desk.change(desk.state.with_skin(profile="light", albedo="profile"))
-    light = hands.settled()
+    light = driver.settled()
     desk.change(desk.state.with_pigments(melanin=0.4))
-    dark = hands.settled()
+    dark = driver.settled()
     assert dark[200:280, 210:240].mean() < 0.7 * light[200:280, 210:240].mean()
 
 
-def test_an_impossible_state_is_told_and_the_last_picture_stays(hands: Hands) -> None:
-    desk = hands.viewer.desk
-    before = hands.settled()
+def test_an_impossible_state_is_told_and_the_last_picture_stays(driver: InputDriver) -> None:
+    desk = driver.viewer.desk
+    before = driver.settled()
     desk.change(desk.state.with_skin(profile="nothing.csv"))
-    after = hands.frame()
+    after = driver.frame()
     assert "nothing.csv" in desk.messages.said
     assert difference(before, after, rows=140) == 0.0
-    assert hands.settled() is not None  # it is not tried again and again
+    assert driver.settled() is not None  # it is not tried again and again
     desk.history.undo()
-    assert difference(before, hands.settled()) == 0.0
+    assert difference(before, driver.settled()) == 0.0
 
 
-def test_buttons_save_load_and_take_pictures(hands: Hands, tmp_path: Path) -> None:
-    desk = hands.viewer.desk
+def test_buttons_save_load_and_take_pictures(driver: InputDriver, tmp_path: Path) -> None:
+    desk = driver.viewer.desk
     desk.save(tmp_path / "scene.toml")
     saved = desk.state
     desk.change(desk.state.with_skin(mix=0.9))
@@ -166,50 +166,50 @@ def test_buttons_save_load_and_take_pictures(hands: Hands, tmp_path: Path) -> No
     assert (tmp_path / "a.png").stat().st_size > 100 and "a.png" in desk.messages.said
 
 
-def test_the_window_may_change_its_size_or_have_none(hands: Hands) -> None:
-    hands.settled()
-    hands.canvas.set_logical_size(200, 300)
-    assert hands.settled().shape == (300, 200, 3)
-    hands.canvas._size_info.set_physical_size(0, 0, 1.0)  # minimised
-    hands.canvas.force_draw()
-    hands.canvas.set_logical_size(400, 480)
-    assert hands.settled().shape == (480, 400, 3)
+def test_the_window_may_change_its_size_or_have_none(driver: InputDriver) -> None:
+    driver.settled()
+    driver.canvas.set_logical_size(200, 300)
+    assert driver.settled().shape == (300, 200, 3)
+    driver.canvas._size_info.set_physical_size(0, 0, 1.0)  # minimised
+    driver.canvas.force_draw()
+    driver.canvas.set_logical_size(400, 480)
+    assert driver.settled().shape == (480, 400, 3)
 
 
-def test_a_lost_device_is_opened_again(make_hands: Callable[[], Hands]) -> None:
-    hands = make_hands()
-    before = hands.settled()
-    lost = hands.viewer.desk.studio
+def test_a_lost_device_is_opened_again(make_driver: Callable[[], InputDriver]) -> None:
+    driver = make_driver()
+    before = driver.settled()
+    lost = driver.viewer.desk.studio
     lost.renderer.device.handle.destroy()
-    hands.viewer.desk.change(hands.viewer.desk.state.with_skin(mix=0.4))
-    hands.frame()
-    assert hands.viewer.desk.studio is not lost and "lost" in hands.viewer.desk.messages.said
-    hands.viewer.desk.history.undo()
-    assert difference(before, hands.settled(), rows=380) == 0.0
-    assert np.abs(hands.frame()[30:440, :190].astype(int) - before[30:440, :190]).max() == 0  # but for "redo"
+    driver.viewer.desk.change(driver.viewer.desk.state.with_skin(mix=0.4))
+    driver.frame()
+    assert driver.viewer.desk.studio is not lost and "lost" in driver.viewer.desk.messages.said
+    driver.viewer.desk.history.undo()
+    assert difference(before, driver.settled(), rows=380) == 0.0
+    assert np.abs(driver.frame()[30:440, :190].astype(int) - before[30:440, :190]).max() == 0  # not "redo"
 
 
-def test_changes_leave_no_memory_behind(hands: Hands) -> None:
+def test_changes_leave_no_memory_behind(driver: InputDriver) -> None:
     """Of the process, where what each frame left behind would add up."""
-    desk = hands.viewer.desk
+    desk = driver.viewer.desk
     start = desk.state
     for k in range(30):
-        _change(hands, k)
+        _change(driver, k)
     gc.collect()
     before = _resident_mb()
     for k in range(60):
-        _change(hands, k)
+        _change(driver, k)
     gc.collect()
     assert _resident_mb() - before < 8.0
     desk.change(start)
 
 
-def _change(hands: Hands, k: int) -> None:
-    desk = hands.viewer.desk
+def _change(driver: InputDriver, k: int) -> None:
+    desk = driver.viewer.desk
     desk.change(
         desk.state.with_skin(mix=0.2 + 0.004 * (k % 100)).with_light(0, position=(k % 50, 500.0, 900.0))
     )
-    hands.frame()
+    driver.frame()
 
 
 def _resident_mb() -> float:

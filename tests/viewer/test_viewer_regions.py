@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from dermis.assets.bust.regions import REGIONS
 from dermis.errors import DermisError
+from dermis.human.bust.regions import REGIONS
 from dermis.scene.skin import Skin
 from dermis.viewer.regions import NO_REGIONS, regional
 from dermis.viewer.state import ViewerState
@@ -28,7 +28,7 @@ def table(tmp_path: Path) -> str:
 
 @pytest.fixture(autouse=True)
 def _small(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dermis.assets.regions.apply.SIZE", 64)
+    monkeypatch.setattr("dermis.human.regions.apply.SIZE", 64)
 
 
 def test_a_table_gives_maps_and_their_mean_and_none_takes_them_away(state: ViewerState, table: str) -> None:

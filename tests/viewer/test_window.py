@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from offscreen_hands import ADAPTER
+from offscreen_input import ADAPTER
 
 _NEEDED = [name for name in ("Xvfb", "xdotool") if shutil.which(name) is None]
 _PATIENCE_S = 60.0

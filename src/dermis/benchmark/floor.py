@@ -7,16 +7,16 @@ from itertools import pairwise
 
 import numpy as np
 
+from dermis.frame.inputs import Inputs
+from dermis.frame.levels import Levels
+from dermis.frame.passes.surface_texels import SURFACE_BYTES
+from dermis.frame.passes.translucency import Thin
 from dermis.gpu import Device, download
 from dermis.gpu.textures import texel_bytes
-from dermis.rendering.inputs import Inputs
-from dermis.rendering.levels import Levels
-from dermis.rendering.stages.surface_texels import SURFACE_BYTES
-from dermis.rendering.stages.transmission import Thin
 
 _MAPS = ("colour_map", "slope_map", "relief_map", "specular_map", "roughness_map")
 _CORNERS, _PLACE = 16, 16  # bytes of a triangle's corners and of a vertex' position in the tables
-_APRON = 16  # bytes of a texel in the list of an apron
+_APRON = 16  # bytes of a texel in the list of an gutter
 _BILINEAR = 4  # texels that one place between texels reads
 
 
@@ -85,7 +85,7 @@ def _scattering_bytes(moved: Moved, looked_up: int) -> dict[str, float]:
 
 
 def _surface_of_blurs(inputs: Inputs, texels: int) -> float:
-    """What each blur must know of the surface: stretch, how far the chart reaches, and aprons.
+    """What each blur must know of the surface: stretch, how far the chart reaches, and gutters.
 
     The passes of 2007 blur a stretch map along instead, which makes another one for each Gaussian.
     """
@@ -97,8 +97,8 @@ def _surface_of_blurs(inputs: Inputs, texels: int) -> float:
     moved = 0.0
     for source, halved in pairwise(levels.halvings):
         moved += texel_bytes(sheets[halved].resources["sheet_map"]) * texels / 4**halved
-        if inputs.edge == "repeated" and (apron := sheets[source].apron):
-            moved += apron.size * (1 + 2 * texel_bytes(levels.stack) / _APRON)
+        if inputs.edge == "repeated" and (gutter := sheets[source].gutter):
+            moved += gutter.size * (1 + 2 * texel_bytes(levels.stack) / _APRON)
     return moved
 
 

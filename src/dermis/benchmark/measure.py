@@ -9,15 +9,15 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from dermis.assets.head import Head
 from dermis.benchmark.cases import FRAGMENTS, Case
 from dermis.benchmark.floor import moved_by, stage_bytes
 from dermis.benchmark.scenes import scenes_of, settings_of
+from dermis.frame.passes.gpu_gems_3_fragments import published_as_fragments
+from dermis.frame.renderer import Renderer
 from dermis.gpu.device import gpu_failures
 from dermis.gpu.frame import Timed
 from dermis.gpu.memory import held_bytes
-from dermis.rendering.renderer import Renderer
-from dermis.rendering.stages.published_fragments import published_as_fragments
+from dermis.mesh.head import Head
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 

@@ -11,12 +11,12 @@ from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 
-from dermis.assets.head import load_head
 from dermis.benchmark.cases import Case
 from dermis.benchmark.copy_rate import copy_rate
 from dermis.benchmark.measure import ON_CPU, Effort, Row, measure
 from dermis.errors import DermisError
-from dermis.rendering.renderer import Renderer
+from dermis.frame.renderer import Renderer
+from dermis.scene.heads import load_head
 
 _LIBRARIES = ("dermis", "wgpu", "numpy")
 Progress = Callable[[int, int], None]

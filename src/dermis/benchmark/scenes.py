@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dermis.assets.head import Head
 from dermis.benchmark.cases import FRAGMENTS, PUBLISHED, Case
+from dermis.mesh.head import Head
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
 from dermis.scene.camera import portrait

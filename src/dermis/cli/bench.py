@@ -76,7 +76,7 @@ def bench(
 
 
 def _head(name: str) -> str:
-    from dermis.assets.samples import cached
+    from dermis.mesh.samples import cached
 
     if name != "auto":
         return name

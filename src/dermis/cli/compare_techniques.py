@@ -48,10 +48,10 @@ def choose(given: Mapping[str, Any]) -> dict[str, Any]:
 
 def compare_techniques(head: str, chosen: dict[str, Any], output: Path | None, as_json: bool) -> None:
     """Render a head with each technique, judge it by a truth, print and write what came of it."""
-    from dermis.assets.head import load_head
     from dermis.comparison.compare import check_choices, compare
     from dermis.comparison.report import write_report
     from dermis.outputs import check_output
+    from dermis.scene.heads import load_head
 
     check_choices(*(chosen[option] for option in ("against", "light", "region", "medium")))
     if output is not None:

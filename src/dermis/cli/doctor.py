@@ -41,9 +41,9 @@ def doctor(*, adapter: str = "auto", as_json: Json = False) -> int:
 
 def examine(wanted: str) -> dict[str, Any]:
     """All findings as one JSON-ready object."""
-    from dermis.assets.folders import cache_folder
-    from dermis.assets.samples import SAMPLES, cached
+    from dermis.disk import cache_folder
     from dermis.gpu.adapters import WANTED_FEATURES, list_adapters
+    from dermis.mesh.samples import SAMPLES, cached
 
     found = [
         {"name": a.name, "driver": a.driver, "kind": a.kind, "backend": a.backend}
@@ -63,8 +63,8 @@ def examine(wanted: str) -> dict[str, Any]:
 
 def _try_out(wanted: str) -> dict[str, Any]:
     """Open the adapter and use it."""
+    from dermis.frame.renderer import Renderer
     from dermis.gpu.probe import half_store_rounding
-    from dermis.rendering.renderer import Renderer
 
     try:
         renderer = Renderer(wanted)
@@ -84,9 +84,9 @@ def _try_out(wanted: str) -> dict[str, Any]:
 
 def _self_test(renderer: Any) -> dict[str, Any]:
     """A white sphere, lit from the camera: its middle must reflect what the light sends, no pixel more."""
-    from dermis.assets.head import Head
-    from dermis.assets.maps import Maps
-    from dermis.assets.primitives import uv_sphere
+    from dermis.mesh.head import Head
+    from dermis.mesh.maps import Maps
+    from dermis.mesh.primitives import uv_sphere
     from dermis.scene import Camera, DirectionalLight, Scene, Settings, Skin
 
     lamp = DirectionalLight(direction=(0.0, 0.0, -1.0), irradiance=(3.14159, 3.14159, 3.14159))

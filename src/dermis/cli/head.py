@@ -96,9 +96,9 @@ def head(
     """
     given = {name: value for name, value in locals().items() if value is not None}
     started = time.perf_counter()
-    from dermis.assets.bust.build import BustRecipe, write_bust
-    from dermis.assets.bust.parameters import BustParameters
-    from dermis.assets.skin_maps.look import SkinLook
+    from dermis.human.bust.build import BustRecipe, write_bust
+    from dermis.human.bust.parameters import BustParameters
+    from dermis.human.skin_maps.look import SkinLook
     from dermis.outputs import check_output
 
     check_output(output, (".glb",), "Name it something.glb")

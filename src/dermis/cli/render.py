@@ -199,8 +199,8 @@ def render(
 def _draw_and_report(
     scene: Any, settings: Any, output: Path, adapter: str, as_json: bool, started: float
 ) -> int:
+    from dermis.frame.renderer import Renderer
     from dermis.images.io import write_image, write_png
-    from dermis.rendering.renderer import Renderer
 
     with working_on("rendering"):
         renderer = Renderer(adapter)

@@ -10,7 +10,7 @@ from dermis.cli.options import check
 from dermis.errors import refuse
 
 if TYPE_CHECKING:
-    from dermis.assets.regions.table import RegionTable
+    from dermis.human.regions.table import RegionTable
     from dermis.scene import Environment, Light, Scene, Settings
 
 _MAP_OPTIONS = ("colour", "normal", "height", "height_mm", "specular_map", "roughness_map")
@@ -42,7 +42,7 @@ def assemble(head: str, given: Mapping[str, Any]) -> tuple[Scene, Settings]:
 
     given : options of `render` by parameter, parsed
     """
-    from dermis.assets.regions.apply import with_regions
+    from dermis.human.regions.apply import with_regions
     from dermis.scene import Scene, Settings, Skin, load_camera
 
     skin, chosen = (_of(given, names) for names in (_SKIN_OPTIONS, _SETTINGS))
@@ -68,7 +68,7 @@ def _of(given: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
 
 def _check(skin: dict[str, Any], chosen: dict[str, Any], around: dict[str, Any]) -> None:
     """Refuse what cannot be before the head is loaded, which takes longer."""
-    from dermis.assets.environment.panorama import panorama_file
+    from dermis.environment.panorama import panorama_file
     from dermis.optics.profiles import load_profile
     from dermis.scene import Environment, Settings, Skin
 
@@ -82,7 +82,7 @@ def _check(skin: dict[str, Any], chosen: dict[str, Any], around: dict[str, Any])
 
 
 def _regions(given: Mapping[str, Any]) -> RegionTable | None:
-    from dermis.assets.regions.table import load_table
+    from dermis.human.regions.table import load_table
 
     for option in ("rho_s", "roughness"):
         if "regions" in given and option in given:
@@ -94,8 +94,8 @@ def _regions(given: Mapping[str, Any]) -> RegionTable | None:
 
 def _begin(head: str, given: Mapping[str, Any]) -> tuple[Scene, Settings]:
     """The file's scene, or a head's with defaults."""
-    from dermis.assets.head import load_head
     from dermis.scene import Scene, Settings, load_scene
+    from dermis.scene.heads import load_head
 
     if Path(head).suffix.lower() != ".toml":
         own = {name.removesuffix("_map"): value for name, value in _of(given, _HEAD_OPTIONS).items()}

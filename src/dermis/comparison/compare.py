@@ -12,17 +12,17 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.head import Head
 from dermis.comparison.scenes import LIGHTS, REGIONS, comparison_scene
 from dermis.comparison.truths import TRUTHS, Subject, Truth, check_seen, matched
 from dermis.errors import refuse
+from dermis.frame.renderer import Renderer
+from dermis.frame.surface_points import surface_points
 from dermis.images.colour import encode_srgb
+from dermis.mesh.head import Head
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.presets import media
 from dermis.optics.profiles import TERMS, write_profile
-from dermis.rendering.renderer import Renderer
-from dermis.rendering.surface_points import surface_points
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dermis.assets.head import Head
-from dermis.assets.maps import Maps
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
 from dermis.scene.camera import Camera, portrait, three_quarter
 from dermis.scene.lights import Light, SpotLight, StripeLight
 from dermis.scene.model import Scene

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
+from dermis.frame.renderer import Renderer
+from dermis.frame.surface_points import SurfacePoints, irradiance_at, surface_points
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Medium
-from dermis.rendering.renderer import Renderer
-from dermis.rendering.surface_points import SurfacePoints, irradiance_at, surface_points
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 

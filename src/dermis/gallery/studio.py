@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.head import Head, load_head
-from dermis.assets.samples import cached
-from dermis.rendering.rendered import Rendered
-from dermis.rendering.renderer import Renderer
+from dermis.frame.rendered import Rendered
+from dermis.frame.renderer import Renderer
+from dermis.mesh.head import Head
+from dermis.mesh.samples import cached
+from dermis.scene.heads import load_head
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 

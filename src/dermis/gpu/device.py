@@ -37,7 +37,7 @@ def open_device(adapter: str = "auto") -> Device:
 class Device:
     """A logical device; nothing here is shared between two of them.
 
-    beside : threads for what the driver and the disk do by themselves: compile, read, copy; what they have
+    executor : threads for what the driver and the disk do by themselves: compile, read, copy; what they have
         not begun when the device is dropped is left
     ffi, lib, checked : the native library, for the calls of every frame, without what wgpu's Python adds;
         calls of `checked` raise what the library finds wrong, in passes when their encoder is submitted
@@ -63,8 +63,8 @@ class Device:
             ) from error
         self.max_texture_size, self.max_storage_bytes = (int(limits[name]) for name in _RAISED_LIMITS[:2])
         self.has_timestamps = "timestamp-query" in adapter.features
-        self.beside = ThreadPoolExecutor(os.cpu_count())
-        weakref.finalize(self, self.beside.shutdown, wait=False, cancel_futures=True)
+        self.executor = ThreadPoolExecutor(os.cpu_count())
+        weakref.finalize(self, self.executor.shutdown, wait=False, cancel_futures=True)
         self._timestamps: tuple[Any, Any] | None = None
         self._uniform_chunks: list[Any] = []
         self.spare_records: list[bytearray] = []

@@ -14,7 +14,7 @@ import numpy as np
 from dermis.errors import DermisError
 from dermis.gpu.bind_groups import BindGroups, key_of
 from dermis.gpu.device import Device
-from dermis.gpu.layout import Binding, bindings, struct_dtype
+from dermis.gpu.shader_types import Binding, bindings, struct_dtype
 from dermis.gpu.uniforms import Uniforms
 from dermis.gpu.wgsl_source import Source, compose
 
@@ -134,7 +134,7 @@ class ComputeProgram(Program):
     ) -> None:
         super().__init__(device, path, folders)
         stage = {"module": self._module, "entry_point": "main", "constants": dict(constants or {})}
-        self._compiled = device.beside.submit(
+        self._compiled = device.executor.submit(
             device.handle.create_compute_pipeline, layout=self._layout, compute=stage
         )
 

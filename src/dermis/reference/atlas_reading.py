@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.atlas import Atlas
-from dermis.assets.geometry import uv_cross
-from dermis.assets.mesh import Mesh
+from dermis.atlas.atlas import Atlas
+from dermis.mesh.geometry import uv_cross
+from dermis.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]

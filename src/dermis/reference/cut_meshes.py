@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.geometry import build_mesh
-from dermis.assets.mesh import Mesh
-from dermis.assets.primitives import SKIN
+from dermis.mesh.geometry import build_mesh
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.primitives import SKIN
 
 Floats = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.environment.panorama import UNIFORM, load_panorama
-from dermis.assets.head import Head
+from dermis.environment.panorama import UNIFORM, load_panorama
 from dermis.errors import refuse
+from dermis.mesh.head import Head
 from dermis.optics.media import Medium
 from dermis.reference.half_space import diffuse_albedo
 from dermis.reference.mitsuba_lights import facing_irradiance

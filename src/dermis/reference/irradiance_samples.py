@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.geometry import edges
-from dermis.assets.mesh import Mesh
 from dermis.errors import refuse
+from dermis.mesh.geometry import edges
+from dermis.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.assets.mesh import Mesh
 from dermis.errors import refuse
+from dermis.mesh.mesh import Mesh
 from dermis.reference.refine import Floats, Index, Patch, refine_patch
 from dermis.reference.surface_diffusion import STEPS, diffuse_on_surface, edge_for, margin_for, welded
 

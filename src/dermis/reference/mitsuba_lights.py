@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.environment.panorama import UNIFORM, load_panorama
+from dermis.environment.panorama import UNIFORM, load_panorama
 from dermis.errors import refuse
 from dermis.scene.environment import Environment
 from dermis.scene.lights import (

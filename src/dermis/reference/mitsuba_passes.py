@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.environment.panorama import load_panorama
-from dermis.assets.folders import cache_folder
+from dermis.disk import cache_folder
+from dermis.environment.panorama import load_panorama
 from dermis.errors import DermisError
 from dermis.optics.media import Medium
 from dermis.outputs import replacing

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from dermis.assets.head import Head
 from dermis.errors import refuse
+from dermis.mesh.head import Head
 from dermis.optics.media import Layer, Medium
 from dermis.reference.mitsuba_lights import rgb
 from dermis.reference.mitsuba_solid import Solid, inwards, skin_solid

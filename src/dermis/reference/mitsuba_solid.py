@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.geometry import triangle_areas, vertex_normals
-from dermis.assets.mesh import Mesh
 from dermis.errors import refuse
+from dermis.mesh.geometry import triangle_areas, vertex_normals
+from dermis.mesh.mesh import Mesh
 
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]

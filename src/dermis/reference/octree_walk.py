@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.machine_code import compiled
+from dermis.machine_code import compiled
 from dermis.reference.octree import Tree
 from dermis.reference.radial_table import Table
 

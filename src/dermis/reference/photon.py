@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.machine_code import compiled
+from dermis.machine_code import compiled
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.int64]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.assets.geometry import edges, triangle_areas
 from dermis.errors import refuse
+from dermis.mesh.geometry import edges, triangle_areas
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]

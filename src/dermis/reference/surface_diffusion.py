@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.assets.geometry import edges, sum_at
-from dermis.assets.mesh import Mesh
 from dermis.errors import refuse
+from dermis.mesh.geometry import edges, sum_at
+from dermis.mesh.mesh import Mesh
 from dermis.reference.surface_diffusion_operators import (
     Floats,
     Index,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.assets.geometry import edges, sum_at
+from dermis.mesh.geometry import edges, sum_at
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array

@@ -8,8 +8,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
-from dermis.assets.head import Head
 from dermis.errors import refuse
+from dermis.mesh.head import Head
 from dermis.scene.plain import Direction, Plain, Vector
 
 _DISTANCE_MM = 1100.0  # a portrait lens' distance: closer makes noses large

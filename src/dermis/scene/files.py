@@ -9,12 +9,13 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import Field
 
-from dermis.assets.head import Head, load_head
-from dermis.assets.regions.apply import with_regions
-from dermis.assets.regions.table import load_table
 from dermis.errors import refuse
+from dermis.human.regions.apply import with_regions
+from dermis.human.regions.table import load_table
+from dermis.mesh.head import Head
 from dermis.scene.camera import PRESETS, Camera, preset
 from dermis.scene.environment import Environment
+from dermis.scene.heads import load_head
 from dermis.scene.lights import (
     DirectionalLight,
     Light,

@@ -32,7 +32,7 @@ def stage_weights(lights: Sequence[DirectionalLight], around: Environment) -> ND
 
     Raises DermisError when the panorama cannot be read.
     """
-    from dermis.assets.environment.panorama import directions, load_panorama, solid_angles
+    from dermis.environment.panorama import directions, load_panorama, solid_angles
 
     radiance = load_panorama(around.name)
     size = radiance.shape[0], radiance.shape[1]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from dermis.assets.head import Head
+from dermis.mesh.head import Head
 from dermis.scene.camera import Camera, portrait
 from dermis.scene.environment import Environment
 from dermis.scene.lights import Light, studio

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dermis.assets.head import Head
+from dermis.mesh.head import Head
 from dermis.scene.camera import Camera
 from dermis.viewer.orbit import Floats, axes
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from dermis.assets.head import Head, load_head
-from dermis.assets.regions.apply import with_regions
 from dermis.errors import refuse
+from dermis.human.regions.apply import with_regions
+from dermis.mesh.head import Head
+from dermis.scene.heads import load_head
 from dermis.scene.skin import Skin
 from dermis.viewer.state import ViewerState
 

@@ -7,11 +7,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dermis.assets.head import Head, load_head
 from dermis.errors import refuse
+from dermis.mesh.head import Head
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.files import NO_LIGHTS, head_table, load_lights, load_scene
+from dermis.scene.heads import load_head
 from dermis.scene.lights import Light
 from dermis.scene.model import Scene
 from dermis.scene.plain import Plain

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.frame.rendered import Rendered
+from dermis.frame.renderer import Renderer
 from dermis.gpu import Device, download, make_texture
 from dermis.images.io import write_image, write_png
-from dermis.rendering.rendered import Rendered
-from dermis.rendering.renderer import Renderer
 from dermis.scene.camera import Camera
 from dermis.scene.settings import Settings
 from dermis.viewer.chart import ATLAS

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
+from dermis.frame.inputs import Inputs
+from dermis.frame.passes.translucency_weights import Pairs
+from dermis.frame.passes.variants import Variants
+from dermis.frame.renderer import Renderer
 from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture
 from dermis.gpu.device import gpu_failures
 from dermis.gpu.textures import texture_from
-from dermis.rendering.inputs import Inputs
-from dermis.rendering.renderer import Renderer
-from dermis.rendering.stages.opposite import Pairs
-from dermis.rendering.stages.variants import Variants
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.viewer.chart import ATLAS, Chart
@@ -53,8 +53,8 @@ class Views:
         Raises DermisError for what the technique does not make.
         """
         inputs = self._renderer.prepare(scene, settings, place)
-        switches = tuple(switch for switch in inputs.light_switches if switch[0] == "SHAPES")
-        program = self._variants.program(switches)
+        constants = tuple(switch for switch in inputs.light_constants if switch[0] == "SHAPES")
+        program = self._variants.program(constants)
         layer, scale = self._layer(inputs, view, settings)
         looked = ("eye", "forward", "right", "up", "samples", "jitter")
         record = program.record("Look", **{name: inputs.view[name] for name in looked})

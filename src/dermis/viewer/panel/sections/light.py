@@ -6,7 +6,7 @@ import math
 
 from imgui_bundle import imgui
 
-from dermis.assets.samples import SAMPLES
+from dermis.mesh.samples import SAMPLES
 from dermis.scene.environment import Environment
 from dermis.scene.files import light_presets
 from dermis.scene.lights import Light, SpotLight

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from dermis.assets.regions.table import DEFAULT
+from dermis.human.regions.table import DEFAULT
 from dermis.viewer.desk import Desk
 from dermis.viewer.panel.fields import choice, field_choice, field_slider
 from dermis.viewer.regions import NO_REGIONS, regional

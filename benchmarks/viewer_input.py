@@ -1,0 +1,208 @@
+"""Motion in a viewer without a window: how many frames a second."""
+
+from __future__ import annotations
+
+import math
+import resource
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from viewer_clock import Clock
+
+from dermis.scene.heads import load_head
+from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
+from dermis.viewer.lamp import drag_light
+from dermis.viewer.orbit import orbit
+from dermis.viewer.pace import Pace
+from dermis.viewer.state import ViewerState, changed
+from dermis.viewer.viewer import Viewer
+
+Change = Callable[[ViewerState, int], ViewerState]
+_SETTLING = 2  # frames before any is counted
+PIGMENTED = "light"  # a profile that sliders of pigments move
+STEP = 0.02  # of turns [rad]
+_REST_S = 30.0  # at most, which some tenths of a second are enough for
+FEWEST = 3  # that a median is made of, however little time is left
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is drawn on what.
+
+    size : of the picture [pixel]
+    frames : of each kind of motion
+    """
+
+    head: str
+    adapter: str
+    size: tuple[int, int]
+    atlas: int
+    samples: int
+    frames: int
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One thing that moves from frame to frame.
+
+    start : the state in which it begins
+    """
+
+    start: Callable[[ViewerState], ViewerState]
+    change: Change
+
+
+class Steady(Pace):
+    """The same effort for every frame: what is asked for."""
+
+    def settings(self, wanted: Settings, size: tuple[int, int], moving: bool) -> Settings:
+        """The wanted ones at the window's size."""
+        return changed(wanted, size=size)
+
+
+class InputDriver:
+    """A viewer on an offscreen canvas, without its panel."""
+
+    def __init__(self, viewer: Viewer, canvas: Any) -> None:
+        self.viewer, self.canvas, self.first = viewer, canvas, viewer.desk.state
+        self._fault: Exception | None = None
+        canvas.request_draw(self._draw)
+
+    def _draw(self) -> None:
+        try:
+            self.viewer.draw()
+        except Exception as fault:  # which the canvas only logs
+            self._fault = fault
+            raise
+
+    def frame(self) -> np.ndarray[Any, Any]:
+        """The next picture, after what has happened since the last one.
+
+        Raises what went wrong, for the canvas would show its last picture for ever.
+        """
+        self.canvas._process_events()
+        picture = np.asarray(self.canvas.draw())
+        if fault := self._fault or self.viewer.failure:
+            raise fault
+        return picture
+
+    def rest(self) -> None:
+        """Draw until nothing moves any more.
+
+        Raises RuntimeError when that takes too long.
+        """
+        clock = Clock(_REST_S)
+        while not self.viewer.is_still:
+            if clock.over:
+                raise RuntimeError(f"the picture does not come to rest within {_REST_S:.0f} s")
+            self.frame()
+
+    def go_on(self, state: ViewerState) -> None:
+        """Another state, in a gesture, so that the history does not grow."""
+        self.viewer.desk.change(state, "benchmark")
+
+    def event(self, kind: str, x: float, y: float, **fields: Any) -> None:
+        """Of a pointer with its left button down."""
+        given = {"button": 1, "buttons": (1,), "modifiers": ()} | fields
+        self.canvas.submit_event({"event_type": kind, "x": x, "y": y, **given})
+
+
+def offscreen(plan: Plan) -> InputDriver:
+    """A viewer that draws every frame at the plan's effort."""
+    from rendercanvas.offscreen import OffscreenRenderCanvas
+
+    settings = Settings(atlas=plan.atlas, samples=plan.samples, shadow_size=plan.atlas)
+    canvas = OffscreenRenderCanvas(size=plan.size)
+    state = ViewerState(Scene(load_head(plan.head)), settings, {"name": plan.head})
+    viewer = Viewer(state, canvas, plan.adapter)
+    viewer.panel.visible = False
+    viewer.desk.studio.pace = Steady(viewer.desk.studio.pace.software)
+    return InputDriver(viewer, canvas)
+
+
+def slider_place(driver: InputDriver, name: str) -> tuple[float, float] | None:
+    """Where a slider of skin with pigments is in the window, None where one had to scroll to it."""
+    driver.viewer.panel.visible = True
+    driver.go_on(driver.first.with_skin(profile=PIGMENTED))
+    for _ in range(FEWEST):
+        driver.frame()
+    driver.viewer.panel.visible = False
+    place = driver.viewer.desk.places[name]
+    return place if place[1] < driver.canvas.get_logical_size()[1] else None
+
+
+def _unmapped(state: ViewerState) -> ViewerState:
+    """With a roughness that is one number, for its slider to move."""
+    head = state.scene.head
+    head = replace(head, maps=replace(head.maps, roughness=None))
+    return replace(state, scene=replace(state.scene, head=head))
+
+
+def _to_and_fro(k: int) -> float:
+    return 0.5 + 0.5 * math.sin(0.2 * k)
+
+
+def _same(state: ViewerState) -> ViewerState:
+    return state
+
+
+MOTIONS: dict[str, Motion] = {
+    "camera": Motion(_same, lambda state, k: state.with_camera(orbit(state.scene.camera, STEP, 0.0))),
+    "light": Motion(_same, lambda state, k: drag_light(state, 0, STEP, 0.0)),
+    "roughness": Motion(_unmapped, lambda state, k: state.with_skin(roughness=0.2 + 0.3 * _to_and_fro(k))),
+    "melanin": Motion(
+        lambda state: state.with_skin(profile=PIGMENTED).with_pigments(melanin=0.05),
+        lambda state, k: state.with_pigments(melanin=0.05 + 0.01 * _to_and_fro(k)),
+    ),
+    "exposure": Motion(_same, lambda state, k: state.with_settings(exposure=1.0 + 0.2 * _to_and_fro(k))),
+}
+
+
+def speeds(driver: InputDriver, plan: Plan, clock: Clock) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Of each kind of motion, one after the other."""
+    for done, (name, motion) in enumerate(MOTIONS.items()):
+        yield name, _speed(driver, motion, plan.frames, clock.share(1.0 / (len(MOTIONS) - done)))
+
+
+def _speed(driver: InputDriver, motion: Motion, frames: int, clock: Clock) -> dict[str, Any]:
+    desk = driver.viewer.desk
+    driver.go_on(motion.start(driver.first))
+    for k in range(_SETTLING):
+        driver.go_on(motion.change(desk.state, k))
+        driver.frame()
+    times, prepared, processor = [], [], processor_s()
+    for k in counted(frames, clock):
+        began = time.perf_counter()
+        driver.go_on(motion.change(desk.state, _SETTLING + k))
+        driver.frame()
+        times.append(time.perf_counter() - began)
+        prepared.append(desk.studio.rendered.setup_ms if desk.studio.rendered else 0.0)
+    rendered = desk.studio.rendered
+    return {
+        "frames": len(times),
+        "frames_per_s": len(times) / sum(times),
+        "frame_ms": 1e3 * float(np.median(times)),
+        "late_frame_ms": 1e3 * float(np.percentile(times, 95)),
+        "longest_frame_ms": 1e3 * max(times),
+        "processor_ms": 1e3 * (processor_s() - processor) / len(times),
+        "prepared_ms": float(np.median(prepared)),
+        "stages": [name for name in (rendered.gpu_ms or {} if rendered else {}) if name != "total"],
+    }
+
+
+def counted(most: int, clock: Clock) -> Iterator[int]:
+    """0, 1, 2 and so on as long as there is time."""
+    for k in range(most):
+        if k >= FEWEST and clock.over:
+            return
+        yield k
+
+
+def processor_s() -> float:
+    """Of this process so far, user and system [s]."""
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    return used.ru_utime + used.ru_stime

@@ -1,0 +1,71 @@
+"""Atlases, and what is found on them, kept on disk by the content of their mesh."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import fields
+
+import numpy as np
+
+from dermis.atlas.atlas import GUTTER, REACH_MM, Atlas, build_atlas
+from dermis.atlas.translucency.pairs import FORM as LINKS_FORM
+from dermis.atlas.translucency.pairs import Links, find_links
+from dermis.disk import Array, Arrays, stored
+from dermis.mesh.mesh import Mesh
+
+_FORM = 3  # raise when `build_atlas` gives other results for the same mesh
+
+
+def cached_atlas(mesh: Mesh, size: int, layout: str = "mesh", reach_mm: float = REACH_MM) -> Atlas:
+    """`build_atlas`, read back from disk when it was made before; the disk may fail without harm."""
+    names = [field.name for field in fields(Atlas)]
+
+    def make() -> Arrays:
+        atlas = build_atlas(mesh, size, layout, reach_mm)
+        return {name: getattr(atlas, name) for name in names}
+
+    return Atlas(**stored("atlas", _key(mesh, size, layout, reach_mm), names, make))
+
+
+def cached_occlusion(mesh: Mesh, atlas: Atlas, form: str, bake: Callable[[], Array]) -> Array:
+    """What `bake` returns for a mesh and its atlas, kept on disk in the same way.
+
+    form : everything else that the result depends on
+    """
+    return _baked("occlusion", mesh, atlas, form, bake)
+
+
+def cached_links(mesh: Mesh, atlas: Atlas, widest_mm: float) -> Links:
+    """`find_links`, kept on disk in the same way."""
+    names = [field.name for field in fields(Links)]
+
+    def make() -> Arrays:
+        links = find_links(mesh, atlas, widest_mm)
+        return {name: getattr(links, name) for name in names}
+
+    return Links(**stored("opposite", links_key(mesh, atlas, widest_mm), names, make))
+
+
+def links_key(mesh: Mesh, atlas: Atlas, widest_mm: float) -> str:
+    """What stands for the content of `find_links`' result."""
+    return _baked_key(mesh, atlas, f"{LINKS_FORM} {widest_mm!r}")
+
+
+def _baked(folder: str, mesh: Mesh, atlas: Atlas, form: str, bake: Callable[[], Array]) -> Array:
+    return stored(folder, _baked_key(mesh, atlas, form), ["open"], lambda: {"open": bake()})["open"]
+
+
+def _baked_key(mesh: Mesh, atlas: Atlas, form: str) -> str:
+    digest = hashlib.sha256(f"{_key(mesh, atlas.size)} {form}".encode())
+    for array in (mesh.positions, mesh.normals, atlas.place, np.packbits(atlas.own)):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()[:40]
+
+
+def _key(mesh: Mesh, size: int, layout: str = "mesh", reach_mm: float = REACH_MM) -> str:
+    digest = hashlib.sha256(f"{_FORM} {GUTTER} {size} {layout} {reach_mm}".encode())
+    digest.update(repr([material.kind for material in mesh.materials]).encode())
+    for array in (mesh.material, mesh.positions, mesh.uv, mesh.triangles, mesh.dpdu, mesh.dpdv, mesh.point):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()[:40]

@@ -1,0 +1,112 @@
+"""Texels of pieces and of the gutters beyond their borders, with the surface that each of them shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.atlas.stitched.beyond import Beyond, walk_beyond
+from dermis.atlas.stitched.border import Border, Gutter, Placing
+from dermis.atlas.stitched.surface import Surface
+
+Doubles = NDArray[np.float64]
+Index = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Cover:
+    """Texels of a grid and the surface they show.
+
+    triangle, weights : (h, w), (h, w, 2) -1 where nothing is; weights of the second and third corner
+    rooted, roots : the same at the nearest place on the texel's own piece: itself, or on the border
+    piece : (h, w) piece, -1 where nothing is
+    gutter : (h, w) texels which show what others compute
+    away_mm : (h, w) distance from the piece
+    """
+
+    triangle: NDArray[np.int32]
+    weights: NDArray[np.float32]
+    rooted: NDArray[np.int32]
+    roots: NDArray[np.float32]
+    piece: NDArray[np.int32]
+    gutter: Flags
+    away_mm: NDArray[np.float32]
+
+
+def cover(
+    surface: Surface,
+    piece: Index,
+    own: Index,
+    border: Border,
+    placing: Placing,
+    width: Gutter,
+    shape: tuple[int, int],
+) -> Cover:
+    """The texels of pieces that are placed apart from each other.
+
+    piece, own : (f,) and numbers of triangles, as for `find_border`
+    """
+    from dermis.atlas.stitched.kernels.fill import fill, weigh
+
+    # triangles that are mirrored within their piece are drawn first, so that others win
+    drawn = own[np.argsort(~_mirrored(surface, piece[own], own), kind="stable")]
+    owner, weights = np.full(shape, -1, np.int32), np.zeros((*shape, 2), np.float32)
+    fill(placing.places, drawn, owner)
+    weigh(placing.places, owner, weights)
+    made = Cover(
+        owner,
+        weights,
+        rooted=owner.copy(),
+        roots=weights.copy(),
+        piece=np.empty(shape, np.int32),
+        gutter=np.zeros(shape, np.bool_),
+        away_mm=np.zeros(shape, np.float32),
+    )
+    _add_beyond(made, piece, walk_beyond(surface, border, placing, width, owner))
+    made.piece[:] = np.where(made.rooted >= 0, piece[np.maximum(made.rooted, 0)], -1)
+    return made
+
+
+def _add_beyond(made: Cover, piece: Index, found: Beyond) -> None:
+    """Write rims and gutters into what holds the pieces alone."""
+    y, x = found.y, found.x
+    made.rooted[y, x], made.roots[y, x], made.away_mm[y, x] = found.root, found.root_weights, found.away_mm
+    made.triangle[y, x], made.weights[y, x] = found.triangle, found.weights
+    made.gutter[y, x] = ~found.rim
+    ended = np.zeros(made.gutter.shape, np.bool_)
+    ended[y, x] = ~found.whole
+    astray = ~found.whole & ~found.rim
+    made.triangle[y[astray], x[astray]] = -1
+    _repeat_edge(made, piece, ended, y[astray], x[astray])
+    # an gutter ends where its light is not in the atlas
+    gone = made.gutter & ((made.triangle < 0) | (piece[np.maximum(made.triangle, 0)] < 0))
+    for grid in (made.triangle, made.rooted):
+        grid[gone] = -1
+    made.gutter[gone] = False
+
+
+def _mirrored(surface: Surface, piece: Index, own: Index) -> Flags:
+    """Which of the triangles `own` face the other way than most of their piece."""
+    whole = np.bincount(piece, surface.area_uv[own])
+    return np.asarray(np.sign(whole)[piece] != np.sign(surface.area_uv[own]))
+
+
+def _repeat_edge(made: Cover, piece: Index, ended: Flags, y: Index, x: Index) -> None:
+    """Texels of an gutter just beyond the end of the surface take what those beside them show.
+
+    A blur along the edge so finds in the gutter what it finds in the rim of a piece.
+
+    ended : (h, w) texels that the surface does not reach
+    y, x : (n,) those of them in an gutter
+    """
+    last = np.array(ended.shape) - 1
+    from_y, from_x = y.copy(), x.copy()
+    for dy, dx in ((0, -1), (0, 1), (-1, 0), (1, 0)):
+        beside_y, beside_x = np.clip(y + dy, 0, last[0]), np.clip(x + dx, 0, last[1])
+        root = made.rooted[beside_y, beside_x]
+        same = (root >= 0) & ~ended[beside_y, beside_x] & (piece[root] == piece[made.rooted[y, x]])
+        from_y, from_x = np.where(same, beside_y, from_y), np.where(same, beside_x, from_x)
+    made.triangle[y, x], made.weights[y, x] = made.triangle[from_y, from_x], made.weights[from_y, from_x]

@@ -1,0 +1,142 @@
+"""A mesh as the layout sees it: triangles in planes of their own, and what lies across each side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.atlas.stitched.ground import Ground
+from dermis.atlas.unwrap.charts import across
+from dermis.mesh.geometry import MIN_UV_CROSS, tangents, triangle_areas, uv_cross, weld
+from dermis.mesh.mesh import Mesh
+
+Doubles = NDArray[np.float64]
+Index = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+_LEAST_MM = 1e-9
+
+
+@dataclass(frozen=True)
+class Surface:
+    """What does not depend on where anything lies in the atlas. Sides are 01, 12, 20 of each triangle.
+
+    corners : (f, 3, 3) positions [mm]
+    uv : (f, 3, 2)
+    area_mm2, area_uv : (f,) the latter negative where u and v are mirrored as seen from outside
+    skin : (f,) triangles that light may cross
+    sound : (f,) skin that has an area in space and in uv
+    ground : what walks need
+    beside_uv : (f, 3) triangle across each side in uv too, itself where the map is cut
+    along : (f, 3, 2, 2) at each corner the steps for u and for v, in the triangle's plane [mm per unit of uv]
+    lengths : (f, 3, 3) at each corner the length of both steps and the cosine between them
+    """
+
+    corners: Doubles
+    uv: Doubles
+    area_mm2: Doubles
+    area_uv: Doubles
+    skin: Flags
+    sound: Flags
+    ground: Ground
+    beside_uv: Index
+    along: Doubles
+    lengths: Doubles
+
+    def part(self, own: Index) -> Surface:
+        """Some of its triangles, not to be walked on: they name those beside them by their old numbers."""
+        names = [field.name for field in fields(self) if field.name != "ground"]
+        return replace(self, **{name: getattr(self, name)[own] for name in names})
+
+
+def survey(mesh: Mesh) -> Surface:
+    """The surface of a mesh."""
+    corners = mesh.positions[mesh.triangles].astype(np.float64)
+    uv = mesh.uv[mesh.triangles].astype(np.float64)
+    skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
+    # v runs down, so uv that is not mirrored has a negative cross product in (u, v)
+    area_uv = -uv_cross(uv) / 2
+    area = triangle_areas(corners)
+    sound = skin & (2 * np.abs(area_uv) > MIN_UV_CROSS) & (area > 0)
+    flat, axes = _flat(corners)
+    along, lengths = _steps(mesh, flat, axes, uv, area_uv)
+    same_uv = weld(np.hstack((mesh.positions, mesh.uv)))[mesh.triangles]
+    beside_uv = (across(same_uv.astype(np.int64)) % len(uv)).reshape(3, -1).T
+    return Surface(
+        corners, uv, area, area_uv, skin, sound, _ground(mesh, flat, skin), beside_uv, along, lengths
+    )
+
+
+def _flat(corners: Doubles) -> tuple[Doubles, Doubles]:
+    """Corners (f, 3, 2) in the triangle's plane, first at 0 and second to its right; both axes (f, 2, 3)."""
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    x = first / np.maximum(np.linalg.norm(first, axis=1, keepdims=True), _LEAST_MM)
+    up = second - (second * x).sum(axis=1, keepdims=True) * x
+    y = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), _LEAST_MM)
+    axes = np.stack((x, y), axis=1)
+    return np.einsum("fki,fai->fka", corners - corners[:, :1], axes), axes
+
+
+def _ground(mesh: Mesh, flat: Doubles, skin: Flags) -> Ground:
+    points, count = mesh.point[mesh.triangles].astype(np.int64), len(flat)
+    side = np.arange(3 * count)
+    other = across(points)
+    start = points.T.ravel()
+    beside = np.where(other == side, -1, other % count).reshape(3, -1).T
+    entry = (other // count).reshape(3, -1).T
+    turned = (start[other] == start).reshape(3, -1).T
+    return Ground(
+        flat,
+        np.ascontiguousarray(beside, np.int32),
+        np.ascontiguousarray(entry, np.int8),
+        np.ascontiguousarray(turned),
+        _apexes(flat),
+        skin,
+    )
+
+
+def _apexes(flat: Doubles) -> Doubles:
+    """(f, 3, 2) the third corner as seen from each side: along it and to its left, in lengths of the side."""
+    side = np.roll(flat, -1, axis=1) - flat
+    rest = np.roll(flat, -2, axis=1) - flat
+    square = np.maximum((side**2).sum(axis=2), _LEAST_MM**2)
+    along = (side * rest).sum(axis=2) / square
+    left = (side[..., 0] * rest[..., 1] - side[..., 1] * rest[..., 0]) / square
+    return np.stack((along, left), axis=-1)
+
+
+def _steps(
+    mesh: Mesh, flat: Doubles, axes: Doubles, uv: Doubles, area_uv: Doubles
+) -> tuple[Doubles, Doubles]:
+    """`along` and `lengths` of a `Surface`: at each corner the mean of triangles mirrored alike in uv."""
+    count = len(mesh.positions)
+    corner = mesh.triangles + count * (area_uv < 0)[:, None].astype(np.int32)
+    positions, uvs, normals = (np.concatenate((a, a)) for a in (mesh.positions, mesh.uv, mesh.normals))
+    steps = np.stack(tangents(positions, uvs, normals, corner), axis=1)[corner].astype(np.float64)
+    length = np.linalg.norm(steps, axis=-1)
+    cosine = (steps[:, :, 0] * steps[:, :, 1]).sum(axis=-1) / np.maximum(length.prod(axis=-1), 1e-12)
+    # laid into the triangle's plane without getting shorter
+    along = np.einsum("fksi,fai->fksa", steps, axes)
+    along *= (length / np.maximum(np.linalg.norm(along, axis=-1), 1e-12))[..., None]
+    own = _own_steps(flat, uv)[:, None]
+    # the mean of triangles that face all ways may mean nothing: then the triangle's own steps
+    bad = _turn(along) * np.sign(area_uv)[:, None] >= -0.05 * length.prod(axis=-1)
+    along = np.where(bad[..., None, None], own, along)
+    return along, np.concatenate((length, cosine[..., None]), axis=-1)
+
+
+def _turn(along: Doubles) -> Doubles:
+    """Positive where v lies to the left of u."""
+    return np.asarray(along[..., 0, 0] * along[..., 1, 1] - along[..., 0, 1] * along[..., 1, 0])
+
+
+def _own_steps(flat: Doubles, uv: Doubles) -> Doubles:
+    """(f, 2, 2) steps for u and v of each triangle by itself [mm per unit of uv]."""
+    e, d = flat[:, 1:] - flat[:, :1], uv[:, 1:] - uv[:, :1]
+    cross = d[:, 0, 0] * d[:, 1, 1] - d[:, 0, 1] * d[:, 1, 0]
+    cross = np.where(np.abs(cross) > MIN_UV_CROSS, cross, np.inf)[:, None]
+    u = (e[:, 0] * d[:, 1, 1:] - e[:, 1] * d[:, 0, 1:]) / cross
+    v = (e[:, 1] * d[:, 0, :1] - e[:, 0] * d[:, 1, :1]) / cross
+    return np.stack((u, v), axis=1)

@@ -1,0 +1,148 @@
+"""Pairs of places that light passes between through thin parts; found once for a mesh and an atlas."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.translucency.facing import facing
+from dermis.atlas.translucency.samples import Samples, giving, shown, surface, taking, texel_mm, texels
+from dermis.mesh.mesh import Mesh
+
+if TYPE_CHECKING:
+    from dermis.atlas.translucency.kernels.pair_search import Sources
+
+Found = tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.uint16]]
+FORM = 11
+"""Differs when finding gives other results."""
+_REACH = 3.2  # standard deviations of the widest Gaussian that two places are apart at most
+_SPACING = 0.36  # of the places, in the same unit: what is read between them is smooth
+_WIDEST_MM = 10.0  # pairs through wax, which spreads light farther, would be too many
+_MOST_CELLS = 2**21  # of the grid that is searched; narrow profiles would ask for thousands of times more
+_ROOM = 3.0  # spacings that a place may be away from the triangle that it stands for
+_PARTS = 16  # of the search, shared by the processor's cores
+
+
+@dataclass(frozen=True)
+class Links:
+    """What lies opposite through the flesh, in cells of a coarse atlas.
+
+    side : cells of the coarse atlas along a side, which no array says
+    receiver : (side, side) int32 0 without surface, 1 where it is thick, from 2 on thin places in order
+    first : (m + 3,) uint32 where the links of 0, 1, 2, ... begin; 0 and 1 have none
+    source : (l,) uint32 the place that each link takes light from
+    lie : (l, 4) uint16 depth under its tangent plane, distance beside its normal, and along the surface
+        [1/65535 of the radius; 65535 where no blur leads]; share that counts [1/65535]
+    texel : (n, 2) uint16 of the sources, x and y in the atlas
+    area_mm2 : (n,) float32 of the sources
+    radius_mm, spacing_mm : () how far pairs are apart at most, and places usually
+    """
+
+    receiver: NDArray[np.int32]
+    first: NDArray[np.uint32]
+    source: NDArray[np.uint32]
+    lie: NDArray[np.uint16]
+    texel: NDArray[np.uint16]
+    area_mm2: NDArray[np.float32]
+    radius_mm: NDArray[np.float64]
+    spacing_mm: NDArray[np.float64]
+
+
+def find_links(mesh: Mesh, atlas: Atlas, widest_mm: float) -> Links:
+    """All pairs of places that face away from each other and are near enough.
+
+    widest_mm : standard deviation of the widest Gaussian; 3.2 of them is near enough, 32 mm at most [mm]
+    """
+    widest = min(widest_mm, _WIDEST_MM)
+    radius, fine = _REACH * widest, texel_mm(atlas)
+    side = min(atlas.size, int(np.ceil(atlas.size * fine / (_SPACING * widest))))
+    seen = texels(atlas)
+    held = surface(atlas, seen, side)
+    spacing = fine * atlas.size / side
+    thin = facing(mesh, _mapped(mesh, atlas), radius + _ROOM * spacing)
+    given = giving(mesh, atlas, seen, side, thin)
+    taken = taking(mesh, atlas, held, thin)
+    found = _search(atlas, given, taken, shown(atlas, seen, given), radius)
+    return _packed(given, taken, held, *found, radius, spacing)
+
+
+def _mapped(mesh: Mesh, atlas: Atlas) -> NDArray[np.bool_]:
+    """(f,) triangles that the atlas shows."""
+    found = np.zeros(len(mesh.triangles) + 1, bool)
+    found[atlas.triangle] = True  # the last one for none
+    return found[:-1]
+
+
+def _search(
+    atlas: Atlas, given: Samples, taken: Samples, shown: NDArray[np.int32], radius_mm: float
+) -> Found:
+    """How many links each place has that takes light, where they begin, and how they lie."""
+    from dermis.atlas.translucency.kernels.pair_search import Map, Receivers, link
+
+    x, y = taken.texel.T
+    stretch, shear = (array[y, x].astype(np.float32) for array in (atlas.stretch, atlas.shear))
+    receivers = Receivers(taken.position, taken.normal, taken.texel, stretch, shear)
+    sources, flat = _in_cells(given, radius_mm / 3.0), Map(atlas.reach, shown)
+    count = np.zeros(len(taken.cell), np.int64)
+    ends = [len(count) * k // _PARTS for k in range(_PARTS + 1)]
+    # The compiled loop releases the interpreter, so that threads share the work.
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        parts = list(
+            pool.map(lambda part: link(receivers, part, sources, flat, radius_mm, count), pairwise(ends))
+        )
+    index, lie = zip(*parts, strict=True)
+    return count, np.concatenate(index), np.concatenate(lie)
+
+
+def _packed(
+    given: Samples,
+    taken: Samples,
+    surface: NDArray[np.bool_],
+    count: NDArray[np.int64],
+    index: NDArray[np.int32],
+    lie: NDArray[np.uint16],
+    radius_mm: float,
+    spacing_mm: float,
+) -> Links:
+    """The links without what nobody uses."""
+    asked, thin = np.zeros(len(given.cell), bool), count > 0
+    asked[index] = True
+    used, number = np.flatnonzero(asked), np.cumsum(asked, dtype=np.uint32) - np.uint32(1)
+    receiver = surface.astype(np.int32)
+    receiver[taken.cell[thin, 1], taken.cell[thin, 0]] = np.arange(2, 2 + thin.sum())
+    first = np.concatenate([[0, 0, 0], np.cumsum(count[thin])])
+    return Links(
+        receiver,
+        first.astype(np.uint32),
+        number[index],
+        lie,
+        given.texel[used].astype(np.uint16),
+        given.area_mm2[used].astype(np.float32),
+        np.array(radius_mm),
+        np.array(spacing_mm),
+    )
+
+
+def _in_cells(given: Samples, cell_mm: float) -> Sources:
+    """The places in the cells of a grid, x fastest."""
+    from dermis.atlas.translucency.kernels.pair_search import Sources
+
+    if not len(given.position):
+        none, nobody = np.zeros((0, 3)), np.zeros(0, np.int64)
+        return Sources(none, none, np.zeros(3), cell_mm, np.ones(3, np.int64), np.zeros(2, np.int64), nobody)
+    low = given.position.min(axis=0)
+    extent = np.maximum(given.position.max(axis=0) - low, cell_mm)
+    cell_mm = max(cell_mm, float(np.cbrt(extent.prod() / _MOST_CELLS)))
+    place = ((given.position - low) / cell_mm).astype(np.int64)
+    size = place.max(axis=0) + 1
+    index = place[:, 0] + size[0] * (place[:, 1] + size[1] * place[:, 2])
+    order = np.argsort(index, kind="stable")
+    first = np.searchsorted(index[order], np.arange(size.prod() + 1))
+    return Sources(given.position[order], given.normal[order], low, cell_mm, size, first, order)

@@ -1,0 +1,122 @@
+"""A mesh with charts in, a uv layout out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dermis.atlas.unwrap.pack import pack
+from dermis.atlas.unwrap.seams import border_sides
+from dermis.atlas.unwrap.settle import Flat, Surface, lay_flat
+from dermis.errors import refuse
+from dermis.mesh.geometry import build_mesh, triangle_areas
+from dermis.mesh.mesh import Material, Mesh
+
+Index = NDArray[np.int64]
+Doubles = NDArray[np.float64]
+
+PADDING = 1 / 128
+"""Empty space between charts, of the map's side: 8 texels at 1024."""
+UPRIGHT = (0.0, 1.0, -0.1)
+"""Points up on a map: up in space and, for what lies level, towards the back."""
+
+_LEAST_MM2 = 1e-10
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the triangles of a mesh lie on its maps.
+
+    uv : (v, 2) of each corner vertex, u to the right, v down
+    triangles : (f, 3) corner vertices, in the order of the mesh's triangles
+    point : (v,) point of the mesh that each corner vertex is
+    chart : (f,) chart of each triangle, from 0
+    """
+
+    uv: Doubles
+    triangles: Index
+    point: Index
+    chart: Index
+
+    def mesh(self, positions: Doubles, normals: Doubles, material: Material) -> Mesh:
+        """The `Mesh` with this layout; positions (n, 3) [mm] and normals (n, 3) of its points."""
+        kind = np.zeros(len(self.triangles))
+        places, upright = positions[self.point], normals[self.point]
+        return build_mesh(places, self.uv, self.triangles, kind, (material,), upright, self.point)
+
+
+def unwrap(
+    positions: Doubles,
+    triangles: Index,
+    chart: Index,
+    seams: Index | None = None,
+    density: ArrayLike = 1.0,
+    weight: ArrayLike = 1.0,
+    upright: ArrayLike = UPRIGHT,
+    padding: float = PADDING,
+) -> Layout:
+    """The layout with each chart laid flat by itself.
+
+    positions : (n, 3) [mm]
+    triangles : (f, 3), each with an area
+    chart : (f,) what is laid flat together; a chart in several pieces becomes several charts
+    seams : edges (s, 2) along which charts are cut open too
+    density : (f,) texels per mm on each triangle relative to others
+    weight : (f,) how much it matters that each triangle keeps its shape and density
+    upright : (3,), or one for each triangle (f, 3), the direction in space that points up on the map
+    padding : empty space between charts, of the map's side
+
+    No triangle is mirrored and none lies on another: where a chart's border crosses itself, triangles go to
+    the chart beside it; what cannot be laid flat even so is halved.
+
+    Raises DermisError when a triangle has no area, and when there are too many charts for one map.
+    """
+    _check_areas(positions, triangles)
+    cuts = np.empty((0, 2), dtype=np.int64) if seams is None else seams
+    dense, heavy = (
+        np.broadcast_to(np.asarray(k, dtype=np.float64), len(triangles)) for k in (density, weight)
+    )
+    flat = lay_flat(Surface(positions, triangles, cuts, dense, heavy), chart)
+    up = np.broadcast_to(np.asarray(upright, dtype=np.float64), (len(triangles), 3))
+    first = np.unique(flat.piece, return_index=True)[1]
+    height = np.einsum("fki,fi->fk", positions[triangles], up[first][flat.piece])
+    uv = _pack(_turn(flat, height), flat, padding)
+    return Layout(uv, flat.corner, flat.point, flat.piece)
+
+
+def _check_areas(positions: Doubles, triangles: Index) -> None:
+    flat = int((triangle_areas(positions[triangles]) < _LEAST_MM2).sum())
+    if flat:
+        refuse("mesh", "triangles with an area", f"{flat} have none", "Remove them first")
+
+
+def _turn(flat: Flat, height: Doubles) -> Doubles:
+    """The places (v, 2), each sheet turned so that `height` (f, 3) of the corners grows upwards."""
+    z = flat.places[:, 0] + 1j * flat.places[:, 1]
+    z3 = z[flat.corner]
+    # i times the side across from a corner is the slope of what is 1 there and 0 on that side
+    slope = 1j * (height * (np.roll(z3, -2, axis=1) - np.roll(z3, -1, axis=1))).sum(axis=1)
+    up = np.bincount(flat.piece, slope.real) + 1j * np.bincount(flat.piece, slope.imag)
+    turn = np.where(np.abs(up) > 0, 1j * np.conj(up) / np.maximum(np.abs(up), 1e-300), 1)
+    z *= turn[_owners(flat)]
+    return np.column_stack((z.real, z.imag))
+
+
+def _owners(flat: Flat) -> Index:
+    """Piece of each corner vertex (v,)."""
+    owner = np.empty(len(flat.point), dtype=np.int64)
+    owner[flat.corner] = flat.piece[:, None]
+    return owner
+
+
+def _pack(places: Doubles, flat: Flat, padding: float) -> Doubles:
+    """uv (v, 2), v down."""
+    sides, triangle = border_sides(flat.corner)
+    owner = flat.piece[triangle]
+    order = np.argsort(owner, kind="stable")
+    starts = np.flatnonzero(np.diff(owner[order])) + 1
+    scale, offset = pack([places[some] for some in np.split(sides[order], starts)], padding)
+    uv = scale * places + offset[_owners(flat)]
+    return np.column_stack((uv[:, 0], 1 - uv[:, 1]))

@@ -1,0 +1,85 @@
+"""Spherical harmonics of a panorama, and its convolution with round kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.environment.panorama import solid_angles
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+_KERNEL_NODES = 4096
+
+
+def legendre(cosine: Floats, degree: int, orders: int) -> list[Floats]:
+    """For each order m < orders the (degree + 1 - m, n) Legendre functions of degrees m, m + 1, ...
+
+    cosine : (n,) of the polar angle
+
+    Associated functions, fully normalised: times exp(i m phi), the integral of their squares over the sphere
+    is 1. Recurrence in the degree [HolmesFeatherstone2002].
+    """
+    sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
+    diagonal = np.full(cosine.shape, np.sqrt(0.25 / np.pi))
+    functions = []
+    for m in range(orders):
+        if m > 0:
+            diagonal = np.sqrt((2.0 * m + 1.0) / (2.0 * m)) * sine * diagonal
+        rows = [diagonal, np.sqrt(2.0 * m + 3.0) * cosine * diagonal]
+        for l in range(m + 2, degree + 1):
+            a = np.sqrt((4.0 * l * l - 1.0) / (l * l - m * m))
+            b = np.sqrt(((l - 1.0) ** 2 - m * m) / (4.0 * (l - 1.0) ** 2 - 1.0))
+            rows.append(a * (cosine * rows[-1] - b * rows[-2]))
+        functions.append(np.stack(rows[: degree + 1 - m]))
+    return functions
+
+
+def analyse(radiance: Floats, degree: int) -> list[Complex]:
+    """For each order m >= 0 the (degree + 1 - m, c) coefficients of a panorama (h, w, c)."""
+    height, width = radiance.shape[:2]
+    weighted = radiance * solid_angles(height, width)[..., None]
+    around = np.fft.rfft(weighted, axis=1)
+    table = legendre(_polar_cosines(height), degree, degree + 1)
+    return [
+        table[m] @ (around[:, m] * np.exp(-1j * m * _first_azimuth(width)))
+        if m < around.shape[1]
+        else np.zeros((degree + 1 - m, radiance.shape[2]), complex)
+        for m in range(degree + 1)
+    ]
+
+
+def zonal(kernel: Callable[[Floats], Floats], degree: int) -> Floats:
+    """(degree + 1,) factors by which a kernel of the angle theta multiplies the coefficients.
+
+    kernel : weight at theta in 0..pi/2, 0 beyond; the factor of degree 0 is its integral over the sphere
+
+    Source: the Funk-Hecke theorem, as in [RamamoorthiHanrahan2001].
+    """
+    theta = 0.5 * np.pi * (np.arange(_KERNEL_NODES) + 0.5) / _KERNEL_NODES
+    (polynomials,) = legendre(np.cos(theta), degree, orders=1)
+    polynomials *= np.sqrt(4.0 * np.pi / (2.0 * np.arange(degree + 1) + 1.0))[:, None]
+    measure = np.pi**2 / _KERNEL_NODES * np.sin(theta)
+    return np.asarray(polynomials @ (kernel(theta) * measure))
+
+
+def synthesise(coefficients: list[Complex], factors: Floats, height: int) -> Floats:
+    """The panorama (height, 2 height, c) of the coefficients, each degree multiplied by its factor."""
+    width = 2 * height
+    degree = len(factors) - 1
+    table = legendre(_polar_cosines(height), degree, degree + 1)
+    around = np.zeros((height, width // 2 + 1, coefficients[0].shape[1]), complex)
+    for m in range(min(degree, width // 2 - 1) + 1):
+        scaled = coefficients[m] * factors[m:, None]
+        around[:, m] = (table[m].T @ scaled) * np.exp(1j * m * _first_azimuth(width))
+    return np.fft.irfft(around, width, axis=1) * width
+
+
+def _polar_cosines(height: int) -> Floats:
+    return np.cos(np.pi * (np.arange(height) + 0.5) / height)
+
+
+def _first_azimuth(width: int) -> float:
+    return 2.0 * np.pi * (0.5 / width - 0.5)

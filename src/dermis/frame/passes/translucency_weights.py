@@ -1,0 +1,150 @@
+"""How much light passes between places that lie opposite each other; told once for a profile."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.atlas.translucency.pairs import Links
+from dermis.disk import cached_array
+from dermis.frame.passes import STAGES
+from dermis.gpu import ComputeProgram, Device, Frame, make_texture, upload
+from dermis.optics.gaussians import MOST_GAUSSIANS
+
+Floats = NDArray[np.float64]
+ROW = 1024  # as in the shaders
+GRAIN = (
+    0.72  # sampled at their spacing, Gaussians of more variance than this times its square are even to 1e-6
+)
+_SMOOTH = 0.45  # of the spacing; light of this standard deviation has no detail that the sources miss
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Pairs of places on a device, and how they lie.
+
+    side : of the coarse atlas
+    receivers : buffer of cells that take light, as translucency.wgsl reads them
+    pairs, sources : buffers of words, as translucency_weights.wgsl reads them
+    count, source_count, receiver_count : of pairs, sources and receivers
+    light : texture of the coarse atlas for what comes through, none yet, and 1 where there is surface
+    key : what stands for all of it, so that what a profile makes of it can be kept on disk; empty for no key
+    """
+
+    side: int
+    radius_mm: float
+    spacing_mm: float
+    receivers: Any
+    pairs: Any
+    sources: Any
+    count: int
+    source_count: int
+    receiver_count: int
+    light: Any
+    key: str = ""
+
+
+def upload_pairs(device: Device, links: Links, key: str = "") -> Pairs:
+    """The links as the shaders read them.
+
+    key : what stands for the links, if what passes is to be kept on disk
+    """
+    count, number = len(links.source), len(links.texel)
+    pairs = np.zeros((max(1, count), 3), np.uint32)
+    pairs[:count, 0] = links.source
+    pairs[:count, 1:] = np.ascontiguousarray(links.lie).view(np.uint32)
+    sources = np.zeros((max(1, number), 2), np.uint32)
+    sources[:number, 0] = np.ascontiguousarray(links.texel).view(np.uint32)[:, 0]
+    sources[:number, 1] = links.area_mm2.view(np.uint32)
+    receivers = _receivers(links)
+    return Pairs(
+        side=len(links.receiver),
+        radius_mm=float(links.radius_mm),
+        spacing_mm=float(links.spacing_mm),
+        receivers=device.buffer(receivers, "STORAGE"),
+        pairs=device.buffer(pairs, "STORAGE"),
+        sources=device.buffer(sources, "STORAGE"),
+        count=len(pairs),
+        source_count=len(sources),
+        receiver_count=len(receivers),
+        light=_unlit(device, links.receiver > 0),
+        key=key,
+    )
+
+
+def _receivers(links: Links) -> NDArray[np.uint32]:
+    """(m, 3) cell, x and y packed, where its links begin, and where they end; one without links for none.
+
+    Those with most links come first: invocations that run side by side, and workgroups that are left for the
+    end, then have little to wait for.
+    """
+    y, x = np.nonzero(links.receiver > 1)
+    which = links.receiver[y, x]
+    first, end = links.first[which], links.first[which + 1]
+    order = np.argsort(first.astype(np.int64) - end, kind="stable")
+    listed = np.stack([x | (y << 16), first, end], axis=-1)[order].astype(np.uint32)
+    return listed if len(listed) else np.zeros((1, 3), np.uint32)
+
+
+def _unlit(device: Device, surface: NDArray[np.bool_]) -> Any:
+    light = np.zeros((*surface.shape, 4), np.float32)
+    light[..., 3] = surface
+    texture = make_texture(device, surface.shape, "rgba32float")
+    upload(device, texture, light)
+    return texture
+
+
+def source_level(pairs: Pairs, variance_mm2: Floats) -> int:
+    """The blurred level that is smooth enough for the sources to tell all of it."""
+    smooth = np.flatnonzero(variance_mm2 >= (_SMOOTH * pairs.spacing_mm) ** 2)
+    return int(smooth[0]) if len(smooth) else len(variance_mm2) - 1
+
+
+class Opposite:
+    """Weighs pairs for a profile. The shader is compiled when it is first wanted."""
+
+    def __init__(self, device: Device) -> None:
+        self._device = device
+
+    @cached_property
+    def _program(self) -> ComputeProgram:
+        return ComputeProgram(self._device, STAGES / "translucency_weights.wgsl")
+
+    def weigh(self, pairs: Pairs, variance_mm2: Floats, weight: Floats) -> Any:
+        """A buffer of the source of each pair and the share of its light, red, green and blue, that passes.
+
+        variance_mm2, weight : (k,) and (k, 3) of the blurred levels
+        """
+        gaussian = np.zeros((MOST_GAUSSIANS, 4), np.float32)
+        gaussian[: len(weight), :3], gaussian[: len(weight), 3] = weight, variance_mm2
+        record = self._program.record(
+            "Opposite",
+            radius_mm=pairs.radius_mm,
+            before_mm2=variance_mm2[source_level(pairs, variance_mm2)],
+            cell_mm2=pairs.spacing_mm**2,
+            grain=GRAIN,
+            count=len(weight),
+            gaussian=gaussian,
+        )
+        adapter = self._device.adapter
+        if not pairs.key or adapter.kind != "CPU":  # GPUs weigh faster than disks are read
+            return self._weighed(pairs, record)
+        told = adapter.name, adapter.driver, self._program.source.text, record.tobytes().hex()
+
+        def weigh() -> NDArray[np.uint8]:
+            links = self._weighed(pairs, record)
+            return np.frombuffer(self._device.handle.queue.read_buffer(links), np.uint8)
+
+        return self._device.buffer(cached_array((), f"passing {pairs.key} {told}", weigh), "STORAGE")
+
+    def _weighed(self, pairs: Pairs, record: Any) -> Any:
+        links = self._device.handle.create_buffer(size=8 * pairs.count, usage=pairs.pairs.usage)
+        bound = {"opposite": record, "pairs": pairs.pairs, "sources": pairs.sources, "links": links}
+        frame = Frame(self._device)
+        frame.compute("opposite", self._program, bound, (ROW, -(-pairs.count // ROW)))
+        frame.submit()
+        return links

@@ -1,0 +1,207 @@
+// Rasterises triangles in compute: the nearest depth of each sample, and which triangle it belongs to.
+// A workgroup takes some triangles of one view, an invocation sets each of them up. Small ones it draws at once; of the others it
+// lists the blocks of pixels that they may cover, and teams of invocations draw those.
+//#include "projected_triangle.wgsl"
+//#include "record_visibility.wgsl"
+//#include "tiles.wgsl"
+
+override TAKEN: u32 = 32u; // triangles of a workgroup, at most as many as its invocations
+override RUN: u32 = 1u; // of them that follow each other in the mesh
+override SMALL: u32 = 16u; // pixels of a box that one invocation draws
+override MOST_BLOCKS: u32 = 16u; // that one invocation tests and lists, at most 32
+override LISTED: u32 = 8u * TAKEN; // blocks that a workgroup can list
+
+override THREADS: u32 = 128u;
+override TEAMS: u32 = THREADS / TEAM;
+
+const TEAM: u32 = 16u; // invocations that draw a block
+
+@group(0) @binding(34) var<storage, read_write> tiles: array<atomic<u32>>;
+
+var<workgroup> taken: array<Drawn, TAKEN>;
+var<workgroup> blocks: array<u32, LISTED>; // place of the triangle, then x and y from the box's first block
+var<workgroup> block_count: atomic<u32>;
+var<workgroup> large: array<u32, TAKEN>; // places of triangles with more blocks
+var<workgroup> large_count: atomic<u32>;
+
+@compute @workgroup_size(THREADS)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) number: u32,
+) {
+    let first = group.y * groups.x + group.x;
+    let step = groups.x * groups.y;
+    let index = triangle_of(number, first, step);
+    if (number == 0u) { // some software adapters leave what the workgroup before counted
+        atomicStore(&block_count, 0u);
+        atomicStore(&large_count, 0u);
+    }
+    workgroupBarrier();
+    if (number < TAKEN && index < views.triangles) {
+        take(index, number, group.z);
+    }
+    workgroupBarrier();
+    let lane = number % TEAM;
+    let count = min(atomicLoad(&block_count), LISTED);
+    for (var k = number / TEAM; k < count; k += TEAMS) {
+        let block = blocks[k];
+        let place = block & 0xffu;
+        let at = first_block(taken[place].box) + vec2u((block >> 8u) & 0xffu, block >> 16u);
+        draw_block(triangle_of(place, first, step), taken[place], at, lane, group.z);
+    }
+    let larger = atomicLoad(&large_count);
+    for (var k = 0u; k < larger; k++) {
+        let place = large[k];
+        draw_large(triangle_of(place, first, step), taken[place], (number / TEAM + k) % TEAMS, lane, group.z);
+    }
+}
+
+// Runs of triangles far from each other in the list: neighbours share corners, but are often all large.
+fn triangle_of(place: u32, first: u32, step: u32) -> u32 {
+    return (place / RUN * step + first) * RUN + place % RUN;
+}
+
+fn take(index: u32, place: u32, view: u32) {
+    let triangle = set_up(index, view);
+    let pixels = triangle.box.size.x * triangle.box.size.y;
+    if (pixels > 0u && pixels <= SMALL) {
+        draw_small(index, triangle, view);
+        mark_box(triangle.box, view);
+    }
+    if (pixels > SMALL) {
+        taken[place] = triangle;
+        list_blocks(triangle, place, view);
+    }
+}
+
+// Those that the triangle may cover. Where there is no space it counts as large: what is drawn twice is the same.
+fn list_blocks(triangle: Drawn, place: u32, view: u32) {
+    let first = first_block(triangle.box);
+    let size = blocks_of(triangle.box);
+    if (size.x * size.y > MOST_BLOCKS) {
+        large[atomicAdd(&large_count, 1u)] = place;
+        return;
+    }
+    let most = most_within_block(triangle);
+    var covered = 0u;
+    for (var k = vec2u(0u); k.y < size.y; k = wrapped(k + vec2u(1u, 0u), size.x)) {
+        covered |= select(0u, 1u << (k.y * size.x + k.x), may_cover(triangle, most, first + k));
+    }
+    mark_box(triangle.box, view); // once, for many blocks lie in one tile
+    let count = countOneBits(covered);
+    var at = atomicAdd(&block_count, count);
+    if (at + count > LISTED) {
+        large[atomicAdd(&large_count, 1u)] = place;
+    }
+    for (var k = vec2u(0u); k.y < size.y && at < LISTED; k = wrapped(k + vec2u(1u, 0u), size.x)) {
+        if ((covered & (1u << (k.y * size.x + k.x))) != 0u) {
+            blocks[at] = place | (k.x << 8u) | (k.y << 16u);
+            at++;
+        }
+    }
+}
+
+// The block so many further on in its row, or in one of those below.
+fn wrapped(k: vec2u, width: u32) -> vec2u {
+    var at = k;
+    while (at.x >= width) {
+        at = vec2u(at.x - width, at.y + 1u);
+    }
+    return at;
+}
+
+// turn: of the team, another one for each triangle
+fn draw_large(index: u32, triangle: Drawn, turn: u32, lane: u32, view: u32) {
+    let most = most_within_block(triangle);
+    let first = first_block(triangle.box);
+    let size = blocks_of(triangle.box);
+    for (var k = wrapped(vec2u(turn, 0u), size.x); k.y < size.y; k = wrapped(k + vec2u(TEAMS, 0u), size.x)) {
+        if (may_cover(triangle, most, first + k)) {
+            for (var s = lane; s < SAMPLES; s += TEAM) {
+                mark((first + k) * BLOCK / TILE, view * SAMPLES + s);
+            }
+            draw_block(index, triangle, first + k, lane, view);
+        }
+    }
+}
+
+// One invocation's part of a block: a pixel, or one in every few rows where each has but one sample.
+fn draw_block(index: u32, triangle: Drawn, block: vec2u, lane: u32, view: u32) {
+    let pixel = block * BLOCK + vec2u(lane % BLOCK, lane / BLOCK);
+    let at = pixel - triangle.box.low; // left of and above the box it is greater than any size
+    if (SAMPLES > 1u) {
+        draw_samples(index, triangle, at, all(at < triangle.box.size), view);
+        return;
+    }
+    let rows = vec4u(0u, 1u, 2u, 3u) * (TEAM / BLOCK);
+    let inside = vec4<bool>(at.x < triangle.box.size.x) & (vec4u(at.y) + rows < vec4u(triangle.box.size.y));
+    let place = vec2f(vec2i(at)) + views.sample[0].xy;
+    let texels = vec4u(texel_of(pixel, view)) + rows * views.width;
+    draw_four(index, triangle, vec4f(place.x), place.y + vec4f(rows), inside, texels);
+}
+
+fn draw_small(index: u32, triangle: Drawn, view: u32) {
+    let low = triangle.box.low;
+    let size = triangle.box.size;
+    for (var y = 0u; y < size.y; y++) {
+        if (SAMPLES > 1u) {
+            for (var x = 0u; x < size.x; x++) {
+                draw_samples(index, triangle, vec2u(x, y), true, view);
+            }
+        } else {
+            for (var x = 0u; x < size.x; x += 4u) {
+                let four = x + vec4u(0u, 1u, 2u, 3u);
+                let texels = texel_of(low + vec2u(0u, y), view) + four;
+                let place = views.sample[0].xy;
+                draw_four(index, triangle, place.x + vec4f(four), vec4f(place.y + f32(y)), four < vec4u(size.x), texels);
+            }
+        }
+    }
+}
+
+// at: the pixel in the triangle's box
+fn draw_samples(index: u32, triangle: Drawn, at: vec2u, inside: bool, view: u32) {
+    let texel = texel_of(triangle.box.low + at, view * SAMPLES);
+    let place = vec2f(vec2i(at));
+    for (var s = 0u; s < SAMPLES; s += 4u) {
+        let four = s + vec4u(0u, 1u, 2u, 3u);
+        let x = vec4f(views.sample[s].x, views.sample[s + 1u].x, views.sample[s + 2u].x, views.sample[s + 3u].x);
+        let y = vec4f(views.sample[s].y, views.sample[s + 1u].y, views.sample[s + 2u].y, views.sample[s + 3u].y);
+        let wanted = vec4<bool>(inside) & (four < vec4u(SAMPLES));
+        draw_four(index, triangle, place.x + x, place.y + y, wanted, texel + four * (views.width * views.height));
+    }
+}
+
+// Four places in the triangle's box and where they are recorded.
+fn draw_four(index: u32, triangle: Drawn, x: vec4f, y: vec4f, wanted: vec4<bool>, texels: vec4u) {
+    let a = triangle.at_low.x + x * triangle.along_x.x + y * triangle.along_y.x;
+    let b = triangle.at_low.y + x * triangle.along_x.y + y * triangle.along_y.y;
+    let c = triangle.at_low.z + x * triangle.along_x.z + y * triangle.along_y.z;
+    let depth = triangle.at_low.w + x * triangle.along_x.w + y * triangle.along_y.w;
+    let between = (min(min(a, b), c) >= vec4f(-SLACK)) & (depth > vec4f(0.0)) & (depth <= vec4f(1.0)) & wanted;
+    record_four(index, depth, between, texels);
+}
+
+fn texel_of(pixel: vec2u, layer: u32) -> u32 {
+    return (layer * views.height + pixel.y) * views.width + pixel.x;
+}
+
+fn mark_box(box: Box, view: u32) {
+    let first = box.low / TILE;
+    let last = (box.low + box.size - 1u) / TILE;
+    for (var y = first.y; y <= last.y; y++) {
+        for (var x = first.x; x <= last.x; x++) {
+            for (var s = 0u; s < SAMPLES; s++) {
+                mark(vec2u(x, y), view * SAMPLES + s);
+            }
+        }
+    }
+}
+
+// Something may be drawn in a tile.
+fn mark(tile: vec2u, layer: u32) {
+    if (RECORDED != AS_FOUND) {
+        atomicStore(&tiles[tile_at(tile, layer)], DRAWN);
+    }
+}

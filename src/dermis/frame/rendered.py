@@ -1,0 +1,61 @@
+"""What a renderer hands out: an image on the device, and what it took."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.frame.passes.pack import Leaving
+from dermis.frame.passes.post import Picture
+from dermis.gpu import Device, download
+from dermis.gpu.device import gpu_failures
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """An image, still on the device, until its renderer draws the next one.
+
+    gpu_ms : device time of each stage that was timed, and "total" [ms]; None without timestamps
+    frame_ms : from recording the frame to its end [ms]
+    setup_ms : what was made for this scene before: loading to the device, atlas, shaders [ms]
+    gaussians : levels of the profile
+    unscattered : share of the skin's triangles that the atlas cannot hold; they are lit directly
+    suns : sun-like peaks of the environment that shine as lights of their own
+    leave : sends the picture's bytes on their way
+    """
+
+    device: Device
+    picture: Picture
+    gpu_ms: dict[str, float] | None
+    frame_ms: float
+    setup_ms: float
+    gaussians: int
+    unscattered: float
+    suns: int
+    leave: Callable[[Picture], Leaving]
+    is_current: Callable[[], bool]
+
+    def linear(self) -> NDArray[np.float32]:
+        """(h, w, 3) linear Rec. 709 after bloom and exposure, float32."""
+        return np.ascontiguousarray(self._read(self.picture.exposed)[..., :3])
+
+    def srgb8(self) -> NDArray[np.uint8]:
+        """(h, w, 3) sRGB bytes, with the tone curve, encoded on the device."""
+        self._check_current()
+        with gpu_failures(self.device):
+            return self.leave(self.picture).image()
+
+    def _read(self, texture: Any) -> NDArray[Any]:
+        self._check_current()
+        with gpu_failures(self.device):
+            return download(self.device, texture)
+
+    def _check_current(self) -> None:
+        if not self.is_current():
+            raise RuntimeError(
+                "a newer frame has taken this image's place: read each before drawing the next"
+            )

@@ -1,0 +1,200 @@
+"""The renderer: a device with all that it keeps from frame to frame."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from typing import Any, Literal, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.frame.frame import Stages, draw_frame
+from dermis.frame.inputs import Inputs
+from dermis.frame.passes.pack import Leaving
+from dermis.frame.passes.post import Picture
+from dermis.frame.preparation import Preparation
+from dermis.frame.rendered import Rendered
+from dermis.gpu import Frame, open_device
+from dermis.gpu.device import gpu_failures
+from dermis.gpu.frame import Timed
+from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
+
+_WARMING_FRAMES = 100
+_IN_FLIGHT = 3  # frames submitted and not done: Python and the device work side by side, pictures stay fresh
+
+
+class Renderer:
+    """Renders scenes on one device; what does not change between two frames is not made again.
+
+    adapter : "auto", "cpu" or part of an adapter's name
+    depth : how many sizes of things are kept, for who goes back and forth between some
+    """
+
+    def __init__(self, adapter: str = "auto", depth: int = 1) -> None:
+        started = time.perf_counter()
+        self.device = open_device(adapter)
+        with gpu_failures(self.device):
+            self.stages = Stages(self.device)
+        self._preparation = Preparation(self.device, self.stages, depth)
+        self.prepare, self.forget = self._preparation.inputs, self._preparation.forget_all
+        self.profile_of, self.thin_parts = self._preparation.profile_of, self._preparation.thin_parts
+        self._frames = 0
+        self._in_flight: deque[int] = deque()
+        self._opening_ms = 1e3 * (time.perf_counter() - started)
+
+    def draw(
+        self,
+        scene: Scene,
+        settings: Settings | None = None,
+        *,
+        keep_shadows: bool = True,
+        keep_stages: bool = False,
+        timed: Timed = True,
+        place: str = "",
+    ) -> Rendered:
+        """Render one frame and leave the image on the device.
+
+        keep_shadows : False draws the shadow maps again even when no light moved
+        keep_stages : True runs only stages whose results are not there already: for still and slow scenes
+        timed : True times each stage in a pass of its own, which takes longer than the frame otherwise does;
+            "whole" times only the frame, with its stages in one pass; False returns as soon as the frame is
+            submitted, so that the device never waits for Python; only when it is three frames behind is it
+            waited for
+        place : name of a scene among several drawn in turn: each keeps light and shadows of its own
+
+        Raises DermisError for sizes over the device's limits and when the device fails.
+        """
+        settings = settings or Settings()
+        with gpu_failures(self.device):
+            started = time.perf_counter()
+            inputs = self.prepare(scene, settings, place)
+            ready = time.perf_counter()
+            frame = Frame(self.device, timed=timed)
+            self._submit(frame, inputs, keep_shadows, keep_stages)
+            if timed:
+                frame.wait()
+            else:
+                self._keep_pace(frame)
+            done = time.perf_counter()
+            times = frame.stage_ms() if timed else None
+        setup_ms = 1e3 * (ready - started) + self._opening_ms
+        self._opening_ms = 0.0
+        number, frame_ms = self._frames, 1e3 * (done - ready)
+        return Rendered(
+            self.device,
+            inputs.picture,
+            times,
+            frame_ms,
+            setup_ms,
+            inputs.gaussians,
+            inputs.head.unscattered,
+            inputs.suns,
+            self._leave,
+            is_current=lambda: number == self._frames,
+        )
+
+    def draw_warm(
+        self, scene: Scene, settings: Settings | None = None, *, keep_shadows: bool = False
+    ) -> Rendered:
+        """A frame timed on a device at work: a GPU that was idle runs at a fraction of its clock rate."""
+        rendered = self.draw(scene, settings, keep_shadows=keep_shadows)
+        if self.device.adapter.kind == "CPU":
+            return rendered
+        for _ in range(_WARMING_FRAMES):
+            self.draw(scene, settings, keep_shadows=keep_shadows, timed=False)
+        self.device.wait()
+        return self.draw(scene, settings, keep_shadows=keep_shadows)
+
+    def _submit(
+        self,
+        frame: Frame,
+        inputs: Inputs,
+        keep_shadows: bool,
+        keep_stages: bool,
+        leave: Callable[[Frame, Picture], Leaving] | None = None,
+    ) -> Leaving | None:
+        """Record and submit; after a failure nobody knows what the shadow maps and the atlas hold.
+
+        leave : sends the picture on its way to NumPy at once
+        """
+        if not keep_shadows:
+            inputs.shadow_maps.drawn = b""
+        self.stages.shown.begin(keep_stages)
+        try:
+            draw_frame(frame, self.stages, inputs)
+            leaving = leave(frame, inputs.picture) if leave else None
+            frame.submit()
+        except Exception:
+            inputs.shadow_maps.drawn = b""
+            self.stages.shown.forget_all()
+            raise
+        self._frames += 1
+        return leaving
+
+    def _keep_pace(self, frame: Frame) -> None:
+        """Wait for the frame before those that may be in flight."""
+        self._in_flight.append(frame.submitted)
+        while len(self._in_flight) > _IN_FLIGHT:
+            self.device.wait(self._in_flight.popleft())
+
+    def _leave(self, picture: Picture) -> Leaving:
+        frame = Frame(self.device, timed=False)
+        leaving = self.stages.pack.draw(frame, picture)
+        frame.submit()
+        return leaving
+
+    def render(self, scene: Scene, **settings: Any) -> NDArray[np.float32]:
+        """(h, w, 3) float32 linear Rec. 709 image; `settings` are those of `Settings`."""
+        return self.draw(scene, Settings(**settings)).linear()
+
+    @overload
+    def render_many(
+        self, scenes: Iterable[Scene], *, linear: Literal[False] = False, **settings: Any
+    ) -> Iterator[NDArray[np.uint8]]: ...
+
+    @overload
+    def render_many(
+        self, scenes: Iterable[Scene], *, linear: Literal[True], **settings: Any
+    ) -> Iterator[NDArray[np.float32]]: ...
+
+    def render_many(
+        self, scenes: Iterable[Scene], *, linear: bool = False, **settings: Any
+    ) -> Iterator[NDArray[Any]]:
+        """(h, w, 3) sRGB bytes of each scene in turn, each handed out while the next ones are drawn.
+
+        linear : float32 linear Rec. 709 instead, as of `render`
+        settings : those of `Settings`, for all of them; heads and textures that scenes share are loaded once
+
+        Raises DermisError as `draw` does.
+        """
+        chosen, leaving = Settings(**settings), deque[Leaving]()
+        for scene in scenes:
+            leaving.append(self._send(scene, chosen, linear))
+            if len(leaving) >= _IN_FLIGHT:
+                yield self._arrived(leaving.popleft())
+        while leaving:
+            yield self._arrived(leaving.popleft())
+
+    def _arrived(self, leaving: Leaving) -> NDArray[Any]:
+        with gpu_failures(self.device):
+            return leaving.image()
+
+    def _send(self, scene: Scene, settings: Settings, linear: bool) -> Leaving:
+        """Submit a frame and send its picture on its way."""
+        with gpu_failures(self.device):
+            inputs, frame = self.prepare(scene, settings), Frame(self.device, timed=False)
+            leaving = self._submit(frame, inputs, True, False, partial(self.stages.pack.draw, linear=linear))
+        assert leaving is not None
+        return leaving
+
+
+def render(scene: Scene, adapter: str = "auto", **settings: Any) -> NDArray[np.float32]:
+    """(h, w, 3) float32 linear Rec. 709 image of a scene; for many images keep a `Renderer`.
+
+    settings : those of `Settings`: size, atlas, samples, technique, exposure, ...
+    """
+    return Renderer(adapter).render(scene, **settings)

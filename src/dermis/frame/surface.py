@@ -1,0 +1,71 @@
+"""The surface of the skin as the shaders take it: numbers, pipeline constants and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from dermis.frame.geometry import HeadTextures
+from dermis.frame.maps import DEFAULT_COLOUR
+from dermis.frame.passes.variants import Constants
+from dermis.gpu import ComputeProgram
+from dermis.optics.directions import directions
+from dermis.optics.gaussians import GaussianSum
+from dermis.scene.model import Scene
+from dermis.scene.skin import Skin
+from dermis.specular.energy import ENERGY
+from dermis.specular.fresnel import FRESNEL, SKIN_ETA, SKIN_F0
+from dermis.specular.models import MODELS
+
+ProfileOf = Callable[[Skin], GaussianSum]
+
+
+def model_of(skin: Skin) -> str:
+    """Name of the lobe in MODELS; skin without one keeps the default's, for wet materials beside it."""
+    return next(iter(MODELS)) if skin.specular == "none" else skin.specular
+
+
+def constants(skin: Skin) -> Constants:
+    """Values of lobe.wgsl's `override`s where they are not the default 0."""
+    numbers = {"MODEL": list(MODELS).index(model_of(skin)), "FRESNEL": list(FRESNEL).index(skin.fresnel)}
+    return tuple((name, number) for name, number in numbers.items() if number)
+
+
+def skin_record(program: ComputeProgram, scene: Scene, head: HeadTextures, profile_of: ProfileOf) -> Any:
+    """The skin's parameters; a roughness map replaces the constant.
+
+    profile_of : the Gaussians of a skin, asked for where directions matter
+    """
+    skin, energy = scene.skin, ENERGY[scene.skin.energy]
+    mapped = scene.head.maps.roughness is not None
+    return program.record(
+        "Skin",
+        roughness=skin.smoothing * (1.0 if mapped else skin.roughness),
+        rho_s=skin.strength,
+        f0=SKIN_F0,
+        eta=SKIN_ETA,
+        loss=energy.loss,
+        returned=float(energy.returned),
+        tint=float(skin.specular_colour == "wrong"),
+        mix=skin.mix,
+        relief_band=head.relief_band,
+        light_count=len(scene.lights),
+        **(_by_direction(scene, profile_of) if skin.direction == "half-space" else {}),
+    )
+
+
+def _by_direction(scene: Scene, profile_of: ProfileOf) -> dict[str, Any]:
+    """What light does by its directions, for half-spaces of the skin's mean colour."""
+    skin = scene.skin
+    colour = profile_of(skin).albedo if skin.albedo == "profile" else scene.head.maps.mean_colour
+    colour = np.full(3, DEFAULT_COLOUR) if colour is None else colour
+    law = directions(colour, 1.0 if skin.specular == "none" else SKIN_ETA)
+    return {
+        "inner_eta": law.eta,
+        "mean_once": law.mean_once,
+        "once": law.once,
+        "back_from_everywhere": law.from_everywhere,
+        "back": np.pad(law.returned, ((0, 0), (0, 1))),
+    }

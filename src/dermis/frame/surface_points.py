@@ -1,0 +1,93 @@
+"""What single pixels see of a head, and the light that enters the skin at given places."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.frame.atlas_layout import Layout
+from dermis.frame.atlas_textures import AtlasTextures, packed_texels
+from dermis.frame.renderer import Renderer
+from dermis.gpu import Frame, download, make_texture
+from dermis.gpu.textures import texture_from
+from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
+
+Floats = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class SurfacePoints:
+    """Where the middles of pixels meet the head.
+
+    mask : (h, w) pixels that see it
+    triangle, barycentric : (n,) and (n, 3) of those pixels, row by row
+    """
+
+    mask: NDArray[np.bool_]
+    triangle: Index
+    barycentric: Floats
+
+
+def surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> SurfacePoints:
+    """The points that an image of one sample for each pixel shows.
+
+    settings : technique and samples are of no account
+    """
+    single = settings.model_copy(update={"samples": 1, "technique": "none"})
+    inputs = renderer.prepare(scene, single)
+    frame = Frame(renderer.device)
+    renderer.stages.visibility.draw(frame, inputs.seen, inputs.camera, inputs.head)
+    frame.submit()
+    seen = download(renderer.device, inputs.seen.texture).astype(np.int64)
+    mask = seen > 0
+    triangle = seen[mask] - 1
+    return SurfacePoints(mask, triangle, _barycentric(scene, inputs.view, triangle, mask))
+
+
+def _barycentric(scene: Scene, view: NDArray[np.void], triangle: Index, mask: NDArray[np.bool_]) -> Floats:
+    """Weights of where rays through the middles of pixels meet their triangles, as in shade.wgsl."""
+    height, width = mask.shape
+    rows, columns = np.nonzero(mask)
+    x, y = 2.0 * (columns + 0.5) / width - 1.0, 1.0 - 2.0 * (rows + 0.5) / height
+    forward, right, up, eye = (view[name].astype(np.float64) for name in ("forward", "right", "up", "eye"))
+    ray = forward + x[:, None] * right + y[:, None] * up
+    mesh = scene.head.mesh
+    a, b, c = (mesh.positions[mesh.triangles[triangle, k]].astype(np.float64) - eye for k in range(3))
+    sides = (np.cross(b, c), np.cross(c, a), np.cross(a, b))
+    weights = np.stack([(side * ray).sum(axis=1) for side in sides], axis=-1)
+    weights *= np.sign(weights.sum(axis=1, keepdims=True))  # triangles seen from behind
+    weights = np.clip(weights, 0.0, None)
+    return np.asarray(weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-300))
+
+
+def irradiance_at(
+    renderer: Renderer, scene: Scene, settings: Settings, triangle: Index, barycentric: Floats
+) -> Floats:
+    """(n, 3) light that enters the skin at places, times the colour's share before scattering.
+
+    scene : without maps and environment, whose texels and occlusion belong to places of the atlas
+    triangle, barycentric : (n,) and (n, 3)
+    """
+    side = max(1, int(np.ceil(np.sqrt(len(triangle)))))
+    places = np.full(side * side, -1, np.int64)
+    places[: len(triangle)] = triangle
+    weights = np.zeros((side * side, 2))
+    weights[: len(triangle)] = barycentric[:, 1:]
+    records = packed_texels(places.reshape(side, side), np.rint(65535 * weights).reshape(side, side, 2))
+    device = renderer.device
+    inputs = renderer.prepare(scene, settings)
+    first = inputs.layouts[0]
+    listed = AtlasTextures({"atlas": texture_from(device, records, "rg32uint")}, sheared=False)
+    lit = make_texture(device, (side, side), "rgba32float")
+    frame = Frame(device)
+    renderer.stages.shadows.draw(
+        frame, inputs.shadow_maps, inputs.shadow_views, inputs.head, inputs.shadow_key
+    )
+    layout = Layout(first.head, listed, first.lit, lit)
+    renderer.stages.irradiance.draw(frame, layout, inputs.light_constants, lit, side)
+    frame.submit()
+    return download(device, lit).reshape(-1, 4)[: len(triangle), :3].astype(np.float64)

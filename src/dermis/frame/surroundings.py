@@ -1,0 +1,134 @@
+"""The environment as the shaders read it: panorama, sun-like peaks, and how much of it each place sees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.cached import cached_occlusion
+from dermis.environment.mirrors import equivalent_mirrors
+from dermis.environment.prefilter import prefilter
+from dermis.environment.suns import Sun
+from dermis.frame.atlas_textures import AtlasTextures
+from dermis.frame.geometry import HeadTextures
+from dermis.frame.kept import Keep
+from dermis.frame.lights import sun_lights
+from dermis.frame.passes.occlusion import FORM, Occlusion, whole_map
+from dermis.frame.surface import model_of
+from dermis.gpu import ComputeProgram, Device, make_texture, upload
+from dermis.gpu.program import Resources
+from dermis.gpu.textures import texture_from
+from dermis.mesh.head import Head
+from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
+
+_BRIGHTEST = 65504.0  # of 16-bit floats
+_FINEST_OCCLUSION = 1024  # texels a side: it is smooth, and a texel of it is under a millimetre
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """A panorama on the device.
+
+    panorama : layers of irradiance and of reflections, black without an environment
+    suns : its peaks
+    brightest : irradiance that a surface gets from the rest at most
+    """
+
+    panorama: Any
+    suns: tuple[Sun, ...]
+    brightest: float = 0.0
+
+
+def load_surroundings(device: Device, name: str | None) -> Surroundings:
+    """The prefiltered panorama of an environment, or of none.
+
+    Raises DermisError when there is no such environment.
+    """
+    if name is None:
+        return Surroundings(make_texture(device, (1, 1), "rgba16float", layers=2, use="map"), ())
+    made = prefilter(name)
+    count, height, width, _ = made.layers.shape
+    texture = make_texture(device, (width + 2, height + 2), "rgba16float", layers=count, use="map")
+    for index, layer in enumerate(made.layers):
+        texels = np.dstack([_bordered(layer), np.ones((height + 2, width + 2))])
+        upload(device, texture, np.minimum(texels, _BRIGHTEST), layer=index)
+    return Surroundings(texture, made.suns, float(made.layers[0].max()))
+
+
+def _bordered(layer: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A layer with what a filter finds around it: beyond a pole the first row again, half way around."""
+    half = layer.shape[1] // 2
+    rows = np.concatenate([np.roll(layer[:1], half, axis=1), layer, np.roll(layer[-1:], half, axis=1)])
+    return np.concatenate([rows[:, -1:], rows, rows[:, :1]], axis=1)
+
+
+def with_suns(keep: Keep, scene: Scene, surroundings: Surroundings) -> Scene:
+    """The scene with its environment's peaks among its lights."""
+    environment = scene.environment
+    if environment is None or not surroundings.suns:
+        return scene
+    key = surroundings, environment
+    suns = keep("suns", key, lambda: sun_lights(surroundings.suns, environment))
+    return replace(scene, lights=(*scene.lights, *suns))
+
+
+def brightest(scene: Scene, surroundings: Surroundings) -> float:
+    """Irradiance that a surface gets from all lights, as they were given, and the environment together.
+
+    scene : with its environment's peaks among its lights
+    """
+    around = surroundings.brightest * scene.environment.exposure if scene.environment else 0.0
+    return around + sum(max(light.irradiance) for light in scene.lights)
+
+
+def environment_record(program: ComputeProgram, scene: Scene, total: Any, occluded: bool) -> Any:
+    """The shader's record of the environment.
+
+    total : (3,) the profile's albedo as the frame uses it
+    """
+    environment = scene.environment
+    if environment is None:
+        return program.record("Environment")
+    angle = np.radians(environment.rotation_degrees)
+    return program.record(
+        "Environment",
+        turn=(np.cos(angle), np.sin(angle)),
+        exposure=environment.exposure,
+        albedo=np.minimum(total, 1.0),
+        occluded=int(occluded),
+        visible=int(environment.visible),
+        mirrors=np.pad(equivalent_mirrors(model_of(scene.skin)).reshape(-1, 3), ((0, 0), (0, 1))),
+    )
+
+
+def occlusion_map(
+    device: Device, head: Head, geometry: HeadTextures, lit: Resources, atlas: Atlas, textures: AtlasTextures
+) -> Any:
+    """The open share of the sky of the atlas' texels and of the vertices, baked or read from disk.
+
+    lit : what the lighting passes read
+    """
+    side = min(atlas.size, _FINEST_OCCLUSION)
+
+    def bake() -> NDArray[np.uint16]:
+        baked = Occlusion(device).bake(head.mesh, geometry, lit, textures.resources["atlas"], side)
+        levels: NDArray[np.uint16] = np.rint(65535.0 * whole_map(baked, side)).astype(np.uint16)
+        return levels
+
+    levels = cached_occlusion(head.mesh, atlas, f"{FORM} {side}", bake)
+    return texture_from(device, levels / np.float32(65535.0), "r32float")
+
+
+def is_occluded(scene: Scene, settings: Settings) -> bool:
+    """Whether the head hides some of its environment from itself."""
+    return scene.environment is not None and settings.occlusion == "baked"
+
+
+def no_occlusion(device: Device) -> Any:
+    """Stands for the map where nothing is occluded."""
+    return make_texture(device, (1, 1), "r32float", use="map")

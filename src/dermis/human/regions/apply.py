@@ -1,0 +1,81 @@
+"""Maps of roughness and strength by region of the face."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.atlas.atlas import Atlas, build_atlas
+from dermis.human.regions.labels import label_texels
+from dermis.human.regions.soften import soften
+from dermis.human.regions.table import DEFAULT, LIMITS, RegionTable, load_table
+from dermis.mesh.head import Head
+
+Floats = NDArray[np.float32]
+
+SIZE = 1024
+"""Side of the maps in texels; maps of the head that are larger keep their size."""
+EDGE_MM = 2.5
+"""Borders between regions go over softly: standard deviation of the blur [mm]."""
+_DETAIL_MM = 6.0  # what is finer stays in the head's own maps; what is coarser comes from the table
+_DARKEST, _BRIGHTEST = 0.4, 3.0  # of the mean, of what is around: else specks in black would outshine all
+
+
+def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT) -> tuple[Head, float]:
+    """The head with roughness and specular maps by region of the face, and the mean rho_s of its skin [-].
+
+    table : what `load_table` gives or takes
+
+    The specular map holds rho_s itself; who scales maps to a mean takes the one returned. Pores and blotches
+    of the head's own two maps stay, as a factor of what is around them.
+    Raises DermisError when the head's regions are not known, and for tables that cannot be.
+    """
+    if not isinstance(table, RegionTable):
+        table = load_table(table)
+    atlas = build_atlas(head.mesh, SIZE)
+    points = atlas.interpolate(head.mesh, head.mesh.positions)[atlas.coverage]
+    soft = soften(points, table.values[label_texels(head, atlas, table)], EDGE_MM)
+    own = (head.maps.roughness, head.maps.specular)
+    roughness, specular = (
+        np.clip(_map(atlas, points, soft[:, k], own[k]), *limits) for k, limits in enumerate(LIMITS.values())
+    )
+    y, x = np.nonzero(atlas.coverage)
+    height, width = specular.shape
+    mean = float(specular[y * height // SIZE, x * width // SIZE].mean())
+    return replace(head, maps=replace(head.maps, roughness=roughness, specular=specular)), mean
+
+
+def _map(atlas: Atlas, points: NDArray[np.float64], level: NDArray[np.float64], own: Floats | None) -> Floats:
+    """(h, w) picture of the levels (n,) of the covered texels, times the fine detail of the own map."""
+    if own is None:
+        return _picture(atlas, level)
+    y, x = np.nonzero(atlas.coverage)
+    height, width = own.shape
+    values = own[y * height // SIZE, x * width // SIZE].astype(np.float64)
+    around = np.maximum(soften(points, values[:, None], _DETAIL_MM)[:, 0], _DARKEST * values.mean())
+    around = np.maximum(around, np.finfo(np.float32).eps)
+    shape = max(height, SIZE), max(width, SIZE)
+    detail = np.minimum(_resized(own, shape) / _resized(_picture(atlas, around), shape), _BRIGHTEST)
+    return np.asarray(detail * _resized(_picture(atlas, level), shape))
+
+
+def _picture(atlas: Atlas, values: NDArray[np.float64]) -> Floats:
+    """(SIZE, SIZE) values (n,) of the covered texels; empty ones take the nearest."""
+    from scipy.ndimage import distance_transform_edt
+
+    picture = np.zeros(atlas.coverage.shape, np.float32)
+    picture[atlas.coverage] = values
+    y, x = distance_transform_edt(~atlas.coverage, return_distances=False, return_indices=True)
+    return np.asarray(picture[y, x])
+
+
+def _resized(picture: Floats, shape: tuple[int, int]) -> Floats:
+    from scipy.ndimage import zoom
+
+    if picture.shape == shape:
+        return picture
+    factors = shape[0] / picture.shape[0], shape[1] / picture.shape[1]
+    return np.asarray(zoom(picture, factors, order=1, mode="nearest", grid_mode=True), np.float32)

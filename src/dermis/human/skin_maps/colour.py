@@ -1,0 +1,55 @@
+"""From pigments to colours."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.human.skin_maps.look import SkinLook
+from dermis.human.skin_maps.patch import Doubles
+from dermis.optics.pigments.skin import SkinParameters
+from dermis.optics.skin_colours import ColourTable, colour_table
+
+EPIDERMIS_MM = 0.05
+"""Thickness of the epidermis of the face, an artist's value within what is measured, 0.05 to 0.1 [mm]."""
+LIP_EPIDERMIS_MM = 0.03
+"""What stands over the blood of the lips, which shows through more than elsewhere [mm]."""
+
+# Hair of light and of dark skin, an artist's values, linear Rec. 709.
+_BROWN, _BLACK = np.array([0.060, 0.033, 0.018]), np.array([0.012, 0.009, 0.008])
+_STUBBLE = np.array([0.095, 0.085, 0.08])  # seen through skin, which makes it blueish
+_BLACK_AT = 0.08  # melanin of a skin whose hair is black
+
+
+def colour_of(look: SkinLook, pigments: Doubles, place: Doubles, mark: Doubles) -> NDArray[np.float32]:
+    """Colours (n, 3), linear Rec. 709 [-].
+
+    pigments : (n, 2) shares of melanin and of blood [-]
+    place, mark : (n, columns) as the compiled loops give them
+    """
+    from dermis.human.skin_maps.kernels.marks import HAIR, STUBBLE
+    from dermis.human.skin_maps.kernels.places import LIP
+
+    skin, lips = _tables(look.eumelanin, look.oxygen)
+    colour = skin.read(*pigments.T)
+    red = place[:, LIP] > 0
+    colour[red] += place[red, LIP, None] * (lips.read(*pigments[red].T) - colour[red])
+    for share, over in ((mark[:, STUBBLE], _STUBBLE), (mark[:, HAIR], _hair_colour(look))):
+        hidden = share > 0
+        # what is dark already does not turn lighter
+        colour[hidden] += share[hidden, None] * (np.minimum(over, colour[hidden]) - colour[hidden])
+    return colour.astype(np.float32)
+
+
+def _hair_colour(look: SkinLook) -> Doubles:
+    dark = min(look.melanin / _BLACK_AT, 1.0)
+    return np.asarray(_BROWN + dark * (_BLACK - _BROWN))
+
+
+@lru_cache(maxsize=4)
+def _tables(eumelanin: float, oxygen: float) -> tuple[ColourTable, ColourTable]:
+    face = SkinParameters(eumelanin=eumelanin, oxygen=oxygen, epidermis_mm=EPIDERMIS_MM)
+    lips = SkinParameters(eumelanin=eumelanin, oxygen=oxygen, epidermis_mm=LIP_EPIDERMIS_MM)
+    return colour_table(face), colour_table(lips)

@@ -1,0 +1,44 @@
+"""A head to render: mesh and maps in one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from dermis.mesh.maps import Maps
+from dermis.mesh.mesh import Mesh
+
+_CROWN_TO_CENTRE_MM = 120.0  # half the height of an adult head
+
+
+@dataclass(frozen=True)
+class Head:
+    """A mesh in mm with its maps.
+
+    name : sample or file
+    attribution : whom to name when a picture of it is shown, empty when nobody asks for it
+    """
+
+    name: str
+    mesh: Mesh
+    maps: Maps
+    attribution: str = ""
+
+    @cached_property
+    def centre_mm(self) -> tuple[float, float, float]:
+        """The middle of the head itself, without neck and shoulders: scenes are placed around it [mm]."""
+        p = self.mesh.positions
+        top = float(p[:, 1].max())
+        skull = p[p[:, 1] > top - 2 * _CROWN_TO_CENTRE_MM]
+        low, high = skull.min(axis=0), skull.max(axis=0)
+        return float(low[0] + high[0]) / 2, top - _CROWN_TO_CENTRE_MM, float(low[2] + high[2]) / 2
+
+    def frontmost(self, x_mm: float, y_mm: float) -> tuple[float, float, float]:
+        """The point of the surface in front of (x, y), relative to the centre [mm]."""
+        p = self.mesh.positions - np.array(self.centre_mm, dtype=np.float32)
+        off = np.hypot(p[:, 0] - x_mm, p[:, 1] - y_mm)
+        near = off <= max(6.0, float(off.min()) + 1.0)
+        x, y, z = p[near][np.argmax(p[near][:, 2])]
+        return float(x), float(y), float(z)

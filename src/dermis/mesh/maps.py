@@ -1,0 +1,231 @@
+"""The pictures that lie on a mesh, in the units that the renderer works with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.errors import refuse
+from dermis.images.colour import decode_srgb8, decode_srgb16
+from dermis.images.filters import without_steps
+from dermis.images.io import Picture, read_bytes, read_image
+
+Floats = NDArray[np.float32]
+PathLike = str | Path | Picture
+
+MIN_SIZE, MAX_SIZE = 16, 16384
+# A normal this far off its surface (87 degrees) has its slope capped; nothing real leans further.
+_MIN_NORMAL_Z = 0.05
+_LARGE = 1 << 14  # bytes of a file whose map is kept on disk: it is read back faster than decoded
+_MEAN_TEXELS, _MOST_APART = 64, 16  # a mean is taken of at least as many a side, at most so far apart
+_FORM = 1  # raise when maps of the same files become others
+
+
+@dataclass(frozen=True)
+class Maps:
+    """What varies over the skin; None is "no map". Row 0 is the top; sizes may differ from map to map.
+
+    colour : (H, W, 3) linear Rec. 709 [-]
+    normal : (H, W, 2) slopes dh/du and dh/d(up) of the bumps, up being towards row 0 [-]
+    height : (H, W) outwards, from an arbitrary zero [mm]
+    specular : (H, W) plain grey 0..1, to be scaled to a mean by whoever knows which texels are skin [-]
+    roughness : (H, W) plain grey 0..1 [-]
+    region : (H, W) uint8 part of the face, by its place in the list of the head that has it
+    """
+
+    colour: Floats | None = None
+    normal: Floats | None = None
+    height: Floats | None = None
+    specular: Floats | None = None
+    roughness: Floats | None = None
+    region: NDArray[np.uint8] | None = None
+
+    @cached_property
+    def mean_colour(self) -> NDArray[np.float64] | None:
+        """(3,) of the colour map, without black texels, which nobody painted [-]."""
+        if self.colour is None:
+            return None
+        apart = int(np.clip(min(self.colour.shape[:2]) // _MEAN_TEXELS, 1, _MOST_APART))
+        texels = self.colour[::apart, ::apart].reshape(-1, 3).astype(np.float64)
+        painted = texels[texels.sum(axis=1) > 0.0]
+        return np.asarray(painted.mean(axis=0)) if len(painted) else np.zeros(3)
+
+
+def load_maps(
+    colour: PathLike | None = None,
+    normal: PathLike | None = None,
+    height: PathLike | None = None,
+    height_mm: float | None = None,
+    specular: PathLike | None = None,
+    roughness: PathLike | None = None,
+    region: PathLike | None = None,
+    normal_y: Literal["up", "down"] = "up",
+) -> Maps:
+    """The maps of these picture files.
+
+    colour : RGB in sRGB, or linear when the file holds floats; alpha is left out
+    normal : tangent-space normals, red towards +u, green as `normal_y` says
+    height : grey, white outwards; needs `height_mm`
+    height_mm : relief of one grey level of an 8-bit map, 1/255 of the full scale at any depth, so that
+        the same picture gives the same relief in 8 bits, 16 bits or floats of 0..1 [mm]
+    specular, roughness : grey, taken as plain numbers and not through the sRGB curve
+    region : grey of 8 bits, the labels themselves
+    normal_y : "up" when green points to row 0 (OpenGL, Blender), "down" when away from it (DirectX)
+    DermisError : a file is not what its role asks for; the message names it
+    """
+    return Maps(
+        colour=None if colour is None else load_colour(colour),
+        normal=None if normal is None else load_normal(normal, normal_y),
+        height=None if height is None else load_height(height, height_mm),
+        specular=None if specular is None else load_grey(specular, "a specular map"),
+        roughness=None if roughness is None else load_grey(roughness, "a roughness map"),
+        region=None if region is None else load_labels(region),
+    )
+
+
+def load_colour(path: PathLike) -> Floats:
+    """(H, W, 3) linear Rec. 709 [-] of a colour map."""
+    return _kept(path, "colour", lambda: _colour(path))
+
+
+def _colour(path: PathLike) -> Floats:
+    image = _read(path, "a colour map")
+    if image.shape[2] < 3:
+        refuse(path, "a colour map with red, green and blue", "it is grey", "Save it as RGB")
+    image = image[..., :3]
+    if image.dtype == np.uint8:
+        return decode_srgb8(image)
+    if image.dtype == np.uint16:
+        return decode_srgb16(image)
+    return _within_unit(path, "a colour map", image)
+
+
+def load_height(path: PathLike, height_mm: float | None) -> Floats:
+    """(H, W) height [mm] of a grey map; see `load_maps`. 8-bit steps are smoothed away, finer ones stay."""
+    if height_mm is None or not (np.isfinite(height_mm) and height_mm > 0):
+        came = "none was given" if height_mm is None else f"it is {height_mm}"
+        remedy = "Skin maps have about 0.02 to 0.03; the map's author knows"
+        refuse(path, "a height map with height_mm, the mm per grey level, above 0", came, remedy)
+    relief_mm = np.float32(255 * height_mm)
+    return _kept(path, f"height {relief_mm!r}", lambda: _height(path) * relief_mm)
+
+
+def _height(path: PathLike) -> Floats:
+    image = _read(path, "a height map")
+    grey = _grey(path, "a height map", image)
+    return without_steps(grey) if image.dtype == np.uint8 else grey
+
+
+def load_grey(path: PathLike, role: str) -> Floats:
+    """(H, W) plain grey values 0..1 [-], not through the sRGB curve.
+
+    role : what the map should be, for the message
+    """
+    return _kept(path, "grey", lambda: _within_unit(path, role, _grey(path, role, _read(path, role))))
+
+
+def load_labels(path: PathLike) -> NDArray[np.uint8]:
+    """(H, W) labels of a grey picture of 8 bits."""
+    return _kept(path, "labels", lambda: _labels(path))
+
+
+def _labels(path: PathLike) -> NDArray[np.uint8]:
+    image = _read(path, "a map of labels")
+    if image.dtype != np.uint8 or image.shape[2] != 1:
+        refuse(path, "labels in 8-bit grey", f"{image.dtype} x {image.shape[2]} came", "Save it as such")
+    return image[..., 0]
+
+
+def load_normal(path: PathLike, normal_y: Literal["up", "down"] = "up") -> Floats:
+    """(H, W, 2) slopes [-] of a tangent-space normal map; see `Maps.normal`.
+
+    normal_y : which way green points: "up" to row 0 or "down" away from it
+
+    A float map may hold -1..1 instead of 0..1. Texels with no outward normal, as in the empty space
+    between uv islands, are flat.
+    """
+    if normal_y not in ("up", "down"):
+        refuse("normal_y", '"up" or "down"', f"it is {normal_y!r}", "Try the other if bumps look like dents")
+    return _kept(path, f"normal {normal_y}", lambda: _slopes(path, normal_y))
+
+
+def _slopes(path: PathLike, normal_y: str) -> Floats:
+    image = _read(path, "a normal map")
+    if image.shape[2] < 3:
+        refuse(path, "a normal map with red, green and blue", "it is grey", "If it is a height map, say so")
+    value = _as_unit(image[..., :3])
+    signed = image.dtype == np.float32 and bool(value.min() < -0.01)
+    normals = value if signed else 2 * value - 1
+    _check_normals(path, normals)
+    slopes: Floats = np.divide(
+        -normals[..., :2], np.maximum(normals[..., 2:], _MIN_NORMAL_Z), dtype=np.float32
+    )
+    slopes[normals[..., 2] <= 0] = 0
+    if normal_y == "down":
+        slopes[..., 1] *= -1
+    return slopes
+
+
+def _check_normals(path: PathLike, normals: Floats) -> None:
+    """Refuse a picture of something else: hardly a texel of it is a unit vector that points outwards."""
+    length = np.sqrt(np.einsum("hwc,hwc->hw", normals, normals))
+    outward = (np.abs(length - 1) < 0.15) & (normals[..., 2] > 0)
+    # A quarter is enough: the rest may be empty space between uv islands.
+    if outward.mean() < 0.25 or normals[..., 2][outward].mean() < 0.7:
+        came = f"its mean blue is {(normals[..., 2].mean() + 1) / 2:.2f} and its colours are no unit vectors"
+        refuse(path, "a tangent-space normal map, which looks light blue", came, "Check which map this is")
+
+
+def _kept(path: PathLike, how: str, load: Callable[[], NDArray[Any]]) -> NDArray[Any]:
+    """What `load` makes of a picture file, kept on disk when the file is large.
+
+    how : all that the map depends on besides the file
+    """
+    data = read_bytes(path)
+    if len(data) < _LARGE:
+        return load()
+    from dermis.disk import cached_array
+
+    return cached_array(np.frombuffer(data, np.uint8), f"map {_FORM} {how}", load)
+
+
+def _read(path: PathLike, role: str) -> NDArray[Any]:
+    image = read_image(path)
+    rows, columns = image.shape[:2]
+    if min(rows, columns) < MIN_SIZE or max(rows, columns) > MAX_SIZE:
+        expected = f"{role} of {MIN_SIZE} to {MAX_SIZE} texels a side"
+        refuse(path, expected, f"it has {columns} x {rows}", "Resize it")
+    if image.dtype == np.float32 and not np.isfinite(image).all():
+        refuse(path, f"{role} of finite numbers", "it holds infinities or NaN", "Export it again")
+    return image
+
+
+def _grey(path: PathLike, role: str, image: NDArray[Any]) -> Floats:
+    """(H, W) in units of the full scale, of a grey picture or of RGB whose channels agree."""
+    channels = _as_unit(image[..., :3] if image.shape[2] > 1 else image)
+    # JPEG may part the channels of a grey picture by a level or two.
+    others = range(1, channels.shape[2])
+    apart = max((float(np.abs(channels[..., k] - channels[..., 0]).max()) for k in others), default=0.0)
+    if apart > 2.5 / 255:
+        came = f"its red, green and blue differ by up to {apart:.2f} of the full scale"
+        refuse(path, f"{role} in grey", came, "Check which map this is, or save it as grey")
+    return np.ascontiguousarray(channels[..., 0])
+
+
+def _as_unit(image: NDArray[Any]) -> Floats:
+    if image.dtype == np.float32:
+        return image
+    return image.astype(np.float32) / np.float32(np.iinfo(image.dtype).max)
+
+
+def _within_unit(path: PathLike, role: str, values: Floats) -> Floats:
+    low, high = float(values.min()), float(values.max())
+    if low < -1e-3 or high > 1 + 1e-3:
+        refuse(path, f"{role} with values of 0 to 1", f"they go from {low:.4g} to {high:.4g}", "Scale them")
+    return np.clip(values, 0, 1)

@@ -1,0 +1,124 @@
+"""Meshes made by formula, for tests, spheres of material and calibration pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dermis.errors import refuse
+from dermis.mesh.geometry import build_mesh
+from dermis.mesh.mesh import Ints, Material, Mesh
+
+SKIN = (Material("skin"),)
+# Faces of a box: corners (x, y, z) in 0..1 from the top left as seen from outside, to the right, down; and
+# left, top and side of its chart.
+_FACES = (
+    (((0, 1, 1), (1, 1, 1), (1, 0, 1), (0, 0, 1)), (0.02, 0.02, 0.45)),
+    (((1, 1, 0), (0, 1, 0), (0, 0, 0), (1, 0, 0)), (0.52, 0.02, 0.45)),
+    (((1, 1, 1), (1, 1, 0), (1, 0, 0), (1, 0, 1)), (0.02, 0.52, 0.2)),
+    (((0, 1, 0), (0, 1, 1), (0, 0, 1), (0, 0, 0)), (0.27, 0.52, 0.2)),
+    (((0, 1, 0), (1, 1, 0), (1, 1, 1), (0, 1, 1)), (0.52, 0.52, 0.2)),
+    (((0, 0, 1), (1, 0, 1), (1, 0, 0), (0, 0, 0)), (0.77, 0.52, 0.2)),
+)
+
+
+def _grid_triangles(columns: int, rows: int) -> tuple[Ints, Ints]:
+    """Upper and lower triangles of the cells of a grid, each (rows * columns, 3), cell by cell.
+
+    Vertices run along u first, (columns + 1) to a row, rows downwards; seen from outside u is to the right.
+    """
+    row, column = np.mgrid[:rows, :columns].astype(np.int32)
+    top_left = (row * (columns + 1) + column).ravel()
+    below = top_left + columns + 1
+    upper = np.column_stack((top_left, below + 1, top_left + 1))
+    lower = np.column_stack((top_left, below, below + 1))
+    return upper, lower
+
+
+def plane(size_mm: float, segments: int = 1, uv_scale: float = 1.0) -> Mesh:
+    """A square in the XY plane about the origin that faces +Z; u runs along +X, v along -Y.
+
+    size_mm : length of a side [mm]
+    segments : cells along a side
+    uv_scale : uv covers [0, uv_scale] along both sides, at most 1
+    """
+    if not (size_mm > 0 and segments >= 1 and 0 < uv_scale <= 1):
+        refuse(
+            "plane",
+            "a size above 0, a segment and a uv_scale in (0, 1]",
+            f"{size_mm} mm, {segments} and {uv_scale} came",
+            "Mend the arguments",
+        )
+    along = np.linspace(0, 1, segments + 1)
+    v, u = (axis.ravel() for axis in np.meshgrid(along, along, indexing="ij"))
+    positions = size_mm * np.column_stack((u - 0.5, 0.5 - v, np.zeros_like(u)))
+    triangles = np.vstack(_grid_triangles(segments, segments))
+    uv = uv_scale * np.column_stack((u, v))
+    return build_mesh(positions, uv, triangles, np.zeros(len(triangles)), SKIN)
+
+
+def uv_sphere(radius_mm: float, segments: int = 64, rings: int = 32) -> Mesh:
+    """A closed sphere about the origin, u once around +Y from -Z by -X, v from the north pole to the south.
+
+    The seam is at -Z, so u = 0.5 faces +Z. Each triangle at a pole has an apex corner of its own with u at
+    the middle of its base, so that none is degenerate.
+
+    radius_mm : [mm]
+    segments, rings : cells around and from pole to pole, at least 3 and 2
+    """
+    if not (radius_mm > 0 and segments >= 3 and rings >= 2):
+        refuse(
+            "uv_sphere",
+            "a radius above 0, 3 segments and 2 rings",
+            f"{radius_mm} mm, {segments} and {rings} came",
+            "Mend the arguments",
+        )
+    row, column = (axis.ravel() for axis in np.mgrid[: rings + 1, : segments + 1])
+    # the last column is the first: exactly the same numbers, so that it welds
+    phi, theta = 2 * np.pi * (column % segments) / segments, np.pi * row / rings
+    north, south = row == 0, row == rings
+    sine = np.where(north | south, 0.0, np.sin(theta))
+    normals = np.column_stack((-sine * np.sin(phi), np.cos(theta), -sine * np.cos(phi)))
+    u = (column + 0.5 * north - 0.5 * south) / segments
+    uv = np.column_stack((u, row / rings))
+    upper, lower = _grid_triangles(segments, rings)
+    triangles = np.vstack((upper[segments:], lower[:-segments]))
+    used, compact = np.unique(triangles, return_inverse=True)
+    corners = compact.reshape(-1, 3)
+    material = np.zeros(len(corners))
+    return build_mesh(radius_mm * normals[used], uv[used], corners, material, SKIN, normals[used])
+
+
+def wedge(side_mm: float, thin_mm: float, thick_mm: float, cells: int = 4) -> Mesh:
+    """A closed slab about the origin, its front towards +Z, thin at -X and thick at +X, each face a chart.
+
+    side_mm : along X and Y [mm]
+    thin_mm, thick_mm : along Z at either end [mm]
+    cells : along a side
+    """
+    if not (side_mm > 0 and min(thin_mm, thick_mm) > 0 and cells >= 1):
+        came = f"{side_mm}, {thin_mm} and {thick_mm} mm and {cells} came"
+        refuse("wedge", "sides above 0 and a cell", came, "Mend the arguments")
+    v, u = (axis.ravel() for axis in np.mgrid[: cells + 1, : cells + 1] / cells)
+    row, column = (axis.ravel() for axis in np.mgrid[:cells, :cells])
+    a = row * (cells + 1) + column
+    quads = np.column_stack((a, a + cells + 1, a + cells + 2, a, a + cells + 2, a + 1)).reshape(-1, 3)
+    positions, uv, normals, triangles = [], [], [], []
+    for index, (corners, (left, top, size)) in enumerate(_FACES):
+        c = np.array(corners, float)
+        c[:, 2] = (c[:, 2] - 0.5) * np.where(c[:, 0] > 0, thick_mm, thin_mm)
+        c[:, :2] = (c[:, :2] - 0.5) * side_mm
+        places = (
+            np.outer((1 - u) * (1 - v), c[0])
+            + np.outer(u * (1 - v), c[1])
+            + np.outer(u * v, c[2])
+            + np.outer((1 - u) * v, c[3])
+        )
+        normal = np.cross(c[3] - c[0], c[1] - c[0])
+        positions.append(places)
+        normals.append(np.tile(normal / np.linalg.norm(normal), (len(places), 1)))
+        uv.append(np.column_stack((left + size * u, top + size * v)))
+        triangles.append(quads + index * len(places))
+    count = sum(map(len, triangles))
+    return build_mesh(
+        np.vstack(positions), np.vstack(uv), np.vstack(triangles), np.zeros(count), SKIN, np.vstack(normals)
+    )

@@ -1,0 +1,185 @@
+"""Heads and environments to begin with: known by hash, fetched once, credited to their authors."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal, NoReturn
+
+from dermis.disk import cache_folder
+from dermis.errors import DermisError, refuse
+
+DATA_VARIABLE = "DERMIS_DATA"
+
+
+@dataclass(frozen=True)
+class SampleFile:
+    """One file of a sample: its name, where it is public, and the hash it must have."""
+
+    name: str
+    url: str
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What is known about a sample before any of it is fetched.
+
+    kind : "head" is a mesh with maps, "environment" a latitude-longitude picture
+    folder : where its files lie below DERMIS_DATA or below the cache
+    files : by role: mesh, colour, specular, normal, height, licence, or environment
+    unit_mm : length of one unit of the mesh [mm]
+    v_origin : the side of the maps where v = 0
+    height_mm : relief of one grey level of the 8-bit height map [mm]
+    """
+
+    name: str
+    kind: Literal["head", "environment"]
+    folder: str
+    files: Mapping[str, SampleFile]
+    licence: str
+    attribution: str
+    unit_mm: float | None = None
+    v_origin: Literal["top", "bottom"] | None = None
+    height_mm: float | None = None
+
+
+def _load_registry() -> Mapping[str, Sample]:
+    text = resources.files(__package__).joinpath("samples.toml").read_text("utf-8")
+    return MappingProxyType({name: _sample(name, entry) for name, entry in tomllib.loads(text).items()})
+
+
+def _sample(name: str, entry: dict[str, Any]) -> Sample:
+    home, listed = entry.pop("home"), entry.pop("files")
+    files = {role: SampleFile(**file, url=home + file["name"]) for role, file in listed.items()}
+    return Sample(name=name, files=MappingProxyType(files), **entry)
+
+
+SAMPLES = _load_registry()
+
+
+def fetch(name: str) -> dict[str, Path]:
+    """Where the files of a sample are, by role, downloading those that are not there yet.
+
+    name : a key of `SAMPLES`
+    DermisError : no such sample; no network; or a file differs from the one that is known
+
+    With DERMIS_DATA set, that folder has to hold the files and nothing is downloaded.
+    """
+    sample = _find(name)
+    paths = {role: _folder(sample) / file.name for role, file in sample.files.items()}
+    missing = [role for role, file in sample.files.items() if not _is_right(paths[role], file)]
+    if missing and _data_folder():
+        _refuse_data(paths[missing[0]])
+    if missing:
+        _download(sample, missing)
+    return paths
+
+
+def cached(name: str) -> bool:
+    """Whether `fetch` would find every file of a sample without the network.
+
+    name : a key of `SAMPLES`
+    """
+    sample = _find(name)
+    return all(_is_right(_folder(sample) / file.name, file) for file in sample.files.values())
+
+
+def _find(name: str) -> Sample:
+    if name not in SAMPLES:
+        refuse(f"sample {name!r}", f"one of {', '.join(SAMPLES)}", "there is none of this name", "Choose one")
+    return SAMPLES[name]
+
+
+def _data_folder() -> str:
+    return os.environ.get(DATA_VARIABLE, "")
+
+
+def _folder(sample: Sample) -> Path:
+    base = _data_folder() or cache_folder() / "samples"
+    return Path(base) / sample.folder
+
+
+def _is_right(path: Path, file: SampleFile) -> bool:
+    """Whether the file is there with the hash that is known."""
+    try:
+        status = path.stat()
+        return _sha256(path, status.st_size, status.st_mtime_ns) == file.sha256
+    except OSError:
+        return False
+
+
+@lru_cache(maxsize=256)
+def _sha256(path: Path, size: int, mtime_ns: int) -> str:
+    """Hash of a file, computed once for each state of it."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _download(sample: Sample, roles: list[str]) -> None:
+    import pooch
+
+    for count, role in enumerate(roles):
+        file, progress = sample.files[role], _Progress(sample.files[role].name)
+        downloader = pooch.HTTPDownloader(progressbar=progress, timeout=30)
+        try:
+            pooch.retrieve(
+                file.url, f"sha256:{file.sha256}", file.name, _folder(sample), downloader=downloader
+            )
+        except (OSError, ValueError) as fault:  # no network, no permission; another hash
+            _refuse_download(sample, roles[count:], fault)
+        finally:
+            progress.stop()
+
+
+class _Progress:
+    """A progress bar on stderr, of the form that pooch calls."""
+
+    def __init__(self, name: str) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn
+
+        text, console = TextColumn("{task.description}"), Console(stderr=True)
+        self._bars = Progress(text, BarColumn(), DownloadColumn(), console=console)
+        self._task = self._bars.add_task(name, total=None)
+        self.total = 0
+
+    def update(self, count: int) -> None:
+        self._bars.start()
+        self._bars.update(self._task, total=self.total or None, advance=count)
+
+    def reset(self) -> None:
+        self._bars.reset(self._task)
+
+    def close(self) -> None:
+        """Called by pooch only when all went well, so `stop` does the work."""
+
+    def stop(self) -> None:
+        if self._bars.live.is_started:
+            self._bars.stop()
+
+
+def _refuse_data(path: Path) -> NoReturn:
+    came = "it is another file (its sha256 differs)" if path.is_file() else "it is not there"
+    remedy = f"Put it there, or unset {DATA_VARIABLE} so that the samples are downloaded"
+    refuse(path, f"a file of the sample data below {DATA_VARIABLE}", came, remedy)
+
+
+def _refuse_download(sample: Sample, roles: list[str], fault: Exception) -> NoReturn:
+    if isinstance(fault, OSError):
+        why = f"it failed ({fault.strerror or type(fault).__name__})"
+    else:
+        why = "another file is there now (its sha256 differs)"
+    urls = "\n".join(f"  {sample.files[role].url}" for role in roles)
+    raise DermisError(
+        f"sample {sample.name!r}: expected to download it, but {why}. "
+        f"Fetch these files by hand:\n{urls}\n"
+        f"into {_folder(sample)}, or into FOLDER/{sample.folder} with {DATA_VARIABLE}=FOLDER set."
+    ) from fault

@@ -1,0 +1,98 @@
+"""Heads by name: the package's own, samples, and files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from dermis.errors import refuse
+from dermis.human.bust import BUSTS
+from dermis.mesh.check import check_head_height
+from dermis.mesh.formats import is_gltf
+from dermis.mesh.gltf_maps import embedded_maps
+from dermis.mesh.head import Head
+from dermis.mesh.load import load_mesh
+from dermis.mesh.maps import load_maps
+from dermis.mesh.samples import SAMPLES, fetch
+from dermis.mesh.subdivide import subdivide as subdivided
+
+MapFile = str | os.PathLike[str] | None
+
+
+def load_head(
+    head: str | os.PathLike[str],
+    *,
+    colour: MapFile = None,
+    normal: MapFile = None,
+    height: MapFile = None,
+    height_mm: float | None = None,
+    specular: MapFile = None,
+    roughness: MapFile = None,
+    unit_mm: float | None = None,
+    v_origin: Literal["auto", "top", "bottom"] = "auto",
+    up: Literal["y", "z"] = "y",
+    normal_y: Literal["up", "down"] = "up",
+    opaque: Sequence[str] = (),
+    subdivide: int = 0,
+) -> Head:
+    """The built-in "bust", a sample ("lee_perry_smith") or a mesh file (.glb, .gltf, .obj, .ply) with maps.
+
+    Options replace what a sample or a glTF file has of its own.
+
+    colour, normal, height, specular, roughness : image files; see `load_maps`
+    height_mm : relief of one grey level of an 8-bit height map [mm]
+    unit_mm : length of the file's unit [mm]; metres for glTF and mm otherwise when left out
+    v_origin : which row of the maps v = 0 is; the format's rule when "auto"
+    up : the file's upward axis
+    normal_y : way in which green points in the normal map: "up" (OpenGL) or "down" (DirectX)
+    opaque : groups of the file that are not skin, whatever they are called
+    subdivide : levels of Loop subdivision, 0 to 3
+
+    Raises DermisError for files that cannot be rendered as a head.
+    """
+    name, path = str(head), Path(head)
+    sample, files = SAMPLES.get(name), dict[str, Any]()
+    if name in BUSTS:
+        from dermis.human.bust.build import cached_bust
+
+        path = cached_bust(name)
+    elif sample is not None:
+        if sample.kind != "head":
+            refuse(
+                name, "a head", f"this sample is an {sample.kind}", f"Use one of {', '.join(_head_names())}"
+            )
+        files = fetch(name)
+        path = files["mesh"]
+        unit_mm = sample.unit_mm if unit_mm is None else unit_mm
+        v_origin = sample.v_origin or v_origin if v_origin == "auto" else v_origin
+        height_mm = sample.height_mm if height_mm is None else height_mm
+    elif not path.is_file():
+        known = ", ".join(_head_names())
+        refuse(name or "head", f"a mesh file or a sample ({known})", f"{name!r} is neither", "Check the name")
+    if sample is None and is_gltf(path):
+        files = embedded_maps(path)
+    mesh = load_mesh(path, unit_mm=unit_mm, v_origin=v_origin, up=up, opaque=tuple(opaque))
+    check_head_height(mesh, name, unit_mm)
+    own = {"colour": colour, "normal": normal, "height": height}
+    own |= {"specular": specular, "roughness": roughness}
+    chosen = _chosen(own, files)
+    if height is None and height_mm is None:
+        height_mm = files.get("height_mm")
+    if height_mm is not None and chosen["height"] is None:
+        came = f"{height_mm} came without a height map"
+        refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
+    maps = load_maps(**chosen, height_mm=height_mm, normal_y=normal_y)
+    thanks = f"{sample.attribution}, {sample.licence}" if sample else ""
+    return Head(name, subdivided(mesh, subdivide), maps, thanks)
+
+
+def _chosen(given: dict[str, MapFile], files: dict[str, Any]) -> dict[str, Any]:
+    """For each role the file given, else the head's own; a normal map that is given replaces its relief."""
+    chosen = {role: files.get(role) if file is None else file for role, file in given.items()}
+    return chosen | {"region": files.get("region")}
+
+
+def _head_names() -> list[str]:
+    return [*BUSTS, *(name for name, sample in SAMPLES.items() if sample.kind == "head")]

@@ -1,0 +1,131 @@
+"""Walks over a surface against the same walk on it laid flat, and overlaps cut until gutters have room."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dermis.atlas.stitched.overlap_cuts import cut_overlaps, find_conflicts
+from dermis.atlas.stitched.pieces import find_pieces
+from dermis.atlas.stitched.surface import Surface, survey
+from dermis.mesh.geometry import build_mesh
+from dermis.mesh.mesh import Mesh
+from dermis.reference.cut_meshes import cut_cone, cut_cylinder, cut_sphere
+
+Floats = NDArray[np.float64]
+RADIUS, HEIGHT, CELLS = 30.0, 80.0, 12
+FACETS = 3 * CELLS
+WIDTH = 2 * RADIUS * np.sin(np.pi / FACETS)  # of a facet: the mesh is a prism
+
+
+def go(surface: Surface, triangle: NDArray[np.int32], start: Floats, target: Floats) -> tuple[Floats, Floats]:
+    """Where walks end in space, and whether the surface went on so far."""
+    from dermis.atlas.stitched.kernels.walk import walk
+
+    found, second = np.empty(len(triangle), np.int32), np.empty((len(triangle), 2))
+    whole = np.empty(len(triangle), np.bool_)
+    walk(surface.ground, triangle, start, target, found, second, whole)
+    weights = np.column_stack((1 - second.sum(axis=1), second))
+    return np.einsum("nk,nkc->nc", weights, surface.corners[found]), whole
+
+
+def around(points: Floats) -> Floats:
+    """Places (n, 2) on the prism unrolled: along its facets, and height."""
+    angle = np.arctan2(points[:, 0], points[:, 2]) % (2 * np.pi)
+    facet = np.floor(angle / (2 * np.pi / FACETS))
+    middle = (facet + 0.5) * 2 * np.pi / FACETS
+    within = points[:, 0] * np.cos(middle) - points[:, 2] * np.sin(middle)
+    return np.column_stack(((facet + 0.5) * WIDTH + within, points[:, 1]))
+
+
+def random_walks(surface: Surface, length: float) -> tuple[NDArray[np.int32], Floats, Floats]:
+    rng = np.random.default_rng(5)
+    triangle = rng.integers(0, len(surface.uv), 2000).astype(np.int32)
+    start = np.einsum("nk,nkc->nc", rng.dirichlet(np.ones(3), 2000), surface.ground.flat[triangle])
+    angle = rng.uniform(0, 2 * np.pi, 2000)
+    return triangle, start, start + length * np.column_stack((np.cos(angle), np.sin(angle)))
+
+
+def prism(turned: bool) -> Mesh:
+    mesh = cut_cylinder(RADIUS, HEIGHT, CELLS)
+    triangles = mesh.triangles.copy()
+    if turned:  # every other triangle is listed the other way round
+        triangles[::2] = triangles[::2, ::-1]
+    return build_mesh(mesh.positions, mesh.uv, triangles, mesh.material, mesh.materials)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("length", [1.0, 20.0, 150.0])
+def test_on_a_prism_walks_are_straight_lines_on_it_unrolled(length: float, turned: bool) -> None:
+    surface = survey(prism(turned))
+    triangle, start, target = random_walks(surface, length)
+    ends, whole = go(surface, triangle, start, target)
+    begins = np.einsum("nk,nkc->nc", _weights(surface, triangle, start), surface.corners[triangle])
+    along = _step(surface, triangle, target - start)
+    expected = around(begins) + along
+    inside = np.abs(expected[:, 1]) < HEIGHT / 2 - 0.05
+    beyond = np.abs(expected[:, 1]) > HEIGHT / 2 + 0.05
+    assert whole[inside].all() and not whole[beyond].any()
+    off = around(ends) - expected
+    off[:, 0] = (off[:, 0] + FACETS * WIDTH / 2) % (FACETS * WIDTH) - FACETS * WIDTH / 2
+    # a walk starts a thousandth of the way to the triangle's middle, and so leaves at another angle
+    assert np.abs(off[inside]).max() < 0.02
+    # where the surface ends first, the walk ends on its edge
+    assert np.abs(np.abs(ends[beyond, 1]) - HEIGHT / 2).max(initial=0) < 1e-3
+
+
+def _weights(surface: Surface, triangle: NDArray[np.int32], place: Floats) -> Floats:
+    p = surface.ground.flat[triangle]
+    matrix = np.concatenate((p.transpose(0, 2, 1), np.ones((len(p), 1, 3))), axis=1)
+    right = np.column_stack((place, np.ones(len(p))))[..., None]
+    return np.asarray(np.linalg.solve(matrix, right)[..., 0])
+
+
+def _step(surface: Surface, triangle: NDArray[np.int32], step: Floats) -> Floats:
+    """A step in a triangle's plane as one along the prism's facets and up."""
+    corners = surface.corners[triangle]
+    x = corners[:, 1] - corners[:, 0]
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    normal = np.cross(x, corners[:, 2] - corners[:, 0])
+    y = np.cross(normal, x) / np.linalg.norm(normal, axis=1, keepdims=True)
+    space = step[:, :1] * x + step[:, 1:] * y
+    facet = around(corners.mean(axis=1))[:, 0] // WIDTH
+    angle = (facet + 0.5) * 2 * np.pi / FACETS
+    tangent = np.column_stack((np.cos(angle), 0 * angle, -np.sin(angle)))
+    return np.column_stack(((space * tangent).sum(axis=1), space[:, 1]))
+
+
+def test_a_round_walk_on_a_sphere_comes_home() -> None:
+    """Great circles close; facets make them miss by a little."""
+    surface = survey(cut_sphere(20.0, 32))
+    triangle, start, target = random_walks(surface, 2 * np.pi * 20.0)
+    ends, whole = go(surface, triangle, start, target)
+    begins = np.einsum("nk,nkc->nc", _weights(surface, triangle, start), surface.corners[triangle])
+    assert whole.all()
+    assert np.percentile(np.linalg.norm(ends - begins, axis=1), 90) < 0.05 * 2 * np.pi * 20.0
+
+
+def test_an_overlap_is_cut_until_its_sides_have_room() -> None:
+    """The unrolled cone's sides meet at the apex: both would need the same texels."""
+    surface = survey(cut_cone(40.0, 50.0))
+    piece, _ = find_pieces(surface)
+    assert piece.max() == 0
+    whole = find_conflicts(surface, piece >= 0, np.flatnonzero(piece == 0), 8.0).length_mm
+    cut = cut_overlaps(surface, piece, 8.0)
+    assert 1 <= cut.max() <= 3
+    assert np.array_equal(cut >= 0, piece >= 0)
+    left = sum(
+        find_conflicts(surface, cut >= 0, np.flatnonzero(cut == k), 8.0).length_mm
+        for k in range(int(cut.max()) + 1)
+    )
+    assert whole > 8.0
+    assert left < 0.5 * whole
+
+
+@pytest.mark.parametrize("mesh", [cut_cylinder(RADIUS, HEIGHT, 6), cut_sphere(30.0, 12)])
+def test_nothing_is_cut_without_need(mesh: Mesh) -> None:
+    surface = survey(mesh)
+    piece, _ = find_pieces(surface)
+    cut = cut_overlaps(surface, piece, 8.0)
+    assert cut.max() == piece.max()

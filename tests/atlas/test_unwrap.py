@@ -1,0 +1,294 @@
+"""Uv layouts: what can be flat without stretch is, and nothing is ever mirrored or laid on top of itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dermis.atlas.raster import rasterise
+from dermis.atlas.unwrap.charts import grow, join_strays, neighbours, pieces, tidy
+from dermis.atlas.unwrap.flatten import flatten
+from dermis.atlas.unwrap.pack import pack
+from dermis.atlas.unwrap.seams import border_sides, cut_open, shortest_seam
+from dermis.atlas.unwrap.stretch import singular_values
+from dermis.atlas.unwrap.untangle import untangle
+from dermis.atlas.unwrap.unwrap import PADDING, Layout, unwrap
+from dermis.atlas.unwrap.validity import crossed, faults
+from dermis.errors import DermisError
+from dermis.mesh.geometry import edges, triangle_areas
+from dermis.mesh.mesh import Material, Mesh
+from dermis.mesh.primitives import plane, uv_sphere
+
+Doubles = NDArray[np.float64]
+Index = NDArray[np.int64]
+Shape = tuple[Doubles, Index]
+
+ISOMETRIC = 1e-6
+"""Stretch of what can be developed: rounding only."""
+SIZE = 1024
+
+
+def square(cells: int = 12, jitter: float = 0.2) -> Shape:
+    """A flat square with uneven triangles, tilted in space."""
+    mesh = plane(10.0, cells)
+    places = mesh.positions.astype(np.float64)
+    inner = (np.abs(places[:, :2]) < 4.99).all(axis=1)
+    move = jitter * 10 / cells * np.random.default_rng(1).uniform(-1, 1, (len(places), 2))
+    places[inner, :2] += move[inner]
+    tilt = np.array([[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]])
+    return places @ tilt.T, mesh.triangles.astype(np.int64)
+
+
+def tube(around: int = 40, along: int = 20) -> Shape:
+    """A round tube along y, open at both ends, of radius 5 and height 12."""
+    angle, height = np.meshgrid(np.arange(around) * 2 * np.pi / around, np.linspace(0, 12, along + 1))
+    places = np.column_stack((5 * np.sin(angle).ravel(), height.ravel(), 5 * np.cos(angle).ravel()))
+    row, column = (axis.ravel() for axis in np.mgrid[:along, :around])
+    a, b = row * around + column, row * around + (column + 1) % around
+    triangles = np.vstack((np.column_stack((a, b, b + around)), np.column_stack((a, b + around, a + around))))
+    return places, triangles.astype(np.int64)
+
+
+def sphere() -> Shape:
+    mesh = uv_sphere(5.0, 32, 16)
+    places = np.zeros((mesh.point.max() + 1, 3))
+    places[mesh.point] = mesh.positions
+    return places, mesh.point[mesh.triangles].astype(np.int64)
+
+
+def one_chart(triangles: Index) -> Index:
+    return np.zeros(len(triangles), dtype=np.int64)
+
+
+def stretch(layout: Layout, positions: Doubles) -> Doubles:
+    return singular_values(positions[layout.point[layout.triangles]], layout.uv[layout.triangles])
+
+
+def as_mesh(layout: Layout, positions: Doubles) -> Mesh:
+    return layout.mesh(positions, np.tile([0.0, 0.0, 1.0], (len(positions), 1)), Material("skin"))
+
+
+def owners_of_texels(mesh: Mesh, layout: Layout, size: int = SIZE) -> Index:
+    """Chart (size, size) at each texel, -1 where none; no texel lies in two triangles."""
+    corners = mesh.uv[mesh.triangles]
+    # a little smaller, for a texel whose centre lies on an edge is in both its triangles
+    corners += 1e-3 * (corners.mean(axis=1, keepdims=True) - corners)
+    apart = np.arange(corners.size // 2, dtype=np.int32).reshape(-1, 3)
+    shrunk = replace(mesh, uv=corners.reshape(-1, 2), triangles=apart)
+    texel, triangle = rasterise(shrunk, size, np.arange(len(apart)))
+    assert len(texel) == len(np.unique(texel))
+    owner = np.full(size * size, -1, dtype=np.int64)
+    owner[texel] = layout.chart[triangle]
+    return owner.reshape(size, size)
+
+
+def check_valid(layout: Layout, positions: Doubles) -> None:
+    assert (layout.uv >= 0).all() and (layout.uv <= 1).all()
+    assert (stretch(layout, positions)[:, 1] > 0).all()
+    owners_of_texels(as_mesh(layout, positions), layout)
+
+
+def test_plane_stays_as_it_is() -> None:
+    positions, triangles = square()
+    layout = unwrap(positions, triangles, one_chart(triangles), upright=(0, 1, 0))
+    check_valid(layout, positions)
+    values = stretch(layout, positions)
+    assert np.ptp(values) / values.mean() < ISOMETRIC
+    assert len(layout.uv) == len(positions) and layout.chart.max() == 0
+    assert values.mean() * 10 > 0.97, "it fills the map"
+
+
+def test_tube_is_rolled_off_once_it_is_cut() -> None:
+    positions, triangles = tube()
+    ends = np.flatnonzero(positions[:, 1] == 0), np.flatnonzero(positions[:, 1] == 12)
+    seam = shortest_seam(positions, triangles, 6.0 + positions[:, 2], *ends)
+    assert np.allclose(positions[seam][..., 2], -5), "behind, where it is cheap"
+    layout = unwrap(positions, triangles, one_chart(triangles), seam)
+    check_valid(layout, positions)
+    values = stretch(layout, positions)
+    assert np.ptp(values) / values.mean() < 1e-3
+    assert layout.chart.max() == 0 and len(layout.uv) == len(positions) + 21
+    assert (np.diff(layout.uv[np.argsort(layout.point), 1]) <= ISOMETRIC).mean() > 0.9, "y runs up the map"
+
+
+@pytest.mark.parametrize("shape", [tube(), sphere()], ids=["tube", "sphere"])
+def test_what_cannot_be_flat_is_halved(shape: Shape) -> None:
+    positions, triangles = shape
+    layout = unwrap(positions, triangles, one_chart(triangles))
+    check_valid(layout, positions)
+    assert 1 <= layout.chart.max() < 12
+    values = stretch(layout, positions)
+    assert np.median(values[:, 0] / values[:, 1]) < 1.4
+
+
+def test_cap_of_a_sphere() -> None:
+    """A cap of 60 degrees: conformal maps change its scale by 4/3, lengths kept along rays stretch by 1.2."""
+    positions, triangles = sphere()
+    cap = triangles[positions[triangles].mean(axis=1)[:, 2] > 2.5]
+    layout = unwrap(positions, cap, one_chart(cap))
+    check_valid(layout, positions)
+    values = stretch(layout, positions)
+    weight = triangle_areas(positions[cap])
+    scale = np.sqrt(values.prod(axis=1))
+    assert layout.chart.max() == 0
+    assert np.average(values[:, 0] / values[:, 1], weights=weight) < 1.12
+    assert scale.max() / scale.min() < 1.25
+
+
+def test_density_sets_the_size_of_charts() -> None:
+    positions, triangles = square()
+    chart = (positions[triangles].mean(axis=1)[:, 1] > 0).astype(np.int64)
+    layout = unwrap(positions, triangles, chart, density=np.where(chart == 0, 1.0, 0.25))
+    values = stretch(layout, positions).mean(axis=1)
+    assert values[chart == 0] / 4 == pytest.approx(values[chart == 1].mean(), rel=ISOMETRIC)
+
+
+def test_weight_keeps_stretch_away() -> None:
+    positions, triangles = sphere()
+    cap = triangles[positions[triangles].mean(axis=1)[:, 2] > 0]
+    heavy = np.abs(positions[cap].mean(axis=1)[:, 1]) > 4
+    plain, weighed = (
+        unwrap(positions, cap, one_chart(cap), weight=weight) for weight in (1.0, np.where(heavy, 20.0, 1.0))
+    )
+    anisotropy = [np.divide(*stretch(layout, positions)[heavy].T).mean() for layout in (plain, weighed)]
+    assert anisotropy[1] - 1 < 0.75 * (anisotropy[0] - 1)
+
+
+def test_charts_lie_upright() -> None:
+    positions, triangles = square()
+    layout = unwrap(positions, triangles, one_chart(triangles), upright=(0.8, 0, 0.6))
+    height = positions[layout.point] @ (0.8, 0, 0.6)
+    assert np.corrcoef(height, layout.uv[:, 1])[0, 1] < -0.999
+
+
+def test_space_between_charts() -> None:
+    positions, triangles = square(24)
+    layout = unwrap(positions, triangles, grow(positions, triangles, 30))
+    owner = owners_of_texels(as_mesh(layout, positions), layout)
+    reach = int(PADDING * SIZE)
+    y, x = np.nonzero(owner >= 0)
+    for dy, dx in ((0, reach), (reach, 0), (reach // 2, reach // 2), (reach // 2, -(reach // 2))):
+        ny, nx = y + dy, x + dx
+        inside = (ny < SIZE) & (nx >= 0) & (nx < SIZE)
+        other = owner[ny[inside], nx[inside]]
+        assert ((other < 0) | (other == owner[y[inside], x[inside]])).all()
+    assert (owner[: reach // 2 - 1] < 0).all() and (owner[:, : reach // 2 - 1] < 0).all()
+    assert (owner >= 0).mean() > 0.5
+
+
+def test_same_input_same_bytes() -> None:
+    positions, triangles = sphere()
+    one, other = (unwrap(positions, triangles, grow(positions, triangles, 9)) for _ in range(2))
+    assert one.uv.tobytes() == other.uv.tobytes() and one.triangles.tobytes() == other.triangles.tobytes()
+
+
+def test_mesh_keeps_points_and_normals() -> None:
+    positions, triangles = sphere()
+    layout = unwrap(positions, triangles, grow(positions, triangles, 9))
+    mesh = layout.mesh(positions, positions / 5, Material("skin"))
+    assert np.array_equal(mesh.point[mesh.triangles], triangles)
+    assert np.allclose(mesh.normals, mesh.positions / 5, atol=1e-6)
+    _, _, counts = edges(mesh.point[mesh.triangles])
+    assert (counts == 2).all()
+
+
+def test_triangle_without_area_is_refused() -> None:
+    positions, triangles = square()
+    with pytest.raises(DermisError, match="triangles with an area"):
+        unwrap(positions, np.vstack((triangles, [[0, 1, 1]])), np.zeros(len(triangles) + 1, dtype=np.int64))
+
+
+def test_seam_between_pieces_is_refused() -> None:
+    positions, triangles = square()
+    both = np.vstack((triangles, triangles + len(positions)))
+    with pytest.raises(DermisError, match="no path joins them"):
+        shortest_seam(
+            np.vstack((positions, positions)),
+            both,
+            np.ones(2 * len(positions)),
+            np.array([0]),
+            np.array([200]),
+        )
+
+
+def test_slit_splits_only_what_lies_on_it() -> None:
+    """Along a slit of k edges from the border inwards, all points but the inner end become two."""
+    positions, triangles = square(8, 0.0)
+    middle = np.flatnonzero(np.abs(positions[:, 1]) < 1e-6)[:4]
+    seam = np.column_stack((middle[:-1], middle[1:]))
+    corner, point = cut_open(triangles, one_chart(triangles), seam)
+    assert np.array_equal(point[corner], triangles)
+    assert sorted(np.flatnonzero(np.bincount(point) == 2)) == sorted(middle[:-1])
+
+
+def test_charts_are_grown_in_one_piece_each() -> None:
+    positions, triangles = sphere()
+    chart = grow(positions, triangles, 20)
+    assert chart.max() == 19
+    assert pieces(chart, neighbours(triangles)).max() == 19
+    two = np.vstack((triangles, triangles + len(positions)))
+    assert grow(np.vstack((positions, positions)), two, 1).max() == 1, "each piece of a mesh has its own"
+
+
+def test_tidy_charts_have_short_borders() -> None:
+    positions, triangles = square(20)
+    side = (positions[triangles].mean(axis=1)[:, 1] > 0).astype(np.int64)
+    noisy = np.where(np.random.default_rng(2).random(len(side)) < 0.15, 1 - side, side)
+    mended = tidy(noisy, triangles)
+    assert (mended == side).mean() > 0.97
+    assert pieces(mended, neighbours(triangles)).max() == 1
+
+
+def test_strays_join_what_surrounds_them() -> None:
+    positions, triangles = square(20)
+    height = positions[triangles].mean(axis=1)[:, 1]
+    half = (height > 2).astype(np.int64)
+    low = int(height.argmin())
+    stray = half.copy()
+    stray[low] = 1
+    assert np.array_equal(join_strays(stray, triangles), half)
+
+
+def test_faults_are_found() -> None:
+    positions, triangles = square(8)
+    places = flatten(positions, triangles, np.ones(len(triangles)), np.ones(len(triangles)))
+    whole = one_chart(triangles)
+    assert not faults(places, triangles, whole).any()
+    assert faults(places * (-1, 1), triangles, whole).all(), "mirrored"
+    inner = np.flatnonzero((np.abs(positions[:, 1]) < 1) & (np.abs(positions[:, 0]) < 1))[0]
+    moved = places.copy()
+    moved[inner] += 4.0
+    assert faults(moved, triangles, whole).any()
+    assert not faults(untangle(moved, triangles), triangles, whole).any()
+    sides, _ = border_sides(triangles)
+    assert len(sides) == 32 and not crossed(places[sides]).any()
+
+
+def test_crossings() -> None:
+    sides = np.array(
+        [[[0, 0], [2, 2]], [[0, 2], [2, 0]], [[2, 2], [3, 0]], [[5, 0], [5, 1]]], dtype=np.float64
+    )
+    assert crossed(sides).tolist() == [True, True, False, False]
+
+
+def test_rectangles_are_packed_well() -> None:
+    random = np.random.default_rng(3)
+    size = random.uniform(1, 4, (25, 2))
+    box = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    outlines = [np.stack((box * s, np.roll(box, -1, axis=0) * s), axis=1) + 7.0 for s in size]
+    scale, offset = pack(outlines, PADDING)
+    low, high = scale * 7.0 + offset, scale * (7.0 + size) + offset
+    assert (low > PADDING / 3).all() and (high < 1 - PADDING / 3).all()
+    gap = np.maximum(low[:, None] - high, low - high[:, None]).max(axis=2)
+    gap[np.diag_indices(25)] = 1
+    assert gap.min() > 0.99 * PADDING
+    assert (scale**2 * size.prod(axis=1)).sum() > 0.65
+
+
+def test_too_many_sheets_are_refused() -> None:
+    box = np.array([[[0, 0], [1, 0]], [[1, 0], [0, 1]], [[0, 1], [0, 0]]], dtype=np.float64)
+    with pytest.raises(DermisError, match="fewer charts"):
+        pack([box] * 40, 0.2)

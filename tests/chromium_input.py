@@ -1,0 +1,74 @@
+"""InputDriver on a page in Chromium: what it shows, drags of a mouse, and fingers."""
+
+from __future__ import annotations
+
+import io
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+PATIENCE_S = 25.0
+Place = tuple[float, float]
+
+
+def pixels(page: Any) -> NDArray[np.int64]:
+    from PIL import Image
+
+    return np.array(Image.open(io.BytesIO(page.screenshot())).convert("RGB")).astype(np.int64)
+
+
+def still(page: Any, judge: Callable[[NDArray[np.int64]], bool]) -> NDArray[np.int64]:
+    """The first picture that satisfies `judge` and does not change any more."""
+    last, end = pixels(page), time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        time.sleep(0.4)
+        found = pixels(page)
+        if judge(found) and np.abs(found - last).max() == 0:
+            return found
+        last = found
+    raise AssertionError("the page never shows that")
+
+
+def head(image: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The part that the panel does not cover."""
+    return image[40:430, 205:]
+
+
+def shows_head(image: NDArray[np.int64]) -> bool:
+    return bool(head(image)[150:250, :60].mean() > 15.0 and head(image)[:20, -20:].mean() < 3.0)
+
+
+def differs_from(before: NDArray[np.int64]) -> Callable[[NDArray[np.int64]], bool]:
+    return lambda image: not looks_like(before)(image)
+
+
+def looks_like(before: NDArray[np.int64]) -> Callable[[NDArray[np.int64]], bool]:
+    """Whether an image is the same but for its encoding: a new frame comes as JPEG, then as PNG."""
+    return lambda image: bool(np.abs(head(image) - head(before)).mean() < 0.5)
+
+
+def drag(page: Any, start: tuple[float, float], end: tuple[float, float]) -> None:
+    page.mouse.move(*start)
+    page.mouse.down()
+    page.mouse.move(*end, steps=8)
+    page.mouse.up()
+
+
+def touch(page: Any, *moments: Sequence[Place]) -> None:
+    """Fingers that go from moment to moment, each finger by its place in the list; then they leave."""
+    session = page.context.new_cdp_session(page)
+    for k, places in enumerate(moments):
+        points = [{"x": x, "y": y, "id": number} for number, (x, y) in enumerate(places)]
+        kind = "touchStart" if k == 0 or len(places) > len(moments[k - 1]) else "touchMove"
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+        page.wait_for_timeout(60)
+    session.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    session.detach()
+
+
+def height(image: NDArray[np.int64]) -> int:
+    """Rows of the picture that show some of the head."""
+    return int((head(image).max(axis=(1, 2)) > 25).sum())

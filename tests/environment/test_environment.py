@@ -1,0 +1,243 @@
+"""Panoramas: where their texels point, their sun-like peaks, and prefiltering against plain sums."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from tolerances import PREFILTERED
+
+from dermis.environment.harmonics import analyse, synthesise, zonal
+from dermis.environment.mirrors import equivalent_mirrors, round_lobe
+from dermis.environment.panorama import (
+    directions,
+    load_panorama,
+    mean_radiance,
+    panorama_file,
+    resampled,
+    solid_angles,
+)
+from dermis.environment.prefilter import HEIGHT, ROUGHNESSES, mirror_kernel, prefilter
+from dermis.environment.suns import split_suns
+from dermis.errors import DermisError
+from dermis.images.colour import luminance
+from dermis.images.io import write_exr, write_png
+from dermis.specular.cosines import cosines
+from dermis.specular.models import MODELS
+
+Floats = NDArray[np.float64]
+
+
+def room(height: int = 128) -> Floats:
+    """A dim room with a bright window and a coloured floor."""
+    towards = directions(height, 2 * height)
+    radiance = 0.3 + 0.2 * towards * [1, 0.5, -0.5]
+    radiance[towards[..., 0] > 0.9] += [4.0, 5.0, 6.0]
+    radiance[towards[..., 1] < -0.5] *= [1.5, 0.8, 0.4]
+    return radiance
+
+
+def with_lamp(radiance: Floats, towards: tuple[float, float, float], strength: float) -> Floats:
+    """The panorama with a lamp of 2 degrees radius."""
+    unit = np.array(towards) / np.linalg.norm(towards)
+    lit = radiance.copy()
+    lit[directions(*radiance.shape[:2]) @ unit > np.cos(np.radians(2.0))] += strength * np.array(
+        [1.0, 0.8, 0.5]
+    )
+    return lit
+
+
+def summed(radiance: Floats, normal: Floats, weight: Floats) -> Floats:
+    """(3,) integral of radiance times a weight per texel."""
+    area = solid_angles(*radiance.shape[:2])
+    return np.asarray((radiance * (weight * area)[..., None]).sum(axis=(0, 1)))
+
+
+def test_the_middle_lies_behind_the_head_and_the_right_at_its_left() -> None:
+    towards = directions(64, 128)
+    assert np.allclose(np.linalg.norm(towards, axis=-1), 1.0)
+    assert np.allclose(towards[31:33, 63:65].mean(axis=(0, 1)), [0, 0, -1], atol=1e-3)
+    assert towards[32, 96] @ [1, 0, 0] > 0.999 and towards[0, 0, 1] > 0.999
+    assert solid_angles(64, 128).sum() * 128 == pytest.approx(4 * np.pi)
+
+
+@pytest.mark.parametrize("height", [64, 100, 128, 300])
+def test_resampling_keeps_the_light(height: int) -> None:
+    """All of it, and where it is: the mean of radiance times direction."""
+    radiance = with_lamp(room(), (0.3, 0.8, 0.2), 50.0)
+    made = resampled(radiance.astype(np.float32), height)
+    assert made.shape == (height, 2 * height, 3)
+    assert np.allclose(mean_radiance(made), mean_radiance(radiance), rtol=1e-6)
+    for axis in range(3):
+        pull, exact = (
+            mean_radiance(part * directions(*part.shape[:2])[..., axis, None]) for part in (made, radiance)
+        )
+        assert np.abs(pull - exact).max() < 2e-3 * mean_radiance(radiance).max()
+    assert np.array_equal(resampled(made, height), made)
+
+
+@pytest.mark.parametrize(("height", "kept"), [(1, 256), (127, 256), (300, 300), (521, 512)])
+def test_any_size_is_taken(tmp_path: Path, height: int, kept: int) -> None:
+    """Also a prime number of rows, and two texels alone."""
+    pixels = np.random.default_rng(height).uniform(0, 2, (height, 2 * height, 3)).astype(np.float32)
+    write_exr(tmp_path / "sky.exr", pixels)
+    made = load_panorama(str(tmp_path / "sky.exr"))
+    assert made.shape == (kept, 2 * kept, 3)
+    assert np.allclose(mean_radiance(made), mean_radiance(pixels.astype(float)), rtol=1e-6)
+
+
+def test_a_lamp_becomes_a_sun_and_no_light_is_lost() -> None:
+    radiance = with_lamp(with_lamp(room(), (0.3, 0.8, 0.2), 5000.0), (-1, 0.5, 1), 900.0)
+    rest, suns = split_suns(radiance)
+    assert len(suns) == 2
+    assert suns[0].irradiance.sum() > suns[1].irradiance.sum()
+    for sun, towards in zip(suns, [(0.3, 0.8, 0.2), (-1, 0.5, 1)], strict=True):
+        assert sun.direction @ towards / np.linalg.norm(towards) > np.cos(np.radians(0.5))
+        assert np.degrees(sun.radius) == pytest.approx(2.0, abs=0.5)
+    whole, left = (4 * np.pi * mean_radiance(part) for part in (radiance, rest))
+    assert np.allclose(left + sum(sun.irradiance for sun in suns), whole, rtol=1e-9)
+    assert rest.min() > 0 and (rest <= radiance + 1e-12).all()
+    assert luminance(rest).max() < luminance(radiance).max() / 10
+
+
+def test_stars_brighter_than_the_sun_do_not_keep_it_from_shining() -> None:
+    """Single texels that give next to no light: a sun is taken for what it gives, not for its brightness."""
+    towards = np.array([0.3, 0.8, 0.2]) / np.linalg.norm([0.3, 0.8, 0.2])
+    radiance = with_lamp(room(), (0.3, 0.8, 0.2), 900.0)
+    spots = np.random.default_rng(2).integers(20, 100, (40, 2))
+    radiance[spots[:, 0], 2 * spots[:, 1]] = 1200.0
+    _, suns = split_suns(radiance)
+    assert suns and suns[0].direction @ towards > np.cos(np.radians(0.5))
+    assert [sun.irradiance.sum() for sun in suns] == sorted((s.irradiance.sum() for s in suns), reverse=True)
+
+
+def test_a_glow_around_the_sun_does_not_widen_it() -> None:
+    """Its shadows are as sharp as the disc that gives most of the light."""
+    radiance = with_lamp(np.full((512, 1024, 3), 0.5), (0.3, 0.8, 0.2), 20000.0)
+    angle = np.degrees(np.arccos(directions(512, 1024) @ [0.3, 0.8, 0.2] / np.linalg.norm([0.3, 0.8, 0.2])))
+    _, (sun,) = split_suns(radiance + 400.0 * np.exp(-((angle / 4.0) ** 2))[..., None])
+    assert np.degrees(sun.radius) == pytest.approx(2.0, rel=0.15)
+
+
+def test_a_soft_room_has_no_sun() -> None:
+    rest, suns = split_suns(room())
+    assert suns == [] and np.array_equal(rest, room())
+
+
+def test_harmonics_give_back_what_they_hold() -> None:
+    """A picture of low degree, through analysis and synthesis."""
+    x, y, z = np.moveaxis(directions(256, 512), -1, 0)
+    picture = np.stack([1 + x * y, z**3 - 0.2 * z, x**2 - z**2 + 0.1 * y], axis=-1)
+    again = synthesise(analyse(picture, 12), np.ones(13), 256)
+    assert np.abs(again - picture).max() < PREFILTERED
+
+
+def test_cosine_kernel_is_the_known_one() -> None:
+    """Factors pi, 2 pi / 3, pi / 4, 0, -pi / 24 [RamamoorthiHanrahan2001]."""
+    expected = [np.pi, 2 * np.pi / 3, np.pi / 4, 0, -np.pi / 24]
+    assert np.allclose(zonal(np.cos, 4), expected, atol=1e-6)
+
+
+@pytest.fixture(scope="module")
+def lamps(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Floats]:
+    """A file of a room with a lamp too weak for a sun, and its radiance."""
+    path = tmp_path_factory.mktemp("environment") / "room.exr"
+    radiance = with_lamp(room(256), (0.2, 0.9, -0.3), 8.0).astype(np.float32)
+    write_exr(path, radiance)
+    return str(path), radiance.astype(np.float64)
+
+
+def test_irradiance_is_the_plain_sum(lamps: tuple[str, Floats]) -> None:
+    name, radiance = lamps
+    made = prefilter(name)
+    assert made.suns == ()
+    towards, normals = directions(256, 512), directions(HEIGHT, 2 * HEIGHT)
+    for y, x in [(0, 3), (20, 70), (64, 128), (90, 200), (127, 250)]:
+        exact = summed(radiance, normals[y, x], np.maximum(towards @ normals[y, x], 0))
+        assert np.allclose(made.layers[0, y, x], exact, rtol=PREFILTERED)
+
+
+@pytest.mark.parametrize("layer", [1, 4, 7, 10])
+def test_reflections_are_the_plain_mean(lamps: tuple[str, Floats], layer: int) -> None:
+    name, radiance = lamps
+    made, m = prefilter(name), float(ROUGHNESSES[layer - 1])
+    towards, mirror = directions(256, 512), directions(HEIGHT, 2 * HEIGHT)
+    for y, x in [(0, 3), (20, 70), (64, 128), (90, 200)]:
+        cosine = np.clip(towards @ mirror[y, x], -1, 1)
+        weight = np.where(cosine > 0, round_lobe(np.arccos(np.maximum(cosine, 0)), m), 0.0)
+        total = summed(np.ones_like(radiance), mirror[y, x], weight)
+        exact = summed(radiance, mirror[y, x], weight) / total
+        assert (
+            np.abs(made.layers[layer, y, x] - exact).max()
+            < PREFILTERED * radiance.mean() + 2e-3 * exact.max()
+        )
+
+
+def test_uniform_light_is_uniform() -> None:
+    made = prefilter("uniform")
+    assert made.suns == ()
+    assert np.allclose(made.layers[0], np.pi, rtol=PREFILTERED)
+    assert np.allclose(made.layers[1:], 1.0, rtol=2 * PREFILTERED)
+
+
+def test_kernels_are_too_smooth_to_ring() -> None:
+    for m in ROUGHNESSES:
+        factors = mirror_kernel(float(m))
+        assert (
+            factors[0] == pytest.approx(1.0) and abs(factors[-1]) < 1e-3 and np.abs(factors).max() < 1 + 1e-9
+        )
+
+
+def test_mirrors_seen_along_the_normal_keep_their_roughness() -> None:
+    table, roughness = equivalent_mirrors(), np.geomspace(0.05, 1, 8)
+    assert np.allclose(table[:, -1, 0], 0, atol=1e-6)
+    assert np.allclose(table[:, -1, 2], roughness, rtol=0.02)
+    assert np.allclose(table[..., 0] ** 2 + table[..., 1] ** 2, 1)
+
+
+@pytest.mark.parametrize("model", ["kelemen", "torrance-sparrow", "blinn-phong", "phong", "two-lobe"])
+def test_mirrors_have_the_lobes_mean_direction(model: str) -> None:
+    """At a node of the table, by light sampled over the hemisphere; and the mean cosine of a round lobe."""
+    table, roughness = equivalent_mirrors(model), np.geomspace(0.05, 1, 8)
+    light, area = directions(256, 512)[:128], solid_angles(256, 512)[:128]
+    cosine = 3 / 7
+    view = np.array([-np.sqrt(1 - cosine**2), cosine, 0])
+    up = np.array([0.0, 1.0, 0.0])
+    weight = MODELS[model].lobe(cosines(up, light, view), roughness[5]) * light[..., 1] * area
+    mean = (light * weight[..., None]).sum(axis=(0, 1)) / weight.sum()
+    assert np.allclose(mean[:2] / np.linalg.norm(mean), table[5, 3, :2], atol=2e-3)
+    own = round_lobe(np.arccos(light[..., 1]), table[5, 3, 2]) * area
+    assert (own * light[..., 1]).sum() / own.sum() == pytest.approx(np.linalg.norm(mean), abs=2e-3)
+
+
+def test_samples_are_found(sample_folder: Path) -> None:
+    made = prefilter("royal_esplanade")
+    assert len(made.suns) == 3 and made.layers.max() < 20  # its brightest texel is 49,664
+    assert all(sun.direction[1] > 0.8 for sun in made.suns)  # lamps in the ceiling
+    assert prefilter("lebombo").suns == ()
+
+
+def test_what_is_no_panorama_is_refused(tmp_path: Path) -> None:
+    square, bytes_ = tmp_path / "square.exr", tmp_path / "grey.png"
+    write_exr(square, np.ones((8, 8, 3), np.float32))
+    write_png(bytes_, np.full((8, 16, 3), 100, np.uint8))
+    for path, said in ((square, "twice as wide"), (bytes_, "uint8")):
+        with pytest.raises(DermisError, match=said):
+            load_panorama(str(path))
+    for worst, said in (
+        (-1, "from -1"),
+        (np.nan, "from nan"),
+        (np.inf, "from 1 to inf"),
+        (2e12, "from 1 to 2e"),
+    ):
+        pixels = np.ones((8, 16, 3), np.float32)
+        pixels[3, 4] = worst
+        write_exr(tmp_path / "odd.exr", pixels)
+        with pytest.raises(DermisError, match=rf"from 0 to 1e\+12, not all of it 0, but it is {said}"):
+            load_panorama(str(tmp_path / "odd.exr"))
+    with pytest.raises(DermisError, match="royal_esplanade"):
+        panorama_file("nowhere.hdr")
+    with pytest.raises(DermisError, match="an environment"):
+        panorama_file("lee_perry_smith")

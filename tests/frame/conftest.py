@@ -1,0 +1,34 @@
+"""One renderer for all tests of the frame: compiling its shaders takes seconds."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+from tolerances import HALVES, TWIN
+
+from dermis.frame.frame import Stages
+from dermis.frame.levels import FLOATS
+from dermis.frame.renderer import Renderer
+from dermis.gpu import Device
+
+
+@pytest.fixture(scope="session")
+def renderer() -> Renderer:
+    return Renderer(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
+
+
+@pytest.fixture(scope="session")
+def close(renderer: Renderer) -> float:
+    """How close light is to its twin after the blurs, of its scale."""
+    return TWIN if renderer.stages.diffuse.texel == FLOATS else HALVES
+
+
+@pytest.fixture(scope="session")
+def device(renderer: Renderer) -> Device:
+    return renderer.device
+
+
+@pytest.fixture(scope="session")
+def stages(renderer: Renderer) -> Stages:
+    return renderer.stages

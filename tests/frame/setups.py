@@ -1,0 +1,131 @@
+"""Small scenes for the tests of the frame, and ways to run a part of it.
+
+Places are given in the mesh's own coordinates; a scene wants them from the head's centre.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dermis.frame.frame import draw_frame
+from dermis.frame.inputs import Inputs
+from dermis.frame.passes import SHARED_SHADERS
+from dermis.frame.passes.variants import Constants
+from dermis.frame.renderer import Renderer
+from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture
+from dermis.mesh.geometry import build_mesh
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.mesh import Material, Mesh
+from dermis.mesh.primitives import SKIN, plane
+from dermis.scene.camera import Camera
+from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
+from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
+from dermis.scene.skin import Skin
+
+Floats = NDArray[np.float64]
+AnyLight = PointLight | SpotLight | DirectionalLight
+
+
+def entered_light(renderer: Renderer, inputs: Inputs) -> NDArray[np.float64]:
+    """(n, n, 4) light that has entered the skin, and 1 where there is any; as halves on GPUs."""
+    made = download(renderer.device, inputs.levels.stack).astype(float)
+    return made / [*(3 * [inputs.scale]), 1.0]
+
+
+def head_of(mesh: Mesh, **maps: Any) -> Head:
+    """A mesh with the given maps as a head."""
+    return Head("test", mesh, Maps(**{role: np.asarray(m, np.float32) for role, m in maps.items()}))
+
+
+def place(head: Head, point: ArrayLike) -> Any:
+    """A point of the mesh's coordinates as scenes want it."""
+    return tuple(float(c) for c in np.asarray(point, float) - head.centre_mm)
+
+
+def front_camera(head: Head, centre: ArrayLike = (0, 0, 0), frame_mm: float = 80.0) -> Camera:
+    """300 mm before `centre`, looking along -Z."""
+    eye = np.add(centre, (0, 0, 300.0))
+    return Camera(position=place(head, eye), target=place(head, centre), frame_mm=frame_mm)
+
+
+def scene_of(head: Head, *lights: AnyLight, camera: Camera | None = None, **skin: Any) -> Scene:
+    return Scene(head, lights=lights, camera=camera or front_camera(head), skin=Skin(**skin))
+
+
+def frontal(irradiance: float = 3.0, *, shadows: bool = False) -> DirectionalLight:
+    """Light along -Z."""
+    return DirectionalLight(direction=(0, 0, -1), irradiance=(irradiance,) * 3, shadows=shadows)
+
+
+def settings_of(**given: Any) -> Settings:
+    """Small sizes unless told otherwise, and an atlas laid out as the mesh's maps are."""
+    small = {"size": (48, 48), "atlas": 64, "samples": 1, "shadow_size": 64, "seams": "alpha"}
+    return Settings(**(small | given))
+
+
+def run_frame(renderer: Renderer, scene: Scene, **given: Any) -> Inputs:
+    """A whole frame; what its stages made can be downloaded from the result."""
+    inputs = renderer.prepare(scene, settings_of(**given))
+    frame = Frame(renderer.device)
+    draw_frame(frame, renderer.stages, inputs)
+    frame.submit()
+    return inputs
+
+
+def probe(
+    device: Device,
+    name: str,
+    size: tuple[int, int],
+    outputs: Sequence[str],
+    constants: Constants = (),
+    **bound: Any,
+) -> Any:
+    """Run a test shader of this folder and download its outputs.
+
+    constants : names and values of the shader's `override`s
+
+    A keyword whose value is a dict is taken as the members of the shader's struct of that name.
+    """
+    path = Path(__file__).parent / f"{name}.wgsl"
+    program = ComputeProgram(device, path, (SHARED_SHADERS,), dict(constants))
+    made = {output: make_texture(device, size, "rgba32float") for output in outputs}
+    records = {
+        key: program.record(key.title(), **v) if isinstance(v, dict) else v for key, v in bound.items()
+    }
+    frame = Frame(device)
+    frame.compute(name, program, {**made, **records}, size)
+    frame.submit()
+    return [download(device, texture).astype(np.float64) for texture in made.values()]
+
+
+def bent_plane(size_mm: float, uv: Sequence[Sequence[float]], segments: int = 1) -> Mesh:
+    """A plane whose uv is mapped through the (2, 3) affine matrix `uv`."""
+    flat = plane(size_mm, segments)
+    matrix = np.asarray(uv, float)
+    return build_mesh(
+        flat.positions, flat.uv @ matrix[:, :2].T + matrix[:, 2], flat.triangles, flat.material, SKIN
+    )
+
+
+def joined(*parts: tuple[Mesh, ArrayLike, tuple[float, float, float]], kinds: Sequence[str] = ()) -> Mesh:
+    """Meshes in one: each moved in space [mm], its uv put into the square (left, top, side).
+
+    kinds : material kind of each part, skin when left out
+    """
+    first = np.cumsum([0, *(len(mesh.positions) for mesh, _, _ in parts[:-1])])
+    kind = list(kinds) or ["skin"] * len(parts)
+    return build_mesh(
+        np.vstack([mesh.positions + np.asarray(move, np.float32) for mesh, move, _ in parts]),
+        np.vstack([[left, top] + side * mesh.uv for mesh, _, (left, top, side) in parts]),
+        np.vstack([mesh.triangles + k for (mesh, _, _), k in zip(parts, first, strict=True)]),
+        np.repeat(np.arange(len(parts)), [len(mesh.triangles) for mesh, _, _ in parts]),
+        tuple(Material(f"part {k}", one, (0.5, 0.25, 0.125)) for k, one in enumerate(kind)),
+        np.vstack([mesh.normals for mesh, _, _ in parts]),
+    )

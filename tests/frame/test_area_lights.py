@@ -1,0 +1,299 @@
+"""Rectangles, spheres, suns and stripes: how much light they give, and shadows that harden at contact."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import light_twins
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from setups import entered_light, head_of, joined, place, probe, run_frame, scene_of, settings_of
+from tolerances import AREA_LIGHT, LIT, TWIN
+from twins import surface
+
+from dermis.atlas.cached import cached_atlas
+from dermis.errors import DermisError
+from dermis.frame.lights import light_records, light_views
+from dermis.frame.rectangles import facing_irradiance, parts_of, rectangle_irradiance
+from dermis.frame.renderer import Renderer
+from dermis.gpu import download
+from dermis.gpu.textures import texture_from
+from dermis.mesh.primitives import plane, uv_sphere
+from dermis.scene.lights import DirectionalLight, Light, RectangleLight, SphereLight, StripeLight
+
+Floats = NDArray[np.float64]
+SIZE = 32
+SHAPED = (("SHAPES", 1),)
+FLOOR = head_of(plane(200.0, 4))
+PLATE = head_of(
+    joined((plane(120.0, 6), (0, 0, 0), (0, 0, 0.7)), (plane(30.0, 2), (-15, 0, 12), (0.75, 0.75, 0.2)))
+)
+
+
+def above(head: Any, height: float, **given: Any) -> dict[str, Any]:
+    """A light over the origin that faces it."""
+    return {"position": place(head, (0, 0, height)), "target": place(head, (0, 0, 0)), **given}
+
+
+def rectangle_from_a_corner(width: float, height: float, distance: float) -> float:
+    """Irradiance of radiance 1 on a surface parallel to a rectangle, opposite its corner: tabulated."""
+    x, y = width / distance, height / distance
+    a, b = np.sqrt(1 + x * x), np.sqrt(1 + y * y)
+    return float(0.5 * (x / a * np.arctan(y / a) + y / b * np.arctan(x / b)))
+
+
+def test_the_closed_form_is_the_tabulated_one() -> None:
+    for width, height, distance in ((1.0, 1.0, 1.0), (3.0, 0.5, 2.0), (10.0, 20.0, 0.7)):
+        whole = 4 * rectangle_from_a_corner(width / 2, height / 2, distance)
+        assert facing_irradiance(width, height, distance) == pytest.approx(whole, rel=1e-12)
+    assert facing_irradiance(1e6, 1e6, 1.0) == pytest.approx(np.pi, rel=1e-4)
+
+
+@pytest.mark.parametrize("size", [(40, 40), (300, 200), (100, 900)])
+def test_parts_of_a_rectangle_are_the_whole(size: tuple[float, float]) -> None:
+    light = RectangleLight(position=(200, 300, 400), target=(0, 10, 0), width_mm=size[0], height_mm=size[1])
+    parts = parts_of(light)
+    assert all(isinstance(part, RectangleLight) for part in parts)
+    area = sum(part.width_mm * part.height_mm for part in parts if isinstance(part, RectangleLight))
+    assert area == pytest.approx(size[0] * size[1])
+    middle = np.mean([part.position for part in parts if isinstance(part, RectangleLight)], axis=0)
+    assert np.allclose(middle, light.position)
+    assert len(parts) <= 9 and (len(parts) == 1) == (max(size) < 0.35 * np.sqrt(200**2 + 290**2 + 400**2))
+
+
+def entered(renderer: Renderer, head: Any, light: Light) -> tuple[Floats, Floats]:
+    """Irradiance of each texel, and their places."""
+    inputs = run_frame(renderer, scene_of(head, light, rho_s=0.0, mix=0.0), atlas=64)
+    made = entered_light(renderer, inputs)[..., :3]
+    return made, surface(cached_atlas(head.mesh, 64), head)[0]
+
+
+@pytest.mark.parametrize("size", [(30, 30), (240, 60), (400, 400)])
+def test_irradiance_of_a_rectangle(renderer: Renderer, size: tuple[float, float]) -> None:
+    """On a floor below it, up to 100 mm aside, from a height of 300 mm."""
+    given = {"width_mm": size[0], "height_mm": size[1], "irradiance": (1.0, 2.0, 3.0), "shadows": False}
+    made, points = entered(renderer, FLOOR, RectangleLight(**above(FLOOR, 300.0, **given)))
+    radiance = np.array([1.0, 2.0, 3.0]) / facing_irradiance(*size, 300.0)
+    picked = [(y, x) for y in (2, 20, 31, 60) for x in (3, 32, 44, 61)]
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * np.array(size) / 2
+    exact = [
+        radiance
+        * rectangle_irradiance(
+            np.column_stack([corners, np.full(4, 300.0)]) - points[at], np.array([0.0, 0.0, 1.0])
+        )
+        for at in picked
+    ]
+    assert np.abs([made[at] for at in picked] - np.array(exact)).max() < AREA_LIGHT * np.max(exact)
+
+
+@pytest.mark.parametrize("radius", [5.0, 80.0, 200.0])
+def test_irradiance_of_a_sphere(renderer: Renderer, radius: float) -> None:
+    """pi (r / d)^2 times the cosine, while all of it stands above the horizon."""
+    made, points = entered(
+        renderer, FLOOR, SphereLight(**above(FLOOR, 300.0, radius_mm=radius, shadows=False))
+    )
+    d2 = points[..., 0] ** 2 + points[..., 1] ** 2 + 300.0**2
+    exact = 3.14 * 300.0**2 / d2 * 300.0 / np.sqrt(d2)
+    assert np.abs(made[..., 0] - exact).max() < AREA_LIGHT * exact.max()
+
+
+@pytest.mark.parametrize("part", [0, 3, 6, 15])
+@pytest.mark.parametrize("kind", ["rectangle", "sphere"])
+def test_parts_are_numpys(renderer: Renderer, kind: str, part: int) -> None:
+    rng = np.random.default_rng(5)
+    points = rng.uniform(-80, 80, (SIZE, SIZE, 3)).astype(np.float32)
+    given = {"position": (150.0, 120.0, 260.0), "irradiance": (1.0, 2.0, 3.0), "shadows": False}
+    light = {
+        "rectangle": RectangleLight(**given, width_mm=60, height_mm=90),
+        "sphere": SphereLight(**given, radius_mm=120),
+    }[kind]
+    lit = run_frame(renderer, scene_of(FLOOR, light)).lit
+    textures = {
+        name: texture_from(renderer.device, np.dstack([values, np.ones((SIZE, SIZE))]), "rgba32float")
+        for name, values in {"points": points, "normals": np.broadcast_to([0, 0, 1.0], points.shape)}.items()
+    }
+    towards, arriving = probe(
+        renderer.device,
+        "light_probe",
+        (SIZE, SIZE),
+        ["towards", "arriving"],
+        SHAPED,
+        **lit,
+        **textures,
+        part={"index": part},
+    )
+    direction, irradiance = light_twins.part_of(lit["lights"]["light"][0], points.astype(float), part)
+    assert np.abs(towards[..., :3] - direction).max() < TWIN
+    assert np.abs(arriving[..., :3] - irradiance).max() < TWIN * irradiance.max()
+    assert (towards[..., 3] == 1).all()
+
+
+def test_a_stripe_is_as_wide_as_asked(renderer: Renderer, close: float) -> None:
+    """1/e^2 of the middle at half its width, nothing beyond its ends."""
+    light = StripeLight(
+        direction=(0, 0, -1),
+        position=place(FLOOR, (10, 0, 0)),
+        width_mm=24,
+        length_mm=100,
+        irradiance=(2, 2, 2),
+        shadows=False,
+    )
+    made, points = entered(renderer, FLOOR, light)
+    exact = 2 * np.exp(-2 * ((points[..., 0] - 10) / 12) ** 2) * (np.abs(points[..., 1]) < 50)
+    inside = np.abs(np.abs(points[..., 1]) - 50) > 3
+    assert np.abs(made[..., 0] - exact)[inside].max() < close * 2
+
+
+def visibility(renderer: Renderer, head: Any, light: Light, size: int = 1024) -> tuple[Floats, Floats]:
+    """Along the floor's middle: places on x, and how much of the light each sees (one part after another)."""
+    scene = scene_of(head, light)
+    views = light_views(scene, size)
+    inputs = run_frame(renderer, scene, shadow_size=size)
+    x = np.linspace(-55, 55, 4 * SIZE * SIZE // 4).astype(np.float32).reshape(SIZE, SIZE)
+    points = np.dstack([x, np.zeros_like(x), np.zeros_like(x), np.ones_like(x)])
+    normals = np.broadcast_to(np.float32([0, 0, 1, 0]), points.shape)
+    textures = {
+        "points": texture_from(renderer.device, points, "rgba32float"),
+        "normals": texture_from(renderer.device, normals, "rgba32float"),
+    }
+    seen = []
+    records = light_records(renderer.stages.shade.program, scene, views)
+    for one in records["light"][: len(views)].copy():
+        records["light"][0] = one
+        towards, _ = probe(
+            renderer.device,
+            "light_probe",
+            (SIZE, SIZE),
+            ["towards", "arriving"],
+            SHAPED,
+            **(inputs.lit | {"lights": records}),
+            **textures,
+            part={"index": 0},
+        )
+        seen.append(towards[..., 3].ravel())
+    return x.ravel().astype(float), np.mean(seen, axis=0)
+
+
+@pytest.mark.parametrize("kind", ["rectangle", "sphere", "sun"])
+def test_a_shadow_fades_as_the_light_is_wide(renderer: Renderer, kind: str) -> None:
+    """A plate from x = -30 to 0 at 12 mm, a light 60 mm wide 300 mm up: a penumbra of 2.5 mm."""
+    wide = 60.0 * 12.0 / (300.0 - 12.0)
+    light: Light = {
+        "rectangle": RectangleLight(**above(PLATE, 300.0, width_mm=60, height_mm=60, softness_mm=0.1)),
+        "sphere": SphereLight(**above(PLATE, 300.0, radius_mm=30, softness_mm=0.1)),
+        "sun": DirectionalLight(
+            direction=(0, 0, -1), angle_degrees=2 * np.degrees(np.arctan(30 / 288)), softness_mm=0.1
+        ),
+    }[kind]
+    x, seen = visibility(renderer, PLATE, light)
+    right = x > -15
+    fading = x[right][(seen[right] > 0.1) & (seen[right] < 0.9)]
+    assert np.ptp(fading) == pytest.approx((0.8 if kind == "rectangle" else 0.69) * wide, abs=0.6)
+    assert seen[(x > -25) & (x < -4)].max() < LIT
+    assert seen[(x < -36) | (x > 4)].min() > 1 - LIT
+    assert x[right][np.argmin(np.abs(seen[right] - 0.5))] == pytest.approx(0.0, abs=0.6)
+
+
+@pytest.mark.parametrize("kind", ["rectangle", "sphere", "sun"])
+def test_soft_visibility_is_numpys(renderer: Renderer, kind: str) -> None:
+    """Points in and above the plate's shadow with normals of their own; at texels' edges rounding decides."""
+    light: Light = {
+        "rectangle": RectangleLight(**above(PLATE, 300.0, width_mm=70, height_mm=40)),
+        "sphere": SphereLight(**above(PLATE, 300.0, radius_mm=30)),
+        "sun": DirectionalLight(direction=(0.2, 0.1, -1), angle_degrees=8),
+    }[kind]
+    rng = np.random.default_rng(8)
+    points = rng.uniform([-45, -25, -2], [15, 25, 9], (SIZE, SIZE, 3)).astype(np.float32)
+    normals = light_twins.unit(rng.normal([0, 0, 2], 1, (SIZE, SIZE, 3))).astype(np.float32)
+    inputs = run_frame(renderer, scene_of(PLATE, light), shadow_size=512)
+    textures = {
+        name: texture_from(renderer.device, np.dstack([values, np.ones((SIZE, SIZE))]), "rgba32float")
+        for name, values in {"points": points, "normals": normals}.items()
+    }
+    towards, _ = probe(
+        renderer.device,
+        "light_probe",
+        (SIZE, SIZE),
+        ["towards", "arriving"],
+        SHAPED,
+        **inputs.lit,
+        **textures,
+        part={"index": 0},
+    )
+    depths = download(renderer.device, inputs.shadow_maps.texture).astype(float)
+    record = inputs.lit["lights"]["light"][0]
+    exact = light_twins.visibility(
+        record, depths, points.reshape(-1, 3).astype(float), normals.reshape(-1, 3)
+    )
+    made = towards[..., 3].ravel()
+    assert 0.1 < made.mean() < 0.9
+    off = np.abs(made - exact) > TWIN
+    assert off.mean() < 0.02 and np.abs(made - exact).max() < 0.15
+
+
+def test_shadows_harden_towards_what_casts_them(renderer: Renderer) -> None:
+    """The same light over plates at 4 and at 24 mm: the penumbra grows with the height."""
+    widths = []
+    for height in (4.0, 24.0):
+        head = head_of(
+            joined(
+                (plane(120.0, 6), (0, 0, 0), (0, 0, 0.7)),
+                (plane(30.0, 2), (-15, 0, height), (0.75, 0.75, 0.2)),
+            )
+        )
+        x, seen = visibility(renderer, head, SphereLight(**above(head, 300.0, radius_mm=40, softness_mm=0.1)))
+        right = x > -15
+        widths.append(np.ptp(x[right][(seen[right] > 0.1) & (seen[right] < 0.9)]))
+    assert widths[1] > 4 * widths[0]
+
+
+def test_a_wide_rectangle_is_seen_part_by_part(renderer: Renderer) -> None:
+    """A light as wide as its distance: the shadow's profile is the share of the light that is hidden."""
+    light = RectangleLight(**above(PLATE, 300.0, width_mm=300, height_mm=40, softness_mm=0.1))
+    x, seen = visibility(renderer, PLATE, light)
+    # places u on the light that the plate hides from x: the line crosses z = 12 between -30 and 0
+    u = np.linspace(-150, 150, 3001)[None, :]
+    crossing = x[:, None] + (u - x[:, None]) * 12 / 300
+    exact = 1.0 - ((crossing > -30) & (crossing < 0)).mean(axis=1)
+    assert np.abs(seen - exact).max() < 0.12
+    assert np.abs(seen - exact).mean() < 0.02
+
+
+@pytest.mark.parametrize("kind", ["rectangle", "sphere", "sun"])
+def test_a_ball_does_not_shade_itself(renderer: Renderer, kind: str) -> None:
+    head = head_of(uv_sphere(80.0, 48, 24))
+    light: Light = {
+        "rectangle": RectangleLight(
+            position=place(head, (200, 250, 400)), target=place(head, (0, 0, 0)), width_mm=150
+        ),
+        "sphere": SphereLight(
+            position=place(head, (200, 250, 400)), target=place(head, (0, 0, 0)), radius_mm=60
+        ),
+        "sun": DirectionalLight(direction=(-2, -2.5, -4), angle_degrees=2),
+    }[kind]
+    plain, shaded = (
+        entered(renderer, head, light.model_copy(update={"shadows": shadows}))[0][..., 0]
+        for shadows in (False, True)
+    )
+    assert (shaded <= plain + 1e-6).all()
+    assert (plain - shaded).max() < AREA_LIGHT * plain.max()  # also where a part of the light has set
+
+
+def test_a_sphere_around_the_head_is_refused(renderer: Renderer) -> None:
+    """It shines outwards: within it there is no light."""
+    light = SphereLight(position=(0, 0, 900), target=(0, 0, -5000), radius_mm=1000, shadows=False)
+    with pytest.raises(DermisError, match=r"light 2: expected a head outside the sphere of 1000 mm"):
+        renderer.draw(scene_of(FLOOR, DirectionalLight(direction=(0, 0, -1)), light), settings_of())
+
+
+def test_far_too_many_lights_are_refused_before_their_maps_are_made(renderer: Renderer) -> None:
+    lights = [DirectionalLight(direction=(0, 0, -1))] * 300
+    with pytest.raises(DermisError, match="lights: expected at most 64, but there are 300"):
+        renderer.draw(scene_of(FLOOR, *lights), settings_of())
+
+
+def test_too_many_parts_are_refused(renderer: Renderer) -> None:
+    wide = RectangleLight(position=(0, 0, 700), width_mm=2000, height_mm=2000, shadows=False)
+    with pytest.raises(DermisError, match="72"):
+        renderer.draw(scene_of(FLOOR, *[wide] * 8), settings_of())

@@ -1,0 +1,214 @@
+"""Skin that returns light by its directions, against the closed form of its law and against conservation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from setups import frontal, head_of, place, probe, run_frame, scene_of
+from tolerances import TWIN
+
+from dermis.frame.renderer import Renderer
+from dermis.gpu import download
+from dermis.gpu.textures import texture_from
+from dermis.mesh.primitives import plane, uv_sphere
+from dermis.optics.directions import ROWS, directions, mean_of_once, refracted
+from dermis.optics.gaussians import GaussianSum
+from dermis.optics.profiles import write_profile
+from dermis.scene.camera import Camera
+from dermis.scene.environment import Environment
+from dermis.scene.lights import DirectionalLight, SpotLight
+from dermis.scene.model import Scene
+
+Floats = NDArray[np.float64]
+FLAT, BALL = head_of(plane(100.0)), head_of(uv_sphere(30.0, 64, 32))
+COLOUR = np.array([0.57, 0.33, 0.2])
+DRY = {"specular": "none", "energy": "none"}
+ASLANT = 72.0
+LIGHT = DirectionalLight(direction=(1.0, 0.5, -0.6), irradiance=(3.0, 2.0, 1.0), shadows=False)
+
+
+@pytest.fixture(scope="module")
+def profile(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A file of a profile with a colour of its own."""
+    path = tmp_path_factory.mktemp("profile") / "own.toml"
+    weight = np.outer([0.4, 0.6], COLOUR)
+    write_profile(path, GaussianSum("own", np.array([0.005, 0.4]), weight), {})
+    return str(path)
+
+
+def seen_from(degrees: float) -> Camera:
+    """Far off the plane's middle, so that all of the picture is seen from one direction."""
+    angle = np.radians(degrees)
+    eye = 3e4 * np.array([np.sin(angle), 0.0, np.cos(angle)])
+    return Camera(position=place(FLAT, eye), target=place(FLAT, (0, 0, 0)), frame_mm=4.0)
+
+
+def middle(renderer: Renderer, scene: Scene, **settings: Any) -> Floats:
+    inputs = run_frame(renderer, scene, **({"size": (9, 9), "atlas": 64} | settings))
+    return download(renderer.device, inputs.picture.exposed)[4, 4, :3].astype(float)
+
+
+def law(cosine_in: float, cosine_out: float, eta: float, colour: Floats = COLOUR) -> Floats:
+    """What leaves in a direction over the same from and to straight above on the mean."""
+    told = directions(colour, eta)
+    rows = np.linspace(0.0, 1.0, ROWS)
+    back = np.array([np.interp(np.sqrt(cosine_in), rows, told.returned[:, c]) for c in range(3)])
+    a, b = (np.sqrt(1.0 - (1.0 - c**2) / eta**2) for c in (cosine_in, cosine_out))
+    return np.asarray(back + told.once * (1.0 / (a + b) - mean_of_once(cosine_in, eta)))
+
+
+@pytest.mark.parametrize("surface", [DRY, {}], ids=["matched", "refracting"])
+def test_law_at_all_directions(renderer: Renderer, surface: Any) -> None:
+    """Finite where light comes in along the surface and leaves along it."""
+    eta = 1.0 if surface else 1.4
+    cosines = np.concatenate([[0.0, 1e-7, 1e-4, 3e-3], np.linspace(0.01, 1.0, 12)])
+    pairs = np.stack([*np.meshgrid(cosines, cosines), *np.zeros((2, 16, 16))], axis=-1)
+    turned = scene_of(
+        head_of(plane(100.0), colour=np.tile(COLOUR, (8, 8, 1))), direction="half-space", **surface
+    )
+    bound = run_frame(renderer, turned, technique="none").lit
+    bound |= {"cosines": texture_from(renderer.device, pairs.astype(np.float32), "rgba32float")}
+    back, beyond, around = (
+        made[..., :3]
+        for made in probe(renderer.device, "direction_probe", (16, 16), ["back", "beyond", "around"], **bound)
+    )
+    told = directions(COLOUR, eta)
+    a, b = (np.maximum(refracted(pairs[..., k], eta), 1e-4) for k in (0, 1))
+    rows, place = np.linspace(0.0, 1.0, ROWS), np.sqrt(pairs[..., 0])
+    expected = np.stack([np.interp(place, rows, told.returned[:, c]) for c in range(3)], axis=-1)
+    np.testing.assert_allclose(back, expected, rtol=1e-4)
+    expected = told.once * (1.0 / (a + b) - mean_of_once(pairs[..., 0], eta))[..., None]
+    np.testing.assert_allclose(beyond, expected, rtol=1e-2, atol=2e-3)  # floats round cosines near 0
+    expected = told.once * (mean_of_once(pairs[..., 1], eta) - told.mean_once)[..., None]
+    np.testing.assert_allclose(around, expected, atol=2e-3)
+
+
+@pytest.mark.parametrize("technique", ["none", "texture-space", "screen-space"])
+@pytest.mark.parametrize("surface", [DRY, {"roughness": 0.5, "rho_s": 0.4}], ids=["matched", "refracting"])
+def test_even_light_on_a_plane(
+    renderer: Renderer, close: float, profile: str, surface: Any, technique: str
+) -> None:
+    """Seen and lit aslant, without the lobe's own light."""
+    scene = scene_of(FLAT, LIGHT, camera=seen_from(ASLANT), profile=profile, albedo="profile", **surface)
+    turned = replace(scene, skin=scene.skin.model_copy(update={"direction": "half-space"}))
+    made, plain = (middle(renderer, one, technique=technique, parts="diffuse") for one in (turned, scene))
+    cosine = 0.6 / float(np.linalg.norm(LIGHT.direction))
+    told = law(cosine, float(np.cos(np.radians(ASLANT))), 1.0 if surface is DRY else 1.4)
+    np.testing.assert_allclose(made / plain, told, atol=3 * (TWIN if technique == "none" else close))
+    assert np.abs(told - 1.0).max() > 0.1
+
+
+def test_a_colour_map_counts_by_its_mean(renderer: Renderer) -> None:
+    """Texels that nobody painted are black, and do not count."""
+    colour = np.zeros((64, 64, 3))
+    colour[:48] = [0.5, 0.25, 0.75]
+    scene = scene_of(head_of(plane(100.0), colour=colour), LIGHT, camera=seen_from(ASLANT))
+    turned = replace(scene, skin=scene.skin.model_copy(update={"direction": "half-space"}))
+    made, plain = (middle(renderer, one, technique="none", parts="diffuse") for one in (turned, scene))
+    cosine = 0.6 / float(np.linalg.norm(LIGHT.direction))
+    told = law(cosine, float(np.cos(np.radians(ASLANT))), 1.4, colour[0, 0])
+    np.testing.assert_allclose(made / plain, told, atol=3 * TWIN)
+
+
+@pytest.mark.parametrize("technique", ["none", "texture-space", "pre-integrated"])
+def test_light_from_everywhere(renderer: Renderer, profile: str, technique: str) -> None:
+    """A matched half-space under even light sends out what enters it from there."""
+    room, told = Environment(name="uniform"), directions(COLOUR, 1.0)
+    for degrees in (10.0, 80.0):
+        scene = scene_of(
+            FLAT,
+            camera=seen_from(degrees),
+            profile=profile,
+            albedo="profile",
+            direction="half-space",
+            **DRY,
+        )
+        made = middle(renderer, replace(scene, lights=(), environment=room), technique=technique)
+        expected = told.from_everywhere + told.once * (
+            mean_of_once(np.cos(np.radians(degrees)), 1.0) - told.mean_once
+        )
+        np.testing.assert_allclose(made, COLOUR * expected, rtol=2e-3)
+
+
+def test_what_leaves_in_all_directions_together_is_what_came_back(renderer: Renderer, profile: str) -> None:
+    angles = np.degrees(np.arccos(np.sqrt((np.arange(12) + 0.5) / 12)))
+    for direction, expected in (("lambertian", 1.0), ("half-space", directions(COLOUR, 1.0).returned[-1])):
+        seen = [
+            middle(
+                renderer,
+                scene_of(
+                    FLAT,
+                    frontal(np.pi),
+                    camera=seen_from(degrees),
+                    profile=profile,
+                    albedo="profile",
+                    direction=direction,
+                    **DRY,
+                ),
+            )
+            for degrees in angles
+        ]
+        np.testing.assert_allclose(np.mean(seen, axis=0), COLOUR * expected, rtol=3e-3)
+
+
+@pytest.mark.parametrize("technique", ["texture-space", "screen-space", "pre-integrated"])
+def test_light_from_around_is_not_multiplied_by_what_scattered_once(
+    renderer: Renderer, profile: str, technique: str
+) -> None:
+    """Bumps lit along their surface and seen along it have little below but what came from around."""
+    bumps = np.random.default_rng(1).normal(0.0, 0.5, (256, 256, 2))
+    rough = head_of(uv_sphere(30.0, 128, 64), normal=bumps)
+    light = DirectionalLight(direction=(-1.0, 0.0, 0.1), irradiance=(3.0,) * 3, shadows=False)
+    plain, turned = (
+        download(
+            renderer.device,
+            run_frame(
+                renderer,
+                scene_of(rough, light, profile=profile, albedo="profile", direction=direction, **DRY),
+                size=(192, 192),
+                technique=technique,
+                atlas=256,
+            ).picture.exposed,
+        )[..., :3]
+        for direction in ("lambertian", "half-space")
+    )
+    assert np.isfinite(turned).all() and turned.min() >= 0.0
+    assert (turned.max(axis=(0, 1)) < 1.6 * plain.max(axis=(0, 1))).all()
+
+
+def test_light_that_came_from_beside_leaves_all_ways_alike(renderer: Renderer, profile: str) -> None:
+    """In a shadow nothing scattered only once: no direction is darkened below nothing, nor an edge drawn."""
+    ball = scene_of(
+        BALL,
+        SpotLight(position=place(BALL, (300, 0, 60)), target=place(BALL, (0, 0, 0)), irradiance=(3, 3, 3)),
+        profile=profile,
+        albedo="profile",
+        direction="half-space",
+        **DRY,
+    )
+    plain = replace(ball, skin=ball.skin.model_copy(update={"direction": "lambertian"}))
+    images = [
+        download(renderer.device, run_frame(renderer, scene, atlas=256).picture.exposed)[..., :3]
+        for scene in (ball, plain)
+    ]
+    made, usual = images
+    assert made.min() >= 0.0 and np.isfinite(made).all()
+    dark = (usual.sum(axis=-1) > 0.0) & (usual.sum(axis=-1) < 0.01 * usual.sum(axis=-1).max())
+    assert dark.sum() > 20
+    assert (made[dark] < 3.0 * usual[dark] + 1e-6).all()
+
+
+def test_white_skin_is_not_made_brighter(renderer: Renderer) -> None:
+    """Whatever white skin does not take, it returns already."""
+    scene = scene_of(FLAT, LIGHT, camera=seen_from(0.0), albedo="profile", direction="half-space", **DRY)
+    bright = directions(np.ones(3), 1.0)
+    np.testing.assert_allclose(bright.returned, 1.0, atol=1e-3)
+    cosine = 0.6 / float(np.linalg.norm(LIGHT.direction))
+    turned = bright.once * (1.0 / (cosine + 1.0) - mean_of_once(cosine, 1.0))
+    made = middle(renderer, scene, technique="none")
+    expected = np.multiply(LIGHT.irradiance, cosine) / np.pi * (1.0 + turned)
+    np.testing.assert_allclose(made, expected, rtol=2e-3)

@@ -1,0 +1,248 @@
+"""Light from all around in the frame: shader against numpy, against plain sums, and white furnaces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import light_twins as twins
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from setups import entered_light, front_camera, frontal, head_of, probe, run_frame, scene_of, settings_of
+from tolerances import FURNACE, PANORAMA, PREFILTERED
+from twins import DEFAULT_COLOUR, surface, surface_albedo
+
+from dermis.atlas.cached import cached_atlas
+from dermis.environment.mirrors import equivalent_mirrors
+from dermis.environment.panorama import directions, solid_angles
+from dermis.environment.prefilter import prefilter
+from dermis.errors import DermisError
+from dermis.frame.renderer import Renderer
+from dermis.gpu import download
+from dermis.gpu.textures import texture_from
+from dermis.images.io import write_exr
+from dermis.mesh.primitives import plane, uv_sphere
+from dermis.scene.environment import Environment
+from dermis.scene.model import Scene
+from dermis.specular.energy import ENERGY
+
+Floats = NDArray[np.float64]
+SIZE = 32
+BALL = uv_sphere(40.0, 48, 24)
+WHITE = head_of(BALL, colour=np.ones((4, 4, 3)))
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A panorama with a coloured side, a window and a bright lamp that becomes a sun."""
+    towards = directions(64, 128)
+    radiance = 0.5 + 0.4 * towards * [1, 0.5, -0.5]
+    radiance[towards[..., 0] > 0.85] += [2.0, 2.5, 3.0]
+    radiance[towards @ [0.6, 0.64, 0.48] > np.cos(np.radians(5.0))] += [300.0, 250.0, 150.0]
+    path = tmp_path_factory.mktemp("environment") / "room.exr"
+    write_exr(path, radiance.astype(np.float32))
+    return str(path)
+
+
+def around(head: Any, environment: Environment, **skin: Any) -> Scene:
+    return replace(scene_of(head, camera=front_camera(head), **skin), environment=environment)
+
+
+def hemisphere(seed: int) -> Floats:
+    """(n, n, 3) unit vectors in all directions, float32 values."""
+    v = np.random.default_rng(seed).normal(size=(SIZE, SIZE, 3))
+    return twins.unit(v).astype(np.float32).astype(float)
+
+
+def facing(normal: Floats, seed: int) -> Floats:
+    """Unit vectors on the normal's side."""
+    v = hemisphere(seed)
+    return np.where(twins.dot(v, normal)[..., None] > 0, v, -v)
+
+
+def test_functions_are_numpys(renderer: Renderer, room: str) -> None:
+    environment = Environment(name=room, rotation_degrees=70.0, exposure=0.6)
+    lit = run_frame(renderer, around(WHITE, environment), occlusion="none").lit
+    rng = np.random.default_rng(3)
+    normal, smooth = hemisphere(1), hemisphere(2)
+    normal[0] = twins.unit(normal[0] * [0.01, 0, 0.01] + [0, 1, 0])  # within a texel of the poles
+    normal[1] = -normal[0]
+    normal[:2, 0] = [[0, 1, 0], [0, -1, 0]]
+    normal = normal.astype(np.float32).astype(float)
+    view = facing(normal, 4)
+    open_, albedo = (rng.uniform(0, 1, (SIZE, SIZE)).astype(np.float32).astype(float) for _ in range(2))
+    m = rng.uniform(0.06, 1, (SIZE, SIZE)).astype(np.float32).astype(float)
+    textures = {
+        "normals": texture_from(renderer.device, np.dstack([normal, open_]), "rgba32float"),
+        "smooth_normals": texture_from(renderer.device, np.dstack([smooth, albedo]), "rgba32float"),
+        "views": texture_from(renderer.device, np.dstack([view, m]), "rgba32float"),
+    }
+    entering, mirror = probe(
+        renderer.device, "environment_probe", (SIZE, SIZE), ["around", "mirror"], **lit, **textures
+    )
+    layers, record = prefilter(room).layers.astype(float), lit["environment"]
+    exact = twins.ambient(layers, record, normal, open_, albedo[..., None])
+    assert np.abs(entering[..., :3] - exact).max() < PANORAMA * exact.max()
+    exact = twins.mirrored(layers, record, smooth, normal, view, m, open_)
+    assert np.abs(mirror[..., :3] - exact).max() < PANORAMA * exact.max()
+
+
+@pytest.mark.parametrize("rotation", [0.0, 90.0])
+def test_what_enters_is_the_sum_over_all_directions(renderer: Renderer, room: str, rotation: float) -> None:
+    """Each texel of a ball: the panorama's texels times their cosines; the sun shines as a light."""
+    scene = around(
+        head_of(BALL), Environment(name=room, rotation_degrees=rotation, exposure=2.0), rho_s=0.0, mix=0.0
+    )
+    inputs = run_frame(renderer, scene, occlusion="none", shadow_size=1024)
+    assert inputs.suns == 1
+    entered = entered_light(renderer, inputs)[..., :3]
+    atlas = cached_atlas(BALL, 64)
+    _, normals = surface(atlas, scene.head)
+    radiance = 2.0 * np.asarray(_read(room))
+    towards = directions(64, 128).reshape(-1, 3)
+    turn = np.radians(rotation)
+    c, s = np.cos(turn), np.sin(turn)
+    towards = towards @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T
+    light = (radiance * solid_angles(64, 128)[..., None]).reshape(-1, 3)
+    picked = [(y, x) for y in (12, 24, 40, 52) for x in (5, 20, 33, 50)]
+    exact = np.array([np.maximum(towards @ normals[at], 0) @ light for at in picked])
+    made = np.array([entered[at] for at in picked])
+    assert (
+        np.abs(made - exact).max() < 0.01 * exact.max()
+    )  # the lamp is 10 degrees wide, a sun has one direction
+
+
+def _read(path: str) -> Any:
+    from dermis.images.io import read_image
+
+    return read_image(Path(path))
+
+
+def middle(image: Floats) -> Floats:
+    """Pixels wholly on the ball."""
+    return np.asarray(image[..., :3][image[..., 3] == 1])
+
+
+@pytest.mark.parametrize("energy", ["none", "full"])
+@pytest.mark.parametrize("rho_s", [0.0, 0.18, 1.0])
+def test_a_white_ball_in_a_furnace(renderer: Renderer, rho_s: float, energy: str) -> None:
+    """As much leaves as arrives; without an energy term the surface's own share comes on top."""
+    scene = around(WHITE, Environment(name="uniform"), rho_s=rho_s, roughness=0.3, energy=energy)
+    inputs = run_frame(renderer, scene, occlusion="none", size=(64, 64), atlas=128)
+    seen = middle(download(renderer.device, inputs.picture.exposed).astype(float))
+    albedo, mean = surface_albedo(np.linspace(0.0, 1, 200), 0.3)
+    expected = ENERGY[energy].furnace(albedo, mean, rho_s)
+    assert seen.min() > expected.min() - FURNACE and seen.max() < expected.max() + FURNACE
+    if energy == "full" or rho_s == 0.0:
+        assert seen.mean() == pytest.approx(1.0, abs=FURNACE)
+        assert seen.max() < 1.01
+
+
+def test_a_plain_sky_fills_everything_evenly(renderer: Renderer) -> None:
+    """A matte plane under radiance 3 of its colour, at any rotation."""
+    head = head_of(plane(100.0))
+    environment = Environment(name="uniform", exposure=3.0, rotation_degrees=33.0)
+    scene = around(head, environment, rho_s=0.0)
+    inputs = run_frame(renderer, scene, occlusion="none", atlas=128)
+    image = download(renderer.device, inputs.picture.exposed).astype(float)
+    assert np.allclose(middle(image), 3.0 * DEFAULT_COLOUR, rtol=PREFILTERED)
+
+
+def test_an_environment_adds_to_lights(renderer: Renderer, close: float) -> None:
+    """And costs nothing when there is none: its stages are not drawn, its texture is a single texel."""
+    head = head_of(plane(100.0))
+    both = replace(scene_of(head, frontal()), environment=Environment(name="uniform"))
+    one, other, sum_ = (
+        download(renderer.device, run_frame(renderer, scene, occlusion="none").picture.exposed)[..., :3]
+        for scene in (scene_of(head, frontal()), around(head, Environment(name="uniform")), both)
+    )
+    assert np.abs(one + other - sum_).max() < close * sum_.max()
+    plain = renderer.prepare(scene_of(head, frontal()), settings_of())
+    assert plain.constants == plain.light_constants == ()
+    lit = plain.lit
+    assert lit["panorama"].size[:2] == lit["occlusion_map"].size[:2] == (1, 1)
+
+
+@pytest.mark.parametrize("model", ["kelemen", "phong"])
+def test_reflections_follow_the_model_in_use(renderer: Renderer, model: str) -> None:
+    scene = around(WHITE, Environment(name="uniform"), specular=model)
+    record = run_frame(renderer, scene, occlusion="none").lit["environment"]
+    table = equivalent_mirrors(model).reshape(-1, 3)
+    assert np.abs(record["mirrors"][:, :3] - table).max() < 1e-6
+
+
+def test_exposure_is_a_factor_of_suns_too(renderer: Renderer, room: str, close: float) -> None:
+    """Also far beyond what a light that is written down may give."""
+    plain, bright = (
+        download(
+            renderer.device,
+            run_frame(renderer, around(WHITE, Environment(name=room, exposure=e))).picture.exposed,
+        )[..., :3]
+        for e in (1.0, 1e6)
+    )
+    assert np.abs(bright / 1e6 - plain).max() < close * plain.max()
+
+
+def test_suns_count_among_the_lights(renderer: Renderer, room: str) -> None:
+    full = replace(scene_of(head_of(plane(50.0)), *[frontal()] * 64), environment=Environment(name=room))
+    with pytest.raises(DermisError, match="65, with the environment's suns"):
+        renderer.draw(full, settings_of(occlusion="none"))
+
+
+@pytest.mark.parametrize("rotation", [60.0, -150.0])
+def test_it_is_seen_behind_the_head(renderer: Renderer, room: str, rotation: float) -> None:
+    """Where each pixel's ray goes; turned by 60 degrees the window is in the picture's right."""
+    environment = Environment(name=room, rotation_degrees=rotation, exposure=0.5, visible=True)
+    camera = front_camera(WHITE, frame_mm=600.0)
+    scene = replace(scene_of(WHITE, camera=camera), environment=environment)
+    inputs = run_frame(renderer, scene, occlusion="none", exposure=2.0, background=(9, 9, 9))
+    image = download(renderer.device, inputs.picture.exposed).astype(float)
+    y, x = np.mgrid[:48, :48]
+    ray = twins.unit(np.dstack([x - 23.5, 23.5 - y, np.full(x.shape, -24.0)]))  # 45 degrees to each side
+    exact = 2 * twins.panorama_at(prefilter(room).layers[1].astype(float), inputs.lit["environment"], ray)
+    free = image[..., 3] == 0
+    assert free.sum() > 1000
+    assert np.abs(image[..., :3] - exact)[free].max() < PANORAMA * exact.max()
+    if rotation == 60.0:
+        assert image[24, 38, 2] > 2 * image[24, 9, 2]
+
+
+def test_a_colour_is_behind_the_head_unless_asked(renderer: Renderer, room: str) -> None:
+    scene = around(WHITE, Environment(name=room))
+    image = download(renderer.device, run_frame(renderer, scene, background=(0, 1, 0)).picture.exposed)
+    assert np.allclose(image[0, 0], [0, 1, 0, 0])
+
+
+def test_the_poles_are_no_seams(renderer: Renderer, tmp_path: Path) -> None:
+    """Half of the sky is bright: across the zenith its reflection changes by steps, not by a leap."""
+    radiance = np.where(directions(64, 128)[..., :1] > 0, [1.0, 1.0, 1.0], [0.0, 0.0, 0.0])
+    write_exr(tmp_path / "half.exr", radiance.astype(np.float32))
+    lit = run_frame(
+        renderer, around(WHITE, Environment(name=str(tmp_path / "half.exr"))), occlusion="none"
+    ).lit
+    angle = np.radians(np.linspace(-3, 3, SIZE * SIZE)).reshape(SIZE, SIZE)
+    normal = np.dstack([np.sin(angle), np.cos(angle), 0 * angle, 1 + 0 * angle])
+    view = np.dstack([normal[..., :3], np.full((SIZE, SIZE), 0.05)])
+    textures = {
+        name: texture_from(renderer.device, values, "rgba32float")
+        for name, values in {"normals": normal, "smooth_normals": normal, "views": view}.items()
+    }
+    _, mirror = probe(
+        renderer.device, "environment_probe", (SIZE, SIZE), ["around", "mirror"], **lit, **textures
+    )
+    seen = mirror[..., 0].ravel()
+    assert np.diff(seen).max() < 2 * np.median(np.diff(seen))
+    assert seen[0] < 0.4 and seen[-1] > 0.6
+
+
+def test_light_follows_the_rotation(renderer: Renderer, room: str) -> None:
+    """The window is in the picture's right, at the head's left; half a turn brings it to the other side."""
+    left_right = []
+    for degrees in (0.0, 180.0):
+        scene = around(WHITE, Environment(name=room, rotation_degrees=degrees), rho_s=0.0)
+        image = download(renderer.device, run_frame(renderer, scene, occlusion="none").picture.exposed)
+        left_right.append((image[24, 14, 2], image[24, 33, 2]))
+    assert left_right[0][1] > 1.2 * left_right[0][0]
+    assert left_right[1][0] > 1.2 * left_right[1][1]

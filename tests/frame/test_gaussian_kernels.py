@@ -1,0 +1,47 @@
+"""Sampled Gaussians: exact in sum and variance, and no wider than their taps."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from tolerances import KERNEL_VARIANCE
+
+from dermis.frame.gaussian_kernels import ROWS_PER_UNIT, TRUNCATION, WIDEST, kernel, kernel_table, taps
+
+VARIANCES = [0.001, 0.02, 0.3, 0.5, 0.999, 1.0, 1.7, 2.3, 4.0, 6.5, 8.99, 9.0]
+
+
+@pytest.mark.parametrize("variance", VARIANCES)
+def test_sum_and_variance(variance: float) -> None:
+    weights = kernel(variance)
+    n = np.arange(len(weights)) - len(weights) // 2
+    assert weights.sum() == pytest.approx(1.0, abs=1e-12)
+    assert (weights * n**2).sum() == pytest.approx(variance, abs=KERNEL_VARIANCE)
+    assert np.array_equal(weights, weights[::-1]) and (weights >= 0).all()
+
+
+@pytest.mark.parametrize("variance", VARIANCES)
+def test_taps_reach_the_truncation(variance: float) -> None:
+    assert taps(variance) == math.ceil(TRUNCATION * math.sqrt(variance))
+    assert len(kernel(variance)) == 2 * taps(variance) + 1
+
+
+def test_no_variance_is_no_blur() -> None:
+    assert kernel(0.0).tolist() == [1.0]
+
+
+@pytest.mark.parametrize("variance", [1.0, 4.0, 9.0])
+def test_a_wide_kernel_is_the_gaussian(variance: float) -> None:
+    weights = kernel(variance)
+    n = np.arange(len(weights)) - len(weights) // 2
+    exact = np.exp(-(n**2) / (2 * variance)) / math.sqrt(2 * math.pi * variance)
+    assert np.abs(weights - exact).max() < 0.01 * exact.max()
+
+
+def test_table_covers_the_widest_kernel() -> None:
+    """Row `WIDEST * ROWS_PER_UNIT` and the next are read; each column used there holds a ratio in 0..1."""
+    table = kernel_table()
+    assert table.shape == (WIDEST * ROWS_PER_UNIT + 2, taps(WIDEST) + 1)
+    assert ((table >= 0) & (table <= 1)).all()

@@ -1,0 +1,67 @@
+"""The blurs as published, with the faults that are known of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dermis.atlas.atlas import build_atlas
+from dermis.frame.atlas_textures import upload_atlas
+from dermis.frame.frame import Stages
+from dermis.gpu import Device, Frame, download, upload
+from dermis.mesh.primitives import plane
+
+SIZE = 256
+TEXELS_PER_MM = 4.0
+VARIANCES = np.array([0.0484, 0.187, 0.567, 1.99])
+
+
+@pytest.fixture(scope="module")
+def levels(device: Device, stages: Stages) -> list[np.ndarray]:
+    """A lit texel spread over a plane."""
+    atlas = build_atlas(plane(SIZE / TEXELS_PER_MM), SIZE)
+    space = stages.published.make_levels(SIZE, len(VARIANCES))
+    light = np.zeros((SIZE, SIZE, 4))
+    light[..., 3] = 1.0
+    light[SIZE // 2, SIZE // 2, :3] = 1000.0
+    upload(device, space.stack, light)
+    frame = Frame(device)
+    stages.published.draw(frame, space, upload_atlas(device, atlas), VARIANCES)
+    frame.submit()
+    return [
+        download(device, space.stack, layer=k + 1)[..., 0].astype(float) / 1000.0
+        for k in range(len(VARIANCES))
+    ]
+
+
+def test_it_gains_a_thousandth_and_loses_more_to_its_halves(levels: list[np.ndarray]) -> None:
+    """The seven weights sum to 1.001 in each pass; halves are cut off, not rounded, on some adapters."""
+    for k, level in enumerate(levels, start=1):
+        assert 0.985 < level.sum() < 1.002 ** (2 * k)
+
+
+def test_it_is_too_wide(levels: list[np.ndarray]) -> None:
+    """By the weights' variance of 1.08, and by reading between texels where steps are under one."""
+    y, x = np.indices((SIZE, SIZE)) - SIZE // 2
+    for level, variance in zip(levels, VARIANCES, strict=True):
+        wide = (level * (x**2 + y**2)).sum() / (2 * level.sum() * TEXELS_PER_MM**2)
+        assert 1.05 < wide / variance < 1.6
+
+
+def test_between_seven_taps_there_are_gaps(levels: list[np.ndarray]) -> None:
+    """A wide Gaussian of a narrow source shows its taps."""
+    row = levels[-1][SIZE // 2]
+    exact = np.exp(-((np.arange(SIZE) - SIZE // 2) ** 2) / (2 * VARIANCES[-1] * TEXELS_PER_MM**2))
+    assert np.abs(row / row.max() - exact)[SIZE // 2 - 12 : SIZE // 2 + 13].max() > 0.01
+
+
+def test_the_clear_colour_takes_no_light_away(device: Device, stages: Stages) -> None:
+    """Weights of 1.001 make no texel more than covered, which would take that colour's light off."""
+    space = stages.published.make_levels(SIZE, len(VARIANCES))
+    upload(device, space.stack, np.dstack([np.zeros((SIZE, SIZE, 3)), np.ones((SIZE, SIZE))]))
+    frame = Frame(device)
+    atlas = upload_atlas(device, build_atlas(plane(SIZE / TEXELS_PER_MM), SIZE))
+    stages.published.draw(frame, space, atlas, VARIANCES, clear=(0.5, 0.35, 0.3))
+    frame.submit()
+    dark = download(device, space.stack, layer=len(VARIANCES))
+    assert np.abs(dark[8:-8, 8:-8, :3]).max() == 0.0 and dark[8:-8, 8:-8, 3].max() == 1.0

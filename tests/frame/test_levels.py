@@ -1,0 +1,186 @@
+"""Levels of less resolution and of halves against whole levels of floats."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from tolerances import FLAT, HALVED, HALVES, SPREAD_ENERGY
+
+from dermis.atlas.atlas import Atlas, build_atlas
+from dermis.frame.atlas_textures import AtlasTextures, _coarser, upload_atlas
+from dermis.frame.coarser import Sheet, halved
+from dermis.frame.levels import FLOATS, halvings_of, scale_of
+from dermis.frame.passes.combine import Combine
+from dermis.frame.passes.diffuse import Diffuse
+from dermis.gpu import Device, Frame, download, make_texture, upload
+from dermis.mesh.primitives import plane
+from dermis.optics.profiles import load_profile
+from dermis.reference.cut_meshes import cut_sphere
+
+Floats = NDArray[np.float64]
+HALF = "rgba16float"
+PROFILE = load_profile("gpu-gems-3")
+BLURRED, WEIGHT = PROFILE.variance_mm2[1:], PROFILE.weight[1:]
+SPHERE = cut_sphere(12.0, 20)
+
+
+@pytest.fixture(scope="module")
+def atlas() -> Atlas:
+    """Fine enough for light to be halved twice."""
+    return build_atlas(SPHERE, 256, "stitched")
+
+
+@pytest.fixture(scope="module")
+def textures(device: Device, atlas: Atlas) -> AtlasTextures:
+    return upload_atlas(device, atlas)
+
+
+def test_halvings_are_the_same_from_disk(
+    device: Device, atlas: Atlas, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    first, second = upload_atlas(device, atlas), upload_atlas(device, atlas)
+    assert len(list(tmp_path.rglob("*.npz"))) == 1 and len(first.coarser) == len(second.coarser) == 3
+    sheet = Sheet(download(device, first.resources["stretch_map"]), atlas.reach, atlas.gutter, atlas.source)
+    for one, other in zip(first.coarser, second.coarser, strict=True):
+        sheet = halved(sheet)
+        expected = np.concatenate([part.view(np.uint32) for part in (sheet.metric, sheet.reach)], axis=-1)
+        for made in (one, other):
+            assert np.array_equal(download(device, made.resources["sheet_map"]), expected)
+        gutters = [device.handle.queue.read_buffer(made.gutter).tobytes() for made in (one, other)]
+        words = np.concatenate([sheet.source.view(np.uint32), sheet.gutter], axis=1, dtype=np.uint32)
+        assert one.sheared == other.sheared and gutters == [words.tobytes()] * 2
+
+
+@pytest.fixture(scope="module")
+def stripes(atlas: Atlas) -> Floats:
+    """Bands of light with hard ends over the sphere."""
+    y = atlas.interpolate(SPHERE, SPHERE.positions)[..., 1]
+    light = (np.sin(y / 1.5) > 0)[..., None] * np.array([1.0, 0.6, 0.3]) + 0.01
+    return np.dstack([light, np.ones(y.shape)]) * atlas.own[..., None]
+
+
+def combined(
+    device: Device, texel: str, textures: AtlasTextures, light: Floats, scale: float = 1.0
+) -> tuple[Floats, tuple[int, ...]]:
+    """The sum of the blurred levels, and how often each was halved."""
+    diffuse, side = Diffuse(device, texel), len(light)
+    space, into = diffuse.make_levels(side, len(BLURRED)), make_texture(device, (side, side), FLOATS)
+    upload(device, space.stack, light * [scale, scale, scale, 1.0])
+    frame = Frame(device)
+    diffuse.draw(frame, space, textures, BLURRED, scale=scale)
+    Combine(device).draw(frame, space, WEIGHT, into)
+    frame.submit()
+    return download(device, into)[..., :3].astype(float), space.halvings
+
+
+def error(made: Floats, exact: Floats, own: NDArray[np.bool_]) -> float:
+    """Relative RMSE."""
+    return float(np.sqrt(((made - exact)[own] ** 2).mean() / (exact[own] ** 2).mean()))
+
+
+@pytest.mark.parametrize("texel", [FLOATS, HALF])
+def test_coarser_levels_show_the_same(
+    device: Device, atlas: Atlas, textures: AtlasTextures, stripes: Floats, texel: str
+) -> None:
+    whole, once = combined(device, FLOATS, replace(textures, coarser=()), stripes)
+    made, halvings = combined(device, texel, textures, stripes)
+    assert max(once) == 0 and max(halvings) == 2
+    assert error(made, whole, atlas.own) < HALVED
+    assert made[atlas.own].sum() == pytest.approx(whole[atlas.own].sum(), rel=SPREAD_ENERGY)
+
+
+@pytest.mark.parametrize("texel", [FLOATS, HALF])
+def test_constant_light_stays_constant_at_every_resolution(
+    device: Device, atlas: Atlas, textures: AtlasTextures, texel: str
+) -> None:
+    made, _ = combined(device, texel, textures, np.ones((256, 256, 4)) * atlas.own[..., None])
+    close = FLAT if texel == FLOATS else HALVES
+    assert np.abs(made[atlas.own] / WEIGHT.sum(axis=0) - 1).max() < close
+
+
+def test_what_halving_adds_too_much_is_taken_off_the_next_level(device: Device) -> None:
+    """Texels of 1 mm: the second level widens by 0.4 mm2, halving alone by 1, which the third makes good."""
+    atlas = build_atlas(plane(256.0), 256)
+    metric = np.zeros((256, 256, 4), np.float16)
+    metric[..., :2] = atlas.stretch
+    coarser = _coarser(device, Sheet(metric, atlas.reach, atlas.gutter, atlas.source))
+    textures = replace(upload_atlas(device, atlas), coarser=coarser, usual_per_mm=2.0)
+    variances, diffuse = np.array([0.5, 0.9, 3.0]), Diffuse(device, FLOATS)
+    space, light = diffuse.make_levels(256, 3), np.zeros((256, 256, 4))
+    light[..., 3], light[128, 128, :3] = 1.0, 1.0
+    upload(device, space.stack, light)
+    frame = Frame(device)
+    diffuse.draw(frame, space, textures, variances)
+    frame.submit()
+    assert space.halvings == (0, 0, 1, 1)
+    for level, variance in ((2, 0.5 + 1.0), (3, 3.0)):
+        made = download(device, space.stack, layer=level, mip=1)[..., 0].astype(float)
+        x = 2 * np.arange(128) + 0.5 - 128  # from the lit texel [mm]
+        middle = (made.sum(axis=0) @ x) / made.sum()
+        wide = (made.sum(axis=0) @ (x - middle) ** 2) / made.sum()
+        assert wide == pytest.approx(variance - 4 * 3 / 16, rel=0.01)  # what reading between texels will add
+
+
+@pytest.mark.parametrize("brightest", [1.0, 5e5, 3e-6, 1e9])
+def test_halves_keep_the_light(
+    device: Device, atlas: Atlas, textures: AtlasTextures, stripes: Floats, brightest: float
+) -> None:
+    """In amount and in place, however bright it is; were they cut off, each pass would lose a 4000th."""
+    light = stripes * [brightest, brightest, brightest, 1.0]
+    floats, _ = combined(device, FLOATS, textures, light)
+    halves, _ = combined(device, HALF, textures, light, scale_of(HALF, brightest))
+    assert error(halves, floats, atlas.own) < HALVES
+    assert halves[atlas.own].sum() == pytest.approx(floats[atlas.own].sum(), rel=HALVES / 4)
+
+
+@pytest.mark.parametrize("brightest", [0.0, 5e-324, 1e-40, 1e-30, 0.3, 3.0, 1e12])
+def test_scales_are_powers_of_two(brightest: float) -> None:
+    """Those that a shader's float holds, however little light there is."""
+    scale = scale_of(HALF, brightest)
+    assert np.frexp(scale)[0] == 0.5 and scale * brightest <= 16
+    assert scale < np.finfo(np.float32).max and 1 / scale > np.finfo(np.float32).tiny
+    assert scale_of(FLOATS, brightest) == 1.0
+
+
+@pytest.mark.parametrize(("texels_per_mm", "most"), [(0.5, 3), (3.0, 3), (30.0, 3), (30.0, 1), (1e6, 3)])
+def test_resolution_falls_step_by_step(texels_per_mm: float, most: int) -> None:
+    found = halvings_of(BLURRED, texels_per_mm, most)
+    assert len(found) == len(BLURRED) + 1 and found[:2] == (0, 0)
+    assert set(np.diff(found)) <= {0, 1} and max(found) <= most
+    assert (max(found) > 0) == (texels_per_mm > 1.0)
+
+
+def test_a_halved_atlas_is_the_same_surface(atlas: Atlas) -> None:
+    """Stretch of half as many texels, runs of half the length, and gutters that show the same places."""
+    metric = np.zeros((256, 256, 4), np.float16)
+    metric[..., :2], metric[..., 2] = atlas.stretch, atlas.shear
+    metric[atlas.coverage & ~atlas.own, 3] = 1
+    coarse = halved(Sheet(metric, atlas.reach, atlas.gutter, atlas.source))
+    own = (coarse.metric[..., 0] > 0) & (coarse.metric[..., 3] == 0)
+    y, x = np.nonzero(own)
+    assert np.median(coarse.metric[y, x, :2] / atlas.stretch[2 * y, 2 * x].clip(1e-3)) == pytest.approx(
+        0.5, 1e-2
+    )
+    assert (2 * coarse.reach[..., 0] <= atlas.reach[::2, ::2, 0].max() + 1).all()
+    assert own[atlas.own[::2, ::2]].all() and len(coarse.gutter) > 50
+    assert not own[coarse.gutter[:, 1], coarse.gutter[:, 0]].any()
+    sources = np.rint(coarse.source).astype(int)
+    assert own[sources[:, 1], sources[:, 0]].mean() > 0.98
+    apart = shown_apart(atlas, coarse)
+    assert np.percentile(apart, 98) < 1.5  # texels of the whole atlas, between what shows at the same place
+
+
+def shown_apart(atlas: Atlas, coarse: Sheet) -> Any:
+    """Distance from the source of each halved texel to the mean of those of its four [texel]."""
+    source = np.full((256, 256, 2), np.nan)
+    source[atlas.gutter[:, 1], atlas.gutter[:, 0]] = atlas.source
+    x, y = 2 * coarse.gutter.astype(int).T
+    four = np.stack([source[y + j, x + i] for j in (0, 1) for i in (0, 1)])
+    whole = np.isfinite(four).all(axis=(0, 2)) & (np.ptp(four, axis=0).max(axis=-1) < 3)
+    return np.linalg.norm(four[:, whole].mean(axis=0) - (2 * coarse.source[whole] + 0.5), axis=-1)

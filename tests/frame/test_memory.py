@@ -1,0 +1,108 @@
+"""What a renderer holds of the device's memory: no more than its last frame needs, and what was foreseen."""
+
+from __future__ import annotations
+
+import gc
+import re
+import weakref
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from setups import frontal, head_of, scene_of, settings_of
+
+from dermis.frame.limits import atlas_texel_bytes
+from dermis.frame.renderer import Renderer
+from dermis.gpu import Device
+from dermis.mesh.primitives import uv_sphere
+from dermis.scene.settings import Settings
+
+SCENE = scene_of(head_of(uv_sphere(30.0, 24, 12)), frontal())
+KINDS: dict[str, dict[str, Any]] = {
+    "texture-space": {},
+    "two layouts": {"seams": "multi-uv"},
+    "published": {"technique": "published"},
+    "screen-space": {"technique": "screen-space"},
+    "pre-integrated": {"technique": "pre-integrated"},
+    "none": {"technique": "none"},
+    "bloom": {"bloom": 0.3},
+}
+
+
+def bytes_of(texel: str) -> int:
+    """Of a texel in one of wgpu's formats, such as rgba16float."""
+    channels, bits = re.fullmatch(r"(r|rg|rgba|depth)(\d+)[a-z-]+", texel).groups()  # type: ignore[union-attr]
+    return len(channels.replace("depth", "d")) * int(bits) // 8
+
+
+class Held:
+    """The textures and buffers of a device that are still alive."""
+
+    def __init__(self, device: Device, patch: pytest.MonkeyPatch) -> None:
+        self._alive: list[tuple[weakref.ref[Any], int]] = []
+        handle = device.handle
+        for name in ("create_texture", "create_buffer", "create_buffer_with_data"):
+            patch.setattr(handle, name, self._counting(getattr(handle, name)))
+
+    def _counting(self, create: Callable[..., Any]) -> Callable[..., Any]:
+        def counted(*args: Any, **kwargs: Any) -> Any:
+            made = create(*args, **kwargs)
+            size = made.size
+            if not isinstance(size, int):
+                width, height, layers = size
+                texels = sum((width >> mip) * (height >> mip) for mip in range(made.mip_level_count))
+                size = texels * layers * bytes_of(made.format)
+            self._alive.append((weakref.ref(made), size))
+            return made
+
+        return counted
+
+    def bytes(self) -> int:
+        gc.collect()
+        return sum(size for made, size in self._alive if made() is not None)
+
+
+def chosen(kind: str) -> Settings:
+    return settings_of(**({"atlas": 256, "size": (64, 64), "transmission": "none"} | KINDS[kind]))
+
+
+@pytest.fixture
+def held(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> Held:
+    renderer.forget()
+    return Held(renderer.device, monkeypatch)
+
+
+def test_a_frame_leaves_nothing_of_the_one_before(renderer: Renderer, held: Held) -> None:
+    """Whatever came before, as much is held as by a renderer without a past."""
+    alone = {}
+    for kind in KINDS:
+        renderer.forget()
+        renderer.draw(SCENE, chosen(kind))
+        alone[kind] = held.bytes()
+    for kind in (*KINDS, *reversed(KINDS)):
+        renderer.draw(SCENE, chosen(kind))
+        assert held.bytes() == alone[kind], kind
+
+
+@pytest.mark.parametrize("kind", ["texture-space", "two layouts", "published", "none"])
+def test_the_atlas_takes_what_was_foreseen(renderer: Renderer, held: Held, kind: str) -> None:
+    """The difference of two sizes, so that all that has another size does not count."""
+    if renderer.device.adapter.kind != "CPU":
+        pytest.skip("only a software adapter takes main memory, and levels of floats")
+    found = {}
+    for side in (256, 512):
+        renderer.forget()
+        renderer.draw(SCENE, chosen(kind).model_copy(update={"atlas": side}))
+        found[side] = held.bytes()
+    levels = 0 if kind == "none" else 5
+    layouts = 2 if kind == "two layouts" else 1
+    foreseen = atlas_texel_bytes(chosen(kind).technique, levels, layouts) if levels else 0
+    assert (found[512] - found[256]) / (512**2 - 256**2) == foreseen
+
+
+def test_techniques_without_an_atlas_ask_for_none(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Even where no device could hold it."""
+    monkeypatch.setattr(renderer.device, "max_texture_size", 2048)
+    assert renderer.draw(SCENE, settings_of(technique="none", atlas=16384)).linear().max() > 0.1

@@ -1,0 +1,30 @@
+"""The mesh reads the same from buffers as from textures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from setups import frontal, head_of, probe, run_frame, scene_of
+
+from dermis.atlas.cached import cached_atlas
+from dermis.frame import geometry
+from dermis.frame.renderer import Renderer
+from dermis.mesh.primitives import uv_sphere
+
+BALL = head_of(uv_sphere(30.0, 24, 12))
+IN_BUFFERS = (("MESH_IN_BUFFERS", 1),)
+
+
+def test_buffers_hold_what_textures_hold(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    inputs = run_frame(renderer, scene_of(BALL, frontal()), atlas=64)
+    monkeypatch.setattr(geometry, "mesh_constants", lambda _: IN_BUFFERS)
+    held = geometry.upload_geometry(renderer.device, BALL.mesh, cached_atlas(BALL.mesh, 64))
+    atlas = inputs.layouts[0].atlas.resources["atlas"]
+    bound = inputs.lit | held | {"atlas": atlas, "footprint": {"side": 1 / 64}}
+    outputs = ["relief", "arriving"]
+    for one, other in zip(
+        probe(renderer.device, "surface_probe", (64, 64), outputs, **bound),
+        probe(renderer.device, "surface_probe", (64, 64), outputs, IN_BUFFERS, **bound),
+        strict=True,
+    ):
+        assert (one != 0).any() and np.array_equal(one, other)

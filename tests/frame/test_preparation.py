@@ -1,0 +1,105 @@
+"""What moves from frame to frame does not have everything else made again, and does not stay behind."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from setups import front_camera, frontal, head_of, scene_of, settings_of
+
+from dermis.frame.renderer import Renderer
+from dermis.mesh.primitives import uv_sphere
+from dermis.scene.environment import Environment
+from dermis.scene.lights import PointLight
+from dermis.scene.model import Scene
+
+BALL = head_of(uv_sphere(30.0, 24, 12))
+LAMP = PointLight(position=(0.0, 80.0, 300.0))
+
+
+def scene(**changed: Any) -> Scene:
+    return replace(scene_of(BALL, LAMP, camera=front_camera(BALL, frame_mm=70.0)), **changed)
+
+
+def made(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Grows whenever something is made that stands."""
+    log: list[int] = []
+    maker = renderer._preparation._maker
+    make = maker.make
+
+    def counted(*given: Any) -> Any:
+        log.append(1)
+        return make(*given)
+
+    monkeypatch.setattr(maker, "make", counted)
+    return log
+
+
+def moved(k: int) -> Scene:
+    """A frame with lamp and camera at other places."""
+    lamp = LAMP.model_copy(update={"position": (10.0 * k, 80.0, 300.0)})
+    plain = scene()
+    x, y, z = plain.camera.position
+    return scene(lights=(lamp,), camera=plain.camera.model_copy(update={"position": (x + k, y, z)}))
+
+
+def test_cameras_and_lights_leave_the_rest(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    log, settings = made(renderer, monkeypatch), settings_of()
+    found = [renderer.prepare(moved(k), settings) for k in range(3)]
+    assert len(log) == 1
+    assert len({one.shadow_key for one in found}) == 3
+    assert len({one.view.tobytes() for one in found}) == 3
+    assert len({one.camera.clips.tobytes() for one in found}) == 3
+    assert len({one.lit["lights"].tobytes() for one in found}) == 3
+    assert len({id(one.levels) for one in found}) == 1
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"lights": (LAMP, LAMP)},
+        {"lights": (LAMP.model_copy(update={"shadows": False}),)},
+        {"head": head_of(uv_sphere(30.0, 20, 10))},
+        {"skin": scene().skin.model_copy(update={"roughness": 0.5})},
+        {"environment": Environment(name="uniform")},
+    ],
+    ids=lambda changed: next(iter(changed)),
+)
+def test_all_else_is_seen(
+    renderer: Renderer, changed: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = settings_of()
+    renderer.prepare(scene(), settings)
+    log = made(renderer, monkeypatch)
+    renderer.prepare(scene(**changed), settings)
+    renderer.prepare(scene(), settings.model_copy(update={"exposure": 2.0}))
+    renderer.prepare(scene(), settings.model_copy(update={"exposure": 2.0}), "elsewhere")
+    assert len(log) == 3
+
+
+def test_what_was_drawn_before_is_let_go_of(renderer: Renderer) -> None:
+    """A still scene counts as a round in which nobody asks for anything else."""
+    two = Renderer(renderer.device.adapter.name, depth=2)
+    settings = settings_of()
+    two.prepare(scene(), settings, "left")
+    for _ in range(8):
+        two.prepare(scene(), settings)
+    roles = two._preparation._kept._things
+    assert "levels" in roles and "levelsleft" not in roles
+
+
+def test_frames_that_move_look_as_if_they_were_the_first(renderer: Renderer) -> None:
+    settings = settings_of()
+    for k in range(3):
+        last = renderer.draw(moved(k), settings).linear()
+    renderer.forget()
+    assert np.array_equal(renderer.draw(moved(2), settings).linear(), last)
+
+
+def test_a_light_of_the_same_kind_elsewhere_shines(renderer: Renderer) -> None:
+    settings = settings_of()
+    front = renderer.draw(scene(lights=(frontal(),)), settings).linear()
+    dark = renderer.draw(scene(lights=(frontal(0.01),)), settings).linear()
+    assert front.max() > 50 * dark.max()

@@ -1,0 +1,92 @@
+"""What the skin's surface settings do to one pixel, seen from straight above, against its closed form."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import twins
+from numpy.typing import NDArray
+from setups import front_camera, head_of, run_frame, scene_of
+from tolerances import TWIN
+
+from dermis.frame import surface
+from dermis.frame.renderer import Renderer
+from dermis.gpu import download
+from dermis.mesh.primitives import plane
+from dermis.scene.lights import DirectionalLight
+from dermis.scene.skin import Skin
+from dermis.specular.cosines import cosines
+from dermis.specular.energy import ENERGY
+from dermis.specular.fresnel import FRESNEL
+from dermis.specular.models import MODELS
+
+Floats = NDArray[np.float64]
+Z = np.array([0.0, 0.0, 1.0])
+COLOUR = np.array([0.5, 0.25, 0.75])
+PATCH = head_of(plane(100.0), colour=np.broadcast_to(COLOUR, (8, 8, 3)))
+LIGHT = DirectionalLight(direction=(0.6, 0, -1), irradiance=(2.0, 2.0, 2.0), shadows=False)
+
+
+def pixel(renderer: Renderer, head: Any = PATCH, **skin: Any) -> Floats:
+    """(3,) radiance at the foot of the camera."""
+    scene = scene_of(head, LIGHT, camera=front_camera(head), **skin)
+    inputs = run_frame(renderer, scene, size=(1, 1), technique="none")
+    return download(renderer.device, inputs.picture.exposed).astype(float)[0, 0, :3]
+
+
+def parts(m: float, rho_s: float, model: str, fresnel: str, energy: str) -> tuple[Floats, float]:
+    """(3,) radiance from below and radiance off the surface."""
+    to_light = np.array([-0.6, 0.0, 1.0]) / np.sqrt(1.36)
+    arriving, law = 2.0 * to_light[2], ENERGY[energy]
+    entering = law.enters(twins.surface_albedo([to_light[2]], m, model, fresnel)[0], rho_s)
+    leaving = law.leaves(*twins.surface_albedo([1.0], m, model, fresnel), rho_s)
+    lobe = MODELS[model].lobe(cosines(Z, to_light, Z), m, FRESNEL[fresnel])
+    return arriving * entering * leaving * COLOUR / np.pi, float(arriving * rho_s * lobe)
+
+
+@pytest.mark.parametrize("energy", ENERGY)
+@pytest.mark.parametrize("fresnel", FRESNEL)
+@pytest.mark.parametrize("model", MODELS)
+def test_every_choice_reaches_the_picture(renderer: Renderer, model: str, fresnel: str, energy: str) -> None:
+    chosen = {"specular": model, "fresnel": fresnel, "energy": energy}
+    below, mirrored = parts(0.4, 0.9, model, fresnel, energy)
+    assert mirrored > 20 * TWIN * below.max()  # or the lobe would not be tested
+    made = pixel(renderer, roughness=0.4, rho_s=0.9, **chosen)
+    assert np.abs(made - below - mirrored).max() < TWIN * made.max()
+
+
+def test_skin_without_reflection_takes_all_the_light(renderer: Renderer) -> None:
+    made = pixel(renderer, specular="none", rho_s=0.9)
+    assert np.abs(made - 2.0 / np.sqrt(1.36) * COLOUR / np.pi).max() < TWIN * made.max()
+
+
+def test_the_wrong_reflection_has_the_colour_of_the_map(renderer: Renderer) -> None:
+    below, mirrored = parts(0.4, 0.9, "kelemen", "schlick", "full")
+    made = pixel(renderer, roughness=0.4, rho_s=0.9, specular_colour="wrong")
+    assert np.abs(made - below - mirrored * COLOUR).max() < TWIN * made.max()
+
+
+@pytest.mark.parametrize(("oiliness", "m", "rho_s"), [(0.0, 0.4, 0.2), (0.5, 0.32, 0.4), (1.0, 0.24, 0.6)])
+def test_oil_is_strength_and_smoothness(renderer: Renderer, oiliness: float, m: float, rho_s: float) -> None:
+    oily = pixel(renderer, roughness=0.4, rho_s=0.2, oiliness=oiliness)
+    assert np.abs(oily - pixel(renderer, roughness=m, rho_s=rho_s)).max() < TWIN * oily.max()
+
+
+def test_oil_smoothes_a_roughness_map_too(renderer: Renderer) -> None:
+    even = {"colour": np.broadcast_to(COLOUR, (8, 8, 3))}
+    mapped = head_of(plane(100.0), roughness=np.full((4, 4), 0.5), **even)
+    oily, plain = pixel(renderer, mapped, oiliness=1.0, rho_s=0.2), pixel(renderer, roughness=0.3, rho_s=0.6)
+    assert np.abs(oily - plain).max() < TWIN * plain.max()
+
+
+def test_strength_stays_within_one() -> None:
+    assert Skin(rho_s=0.9, oiliness=1.0).strength == 1.0
+    assert Skin(rho_s=0.9, specular="none").strength == 0.0
+
+
+def test_only_other_models_than_the_default_ask_for_another_pipeline() -> None:
+    assert surface.constants(Skin()) == surface.constants(Skin(specular="none")) == ()
+    assert surface.constants(Skin(specular="phong")) == (("MODEL", 5),)
+    assert surface.constants(Skin(fresnel="exact")) == (("FRESNEL", 1),)

@@ -1,0 +1,110 @@
+"""What is kept of the surface at each texel of an atlas: how exactly, and how long."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from setups import entered_light, frontal, head_of, probe, run_frame, scene_of
+
+from dermis.frame.passes.surface_texels import SURFACE_BYTES, SurfaceTexels
+from dermis.frame.renderer import Renderer
+from dermis.gpu.textures import texture_from
+from dermis.mesh.primitives import uv_sphere
+
+SIZE = 64
+HEAD = head_of(uv_sphere(40.0, 24, 12))
+SCENE = scene_of(HEAD, frontal())
+Floats = NDArray[np.float64]
+
+
+@pytest.fixture(scope="module")
+def packed(renderer: Renderer) -> tuple[Floats, Floats, list[Floats]]:
+    """Directions, colours with heights, and what came out of the words they were packed in."""
+    random = np.random.default_rng(3)
+    directions = random.normal(size=(SIZE, SIZE, 4))
+    directions[0, :6, :3] = np.concatenate([np.eye(3), -np.eye(3)])
+    directions /= np.linalg.norm(directions[..., :3], axis=-1, keepdims=True)
+    colours = 10.0 ** random.uniform(-6, 3, (SIZE, SIZE, 1)) * random.uniform(0.2, 1, (SIZE, SIZE, 4))
+    colours[0, 0, :3], colours[0, 1, :3], colours[..., 3] = 0.0, 1.0, random.uniform(0, 2, (SIZE, SIZE))
+    textures = {
+        name: texture_from(renderer.device, values.astype(np.float32), "rgba32float")
+        for name, values in (("directions", directions), ("colours", colours))
+    }
+    lit = run_frame(renderer, SCENE, atlas=SIZE).lit
+    names = ["normal", "bent", "colour", "places"]
+    made = probe(renderer.device, "packed_probe", (SIZE, SIZE), names, **lit, **textures)
+    return directions[..., :3], colours, made
+
+
+def test_directions(packed: tuple[Floats, Floats, list[Floats]]) -> None:
+    """16 bits along each side of the octahedron."""
+    directions, _, (normal, bent, _, places) = packed
+    assert np.abs(normal[..., :3] - directions).max() < 6e-5
+    assert np.abs(bent[..., :3] + directions).max() < 6e-5
+    assert np.abs(places[..., :3] - 100.0 * directions[..., [1, 2, 0]]).max() < 1e-4
+
+
+def test_colours_and_heights(packed: tuple[Floats, Floats, list[Floats]]) -> None:
+    directions, colours, (normal, bent, colour, places) = packed
+    most = colours[..., :3].max(axis=-1, keepdims=True)
+    assert (np.abs(colour[..., :3] - colours[..., :3]) <= 1.01 / 65535 * most).all()
+    assert (np.abs(places[..., 3] - colours[..., 3]) <= colours[..., 3] / 32 + 1e-4).all()
+    for made, direction in ((normal, directions[..., 0]), (bent, directions[..., 1])):
+        assert np.allclose(made[..., 3], 0.5 + 0.4 * direction, rtol=1e-3)
+
+
+def drawn(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """The atlases whose surface is drawn from now on."""
+    found: list[Any] = []
+    draw = SurfaceTexels._draw
+
+    def noted(self: SurfaceTexels, bound: dict[str, Any], size: tuple[int, ...]) -> None:
+        found.append(size[0])
+        draw(self, bound, size)
+
+    monkeypatch.setattr(SurfaceTexels, "_draw", noted)
+    renderer.forget()
+    return found
+
+
+def test_drawn_only_when_it_changes(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = drawn(renderer, monkeypatch)
+    for scene in (SCENE, SCENE, scene_of(HEAD, frontal(2.0), mix=0.2), scene_of(HEAD, energy="none")):
+        run_frame(renderer, scene, atlas=SIZE)
+    assert found == [SIZE]  # neither lights nor what the frame multiplies with
+    for scene in (scene_of(HEAD, frontal(), roughness=0.4), scene_of(HEAD, frontal(), rho_s=0.3), SCENE):
+        run_frame(renderer, scene, atlas=SIZE)
+    assert found == [SIZE] * 4
+    run_frame(renderer, SCENE, atlas=2 * SIZE)
+    assert found == [SIZE] * 4 + [2 * SIZE]
+
+
+def test_what_changed_is_seen(renderer: Renderer) -> None:
+    """A head seen before, drawn again after others, is as it was at first."""
+    coloured = head_of(HEAD.mesh, colour=np.full((4, 4, 3), 0.25))
+    changed = [scene_of(coloured, frontal(), mix=1.0), scene_of(HEAD, frontal(), mix=1.0, rho_s=0.9)]
+    first, *_, last = found = [
+        entered_light(renderer, run_frame(renderer, scene, atlas=SIZE))
+        for scene in (scene_of(HEAD, frontal(), mix=1.0), *changed, scene_of(HEAD, frontal(), mix=1.0))
+    ]
+    assert np.array_equal(first, last)
+    assert not any(np.array_equal(first, other) for other in found[1:-1])
+
+
+def test_gone_with_its_atlas(renderer: Renderer) -> None:
+    inputs = run_frame(renderer, SCENE, atlas=SIZE)
+    texture = renderer.stages.irradiance._surfaces.of(inputs.layouts[0])
+    assert texture.size == (SIZE, SIZE, 2) and SURFACE_BYTES == 2 * 16
+    gone = weakref.ref(texture)
+    del texture, inputs
+    renderer.forget()
+    renderer.stages.shown.forget_all()
+    gc.collect()
+    run_frame(renderer, scene_of(head_of(uv_sphere(30.0, 12, 6)), frontal()), atlas=SIZE)
+    gc.collect()
+    assert gone() is None

@@ -1,0 +1,167 @@
+"""The nearest surface in compute against planes in NumPy, and what is left of it in the next frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from setups import front_camera, frontal, head_of, scene_of, settings_of
+
+from dermis.frame.passes import visibility_buffer
+from dermis.frame.passes.visibility_buffer import Layers, Nearest
+from dermis.frame.projection import parallel_view
+from dermis.frame.renderer import Renderer
+from dermis.gpu import Frame, download
+from dermis.mesh.geometry import build_mesh
+from dermis.mesh.head import Head
+from dermis.mesh.primitives import SKIN, plane, uv_sphere
+from dermis.scene.camera import Camera
+
+Floats = NDArray[np.float64]
+SIZE = (150, 100)
+GRAZING = 1e-3  # samples this near an edge, as a share of the triangle, are left out
+STEEP = 1e-5  # rounding of depths that change by most of their range within a pixel
+
+
+def soup(count: int, seed: int = 3) -> Head:
+    """Triangles from far below a pixel to half of the picture, each with its own part of the maps."""
+    rng = np.random.default_rng(seed)
+    middle = rng.uniform((-70, -45, -40), (70, 45, 40), (count, 1, 3))
+    side = np.exp(rng.uniform(np.log(0.2), np.log(70.0), (count, 1, 1)))
+    cells = int(np.ceil(np.sqrt(count)))
+    cell = np.column_stack(np.divmod(np.arange(count), cells))[:, None]
+    uv = np.add(cell, [(0.1, 0.1), (0.9, 0.1), (0.1, 0.9)]) / cells
+    positions = (middle + side * rng.uniform(-0.5, 0.5, (count, 3, 3))).reshape(-1, 3)
+    corners = np.arange(3 * count).reshape(-1, 3)
+    return head_of(build_mesh(positions, uv.reshape(-1, 2), corners, np.zeros(count), SKIN))
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Of each sample: depth, 0 where there is nothing; triangle + 1; and whether neither is a close call."""
+
+    depth: Floats
+    triangle: NDArray[np.int64]
+    sure: NDArray[np.bool_]
+
+
+@cache
+def truth_of_soup(numbers: bytes) -> Truth:
+    """Every triangle at the centre of every pixel, as a matrix sees them."""
+    head, clip = SOUP, np.frombuffer(numbers).reshape(4, 4)
+    corners = np.c_[head.mesh.positions.astype(float), np.ones(len(head.mesh.positions))] @ clip.T
+    width, height = SIZE
+    y, x = np.mgrid[:height, :width] + 0.5
+    at = np.stack((2 * x / width - 1, 1 - 2 * y / height, np.ones_like(x)), axis=-1)
+    depths, close = [np.zeros_like(x)], np.zeros(x.shape, bool)
+    for triangle in corners[head.mesh.triangles]:
+        weights = at @ np.linalg.inv(triangle[:, [0, 1, 3]])
+        shares = weights * triangle[:, 3]
+        depth = weights @ triangle[:, 2]
+        depths.append(np.where((shares >= 0).all(axis=-1), depth, 0.0))
+        close |= (np.abs(shares) < GRAZING).any(axis=-1) & (shares > -GRAZING).all(axis=-1)
+    every = np.stack(depths)
+    second, first = np.sort(every, axis=0)[-2:]
+    sure = ~close & ((first == 0) | (first - second > 2 * STEEP))
+    return Truth(first, np.where(first > 0, every.argmax(axis=0), 0), sure)
+
+
+def shown(
+    finder: Nearest, layers: Layers, renderer: Renderer, head: Head, camera: Camera, samples: int
+) -> Any:
+    """Layers after a view was drawn into them, and its matrices."""
+    settings = settings_of(size=SIZE, samples=samples)
+    inputs = renderer.prepare(scene_of(head, frontal(), camera=camera), settings)
+    frame = Frame(renderer.device)
+    finder.draw(frame, "nearest", layers, inputs.camera, inputs.head)
+    frame.submit()
+    made = [download(renderer.device, layers.texture, layer=k) for k in range(layers.count)]
+    return made, inputs.camera.matrices(SIZE)
+
+
+SOUP = soup(600)
+TURNED = Camera(position=(60, 50, 280), target=(3, 2, 0), up=(0.2, 1, 0), frame_mm=110)
+
+
+@pytest.mark.parametrize("samples", [1, 4, 5])
+@pytest.mark.parametrize("groups", [1, 4096])
+@pytest.mark.parametrize("what", ["depth", "triangle", "triangle after depth"])
+def test_triangles_of_all_sizes(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, what: str, groups: int, samples: int
+) -> None:
+    """In workgroups of few and of many triangles, with a word or two for each sample."""
+    monkeypatch.setattr(visibility_buffer, "_GROUPS", groups)
+    monkeypatch.setattr(visibility_buffer, "_COARSEST_MM", 0.0 if "after" in what else 0.1)
+    finder = Nearest(renderer.device, triangles=what != "depth", compute=True)
+    made, clips = shown(finder, finder.make_layers(SIZE, samples), renderer, SOUP, TURNED, samples)
+    for layer, clip in zip(made, clips, strict=True):
+        truth = truth_of_soup(clip.tobytes())
+        assert truth.sure.mean() > 0.9 and 0.3 < (truth.depth > 0).mean() < 1
+        assert len(np.unique(truth.triangle)) > 90
+        if what == "depth":
+            assert np.allclose(layer[truth.sure], truth.depth[truth.sure], rtol=0, atol=STEEP)
+        else:
+            assert np.array_equal(layer[truth.sure], truth.triangle[truth.sure])
+
+
+def test_more_blocks_than_a_workgroup_lists(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """128 triangles of one workgroup that cover 11 blocks each, and it lists 1024."""
+    monkeypatch.setattr(visibility_buffer, "_GROUPS", 1)
+    monkeypatch.setattr(visibility_buffer, "_RUN", 128)
+    head = head_of(plane(80.0, 8))
+    finder = Nearest(renderer.device, triangles=True, compute=True)
+    layers = finder.make_layers(SIZE, 1)
+    (layer,), _ = shown(finder, layers, renderer, head, front_camera(head, (0, 0, 0.1), frame_mm=31.0), 1)
+    assert (layer > 0).all()
+
+
+BALL = head_of(uv_sphere(12.0, 24, 12))
+
+
+@pytest.mark.parametrize("apart", [False, True])
+@pytest.mark.parametrize("triangles", [False, True])
+def test_tiles_hold_only_the_last_view(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, triangles: bool, apart: bool
+) -> None:
+    """A ball that leaves tiles and comes back leaves nothing behind, nor do layers that are drawn no more."""
+    monkeypatch.setattr(visibility_buffer, "_COARSEST_MM", 0.0 if apart else 0.1)
+    finder = Nearest(renderer.device, triangles=triangles, compute=True)
+    used = finder.make_layers(SIZE, 2)
+    for aside, samples in ((40, 2), (-40, 2), (-40, 2), (5, 1), (40, 2), (500, 2)):
+        camera = front_camera(BALL, (aside, 0, 0), frame_mm=80.0)
+        fresh = finder.make_layers(SIZE, 2)
+        left, right = (shown(finder, layers, renderer, BALL, camera, samples)[0] for layers in (used, fresh))
+        assert (right[0] > 0).any() == (aside < 500) and (right[1] > 0).any() == (aside < 500 and samples > 1)
+        assert np.array_equal(left, right)
+
+
+def test_steps_of_depth() -> None:
+    """How far apart two depths are that differ by little where depths are coarsest, as if all were."""
+    near, far = 250.0, 640.0
+    scale = near / (far - near)
+    eye = np.array([[3.3, 0, 0, 0], [0, 5, 0, 0], [0, 0, -scale, scale * (far - 5)], [0, 0, 1, 5]])
+    seen, little = 3.0 * eye, 1e-3
+    at_far, before = np.array([[1, 2, far - 5, 1], [1, 2, far - 5 - little, 1]])
+    step = (seen[2] @ before) / (seen[3] @ before) - (seen[2] @ at_far) / (seen[3] @ at_far)
+    assert nearest._depth_range_mm(seen) == pytest.approx(little / step, rel=1e-4)
+    parallel = parallel_view(np.array([0.0, 0.6, -0.8]), BALL.mesh, 64)
+    assert nearest._depth_range_mm(parallel.clip) == pytest.approx(parallel.far - parallel.near)
+
+
+@pytest.mark.parametrize(("eye", "ahead"), [((1, 0, 0), (0, 0, -50)), ((30, 120, 1), (0, -50, 0))])
+def test_corners_on_the_plane_of_the_eye(renderer: Renderer, eye: Any, ahead: Any) -> None:
+    """No triangle goes on beyond the edge opposite a corner beside the eye: the rasteriser's silhouettes."""
+    ball = head_of(uv_sphere(60.0, 24, 12))
+    target = tuple(np.add(eye, ahead).tolist())
+    camera = Camera(position=eye, target=target, up=(0.1, 1, 0.2), frame_mm=60.0)
+    covered = []
+    for compute in (True, False):
+        finder = Nearest(renderer.device, triangles=False, compute=compute)
+        (layer,), _ = shown(finder, finder.make_layers(SIZE, 1), renderer, ball, camera, 1)
+        covered.append(layer > 0)
+    assert 0.1 < covered[1].mean() < 0.95
+    assert (covered[0] != covered[1]).mean() < 1e-3

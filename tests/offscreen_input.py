@@ -1,0 +1,76 @@
+"""Input to a viewer without a window: pointer and key events, and a clock that only they move."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.scene.settings import Settings
+
+ADAPTER = os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
+SETTINGS = Settings(atlas=128, samples=2, shadow_size=256)
+
+
+@dataclass
+class InputDriver:
+    """A viewer on an offscreen canvas, with a clock that only the test moves."""
+
+    viewer: Any
+    canvas: Any
+    now: float = 0.0
+
+    def frame(self, seconds: float = 0.05) -> NDArray[np.uint8]:
+        """The next frame's (h, w, 3) pixels, some time later [s]."""
+        self.now += seconds
+        self.canvas._process_events()
+        return np.array(self.canvas.draw())[..., :3]
+
+    def settled(self) -> NDArray[np.uint8]:
+        """The picture when nothing moves any more."""
+        for _ in range(60):
+            self.frame()
+            while self.viewer.desk.studio.is_searching:  # which takes time, not frames
+                time.sleep(0.005)
+            if self.viewer.is_still:
+                return self.frame()
+        raise AssertionError("the viewer does not come to rest")
+
+    def event(self, kind: str, **fields: Any) -> None:
+        self.canvas.submit_event({"event_type": kind, "modifiers": (), **fields})
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float], **fields: Any) -> None:
+        """Press, move in a few steps, and let go."""
+        self.event("pointer_move", x=start[0], y=start[1], button=0, buttons=())
+        self.frame()
+        self.event("pointer_down", x=start[0], y=start[1], button=1, buttons=(1,), **fields)
+        self.frame()
+        for k in range(1, 5):
+            x, y = (a + (b - a) * k / 4 for a, b in zip(start, end, strict=True))
+            self.event("pointer_move", x=x, y=y, button=1, buttons=(1,), **fields)
+            self.frame()
+        self.event("pointer_up", x=end[0], y=end[1], button=1, buttons=(), **fields)
+        self.frame()
+
+    def click(self, place: tuple[float, float]) -> None:
+        self.drag(place, place)
+
+    def place(self, label: str) -> tuple[float, float]:
+        """Where a control of the panel is; the panel must be drawn."""
+        self.frame()
+        found: tuple[float, float] = self.viewer.desk.places[label]
+        return found
+
+    def press(self, label: str) -> None:
+        """Click on a control of the panel."""
+        self.click(self.place(label))
+        self.frame()
+
+    def choose(self, label: str, name: str) -> None:
+        """One of the names of a list of the panel."""
+        self.press(label)
+        self.click(self.place(f"{label}/{name}"))

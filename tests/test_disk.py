@@ -1,0 +1,272 @@
+"""Atlases on disk: found again, and harmless when the disk is not as it should be."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dermis import disk
+from dermis.atlas import cached
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.cached import cached_atlas
+from dermis.disk import cached_array, cached_mips
+from dermis.mesh.cached import cached_mesh
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.primitives import plane, uv_sphere
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    return tmp_path / "atlas"
+
+
+@pytest.fixture
+def built(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Sizes of the atlases that were computed and not read."""
+    sizes: list[int] = []
+    build = cached.build_atlas
+
+    def counted(mesh: Mesh, size: int, layout: str, reach_mm: float) -> Atlas:
+        sizes.append(size)
+        return build(mesh, size, layout, reach_mm)
+
+    monkeypatch.setattr(cached, "build_atlas", counted)
+    return sizes
+
+
+def same(a: Atlas, b: Atlas) -> bool:
+    pairs = [(getattr(a, f.name), getattr(b, f.name)) for f in fields(Atlas)]
+    return all(x.dtype == y.dtype and np.array_equal(x, y) for x, y in pairs)
+
+
+def only(folder: Path) -> Path:
+    (path,) = folder.iterdir()
+    assert path.suffix == ".npz"
+    return path
+
+
+def test_a_hit_is_the_same(folder: Path, built: list[int]) -> None:
+    first, second = (cached_atlas(uv_sphere(40.0, 12, 6), 64) for _ in range(2))
+    assert same(first, second)
+    assert built == [64]
+    assert only(folder)
+
+
+def test_mesh_and_size_are_told_apart(folder: Path, built: list[int]) -> None:
+    for mesh, size in ((plane(10.0), 64), (plane(20.0), 64), (plane(10.0), 65), (plane(10.0, 2), 64)):
+        cached_atlas(mesh, size)
+    assert len(built) == 4 and len(list(folder.iterdir())) == 4
+
+
+def test_layouts_and_reaches_are_told_apart(folder: Path, built: list[int]) -> None:
+    sphere = uv_sphere(40.0, 24, 12)
+    made = [
+        cached_atlas(sphere, 64, *how)
+        for how in (("mesh",), ("stitched",), ("stitched", 5.0), ("unwrapped",), ("stitched",))
+    ]
+    assert len(built) == 4 and len(list(folder.iterdir())) == 4
+    assert same(made[1], made[4])
+    assert len(made[1].gutter) > len(made[2].gutter) > len(made[0].gutter) == len(made[3].gutter) == 0
+
+
+@pytest.mark.parametrize(
+    "garbage",
+    [b"", b"no archive at all", b"PK\x03\x04 half an archive", "cut", "flipped", "packed", "other arrays"],
+)
+def test_a_broken_file_is_made_again(folder: Path, built: list[int], garbage: bytes | str) -> None:
+    first = cached_atlas(plane(10.0), 64)
+    path = only(folder)
+    whole = path.read_bytes()
+    if garbage == "cut":
+        path.write_bytes(whole[: len(whole) // 2])
+    elif garbage == "flipped":
+        path.write_bytes(whole[:3000] + bytes(b ^ 0xFF for b in whole[3000:3100]) + whole[3100:])
+    elif garbage == "packed":  # by a method that does not exist, which the last directory entry tells
+        place = whole.rindex(b"PK\x01\x02") + 10
+        path.write_bytes(whole[:place] + b"\x63\x00" + whole[place + 2 :])
+    elif garbage == "other arrays":
+        np.savez(path, triangle=np.zeros(3))
+    else:
+        path.write_bytes(garbage if isinstance(garbage, bytes) else b"")
+    assert same(cached_atlas(plane(10.0), 64), first)
+    assert built == [64, 64]
+    assert same(cached_atlas(plane(10.0), 64), first)
+    assert built == [64, 64]
+    assert only(folder) == path
+
+
+def test_a_file_with_pickled_objects_is_not_opened(folder: Path, built: list[int]) -> None:
+    first = cached_atlas(plane(10.0), 64)
+    objects = np.array([{"any": "object"}], dtype=object)
+    np.savez(only(folder), **{f.name: objects for f in fields(Atlas)})
+    assert same(cached_atlas(plane(10.0), 64), first)
+
+
+@pytest.mark.parametrize("blocked", ["a file", "a folder in the file's place", "nothing may be written"])
+def test_a_folder_that_cannot_be_used_does_no_harm(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, blocked: str
+) -> None:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path / "here"))
+    if blocked == "a file":
+        (tmp_path / "here").write_text("")
+    elif blocked == "a folder in the file's place":
+        (tmp_path / "here" / "atlas" / f"{cached._key(plane(10.0), 64)}.npz").mkdir(parents=True)
+    else:
+        monkeypatch.setattr(Path, "mkdir", _refuse)
+    assert cached_atlas(plane(10.0), 64).size == 64
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def test_a_folder_that_may_only_be_read_is_read(
+    folder: Path, built: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = cached_atlas(plane(10.0), 64)
+    monkeypatch.setattr(Path, "touch", _refuse)
+    assert same(cached_atlas(plane(10.0), 64), first)
+    assert built == [64]
+
+
+def _refuse(*_: object, **__: object) -> None:
+    raise PermissionError("read-only file system")
+
+
+def test_a_full_disk_leaves_no_part_file(
+    folder: Path, built: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(file: object, **_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(np, "savez", full)
+    assert cached_atlas(plane(10.0), 64).size == 64
+    assert list(folder.iterdir()) == []
+
+
+def test_the_longest_unused_are_forgotten(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cached_atlas(plane(10.0), 64)
+    one = only(folder).stat().st_size
+    monkeypatch.setattr(disk, "_MOST_BYTES", int(2.5 * one))
+    first = only(folder)
+    os.utime(first, (1, 1))
+    cached_atlas(plane(11.0), 64)
+    (second,) = set(folder.iterdir()) - {first}
+    os.utime(second, (2, 2))
+    cached_atlas(plane(10.0), 64)  # used again: now the second is the oldest
+    cached_atlas(plane(12.0), 64)
+    left = set(folder.iterdir())
+    assert first in left and second not in left and len(left) == 2
+
+
+def test_what_a_killed_process_left_goes_after_a_day(folder: Path) -> None:
+    folder.mkdir()
+    old, new = folder / "a.1.2.part", folder / "b.1.2.part"
+    for path in (old, new):
+        path.write_bytes(b"half of it")
+    os.utime(old, (1, 1))
+    cached_atlas(plane(10.0), 64)
+    assert not old.exists() and new.exists()
+
+
+def test_mips_and_arrays_come_back_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    source = np.random.default_rng(1).random((6, 9)).astype(np.float32)
+    chain = [source, source[:3, :4], source[:1, :2], source[:1, :1]]
+    made: list[str] = []
+
+    def note(what: str, result: Any) -> Any:
+        made.append(what)
+        return result
+
+    for _ in range(2):
+        levels = cached_mips(source, "a", lambda: note("mips", chain))
+        assert all(np.array_equal(one, other) for one, other in zip(levels, chain, strict=True))
+        assert np.array_equal(cached_array(source, "a", lambda: note("picture", 2 * source)), 2 * source)
+    assert made == ["mips", "picture"]
+    for other, form in ((source, "b"), (source + 1, "a"), (source.reshape(9, 6), "a")):
+        assert np.array_equal(cached_array(other, form, lambda: note("again", source)), source)
+    assert made[2:] == ["again"] * 3
+
+
+def test_the_order_of_sources_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    a, b = np.zeros(3), np.ones(3)
+    made = [
+        cached_array(sources, "sum", lambda k=k: np.full(2, k))[0]  # type: ignore[misc]
+        for k, sources in enumerate([(a, b), (b, a), a, (a, b)])
+    ]
+    assert made == [0, 1, 2, 0]
+
+
+def test_what_the_folder_cannot_hold_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It would drive out all others, and itself, each time."""
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    monkeypatch.setattr(disk, "_MOST_BYTES", 1000)
+    for k in (1, 2):
+        assert cached_array(np.zeros(1), "large", lambda k=k: np.full(200, k))[0] == k  # type: ignore[misc]
+        assert cached_array(np.zeros(1), "small", lambda k=k: np.full(20, k))[0] == 1  # type: ignore[misc]
+
+
+def test_of_what_the_folder_cannot_hold_at_once_some_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The maps of one head may be too many: each start would make and write all of them again."""
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    monkeypatch.setattr(disk, "_MOST_BYTES", 100_000)
+    made: list[int] = []
+
+    def start(first: int) -> None:
+        made.clear()
+        for k in range(first, first + 4):
+            cached_array(np.array([k]), "map", lambda k=k: made.append(k) or np.zeros(30_000, np.uint8))  # type: ignore[misc]
+
+    start(0)
+    start(0)
+    assert made == [3]
+    for path in tmp_path.rglob("*.npz"):  # another day
+        os.utime(path, (1, 1))
+    start(10)
+    start(10)
+    assert made == [13]
+
+
+def test_all_kinds_of_arrays_come_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    arrays = {
+        "none": np.zeros((0, 3), np.float16),
+        "one": np.array(2.5),
+        "turned": np.arange(12.0).reshape(3, 4).T,
+        "strided": np.arange(20, dtype=np.uint16)[::3],
+        "odd": np.arange(7, dtype=np.uint8),
+        "true": np.array([True, False]),
+    }
+    for _ in range(2):
+        found = disk.cached_arrays((), "kinds", list(arrays), lambda: arrays)
+    assert found is not arrays
+    for name, array in arrays.items():
+        assert found[name].dtype == array.dtype and found[name].shape == array.shape
+        assert np.array_equal(found[name], array) and found[name].flags.writeable
+
+
+def test_a_mesh_comes_back_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    mesh, made = uv_sphere(20.0), []
+
+    def load() -> Mesh:
+        made.append(1)
+        return mesh
+
+    first, second = (cached_mesh(b"file", "up y", load) for _ in range(2))
+    for one in (first, second):
+        assert one.materials == mesh.materials
+        for name in ("positions", "normals", "uv", "dpdu", "dpdv", "point", "triangles", "material"):
+            kept, given = getattr(one, name), getattr(mesh, name)
+            assert kept.dtype == given.dtype and np.array_equal(kept, given)
+    assert len(made) == 1
+    cached_mesh(b"file", "up z", load)
+    cached_mesh(b"another", "up y", load)
+    assert len(made) == 3
