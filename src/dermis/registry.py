@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any, Generic, TypeVar, cast
 
@@ -37,6 +38,15 @@ class Registry(Mapping[str, T], Generic[T]):
         self._entries[name] = entry
         if summary:
             self._summaries[name] = summary
+
+    @contextmanager
+    def including(self, name: str, entry: T | str) -> Iterator[None]:
+        """While it lasts, an entry more."""
+        self.register(name, entry)
+        try:
+            yield
+        finally:
+            del self._entries[name]
 
     @property
     def names(self) -> tuple[str, ...]:

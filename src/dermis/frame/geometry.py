@@ -23,15 +23,11 @@ class HeadResources:
     """What the shaders read of a head, by the names they use.
 
     resources : name in geometry.wgsl and skin.wgsl -> texture or sampler
-    relief_band : mip of the height map from which on the normal map knows the relief, -1 without one
     triangles : count
-    unscattered : share of the skin's triangles that the atlas cannot hold
     """
 
     resources: dict[str, Any]
-    relief_band: float
     triangles: int
-    unscattered: float
 
 
 def upload_geometry(device: Device, mesh: Mesh, atlas: Atlas) -> dict[str, Any]:

@@ -70,8 +70,7 @@ class Blur:
 
 
 def usual_texel(device: Device) -> str:
-    """Format of levels: halves on GPUs, which read them faster, floats on software adapters, which convert halves
-    one by one."""
+    """Format of levels: halves on GPUs, which read them faster; floats where software converts halves."""
     return FLOATS if device.adapter.kind == "CPU" else HALVES
 
 

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.cached import cached_pairs, pairs_key
-from dermis.frame.passes.translucency import Thin
-from dermis.frame.passes.translucency_weights import Pairs, source_level, upload_pairs, weigh
+from dermis.frame.atlas_layout import PairBuffers, Translucency
+from dermis.frame.passes.translucency_weights import source_level, upload_pairs, weigh
 from dermis.gpu import Device, Memo
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
@@ -26,7 +26,7 @@ def translucency_of(
     weight: Floats,
     changing: bool,
     of: str,
-) -> Thin:
+) -> Translucency:
     """What comes through a head's thin parts, on an atlas.
 
     variance_mm2, weight : (k,) and (k, 3) of the blurred levels
@@ -38,7 +38,7 @@ def translucency_of(
     pairs = memo.meanwhile(
         device.executor, pairs_of, device, head.mesh, atlas, widest, changing, alike=(head, atlas), of=of
     )
-    return memo.keep(thin_of, device, pairs, variance_mm2, weight, of=of)
+    return memo.keep(translucency_from, device, pairs, variance_mm2, weight, of=of)
 
 
 def shared_width(widest_mm: float) -> float:
@@ -47,7 +47,7 @@ def shared_width(widest_mm: float) -> float:
     return float(2.0 ** (step / _WIDTHS_TO_DOUBLE))
 
 
-def pairs_of(device: Device, mesh: Mesh, atlas: Atlas, widest_mm: float, changing: bool) -> Pairs:
+def pairs_of(device: Device, mesh: Mesh, atlas: Atlas, widest_mm: float, changing: bool) -> PairBuffers:
     """The translucent pairs of a mesh, searched for or read from disk.
 
     widest_mm : standard deviation of the widest Gaussian [mm]
@@ -56,8 +56,10 @@ def pairs_of(device: Device, mesh: Mesh, atlas: Atlas, widest_mm: float, changin
     return upload_pairs(device, cached_pairs(mesh, atlas, widest_mm), key)
 
 
-def thin_of(device: Device, pairs: Pairs, variance_mm2: Floats, weight: Floats) -> Thin:
+def translucency_from(
+    device: Device, pairs: PairBuffers, variance_mm2: Floats, weight: Floats
+) -> Translucency:
     """What a profile lets pass between pairs, and space for it."""
     gathered = device.buffer(np.zeros((pairs.source_count, 2), np.uint32), "STORAGE")
     weights = weigh(device, pairs, variance_mm2, weight)
-    return Thin(pairs, weights, source_level(pairs, variance_mm2), gathered)
+    return Translucency(pairs, weights, source_level(pairs, variance_mm2), gathered)

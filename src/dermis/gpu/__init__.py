@@ -5,7 +5,7 @@ from dermis.gpu.device import Device, open_device
 from dermis.gpu.frame import Frame
 from dermis.gpu.graph import Graph
 from dermis.gpu.memo import Memo
-from dermis.gpu.program import ComputeProgram, Constants, FragmentProgram, RasterProgram, compute_program
+from dermis.gpu.program import ComputeProgram, Constants, FragmentProgram, RasterProgram, compiled
 from dermis.gpu.recorder import Recorder
 from dermis.gpu.textures import download, make_texture, upload
 
@@ -20,7 +20,7 @@ __all__ = [
     "Memo",
     "RasterProgram",
     "Recorder",
-    "compute_program",
+    "compiled",
     "download",
     "list_adapters",
     "make_texture",

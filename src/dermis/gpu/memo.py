@@ -53,9 +53,10 @@ class Memo:
         self._making: list[Made] = []
         self._awaited: Future[Any] | None = None
 
-    def keep(self, make: Callable[..., T], *args: Any, of: str = "") -> T:
-        """What `make(*args)` returned, made unless these are among the arguments used last.
+    def keep(self, make: Callable[..., T], *args: Any, using: tuple[Any, ...] = (), of: str = "") -> T:
+        """What `make(*args, *using)` returned, made unless these are among the arguments used last.
 
+        using : what it also takes, and what makes no other result where the arguments are the same
         of : whose it is, where several are in use in turn
         """
         role = make, of
@@ -67,7 +68,7 @@ class Memo:
             if found is not None:
                 kept.remove(found)
             del kept[self._depth - 1 :]  # before making, which may need the space
-            found = self._made(make, args)
+            found = self._made(make, args, using)
         kept.insert(0, found)
         self._touch(role, found)
         if self._making:
@@ -133,11 +134,11 @@ class Memo:
         """Make everything again."""
         self._kept.clear()
 
-    def _made(self, make: Callable[..., Any], args: tuple[Any, ...]) -> Made:
+    def _made(self, make: Callable[..., Any], args: tuple[Any, ...], using: tuple[Any, ...]) -> Made:
         made = Made(args)
         self._making.append(made)
         try:
-            made.value = make(*args)
+            made.value = make(*args, *using)
         finally:
             self._making.pop()
         if made.provisional and self._making:

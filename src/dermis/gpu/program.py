@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from dermis.gpu.uniforms import Uniforms
 from dermis.gpu.wgsl_source import Source, compose
 
 Resources = Mapping[str, Any]
+P = TypeVar("P")
 _TOOLKIT_SHADERS = Path(__file__).parent / "wgsl"
 _UNIFORM = {"type": "uniform"}
 _MOST_VARIANTS = 12  # of a shader: on a software adapter each takes some 7 MB
@@ -188,29 +189,6 @@ class ComputeProgram(Program):
         return int(wgpu.ShaderStage.COMPUTE)
 
 
-def compute_program(
-    device: Device,
-    path: Path,
-    folders: tuple[Path, ...] = (),
-    constants: Constants = (),
-    suited: Constants = (),
-) -> ComputeProgram:
-    """The program of a shader with these pipeline constants, compiled unless it is one of those used last.
-
-    suited : constants that suit the device, for shaders that have them
-    """
-    variants: dict[Any, ComputeProgram] = device.programs.setdefault((path, folders), {})
-    found = variants.pop(constants, None)
-    if found is None:
-        text = compose(path, (*folders, _TOOLKIT_SHADERS)).text
-        own = {name: value for name, value in suited if f"override {name}:" in text}
-        found = ComputeProgram(device, path, folders, own | dict(constants))
-    variants[constants] = found  # the last one
-    for oldest in list(variants)[:-_MOST_VARIANTS]:
-        del variants[oldest]
-    return found
-
-
 class RasterProgram(Program):
     """A vertex shader `vertex`, and a fragment shader `fragment` when there is a colour target.
 
@@ -223,6 +201,7 @@ class RasterProgram(Program):
         device: Device,
         path: Path,
         folders: Sequence[Path] = (),
+        constants: Mapping[str, float] | None = None,
         *,
         target: str | None,
         depth_compare: str,
@@ -231,7 +210,7 @@ class RasterProgram(Program):
         fragment = {"module": self._module, "entry_point": "fragment", "targets": [{"format": target}]}
         self.pipeline = device.handle.create_render_pipeline(
             layout=self._layout,
-            vertex={"module": self._module, "entry_point": "vertex"},
+            vertex={"module": self._module, "entry_point": "vertex", "constants": dict(constants or {})},
             fragment=fragment if target else None,
             primitive={"topology": "triangle-list", "cull_mode": "none"},
             depth_stencil={
@@ -275,3 +254,29 @@ class FragmentProgram(Program):
         import wgpu
 
         return int(wgpu.ShaderStage.FRAGMENT)
+
+
+def compiled(
+    kind: Callable[..., P],
+    device: Device,
+    path: Path,
+    folders: tuple[Path, ...] = (),
+    constants: Constants = (),
+    suited: Constants = (),
+    **options: Any,
+) -> P:
+    """A program of that kind with these pipeline constants, compiled unless it is one of those used last.
+
+    suited : constants that suit the device, for shaders that have them
+    options : those of the kind
+    """
+    variants: dict[Any, P] = device.programs.setdefault((kind, path, folders, str(options)), {})
+    found = variants.pop(constants, None)
+    if found is None:
+        text = compose(path, (*folders, _TOOLKIT_SHADERS)).text
+        own = {name: value for name, value in suited if f"override {name}:" in text}
+        found = kind(device, path, folders, own | dict(constants), **options)
+    variants[constants] = found  # the last one
+    for oldest in list(variants)[:-_MOST_VARIANTS]:
+        del variants[oldest]
+    return found

@@ -170,6 +170,6 @@ def _alike(held: Any, value: Any) -> bool:
     if isinstance(held, _Values):
         if type(value) is not held.kind:
             return False
-        parts = (getattr(value, one.name) for one in fields(value))
+        parts = (getattr(value, one.name) for one in fields(held.kind))
         return all(map(_alike, held.fields, parts))
     return same(held, value)

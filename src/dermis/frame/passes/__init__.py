@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from dermis.gpu import ComputeProgram, Constants, Device, compute_program
+from dermis.gpu import ComputeProgram, Constants, Device, compiled
 
 PASSES = Path(__file__).parent
 TECHNIQUES = PASSES.parent / "techniques"
@@ -34,17 +34,31 @@ def program(
 
     What suits the device is added to them; see `shader_folders` for the formats.
     """
-    return compute_program(
-        device, PASSES / path, shader_folders(source, store), constants, device_constants(device)
+    return compiled(
+        ComputeProgram,
+        device,
+        PASSES / path,
+        shader_folders(source, store),
+        constants,
+        device_constants(device),
     )
 
 
 def device_constants(device: Device) -> Constants:
     """Pipeline constants that suit the device, for shaders that have them.
 
-    GPUs read buffers faster and software adapters textures, which also pass over lights in the dark one by one
-    and shade a column of pixels at a time; see geometry.wgsl, lighting.wgsl and shade.wgsl.
+    GPUs read buffers faster. Software adapters read textures faster, pass over lights in the dark one by one,
+    and shade columns of pixels; see geometry.wgsl, lighting.wgsl and shade.wgsl.
     """
     if device.adapter.kind == "CPU":
         return (("PASSES_DARK", 1), ("STRIP", _STRIP))
     return (("MESH_IN_BUFFERS", 1),)
+
+
+def warm_up(device: Device) -> None:
+    """Begin to compile what most frames need, while others load what it is to work on."""
+    for name in ("shade.wgsl", "surface_texels.wgsl", "shadow_bounds.wgsl", "post.wgsl", "pack.wgsl"):
+        program(device, name)
+    texel = "rgba32float" if device.adapter.kind == "CPU" else "rgba16float"
+    for name in ("stitch_gather.wgsl", "diffuse_halve.wgsl"):
+        program(device, name, source=texel, store=texel)

@@ -30,7 +30,7 @@ def make_glow(device: Device, size: tuple[int, int]) -> Glow:
 
 
 def draw(graph: Recorder, glow: Glow, picture: Any, share: float) -> Any:
-    """The picture with `share` of its light scattered, in a texture of `glow`: what one place loses others gain."""
+    """The picture with `share` of its light scattered, in a texture of `glow`; none of it is lost."""
     source = picture
     for halved in glow.halved:
         _step(graph, 0, source, source, halved, 0.0, 0.0)

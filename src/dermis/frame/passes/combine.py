@@ -18,7 +18,7 @@ def make_sum(device: Device, side: int) -> Any:
 
 
 def draw(graph: Recorder, levels: Levels, blur: Blur, into: Any, transmitted: Any = None) -> None:
-    """Sum of the blurred layers, which start after the unblurred one, from the coarsest resolution to the finest.
+    """Sum of the blurred layers, which start after the unblurred one, from coarse resolution to fine.
 
     transmitted : texture of what comes through thin parts, None without any
     """
@@ -32,9 +32,7 @@ def draw(graph: Recorder, levels: Levels, blur: Blur, into: Any, transmitted: An
         padded[:count, :3] = blur.weight[first : first + count]
         padded[0, 3] = 1.0
         layers = {"first": 1 + first, "count": count, "mip": mip, "weight": padded}
-        scales = (
-            {"scale": 1.0, "through": blur.scale} if mip else {"scale": 1.0 / blur.scale, "through": 1.0}
-        )
+        scales = {"scale": 1.0, "through": blur.scale} if mip else {"scale": 1.0 / blur.scale, "through": 1.0}
         bound = {
             "weights": shader.record("Weights", **layers, **scales),
             "levels": levels.stack,
@@ -51,9 +49,7 @@ def nothing(device: Device) -> Any:
     return device.shared("nothing", lambda: make_texture(device, (1, 1), "rgba32float", use="map"))
 
 
-def _program(
-    device: Device, texel: str, between: bool, coarser: bool, transmitted: bool
-) -> ComputeProgram:
+def _program(device: Device, texel: str, between: bool, coarser: bool, transmitted: bool) -> ComputeProgram:
     """The pass into the space between, or into the sum of 32-bit floats."""
     constants = (("COARSER", coarser), ("TRANSMITTED", transmitted))
     return program(device, "combine.wgsl", constants, texel, texel if between else FLOATS)

@@ -27,7 +27,6 @@ _DIRECTIONAL = 2  # lights.wgsl
 def bake_occlusion(
     device: Device,
     mesh: Mesh,
-    head: HeadResources,
     lit: Resources,
     atlas: Any,
     side: int,
@@ -45,7 +44,7 @@ def bake_occlusion(
     rows = side - (-len(mesh.positions) // side)
     sums = device.buffer(np.zeros((rows, side, 2), np.float32), "STORAGE")
     layers = make_layers(device, (map_size, map_size), _BATCH, triangles=False)
-    frame = Frame(device)
+    head, frame = HeadResources(dict(lit), len(mesh.triangles)), Frame(device)
     for first in range(0, len(towards), _BATCH):
         views = [parallel_view(-d, mesh, map_size) for d in towards[first : first + _BATCH]]
         draw_layers(frame, "occlusion", layers, shadow_layers(views), head)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from dermis.frame.passes import device_constants, program
+from dermis.frame.passes.post import Picture
 from dermis.frame.passes.visibility_buffer import Layers
 from dermis.gpu import ComputeProgram, Constants, Device, Recorder, make_texture
 from dermis.gpu.program import Resources
@@ -25,22 +26,22 @@ def draw(
     constants: Constants,
     visibility: Layers,
     scattered: Any,
-    into: Any,
-    size: tuple[int, int],
+    picture: Picture,
     apart: Any = None,
-) -> None:
-    """Shade every sample of every pixel: radiance and coverage into a texture of the image's size.
+) -> Any:
+    """Shade every sample of every pixel; returns the texture of radiance and coverage.
 
     view : record of the shader's struct Shade
     constants : of the lights, the surface and the technique
     scattered : light below the skin by place on the atlas, or the tables of pre-integrated skin
     apart : layers for the light below the skin and how it leaves, which the radiance is then without
     """
-    device = graph.device
-    bound = {**lit, "shade": view, "seen": visibility.texture, "scattered": scattered, "image": into}
-    bound["apart"] = apart or nothing_apart(device)
+    device, (width, height) = graph.device, picture.size
+    bound = {**lit, "shade": view, "seen": visibility.texture, "scattered": scattered}
+    bound |= {"image": picture.radiance, "apart": apart or nothing_apart(device)}
     strip = int(dict(device_constants(device)).get("STRIP", 1))
-    graph.compute("shade", shade_program(device, constants), bound, (size[0], -(-size[1] // strip)))
+    graph.compute("shade", shade_program(device, constants), bound, (width, -(-height // strip)))
+    return picture.radiance
 
 
 def nothing_apart(device: Device) -> Any:

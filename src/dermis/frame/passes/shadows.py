@@ -6,11 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from dermis.frame.geometry import HeadResources
-from dermis.frame.limits import check_shadows
 from dermis.frame.passes import program
-from dermis.frame.passes.visibility_buffer import Layers, draw_layers, make_layers
+from dermis.frame.passes.visibility_buffer import Drawer, Layers, draw_layers, make_layers
 from dermis.frame.projection import Views
-from dermis.gpu import Device, Graph, make_texture
+from dermis.gpu import Device, make_texture
+from dermis.gpu.memory import check_memory
+
+_DEPTH_BYTES = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,13 +36,14 @@ def make_shadow_maps(device: Device, layers: int, size: int) -> ShadowMaps:
 
     Raises DermisError when they do not fit into memory.
     """
-    check_shadows(device, layers, size)
+    needed = _DEPTH_BYTES * layers * size**2
+    check_memory(device, needed, "shadow_size", f"{layers} maps of {size} texels")
     side = _squares(size)
     bounds = make_texture(device, (side + side // 2, side), "r32float", layers=max(2, layers))
     return ShadowMaps(make_layers(device, (size, size), layers, triangles=False), bounds)
 
 
-def draw(graph: Graph, maps: ShadowMaps, views: Views, head: HeadResources, bounded: bool = True) -> None:
+def draw(graph: Drawer, maps: ShadowMaps, views: Views, head: HeadResources, bounded: bool = True) -> None:
     """Draw the depth that each light sees.
 
     bounded : whether some light has a size, so that the bounds are read

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
+from dermis.frame.atlas_layout import Translucency
 from dermis.frame.levels import Blur, Levels
 from dermis.frame.passes import program
-from dermis.frame.passes.translucency_weights import Pairs
 from dermis.gpu import Constants, Recorder
 
 _TEAMS: Constants = (("SIZE", 128), ("TEAM", 16), ("ROUND", 4))
@@ -16,28 +15,7 @@ _GATHERING = 64  # invocations of a workgroup, as in translucency_gather.wgsl
 _ROW = 1024  # workgroups, of which no more than 65535 fit in a row
 
 
-@dataclass(frozen=True, eq=False)
-class Thin:
-    """Thin parts of an atlas.
-
-    pairs : translucent pairs
-    weights : what `TranslucencyWeights.weigh` made of them
-    layer : blurred level, counted from 0, whose light passes
-    gathered : buffer for the light of the sources
-    """
-
-    pairs: Pairs
-    weights: Any
-    layer: int
-    gathered: Any
-
-    @property
-    def light(self) -> Any:
-        """Texture of the coarse atlas for what comes through."""
-        return self.pairs.light
-
-
-def draw(graph: Recorder, levels: Levels, blur: Blur, thin: Thin, constants: Constants = ()) -> Any:
+def draw(graph: Recorder, levels: Levels, blur: Blur, thin: Translucency, constants: Constants = ()) -> Any:
     """The light that comes through, from the blurred layers, summed from all places opposite.
 
     constants : of translucency.wgsl, where others than those that suit the device are wanted

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,42 +9,20 @@ from numpy.typing import NDArray
 
 from dermis.atlas.translucency.pairs import TranslucentPairs
 from dermis.disk import cached_array
+from dermis.frame.atlas_layout import PairBuffers
 from dermis.frame.passes import program
 from dermis.gpu import ComputeProgram, Device, Frame, make_texture, upload
 from dermis.optics.gaussians import MOST_GAUSSIANS
 
 Floats = NDArray[np.float64]
 ROW = 1024  # as in the shaders
-GRAIN = 0.72  # sampled at their spacing, Gaussians of more variance than this times its square are even to 1e-6
+GRAIN = (
+    0.72  # sampled at their spacing, Gaussians of more variance than this times its square are even to 1e-6
+)
 _SMOOTH = 0.45  # of the spacing; light of this standard deviation has no detail that the sources miss
 
 
-@dataclass(frozen=True, eq=False)
-class Pairs:
-    """Pairs of places on a device, and how they lie.
-
-    side : of the coarse atlas
-    receivers : buffer of cells that take light, as translucency.wgsl reads them
-    pairs, sources : buffers of words, as translucency_weights.wgsl reads them
-    count, source_count, receiver_count : of pairs, sources and receivers
-    light : texture of the coarse atlas for what comes through, none yet, and 1 where there is surface
-    key : what stands for all of it, so that what a profile makes of it can be kept on disk; empty for no key
-    """
-
-    side: int
-    radius_mm: float
-    spacing_mm: float
-    receivers: Any
-    pairs: Any
-    sources: Any
-    count: int
-    source_count: int
-    receiver_count: int
-    light: Any
-    key: str = ""
-
-
-def upload_pairs(device: Device, table: TranslucentPairs, key: str = "") -> Pairs:
+def upload_pairs(device: Device, table: TranslucentPairs, key: str = "") -> PairBuffers:
     """The pairs as the shaders read them.
 
     key : what stands for the table, if what passes is to be kept on disk
@@ -58,7 +35,7 @@ def upload_pairs(device: Device, table: TranslucentPairs, key: str = "") -> Pair
     sources[:number, 0] = np.ascontiguousarray(table.texel).view(np.uint32)[:, 0]
     sources[:number, 1] = table.area_mm2.view(np.uint32)
     receivers = _receivers(table)
-    return Pairs(
+    return PairBuffers(
         side=len(table.receiver),
         radius_mm=float(table.radius_mm),
         spacing_mm=float(table.spacing_mm),
@@ -95,13 +72,13 @@ def _unlit(device: Device, surface: NDArray[np.bool_]) -> Any:
     return texture
 
 
-def source_level(pairs: Pairs, variance_mm2: Floats) -> int:
+def source_level(pairs: PairBuffers, variance_mm2: Floats) -> int:
     """The blurred level that is smooth enough for the sources to tell all of it."""
     smooth = np.flatnonzero(variance_mm2 >= (_SMOOTH * pairs.spacing_mm) ** 2)
     return int(smooth[0]) if len(smooth) else len(variance_mm2) - 1
 
 
-def weigh(device: Device, pairs: Pairs, variance_mm2: Floats, weight: Floats) -> Any:
+def weigh(device: Device, pairs: PairBuffers, variance_mm2: Floats, weight: Floats) -> Any:
     """A buffer of the source of each pair and the share of its light, red, green and blue, that passes.
 
     variance_mm2, weight : (k,) and (k, 3) of the blurred levels
@@ -130,7 +107,7 @@ def weigh(device: Device, pairs: Pairs, variance_mm2: Floats, weight: Floats) ->
     return device.buffer(cached_array((), f"passing {pairs.key} {told}", make), "STORAGE")
 
 
-def _weighed(device: Device, shader: ComputeProgram, pairs: Pairs, record: Any) -> Any:
+def _weighed(device: Device, shader: ComputeProgram, pairs: PairBuffers, record: Any) -> Any:
     weights = device.handle.create_buffer(size=8 * pairs.count, usage=pairs.pairs.usage)
     bound = {"weighing": record, "pairs": pairs.pairs, "sources": pairs.sources, "weights": weights}
     frame = Frame(device)

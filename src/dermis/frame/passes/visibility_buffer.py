@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 
 from dermis.frame.geometry import HeadResources
-from dermis.frame.passes import PASSES, program, shader_folders
+from dermis.frame.passes import PASSES, device_constants, program, shader_folders
 from dermis.frame.projection import Matrix, Views
-from dermis.gpu import Constants, Device, Graph, RasterProgram, Recorder, make_texture
+from dermis.gpu import Constants, Device, Frame, Graph, RasterProgram, Recorder, compiled, make_texture
 from dermis.gpu.program import Program
 
+Drawer = Frame | Graph
 _GROUPS = 2048  # workgroups that keep a GPU busy; where there are more triangles, each takes more of them
 _TAKEN = (8, 128)  # triangles of a workgroup of visibility_buffer.wgsl: fewest and most
 _RUN = 16  # of them that follow each other, where they are many and so small
@@ -64,7 +65,7 @@ def make_layers(
     return make(device, size, max(1, count), triangles)
 
 
-def draw_layers(graph: Graph, stage: str, layers: Layers, views: Views, head: HeadResources) -> None:
+def draw_layers(graph: Drawer, stage: str, layers: Layers, views: Views, head: HeadResources) -> None:
     """Fill a layer for each place of each view; depth 1 is near and 0 far."""
     if layers.nearness is not None:
         _draw_compute(graph, stage, layers, views, head)
@@ -72,7 +73,7 @@ def draw_layers(graph: Graph, stage: str, layers: Layers, views: Views, head: He
         _draw_raster(graph, stage, layers, views.matrices(layers.size), head)
 
 
-def draw(graph: Graph, visibility: Layers, views: Views, head: HeadResources) -> None:
+def draw(graph: Drawer, visibility: Layers, views: Views, head: HeadResources) -> None:
     """Find the triangle that each sample of the image sees [Burns2013]; shading happens later, in compute."""
     draw_layers(graph, "visibility", visibility, views, head)
 
@@ -138,7 +139,7 @@ def _recorded(layers: Layers, triangles: int, clips: Matrix) -> tuple[int, ...]:
     return (_BOTH,) if fine else (_DEPTH, _FOUND)
 
 
-def _draw_raster(graph: Graph, stage: str, layers: Layers, clips: Matrix, head: HeadResources) -> None:
+def _draw_raster(graph: Drawer, stage: str, layers: Layers, clips: Matrix, head: HeadResources) -> None:
     shader = _raster_program(graph.device, layers.triangles)
     resources = {**head.resources, "views": _views(shader, layers, clips, head)}
     for layer, (depth, target) in enumerate(zip(layers.depth, layers.targets, strict=True)):
@@ -147,12 +148,10 @@ def _draw_raster(graph: Graph, stage: str, layers: Layers, clips: Matrix, head: 
 
 
 def _raster_program(device: Device, triangles: bool) -> RasterProgram:
-    def make() -> RasterProgram:
-        path, target = PASSES / "visibility_buffer_raster.wgsl", "r32uint" if triangles else None
-        return RasterProgram(device, path, shader_folders(), target=target, depth_compare="greater")
-
-    made: RasterProgram = device.shared(f"visibility raster {triangles}", make)
-    return made
+    path, target = PASSES / "visibility_buffer_raster.wgsl", "r32uint" if triangles else None
+    options = {"target": target, "depth_compare": "greater"}
+    suited = device_constants(device)
+    return compiled(RasterProgram, device, path, shader_folders(), (), suited, **options)
 
 
 def _views(shader: Program, layers: Layers, clips: Matrix, head: HeadResources) -> Any:

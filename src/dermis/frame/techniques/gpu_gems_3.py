@@ -1,79 +1,86 @@
-"""The published blurs as the baseline to measure against: seven taps, halves, a blurred stretch map."""
+"""The blurs of 2007 as the baseline to measure against: seven taps, halves, a blurred stretch map."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from dermis.frame.atlas_textures import AtlasTextures
-from dermis.frame.levels import Levels
-from dermis.frame.passes import STAGES
-from dermis.gpu import ComputeProgram, Device, Frame, make_texture
+from dermis.frame.inputs import Split
+from dermis.frame.levels import HALVES, Blur, Levels, make_levels
+from dermis.frame.passes import TECHNIQUES, program
+from dermis.frame.techniques.technique import AtlasTechnique
+from dermis.gpu import Device, make_texture
+from dermis.gpu.textures import FORMAT_BYTES
 
-TEXEL = "rgba16float"
 Pair = tuple[Any, Any]
 
 
-class Published:
-    """Spreads the light of layer 0 to the layers above it, in twelve passes for six Gaussians."""
+@dataclass(frozen=True, eq=False)
+class StretchedLevels(Levels):
+    """Levels with space for a stretch map that is blurred along with the light."""
+
+    stretch: Pair = (None, None)
+
+
+class GpuGems3(AtlasTechnique):
+    """Twelve passes for six Gaussians."""
 
     name = "gpu-gems-3"
+    sources = ("dEonLuebke2007",)
+    stitches = False
+    transmits = True
 
-    def __init__(self, device: Device) -> None:
-        self._device = device
-        self._made: dict[str, list[Any]] = {}
+    def texel(self, device: Device) -> str:
+        """Halves, as then."""
+        return HALVES
 
-    def make_levels(self, size: int, count: int) -> Levels:
-        """Space for the unblurred light and `count` blurred levels."""
-        stack = make_texture(self._device, (size, size), TEXEL, layers=max(2, count + 1))
-        scratch, *stretch = (make_texture(self._device, (size, size), TEXEL) for _ in range(3))
-        return Levels(stack, scratch, size, TEXEL, (0,) * (count + 1), stretch=tuple(stretch))
+    def make_levels(self, device: Device, side: int, count: int) -> Levels:
+        """Space for light, its blurred levels and a blurred stretch map."""
+        made = make_levels(device, side, count, HALVES, halved=False)
+        first, second = (make_texture(device, (side, side), HALVES) for _ in range(2))
+        return StretchedLevels(made.stack, made.scratch, side, HALVES, stretch=(first, second))
 
-    def draw(
-        self,
-        frame: Frame,
-        levels: Levels,
-        atlas: AtlasTextures,
-        variance_mm2: NDArray[np.float64],
-        edge: str = "cleared",
-        clear: ArrayLike = (0.0, 0.0, 0.0),
-        scale: float = 1.0,
-    ) -> None:
-        """Fill layer k with the light spread by variance_mm2[k - 1] (increasing).
+    def texel_bytes(self, levels: int) -> float:
+        """Memory for each texel of the atlas."""
+        return float(FORMAT_BYTES[HALVES] * (levels + 4))
 
-        edge : "cleared", where empty texels show the light `clear`, or "skipped", where they are left out
-        scale : what light is multiplied with in the layers
-        """
-        sampler = self._device.sampler(mag_filter="linear", min_filter="linear")
-        along, (stretch, spare) = self._along(edge), levels.stretch
-        levels.scale = scale
-        source, before = atlas.resources["stretch_map"], 0.0
-        for k, variance in enumerate(variance_mm2, start=1):
-            record = along[0].record(
-                "Spread", sigma_mm=np.sqrt(variance - before), clear=scale * np.asarray(clear)
+    def halvings(self, split: Split, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
+        """All levels have the whole resolution."""
+        return (0,) * (len(split.blurred_mm2) + 1)
+
+    def fill(self, graph: Any, levels: Levels, atlas: AtlasTextures, blur: Blur) -> None:
+        """Fill layer k with the light of layer 0 spread by the k-th Gaussian."""
+        assert isinstance(levels, StretchedLevels)
+        shaders = [
+            self.shader(graph.device, (("AXIS", axis), ("SKIPPED", blur.edge == "skipped")))
+            for axis in (0, 1)
+        ]
+        source, before, (stretch, spare) = atlas.resources["stretch_map"], 0.0, levels.stretch
+        for k, variance in enumerate(blur.variance_mm2, start=1):
+            record = shaders[0].record(
+                "Spread", sigma_mm=np.sqrt(variance - before), clear=blur.scale * np.asarray(blur.clear)
             )
             passes = (
                 (levels.layer(k - 1), source, levels.spare(), spare),
                 (levels.spare(), spare, levels.layer(k), stretch),
             )
-            for program, (light, wide, blurred, wider) in zip(along, passes, strict=True):
-                bound = {"spread": record, "linear": sampler, "source": light, "stretch": wide}
-                self._run(frame, program, bound, (blurred, wider), levels.size)
+            for shader, (light, wide, blurred, wider) in zip(shaders, passes, strict=True):
+                linear = graph.device.sampler(mag_filter="linear", min_filter="linear")
+                bound = {"spread": record, "linear": linear, "source": light, "stretch": wide}
+                self.run(graph, shader, bound, (blurred, wider), levels.size)
             source, before = stretch, float(variance)
 
-    def _run(self, frame: Frame, program: Any, bound: dict[str, Any], into: Pair, side: int) -> None:
-        """One pass into a texture of light and one of stretch."""
+    def shader(self, device: Device, constants: Any) -> Any:
+        """The pass along one axis."""
+        return program(device, TECHNIQUES / "gpu_gems_3.wgsl", constants)
+
+    def run(self, graph: Any, shader: Any, bound: dict[str, Any], into: Pair, side: int) -> None:
+        """Declare one pass into a texture of light and one of stretch."""
         bound = bound | {"blurred": into[0], "stretch_blurred": into[1]}
-        frame.compute("diffuse", program, bound, (side, side))
+        graph.compute("diffuse", shader, bound, (side, side))
 
-    def _along(self, edge: str) -> list[Any]:
-        """The passes along u and along v, made when first asked for."""
-        if edge not in self._made:
-            skipped = edge == "skipped"
-            self._made[edge] = [self._program({"AXIS": axis, "SKIPPED": skipped}) for axis in (0, 1)]
-        return self._made[edge]
 
-    def _program(self, constants: dict[str, float]) -> Any:
-        return ComputeProgram(self._device, STAGES / "gpu_gems_3.wgsl", constants=constants)
+TECHNIQUE = GpuGems3()
