@@ -16,7 +16,7 @@ from dermis.gpu.bind_groups import BindGroups, key_of
 from dermis.gpu.device import Device
 from dermis.gpu.shader_types import Binding, bindings, struct_dtype
 from dermis.gpu.uniforms import Uniforms
-from dermis.gpu.wgsl_source import Source, compose
+from dermis.gpu.wgsl_source import Folder, Source, compose
 
 Resources = Mapping[str, Any]
 _TOOLKIT_SHADERS = Path(__file__).parent / "wgsl"
@@ -52,7 +52,7 @@ def _entry(binding: Binding, value: Any, given: Any) -> Any:
 class Program:
     """What compute and raster programs share: the composed text, its bindings and their layouts."""
 
-    def __init__(self, device: Device, path: Path, folders: Sequence[Path] = ()) -> None:
+    def __init__(self, device: Device, path: Path, folders: Sequence[Folder] = ()) -> None:
         self.device = device
         self.name = path.stem
         self.source: Source = compose(path, (*folders, _TOOLKIT_SHADERS))
@@ -129,7 +129,7 @@ class ComputeProgram(Program):
         self,
         device: Device,
         path: Path,
-        folders: Sequence[Path] = (),
+        folders: Sequence[Folder] = (),
         constants: Mapping[str, float] | None = None,
     ) -> None:
         super().__init__(device, path, folders)
@@ -164,7 +164,7 @@ class RasterProgram(Program):
         self,
         device: Device,
         path: Path,
-        folders: Sequence[Path] = (),
+        folders: Sequence[Folder] = (),
         *,
         target: str | None,
         depth_compare: str,
@@ -199,7 +199,7 @@ class FragmentProgram(Program):
         self,
         device: Device,
         path: Path,
-        folders: Sequence[Path] = (),
+        folders: Sequence[Folder] = (),
         constants: Mapping[str, float] | None = None,
         *,
         targets: Sequence[str],

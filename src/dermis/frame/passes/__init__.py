@@ -2,8 +2,17 @@
 
 from pathlib import Path
 
+from dermis.frame.lights import light_numbers
+from dermis.frame.lights.kind import light_shaders
+from dermis.frame.surface import lobe_shaders, surface_numbers
+from dermis.gpu.wgsl_source import ShaderFolder
+
 STAGES = Path(__file__).parent
-SHARED_SHADERS = Path(__file__).parent.parent / "wgsl"
+SHARED_SHADERS = ShaderFolder(
+    STAGES.parent / "wgsl",
+    lists={"lights": light_shaders, "lobes": lobe_shaders},
+    numbers=lambda: {**light_numbers(), **surface_numbers()},
+)
 TILE = 16
 """Side of workgroups that do little: smaller ones are done before the H200 has started the next."""
 _LEVELS = STAGES / "levels"
