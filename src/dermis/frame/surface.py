@@ -7,13 +7,15 @@ from typing import Any
 import numpy as np
 
 from dermis.frame.maps import DEFAULT_COLOUR, relief_band
-from dermis.gpu import ComputeProgram, Constants
+from dermis.gpu import ComputeProgram
+from dermis.gpu.wgsl_source import Member
 from dermis.mesh.maps import Maps
 from dermis.optics.directions import directions
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.skin import Skin
+from dermis.specular.albedo import ROOT_OF_FIRST_ROW
 from dermis.specular.energy import ENERGY
-from dermis.specular.fresnel import FRESNEL, SKIN_ETA, SKIN_F0
+from dermis.specular.fresnel import SKIN_ETA, SKIN_F0
 from dermis.specular.models import MODELS
 
 
@@ -22,9 +24,20 @@ def model_of(skin: Skin) -> str:
     return next(iter(MODELS)) if skin.specular == "none" else skin.specular
 
 
-def constants(skin: Skin) -> Constants:
+def lobe_shaders() -> list[Member]:
+    """The models as lobe.wgsl includes them; their place is their number."""
+    return [Member(name, model.shader) for name, model in MODELS.items()]
+
+
+def surface_numbers() -> dict[str, float]:
+    """What lobe.wgsl and the models' shaders fill in."""
+    of_models = {name: number for model in MODELS.values() for name, number in model.numbers.items()}
+    return {"root_of_first_row": ROOT_OF_FIRST_ROW, **of_models}
+
+
+def constants(skin: Skin) -> tuple[tuple[str, int], ...]:
     """Values of lobe.wgsl's `override`s where they are not the default 0."""
-    numbers = {"MODEL": list(MODELS).index(model_of(skin)), "FRESNEL": list(FRESNEL).index(skin.fresnel)}
+    numbers = {"MODEL": MODELS.names.index(model_of(skin)), "EXACT_FRESNEL": int(skin.fresnel == "exact")}
     return tuple((name, number) for name, number in numbers.items() if number)
 
 

@@ -17,7 +17,7 @@ from dermis.gpu.by_resources import ByResources, key_of
 from dermis.gpu.device import Device
 from dermis.gpu.shader_types import Binding, bindings, members_read, struct_dtype
 from dermis.gpu.uniforms import Uniforms
-from dermis.gpu.wgsl_source import Source, compose
+from dermis.gpu.wgsl_source import Folder, Source, compose
 
 Resources = Mapping[str, Any]
 P = TypeVar("P")
@@ -57,7 +57,7 @@ def _entry(binding: Binding, value: Any, given: Any) -> Any:
 class Program:
     """What compute and raster programs share: the composed text, its bindings and their layouts."""
 
-    def __init__(self, device: Device, path: Path, folders: Sequence[Path] = ()) -> None:
+    def __init__(self, device: Device, path: Path, folders: Sequence[Folder] = ()) -> None:
         self.device = device
         self.name = path.stem
         self.source: Source = compose(path, (*folders, _TOOLKIT_SHADERS))
@@ -165,7 +165,7 @@ class ComputeProgram(Program):
         self,
         device: Device,
         path: Path,
-        folders: Sequence[Path] = (),
+        folders: Sequence[Folder] = (),
         constants: Mapping[str, float] | None = None,
     ) -> None:
         super().__init__(device, path, folders)
@@ -200,7 +200,7 @@ class RasterProgram(Program):
         self,
         device: Device,
         path: Path,
-        folders: Sequence[Path] = (),
+        folders: Sequence[Folder] = (),
         constants: Mapping[str, float] | None = None,
         *,
         target: str | None,
@@ -236,7 +236,7 @@ class FragmentProgram(Program):
         self,
         device: Device,
         path: Path,
-        folders: Sequence[Path] = (),
+        folders: Sequence[Folder] = (),
         constants: Mapping[str, float] | None = None,
         *,
         targets: Sequence[str],
@@ -260,7 +260,7 @@ def compiled(
     kind: Callable[..., P],
     device: Device,
     path: Path,
-    folders: tuple[Path, ...] = (),
+    folders: tuple[Folder, ...] = (),
     constants: Constants = (),
     suited: Constants = (),
     **options: Any,

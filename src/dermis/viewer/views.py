@@ -53,7 +53,8 @@ class Views:
         Raises DermisError for what the technique does not make.
         """
         inputs = self._renderer.prepare(scene, settings, place)
-        constants = tuple(switch for switch in inputs.light_constants if switch[0] == "SHAPES")
+        around = ("ENVIRONMENT", "HALF_SPACE")  # which the shader has not
+        constants = tuple(switch for switch in inputs.light_constants if switch[0] not in around)
         shader = program(self._renderer.device, _INTERMEDIATE, constants)
         layer, scale = self._layer(inputs, view, settings)
         looked = ("eye", "forward", "right", "up", "samples", "jitter")

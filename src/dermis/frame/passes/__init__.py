@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from dermis.frame.lights import light_numbers
+from dermis.frame.lights.kind import light_shaders
+from dermis.frame.surface import lobe_shaders, surface_numbers
 from dermis.gpu import ComputeProgram, Constants, Device, compiled
+from dermis.gpu.wgsl_source import Folder, ShaderFolder
 
 PASSES = Path(__file__).parent
 TECHNIQUES = PASSES.parent / "techniques"
-SHARED_SHADERS = PASSES.parent / "wgsl"
+SHARED_SHADERS = ShaderFolder(
+    PASSES.parent / "wgsl",
+    lists={"lights": light_shaders, "lobes": lobe_shaders},
+    numbers=lambda: {**light_numbers(), **surface_numbers()},
+)
 TILE = 16
 """Side of workgroups that do little: smaller ones are done before the H200 has started the next."""
 _LEVELS = PASSES / "levels"
@@ -17,7 +25,7 @@ _STORES = {"rgba32float": _LEVELS / "floats", "rgba16float": _LEVELS / "halves"}
 _STRIP = 16  # pixels of an invocation on software adapters, see shade.wgsl
 
 
-def shader_folders(source: str = "", store: str = "") -> tuple[Path, ...]:
+def shader_folders(source: str = "", store: str = "") -> tuple[Folder, ...]:
     """Where includes are looked up.
 
     source, store : formats of the blurred light that the shader reads and stores, if it does

@@ -35,7 +35,7 @@ def draw(graph: Recorder, levels: Levels, blur: Blur, thin: Translucency, consta
     entering = {**sources, "gathered": thin.gathered}
     leaving = {
         "receivers": pairs.receivers,
-        "links": thin.weights,
+        "weights": thin.weights,
         "gathered": thin.gathered,
         "transmitted": pairs.light,
     }
