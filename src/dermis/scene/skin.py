@@ -77,8 +77,8 @@ class Skin(Plain):
     rho_s: Annotated[float, Field(ge=0, le=1)] = 0.18
     """Strength of the surface reflection."""
     oiliness: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """One dial over both: 1 is shiny skin, with 3 times the strength and 0.6 times the roughness; an artist's
-    mapping, not a measured one."""
+    """One dial over strength and roughness: 1 is shiny skin, 3 times as strong and 0.6 times as rough; an
+    artist's mapping, not a measured one."""
     specular: SpecularName = "kelemen"
     """Model of the surface reflection; "none" leaves it out."""
     fresnel: FresnelName = "schlick"
