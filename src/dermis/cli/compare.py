@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dermis.cli.console import print_json, print_lines, working_on
-from dermis.cli.options import NOTHING, Adapter, Json, Output, Whole, check, option_name, options_of
+from dermis.cli.options import NOTHING, Adapter, Json, Output, Whole, check, given, option_name, options_of
 from dermis.errors import refuse
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
@@ -78,51 +78,50 @@ def compare(
     output:
         HTML report; for specular a folder of plots.
     """
-    words: dict[str, Any] = {"against": against, "techniques": techniques, "light": light, "region": region}
-    words |= {"medium": medium, "samples": samples}
-    given = {name: value for name, value in words.items() if value is not None} | sizes | skin
-    _check_used(what, given)
+    words = given(against=against, techniques=techniques, light=light, region=region)
+    chosen = words | given(medium=medium, samples=samples) | sizes | skin
+    _check_used(what, chosen)
     if what == "specular":
         from dermis.cli.compare_specular import compare_specular
 
         check(Skin, skin)
         compare_specular(output, Skin(**skin).roughness, adapter, as_json)
     else:
-        _compare_techniques(what, _choose(given, sizes) | {"adapter": adapter}, output, as_json)
+        _compare_techniques(what, _choose(chosen, sizes) | {"adapter": adapter}, output, as_json)
     return 0
 
 
-def _check_used(what: str, given: Mapping[str, Any]) -> None:
+def _check_used(what: str, chosen: Mapping[str, Any]) -> None:
     """Refuse options that would change nothing."""
     if what == "specular":
-        idle = dict.fromkeys(given.keys() - {"roughness"}, "surface models are compared without a head")
+        idle = dict.fromkeys(chosen.keys() - {"roughness"}, "surface models are compared without a head")
     else:
         idle = {"roughness": "techniques are compared without surface reflection"}
-        if given.get("against") not in _BY_PATHS:
+        if chosen.get("against") not in _BY_PATHS:
             idle["samples"] = f"only {' and '.join(_BY_PATHS)} trace paths"
             idle["direction"] = f"only {' and '.join(_BY_PATHS)} know directions"
     for name, why in idle.items():
-        if name in given:
+        if name in chosen:
             refuse(option_name(name), "no such option here", f"it came, and {why}", "Leave it out")
 
 
-def _choose(given: Mapping[str, Any], sizes: Mapping[str, Any]) -> dict[str, Any]:
+def _choose(chosen: Mapping[str, Any], sizes: Mapping[str, Any]) -> dict[str, Any]:
     """What `dermis.comparison.compare` is asked for."""
     from dermis.comparison.scenes import usual_region
 
-    names = [name.strip() for name in given.get("techniques", ",".join(TECHNIQUES)).split(",")]
+    names = [name.strip() for name in chosen.get("techniques", ",".join(TECHNIQUES)).split(",")]
     for name in names:
         check(Settings, {**_SIZES, **sizes, "technique": name}, {"technique": "techniques"})
-    light = given.get("light", "front")
+    light = chosen.get("light", "front")
     return {
-        "against": given.get("against", "surface-integral"),
+        "against": chosen.get("against", "surface-integral"),
         "techniques": names,
         "light": light,
-        "region": given.get("region", usual_region(light)),
-        "medium": given.get("medium", "skin1"),
-        "direction": given.get("direction", "lambertian"),
+        "region": chosen.get("region", usual_region(light)),
+        "medium": chosen.get("medium", "skin1"),
+        "direction": chosen.get("direction", "lambertian"),
         "settings": Settings(**{**_SIZES, **sizes}),
-        "samples": given.get("samples", 64),
+        "samples": chosen.get("samples", 64),
     }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict, get_args
@@ -69,6 +69,11 @@ def options_of(
     return Annotated[made(model.__name__, options, total=False), Parameter(name="*")]
 
 
+def given(**options: Any) -> dict[str, Any]:
+    """Those that are not None."""
+    return {name: value for name, value in options.items() if value is not None}
+
+
 def option_name(field: str, names: Mapping[str, str] | None = None) -> str:
     """What is typed for a field: --rho-s for rho_s."""
     return "--" + (names or {}).get(field, field).replace("_", "-")
@@ -109,25 +114,25 @@ def _help(model: type[Plain], field: str, defaults: Mapping[str, Any]) -> str:
     return f"{text} [default: {default}]" if default else text
 
 
-def check(model: type[Plain], given: Mapping[str, Any], names: Mapping[str, str] | None = None) -> None:
+def check(model: type[Plain], values: Mapping[str, Any], names: Mapping[str, str] | None = None) -> None:
     """Refuse values that no field of a model can have, under the names of their options.
 
-    given : values by field
+    values : by field
     names : options by field, where they are not called like it
     """
     from dermis.scene.plain import ImpossibleError
 
     try:
-        model(**given)
+        model(**values)
     except ImpossibleError as error:
         place, finding = next(iter(error.findings.items()))
-        field = place.partition(".")[0] or next(name for name in model.model_fields if name in given)
+        field = place.partition(".")[0] or next(name for name in model.model_fields if name in values)
         raise DermisError(f"{option_name(field, names)}: {finding}. Correct it.") from None
 
 
-def refuse_options(given: Collection[str], names: Mapping[str, str] | None, place: str, remedy: str) -> None:
+def refuse_options(fields: Iterable[str], names: Mapping[str, str] | None, place: str, remedy: str) -> None:
     """Refuse options that would change nothing."""
-    for field in given:
+    for field in fields:
         refuse(option_name(field, names), f"no such option {place}", "it came", remedy)
 
 
