@@ -16,9 +16,6 @@ if TYPE_CHECKING:
     from dermis.scene.plain import Plain
 
 
-_VAST = 1e5  # bounds beyond it only keep numbers finite
-
-
 def _whole(_: type, tokens: Sequence[Token]) -> int:
     return int(tokens[0].value)
 
@@ -79,6 +76,11 @@ def option_name(field: str, names: Mapping[str, str] | None = None) -> str:
     return "--" + (names or {}).get(field, field).replace("_", "-")
 
 
+def is_option(model: type[Plain], field: str) -> bool:
+    """Whether a field can be an option: it holds words or numbers, not other models."""
+    return _kind(model, field)[0] is not None
+
+
 def _kind(model: type[Plain], field: str) -> tuple[Any, dict[str, Any]]:
     """What cyclopts takes a field's words for, and how it makes the value of them; None for no option."""
     from dermis.scene.plain import choices_of
@@ -105,11 +107,11 @@ def _kind(model: type[Plain], field: str) -> tuple[Any, dict[str, Any]]:
 
 def _help(model: type[Plain], field: str, defaults: Mapping[str, Any]) -> str:
     """A field's help with its bounds, where they say something, and its default."""
-    from dermis.scene.plain import bounds_of, help_of, shown
+    from dermis.scene.plain import choices_of, help_of, shown, values_of
 
-    text, (low, high) = help_of(model, field), bounds_of(model, field)
-    if low is not None and high is not None and high < _VAST:
-        text += f" [range: {low:g} to {high:g}]"
+    text = help_of(model, field)
+    if (values := values_of(model, field)) and not choices_of(model, field):  # cyclopts adds choices itself
+        text += f" [range: {values}]"
     default = shown(defaults.get(field, model.model_fields[field].get_default()))
     return f"{text} [default: {default}]" if default else text
 

@@ -15,6 +15,7 @@ from dermis.registry import Named
 
 FARTHEST_MM = 1e6
 _LONGEST = 80  # letters of what came
+_VAST = 1e5  # bounds beyond it only keep numbers finite
 
 
 def _direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -95,9 +96,12 @@ def range_of(model: type[BaseModel], field: str) -> Range | None:
     return _range(model.model_fields[field])
 
 
-def bounds_of(model: type[BaseModel], field: str) -> tuple[float | None, float | None]:
-    """The least and the greatest that a number may be, None where there is no such bound."""
-    return _bounds(model.model_fields[field])
+def values_of(model: type[BaseModel], field: str) -> str:
+    """The words that a field may be, or the bounds of a number where they say something."""
+    low, high = _bounds(model.model_fields[field])
+    if low is not None and high is not None and high < _VAST:
+        return f"{low:g} to {high:g}"
+    return ", ".join(choices_of(model, field))
 
 
 def shown(value: Any) -> str:
