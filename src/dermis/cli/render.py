@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from dermis.cli.console import note, print_json, print_lines, working_on
 from dermis.cli.options import Adapter, Json
 from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble
+from dermis.scene.techniques import TECHNIQUES
 
 _MOST_UNSCATTERED = 0.05  # closed eyes and other collapsed charts of real scans stay under it
 
@@ -67,7 +68,8 @@ def _draw_and_report(
         setup_ms = rendered.setup_ms
         if as_json:  # the first frame fills caches; a warm one is timed
             rendered = renderer.draw_warm(scene, settings)
-    if settings.technique == "texture-space" and rendered.unscattered > _MOST_UNSCATTERED:
+    technique = TECHNIQUES[settings.technique]
+    if technique.on_atlas and technique.stitches and rendered.unscattered > _MOST_UNSCATTERED:
         share = f"{rendered.unscattered:.0%} of the skin's triangles"
         why = "their uv is collapsed, mirrored onto other skin, or thinner than a texel of the atlas"
         note(f"note: {share} are lit without scattering: {why}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -22,7 +23,14 @@ if TYPE_CHECKING:
     from dermis.scene.settings import Settings
     from dermis.scene.skin import Skin
 
-_HOME = {"load_camera": "files", "Light": "lights"}  # where `dermis` itself has no such name
+_HOMES = {
+    "camera": ("Camera", "portrait", "profile", "three_quarter"),
+    "environment": ("Environment",),
+    "files": ("load_camera", "load_lights", "load_scene"),
+    "model": ("Scene",),
+    "settings": ("Settings",),
+    "skin": ("Skin",),
+}
 
 __all__ = [
     "Camera",
@@ -49,12 +57,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Names on first use: a command's help needs some of the models, not the heads."""
-    from importlib import import_module
-
-    import dermis
-
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    home = import_module(f"{__name__}.{_HOME[name]}") if name in _HOME else dermis
-    globals()[name] = value = getattr(home, name)
+    home = next((home for home, names in _HOMES.items() if name in names), "lights")
+    globals()[name] = value = getattr(import_module(f"{__name__}.{home}"), name)
     return value
