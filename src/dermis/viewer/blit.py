@@ -1,4 +1,4 @@
-"""The rendered image into the window's texture, without a detour through main memory."""
+"""Copies rendered images into the window's texture, on the device."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Box = tuple[int, int, int, int]
 
 @dataclass(frozen=True)
 class Patch:
-    """An image, scaled to a box of the target, of which a part is shown.
+    """An image scaled to a box of the target, and the part of that box that is drawn.
 
     image : texture of sRGB bytes
     """
@@ -27,7 +27,7 @@ class Patch:
 
 
 class Blit(Program):
-    """Draws images of bytes into targets of one format."""
+    """Draws byte images into targets of one format."""
 
     def __init__(self, device: Device, target: str) -> None:
         super().__init__(device, Path(__file__).parent / "blit.wgsl")
@@ -45,9 +45,9 @@ class Blit(Program):
         )
 
     def draw(self, patches: Sequence[Patch], view: Any) -> None:
-        """Patches on black.
+        """Draw patches on black.
 
-        view : of the target's texture
+        view : of the target texture
         """
         encoder = self.device.handle.create_command_encoder()
         whole = {"view": view, "load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 1)}
