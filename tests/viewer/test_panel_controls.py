@@ -193,13 +193,13 @@ def test_a_screenshot_that_cannot_be_is_told_and_the_viewer_goes_on(
     session = driver.viewer.session
     session.change(session.state.in_view(view))
     before = driver.settled()
-    session.files.picture, session.files.size = str(tmp_path / name), size
+    session.picture_file, session.picture_size = str(tmp_path / name), size
     for section in ("Profile", "Surface"):  # closed, else the button would be below the window's edge
         driver.press(section)
     driver.press("screenshot")
     for section in ("Surface", "Profile"):
         driver.press(section)
-    assert said in session.messages.said and len(session.messages.said) < 400
+    assert said in session.message and len(session.message) < 400
     assert not list(tmp_path.iterdir())
     after = driver.settled()
     assert (after[:200, 205:] == before[:200, 205:]).all()

@@ -148,7 +148,7 @@ def test_an_impossible_state_is_told_and_the_last_picture_stays(driver: InputDri
     before = driver.settled()
     session.change(session.state.with_skin(profile="nothing.csv"))
     after = driver.frame()
-    assert "nothing.csv" in session.messages.said
+    assert "nothing.csv" in session.message
     assert difference(before, after, rows=140) == 0.0
     assert driver.settled() is not None  # it is not tried again and again
     session.history.undo()
@@ -163,7 +163,7 @@ def test_buttons_save_load_and_take_pictures(driver: InputDriver, tmp_path: Path
     session.load(tmp_path / "scene.toml")
     assert session.state.scene.skin == saved.scene.skin and session.state.scene.head is saved.scene.head
     session.screenshot(tmp_path / "a.png", (32, 32))
-    assert (tmp_path / "a.png").stat().st_size > 100 and "a.png" in session.messages.said
+    assert (tmp_path / "a.png").stat().st_size > 100 and "a.png" in session.message
 
 
 def test_the_window_may_change_its_size_or_have_none(driver: InputDriver) -> None:
@@ -183,7 +183,7 @@ def test_a_lost_device_is_opened_again(make_driver: Callable[[], InputDriver]) -
     lost.renderer.device.handle.destroy()
     driver.viewer.session.change(driver.viewer.session.state.with_skin(mix=0.4))
     driver.frame()
-    assert driver.viewer.session.studio is not lost and "lost" in driver.viewer.session.messages.said
+    assert driver.viewer.session.studio is not lost and "lost" in driver.viewer.session.message
     driver.viewer.session.history.undo()
     assert difference(before, driver.settled(), rows=380) == 0.0
     assert np.abs(driver.frame()[30:440, :190].astype(int) - before[30:440, :190]).max() == 0  # not "redo"

@@ -36,9 +36,5 @@ class Chart:
         (u, v), shrunk = self.centre, self.span - span
         return replace(self, span=span)._at(u + shrunk * x, v + shrunk * y)
 
-    def whole(self) -> Chart:
-        """Show the whole layer."""
-        return Chart(self.layer)
-
     def _at(self, u: float, v: float) -> Chart:
         return replace(self, centre=(min(1.0, max(0.0, u)), min(1.0, max(0.0, v))))

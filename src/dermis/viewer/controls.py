@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from dermis.scene.camera import preset
-from dermis.viewer.chart import ATLAS
+from dermis.viewer.chart import ATLAS, Chart
 from dermis.viewer.navigation import dolly, drag_light, focus, orbit, pan, pick
 from dermis.viewer.state import History, ViewerState
 
@@ -108,7 +108,7 @@ class Controls:
     def _focus(self, event: Event, size: Pair) -> None:
         state, (width, height) = self.history.state, size
         if state.view == ATLAS:
-            self.history.change(state.with_chart(state.chart.whole()))
+            self.history.change(state.with_chart(Chart(state.chart.layer)))
             return
         x, y = 2.0 * event["x"] / width - 1.0, 1.0 - 2.0 * event["y"] / height
         point = pick(state.scene.head, state.scene.camera, x, y, width / height)

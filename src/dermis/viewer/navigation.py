@@ -55,7 +55,7 @@ def dolly(camera: Camera, factor: float) -> Camera:
     distance = float(np.linalg.norm(away))
     wanted = distance * frame / camera.frame_mm
     moved = max(min(wanted, FARTHEST_MM / 10), min(distance, _NEAREST_MM))
-    return _placed(camera, np.array(camera.target) + away * (moved / distance), camera.target, frame)
+    return _placed(camera, np.array(camera.target) + away * (moved / distance), camera.target, frame_mm=frame)
 
 
 def focus(camera: Camera, point: Any) -> Camera:
@@ -157,9 +157,8 @@ def _same(a: Camera, b: Camera) -> bool:
     return max(off) < 5e-4 * b.frame_mm and abs(a.frame_mm - b.frame_mm) < 5e-4 * b.frame_mm
 
 
-def _placed(camera: Camera, position: Any, target: Any, frame_mm: float | None = None) -> Camera:
-    frame = camera.frame_mm if frame_mm is None else frame_mm
-    return changed(camera, position=_vector(position), target=_vector(target), frame_mm=frame)
+def _placed(camera: Camera, position: Any, target: Any, **fields: float) -> Camera:
+    return changed(camera, position=_vector(position), target=_vector(target), **fields)
 
 
 def _vector(v: Any) -> tuple[float, float, float]:

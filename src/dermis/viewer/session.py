@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 
 from dermis.errors import refuse
@@ -17,27 +16,12 @@ from dermis.viewer.studio import Studio
 NO_REGIONS = "none"
 
 
-@dataclass
-class Messages:
-    """Text over the picture: the adapter's status, and the result of the last action."""
-
-    status: str = ""
-    said: str = ""
-
-
-@dataclass
-class FileNames:
-    """Files that the panel's buttons write, and the size of screenshots [pixel]."""
-
-    scene: str = "scene.toml"
-    picture: str = "dermis.png"
-    size: tuple[int, int] = (1920, 1080)
-
-
 class Session:
     """The undo history, the input controls that change it, and the studio that draws its state.
 
     split : the before/after comparison
+    status, message : text over the picture: the adapter's state, and the result of the last action
+    scene_file, picture_file, picture_size : what the panel's buttons write [pixel]
     positions : of the panel's controls in the window, by label
     """
 
@@ -46,8 +30,8 @@ class Session:
         self.controls = Controls(self.history)
         self.studio = studio
         self.split = Split()
-        self.messages = Messages()
-        self.files = FileNames()
+        self.status = self.message = ""
+        self.scene_file, self.picture_file, self.picture_size = "scene.toml", "dermis.png", (1920, 1080)
         self.positions: dict[str, tuple[float, float]] = {}
 
     @property
@@ -58,7 +42,7 @@ class Session:
     def change(self, state: ViewerState, gesture: str = "") -> None:
         """Go to a new state; changes with the same gesture are undone together."""
         self.history.change(state, gesture)
-        self.messages.said = ""
+        self.message = ""
 
     def save(self, path: Path) -> None:
         """Write the scene file.
@@ -66,7 +50,7 @@ class Session:
         Raises DermisError when that is not possible.
         """
         save_state(path, self.state)
-        self.messages.said = f"saved {path}"
+        self.message = f"saved {path}"
 
     def load(self, path: Path) -> None:
         """Open a scene file.
@@ -74,7 +58,7 @@ class Session:
         Raises DermisError for a file that is not a scene.
         """
         self.change(load_state(path, self.state))
-        self.messages.said = f"loaded {path}"
+        self.message = f"loaded {path}"
 
     def screenshot(self, path: Path, size: tuple[int, int]) -> None:
         """Write the picture at any size: .png with the tone curve or .exr, linear.
@@ -87,7 +71,7 @@ class Session:
         if kind == ".exr" and view not in (PICTURE, *PARTS):
             refuse(f"view {view} as .exr", "a view of linear light", "its numbers are colours", "Take .png")
         self.studio.screenshot(path, self.state, size)
-        self.messages.said = f"wrote {path}, {size[0]} x {size[1]}"
+        self.message = f"wrote {path}, {size[0]} x {size[1]}"
 
 
 def apply_regions(state: ViewerState, name: str, known: Iterable[ViewerState] = ()) -> ViewerState:

@@ -98,7 +98,7 @@ class Viewer:
         self._last_draw = now
         moving = self._is_moving(now) or session.studio.is_searching
         images = self._images(state, camera, size, moving)
-        session.messages.status = self._status(size)
+        session.status = self._status(size)
         target = self._context.get_current_texture().create_view()
         self._blit.draw(self._patches(*images, size), target)
         self.panel.draw(target, self.canvas.get_logical_size(), self.canvas.get_pixel_ratio())
@@ -134,13 +134,13 @@ class Viewer:
             try:
                 images = session.studio.pictures(state, session.split.before, camera, size, moving)
                 if self._refused:
-                    self._refused, session.messages.said = None, ""
+                    self._refused, session.message = None, ""
                 return images
             except DermisError as error:
                 if session.studio.last_image is None or isinstance(error.__cause__, wgpu.GPUError):
                     raise
                 self._refused = state
-                session.messages.said = str(error)
+                session.message = str(error)
         return session.studio.last_image, None
 
     def _is_moving(self, now: float) -> bool:
@@ -198,5 +198,5 @@ class Viewer:
             self._context.unconfigure()
         self.session.studio = Studio(self._adapter)
         self._open()
-        self.session.messages.said = "the graphics device was lost and opened again"
+        self.session.message = "the graphics device was lost and opened again"
         self.canvas.request_draw()

@@ -14,8 +14,6 @@ from dermis.viewer.viewer import Viewer
 Size = tuple[int, int]
 _TITLE = "dermis"
 _MOST_FPS = 60
-_VIEWER = 'Install it: pip install "dermis[viewer]"'
-_NOTEBOOK = 'Install it: pip install "dermis[notebook]"'
 
 
 def show_window(state: ViewerState, adapter: str, size: Size) -> None:
@@ -23,7 +21,7 @@ def show_window(state: ViewerState, adapter: str, size: Size) -> None:
 
     Raises DermisError without a display, a device or the extra `viewer`.
     """
-    backend = _backend("glfw", ("glfw",), _VIEWER)
+    backend = _backend("glfw", ("glfw",), "viewer")
     with warnings.catch_warnings(record=True) as caught:  # without a display glfw warns, and exits later
         warnings.simplefilter("always")
         if not backend.glfw.init():
@@ -56,7 +54,7 @@ def serve(
 
     Raises DermisError when the address cannot be used, without a device or the extra `viewer`.
     """
-    _backend("http", ("uvicorn", "websockets"), _VIEWER)
+    _backend("http", ("uvicorn", "websockets"), "viewer")
     from dermis.viewer.browser.canvas import PageCanvas
     from dermis.viewer.browser.server import bind, is_local, server
 
@@ -81,7 +79,7 @@ def notebook_viewer(
 
     Raises DermisError for anything else, and without the extra `notebook`.
     """
-    canvas = _notebook_canvas(_backend("anywidget", ("anywidget",), _NOTEBOOK))
+    canvas = _notebook_canvas(_backend("anywidget", ("anywidget",), "notebook"))
     state = shown if isinstance(shown, ViewerState) else named_state(shown)
     return Viewer(state, canvas(size=size, max_fps=_MOST_FPS), adapter)
 
@@ -104,12 +102,13 @@ def _notebook_canvas(backend: Any) -> Any:
     return NotebookCanvas
 
 
-def _backend(name: str, needed: tuple[str, ...], remedy: str) -> Any:
+def _backend(name: str, needed: tuple[str, ...], extra: str) -> Any:
     """A module of rendercanvas, provided that the packages it needs are installed."""
     for package in (*needed, "imgui_bundle", "rendercanvas"):
         try:
             importlib.import_module(package)
         except ImportError:
+            remedy = f'Install it: pip install "dermis[{extra}]"'
             refuse("viewer", f"the package {package.replace('_', '-')}", "it is not installed", remedy)
     return importlib.import_module(f"rendercanvas.{name}")
 

@@ -8,9 +8,8 @@ import json
 import secrets
 import socket
 from collections.abc import Awaitable, Callable, MutableMapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from dermis.errors import refuse
 
@@ -29,8 +28,7 @@ _MOST_LETTERS = 4096
 _NOT_FOUND = {"type": "http.response.start", "status": 404, "headers": [(b"content-type", b"text/plain")]}
 
 
-@dataclass(frozen=True)
-class Address:
+class Address(NamedTuple):
     """Where the page is served.
 
     token : secret part of the URL, empty when only this machine can connect

@@ -14,7 +14,9 @@ from dermis.viewer.session import Session
 from dermis.viewer.state import ViewerState
 
 Apply = Callable[..., ViewerState]
+Put = Callable[[Any], ViewerState]
 _LOG = int(imgui.SliderFlags_.logarithmic)
+_HDR = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.hdr)
 _FORMS = {"_per_mm": "%.3g", "_mm": "%.4g mm", "_degrees": "%.4g°"}  # by the unit that a name ends in
 _ALL_NAMES = int(imgui.ComboFlags_.height_largest)
 _TOOLTIP_WIDTH = 260.0
@@ -69,7 +71,7 @@ def _draw_field(session: Session, values: Plain, name: str, apply: Apply, style:
         return apply(**{name: found})
 
     if isinstance(value, bool):
-        checkbox(session, label, value, put)
+        _hold(session, label, imgui.checkbox(label, value), put)
     elif style.options:
         combo(session, label, str(value), map(str, style.options), lambda text: put(int(text)))
     elif isinstance(value, (int, float)):
@@ -78,9 +80,11 @@ def _draw_field(session: Session, values: Plain, name: str, apply: Apply, style:
         shown = Range(span.low / unit, span.high / unit, span.logarithmic)
         slider(session, label, value / unit, lambda found: put(exact(unit * found)), shown, form)
     elif kind.model_fields[name].annotation == _COLOUR:
-        colour(session, label, value, put)
+        result = imgui.color_edit3(label, list(value), _HDR)
+        _hold(session, label, result, lambda found: put(tuple(max(0.0, c) for c in found)))
     elif isinstance(value, tuple) and span.logarithmic:
-        rgb_sliders(session, label, value, put, span)
+        result = imgui.slider_float3(label, list(value), span.low, span.high, "%.3g", _LOG)
+        _hold(session, label, result, lambda found: put(tuple(_clamped(one, span) for one in found)))
     elif len(words := choices_of(kind, name)) > 1:
         combo(session, label, str(value), words, put)
     else:
@@ -106,52 +110,29 @@ def _explain(text: str) -> None:
     imgui.end_tooltip()
 
 
-def slider(
-    session: Session,
-    label: str,
-    value: float,
-    apply: Callable[[float], ViewerState],
-    span: Range,
-    form: str = "%.3f",
-) -> None:
-    """A number on a scale; a drag is one step of the undo history."""
-    low, high, logarithmic = span
-    flags = _LOG if logarithmic else 0
-    moved, found = imgui.slider_float(label, value, low, high, form, flags)
-    _held(session, label, moved, lambda: apply(min(high, max(low, found))))
+def slider(session: Session, label: str, value: float, put: Put, span: Range, form: str) -> None:
+    """A number on a scale."""
+    flags = _LOG if span.logarithmic else 0
+    result = imgui.slider_float(label, value, span.low, span.high, form, flags)
+    _hold(session, label, result, lambda found: put(_clamped(found, span)))
 
 
-def rgb_sliders(
-    session: Session, label: str, value: tuple[float, ...], apply: Callable[[Any], ViewerState], span: Range
-) -> None:
-    """Red, green and blue on scales; a drag is one step of the undo history."""
-    low, high, logarithmic = span
-    flags = _LOG if logarithmic else 0
-    moved, found = imgui.slider_float3(label, list(value), low, high, "%.3g", flags)
-    _held(session, label, moved, lambda: apply(tuple(min(high, max(low, one)) for one in found)))
+def _clamped(value: float, span: Range) -> float:
+    """Within the range, which typing and single precision can leave."""
+    return min(span.high, max(span.low, value))
 
 
-def colour(
-    session: Session, label: str, value: tuple[float, ...], apply: Callable[[Any], ViewerState]
-) -> None:
-    """Linear Rec. 709, above 1 for lights; a drag is one step of the undo history."""
-    flags = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.hdr)
-    moved, found = imgui.color_edit3(label, list(value), flags)
-    _held(session, label, moved, lambda: apply(tuple(max(0.0, c) for c in found)))
-
-
-def _held(session: Session, label: str, moved: bool, make: Callable[[], ViewerState]) -> None:
-    """Apply the change of a control that is held down, as one gesture."""
+def _hold(session: Session, label: str, result: tuple[bool, Any], put: Put) -> None:
+    """Apply the new value of a control; all values while it is held are one step of the undo history."""
     record_position(session, label)
+    moved, found = result
     if moved:
-        attempt(session, lambda: session.change(make(), f"slide {label}"))
+        attempt(session, lambda: session.change(put(found), f"hold {label}"))
     if imgui.is_item_deactivated():
         session.history.end_gesture()
 
 
-def combo(
-    session: Session, label: str, current: str, names: Iterable[str], apply: Callable[[str], ViewerState]
-) -> None:
+def combo(session: Session, label: str, current: str, names: Iterable[str], put: Put) -> None:
     """One of some names."""
     if not imgui.begin_combo(label, current, _ALL_NAMES):
         record_position(session, label)
@@ -160,16 +141,8 @@ def combo(
         clicked, _ = imgui.selectable(name, name == current)
         record_position(session, f"{label}/{name}")
         if clicked and name != current:
-            attempt(session, lambda chosen=name: session.change(apply(chosen)))  # type: ignore[misc]
+            attempt(session, lambda chosen=name: session.change(put(chosen)))  # type: ignore[misc]
     imgui.end_combo()
-
-
-def checkbox(session: Session, label: str, value: bool, apply: Callable[[bool], ViewerState]) -> None:
-    """Yes or no."""
-    moved, found = imgui.checkbox(label, value)
-    record_position(session, label)
-    if moved:
-        attempt(session, lambda: session.change(apply(found)))
 
 
 def button(session: Session, label: str) -> bool:
@@ -177,13 +150,6 @@ def button(session: Session, label: str) -> bool:
     pressed = imgui.button(label)
     record_position(session, label)
     return bool(pressed)
-
-
-def grey_text(text: str) -> None:
-    """A grey line, wrapped at the panel's edge."""
-    imgui.push_style_color(int(imgui.Col_.text), imgui.get_style_color_vec4(int(imgui.Col_.text_disabled)))
-    imgui.text_wrapped(text)
-    imgui.pop_style_color()
 
 
 def record_position(session: Session, label: str) -> None:
@@ -198,4 +164,4 @@ def attempt(session: Session, act: Callable[[], None]) -> None:
     try:
         act()
     except DermisError as error:
-        session.messages.said = str(error)
+        session.message = str(error)

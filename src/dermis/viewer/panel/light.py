@@ -19,14 +19,6 @@ _CUSTOM = "custom"
 _NO_ENVIRONMENT = "none"
 _STOPS = Range(-6.0, 4.0)
 _FADE = 0.5  # least width over which a cone fades [degrees]
-_SIZE = Style(span=Range(1.0, 3000.0, True))
-_LIGHT = {
-    "width_mm": _SIZE,
-    "height_mm": _SIZE,
-    "length_mm": _SIZE,
-    "radius_mm": Style(span=Range(1.0, 500.0, True)),
-    "softness_mm": Style(span=Range(0.1, 100.0, True)),
-}
 _ENVIRONMENT = {"exposure": Style("brightness")}
 
 
@@ -64,7 +56,7 @@ def _light(session: Session, index: int, light: Light) -> None:
 
     imgui.text_disabled(f"{light.kind}, Shift and drag to move")
     slider(session, "strength", math.log2(strength / math.pi), scale, _STOPS, "%.2f stops")
-    draw_fields(session, light, apply, _LIGHT | _cone(light))
+    draw_fields(session, light, apply, _cone(light))
     if button(session, "copy"):  # refused when there are too many
         lights = session.state.scene.lights
         attempt(session, lambda: session.change(session.state.with_lights([*lights, light])))

@@ -86,12 +86,6 @@ class Panel:
             _feed_key(io, str(event["key"]), kind == "key_down")
         return bool(io.want_text_input)
 
-    @property
-    def is_active(self) -> bool:
-        """Whether a control is held or typed into."""
-        self._enter()
-        return bool(imgui.is_any_item_active())
-
     def draw(self, target: Any, size: tuple[float, float], pixel_ratio: float) -> None:
         """Draw over what the target shows.
 
@@ -121,7 +115,7 @@ class Panel:
         if {"Control", "Meta"} & set(event.get("modifiers", ())):
             if key.lower() != "s":
                 return False
-            attempt(session, lambda: session.save(Path(session.files.scene)))
+            attempt(session, lambda: session.save(Path(session.scene_file)))
         elif key == "Tab":
             self.visible = not self.visible
         elif key in HELP_KEYS or (key == "Escape" and self.shows_help):
@@ -137,7 +131,7 @@ class Panel:
     def _covers(self, x: float, y: float, size: tuple[float, float]) -> bool:
         """Whether a pointer there is over the panel; Dear ImGui would know it only a frame later."""
         on_button = not self.visible and x < self._button_end[0] and y < self._button_end[1]
-        return x < self.width(size) or on_button or self._has_popup or self.is_active
+        return x < self.width(size) or on_button or self._has_popup or bool(imgui.is_any_item_active())
 
     def _draw_windows(self, size: tuple[float, float]) -> None:
         """The panel, or the button that brings it back, and the overlay."""
@@ -145,11 +139,11 @@ class Panel:
             self._draw_panel(size)
         else:
             self._draw_button()
-        left, messages = self.width(size), self._session.messages
+        left, session = self.width(size), self._session
         if self.shows_help:
             draw_help(left, size)
-        draw_divider(self._session.split, left, size)
-        draw_messages([line for line in (messages.said, messages.status) if line], left, size)
+        draw_divider(session.split, left, size)
+        draw_messages([line for line in (session.message, session.status) if line], left, size)
 
     def _draw_button(self) -> None:
         """A button in the corner of the picture."""
@@ -187,11 +181,8 @@ class Panel:
         imgui.end()
 
     def _draw_toolbar(self) -> None:
-        history = self._session.history
-        for label, possible, step in (
-            ("undo", history.can_undo, history.undo),
-            ("redo", history.can_redo, history.redo),
-        ):
+        h = self._session.history
+        for label, possible, step in (("undo", h.can_undo, h.undo), ("redo", h.can_redo, h.redo)):
             imgui.begin_disabled(not possible)
             if button(self._session, label):
                 step()

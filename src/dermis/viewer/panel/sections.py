@@ -6,8 +6,9 @@ To add a section, write a function that draws it and add it to `SECTIONS`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 from imgui_bundle import imgui
 
@@ -32,8 +33,7 @@ _PICTURE = ("exposure", "tone", "gamma", "bloom", "background")
 _NOWHERE = ("size", "parts")  # the window's, and a view
 
 
-@dataclass(frozen=True)
-class Section:
+class Section(NamedTuple):
     """A part of the panel that can be opened and closed."""
 
     title: str
@@ -92,18 +92,17 @@ def draw_picture(session: Session) -> None:
 
 def draw_files(session: Session) -> None:
     """The scene file, and screenshots of any size."""
-    files = session.files
-    _, files.scene = imgui.input_text("scene", files.scene)
+    _, session.scene_file = imgui.input_text("scene", session.scene_file)
     if button(session, "save"):
-        attempt(session, lambda: session.save(Path(files.scene)))
+        attempt(session, lambda: session.save(Path(session.scene_file)))
     imgui.same_line()
     if button(session, "load"):
-        attempt(session, lambda: session.load(Path(files.scene)))
-    _, files.picture = imgui.input_text("picture", files.picture)
-    _, sides = imgui.input_int2("size", list(files.size))
-    files.size = max(1, sides[0]), max(1, sides[1])
+        attempt(session, lambda: session.load(Path(session.scene_file)))
+    _, session.picture_file = imgui.input_text("picture", session.picture_file)
+    _, sides = imgui.input_int2("size", list(session.picture_size))
+    session.picture_size = max(1, sides[0]), max(1, sides[1])
     if button(session, "screenshot"):
-        attempt(session, lambda: session.screenshot(Path(files.picture), files.size))
+        attempt(session, lambda: session.screenshot(Path(session.picture_file), session.picture_size))
 
 
 SECTIONS = (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
 
 from imgui_bundle import imgui
@@ -14,11 +13,12 @@ from dermis.optics.profiles import preset_names
 from dermis.optics.tissue import SPECTRAL
 from dermis.scene.skin import MOST_LAYERS, Pigments, Skin, TissueLayer
 from dermis.scene.tissue import layers_of
-from dermis.viewer.panel.fields import Style, attempt, button, combo, draw_fields, grey_text, record_position
+from dermis.viewer.panel.fields import Style, attempt, button, combo, draw_fields, record_position
 from dermis.viewer.panel.plots import plot_profile
 from dermis.viewer.session import NO_REGIONS, Session, apply_regions
 from dermis.viewer.state import ViewerState, changed
 
+Layers = tuple[TissueLayer, ...]
 _PROFILE_FIELDS = ("profile", "albedo", "pigments", "layers")
 _FIRST_STRUCTURE = "dj2006"
 _BLOODY_STRUCTURE = "donner2008"  # the one with blood in its epidermis
@@ -49,10 +49,10 @@ def draw_profile(session: Session) -> None:
     draw_fields(session, skin, with_skin, {"albedo": Style("colour from")}, ["albedo"])
     if skin.profile in (SPECTRAL, *EXAMPLES):
         _pigments(session, skin)
-    elif layers := _layers(skin):
+    elif layers := skin.layers or _named_layers(skin.profile):
         _stack(session, layers)
     else:
-        grey_text("a sum of Gaussians, without layers")
+        imgui.text_disabled("a sum of Gaussians, without layers")
     if skin.has_own_tissue and button(session, "reset"):
         session.change(with_skin(pigments=None, layers=()))
     plot_profile(session)
@@ -60,26 +60,20 @@ def draw_profile(session: Session) -> None:
 
 def draw_surface(session: Session) -> None:
     """All that the section above leaves of the skin's fields: a new one appears here."""
-    state = session.state
+    state, known = session.state, session.history.states
     replaced = {
         "roughness": state.scene.head.maps.roughness is not None and "roughness comes from the head's map",
         "rho_s": "regions" in state.head and "rho_s comes from the regions",
     }
     for name in type(state.scene.skin).model_fields:
         if name == "rho_s":
-            _regions(session)
+            now = str(state.head.get("regions", NO_REGIONS))
+            names = dict.fromkeys((NO_REGIONS, DEFAULT, now))
+            combo(session, "regions", now, names, lambda name: apply_regions(state, name, known))
         if text := replaced.get(name):
             imgui.text_disabled(text)
         elif name not in _PROFILE_FIELDS:
             draw_fields(session, state.scene.skin, state.with_skin, _SURFACE, [name])
-
-
-def _regions(session: Session) -> None:
-    """Tables of face regions: none, the default, and the head's own."""
-    state = session.state
-    now = str(state.head.get("regions", NO_REGIONS))
-    names = dict.fromkeys((NO_REGIONS, DEFAULT, now))
-    combo(session, "regions", now, names, lambda name: apply_regions(state, name, session.history.states))
 
 
 def _pigments(session: Session, skin: Skin) -> None:
@@ -98,20 +92,16 @@ def _pigments(session: Session, skin: Skin) -> None:
     draw_fields(session, values, apply, _PIGMENTS, _DERMIS)
 
 
-def _layers(skin: Skin) -> tuple[TissueLayer, ...]:
+@lru_cache(maxsize=16)
+def _named_layers(profile: str) -> tuple[TissueLayer, ...]:
+    """Layers of a named profile, none for a table of Gaussians; files are not read again in each frame."""
     try:
-        return skin.layers or _named_layers(skin.profile)
+        return layers_of(Skin(profile=profile))
     except DermisError:  # a table, or a file that the message over the picture is about
         return ()
 
 
-@lru_cache(maxsize=16)
-def _named_layers(profile: str) -> tuple[TissueLayer, ...]:
-    """Layers of a named profile; files are read once instead of in each frame."""
-    return layers_of(Skin(profile=profile))
-
-
-def _stack(session: Session, layers: Sequence[TissueLayer]) -> None:
+def _stack(session: Session, layers: Layers) -> None:
     """The layers, topmost first; each opens to its numbers."""
     for index, layer in enumerate(layers):
         depth = "semi-infinite" if layer.thickness_mm is None else f"{layer.thickness_mm:.3g} mm"
@@ -122,7 +112,7 @@ def _stack(session: Session, layers: Sequence[TissueLayer]) -> None:
             imgui.tree_pop()
 
 
-def _layer(session: Session, layers: Sequence[TissueLayer], index: int) -> None:
+def _layer(session: Session, layers: Layers, index: int) -> None:
     layer, suffix = layers[index], f"##{index + 1}"
 
     def apply(**fields: object) -> ViewerState:
@@ -138,9 +128,7 @@ def _layer(session: Session, layers: Sequence[TissueLayer], index: int) -> None:
         attempt(session, lambda: session.change(_with_layers(session, layers, index)))
 
 
-def _with_layers(
-    session: Session, layers: Sequence[TissueLayer], index: int, *instead: TissueLayer
-) -> ViewerState:
+def _with_layers(session: Session, layers: Layers, index: int, *instead: TissueLayer) -> ViewerState:
     """The state with other layers in place of one."""
     stack = (*layers[:index], *instead, *layers[index + 1 :])
     return session.state.with_skin(layers=[layer.model_dump() for layer in stack])
