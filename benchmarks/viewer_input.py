@@ -1,4 +1,4 @@
-"""Motion in a viewer without a window: how many frames a second."""
+"""Frame rates of motion in a viewer without a window."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ FEWEST = 3  # that a median is made of, however little time is left
 
 @dataclass(frozen=True)
 class Plan:
-    """What is drawn on what.
+    """What is drawn, and on which adapter.
 
     size : of the picture [pixel]
     frames : of each kind of motion
@@ -56,7 +56,7 @@ class Motion:
 
 
 class Steady(Pace):
-    """The same effort for every frame: what is asked for."""
+    """The same quality for every frame: what the settings ask for."""
 
     def settings(self, wanted: Settings, size: tuple[int, int], moving: bool) -> Settings:
         """The wanted ones at the window's size."""
@@ -90,7 +90,7 @@ class InputDriver:
         return picture
 
     def rest(self) -> None:
-        """Draw until nothing moves any more.
+        """Draw until nothing moves.
 
         Raises RuntimeError when that takes too long.
         """
@@ -101,7 +101,7 @@ class InputDriver:
             self.frame()
 
     def go_on(self, state: ViewerState) -> None:
-        """Another state, in a gesture, so that the history does not grow."""
+        """Go to another state within one gesture, so that the undo history does not grow."""
         self.viewer.session.change(state, "benchmark")
 
     def event(self, kind: str, x: float, y: float, **fields: Any) -> None:
@@ -111,7 +111,7 @@ class InputDriver:
 
 
 def offscreen(plan: Plan) -> InputDriver:
-    """A viewer that draws every frame at the plan's effort."""
+    """A viewer that draws every frame at the plan's quality."""
     from rendercanvas.offscreen import OffscreenRenderCanvas
 
     settings = Settings(atlas=plan.atlas, samples=plan.samples, shadow_size=plan.atlas)
@@ -124,7 +124,7 @@ def offscreen(plan: Plan) -> InputDriver:
 
 
 def slider_position(driver: InputDriver, name: str) -> tuple[float, float] | None:
-    """Where a slider of skin with pigments is in the window, None where one had to scroll to it."""
+    """Position of a pigment's slider in the window, None when it would have to be scrolled to."""
     driver.viewer.panel.visible = True
     driver.go_on(driver.first.with_skin(profile=PIGMENTED))
     for _ in range(FEWEST):

@@ -1,4 +1,4 @@
-"""What the viewer holds while everything in it is changed again and again."""
+"""The viewer's memory while everything in it is changed again and again."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from dermis.viewer.state import ViewerState
 
 Kind = Callable[[ViewerState, random.Random], ViewerState]
 _SAMPLES = 60  # of the memory, over all the time
-_BY_HAND = ("split", "undo", "redo", "size", "panel", "preset", "start again")
+_ACTIONS = ("split", "undo", "redo", "size", "panel", "preset", "start again")
 
 
 def _one(chance: random.Random, *names: Any) -> Any:
@@ -28,9 +28,9 @@ def _one(chance: random.Random, *names: Any) -> Any:
 
 
 KINDS: dict[str, Kind] = {
-    "turn": lambda s, r: s.with_camera(orbit(s.scene.camera, r.uniform(-1, 1), r.uniform(-0.3, 0.3))),
+    "orbit": lambda s, r: s.with_camera(orbit(s.scene.camera, r.uniform(-1, 1), r.uniform(-0.3, 0.3))),
     "pan": lambda s, r: s.with_camera(pan(s.scene.camera, r.uniform(-0.1, 0.1), r.uniform(-0.1, 0.1))),
-    "come nearer": lambda s, r: s.with_camera(dolly(s.scene.camera, r.uniform(0.8, 1.25))),
+    "dolly": lambda s, r: s.with_camera(dolly(s.scene.camera, r.uniform(0.8, 1.25))),
     "light": lambda s, r: drag_light(s, 0, r.uniform(-0.5, 0.5), r.uniform(-0.2, 0.2)),
     "rig": lambda s, r: s.with_rig(_one(r, *light_presets())),
     "environment": lambda s, r: s.with_environment(_one(r, None, Environment(name="uniform", exposure=0.5))),
@@ -65,7 +65,7 @@ def endured(driver: InputDriver, plan: Plan, minutes: float, changes: int) -> di
     """The memory over at least so many minutes and changes; each change is drawn."""
     chance, session = random.Random(11), driver.viewer.session
     done, taken = 0, list[dict[str, float]]()
-    counts = dict.fromkeys((*KINDS, *_BY_HAND), 0)
+    counts = dict.fromkeys((*KINDS, *_ACTIONS), 0)
     for kind in counts:  # all that is ever compiled and loaded, before anything is counted
         _change(driver, kind, chance, plan)
         driver.frame()

@@ -35,7 +35,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         super()._on_event(event, id)
         acted = kind == "_clients_change" or (kind[:1] != "_" and id == self._active_client)
         if acted and self._frame_info_per_client:
-            # rendercanvas would draw one tick later, and a reloaded or resized page only when something moves.
+            # rendercanvas would draw one tick later, and for a reloaded or resized page only on motion.
             self.request_draw()
         elif kind == "_framefeedback" and not self._draw_requested:
             self._send_last_frame_to_ready_clients()  # encoded while this page was not ready
