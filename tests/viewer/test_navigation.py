@@ -11,10 +11,18 @@ from dermis.mesh.head import Head
 from dermis.scene import Camera, Environment
 from dermis.scene.camera import PRESETS, preset
 from dermis.scene.lights import DirectionalLight, SpotLight
-from dermis.viewer.easing import Easing
-from dermis.viewer.lamp import drag_light, turned_light
-from dermis.viewer.orbit import axes, between, dolly, focus, orbit, pan
-from dermis.viewer.picking import pick
+from dermis.viewer.navigation import (
+    Easing,
+    axes,
+    between,
+    dolly,
+    drag_light,
+    focus,
+    orbit,
+    orbit_light,
+    pan,
+    pick,
+)
 from dermis.viewer.state import ViewerState
 
 CAMERA = Camera(position=(0.0, 0.0, 1000.0), target=(0.0, 0.0, 0.0), frame_mm=300.0)
@@ -119,16 +127,16 @@ def test_between_opposite_sides_does_not_go_through_the_head() -> None:
 
 def test_a_light_is_carried_around_its_target() -> None:
     light = SpotLight(position=(0.0, 0.0, 800.0))
-    moved = turned_light(light, CAMERA, math.pi / 2, 0.0)
+    moved = orbit_light(light, CAMERA, math.pi / 2, 0.0)
     assert isinstance(moved, SpotLight)
     assert np.allclose(moved.position, (800.0, 0.0, 0.0)) and moved.irradiance == light.irradiance
-    raised = turned_light(light, CAMERA, 0.0, math.pi / 2)
+    raised = orbit_light(light, CAMERA, 0.0, math.pi / 2)
     assert isinstance(raised, SpotLight)
     assert np.allclose(raised.position, (0.0, 800.0, 0.0))
 
 
 def test_parallel_light_turns_its_direction() -> None:
-    moved = turned_light(DirectionalLight(direction=(0, 0, -2)), CAMERA, math.pi / 2, 0.0)
+    moved = orbit_light(DirectionalLight(direction=(0, 0, -2)), CAMERA, math.pi / 2, 0.0)
     assert isinstance(moved, DirectionalLight) and np.allclose(moved.direction, (-2.0, 0.0, 0.0))
 
 
