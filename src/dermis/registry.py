@@ -38,6 +38,11 @@ class Registry(Mapping[str, T], Generic[T]):
         if summary:
             self._summaries[name] = summary
 
+    def remove(self, name: str) -> None:
+        """Take an entry out again; nothing happens when it is not there."""
+        self._entries.pop(name, None)
+        self._summaries.pop(name, None)
+
     @property
     def names(self) -> tuple[str, ...]:
         """Names of all entries."""

@@ -3,38 +3,21 @@
 from dermis.scene.camera import Camera, portrait, profile, three_quarter
 from dermis.scene.environment import Environment
 from dermis.scene.files import load_camera, load_lights, load_scene
-from dermis.scene.lights import (
-    DirectionalLight,
-    Light,
-    PointLight,
-    RectangleLight,
-    SphereLight,
-    SpotLight,
-    StripeLight,
-    studio,
-)
+from dermis.scene.lights import *  # noqa: F403 each kind
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 
-__all__ = [
+__all__ = [  # besides those of dermis.scene.lights
     "Camera",
-    "DirectionalLight",
     "Environment",
-    "Light",
-    "PointLight",
-    "RectangleLight",
     "Scene",
     "Settings",
     "Skin",
-    "SphereLight",
-    "SpotLight",
-    "StripeLight",
     "load_camera",
     "load_lights",
     "load_scene",
     "portrait",
     "profile",
-    "studio",
     "three_quarter",
 ]

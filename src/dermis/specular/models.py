@@ -1,4 +1,4 @@
-"""Every model of the surface by its name, behind one protocol; without numbers, so that a command's help is quick."""
+"""Every model of the surface by its name, behind one protocol."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class Lobe(Protocol):
 class Model:
     """A lobe and what is to be said of it.
 
-    Its shader, beside the lobe's module and of the same name, has `fn NAME(a: Angles, m: f32) -> f32` with NAME as
-    in scene files, hyphens turned into underscores.
+    Its shader lies beside the lobe's module under the same name and has `fn NAME(a: Angles, m: f32) -> f32`,
+    NAME as in scene files, with underscores for hyphens.
 
     note : what the model is; for one that is not reciprocal, why
     reciprocal : whether light and view may change places
@@ -46,7 +46,7 @@ class Model:
     @property
     def shader(self) -> Path:
         """The file of its shader."""
-        return Path(inspect.getfile(self.lobe)).with_suffix(".wgsl")  # type: ignore[arg-type]
+        return Path(inspect.getfile(self.lobe)).with_suffix(".wgsl")
 
 
 MODELS: Registry[Model] = Registry(
@@ -63,7 +63,7 @@ MODELS: Registry[Model] = Registry(
         "kelemen-direct": "dermis.specular.kelemen:KELEMEN_DIRECT",
     },
 )
-"""By the names that scenes use."""
+"""By the names that scenes use; imported when needed, so that a command's help is quick."""
 
 SpecularName = Annotated[str, Named(MODELS, "none")]
 FresnelName = Literal["schlick", "exact"]

@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike
 
 from dermis.specular.cosines import Cosines, Floats
 from dermis.specular.fresnel import Fresnel, schlick
-from dermis.specular.models import Model
 from dermis.specular.kelemen import kelemen
+from dermis.specular.models import Model
 
 NARROW, WIDE = 0.75**2, 1.3**2
 """Factors of m: an engine's 0.75 and 1.3 belong to its roughness, whose square is m [EpicGames2025]."""
