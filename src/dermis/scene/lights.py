@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tomllib
+from importlib import resources
 from typing import Annotated, Literal
 
 import numpy as np
@@ -19,6 +21,7 @@ __all__ = [
     "SphereLight",
     "SpotLight",
     "StripeLight",
+    "preset_lights",
     "studio",
 ]
 
@@ -161,8 +164,12 @@ LIGHTS: Registry[type[Light]] = Registry(
 Cycles take in its place in `dermis.reference.lights`."""
 
 
+def preset_lights(name: str) -> tuple[Light, ...]:
+    """The lights of a preset of the package."""
+    text = (resources.files("dermis.scene") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+    return tuple(LIGHTS[table["kind"]](**table) for table in tomllib.loads(text)["lights"])
+
+
 def studio() -> tuple[Light, ...]:
     """Three shadowed spots: a warm key from the upper left, a weak fill, a cool rim from behind."""
-    from dermis.scene.files import preset_lights
-
     return preset_lights("studio")
