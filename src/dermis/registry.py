@@ -50,8 +50,13 @@ class Registry(Mapping[str, T], Generic[T]):
         try:
             yield
         finally:
-            del self._entries[name]
-            self.changes += 1
+            self.remove(name)
+
+    def remove(self, name: str) -> None:
+        """Take an entry out again; nothing happens when it is not there."""
+        self._entries.pop(name, None)
+        self._summaries.pop(name, None)
+        self.changes += 1
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -62,21 +67,11 @@ class Registry(Mapping[str, T], Generic[T]):
         """What each name stands for, of those that say so: "name: summary"."""
         return [f"{name}: {summary}" for name, summary in self._summaries.items()]
 
-    def check(self, name: str) -> str:
-        """The name itself.
-
-        Raises ValueError for one that is not registered, worded as what was expected.
-        """
-        if name not in self._entries:
-            raise ValueError(f"one of {', '.join(self._entries)}")
-        return name
-
     def __getitem__(self, name: str) -> T:
         """Raises DermisError for a name that is not registered."""
-        try:
-            entry = self._entries[self.check(name)]
-        except ValueError as error:
-            refuse(self.kind, str(error), f"{name!r} came", "Correct it")
+        entry = self._entries.get(name)
+        if entry is None:
+            refuse(self.kind, f"one of {', '.join(self._entries)}", f"{name!r} came", "Correct it")
         if isinstance(entry, str):
             module, _, attribute = entry.partition(":")
             entry = self._entries[name] = cast(T, getattr(import_module(module), attribute))
@@ -107,7 +102,7 @@ class Named:
     def check(self, name: str) -> str:
         """The name itself.
 
-        Raises ValueError for one that is neither registered nor one of the others.
+        Raises ValueError for one that is neither registered nor one of the others, worded as expected.
         """
         if name not in self.names:
             raise ValueError(f"one of {', '.join(self.names)}")

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from dermis.gpu.repeated import Recording
 from offscreen_input import ADAPTER
 
-from dermis.gpu.repeated import Recording
 from dermis.scene.environment import Environment
 from dermis.viewer.navigation import orbit
 from dermis.viewer.pace import QUALITY_LEVELS

@@ -11,7 +11,8 @@ import numpy as np
 
 from dermis.errors import refuse
 from dermis.optics.media import Medium
-from dermis.reference.mitsuba_lights import emitter, surroundings
+from dermis.reference.described import surroundings
+from dermis.reference.lights import emitter
 from dermis.reference.mitsuba_skin import Lambertian, head_shapes, mask_shapes
 from dermis.scene.camera import Camera
 from dermis.scene.model import Scene

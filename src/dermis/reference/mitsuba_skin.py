@@ -12,7 +12,7 @@ import numpy as np
 from dermis.errors import refuse
 from dermis.mesh.head import Head
 from dermis.optics.media import Layer, Medium
-from dermis.reference.mitsuba_lights import rgb
+from dermis.reference.described import rgb
 from dermis.reference.mitsuba_solid import Solid, inwards, skin_solid
 
 _GAP = 0.97

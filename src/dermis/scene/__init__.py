@@ -9,16 +9,7 @@ if TYPE_CHECKING:
     from dermis.scene.camera import Camera, portrait, profile, three_quarter
     from dermis.scene.environment import Environment
     from dermis.scene.files import load_camera, load_lights, load_scene
-    from dermis.scene.lights import (
-        DirectionalLight,
-        Light,
-        PointLight,
-        RectangleLight,
-        SphereLight,
-        SpotLight,
-        StripeLight,
-        studio,
-    )
+    from dermis.scene.lights import *  # noqa: F403 each kind
     from dermis.scene.model import Scene
     from dermis.scene.settings import Settings
     from dermis.scene.skin import Skin
@@ -32,33 +23,26 @@ _HOMES = {
     "skin": ("Skin",),
 }
 
-__all__ = [
+__all__ = [  # besides those of dermis.scene.lights
     "Camera",
-    "DirectionalLight",
     "Environment",
-    "Light",
-    "PointLight",
-    "RectangleLight",
     "Scene",
     "Settings",
     "Skin",
-    "SphereLight",
-    "SpotLight",
-    "StripeLight",
     "load_camera",
     "load_lights",
     "load_scene",
     "portrait",
     "profile",
-    "studio",
     "three_quarter",
 ]
 
 
 def __getattr__(name: str) -> Any:
     """Names on first use: a command's help needs some of the models, not the heads."""
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     home = next((home for home, names in _HOMES.items() if name in names), "lights")
-    globals()[name] = value = getattr(import_module(f"{__name__}.{home}"), name)
+    module = import_module(f"{__name__}.{home}")
+    if name.startswith("_") or not hasattr(module, name):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value = getattr(module, name)
     return value

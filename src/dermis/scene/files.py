@@ -16,7 +16,7 @@ from dermis.scene.camera import PRESETS, Camera, preset
 from dermis.scene.environment import Environment
 from dermis.scene.head_table import HeadTable
 from dermis.scene.heads import load_head
-from dermis.scene.lights import LIGHTS, Light
+from dermis.scene.lights import LIGHTS, Light, preset_lights
 from dermis.scene.model import Scene
 from dermis.scene.plain import ImpossibleError, Plain
 from dermis.scene.settings import Settings
@@ -27,12 +27,6 @@ NO_LIGHTS = "none"
 """Name of the rig without lights, for an environment alone."""
 _PARTS = {"head", "skin", "lights", "environment", "camera", "render"}
 _MAPS = ("colour", "normal", "height", "specular", "roughness")
-
-
-def preset_lights(name: str) -> tuple[Light, ...]:
-    """The lights of a preset of the package."""
-    text = (resources.files("dermis.scene") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
-    return _lights(f"preset {name}", tomllib.loads(text).get("lights"))
 
 
 def load_lights(name: str) -> tuple[Light, ...]:
