@@ -93,6 +93,7 @@ class Memo:
                 found: T = search.value
                 return found
         self._awaited = running
+        self._asked[-1].add((_begin, of))  # or it would go before it is found
         for one in self._making:
             one.provisional = True
         standing_in: T = search.value
