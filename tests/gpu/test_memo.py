@@ -121,6 +121,7 @@ def test_arguments_are_the_same_by_what_they_say() -> None:
         ((1, (2, thing)), (1, (2, thing))),
         (ones, ones.copy()),
         (Value(1, ones), Value(1, ones.copy())),
+        ([Value(1, ones), None], [Value(1, ones.copy()), None]),
     ]
     others: list[tuple[Any, Any]] = [
         (1, 2),
@@ -131,6 +132,8 @@ def test_arguments_are_the_same_by_what_they_say() -> None:
         (ones, ones[:, None]),
         (ones, 2 * ones),
         (Value(1, ones), Value(1, 2 * ones)),
+        ([Value(1, ones)], [Value(1, 2 * ones)]),
+        ([1, 2], (1, 2)),
     ]
     assert [same(a, b) for a, b in alike] == [True] * len(alike)
     assert [same(a, b) for a, b in others] == [False] * len(others)
