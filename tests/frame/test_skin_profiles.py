@@ -1,4 +1,4 @@
-"""What is kept from frame to frame."""
+"""Profiles of skins, fitted when they are asked for and kept."""
 
 from __future__ import annotations
 
@@ -7,54 +7,12 @@ from pathlib import Path
 import pytest
 
 from dermis.errors import DermisError
-from dermis.frame.kept import Kept
 from dermis.frame.skin_profiles import SkinProfiles
 from dermis.frame.translucency import shared_width
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import fit_profile, load_profile
 from dermis.optics.tissue import Tissue
 from dermis.scene.skin import Pigments, Skin
-
-
-def made(kept: Kept, keys: str) -> str:
-    """The keys for which something was made."""
-    log: list[str] = []
-    for key in keys:
-        kept.keep("role", key, lambda key=key: log.append(key) or key)  # type: ignore[misc, func-returns-value]
-    return "".join(log)
-
-
-@pytest.mark.parametrize(
-    ("depth", "keys", "expected"),
-    [(1, "aabba", "aba"), (2, "abab", "ab"), (2, "abcab", "abcab"), (2, "abacab", "abcb")],
-)
-def test_the_things_used_last_are_kept(depth: int, keys: str, expected: str) -> None:
-    assert made(Kept(depth), keys) == expected
-
-
-def test_room_is_made_before_a_thing_is() -> None:
-    """So that memory never holds one more than is kept."""
-    kept = Kept(2)
-    made(kept, "ab")
-    kept.keep("role", "c", lambda: made(kept, "b"))  # "a" went, "b" is still there
-    assert made(kept, "b") == ""
-
-
-@pytest.mark.parametrize(("depth", "rounds"), [(1, 1), (2, 4)])
-def test_a_role_that_nobody_asks_for_goes_after_some_rounds(depth: int, rounds: int) -> None:
-    kept = Kept(depth)
-    for more, expected in ((0, ""), (rounds, "a")):
-        made(kept, "a")
-        for _ in range(more + 1):
-            kept.forget_idle()
-        assert made(kept, "a") == expected
-
-
-def test_forgetting_makes_everything_again() -> None:
-    kept = Kept(3)
-    made(kept, "abc")
-    kept.forget_all()
-    assert made(kept, "abc") == "abc"
 
 
 def skin(**pigments: float) -> Skin:
