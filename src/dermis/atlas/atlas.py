@@ -52,8 +52,7 @@ class Atlas:
     @property
     def coverage(self) -> NDArray[np.bool_]:
         """(n, n) texels that hold surface, gutter included."""
-        covered: NDArray[np.bool_] = self.triangle >= 0
-        return covered
+        return np.asarray(self.triangle >= 0)
 
     @property
     def own(self) -> NDArray[np.bool_]:
@@ -77,8 +76,7 @@ class Atlas:
     ) -> NDArray[np.float64]:
         """(n, n, c) of a (v, c) corner attribute, or those of some rows; undefined outside the coverage."""
         corners = values[mesh.triangles[np.maximum(self.triangle[rows], 0)]].astype(float)
-        total: NDArray[np.float64] = np.einsum("yxk,yxkc->yxc", self.weights(rows), corners)
-        return total
+        return np.asarray(np.einsum("yxk,yxkc->yxc", self.weights(rows), corners))
 
 
 def build_atlas(mesh: Mesh, size: int, layout: str = "mesh", reach_mm: float = REACH_MM) -> Atlas:

@@ -51,15 +51,13 @@ class GaussianSum:
     @property
     def albedo(self) -> Floats:
         """Total reflectance per channel: the sum of the weights [-]."""
-        total: Floats = self.weight.sum(axis=0)
-        return total
+        return np.asarray(self.weight.sum(axis=0))
 
     def radiant_exitance(self, radius_mm: ArrayLike) -> Floats:
         """R at distances r from a pencil of unit power, shape (..., c) [1/mm2]."""
         r = np.asarray(radius_mm, dtype=np.float64)[..., None]
         bells = np.exp(-(r**2) / (2 * self.variance_mm2)) / (2 * np.pi * self.variance_mm2)
-        profile: Floats = bells @ self.weight
-        return profile
+        return np.asarray(bells @ self.weight)
 
     def within(self, radius_mm: ArrayLike) -> Floats:
         """Share of the light that leaves within distances r, shape (..., c) [-]."""

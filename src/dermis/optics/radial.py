@@ -74,8 +74,7 @@ def resample(radius_mm: Floats, grid_mm: Floats, values: Floats) -> Floats:
     """Values (m, c) on a log-spaced grid, read at other radii with a cubic spline in log r, (n, c)."""
     from scipy.interpolate import CubicSpline
 
-    read: Floats = CubicSpline(np.log(grid_mm), values)(np.log(radius_mm))
-    return read
+    return np.asarray(CubicSpline(np.log(grid_mm), values)(np.log(radius_mm)))
 
 
 def enclosed(radius_mm: Floats, grid_mm: Floats, reflectance: Floats) -> Floats:

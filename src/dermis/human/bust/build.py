@@ -23,7 +23,7 @@ from dermis.human.skin_maps.look import SkinLook
 from dermis.human.skin_maps.paint import Painted, paint_skin
 from dermis.images.codecs import encode_png8, encode_png16
 from dermis.images.colour import encode_srgb8
-from dermis.images.fill import fill_empty
+from dermis.images.filters import fill_empty
 from dermis.mesh.gltf_write import encode_glb
 from dermis.mesh.mesh import Mesh
 from dermis.outputs import reason, replacing

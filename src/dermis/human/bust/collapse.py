@@ -38,8 +38,7 @@ def _common(chosen: Index, ends: Index, count: int) -> Index:
     both = np.vstack((ends, ends[:, ::-1]))
     linked = csr_array((np.ones(len(both), dtype=np.int32), (both[:, 0], both[:, 1])), shape=(count, count))
     shared = linked[chosen[:, 0]] * linked[chosen[:, 1]]
-    common: Index = np.asarray(shared.sum(axis=1), dtype=np.int64).ravel()
-    return common
+    return np.asarray(shared.sum(axis=1), dtype=np.int64).ravel()
 
 
 def _draw_together(surface: Surface, ends: Index, middle: Doubles) -> Surface:
@@ -63,8 +62,7 @@ def _draw_together(surface: Surface, ends: Index, middle: Doubles) -> Surface:
 
 
 def _degenerate(t: Index) -> Flags:
-    same: Flags = (t[:, 0] == t[:, 1]) | (t[:, 1] == t[:, 2]) | (t[:, 2] == t[:, 0])
-    return same
+    return np.asarray((t[:, 0] == t[:, 1]) | (t[:, 1] == t[:, 2]) | (t[:, 2] == t[:, 0]))
 
 
 def _compact(p: Doubles, t: Index) -> Surface:

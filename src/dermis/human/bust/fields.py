@@ -38,8 +38,7 @@ def ellipsoid(points: Doubles, centre: ArrayLike, radii: ArrayLike, axes: Double
     scaled = local / radii
     reach = np.sqrt(np.einsum("ni,ni->n", scaled, scaled)) + 1e-9
     slope = np.sqrt(np.einsum("ni,ni->n", scaled / radii, scaled / radii)) + 1e-9
-    distance: Doubles = reach * (reach - 1) / slope
-    return distance
+    return np.asarray(reach * (reach - 1) / slope)
 
 
 def cone(points: Doubles, start: ArrayLike, end: ArrayLike, radius: float, end_radius: float) -> Doubles:
@@ -49,8 +48,7 @@ def cone(points: Doubles, start: ArrayLike, end: ArrayLike, radius: float, end_r
     local = points - first
     t = np.clip(local @ along / (along @ along), 0, 1)
     away = local - t[:, None] * along
-    distance: Doubles = np.sqrt(np.einsum("ni,ni->n", away, away)) - (radius + (end_radius - radius) * t)
-    return distance
+    return np.asarray(np.sqrt(np.einsum("ni,ni->n", away, away)) - (radius + (end_radius - radius) * t))
 
 
 def tube(points: Doubles, knots: ArrayLike, pieces: int = 4) -> Doubles:
@@ -80,8 +78,7 @@ def spline(knots: ArrayLike, pieces: int, closed: bool = False) -> Doubles:
 def bump(points: Doubles, centre: ArrayLike, radii: ArrayLike) -> Doubles:
     """A soft spot, 1 at its centre and exp(-1) at its radii."""
     scaled = (points - np.asarray(centre)) / np.asarray(radii)
-    height: Doubles = np.exp(-np.einsum("ni,ni->n", scaled, scaled))
-    return height
+    return np.asarray(np.exp(-np.einsum("ni,ni->n", scaled, scaled)))
 
 
 def rise(values: Doubles, low: float, high: float) -> Doubles:

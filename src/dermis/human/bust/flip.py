@@ -36,8 +36,7 @@ def flip(surface: Surface) -> Surface:
 def _angle(p: Doubles, apex: Index, a: Index, b: Index) -> Doubles:
     """Angle at `apex` [rad]."""
     u, v = p[a] - p[apex], p[b] - p[apex]
-    angle: Doubles = np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ni,ni->n", u, v))
-    return angle
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ni,ni->n", u, v)))
 
 
 def _stays_flat(p: Doubles, a: Index, b: Index, c: Index, d: Index) -> Flags:
@@ -45,13 +44,11 @@ def _stays_flat(p: Doubles, a: Index, b: Index, c: Index, d: Index) -> Flags:
     before = face_normals(p, np.column_stack((a, b, c))) + face_normals(p, np.column_stack((b, a, d)))
     one, other = face_normals(p, np.column_stack((a, d, c))), face_normals(p, np.column_stack((d, b, c)))
     dots = np.minimum(np.einsum("ni,ni->n", before, one), np.einsum("ni,ni->n", before, other))
-    flat: Flags = dots > 1.4
-    return flat
+    return np.asarray(dots > 1.4)
 
 
 def _linked(ends: Index, pairs: Index) -> Flags:
     """Whether each pair is an edge already."""
     stride = int(max(ends.max(), pairs.max(initial=0))) + 1
     known = ends.min(axis=1) * stride + ends.max(axis=1)
-    linked: Flags = np.isin(pairs.min(axis=1) * stride + pairs.max(axis=1), known)
-    return linked
+    return np.asarray(np.isin(pairs.min(axis=1) * stride + pairs.max(axis=1), known))

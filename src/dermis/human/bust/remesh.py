@@ -105,8 +105,7 @@ def relax(surface: Surface, field: Field, size: Field, passes: int) -> Surface:
 def _vertex_normals(p: Doubles, t: Index) -> Doubles:
     faces = np.cross(p[t[:, 1]] - p[t[:, 0]], p[t[:, 2]] - p[t[:, 0]])
     summed = sum_at(t.ravel(), np.repeat(faces, 3, axis=0), len(p))
-    normals: Doubles = summed / np.maximum(np.linalg.norm(summed, axis=1, keepdims=True), 1e-12)
-    return normals
+    return np.asarray(summed / np.maximum(np.linalg.norm(summed, axis=1, keepdims=True), 1e-12))
 
 
 def project(points: Doubles, field: Field, size: Field) -> Doubles:

@@ -29,8 +29,7 @@ class Surface:
 def face_normals(p: Doubles, t: Index) -> Doubles:
     """Unit normals (m, 3) of triangles."""
     normals = np.cross(p[t[:, 1]] - p[t[:, 0]], p[t[:, 2]] - p[t[:, 0]])
-    unit: Doubles = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    return unit
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12))
 
 
 def apart(rank: Index, ends: Index, triangles: Index, count: int) -> Flags:

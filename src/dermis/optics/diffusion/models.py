@@ -78,8 +78,7 @@ def transform(medium: Medium, model: Model, clamp: Clamp, frequency: Floats) -> 
 
 
 def _total(medium: Medium, model: Model, clamp: Clamp) -> Floats:
-    total: Floats = transform(medium, model, clamp, hankel.STILL)[0]
-    return total
+    return np.asarray(transform(medium, model, clamp, hankel.STILL)[0])
 
 
 def _need_half_space(medium: Medium, model: Model) -> None:
