@@ -11,7 +11,7 @@ import pytest
 from dermis.errors import DermisError
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.media import Medium
-from dermis.optics.pigments.scattering import jacques_1998
+from dermis.optics.pigments.chromophores import jacques_1998
 from dermis.optics.pigments.skin import SkinParameters, spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, outside_gamut, rgb_weights, tabulated
 

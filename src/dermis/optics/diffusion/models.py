@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from dermis.errors import refuse
-from dermis.optics.diffusion import better_dipole, dipole, hankel, layered_diffusion, layers, multipole
+from dermis.optics.diffusion import dipole, hankel, layered_diffusion, multipole
 from dermis.optics.diffusion.boundary import mismatch, normal_reflectance
 from dermis.optics.diffusion.multipole import Clamp
 from dermis.optics.media import Floats, Medium
@@ -74,7 +74,7 @@ def transform(medium: Medium, model: Model, clamp: Clamp, frequency: Floats) -> 
         A = mismatch(medium.eta, "exact")
         source: layered_diffusion.Source = "beam" if model == "layered" else "point"
         return layered_diffusion.respond(frequency, medium, A, source)[0]
-    return layers.respond(frequency, medium, mismatch(medium.eta), clamp).R_above
+    return multipole.respond(frequency, medium, mismatch(medium.eta), clamp).R_above
 
 
 def _total(medium: Medium, model: Model, clamp: Clamp) -> Floats:
@@ -91,10 +91,10 @@ def _need_half_space(medium: Medium, model: Model) -> None:
 def _pointwise(medium: Medium, model: Model, clamp: Clamp, radius_mm: Floats) -> Floats:
     layer = medium.layers[0]
     if model == "better-dipole":
-        return better_dipole.reflectance(radius_mm, layer, medium.eta)
+        return dipole.better_reflectance(radius_mm, layer, medium.eta)
     if model == "dipole":
         return dipole.reflectance(radius_mm, layer, mismatch(medium.eta))
-    return multipole.reflectance(radius_mm, layers.slabs_of(medium, mismatch(medium.eta), clamp)[0])
+    return multipole.reflectance(radius_mm, multipole.slabs_of(medium, mismatch(medium.eta), clamp)[0])
 
 
 def _assemble(

@@ -9,8 +9,14 @@ from typing import Final, Literal, get_args
 
 from dermis.errors import refuse
 from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium
-from dermis.optics.pigments.chromophores import baseline, blood, melanosome
-from dermis.optics.pigments.scattering import DERMIS_SHARE, ScatteringLaw, donner_jensen_2006
+from dermis.optics.pigments.chromophores import (
+    DERMIS_SHARE,
+    ScatteringLaw,
+    baseline,
+    blood,
+    donner_jensen_2006,
+    melanosome,
+)
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, visible
 
 Structure = Literal["dj2006", "donner2008", "biospec"]
