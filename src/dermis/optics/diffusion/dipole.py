@@ -75,7 +75,7 @@ def better_reflectance(radius_mm: ArrayLike, layer: Layer, eta: float, depths: i
         d_r, d_v = (np.sqrt(r[..., None] ** 2 + z**2) for z in (z_r, z_v))
         fluence = (np.exp(-sigma_tr * d_r) / d_r - np.exp(-sigma_tr * d_v) / d_v) / (4.0 * np.pi * D_g)
         outward = flux(r, z_r, sigma_tr) + flux(r, z_v, sigma_tr)
-        # Diffusion overrates light that scattered once and is near: an empirical fade.
+        # Diffusion overestimates near light that scattered once: an empirical fade.
         kappa = -np.expm1(-2.0 * layer.sigma_t_prime * (d_r + z_r))
         result += kappa * (fluence * (1.0 - 2.0 * F1) / 4.0 + outward * (1.0 - 3.0 * F2) / 2.0)
     return np.asarray(layer.alpha_prime**2 * result / depths)

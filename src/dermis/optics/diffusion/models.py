@@ -57,13 +57,13 @@ def diffusion_profile(
     if closed or model == "better-dipole":
         grid = np.geomspace(1e-6, 1e3, 1500)
         values = _pointwise(medium, model, clamp, grid)
-        total = (
-            enclosed(grid[-1:], grid, values)[0] if model == "better-dipole" else _total(medium, model, clamp)
-        )
     else:
         grid = hankel.radii()
         values = hankel.to_radius(transform(medium, model, clamp, hankel.frequencies()))
-        total = _total(medium, model, clamp)
+    if model == "better-dipole":
+        total = enclosed(grid[-1:], grid, values)[0]
+    else:
+        total = transform(medium, model, clamp, hankel.STILL)[0]
     near = (grid > 1e-7) & (grid < 1e3)  # beyond, the numbers are noise
     return _assemble(medium, model, clamp, grid[near], values[near], total, rgb)
 
@@ -75,10 +75,6 @@ def transform(medium: Medium, model: Model, clamp: Clamp, frequency: Floats) -> 
         source: layered_diffusion.Source = "beam" if model == "layered" else "point"
         return layered_diffusion.respond(frequency, medium, A, source)[0]
     return multipole.respond(frequency, medium, mismatch(medium.eta), clamp).R_above
-
-
-def _total(medium: Medium, model: Model, clamp: Clamp) -> Floats:
-    return np.asarray(transform(medium, model, clamp, hankel.STILL)[0])
 
 
 def _need_half_space(medium: Medium, model: Model) -> None:
@@ -126,16 +122,13 @@ def _assemble(
 
 
 def _doubts(medium: Medium, model: Model, clamp: Clamp) -> list[str]:
-    """What of the medium the model takes badly."""
+    """Warnings of what in the medium the model handles badly."""
     found = []
     for number, layer in enumerate(medium.layers, 1):
         thin = layer.thickness_mm < layer.mean_free_path_mm
         if model == "multipole" and thin.any():
-            what = (
-                "its source lies below it, light is lost"
-                if clamp == "none"
-                else "its source is moved into it"
-            )
+            lost = "its source lies below it, light is lost"
+            what = lost if clamp == "none" else "its source is moved into it"
             found.append(f"layer {number} ({layer.name}) is thinner than a reduced mean free path: {what}")
     worst = float(_early_albedo(medium).min())
     if worst < _ABSORBING:
@@ -156,7 +149,7 @@ def _early_albedo(medium: Medium) -> Floats:
 
 
 def _flaws(total: Floats, ring_energy: Floats) -> Sequence[str]:
-    """What of the result no real light does, or no ring holds."""
+    """Warnings of what in the result is unphysical, or missing from the rings."""
     found = light_beyond(total, ring_energy)
     if (total < 0.0).any():
         found.append(f"a total reflectance is negative: {np.round(total, 4).tolist()}")

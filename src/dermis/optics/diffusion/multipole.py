@@ -1,4 +1,4 @@
-"""The multipole: slabs by mirror images in both of their faces, and stacks of slabs, frequency by frequency."""
+"""The multipole: a slab by mirror images in both of its faces, and stacks of slabs by frequency."""
 
 from __future__ import annotations
 

@@ -63,9 +63,8 @@ class SkinParameters:
             refuse(_option("epidermis_mm"), expected, f"{self.epidermis_mm:g} mm came", "Correct it")
         if self.melanin + self.epidermal_blood > 1.0:
             both = f"{_option('melanin')} and {_option('epidermal_blood')}"
-            refuse(
-                both, "at most 1 together", f"{self.melanin:g} and {self.epidermal_blood:g} came", "Lower one"
-            )
+            came = f"{self.melanin:g} and {self.epidermal_blood:g} came"
+            refuse(both, "at most 1 together", came, "Lower one")
 
 
 EXAMPLES: Final[Mapping[str, SkinParameters]] = MappingProxyType(
@@ -86,7 +85,7 @@ def spectral_medium(
 ) -> Medium:
     """The layers of a skin, with a channel for each wavelength.
 
-    structure : "dj2006" is an epidermis on a dermis without end; "donner2008" has a thin sheet of melanin
+    structure : "dj2006" is an epidermis on a semi-infinite dermis; "donner2008" has a thin sheet of melanin
         between them and blood in both; "biospec" has a stratum corneum, an epidermis and two layers of dermis
     parameters : what they are made of
     wavelength_nm : (n,) from 380 to 780 [nm]
@@ -146,7 +145,7 @@ def _epidermis(
 
 
 def _dermis(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, name: str = "dermis") -> Layer:
-    """Blood, and tissue in the rest of the volume; without end."""
+    """Blood, and tissue in the rest of the volume; semi-infinite."""
     sigma_a = p.blood * blood(wavelength_nm, p.oxygen) + (1.0 - p.blood) * baseline(wavelength_nm)
     return Layer(sigma_a, DERMIS_SHARE * sigma_s_prime, name=name)
 
