@@ -104,7 +104,7 @@ def _from_skin_table(
     table = document["skin"]
     fields = set(SkinParameters.__dataclass_fields__)
     if not isinstance(table, dict) or set(document) - {"skin", "name"}:
-        refuse(path, "only a table [skin] and a name", "it holds something else", "Take the rest out")
+        refuse(path, "a table [skin] and a name only", "it holds something else", "Take the rest out")
     own = dict(table)
     structure = own.pop("structure", _STRUCTURE)
     unknown = sorted(set(own) - fields)

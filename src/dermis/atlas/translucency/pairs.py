@@ -92,7 +92,7 @@ def _search(
     sources, flat = _in_cells(given, radius_mm / 3.0), Map(atlas.reach, shown)
     count = np.zeros(len(taken.cell), np.int64)
     ends = [len(count) * k // _PARTS for k in range(_PARTS + 1)]
-    # The compiled loop releases the interpreter, so that threads share the work.
+    # the kernel releases the GIL, so that threads share the work
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         parts = list(
             pool.map(lambda part: search(receivers, part, sources, flat, radius_mm, count), pairwise(ends))

@@ -101,7 +101,7 @@ def gradient(field: Field, points: Doubles, step: float | Doubles = 0.05) -> Dou
     return np.asarray((values.T @ _TETRAHEDRON) / (4 * steps[:, None]))
 
 
-def turned(axis: int, degrees: float) -> Doubles:
+def rotation(axis: int, degrees: float) -> Doubles:
     """Rotation matrix (3, 3) about x, y or z (0, 1, 2)."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     matrix = np.eye(3)

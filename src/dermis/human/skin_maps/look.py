@@ -1,10 +1,31 @@
-"""What makes one skin look different from another on the same head."""
+"""What makes one skin look different from another, and the patches of it that are painted at once."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from dermis.errors import refuse
+
+Doubles = NDArray[np.float64]
+
+
+class Patch(NamedTuple):
+    """Places on the skin, as the kernels take them.
+
+    points : (n, 3) [mm]
+    normals : (n, 3) unit normals of the smooth surface
+    texel_mm : (n,) how far apart the places around each are [mm]
+    seed : where the random numbers of all textures begin
+    """
+
+    points: Doubles
+    normals: Doubles
+    texel_mm: Doubles
+    seed: int
 
 
 @dataclass(frozen=True)
@@ -22,7 +43,7 @@ class SkinLook:
     age : depth of folds and lines, from youth to old age, 0 to 1 [-]
     seed : which spots, hairs and lines, any integer from 0
 
-    The epidermis is that of `colour.EPIDERMIS_MM`: what absorbs is melanin times thickness.
+    The epidermis is `reflection.EPIDERMIS_MM` thick; absorption goes with melanin times thickness.
     """
 
     melanin: float = 0.018
@@ -46,4 +67,4 @@ class SkinLook:
 
 
 RANGES = {"seed": (0, 2**32 - 1)}
-"""Least and greatest value of what does not go from 0 to 1."""
+"""Least and greatest values of fields that do not go from 0 to 1."""

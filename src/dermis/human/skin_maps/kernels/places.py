@@ -6,7 +6,7 @@ import math
 
 from dermis.human.skin_maps.face import DEGREES, Face
 from dermis.human.skin_maps.kernels.noise import blobs, smooth_step
-from dermis.human.skin_maps.patch import Doubles, Patch
+from dermis.human.skin_maps.look import Doubles, Patch
 from dermis.machine_code import compiled
 
 # Columns of what `locate` gives.
