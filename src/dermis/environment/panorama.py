@@ -19,6 +19,10 @@ UNIFORM = "uniform"
 _LEAST_ROWS, _MOST_ROWS = 256, 512
 """Fewer are split, as texel sums stand for integrals; more are averaged: the narrowest lobe spans 16."""
 _BRIGHTEST = 1e12  # far beyond any sun; keeps single precision on the device from overflowing
+MOST_SUNS = 4
+_PEAK = 32.0  # times the mean radiance: what is brighter may belong to a sun
+_NEAR_DEGREES = 8.0
+_LEAST_SHARE = 0.05  # of the irradiance that the mean radiance gives
 
 
 def load_panorama(name: str) -> Floats:
@@ -110,12 +114,6 @@ def panorama_file(name: str) -> Path | None:
 
 def _sample_names() -> list[str]:
     return [name for name, sample in SAMPLES.items() if sample.kind == "environment"]
-
-
-MOST_SUNS = 4
-_PEAK = 32.0  # times the mean radiance: what is brighter may belong to a sun
-_NEAR_DEGREES = 8.0
-_LEAST_SHARE = 0.05  # of the irradiance that the mean radiance gives
 
 
 @dataclass(frozen=True)

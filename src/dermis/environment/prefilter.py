@@ -19,6 +19,10 @@ SIDE = 8
 SMOOTHEST, ROUGHEST = 0.05, 1.0
 _NODES = (192, 96)  # of the quadrature over polar angle and azimuth
 _LEAST_COSINE = 0.02
+ROUGHNESSES = np.geomspace(SMOOTHEST, ROUGHEST, 10)
+"""Of the reflections' layers, even in the logarithm, between which the shader interpolates."""
+HEIGHT = 128
+_DEGREE = 96  # the smoothest lobe multiplies this degree by 1e-10: no ringing around lamps
 
 
 def round_lobe(theta: Floats, m: float) -> Floats:
@@ -75,12 +79,6 @@ def _spreads() -> tuple[Floats, Floats]:
     roughness = np.geomspace(SMOOTHEST, ROUGHEST, 40)
     weights = [round_lobe(theta, float(m)) * np.sin(theta) for m in roughness]
     return np.array([(w * np.cos(theta)).sum() / w.sum() for w in weights]), roughness
-
-
-ROUGHNESSES = np.geomspace(SMOOTHEST, ROUGHEST, 10)
-"""Of the reflections' layers, even in the logarithm, between which the shader interpolates."""
-HEIGHT = 128
-_DEGREE = 96  # the smoothest lobe multiplies this degree by 1e-10: no ringing around lamps
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ EXR_START = b"\x76\x2f\x31\x01"
 PILLOW_STARTS = (_PNG_START, b"\xff\xd8\xff", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 
 _PILLOW_LOCK = threading.Lock()
+RADIANCE_START = b"#?"
 
 
 def decode_exr(path: Path) -> NDArray[np.float32]:
@@ -139,9 +140,6 @@ def encode_png16(levels: NDArray[Any]) -> bytes:
     frame = av.VideoFrame.from_ndarray(pixels, format=f"{pixel_format}le")
     frame = frame.reformat(format=f"{pixel_format}be")
     return b"".join(bytes(packet) for packet in [*encoder.encode(frame), *encoder.encode(None)])
-
-
-RADIANCE_START = b"#?"
 
 
 def decode_radiance(data: bytes) -> NDArray[np.float32]:

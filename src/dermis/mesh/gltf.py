@@ -20,6 +20,10 @@ from dermis.mesh.mesh import Mesh
 
 _READABLE = {"image/png", "image/jpeg"}
 ROLES = ("height", "specular", "roughness", "region")
+_FLOAT, _UNSIGNED = 5126, 5125
+_VERTICES, _INDICES = 34962, 34963
+_LINEAR_MIPMAPS, _LINEAR, _CLAMP = 9987, 9729, 33071
+_WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 
 
 def embedded_maps(path: Path) -> dict[str, Any]:
@@ -92,11 +96,6 @@ def _buffer(path: Path, tree: dict[str, Any], binary: bytes, index: int) -> byte
     return (path.parent / unquote(uri)).read_bytes()
 
 
-_FLOAT, _UNSIGNED = 5126, 5125
-_VERTICES, _INDICES = 34962, 34963
-_LINEAR_MIPMAPS, _LINEAR, _CLAMP = 9987, 9729, 33071
-
-
 @dataclass
 class _Binary:
     """The file's one buffer as it grows, with the views and accessors into it."""
@@ -117,9 +116,6 @@ class _Binary:
         entry = {"bufferView": place, "componentType": component, "count": values.size // _WIDTH[kind]}
         self.accessors.append(entry | {"type": kind} | more)
         return len(self.accessors) - 1
-
-
-_WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 
 
 def encode_glb(

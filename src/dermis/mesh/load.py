@@ -26,6 +26,7 @@ Up = Literal["y", "z"]
 
 FARTHEST_UV = 1e4
 """Beyond this uv are damage, not tiles."""
+_FORM = 1  # raise when `load_mesh` gives other results for the same file
 
 
 def load_mesh(
@@ -199,9 +200,6 @@ def _materials(
 
 def _has(group: Group, word: str) -> bool:
     return any(word in name.casefold() for name in group.names)
-
-
-_FORM = 1  # raise when `load_mesh` gives other results for the same file
 
 
 def cached_mesh(data: bytes, options: str, load: Callable[[], Mesh]) -> Mesh:

@@ -35,6 +35,16 @@ SMALLEST, LARGEST = 256, 4096
 _STRIP = 256  # rows painted at a time
 _RELIEF_MM = 1.0  # full scale of the height map
 _STRENGTH = 0.5  # full scale of the specular map
+_MATERIAL = {
+    "name": "skin",
+    "pbrMetallicRoughness": {
+        "baseColorTexture": {"index": "colour"},
+        "metallicRoughnessTexture": {"index": "metallic roughness"},
+        "metallicFactor": 0.0,
+    },
+    "normalTexture": {"index": "normal"},
+    "extensions": {"KHR_materials_ior": {"ior": 1.4}},
+}
 
 
 @dataclass(frozen=True)
@@ -98,18 +108,6 @@ def encode_bust(recipe: BustRecipe, report: Report = lambda done, of: None) -> b
 def bust_of(recipe: BustRecipe) -> Mesh:
     """The mesh of a recipe, with uv."""
     return bust_mesh(recipe.shape) if recipe.layout == "few" else many_charts_mesh(recipe.shape)
-
-
-_MATERIAL = {
-    "name": "skin",
-    "pbrMetallicRoughness": {
-        "baseColorTexture": {"index": "colour"},
-        "metallicRoughnessTexture": {"index": "metallic roughness"},
-        "metallicFactor": 0.0,
-    },
-    "normalTexture": {"index": "normal"},
-    "extensions": {"KHR_materials_ior": {"ior": 1.4}},
-}
 
 
 def _paint(recipe: BustRecipe, mesh: Mesh, atlas: Atlas, report: Report) -> Painted:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 Doubles = NDArray[np.float64]
 Field = Callable[[Doubles], Doubles]
 """Distance (n,) [mm] of points (n, 3) [mm]."""
+_TETRAHEDRON = np.array([[1.0, -1, -1], [-1, -1, 1], [-1, 1, -1], [1, 1, 1]])
 
 
 def smooth_union(a: Doubles, b: Doubles, radius: float | Doubles) -> Doubles:
@@ -85,9 +86,6 @@ def rise(values: Doubles, low: float, high: float) -> Doubles:
     """From 0 at `low` to 1 at `high` with level ends; downwards when `low` is the greater."""
     t: Doubles = np.clip((values - low) / (high - low), 0, 1)
     return t * t * (3 - 2 * t)
-
-
-_TETRAHEDRON = np.array([[1.0, -1, -1], [-1, -1, 1], [-1, 1, -1], [1, 1, 1]])
 
 
 def gradient(field: Field, points: Doubles, step: float | Doubles = 0.05) -> Doubles:

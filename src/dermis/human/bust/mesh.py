@@ -33,6 +33,25 @@ DETAIL = (
 _GROWTH = 0.17  # of the edge, per mm away from there
 _COARSEST_MM = 6.5
 _ROUNDS = 4
+CHARTS = {
+    "face": 1.0,
+    "back of the head": 0.6,
+    "neck": 0.75,
+    "bottom": 0.2,
+    "left ear front": 1.1,
+    "left ear back": 0.7,
+    "right ear front": 1.1,
+    "right ear back": 0.7,
+    "under the chin": 0.7,
+}
+"""Texels per mm on each chart relative to the face, where it has most [-]."""
+# Artist's values on the average head [mm].
+_JAW_EDGE = np.array([[-85.0, -108.0], [-8, -87], [30, -78.5], [60, -70], [100, -58]])
+"""Depth behind the origin and height of the seam under chin and jaw, up to the nape."""
+_CHIN_FLOOR = 13.0
+"""From there down to the crease between chin and throat."""
+_CROWN_Z, _CROWN_SLOPE = -12.0, 0.1
+_MANY = 300
 
 
 def build_bust(parameters: BustParameters, cell: float = 1.0) -> tuple[Doubles, Index, Doubles]:
@@ -93,28 +112,6 @@ def twins(half: HalfMesh) -> Index:
     twin = np.arange(len(inner))
     twin[inner] = len(inner) + np.arange(inner.sum())
     return twin
-
-
-CHARTS = {
-    "face": 1.0,
-    "back of the head": 0.6,
-    "neck": 0.75,
-    "bottom": 0.2,
-    "left ear front": 1.1,
-    "left ear back": 0.7,
-    "right ear front": 1.1,
-    "right ear back": 0.7,
-    "under the chin": 0.7,
-}
-"""Texels per mm on each chart relative to the face, where it has most [-]."""
-
-# Artist's values on the average head [mm].
-_JAW_EDGE = np.array([[-85.0, -108.0], [-8, -87], [30, -78.5], [60, -70], [100, -58]])
-"""Depth behind the origin and height of the seam under chin and jaw, up to the nape."""
-_CHIN_FLOOR = 13.0
-"""From there down to the crease between chin and throat."""
-_CROWN_Z, _CROWN_SLOPE = -12.0, 0.1
-_MANY = 300
 
 
 def bust_mesh(parameters: BustParameters, cell: float = 1.0) -> Mesh:

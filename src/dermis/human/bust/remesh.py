@@ -21,6 +21,7 @@ _STRETCHES = (
     ((-125, -60, 5.0), (-60, 25, 2.0), (25, 130, 3.0)),
 )
 _STRIDE = 3  # nodes of the first, coarse look at the field
+_COARSENING = 10  # passes that thin out what marching cubes made too fine
 
 
 def polygonise(field: Field) -> HalfMesh:
@@ -55,9 +56,6 @@ def _sample(field: Field, axes: list[Doubles]) -> Doubles:
 
 def _grid(axes: list[Doubles]) -> Doubles:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-
-
-_COARSENING = 10  # passes that thin out what marching cubes made too fine
 
 
 def remesh(mesh: HalfMesh, field: Field, size: Field, rounds: int) -> HalfMesh:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas, build_atlas
+from dermis.human.bust.fields import Doubles
 from dermis.human.regions.labels import label_texels
 from dermis.human.regions.table import DEFAULT, LIMITS, RegionTable, load_table
 from dermis.mesh.head import Head
@@ -21,6 +22,9 @@ EDGE_MM = 2.5
 """Borders between regions are blurred: standard deviation [mm]."""
 _DETAIL_MM = 6.0  # what is finer stays in the head's own maps; what is coarser comes from the table
 _DARKEST, _BRIGHTEST = 0.4, 3.0  # of the mean and of the surroundings: else specks in black would glare
+_CELL_MM = 2.0
+_MOST_CELLS = 256  # along the longest side
+_REACH = 3  # standard deviations
 
 
 def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT) -> tuple[Head, float]:
@@ -79,13 +83,6 @@ def _resized(picture: Floats, shape: tuple[int, int]) -> Floats:
         return picture
     factors = shape[0] / picture.shape[0], shape[1] / picture.shape[1]
     return np.asarray(zoom(picture, factors, order=1, mode="nearest", grid_mode=True), np.float32)
-
-
-Doubles = NDArray[np.float64]
-
-_CELL_MM = 2.0
-_MOST_CELLS = 256  # along the longest side
-_REACH = 3  # standard deviations
 
 
 def soften(points: Doubles, values: Doubles, sigma_mm: float) -> Doubles:

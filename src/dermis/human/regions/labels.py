@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dermis.atlas.atlas import Atlas
 from dermis.errors import refuse
 from dermis.human.bust import ears
-from dermis.human.bust.fields import gradient
+from dermis.human.bust.fields import Doubles, gradient
 from dermis.human.bust.parameters import BustParameters
 from dermis.human.bust.regions import REGIONS, region_of
 from dermis.human.bust.shape import landmarks, symmetric
@@ -23,7 +23,6 @@ from dermis.human.regions.table import RegionTable
 from dermis.mesh.head import Head
 from dermis.mesh.maps import load_labels
 
-Doubles = NDArray[np.float64]
 Place = tuple[float, float, float]
 Places = Mapping[str, Place]
 

@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.human.bust import ears, eyes, lips, nose
-from dermis.human.bust.fields import gradient, spline
+from dermis.human.bust.fields import Doubles, gradient, spline
 from dermis.human.bust.parameters import BustParameters
 from dermis.human.bust.shape import symmetric
 from dermis.human.bust.warp import make_warp
-from dermis.human.skin_maps.look import Doubles
 
 _STEP_MM = 0.25
 DEGREES = 2
@@ -23,6 +22,7 @@ DEGREES = 2
 _REACH_MM = 52.0
 _UPPER_LID_MM = 0.5  # from the line of the lids to where they meet
 _AMOUNTS = "blood melanin strength roughness pores furrows freckles level around hair"
+_PIECES = 4
 
 
 class Face(NamedTuple):
@@ -96,9 +96,6 @@ def _hairline() -> Doubles:
 
     angle, height = np.array([[float(row["angle"]), float(row["height"])] for row in read_rows("hairline")]).T
     return np.asarray(PchipInterpolator(angle, height)(np.arange(0, 181, DEGREES)))
-
-
-_PIECES = 4
 
 
 class Folds(NamedTuple):

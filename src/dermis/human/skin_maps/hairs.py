@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.human.bust import eyes
 from dermis.human.bust.anatomy import nominal
-from dermis.human.skin_maps.look import Doubles
+from dermis.human.bust.fields import Doubles
 
 _BROW_HAIRS, _LASHES = 1100, 130
 WIDEST_TEXEL_MM = 0.8

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from dermis.errors import refuse
+from dermis.human.bust.fields import Doubles
 
-Doubles = NDArray[np.float64]
+RANGES = {"seed": (0, 2**32 - 1)}
+"""Least and greatest values of fields that do not go from 0 to 1."""
 
 
 class Patch(NamedTuple):
@@ -64,7 +63,3 @@ class SkinLook:
             if not low <= value <= high or (field.name == "seed" and value != int(value)):
                 expected = f"a number from {low} to {high}"
                 refuse(f"--{field.name}", expected, f"{value!r} came", "Choose within")
-
-
-RANGES = {"seed": (0, 2**32 - 1)}
-"""Least and greatest values of fields that do not go from 0 to 1."""

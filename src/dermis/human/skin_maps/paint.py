@@ -11,11 +11,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.human.bust.fields import Doubles
 from dermis.human.bust.parameters import BustParameters
 from dermis.human.bust.regions import REGIONS, region_of
 from dermis.human.skin_maps.face import make_face, make_folds
 from dermis.human.skin_maps.hairs import make_hairs
-from dermis.human.skin_maps.look import Doubles, Patch, SkinLook
+from dermis.human.skin_maps.look import Patch, SkinLook
 from dermis.human.skin_maps.reflection import colour_of, gloss
 
 Floats = NDArray[np.float32]

@@ -7,7 +7,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.human.skin_maps.look import Doubles, SkinLook
+from dermis.human.bust.fields import Doubles
+from dermis.human.skin_maps.look import SkinLook
 from dermis.optics.pigments.skin import SkinParameters
 from dermis.optics.skin_colours import ColourTable, colour_table
 
@@ -20,6 +21,14 @@ LIP_EPIDERMIS_MM = 0.03
 _BROWN, _BLACK = np.array([0.060, 0.033, 0.018]), np.array([0.012, 0.009, 0.008])
 _STUBBLE = np.array([0.095, 0.085, 0.08])  # seen through skin, which makes it blueish
 _BLACK_AT = 0.08  # melanin of a skin whose hair is black
+# Artist's values: measured ones by face region exist [Weyrich2006], but not in a form that can be used here.
+# They keep near what real-time skin has been given by hand, rho_s 0.18 and m 0.3 [dEonLuebke2007].
+_STRENGTH, _OILY_STRENGTH = 0.155, 0.08
+_ROUGHNESS, _OILY_ROUGHNESS = 0.36, -0.10
+_LIP_STRENGTH, _LIP_ROUGHNESS = 0.05, -0.07
+_UNEVEN = 0.15  # of the oil
+_LEAST_STRENGTH, _MOST_STRENGTH = 0.05, 0.45
+_LEAST_ROUGHNESS, _MOST_ROUGHNESS = 0.15, 0.6
 
 
 def colour_of(look: SkinLook, pigments: Doubles, place: Doubles, mark: Doubles) -> NDArray[np.float32]:
@@ -52,16 +61,6 @@ def _tables(eumelanin: float, oxygen: float) -> tuple[ColourTable, ColourTable]:
     face = SkinParameters(eumelanin=eumelanin, oxygen=oxygen, epidermis_mm=EPIDERMIS_MM)
     lips = SkinParameters(eumelanin=eumelanin, oxygen=oxygen, epidermis_mm=LIP_EPIDERMIS_MM)
     return colour_table(face), colour_table(lips)
-
-
-# Artist's values: measured ones by face region exist [Weyrich2006], but not in a form that can be used here.
-# They keep near what real-time skin has been given by hand, rho_s 0.18 and m 0.3 [dEonLuebke2007].
-_STRENGTH, _OILY_STRENGTH = 0.155, 0.08
-_ROUGHNESS, _OILY_ROUGHNESS = 0.36, -0.10
-_LIP_STRENGTH, _LIP_ROUGHNESS = 0.05, -0.07
-_UNEVEN = 0.15  # of the oil
-_LEAST_STRENGTH, _MOST_STRENGTH = 0.05, 0.45
-_LEAST_ROUGHNESS, _MOST_ROUGHNESS = 0.15, 0.6
 
 
 def gloss(look: SkinLook, place: Doubles, mark: Doubles) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

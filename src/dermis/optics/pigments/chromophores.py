@@ -21,6 +21,10 @@ from dermis.optics.pigments.spectra import tabulated, visible
 _NM_PER_MM = 1e6
 _MM_PER_CM = 10.0
 _HAEMOGLOBIN_MOLAR = 150.0 / 64500.0  # in whole blood: 150 g/l of 64500 g/mol [mol/l]
+ScatteringLaw = Callable[[ArrayLike], Floats]
+"""From wavelengths [nm] to the reduced scattering of the epidermis [1/mm]."""
+DERMIS_SHARE: Final = 0.5
+"""Scattering of the dermis over that of the epidermis, after [DonnerJensen2006] [-]."""
 
 
 def eumelanin(wavelength_nm: ArrayLike) -> Floats:
@@ -95,13 +99,6 @@ def water(wavelength_nm: ArrayLike) -> Floats:
     """
     k = tabulated("water", "k", wavelength_nm)
     return np.asarray(4.0 * np.pi * k * _NM_PER_MM / visible(wavelength_nm))
-
-
-ScatteringLaw = Callable[[ArrayLike], Floats]
-"""From wavelengths [nm] to the reduced scattering of the epidermis [1/mm]."""
-
-DERMIS_SHARE: Final = 0.5
-"""Scattering of the dermis over that of the epidermis, after [DonnerJensen2006] [-]."""
 
 
 def donner_jensen_2006(wavelength_nm: ArrayLike) -> Floats:

@@ -28,6 +28,8 @@ _SHEET_MM = 0.001
 _CORNEUM_MM, _PAPILLARY_MM = 0.01, 0.2
 _RETICULAR_BLOOD = 0.0091 / 0.012
 _THICKEST_EPIDERMIS_MM = 2.0
+_ONE_INDEX = f"all layers have the index {SKIN_ETA:g}: light meets no surface between them"
+_THIN = "the multipole misjudges so thin a layer: take layered diffusion"
 
 
 @dataclass(frozen=True)
@@ -156,8 +158,6 @@ def _option(name: str) -> str:
 
 _Build = Callable[[SkinParameters, Floats, Floats], tuple[Layer, ...]]
 
-_ONE_INDEX = f"all layers have the index {SKIN_ETA:g}: light meets no surface between them"
-_THIN = "the multipole misjudges so thin a layer: take layered diffusion"
 _STRUCTURES: dict[str, tuple[_Build, str, tuple[str, ...]]] = {
     "dj2006": (
         _dj2006,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from dermis.human.bust.fields import Doubles
 from dermis.human.skin_maps.hairs import WIDEST_TEXEL_MM, Hairs
 from dermis.human.skin_maps.kernels.noise import (
     blobs,
@@ -26,7 +27,7 @@ from dermis.human.skin_maps.kernels.places import (
     Y,
     Z,
 )
-from dermis.human.skin_maps.look import Doubles, Patch
+from dermis.human.skin_maps.look import Patch
 from dermis.machine_code import compiled
 
 # Columns of what `mark` gives: how much of each is at a place [-].
@@ -37,6 +38,12 @@ COLUMNS = 6
 # Artist's values.
 _PORE_SPACING_MM, _MOLE_SPACING_MM, _STUBBLE_SPACING_MM = 1.15, 28.0, 0.85
 _FRECKLE_SPACING_MM, _SMALL_FRECKLE_SPACING_MM = 4.2, 2.2
+# Artist's values, in doublings of the pigment.
+_BLOTCHES, _BLOTCH_BLOB_MM, _BLOTCH_GAIN = 0.55, 19.0, 0.86
+_PATCHES, _PATCH_BLOB_MM, _PATCH_GAIN = 0.22, 24.0, 0.75
+_FRECKLE, _MOLE, _PORE, _RED_PORE = 1.7, 3.4, 0.7, 0.4
+_LIP_BLOOD, _LIP_MELANIN = 2.3, 0.5
+_RED_LIDS, _RED_SLIT = 0.8, 1.2
 
 
 @compiled
@@ -123,14 +130,6 @@ def _hair(x: float, y: float, hairs: Hairs, texel: float) -> float:
         beside = max(1.0 - (dx * dx + dy * dy) / reach, 0.0)
         bare *= 1.0 - piece[6] * beside * beside * width / math.sqrt(reach)
     return 1.0 - bare
-
-
-# Artist's values, in doublings of the pigment.
-_BLOTCHES, _BLOTCH_BLOB_MM, _BLOTCH_GAIN = 0.55, 19.0, 0.86
-_PATCHES, _PATCH_BLOB_MM, _PATCH_GAIN = 0.22, 24.0, 0.75
-_FRECKLE, _MOLE, _PORE, _RED_PORE = 1.7, 3.4, 0.7, 0.4
-_LIP_BLOOD, _LIP_MELANIN = 2.3, 0.5
-_RED_LIDS, _RED_SLIT = 0.8, 1.2
 
 
 @compiled

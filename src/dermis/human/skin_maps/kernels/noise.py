@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from dermis.human.skin_maps.look import Doubles
+from dermis.human.bust.fields import Doubles
 from dermis.machine_code import compiled
 
 _ALONG_I, _ALONG_J = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xC2B2AE3D27D4EB4F)
