@@ -32,9 +32,7 @@ SWELLINGS = {
     "masseter": (53, -64, 14, 12, 22, 20, 2.2, 0.5),
 }
 # Start x, y, z, end x, y, z, radius, depth, and how much the depth lessens with fullness.
-CREASES = {
-    "nasolabial": (18, -41, 92, 33, -68, 82, 4.5, 1.3, 0.5),
-}
+CREASES = {"nasolabial": (18, -41, 92, 33, -68, 82, 4.5, 1.3, 0.5)}
 
 
 def modelling(p: Doubles, parameters: BustParameters) -> Doubles:
