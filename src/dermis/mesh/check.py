@@ -58,10 +58,11 @@ def check_arrays(
             refuse(culprit, f"finite {name}", came, _DAMAGED)
     farthest = float(np.abs(positions).max())
     if farthest > FARTHEST_MM:
-        expected = f"positions within {FARTHEST_MM:g} mm of the origin"
-        refuse(
-            culprit, expected, f"one is {farthest:.3g} mm away", f"{_UNIT}, or move the head to the origin"
+        expected, came = (
+            f"positions within {FARTHEST_MM:g} mm of the origin",
+            f"one is {farthest:.3g} mm away",
         )
+        refuse(culprit, expected, came, f"{_UNIT}, or move the head to the origin")
 
 
 def _check_uv_range(mesh: Mesh, culprit: object) -> None:
@@ -86,18 +87,12 @@ def _check_manifold(mesh: Mesh, culprit: object) -> None:
     ends, _, counts = edges(mesh.point[mesh.triangles])
     crowded = np.flatnonzero(counts > 2)
     if len(crowded):
-        first = crowded[0]
-        place = mesh.positions[np.flatnonzero(mesh.point == ends[first, 0])[0]]
-        where = ", ".join(f"{x:.4g}" for x in place)
-        came = (
-            f"{len(crowded)} edges are non-manifold, the first has {counts[first]} triangles at ({where}) mm"
-        )
-        remedy = (
-            "In Blender: Select > All by Trait > Non Manifold, delete inner or double faces, then Mesh > "
-        )
-        refuse(
-            culprit, "a surface of one sheet, two triangles to an edge", came, remedy + "Merge > By Distance"
-        )
+        place = mesh.positions[np.flatnonzero(mesh.point == ends[crowded[0], 0])[0]]
+        where = f"{counts[crowded[0]]} triangles at ({', '.join(f'{x:.4g}' for x in place)}) mm"
+        came = f"{len(crowded)} edges are non-manifold, the first has {where}"
+        remedy = "In Blender: Select > All by Trait > Non Manifold, delete inner or double faces, "
+        remedy += "then Mesh > Merge > By Distance"
+        refuse(culprit, "a surface of one sheet, two triangles to an edge", came, remedy)
 
 
 def _check_skin(mesh: Mesh, culprit: object) -> None:
