@@ -6,7 +6,6 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
+from dermis.tables import read_rows
 
 Floats = NDArray[np.float64]
 
@@ -213,10 +213,9 @@ def _number(place: object, table: Mapping[str, Any], key: str, default: float) -
 
 
 def _read(table: str) -> dict[str, list[Layer]]:
-    text = resources.files("dermis.optics").joinpath(f"data/media/{table}.csv").read_text("utf-8")
-    rows = [line.split(",") for line in text.splitlines() if not line.startswith("#")][1:]
     found: dict[str, list[Layer]] = {}
-    for medium, layer, thickness, *coefficients in rows:
+    for row in read_rows("dermis.optics", f"data/media/{table}"):
+        medium, layer, thickness, *coefficients = row.values()
         sigma = np.array(coefficients, dtype=np.float64)
         found.setdefault(medium, []).append(Layer(sigma[:3], sigma[3:], float(thickness), layer))
     return found
