@@ -21,7 +21,7 @@ from dermis.frame.renderer import Renderer
 from dermis.gpu import Device, download
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import uv_sphere, wedge
-from dermis.optics.diffusion.transmission import through_gaussians
+from dermis.optics.diffusion.models import through_gaussians
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
 from dermis.scene.lights import DirectionalLight

@@ -9,8 +9,7 @@ import pytest
 
 from dermis.errors import DermisError
 from dermis.optics.diffusion.models import diffusion_profile
-from dermis.optics.media import Layer, Medium
-from dermis.optics.presets import media, medium_from_toml, read_toml
+from dermis.optics.media import Layer, Medium, media, medium_from_toml, read_toml
 
 ONE = np.array([1.0])
 
