@@ -123,11 +123,11 @@ def test_what_passes_is_the_same_from_disk(
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     variance, weight, made = BLURRED.variance_mm2, BLURRED.weight, 0
     plain = read_buffer(device, Opposite(device).weigh(upload_pairs(device, found[2]), variance, weight))
-    assert not list(tmp_path.rglob("*.npz"))
+    assert not list(tmp_path.rglob("*.arrays"))
     for key, factor in (("a", 1.0), ("a", 1.0), ("b", 1.0), ("b", 0.5)):
         words = Opposite(device).weigh(upload_pairs(device, found[2], key), variance, factor * weight)
         assert np.array_equal(read_buffer(device, words), plain) == (factor == 1.0)
-        made = len(list(tmp_path.rglob("*.npz")))
+        made = len(list(tmp_path.rglob("*.arrays")))
     assert made == (3 if device.adapter.kind == "CPU" else 0)
 
 

@@ -100,7 +100,7 @@ def test_built_in_heads_are_kept_on_disk(monkeypatch: pytest.MonkeyPatch, tmp_pa
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     calls = []
 
-    def small(recipe: BustRecipe, report: Any) -> bytes:
+    def small(recipe: BustRecipe, report: Any = None) -> bytes:
         calls.append(recipe)
         return b"glTF"
 
@@ -108,6 +108,8 @@ def test_built_in_heads_are_kept_on_disk(monkeypatch: pytest.MonkeyPatch, tmp_pa
     assert cached_bust("bust") == cached_bust("bust") and len(calls) == 1
     assert cached_bust("bust_many_charts") != cached_bust("bust")
     assert [recipe.layout for recipe in calls] == ["few", "many"]
+    cached_bust("bust").write_bytes(b"glT")  # cut off
+    assert cached_bust("bust").read_bytes() == b"glTF" and len(calls) == 3
 
 
 @pytest.mark.parametrize("size", [0, 255, 128, 3000, 8192])

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas, build_atlas
-from dermis.disk import cache_folder
+from dermis.disk import cache_folder, stored_file
 from dermis.errors import refuse
 from dermis.human.bust import BUSTS
 from dermis.human.bust.parameters import BustParameters
@@ -59,17 +59,15 @@ class BustRecipe:
 
 
 def cached_bust(name: str) -> Path:
-    """The file of a built-in head, made on first use."""
+    """The file of a built-in head, made on first use and when it is no longer as it was made."""
     recipe = BustRecipe(layout="few" if name == BUSTS[0] else "many")
-    path = cache_folder() / "bust" / f"{name}-{_digest(recipe)}.glb"
-    if not path.is_file():
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as fault:
-            came = f"it cannot be made ({reason(fault)})"
-            refuse(path.parent, "a folder for what is kept", came, "Name a writable one in DERMIS_CACHE")
-        write_bust(path, recipe)
-    return path
+    try:
+        return stored_file("bust", f"{name}-{_digest(recipe)}.glb", lambda: encode_bust(recipe))
+    except OSError as fault:
+        came = f"it cannot be written ({reason(fault)})"
+        refuse(
+            cache_folder() / "bust", "a folder for what is kept", came, "Name a writable one in DERMIS_CACHE"
+        )
 
 
 def write_bust(path: Path, recipe: BustRecipe, report: Report = lambda done, of: None) -> None:
