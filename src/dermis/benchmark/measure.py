@@ -11,8 +11,8 @@ from pathlib import Path
 
 from dermis.benchmark.cases import FRAGMENTS, Case
 from dermis.benchmark.floor import moved_by, stage_bytes
+from dermis.benchmark.gpu_gems_3_fragments import published_as_fragments
 from dermis.benchmark.scenes import scenes_of, settings_of
-from dermis.frame.passes.gpu_gems_3_fragments import published_as_fragments
 from dermis.frame.renderer import Renderer
 from dermis.gpu.device import gpu_failures
 from dermis.gpu.frame import Timed

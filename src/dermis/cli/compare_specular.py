@@ -30,7 +30,7 @@ def compare_specular(output: Path | None, roughness: float, adapter: str, as_jso
 
 def _specular(adapter: str) -> dict[str, Any]:
     """All findings as one JSON-ready object."""
-    from dermis.frame.lobe_cost import lobe_cost_ns
+    from dermis.benchmark.lobe_cost import lobe_cost_ns
     from dermis.gpu import open_device
     from dermis.gpu.device import gpu_failures
     from dermis.specular.comparison import albedo_rows, reciprocity_error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +23,8 @@ from dermis.optics.gaussians import MOST_GAUSSIANS
 
 if TYPE_CHECKING:
     from dermis.frame.frame import Stages
+
+_FOLDER = Path(__file__).parent
 
 
 @contextmanager
@@ -49,7 +52,7 @@ class FragmentIrradiance(Irradiance):
     def _program(self, constants: Constants, texel: str) -> Any:
         if constants not in self._programs:
             path, chosen = (
-                STAGES / "gpu_gems_3_irradiance.wgsl",
+                _FOLDER / "gpu_gems_3_irradiance.wgsl",
                 dict(constants + mesh_constants(self._device)),
             )
             program = FragmentProgram(self._device, path, (SHARED_SHADERS,), chosen, targets=[texel])
@@ -81,8 +84,8 @@ class FragmentBlurs(Published):
         frame.fill("diffuse", program, bound, into)
 
     def _program(self, constants: dict[str, float]) -> FragmentProgram:
-        path = STAGES / "gpu_gems_3_fragment.wgsl"
-        return FragmentProgram(self._device, path, constants=constants, targets=[TEXEL, TEXEL])
+        path = _FOLDER / "gpu_gems_3_fragment.wgsl"
+        return FragmentProgram(self._device, path, (STAGES,), constants, targets=[TEXEL, TEXEL])
 
 
 class FragmentSum(Combine):
@@ -92,7 +95,7 @@ class FragmentSum(Combine):
         self._device = device
         self._nothing = make_texture(device, (1, 1), FLOATS, use="map")
         self._sum = FragmentProgram(
-            device, STAGES / "gpu_gems_3_sum.wgsl", (SHARED_SHADERS,), targets=[FLOATS]
+            device, _FOLDER / "gpu_gems_3_sum.wgsl", (SHARED_SHADERS,), targets=[FLOATS]
         )
 
     def make_sum(self, side: int) -> Any:
