@@ -52,10 +52,10 @@ def test_bytes_are_numpys(device: Device, stages: Stages, exposure: float) -> No
 
 def test_every_grey_level_survives(device: Device, stages: Stages) -> None:
     """Bytes decoded to linear light and encoded again are themselves."""
-    from dermis.images.colour import decode_srgb8
+    from dermis.images.colour import decode_srgb_levels
 
     levels = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(4, axis=2)
-    radiance = decode_srgb8(levels)
+    radiance = decode_srgb_levels(levels)
     radiance[..., 3] = 1.0
     _, encoded = finished(device, stages, radiance, 1.0)
     assert np.array_equal(encoded[..., :3], levels[..., :3])

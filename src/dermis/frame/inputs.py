@@ -35,7 +35,7 @@ from dermis.frame.samples import pixel_samples
 from dermis.gpu import ComputeProgram
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
-from dermis.optics.fits.single import single_gaussian
+from dermis.optics.fits.gaussian import single_gaussian
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.camera import Camera
 from dermis.scene.settings import Settings

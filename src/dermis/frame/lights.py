@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.environment.suns import Sun
+from dermis.environment.panorama import Sun
 from dermis.errors import refuse
 from dermis.frame.passes.variants import Constants
 from dermis.frame.projection import (

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.cached import cached_occlusion
-from dermis.environment.mirrors import equivalent_mirrors
-from dermis.environment.prefilter import prefilter
-from dermis.environment.suns import Sun
+from dermis.environment.panorama import Sun
+from dermis.environment.prefilter import equivalent_mirrors, prefilter
 from dermis.frame.atlas_textures import AtlasTextures
 from dermis.frame.geometry import HeadTextures
 from dermis.frame.kept import Keep

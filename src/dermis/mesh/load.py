@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
+from collections.abc import Callable
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.disk import Arrays, stored
 from dermis.errors import DermisError, refuse
-from dermis.mesh.cached import cached_mesh
 from dermis.mesh.check import UV_TOLERANCE, check_arrays, check_mesh
 from dermis.mesh.formats import READERS, Group, Part, default_unit_mm, is_gltf
 from dermis.mesh.geometry import build_mesh
@@ -22,6 +26,7 @@ Up = Literal["y", "z"]
 
 FARTHEST_UV = 1e4
 """Beyond this uv are damage, not tiles."""
+_FORM = 1  # raise when `load_mesh` gives other results for the same file
 
 
 def load_mesh(
@@ -195,3 +200,26 @@ def _materials(
 
 def _has(group: Group, word: str) -> bool:
     return any(word in name.casefold() for name in group.names)
+
+
+def cached_mesh(data: bytes, options: str, load: Callable[[], Mesh]) -> Mesh:
+    """The mesh that `load` makes of a file, kept on disk in the same way.
+
+    data : the file, with all that the mesh is made of
+    options : how it is read
+    """
+    arrays = [field.name for field in fields(Mesh) if field.name != "materials"]
+
+    def make() -> Arrays:
+        mesh = load()
+        told = json.dumps([asdict(material) for material in mesh.materials]).encode()
+        return {name: getattr(mesh, name) for name in arrays} | {"materials": np.frombuffer(told, np.uint8)}
+
+    digest = hashlib.sha256(f"{_FORM} {options}".encode())
+    digest.update(data)
+    found = stored("meshes", digest.hexdigest()[:40], [*arrays, "materials"], make)
+    materials = json.loads(found.pop("materials").tobytes())
+    return Mesh(
+        **found,
+        materials=tuple(Material(one["name"], one["kind"], tuple(one["colour"])) for one in materials),
+    )

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
-from dermis.images.colour import decode_srgb8, decode_srgb16
+from dermis.images.colour import decode_srgb_levels
 from dermis.images.filters import without_steps
 from dermis.images.io import Picture, read_bytes, read_image
 
@@ -99,11 +99,9 @@ def _colour(path: PathLike) -> Floats:
     if image.shape[2] < 3:
         refuse(path, "a colour map with red, green and blue", "it is grey", "Save it as RGB")
     image = image[..., :3]
-    if image.dtype == np.uint8:
-        return decode_srgb8(image)
-    if image.dtype == np.uint16:
-        return decode_srgb16(image)
-    return _within_unit(path, "a colour map", image)
+    if image.dtype == np.float32:
+        return _within_unit(path, "a colour map", image)
+    return decode_srgb_levels(image)
 
 
 def load_height(path: PathLike, height_mm: float | None) -> Floats:

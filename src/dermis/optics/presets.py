@@ -26,7 +26,7 @@ _KEYS = ("absorption_per_mm", "scattering_per_mm")
 
 @cache
 def media() -> Mapping[str, Medium]:
-    """The media that have a name, under skin's index of refraction."""
+    """The named media, with skin's index of refraction."""
     found: dict[str, Medium] = {}
     for table, sources in _SOURCES.items():
         for name, layers in _read(table).items():
@@ -41,7 +41,7 @@ def medium_from_toml(path: Path, document: Mapping[str, Any]) -> Medium:
     document : `eta` and, topmost first, `[[layers]]` with `absorption_per_mm` and `scattering_per_mm` (lists
         of 3), and `thickness_mm` in all but the last
 
-    Raises DermisError when that is not what it holds.
+    Raises DermisError for any other content.
     """
     tables = document.get("layers")
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
@@ -63,7 +63,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def read_text(path: Path, form: str) -> str:
-    """The text of a small file; DermisError, naming the form that was expected, when it is none."""
+    """The text of a small file; DermisError, which names the form expected, when it cannot be read."""
     try:
         with path.open(encoding="utf-8") as file:
             text = file.read(_MOST_LETTERS + 1)  # some devices never end
@@ -101,7 +101,7 @@ def _number(place: object, table: Mapping[str, Any], key: str, default: float) -
 
 
 def _read(table: str) -> dict[str, list[Layer]]:
-    text = (resources.files("dermis.optics") / "data" / "media" / f"{table}.csv").read_text(encoding="utf-8")
+    text = resources.files("dermis.optics").joinpath(f"data/media/{table}.csv").read_text("utf-8")
     rows = [line.split(",") for line in text.splitlines() if not line.startswith("#")][1:]
     found: dict[str, list[Layer]] = {}
     for medium, layer, thickness, *coefficients in rows:

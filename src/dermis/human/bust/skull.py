@@ -68,5 +68,4 @@ def _radial(scaled: tuple[Doubles, ...], local: tuple[Doubles, ...], power: Doub
         logs = [power * np.log(np.abs(axis) + 1e-12) for axis in scaled]
     reach = np.sum([np.exp(log) for log in logs], axis=0) ** (1 / power)
     length = np.sqrt(np.sum([axis * axis for axis in local], axis=0))
-    distance: Doubles = length * (1 - 1 / np.maximum(reach, 1e-3))
-    return distance
+    return np.asarray(length * (1 - 1 / np.maximum(reach, 1e-3)))

@@ -63,8 +63,7 @@ class Warp:
         a, b, c = columns
         # cofactors of the Jacobian turn normals
         turned = sum(normals[:, [k]] * np.cross(u, v) for k, (u, v) in enumerate(((b, c), (c, a), (a, b))))
-        unit: Doubles = turned / np.linalg.norm(turned, axis=1, keepdims=True)
-        return unit
+        return np.asarray(turned / np.linalg.norm(turned, axis=1, keepdims=True))
 
     def _shift(self, points: Doubles) -> Doubles:
         moved = np.zeros_like(points, dtype=np.float64)

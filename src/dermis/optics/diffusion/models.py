@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from dermis.errors import refuse
-from dermis.optics.diffusion import better_dipole, dipole, hankel, layered_diffusion, layers, multipole
+from dermis.optics.diffusion import dipole, hankel, layered_diffusion, multipole
 from dermis.optics.diffusion.boundary import mismatch, normal_reflectance
 from dermis.optics.diffusion.multipole import Clamp
 from dermis.optics.media import Floats, Medium
@@ -57,13 +57,13 @@ def diffusion_profile(
     if closed or model == "better-dipole":
         grid = np.geomspace(1e-6, 1e3, 1500)
         values = _pointwise(medium, model, clamp, grid)
-        total = (
-            enclosed(grid[-1:], grid, values)[0] if model == "better-dipole" else _total(medium, model, clamp)
-        )
     else:
         grid = hankel.radii()
         values = hankel.to_radius(transform(medium, model, clamp, hankel.frequencies()))
-        total = _total(medium, model, clamp)
+    if model == "better-dipole":
+        total = enclosed(grid[-1:], grid, values)[0]
+    else:
+        total = transform(medium, model, clamp, hankel.STILL)[0]
     near = (grid > 1e-7) & (grid < 1e3)  # beyond, the numbers are noise
     return _assemble(medium, model, clamp, grid[near], values[near], total, rgb)
 
@@ -74,12 +74,7 @@ def transform(medium: Medium, model: Model, clamp: Clamp, frequency: Floats) -> 
         A = mismatch(medium.eta, "exact")
         source: layered_diffusion.Source = "beam" if model == "layered" else "point"
         return layered_diffusion.respond(frequency, medium, A, source)[0]
-    return layers.respond(frequency, medium, mismatch(medium.eta), clamp).R_above
-
-
-def _total(medium: Medium, model: Model, clamp: Clamp) -> Floats:
-    total: Floats = transform(medium, model, clamp, hankel.STILL)[0]
-    return total
+    return multipole.respond(frequency, medium, mismatch(medium.eta), clamp).R_above
 
 
 def _need_half_space(medium: Medium, model: Model) -> None:
@@ -92,10 +87,10 @@ def _need_half_space(medium: Medium, model: Model) -> None:
 def _pointwise(medium: Medium, model: Model, clamp: Clamp, radius_mm: Floats) -> Floats:
     layer = medium.layers[0]
     if model == "better-dipole":
-        return better_dipole.reflectance(radius_mm, layer, medium.eta)
+        return dipole.better_reflectance(radius_mm, layer, medium.eta)
     if model == "dipole":
         return dipole.reflectance(radius_mm, layer, mismatch(medium.eta))
-    return multipole.reflectance(radius_mm, layers.slabs_of(medium, mismatch(medium.eta), clamp)[0])
+    return multipole.reflectance(radius_mm, multipole.slabs_of(medium, mismatch(medium.eta), clamp)[0])
 
 
 def _assemble(
@@ -127,16 +122,13 @@ def _assemble(
 
 
 def _doubts(medium: Medium, model: Model, clamp: Clamp) -> list[str]:
-    """What of the medium the model takes badly."""
+    """Warnings of what in the medium the model handles badly."""
     found = []
     for number, layer in enumerate(medium.layers, 1):
         thin = layer.thickness_mm < layer.mean_free_path_mm
         if model == "multipole" and thin.any():
-            what = (
-                "its source lies below it, light is lost"
-                if clamp == "none"
-                else "its source is moved into it"
-            )
+            lost = "its source lies below it, light is lost"
+            what = lost if clamp == "none" else "its source is moved into it"
             found.append(f"layer {number} ({layer.name}) is thinner than a reduced mean free path: {what}")
     worst = float(_early_albedo(medium).min())
     if worst < _ABSORBING:
@@ -157,7 +149,7 @@ def _early_albedo(medium: Medium) -> Floats:
 
 
 def _flaws(total: Floats, ring_energy: Floats) -> Sequence[str]:
-    """What of the result no real light does, or no ring holds."""
+    """Warnings of what in the result is unphysical, or missing from the rings."""
     found = light_beyond(total, ring_energy)
     if (total < 0.0).any():
         found.append(f"a total reflectance is negative: {np.round(total, 4).tolist()}")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.errors import refuse
-from dermis.optics.diffusion import hankel, layered_diffusion, layers
+from dermis.optics.diffusion import hankel, layered_diffusion, multipole
 from dermis.optics.diffusion.boundary import mismatch, normal_reflectance
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats, Medium
@@ -46,7 +46,7 @@ def through_slab(
             diffuse = layered_diffusion.respond(hankel.STILL, slab, mismatch(medium.eta, "exact"))[1][0]
             found.append(diffuse + straight)
         else:
-            found.append(layers.respond(hankel.STILL, slab, mismatch(medium.eta)).T_down[0])
+            found.append(multipole.respond(hankel.STILL, slab, mismatch(medium.eta)).T_down[0])
     return np.stack(found)
 
 

@@ -1,4 +1,4 @@
-"""From pigments to colours."""
+"""Colour of the skin from its pigments, and strength and roughness of its surface reflection."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.human.bust.fields import Doubles
 from dermis.human.skin_maps.look import SkinLook
-from dermis.human.skin_maps.patch import Doubles
 from dermis.optics.pigments.skin import SkinParameters
 from dermis.optics.skin_colours import ColourTable, colour_table
 
@@ -21,13 +21,21 @@ LIP_EPIDERMIS_MM = 0.03
 _BROWN, _BLACK = np.array([0.060, 0.033, 0.018]), np.array([0.012, 0.009, 0.008])
 _STUBBLE = np.array([0.095, 0.085, 0.08])  # seen through skin, which makes it blueish
 _BLACK_AT = 0.08  # melanin of a skin whose hair is black
+# Artist's values: measured ones by face region exist [Weyrich2006], but not in a form that can be used here.
+# They keep near what real-time skin has been given by hand, rho_s 0.18 and m 0.3 [dEonLuebke2007].
+_STRENGTH, _OILY_STRENGTH = 0.155, 0.08
+_ROUGHNESS, _OILY_ROUGHNESS = 0.36, -0.10
+_LIP_STRENGTH, _LIP_ROUGHNESS = 0.05, -0.07
+_UNEVEN = 0.15  # of the oil
+_LEAST_STRENGTH, _MOST_STRENGTH = 0.05, 0.45
+_LEAST_ROUGHNESS, _MOST_ROUGHNESS = 0.15, 0.6
 
 
 def colour_of(look: SkinLook, pigments: Doubles, place: Doubles, mark: Doubles) -> NDArray[np.float32]:
     """Colours (n, 3), linear Rec. 709 [-].
 
     pigments : (n, 2) shares of melanin and of blood [-]
-    place, mark : (n, columns) as the compiled loops give them
+    place, mark : (n, columns) as the kernels give them
     """
     from dermis.human.skin_maps.kernels.marks import HAIR, STUBBLE
     from dermis.human.skin_maps.kernels.places import LIP
@@ -53,3 +61,22 @@ def _tables(eumelanin: float, oxygen: float) -> tuple[ColourTable, ColourTable]:
     face = SkinParameters(eumelanin=eumelanin, oxygen=oxygen, epidermis_mm=EPIDERMIS_MM)
     lips = SkinParameters(eumelanin=eumelanin, oxygen=oxygen, epidermis_mm=LIP_EPIDERMIS_MM)
     return colour_table(face), colour_table(lips)
+
+
+def gloss(look: SkinLook, place: Doubles, mark: Doubles) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """rho_s and m (n,) [-]: oilier in the middle of the face and on the lips, weaker in pores and on hair.
+
+    place, mark : (n, columns) as the kernels give them
+    """
+    from dermis.human.skin_maps.kernels.marks import FILM, HAIR, PORE
+    from dermis.human.skin_maps.kernels.places import LIP, ROUGHNESS, STRENGTH
+
+    zones = 0.5 + 1.25 * look.oil
+    rho_s = _STRENGTH + _OILY_STRENGTH * look.oil + zones * place[:, STRENGTH] + _LIP_STRENGTH * place[:, LIP]
+    rho_s *= (1.0 + _UNEVEN * mark[:, FILM]) * (1.0 - 0.5 * mark[:, PORE]) * (1.0 - 0.4 * mark[:, HAIR])
+    m = _ROUGHNESS + _OILY_ROUGHNESS * look.oil + zones * place[:, ROUGHNESS] + _LIP_ROUGHNESS * place[:, LIP]
+    m *= 1.0 - 0.5 * _UNEVEN * mark[:, FILM]
+    return (
+        np.clip(rho_s, _LEAST_STRENGTH, _MOST_STRENGTH).astype(np.float32),
+        np.clip(m, _LEAST_ROUGHNESS, _MOST_ROUGHNESS).astype(np.float32),
+    )

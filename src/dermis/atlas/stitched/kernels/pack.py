@@ -1,4 +1,4 @@
-"""Shapes of cells laid into a square without touching."""
+"""Packing of shapes of cells into a square."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dermis.machine_code import compiled
 
 
 @compiled
-def stow(
+def pack(
     spans: NDArray[np.int32],
     first: NDArray[np.int64],
     extent: NDArray[np.int32],

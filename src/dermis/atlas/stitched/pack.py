@@ -1,4 +1,4 @@
-"""Where pieces and their gutters go in the square."""
+"""Packing of pieces and their gutters into the square."""
 
 from __future__ import annotations
 
@@ -7,12 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.stitched.border import Border, Gutter, Placing, find_border, needed
-from dermis.atlas.stitched.surface import Surface
-
-Doubles = NDArray[np.float64]
-Index = NDArray[np.int64]
-Flags = NDArray[np.bool_]
+from dermis.atlas.stitched.gutter import Border, GutterWidth, Packing, find_border, needed
+from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
 
 _CELLS = 512  # along the square at most
 _HALVINGS = 9  # in the search for the scale
@@ -31,7 +27,7 @@ class _Piece(NamedTuple):
     border : its sides, by the triangles' number within the piece
     """
 
-    part: Surface
+    part: FlatSurface
     uv: Doubles
     most: Doubles
     scale: float
@@ -52,7 +48,9 @@ class _Shape(NamedTuple):
     margin: Doubles
 
 
-def lay_out(surface: Surface, piece: Index, scale: Doubles, size: int, width: Gutter) -> Placing | None:
+def pack_pieces(
+    surface: FlatSurface, piece: Index, scale: Doubles, size: int, width: GutterWidth
+) -> Packing | None:
     """Pieces side by side with room for their gutters, as large as can be.
 
     None if they do not fit however small.
@@ -65,21 +63,21 @@ def lay_out(surface: Surface, piece: Index, scale: Doubles, size: int, width: Gu
     order = np.argsort(piece, kind="stable")[np.count_nonzero(piece < 0) :]
     groups = [own for own in np.split(order, np.flatnonzero(np.diff(piece[order])) + 1) if len(own)]
     pieces = [_apart(surface, piece, own, float(scale[own[0]])) for own in groups]
-    placing = Placing(np.zeros(surface.uv.shape), *np.zeros((2, len(piece))))
+    packing = Packing(np.zeros(surface.uv.shape), *np.zeros((2, len(piece))))
     if not pieces:
-        return placing
+        return packing
     best, corner = _search(pieces, cells, width._replace(widest=width.widest * cells / size))
     if corner is None:
         return None
     per_cell = size / cells
     for own, one, low in zip(groups, pieces, corner, strict=True):
-        placing.places[own] = (one.uv * best + low) * per_cell - 0.5
-        placing.per_uv[own] = one.scale * best * per_cell
-        placing.per_mm[own] = one.per_mm * best * per_cell
-    return placing
+        packing.places[own] = (one.uv * best + low) * per_cell - 0.5
+        packing.per_uv[own] = one.scale * best * per_cell
+        packing.per_mm[own] = one.per_mm * best * per_cell
+    return packing
 
 
-def _apart(surface: Surface, piece: Index, own: Index, scale: float) -> _Piece:
+def _apart(surface: FlatSurface, piece: Index, own: Index, scale: float) -> _Piece:
     border = find_border(surface, piece, own)
     number = np.empty(len(piece), np.int64)
     number[own] = np.arange(len(own))
@@ -90,17 +88,17 @@ def _apart(surface: Surface, piece: Index, own: Index, scale: float) -> _Piece:
     return _Piece(part, uv, uv.max(axis=(0, 1)), scale, per_mm, border)
 
 
-def _search(pieces: list[_Piece], cells: int, width: Gutter) -> tuple[float, list[Doubles] | None]:
+def _search(pieces: list[_Piece], cells: int, width: GutterWidth) -> tuple[float, list[Doubles] | None]:
     """Largest scale [cell per unit of scaled uv] at which all fit, and where each piece's uv is 0 [cell]."""
     area = sum(float(np.abs(one.part.area_uv).sum()) * one.scale**2 for one in pieces)
     best, corner = 0.0, None
     for attempt in range(_ATTEMPTS):
-        if attempt > 0 and (corner is None or _stow(pieces, best * _GAIN, cells, width, attempt) is None):
+        if attempt > 0 and (corner is None or _pack(pieces, best * _GAIN, cells, width, attempt) is None):
             continue
         low, high = best, cells / np.sqrt(area)
         for _ in range(_HALVINGS):
             middle = (low + high) / 2
-            found = _stow(pieces, middle, cells, width, attempt)
+            found = _pack(pieces, middle, cells, width, attempt)
             if found is None:
                 high = middle
             else:
@@ -108,14 +106,14 @@ def _search(pieces: list[_Piece], cells: int, width: Gutter) -> tuple[float, lis
     return best, corner
 
 
-def _stow(
-    pieces: list[_Piece], scale: float, cells: int, width: Gutter, attempt: int
+def _pack(
+    pieces: list[_Piece], scale: float, cells: int, width: GutterWidth, attempt: int
 ) -> list[Doubles] | None:
     """Where each piece's uv is 0 [cell] when they are laid side by side; None if they do not fit.
 
     attempt : chooses which comes first, and whether by rows or by columns
     """
-    from dermis.atlas.stitched.kernels.stow import stow
+    from dermis.atlas.stitched.kernels.pack import pack
 
     if any((one.most * scale > cells).any() for one in pieces):
         return None
@@ -131,21 +129,21 @@ def _stow(
     spans = np.concatenate([shape.spans for shape in shapes])
     first = np.cumsum([0, *(len(shape.spans) for shape in shapes)])
     corner = np.zeros((len(shapes), 2), np.int32)
-    if not stow(spans, first, extent, order, cells, corner):
+    if not pack(spans, first, extent, order, cells, corner):
         return None
     if attempt % 2 == 1:
         corner = corner[:, ::-1]
     return [shape.margin + low for shape, low in zip(shapes, corner, strict=True)]
 
 
-def _shape(one: _Piece, scale: float, width: Gutter, by_columns: bool) -> _Shape:
+def _shape(one: _Piece, scale: float, width: GutterWidth, by_columns: bool) -> _Shape:
     """All cells in which a texel might be needed; with `by_columns` rows and columns change places."""
     margin = np.ceil(_half_extent(one, scale, width)) + 2
     across, down = np.ceil(one.most * scale + 2 * margin).astype(int) + 1
     every = np.ones(len(one.uv))
     places = one.uv * scale + margin - 0.5
-    placing = Placing(places, every * one.scale * scale, every * one.per_mm * scale)
-    mask = needed(one.part, np.arange(len(every)), one.border, placing, width, (int(down), int(across)))
+    packing = Packing(places, every * one.scale * scale, every * one.per_mm * scale)
+    mask = needed(one.part, np.arange(len(every)), one.border, packing, width, (int(down), int(across)))
     # a needed texel may lie in a cell whose centre is not needed
     mask[1:] |= mask[:-1].copy()
     mask[:-1] |= mask[1:].copy()
@@ -167,7 +165,7 @@ def _spans(mask: Flags) -> tuple[NDArray[np.int32], tuple[int, int]]:
     return np.ascontiguousarray(spans, np.int32), (mask.shape[1], mask.shape[0])
 
 
-def _half_extent(one: _Piece, scale: float, width: Gutter) -> Doubles:
+def _half_extent(one: _Piece, scale: float, width: GutterWidth) -> Doubles:
     """(2,) how far gutters reach along u and v at most [cell]."""
     steps = one.part.along[one.border.triangle] / (one.scale * scale)
     if not len(steps):
