@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.atlas.atlas import build_atlas
+from dermis.atlas.build import build_atlas
 from dermis.frame.atlas_textures import upload_atlas
 from dermis.frame.frame import Stages
 from dermis.gpu import Device, Frame, download, upload

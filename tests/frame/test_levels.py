@@ -11,7 +11,8 @@ import pytest
 from numpy.typing import NDArray
 from tolerances import FLAT, HALVED, HALVES, SPREAD_ENERGY
 
-from dermis.atlas.atlas import Atlas, build_atlas
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.build import build_atlas
 from dermis.frame.atlas_textures import AtlasTextures, _coarser, upload_atlas
 from dermis.frame.coarser import Sheet, halved
 from dermis.frame.levels import FLOATS, halvings_of, scale_of

@@ -15,7 +15,7 @@ from setups import settings_of
 
 import dermis
 from dermis.frame import renderer as renderer_module
-from dermis.frame.passes import SHARED_SHADERS, SOURCE_SHADERS, STAGES, STORE_SHADERS
+from dermis.frame.passes import SHARED_SHADERS
 from dermis.frame.renderer import Renderer
 from dermis.gpu import open_device
 from dermis.gpu.device import DEFAULT_LIMITS
@@ -27,8 +27,8 @@ from dermis.mesh.primitives import uv_sphere
 from dermis.scene import Environment, Scene, Settings, load_lights
 
 PACKAGE = Path(dermis.__file__).parent
-TOOLKIT = PACKAGE / "gpu" / "wgsl"
-FOLDERS = (SHARED_SHADERS, TOOLKIT, SOURCE_SHADERS["rgba16float"], STORE_SHADERS["rgba16float"])
+SHADERS = sorted(PACKAGE.rglob("*.wgsl"))
+FOLDERS = (SHARED_SHADERS, *sorted({path.parent for path in SHADERS}))
 MOST = {
     kind: DEFAULT_LIMITS[f"max-{name}-per-shader-stage"]
     for kind, name in {
@@ -50,7 +50,7 @@ TECHNIQUES = get_args(Settings.model_fields["technique"].annotation)
 def _programs() -> list[Path]:
     """Shaders with an entry point: all that Python compiles."""
     entry = re.compile(r"^@(compute|vertex|fragment)\b", re.MULTILINE)
-    return [path for path in sorted(PACKAGE.rglob("*.wgsl")) if entry.search(compose(path, FOLDERS).text)]
+    return [path for path in SHADERS if entry.search(compose(path, FOLDERS).text)]
 
 
 @pytest.mark.parametrize("path", _programs(), ids=lambda path: path.stem)
@@ -68,7 +68,7 @@ def test_bindings_fit_any_device(path: Path) -> None:
 
 
 def test_uniforms_fit_64_kib() -> None:
-    text = compose(STAGES / "shade.wgsl", (SHARED_SHADERS, TOOLKIT)).text
+    text = compose(next(path for path in SHADERS if path.name == "shade.wgsl"), FOLDERS).text
     for name in ("Skin", "Lights", "Shade"):
         assert struct_dtype(text, name).itemsize <= DEFAULT_LIMITS["max-uniform-buffer-binding-size"]
 

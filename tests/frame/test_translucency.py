@@ -13,7 +13,8 @@ from setups import head_of, run_frame, scene_of
 from tolerances import SLAB_THROUGH
 from translucency_truth import hook, straight
 
-from dermis.atlas.atlas import Atlas, build_atlas
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.build import build_atlas
 from dermis.atlas.translucency.pairs import TranslucentPairs, _in_cells, find_pairs
 from dermis.atlas.translucency.samples import Samples, giving, surface, taking, texels
 from dermis.frame.frame import Stages

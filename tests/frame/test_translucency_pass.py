@@ -8,7 +8,7 @@ import translucency_twins
 from numpy.typing import NDArray
 from tolerances import TWIN
 
-from dermis.atlas.atlas import build_atlas
+from dermis.atlas.build import build_atlas
 from dermis.atlas.translucency.pairs import TranslucentPairs, find_pairs
 from dermis.frame.frame import Stages
 from dermis.frame.levels import FLOATS, make_levels

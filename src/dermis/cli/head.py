@@ -96,8 +96,8 @@ def head(
     """
     given = {name: value for name, value in locals().items() if value is not None}
     started = time.perf_counter()
-    from dermis.human.bust.build import BustRecipe, write_bust
     from dermis.human.bust.parameters import BustParameters
+    from dermis.human.bust_file import BustRecipe, write_bust
     from dermis.human.skin_maps.look import SkinLook
     from dermis.outputs import check_output
 

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from dermis.errors import DermisError
 from dermis.gpu.adapters import Adapter, fitting_adapters
-from dermis.gpu.uniforms import CHUNK_BYTES
 
 _TIMED_PASSES = 2048
 _STAGING_STEP = 4096
@@ -136,10 +135,10 @@ class Device:
         """Length of a timestamp's tick [ns]; wgpu hands out the native API's ticks."""
         return float(self.lib.wgpuQueueGetTimestampPeriod(self.handle.queue._internal))
 
-    def uniform_chunk(self, index: int) -> Any:
-        """One of the buffers for the records of frames; made when first asked for."""
+    def uniform_chunk(self, index: int, size: int) -> Any:
+        """One of the buffers for the records of frames [byte]; made when first asked for."""
         while len(self._uniform_chunks) <= index:
-            self._uniform_chunks.append(self.uniform_buffer(CHUNK_BYTES))
+            self._uniform_chunks.append(self.uniform_buffer(size))
         return self._uniform_chunks[index]
 
     def uniform_buffer(self, size: int) -> Any:

@@ -12,7 +12,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.atlas import Atlas, build_atlas
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.build import build_atlas
 from dermis.disk import cache_folder, stored_file
 from dermis.errors import refuse
 from dermis.human.bust import BUSTS
@@ -168,11 +169,11 @@ def _normals(slopes: Floats) -> NDArray[np.uint8]:
 @cache
 def _code() -> str:
     """A digest of the generator, so that busts are made again when it changes."""
-    package = Path(__file__).parents[2]
-    below = ("human/bust", "human/skin_maps", "human/skin_maps/kernels", "atlas/unwrap")
+    package = Path(__file__).parents[1]
+    below = ("atlas", "atlas/unwrap", "human", "human/bust", "human/skin_maps", "human/skin_maps/kernels")
     files = [file for folder in below for kind in ("*.py", "*.csv") for file in (package / folder).glob(kind)]
     digest = hashlib.sha256()
-    used = (package / name for name in ("atlas/atlas.py", "mesh/geometry.py", "mesh/gltf.py"))
+    used = (package / name for name in ("mesh/geometry.py", "mesh/gltf.py"))
     for file in sorted((*files, *used)):
         digest.update(file.read_bytes())
     return digest.hexdigest()
