@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import translucency_twins
-from dermis.frame.passes.variants import Constants
 from numpy.typing import NDArray
 from tolerances import TWIN
 
