@@ -57,9 +57,15 @@ def _entry(binding: Binding, value: Any, given: Any) -> Any:
 class Program:
     """What compute and raster programs share: the composed text, its bindings and their layouts."""
 
-    def __init__(self, device: Device, path: Path, folders: Sequence[Folder] = ()) -> None:
-        self.device = device
-        self.name = path.stem
+    def __init__(
+        self,
+        device: Device,
+        path: Path,
+        folders: Sequence[Folder] = (),
+        constants: Mapping[str, float] | None = None,
+    ) -> None:
+        self.device, self.name = device, path.stem
+        self.constants = dict(constants or {})
         self.source: Source = compose(path, (*folders, _TOOLKIT_SHADERS))
         self.bindings: tuple[Binding, ...] = bindings(self.source.text)
         self._module = self._compile(path)
@@ -110,7 +116,7 @@ class Program:
             self._accesses.keep(key, bound, found)
         return found
 
-    def constants(self, resources: Resources) -> tuple[bytes, ...]:
+    def numbers(self, resources: Resources) -> tuple[bytes, ...]:
         """What the shader reads of the records."""
         try:
             return tuple([read(resources[name]) for name, read in self._read_of.items()])
@@ -168,8 +174,8 @@ class ComputeProgram(Program):
         folders: Sequence[Folder] = (),
         constants: Mapping[str, float] | None = None,
     ) -> None:
-        super().__init__(device, path, folders)
-        stage = {"module": self._module, "entry_point": "main", "constants": dict(constants or {})}
+        super().__init__(device, path, folders, constants)
+        stage = {"module": self._module, "entry_point": "main", "constants": self.constants}
         self._compiled = device.executor.submit(
             device.handle.create_compute_pipeline, layout=self._layout, compute=stage
         )
@@ -206,11 +212,11 @@ class RasterProgram(Program):
         target: str | None,
         depth_compare: str,
     ) -> None:
-        super().__init__(device, path, folders)
+        super().__init__(device, path, folders, constants)
         fragment = {"module": self._module, "entry_point": "fragment", "targets": [{"format": target}]}
         self.pipeline = device.handle.create_render_pipeline(
             layout=self._layout,
-            vertex={"module": self._module, "entry_point": "vertex", "constants": dict(constants or {})},
+            vertex={"module": self._module, "entry_point": "vertex", "constants": self.constants},
             fragment=fragment if target else None,
             primitive={"topology": "triangle-list", "cull_mode": "none"},
             depth_stencil={
@@ -241,8 +247,8 @@ class FragmentProgram(Program):
         *,
         targets: Sequence[str],
     ) -> None:
-        super().__init__(device, path, folders)
-        stage = {"module": self._module, "entry_point": "fragment", "constants": dict(constants or {})}
+        super().__init__(device, path, folders, constants)
+        stage = {"module": self._module, "entry_point": "fragment", "constants": self.constants}
         self.pipeline = device.handle.create_render_pipeline(
             layout=self._layout,
             vertex={"module": self._module, "entry_point": "vertex"},
