@@ -78,9 +78,7 @@ CHANGES: dict[str, Callable[[ViewerState], ViewerState]] = {
 def test_what_is_kept_never_shows(name: str, studio: Studio, fresh: Renderer, state: ViewerState) -> None:
     image(studio, state)
     changed = CHANGES[name](state)
-    expected = fresh.draw(
-        changed.scene, changed.settings.model_copy(update={"size": SIZE}), anew=True
-    )
+    expected = fresh.draw(changed.scene, changed.settings.model_copy(update={"size": SIZE}), anew=True)
     off = np.abs(image(studio, changed) - expected.srgb8().astype(int))
     assert off.max() <= (1 if name == "pigments" else 0)  # whose fit begins elsewhere
 
