@@ -80,6 +80,18 @@ def test_parts_of_what_is_asked_for_stay() -> None:
     assert log.asked(memo, "a") == ""
 
 
+def test_parts_of_what_is_asked_for_are_those_used_last() -> None:
+    """Else who goes back to a whole has its parts made again for the next one that is like it."""
+    memo, log = Memo(2), Log()
+
+    def whole(key: str) -> str:
+        return memo.keep(log.make, key)
+
+    for key in "abac":
+        assert memo.keep(whole, key) == key.upper()
+    assert log.asked(memo, "acb") == "b"
+
+
 def test_forgetting_makes_everything_again() -> None:
     memo, log = Memo(3), Log()
     log.asked(memo, "abc")

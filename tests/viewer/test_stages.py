@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from dermis.gpu.repeated import Recording
 from offscreen_input import ADAPTER
 
+from dermis.gpu.recording import Recording
 from dermis.scene.environment import Environment
 from dermis.viewer.navigation import orbit
 from dermis.viewer.pace import QUALITY_LEVELS
@@ -18,7 +18,7 @@ from dermis.viewer.state import ViewerState
 from dermis.viewer.studio import Studio
 
 SIZE = (96, 96)
-SPREAD = {"diffuse", "transmission", "combine"}
+SPREAD = {"diffuse", "translucency", "combine"}
 PICTURE = {"shade", "post"}
 
 
@@ -55,7 +55,10 @@ CHANGES: dict[str, tuple[Callable[[ViewerState], ViewerState], set[str]]] = {
         lambda state: state.with_light(0, irradiance=(1.0, 2.0, 3.0)),
         {"irradiance"} | SPREAD | PICTURE,
     ),
-    "roughness": (lambda state: state.with_skin(roughness=0.6), {"irradiance"} | SPREAD | PICTURE),
+    "roughness": (
+        lambda state: state.with_skin(roughness=0.6),
+        {"surface", "irradiance"} | SPREAD | PICTURE,
+    ),
     "mix": (lambda state: state.with_skin(mix=1.0), {"irradiance"} | SPREAD | PICTURE),
     "profile": (lambda state: state.with_skin(profile="dark"), SPREAD | PICTURE),
     "fewer Gaussians": (  # which have another space for their levels
@@ -63,13 +66,16 @@ CHANGES: dict[str, tuple[Callable[[ViewerState], ViewerState], set[str]]] = {
         {"irradiance"} | SPREAD | PICTURE,
     ),
     "pigments": (skin_of(0.05), SPREAD | PICTURE),
-    "stretch": (lambda state: state.with_settings(stretch="none"), {"irradiance"} | SPREAD | PICTURE),
+    "stretch": (
+        lambda state: state.with_settings(stretch="none"),
+        {"surface", "irradiance"} | SPREAD | PICTURE,
+    ),
     "part": (lambda state: state.in_view("specular"), PICTURE),
     "background": (lambda state: state.with_settings(background=(0.1, 0.2, 0.3)), PICTURE),
     "exposure": (lambda state: state.with_settings(exposure=2.0), {"post"}),
     "tone": (lambda state: state.with_settings(tone="filmic"), {"post"}),
     "bloom": (lambda state: state.with_settings(bloom=0.2), {"bloom", "post"}),
-    "nothing": (lambda state: replace(state), {"post"}),
+    "nothing": (lambda state: replace(state), set()),
 }
 
 

@@ -92,14 +92,14 @@ def test_pigments_move_on_while_the_search_goes_on(studio: Studio, held: Held, s
 def test_a_moving_picture_shows_what_was_found(studio: Studio, held: Held, state: ViewerState) -> None:
     dark = skin(state, DARK)
     image(studio, dark, True)
-    assert studio.renderer.thin_parts.provisional
+    assert studio.renderer.memo.provisional
     held.may_go_on.set()
     for k in range(1000):
-        if not studio.renderer.thin_parts.provisional:
+        if not studio.renderer.memo.provisional:
             break
         time.sleep(0.01)
         image(studio, dark.with_settings(exposure=1.0 + 1e-4 * k), True)
-    assert not studio.renderer.thin_parts.provisional
+    assert not studio.renderer.memo.provisional
     assert len(held.widths) == 1
 
 

@@ -13,7 +13,7 @@ from dermis.disk import cached_arrays
 from dermis.frame.coarser import Sheet, halved
 from dermis.frame.levels import MOST_HALVINGS
 from dermis.frame.seams import FEATHER_MM, REMEDIES, Remedy
-from dermis.gpu import Device
+from dermis.gpu import Device, scratch
 from dermis.gpu.textures import texture_from
 
 _HALVING = "halved 1"  # raise when `halved` gives other results
@@ -77,7 +77,8 @@ def _uploaded(device: Device, sheet: Sheet, resources: dict[str, Any], **more: A
         return AtlasTextures(resources, sheared, **more)
     beyond = np.concatenate([sheet.source.view(np.uint32), sheet.gutter.astype(np.uint32)], axis=1)
     light = np.zeros((len(beyond), 4), np.float32)
-    lists = (device.buffer(words, "STORAGE") for words in (beyond, light))
+    lists = [device.buffer(words, "STORAGE") for words in (beyond, light)]
+    scratch(device, lists[1])
     return AtlasTextures(resources, sheared, *lists, **more)
 
 

@@ -9,7 +9,7 @@ from dermis.atlas.atlas import Atlas
 from dermis.atlas.cached import cached_pairs, pairs_key
 from dermis.frame.atlas_layout import PairBuffers, Translucency
 from dermis.frame.passes.translucency_weights import source_level, upload_pairs, weigh
-from dermis.gpu import Device, Memo
+from dermis.gpu import Device, Memo, scratch
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 
@@ -60,6 +60,6 @@ def translucency_from(
     device: Device, pairs: PairBuffers, variance_mm2: Floats, weight: Floats
 ) -> Translucency:
     """What a profile lets pass between pairs, and space for it."""
-    gathered = device.buffer(np.zeros((pairs.source_count, 2), np.uint32), "STORAGE")
+    gathered = scratch(device, device.buffer(np.zeros((pairs.source_count, 2), np.uint32), "STORAGE"))
     weights = weigh(device, pairs, variance_mm2, weight)
     return Translucency(pairs, weights, source_level(pairs, variance_mm2), gathered)

@@ -25,6 +25,7 @@ class Slot:
     frame : the one in which `value`, `writer` and `writers` hold
     writer : the pass that writes it last
     writers : all that do, and those that write what contains it or is contained
+    scratch : whether only passes read it, so that it may hold anything in between
     """
 
     parent: Slot | None = None
@@ -34,6 +35,7 @@ class Slot:
     frame: int = 0
     writer: int = 0
     writers: list[int] = field(default_factory=list)
+    scratch: bool = False
 
     def sources(self, frame: int) -> Iterator[Slot]:
         """The slots from which it gets what it holds in the frame: itself, its views, or its texture."""
@@ -83,6 +85,12 @@ class Access:
 def new_number() -> int:
     """A number that nothing has had before."""
     return next(_number)
+
+
+def scratch(device: Device, resource: Any) -> Any:
+    """The texture or buffer, which passes share: none runs only for what it leaves there."""
+    slot_of(device, resource).scratch = True
+    return resource
 
 
 def slot_of(device: Device, resource: Any) -> Slot:

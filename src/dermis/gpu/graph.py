@@ -231,7 +231,7 @@ class Graph:
             for slot, value in one.writes:
                 last = slot.writers[-1] == index
                 there = last and slot.held == value and id(slot) not in lost
-                if not there and (last or (index, id(slot)) in wanted):
+                if not there and ((last and not slot.scratch) or (index, id(slot)) in wanted):
                     due[index] = True
             if due[index]:
                 wanted.update((before, id(slot)) for before, slot in one.needs)

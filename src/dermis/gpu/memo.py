@@ -62,14 +62,11 @@ class Memo:
         role = make, of
         kept = self._kept.setdefault(role, [])
         found = next((one for one in kept if same(one.args, args)), None)
-        if found is not None and not found.provisional:
-            kept.remove(found)
-        else:
-            if found is not None:
-                kept.remove(found)
-            del kept[self._depth - 1 :]  # before making, which may need the space
+        if found is None or found.provisional:
+            kept[:] = [one for one in kept if one is not found][
+                : self._depth - 1
+            ]  # whose space may be needed
             found = self._made(make, args, using)
-        kept.insert(0, found)
         self._touch(role, found)
         if self._making:
             self._making[-1].parts.append((role, found))
@@ -147,7 +144,10 @@ class Memo:
         return made
 
     def _touch(self, role: Role, made: Made) -> None:
+        """It and its parts are what was used last."""
         self._asked[-1].add(role)
+        others = (one for one in self._kept.get(role, ()) if one is not made)
+        self._kept[role] = [made, *others][: self._depth]
         for part in made.parts:
             self._touch(*part)
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.passes import program
-from dermis.gpu import Device, Recorder, make_texture
+from dermis.gpu import Device, Recorder, make_texture, scratch
 
 SURFACE_BYTES = 32
 """Of a texel."""
@@ -14,7 +14,7 @@ SURFACE_BYTES = 32
 
 def make_surfaces(device: Device, side: int) -> Any:
     """Space for positions, normals, colours and gloss: two layers, as packed_surface.wgsl reads them."""
-    return make_texture(device, (side, side), "rgba32uint", layers=2)
+    return scratch(device, make_texture(device, (side, side), "rgba32uint", layers=2))
 
 
 def draw(graph: Recorder, layout: AtlasLayout) -> None:

@@ -11,7 +11,7 @@ from dermis.atlas.translucency.pairs import TranslucentPairs
 from dermis.disk import cached_array
 from dermis.frame.atlas_layout import PairBuffers
 from dermis.frame.passes import program
-from dermis.gpu import ComputeProgram, Device, Frame, make_texture, upload
+from dermis.gpu import ComputeProgram, Device, Frame, make_texture, scratch, upload
 from dermis.optics.gaussians import MOST_GAUSSIANS
 
 Floats = NDArray[np.float64]
@@ -69,7 +69,7 @@ def _unlit(device: Device, surface: NDArray[np.bool_]) -> Any:
     light[..., 3] = surface
     texture = make_texture(device, surface.shape, "rgba32float")
     upload(device, texture, light)
-    return texture
+    return scratch(device, texture)
 
 
 def source_level(pairs: PairBuffers, variance_mm2: Floats) -> int:
