@@ -89,4 +89,4 @@ def test_strength_stays_within_one() -> None:
 def test_only_other_models_than_the_default_ask_for_another_pipeline() -> None:
     assert surface.constants(Skin()) == surface.constants(Skin(specular="none")) == ()
     assert surface.constants(Skin(specular="phong")) == (("MODEL", 5),)
-    assert surface.constants(Skin(fresnel="exact")) == (("FRESNEL", 1),)
+    assert surface.constants(Skin(fresnel="exact")) == (("EXACT_FRESNEL", 1),)
