@@ -16,13 +16,13 @@ from typing import Any
 from other_program import lasted_s
 
 from dermis.benchmark.cases import FRAGMENTS, PRESETS, Case
+from dermis.benchmark.lobe_cost import lobe_cost_ns
 from dermis.benchmark.measure import Effort, row_ms, stage_ms
 from dermis.benchmark.report import as_json
 from dermis.benchmark.run import run
 from dermis.benchmark.scenes import scenes_of
 from dermis.cli.console import note
 from dermis.errors import DermisError
-from dermis.frame.lobe_cost import lobe_cost_ns
 from dermis.frame.renderer import Renderer
 from dermis.images.writer import ImageWriter
 from dermis.mesh.head import Head

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.benchmark.gpu_gems_3_fragments import published_as_fragments
 from dermis.comparison.scenes import comparison_scene, usual_region
 from dermis.comparison.truths import matched
 from dermis.errors import DermisError
-from dermis.frame.passes.gpu_gems_3_fragments import published_as_fragments
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.optics.diffusion.models import diffusion_profile

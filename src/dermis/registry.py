@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any, Generic, TypeVar, cast
 
@@ -38,10 +39,14 @@ class Registry(Mapping[str, T], Generic[T]):
         if summary:
             self._summaries[name] = summary
 
-    def remove(self, name: str) -> None:
-        """Take an entry out again; nothing happens when it is not there."""
-        self._entries.pop(name, None)
-        self._summaries.pop(name, None)
+    @contextmanager
+    def including(self, name: str, entry: T | str) -> Iterator[None]:
+        """While it lasts, an entry more."""
+        self.register(name, entry)
+        try:
+            yield
+        finally:
+            del self._entries[name]
 
     @property
     def names(self) -> tuple[str, ...]:

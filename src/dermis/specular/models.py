@@ -1,4 +1,4 @@
-"""Every model of the surface by its name, behind one protocol."""
+"""Every model of the surface by its name, behind one protocol; the models are imported when first used."""
 
 from __future__ import annotations
 

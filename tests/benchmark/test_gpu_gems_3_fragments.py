@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,8 +11,8 @@ from numpy.typing import NDArray
 from setups import front_camera, head_of, run_frame, scene_of
 from tolerances import HALVES
 
-from dermis.frame.passes import gpu_gems_3_fragments
-from dermis.frame.passes.gpu_gems_3_fragments import published_as_fragments
+from dermis.benchmark import gpu_gems_3_fragments
+from dermis.benchmark.gpu_gems_3_fragments import published_as_fragments
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Frame, download
 from dermis.mesh.geometry import build_mesh
@@ -33,6 +34,11 @@ class Drawn(NamedTuple):
     levels: list[Floats]
     results: list[Floats]
     filled: int
+
+
+@pytest.fixture(scope="module")
+def renderer() -> Renderer:
+    return Renderer(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,90 @@
+"""The passes of 2007 in the graphics pipeline, as they were drawn then: a baseline to measure against."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dermis.frame.atlas_layout import AtlasLayout
+from dermis.frame.inputs import Inputs
+from dermis.frame.levels import FLOATS, HALVES, Blur, Levels
+from dermis.frame.passes import device_constants, shader_folders, surface_texels, translucency
+from dermis.frame.passes.combine import nothing
+from dermis.frame.techniques.gpu_gems_3 import GpuGems3, Pair, StretchedLevels
+from dermis.gpu import Constants, Device, FragmentProgram, Graph, compiled, make_texture
+from dermis.optics.gaussians import MOST_GAUSSIANS
+
+_FOLDER = Path(__file__).parent
+
+
+class Fragments(GpuGems3):
+    """Lights the atlas, blurs and adds up in render passes; the same up to the rounding of halves."""
+
+    name = "gpu-gems-3 as fragments"
+
+    def make_levels(self, device: Device, side: int, count: int) -> Levels:
+        """Space for the light that enters and `count` blurred levels, all of it halves."""
+        stack = make_texture(device, (side, side), HALVES, layers=max(2, count + 1), use="raster")
+        scratch, *stretch = (make_texture(device, (side, side), HALVES, use="raster") for _ in range(3))
+        first, second = (texture.create_view() for texture in stretch)
+        return StretchedLevels(stack, scratch, side, HALVES, stretch=(first, second))
+
+    def make_sum(self, device: Device, side: int) -> Any:
+        """Space for the sum."""
+        return make_texture(device, (side, side), FLOATS, use="raster")
+
+    def scatter(self, graph: Graph, inputs: Inputs) -> Any:
+        """Light the atlas, let the light spread, and add it up."""
+        made = inputs.resources
+        for layout, blur in zip(inputs.layouts, inputs.blurs, strict=True):
+            surface_texels.draw(graph, layout)
+            self._light(graph, layout, inputs.light_constants, made.levels.layer(0), blur.scale)
+            self.fill(graph, made.levels, layout.atlas, blur)
+            thin = layout.translucency
+            through = translucency.draw(graph, made.levels, blur, thin) if thin else None
+            self._add_up(graph, made.levels, blur, layout.scattered, through)
+        return made.scattered
+
+    def shader(self, device: Device, constants: Constants) -> FragmentProgram:
+        """The pass along one axis."""
+        return _program(device, "gpu_gems_3_fragment.wgsl", constants, [HALVES, HALVES])
+
+    def run(self, graph: Graph, shader: Any, bound: dict[str, Any], into: Pair, side: int) -> None:
+        """One pass that fills a texture of light and one of stretch."""
+        graph.fill("diffuse", shader, bound, into)
+
+    def _light(
+        self, graph: Graph, layout: AtlasLayout, constants: Constants, into: Any, scale: float
+    ) -> None:
+        shader = _program(graph.device, "gpu_gems_3_irradiance.wgsl", constants, [HALVES])
+        bound = {
+            **layout.lit,
+            "surfaces": layout.surfaces,
+            "entering": shader.record("Entering", scale=scale),
+        }
+        graph.fill("irradiance", shader, bound, [into])
+
+    def _add_up(self, graph: Graph, levels: Levels, blur: Blur, into: Any, through: Any) -> None:
+        shader = _program(graph.device, "gpu_gems_3_sum.wgsl", (), [FLOATS])
+        padded = np.zeros((MOST_GAUSSIANS, 4), np.float32)
+        padded[: len(blur.weight), :3] = blur.weight / blur.scale
+        padded[0, 3] = 1.0
+        counts = {"count": len(blur.weight), "through": through is not None}
+        bound = {
+            "weights": shader.record("Weights", weight=padded, **counts),
+            "levels": levels.stack,
+            "transmitted": nothing(graph.device) if through is None else through,
+        }
+        graph.fill("combine", shader, bound, [into])
+
+
+def _program(device: Device, name: str, constants: Constants, targets: list[str]) -> FragmentProgram:
+    suited = device_constants(device)
+    return compiled(
+        FragmentProgram, device, _FOLDER / name, shader_folders(), constants, suited, targets=targets
+    )
+
+
+FRAGMENTS = Fragments()
