@@ -43,18 +43,14 @@ power = 6
 
 @pytest.fixture
 def glow() -> Iterator[None]:
-    LIGHTS.register("after-glow", GlowLight)
-    KINDS.register("after-glow", GLOW)
-    yield
-    LIGHTS.remove("after-glow")
-    KINDS.remove("after-glow")
+    with LIGHTS.including("after-glow", GlowLight), KINDS.including("after-glow", GLOW):
+        yield
 
 
 @pytest.fixture
 def chalk() -> Iterator[None]:
-    MODELS.register("blue-chalk", CHALK)
-    yield
-    MODELS.remove("blue-chalk")
+    with MODELS.including("blue-chalk", CHALK):
+        yield
 
 
 def picture(renderer: Renderer, *lights: object, parts: str = "all", **skin: object) -> Floats:
