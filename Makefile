@@ -1,6 +1,6 @@
 # Two commands are enough: `make demo` shows the package, `make test` checks it.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo lint test docs lock clean
+.PHONY: help setup demo lint test wheel docs lock clean
 
 PY := .venv/bin/python
 ARGS ?=
@@ -23,7 +23,10 @@ lint: setup ## style, types and floors
 	.venv/bin/lint-imports
 
 test: lint ## lint and every test (ARGS="-k blur" chooses some)
-	$(PY) -m pytest -n 2 --dist loadfile $(ARGS)
+	$(PY) -m pytest -n 2 --dist loadfile --durations=10 $(ARGS)
+
+wheel: setup ## the package as a wheel in dist
+	$(PY) -m pip wheel --quiet --no-deps --no-build-isolation --disable-pip-version-check -w dist . && ls dist
 
 lock: ## write requirements.lock anew from pyproject.toml (ARGS=--upgrade for newer versions)
 	@sh tools/lock.sh $(ARGS)
