@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from peers_measured import OURS, PUBLISHED, Frames, Measured
 
-from dermis.reference.cycles_process import CyclesPass
+from dermis.reference.cycles import CyclesPass
 from dermis.reference.metrics import energy_ratio, relative_rmse
 from dermis.reference.path_traced import PathTraced
 

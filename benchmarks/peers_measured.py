@@ -23,8 +23,7 @@ from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.media import Medium
 from dermis.optics.presets import media
 from dermis.optics.profiles import TERMS, write_profile
-from dermis.reference.cycles import Method, cycles_passes
-from dermis.reference.cycles_process import CyclesPass
+from dermis.reference.cycles import CyclesPass, Method, cycles_passes
 from dermis.reference.path_traced import SAMPLES_PER_PASS, PathTraced, path_trace
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings

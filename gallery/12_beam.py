@@ -12,7 +12,7 @@ import numpy as np
 
 import dermis
 from dermis.gallery.picture import main
-from dermis.reference.counted import counted_profile
+from dermis.reference.slab_mc import counted_profile
 
 HALF_MM, EXPOSED_MM, PHOTONS = 4.0, 1.0, 400_000
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -22,9 +23,11 @@ from dermis.gpu import Frame, download, upload
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.optics.profiles import load_profile
-from dermis.reference.atlas_reading import Points, lit_at, seam_points, shown
-from dermis.reference.cut_meshes import cut_sphere
 from dermis.scene import DirectionalLight, Light, Scene, Settings, Skin, StripeLight
+
+sys.path.append(str(Path(__file__).parent.parent / "tests"))  # the surfaces are the tests' own
+from atlas_reading import Points, lit_at, seam_points, shown
+from cut_meshes import cut_sphere
 
 Choice = Callable[[np.ndarray], np.ndarray]
 HUMAN = "heads/makehuman/head_young_male_light.obj"

@@ -18,7 +18,7 @@ from dermis.errors import DermisError, refuse
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
-from dermis.reference.cycles_process import CyclesPass
+from dermis.reference.cycles import CyclesPass
 from dermis.reference.path_traced import PathTraced
 
 BALL = Head("ball", uv_sphere(100.0, 24, 12), Maps())

@@ -15,7 +15,7 @@ from dermis.comparison.compare import Comparison, Row
 from dermis.comparison.sources import comparison_sources
 from dermis.images.codecs import encode_png8
 from dermis.outputs import replacing
-from dermis.reference.difference_images import signed_difference
+from dermis.reference.metrics import signed_difference
 
 Floats = NDArray[np.float64]
 _COLUMNS = ("technique", "relative RMSE", "FLIP", "energy ratio", "ms a frame")

@@ -94,7 +94,7 @@ def heat_around(
     lit : of the whole head, see `irradiance_samples`
     least_mm2 : variance under which Gaussians are integrated by straight-line distance
     """
-    from dermis.reference.map_error import patch_of
+    from dermis.reference.refine import patch_of
     from dermis.reference.surface_diffusion import diffuse_on_surface
 
     started = time.perf_counter()

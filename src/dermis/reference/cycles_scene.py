@@ -13,7 +13,7 @@ from dermis.mesh.head import Head
 from dermis.optics.media import Medium
 from dermis.reference.half_space import diffuse_albedo
 from dermis.reference.mitsuba_lights import facing_irradiance
-from dermis.reference.mitsuba_skin import Lambertian
+from dermis.reference.mitsuba_scene import Lambertian
 from dermis.scene.environment import Environment
 from dermis.scene.lights import (
     DirectionalLight,

@@ -17,7 +17,7 @@ from dermis.environment.panorama import load_panorama
 from dermis.errors import DermisError
 from dermis.optics.media import Medium
 from dermis.outputs import replacing
-from dermis.reference.mitsuba_skin import Lambertian
+from dermis.reference.mitsuba_scene import Lambertian
 from dermis.scene.model import Scene
 
 Floats = NDArray[np.float64]
@@ -62,7 +62,7 @@ class Passes:
 
 
 def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], form: str) -> str:
-    """A name for all that the image depends on.
+    """A hash of all that the image depends on.
 
     form : versions, and how it is traced
     """
