@@ -49,7 +49,7 @@ OURS = {
 }
 """By what they are called in the table; screen space has no use for an atlas."""
 COMPUTE, FRAGMENTS = "passes of 2007 as compute", "passes of 2007 as fragments"
-PUBLISHED = {name: Way("published") for name in (COMPUTE, FRAGMENTS)}
+PUBLISHED = {name: Way("gpu-gems-3") for name in (COMPUTE, FRAGMENTS)}
 """The published structure in our renderer, to set beside the first of ours."""
 SEEDS = (100, 200)
 """Of the first pass of each turn; the passes of a turn have the following ones."""

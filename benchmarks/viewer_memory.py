@@ -47,7 +47,7 @@ KINDS: dict[str, Kind] = {
     ),
     "colour": lambda s, r: s.with_skin(albedo=_one(r, "map", "profile")),
     "technique": lambda s, r: s.with_settings(
-        technique=_one(r, "texture-space", "one-blur", "published", "screen-space", "pre-integrated", "none")
+        technique=_one(r, "texture-space", "one-blur", "gpu-gems-3", "screen-space", "pre-integrated", "none")
     ),
     "stretch": lambda s, r: s.with_settings(stretch=_one(r, "full", "axes", "none")),
     "seams": lambda s, r: s.with_settings(seams=_one(r, "stitch", "none", "alpha", "multi-uv")),

@@ -12,7 +12,7 @@ Columns: 4
 from dermis.comparison.compare import compare
 from dermis.gallery.picture import main
 
-TECHNIQUES = ("none", "one-blur", "published", "texture-space", "screen-space", "pre-integrated")
+TECHNIQUES = ("none", "one-blur", "gpu-gems-3", "texture-space", "screen-space", "pre-integrated")
 
 
 def draw(studio):

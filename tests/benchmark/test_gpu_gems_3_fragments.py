@@ -64,7 +64,7 @@ def drawn(renderer: Renderer, scene: Scene, seams: str) -> Drawn:
             fill(frame, stage, *rest)
 
         patch.setattr(Frame, "fill", counted)
-        inputs = run_frame(renderer, scene, technique="published", atlas=128, seams=seams)
+        inputs = run_frame(renderer, scene, technique="gpu-gems-3", atlas=128, seams=seams)
     device, levels, layout = renderer.device, inputs.levels, inputs.layouts[0]
     assert layout.thin is not None
     stack = [download(device, levels.stack, layer=k) for k in range(1 + len(inputs.blurred_mm2))]

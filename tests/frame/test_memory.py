@@ -21,7 +21,7 @@ SCENE = scene_of(head_of(uv_sphere(30.0, 24, 12)), frontal())
 KINDS: dict[str, dict[str, Any]] = {
     "texture-space": {},
     "two layouts": {"seams": "multi-uv"},
-    "published": {"technique": "published"},
+    "gpu-gems-3": {"technique": "gpu-gems-3"},
     "screen-space": {"technique": "screen-space"},
     "pre-integrated": {"technique": "pre-integrated"},
     "none": {"technique": "none"},
@@ -84,7 +84,7 @@ def test_a_frame_leaves_nothing_of_the_one_before(renderer: Renderer, held: Held
         assert held.bytes() == alone[kind], kind
 
 
-@pytest.mark.parametrize("kind", ["texture-space", "two layouts", "published", "none"])
+@pytest.mark.parametrize("kind", ["texture-space", "two layouts", "gpu-gems-3", "none"])
 def test_the_atlas_takes_what_was_foreseen(renderer: Renderer, held: Held, kind: str) -> None:
     """The difference of two sizes, so that all that has another size does not count."""
     if renderer.device.adapter.kind != "CPU":

@@ -101,11 +101,11 @@ CHANGES: dict[str, tuple[Callable[[], Scene], dict[str, Any]]] = {
     "samples": (scene, {"samples": 4}),
     **{
         f"technique {name}": (scene, {"technique": name})
-        for name in ("none", "one-blur", "published", "screen-space", "pre-integrated")
+        for name in ("none", "one-blur", "gpu-gems-3", "screen-space", "pre-integrated")
     },
     **{f"seams {name}": (lambda: scene(LEANING), {"seams": name}) for name in REMEDIES},
     "seam colour": (lambda: scene(LEANING), {"seams": "clear-colour", "seam_colour": (0.1, 0.2, 0.9)}),
-    "published on two atlases": (scene, {"technique": "published", "seams": "multi-uv"}),
+    "published on two atlases": (scene, {"technique": "gpu-gems-3", "seams": "multi-uv"}),
     "axes": (lambda: scene(LEANING), {"stretch": "axes"}),
     "one density": (scene, {"stretch": "none"}),
     "thin": (lambda: scene(LEAF), {}),

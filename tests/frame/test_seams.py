@@ -62,7 +62,7 @@ def test_remedies_leave_seams(renderer: Renderer, seams: str) -> None:
     assert np.percentile(jumps(renderer, seams), 90) > 3 * SEAM
 
 
-@pytest.mark.parametrize("technique", ["texture-space", "published"])
+@pytest.mark.parametrize("technique", ["texture-space", "gpu-gems-3"])
 def test_black_bleeds_in_without_a_remedy(renderer: Renderer, technique: str) -> None:
     """The darkest light at the seams, by remedy: each of them is lighter than none."""
     darkest = {}

@@ -16,7 +16,7 @@ from dermis.scene.model import Scene
 HEAD = head_of(uv_sphere(30.0, 24, 12))
 SEQUENCES: dict[str, list[dict[str, Any]]] = {
     "back from two layouts": [{"seams": "stitch"}, {"seams": "multi-uv"}, {"seams": "stitch"}],
-    "back from other blurs": [{}, {"technique": "published"}, {}, {"technique": "one-blur"}, {}],
+    "back from other blurs": [{}, {"technique": "gpu-gems-3"}, {}, {"technique": "one-blur"}, {}],
     "exposure": [{"exposure": 1e-6}, {"exposure": 1.0}],
     "colour beside the charts": [{"seams": "clear-colour", "seam_colour": (c, 0.1, 0.1)} for c in (0.1, 0.9)],
     "size": [{"atlas": 64}, {"atlas": 100}, {"atlas": 64}],

@@ -106,7 +106,7 @@ def test_every_control_is_a_step_that_undo_takes_back(start: str, tall: InputDri
 
 def test_controls_are_explained_by_the_settings_own_words() -> None:
     said = meanings(Skin)
-    assert said["mix"].startswith("share of the colour map") and "Schlick" in said["fresnel"]
+    assert said["mix"].startswith("Share of the colour map") and "Schlick" in said["fresnel"]
     assert {"mix", "roughness", "rho_s", "oiliness", "specular", "energy"} <= said.keys()
 
 

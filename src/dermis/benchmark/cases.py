@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-PUBLISHED = "published"
+PUBLISHED = "gpu-gems-3"
 FRAGMENTS = "published-fragments"
 """The passes of 2007 in the graphics pipeline; `PUBLISHED` are the same in compute."""
 

@@ -29,7 +29,7 @@ _FOLDER = Path(__file__).parent
 
 @contextmanager
 def published_as_fragments(device: Device, stages: Stages) -> Iterator[None]:
-    """While it lasts, frames of the technique "published" light the atlas, blur and add up in render passes.
+    """While it lasts, frames of the technique "gpu-gems-3" light the atlas, blur and add up in render passes.
 
     The results are those of compute up to the rounding of halves. Other techniques cannot be drawn meanwhile.
     """

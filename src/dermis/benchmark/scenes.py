@@ -30,7 +30,7 @@ def settings_of(case: Case) -> Settings:
         size=case.image,
         atlas=case.atlas,
         samples=case.samples,
-        technique=technique,  # type: ignore[arg-type]  # checked by the model
+        technique=technique,
     )
 
 

@@ -15,7 +15,7 @@ _SKIN, _SETTINGS = ("profile", "specular"), ("technique", "seams", "transmission
 def cite(
     *keys: str,
     scene: Path | None = None,
-    technique: Literal["texture-space", "none", "one-blur", "published", "screen-space", "pre-integrated"]
+    technique: Literal["texture-space", "none", "one-blur", "gpu-gems-3", "screen-space", "pre-integrated"]
     | None = None,
     seams: Literal["stitch", "none", "clear-colour", "stretch-map", "alpha", "multi-uv"] | None = None,
     transmission: Literal["thin", "none"] | None = None,

@@ -43,7 +43,7 @@ def compare(
 
         dermis compare bust --against path-traced --light back --samples 256 --json
 
-        dermis compare bust --against heat --region ear --techniques published,texture-space
+        dermis compare bust --against heat --region ear --techniques gpu-gems-3,texture-space
 
         dermis compare specular -o plots
 
@@ -56,7 +56,7 @@ def compare(
         surface near the middle of the picture), path-traced (light through the medium; needs Mitsuba) or
         cycles (Blender's random walk; DERMIS_BLENDER_PYTHON names a Python that has bpy) [surface-integral].
     techniques:
-        Names with commas: none, one-blur, published, texture-space, screen-space, pre-integrated [all].
+        Names with commas: none, one-blur, gpu-gems-3, texture-space, screen-space, pre-integrated [all].
     light:
         front, back (through the ear) or laser (a stripe over cheek and ear) [front].
     region:

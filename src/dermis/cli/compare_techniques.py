@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dermis.comparison.compare import Comparison
 
 
-TECHNIQUES = "none,one-blur,published,texture-space,screen-space,pre-integrated"
+TECHNIQUES = "none,one-blur,gpu-gems-3,texture-space,screen-space,pre-integrated"
 
 
 def choose(given: Mapping[str, Any]) -> dict[str, Any]:

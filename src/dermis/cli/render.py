@@ -26,7 +26,7 @@ def render(
     size: str | None = None,
     atlas: Whole = None,
     samples: Whole = None,
-    technique: Literal["texture-space", "none", "one-blur", "published", "screen-space", "pre-integrated"]
+    technique: Literal["texture-space", "none", "one-blur", "gpu-gems-3", "screen-space", "pre-integrated"]
     | None = None,
     transmission: Literal["thin", "none"] | None = None,
     seams: Literal["stitch", "none", "clear-colour", "stretch-map", "alpha", "multi-uv"] | None = None,
@@ -96,13 +96,13 @@ def render(
     samples:
         Samples of each pixel's edges [4].
     technique:
-        texture-space scatters light below the surface; none is dry skin. Baselines: one-blur, published (the
+        texture-space scatters light below the surface; none is dry skin. Baselines: one-blur, gpu-gems-3 (the
         passes of 2007), and what engines do: screen-space, pre-integrated.
     transmission:
         thin lets light through thin parts such as ears; none takes all for thick [thin].
     seams:
         stitch lets light cross the map's seams; the others are the talk's remedies, for comparison [stitch].
-        one-blur and published know no stitching: for it they take clear-colour.
+        one-blur and gpu-gems-3 know no stitching: for it they take clear-colour.
     stretch:
         full corrects blurs for the map's stretch and shear; axes takes u and v for at right angles [full].
     profile:

@@ -77,7 +77,7 @@ class Stages:
 
     def spreading(self, technique: str) -> Diffuse | Published:
         """The stage that blurs light over the atlas."""
-        return self.published if technique == "published" else self.diffuse
+        return self.published if technique == "gpu-gems-3" else self.diffuse
 
 
 def draw_frame(frame: Frame, stages: Stages, inputs: Inputs) -> None:

@@ -45,7 +45,7 @@ def atlas_texel_bytes(technique: str, levels: int, layouts: int) -> float:
     """
     if not levels:
         return layouts * _GEOMETRY
-    if technique == "published":  # besides, a stretch map between passes
+    if technique == "gpu-gems-3":  # besides, a stretch map between passes
         blurs = float(_HALVES * (levels + 2) + 2 * _HALVES)
     else:
         blurs = _FLOATS * (levels + 2) * sum(0.25**halving for halving in range(MOST_HALVINGS + 1))

@@ -19,7 +19,7 @@ from dermis.mesh.mesh import Mesh
 from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
-_WITH_TRANSMISSION = ("texture-space", "published")
+_WITH_TRANSMISSION = ("texture-space", "gpu-gems-3")
 _WIDTHS_TO_DOUBLE, _LEAST_SHARED_MM = 2, 0.5
 
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
-
-from pydantic import Field
+from typing import Any, TypeVar
 
 from dermis.errors import refuse
 from dermis.human.regions.apply import with_regions
@@ -15,7 +13,7 @@ from dermis.human.regions.table import load_table
 from dermis.mesh.head import Head
 from dermis.scene.camera import PRESETS, Camera, preset
 from dermis.scene.environment import Environment
-from dermis.scene.heads import load_head
+from dermis.scene.heads import HeadTable, load_head
 from dermis.scene.lights import (
     DirectionalLight,
     Light,
@@ -43,26 +41,6 @@ NO_LIGHTS = "none"
 """Name of the rig without lights, for an environment alone."""
 _PARTS = {"head", "skin", "lights", "environment", "camera", "render"}
 _MAPS = ("colour", "normal", "height", "specular", "roughness")
-_Length = Annotated[float | None, Field(gt=0, allow_inf_nan=False)]
-
-
-class _HeadTable(Plain):
-    """The [head] of a scene: what `load_head` takes, and a table of regions of the face."""
-
-    name: str
-    colour: str | None = None
-    normal: str | None = None
-    height: str | None = None
-    height_mm: _Length = None
-    specular: str | None = None
-    roughness: str | None = None
-    unit_mm: _Length = None
-    v_origin: Literal["auto", "top", "bottom"] = "auto"
-    up: Literal["y", "z"] = "y"
-    normal_y: Literal["up", "down"] = "up"
-    opaque: tuple[str, ...] = ()
-    subdivide: Annotated[int, Field(ge=0, le=3)] = 0
-    regions: str | None = None
 
 
 def preset_lights(name: str) -> tuple[Light, ...]:
@@ -104,7 +82,7 @@ def load_scene(path: Path, known: Head | None = None) -> tuple[Scene, Settings]:
         refuse(path, f"only the parts {', '.join(sorted(_PARTS))}", f"{part!r} came", "Correct its name")
     skin = _made(Skin, path, "skin", table.get("skin", {}))
     settings = _made(Settings, path, "render", table.get("render", {}))
-    described = _made(_HeadTable, path, "head", table.get("head"))
+    described = _made(HeadTable, path, "head", table.get("head"))
     _check_said_once(path, described, skin)
     head, skin = (known, skin) if known else _head(path, described, skin)
     environment = _environment(path, table["environment"]) if "environment" in table else None
@@ -131,7 +109,7 @@ def head_table(path: Path) -> dict[str, Any]:
     return table
 
 
-def _head(path: Path, table: _HeadTable, skin: Skin) -> tuple[Head, Skin]:
+def _head(path: Path, table: HeadTable, skin: Skin) -> tuple[Head, Skin]:
     """The head, and the skin with the mean strength that a table of regions gives it."""
     regions = None if table.regions is None else load_table(_beside(path, table.regions))
     options = table.model_dump(exclude={"name", "regions"}, exclude_none=True)
@@ -143,7 +121,7 @@ def _head(path: Path, table: _HeadTable, skin: Skin) -> tuple[Head, Skin]:
     return head, skin.model_copy(update={"rho_s": rho_s})
 
 
-def _check_said_once(path: Path, table: _HeadTable, skin: Skin) -> None:
+def _check_said_once(path: Path, table: HeadTable, skin: Skin) -> None:
     for name in ("rho_s", "roughness"):
         if table.regions is not None and name in skin.model_fields_set:
             came = "it came beside the head's regions, which say it for each region"

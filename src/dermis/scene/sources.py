@@ -14,13 +14,13 @@ _TECHNIQUES = {
     "texture-space": ("dEonLuebke2007", "Geusebroek2003"),
     "none": (),
     "one-blur": ("Borshukov2003", "Green2004"),
-    "published": ("dEonLuebke2007",),
+    "gpu-gems-3": ("dEonLuebke2007",),
     "screen-space": ("Jimenez2015",),
     "pre-integrated": ("Penner2011",),
 }
-_CUT = ("one-blur", "published")  # which stitch nothing
+_CUT = ("one-blur", "gpu-gems-3")  # which stitch nothing
 _WITH_SEAMS = ("texture-space", *_CUT)
-_WITH_TRANSMISSION = ("texture-space", "published")
+_WITH_TRANSMISSION = ("texture-space", "gpu-gems-3")
 _FRESNEL = {"schlick": ("Schlick1994", "Dudash2007"), "exact": ("CookTorrance1982",)}
 _HALF_SPACE = ("Chandrasekhar1960", "Jensen2001")
 _TONES = {"none": (), "filmic": ("Hable2010",), "neutral": ("Khronos2024",)}

@@ -19,7 +19,7 @@ Pair = tuple[Any, Any]
 class Published:
     """Spreads the light of layer 0 to the layers above it, in twelve passes for six Gaussians."""
 
-    name = "published"
+    name = "gpu-gems-3"
 
     def __init__(self, device: Device) -> None:
         self._device = device

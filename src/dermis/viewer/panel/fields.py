@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any, get_args
+from typing import Any
 
 from imgui_bundle import imgui
 
 from dermis.errors import DermisError
-from dermis.scene.plain import Plain
+from dermis.scene.plain import Plain, choices_of
 from dermis.viewer.desk import Desk
 from dermis.viewer.panel.meanings import explain
 from dermis.viewer.state import ViewerState
@@ -64,7 +64,7 @@ def field_choice(desk: Desk, label: str, values: Plain, field: str, apply: Apply
 
 def words_of(kind: type[Plain], field: str) -> tuple[str, ...]:
     """The words of a field that is a literal."""
-    return tuple(get_args(kind.model_fields[field].annotation))
+    return choices_of(kind, field)
 
 
 def field_slider(

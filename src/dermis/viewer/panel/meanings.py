@@ -8,7 +8,7 @@ from functools import cache
 
 from imgui_bundle import imgui
 
-from dermis.scene.plain import Plain
+from dermis.scene.plain import Plain, help_of
 
 _WIDTH = 260.0
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*) : (.*(?:\n    .*)*)", re.MULTILINE)
@@ -33,4 +33,4 @@ def meanings(kind: type[Plain]) -> dict[str, str]:
     for one in reversed(kind.__mro__):
         for names, text in _ENTRY.findall(inspect.cleandoc(one.__doc__ or "")):
             found |= dict.fromkeys(names.split(", "), re.sub(r"\s+", " ", text))
-    return found
+    return found | {field: text for field in kind.model_fields if (text := help_of(kind, field))}
