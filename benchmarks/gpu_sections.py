@@ -29,6 +29,7 @@ from dermis.mesh.head import Head
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
+from dermis.scene.techniques import TECHNIQUES
 
 ENVIRONMENTS: dict[str, tuple[bool, str | None]] = {
     "studio": (True, None),
@@ -44,10 +45,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
         "stretch": "axes",
         "transmission": "none",
     },
-    "one-blur": {"technique": "one-blur"},
-    "screen-space": {"technique": "screen-space"},
-    "pre-integrated": {"technique": "pre-integrated"},
-    "none": {"technique": "none"},
+    **{name: {"technique": name} for name in TECHNIQUES if name != Settings().technique},
 }
 _VIEWER_S, _LATE_S = 90.0, 20.0  # what the viewer's benchmark is given, and how late it may be
 

@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.benchmark.gpu_gems_3_fragments import published_as_fragments
-from dermis.comparison.scenes import comparison_scene, usual_region
-from dermis.comparison.truths import matched
+from dermis.comparison.scenes import medium_scene, usual_region
 from dermis.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
-from dermis.optics.diffusion.models import diffusion_profile
-from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.media import Medium
 from dermis.optics.presets import media
-from dermis.optics.profiles import TERMS, write_profile
 from dermis.reference.cycles import CyclesPass, Method, cycles_passes
 from dermis.reference.path_traced import SAMPLES_PER_PASS, PathTraced, path_trace
 from dermis.scene.model import Scene
@@ -117,7 +111,7 @@ def measure(
 
     report : told how much work is done since it was last told
     """
-    body = matched(media()["skin1"])
+    body = media()["skin1"].with_eta(1.0)
     settings = Settings(size=(plan.side, plan.side))
     cycles: dict[str, list[list[CyclesPass]]] = {method: [] for method in METHODS}
     ours: dict[str, Frames] = {}
@@ -126,7 +120,7 @@ def measure(
     def per_pass(done: int, of: int) -> None:
         report(SAMPLES_PER_PASS * _WORK["path-traced"])
 
-    with _scene(head, light, body) as scene:
+    with medium_scene(head, light, usual_region(light), body) as (scene, _):
         for seed in SEEDS:
             for method in METHODS:
                 _add_frames(ours, renderer, scene, plan)
@@ -145,15 +139,6 @@ def measure(
         report(_WORK["ours"])
     whole = {method: turns for method, turns in cycles.items() if method not in left_out}
     return Measured(light, usual_region(light), ours, whole, left_out, truth, core_seconds)
-
-
-@contextmanager
-def _scene(head: Head, light: str, body: Medium) -> Iterator[Scene]:
-    """White skin with the medium's profile; its file lives as long as the context."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "profile.toml"
-        write_profile(file, fit_gaussians(diffusion_profile(body).rings(), TERMS, name=body.name).profile, {})
-        yield comparison_scene(head, light, usual_region(light), str(file))
 
 
 def _passes(

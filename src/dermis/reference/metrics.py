@@ -87,8 +87,8 @@ def energy_ratio(
 ) -> Estimate:
     """Sum of the image over sum of the truth [-]; arguments as of `relative_rmse`.
 
-    The ratio's relative error is that of the truth's sum, whose variance is the sum of the variances. Channels
-    may share paths, so their deviations are added.
+    The ratio's relative error is that of the truth's sum, whose variance is the sum of the variances;
+    channels may share paths, so their deviations are added.
     """
     I, T, s2 = _pixels(image, truth, mask, variance)
     total = float(T.sum())
