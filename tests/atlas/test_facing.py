@@ -1,4 +1,4 @@
-"""Triangles that may have something opposite: none is missed, and the search finds all that there is."""
+"""Triangles that may belong to translucent pairs: none is missed, and the search finds every pair."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from translucency_truth import hook
 from dermis.atlas.atlas import build_atlas
 from dermis.atlas.translucency import pairs as search
 from dermis.atlas.translucency.facing import facing
-from dermis.atlas.translucency.pairs import Links, find_links
+from dermis.atlas.translucency.pairs import TranslucentPairs, find_pairs
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import uv_sphere, wedge
 
@@ -28,7 +28,7 @@ def faced(mesh: Mesh, radius_mm: float) -> NDArray[np.bool_]:
 
 @pytest.mark.parametrize("name", MESHES)
 @pytest.mark.parametrize("radius_mm", [1.0, 3.0])
-def test_no_triangle_with_a_place_opposite_is_missed(name: str, radius_mm: float) -> None:
+def test_no_triangle_with_a_pair_is_missed(name: str, radius_mm: float) -> None:
     mesh, chance = MESHES[name](), np.random.default_rng(5)
     weight = chance.dirichlet(np.ones(3), (4, len(mesh.triangles)))
     place, normal = (
@@ -53,7 +53,7 @@ def test_only_the_rim_of_a_thick_slab_is_left() -> None:
     assert faced(mesh, 12.0).all()
 
 
-def test_triangles_without_light_have_nothing_opposite() -> None:
+def test_triangles_without_light_have_no_pairs() -> None:
     mesh = wedge(30.0, 1.0, 1.0, cells=4)
     front = mesh.normals[mesh.triangles][:, :, 2].min(axis=1) > 0.9
     assert facing(mesh, np.ones(len(front), bool), 3.0)[front].all()
@@ -62,21 +62,21 @@ def test_triangles_without_light_have_nothing_opposite() -> None:
     assert not facing(mesh, np.zeros(len(front), bool), 3.0).any()
 
 
-def listed(links: Links) -> tuple[NDArray[np.integer], ...]:
-    """What is linked, whatever the order of a receiver's links."""
-    receiver = np.repeat(np.arange(len(links.first) - 1), np.diff(links.first.astype(np.int64)))
-    order = np.lexsort((links.source, receiver))
-    return receiver[order], links.texel[links.source[order]], links.lie[order]
+def listed(table: TranslucentPairs) -> tuple[NDArray[np.integer], ...]:
+    """Every pair, whatever the order of a receiver's pairs."""
+    receiver = np.repeat(np.arange(len(table.first) - 1), np.diff(table.first.astype(np.int64)))
+    order = np.lexsort((table.source, receiver))
+    return receiver[order], table.texel[table.source[order]], table.geometry[order]
 
 
 @pytest.mark.parametrize("name", MESHES)
 @pytest.mark.parametrize("layout", ["mesh", "stitched"])
-def test_what_is_left_out_has_no_links(name: str, layout: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_left_out_has_no_pairs(name: str, layout: str, monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = MESHES[name]()
     atlas = build_atlas(mesh, 128, layout)
-    few = find_links(mesh, atlas, 0.7)
+    few = find_pairs(mesh, atlas, 0.7)
     monkeypatch.setattr(search, "facing", lambda mesh, shown, radius_mm: np.ones_like(shown))
-    every = find_links(mesh, atlas, 0.7)
+    every = find_pairs(mesh, atlas, 0.7)
     assert all(np.array_equal(a, b) for a, b in zip(listed(few), listed(every), strict=True))
     for part in ("receiver", "first", "texel", "area_mm2", "radius_mm", "spacing_mm"):
         assert np.array_equal(getattr(few, part), getattr(every, part)), part

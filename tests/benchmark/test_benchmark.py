@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.atlas.cached import cached_atlas, cached_links
+from dermis.atlas.cached import cached_atlas, cached_pairs
 from dermis.benchmark import run as running
 from dermis.benchmark.cases import FRAGMENTS, PRESETS, PUBLISHED, Case
 from dermis.benchmark.copy_rate import copy_rate
@@ -100,7 +100,7 @@ def test_the_floor_by_hand(renderer: Renderer, head_file: str, tmp_path: Path) -
 
 
 def test_the_floor_of_thin_parts_is_their_buffers(renderer: Renderer, tmp_path: Path) -> None:
-    """Against the links as they lie on disk, which the buffers were made from."""
+    """Against the pairs kept on disk, which the buffers were made from."""
     from small_head import obj_text
 
     vertices = [line.split() for line in obj_text().splitlines()]
@@ -112,13 +112,13 @@ def test_the_floor_of_thin_parts_is_their_buffers(renderer: Renderer, tmp_path: 
     moved = moved_by(renderer.device, renderer.prepare(scene, settings), len(head.mesh.positions))
     atlases = laid_out(settings, len(moved.inputs.blurred_mm2), False)
     atlas = cached_atlas(head.mesh, atlases.side, atlases.layouts[0])
-    links = cached_links(head.mesh, atlas, float(np.sqrt(moved.inputs.blurred_mm2[-1])))
-    assert len(links.source) > 100
-    receivers = len(links.first) - 3  # of 12 bytes; their cells alone are written
-    pairs = 8 * len(links.source) + 8 * len(links.texel) + 12 * receivers
+    table = cached_pairs(head.mesh, atlas, float(np.sqrt(moved.inputs.blurred_mm2[-1])))
+    assert len(table.source) > 100
+    receivers = len(table.first) - 3  # of 12 bytes; their cells alone are written
+    pairs = 8 * len(table.source) + 8 * len(table.texel) + 12 * receivers
     thin, levels = moved.inputs.layouts[0].thin, moved.inputs.levels
     assert thin is not None
-    light = min(4 * len(links.texel), (levels.size >> levels.halvings[1 + thin.layer]) ** 2)
+    light = min(4 * len(table.texel), (levels.size >> levels.halvings[1 + thin.layer]) ** 2)
     assert stage_bytes(moved)["transmission"] == pairs + light * texel_bytes(levels.stack) + 16 * receivers
 
 

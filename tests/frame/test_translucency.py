@@ -14,10 +14,10 @@ from tolerances import SLAB_THROUGH
 from translucency_truth import hook, straight
 
 from dermis.atlas.atlas import Atlas, build_atlas
-from dermis.atlas.translucency.pairs import Links, _in_cells, find_links
+from dermis.atlas.translucency.pairs import TranslucentPairs, _in_cells, find_pairs
 from dermis.atlas.translucency.samples import Samples, giving, surface, taking, texels
 from dermis.frame.frame import Stages
-from dermis.frame.passes.translucency_weights import Opposite, upload_pairs
+from dermis.frame.passes.translucency_weights import TranslucencyWeights, upload_pairs
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device, download
 from dermis.mesh.mesh import Mesh
@@ -28,6 +28,7 @@ from dermis.optics.profiles import load_profile
 from dermis.scene.lights import DirectionalLight
 
 Floats = NDArray[np.float64]
+Found = tuple[Mesh, Atlas, TranslucentPairs]
 PROFILE = load_profile("gpu-gems-3")
 BLURRED = GaussianSum("blurred levels", PROFILE.variance_mm2[1:], PROFILE.weight[1:])
 SIGMA = float(np.sqrt(PROFILE.variance_mm2[-1]))
@@ -35,21 +36,21 @@ BEHIND = DirectionalLight(direction=(0, 0, 1), irradiance=(1.0, 1.0, 1.0), shado
 
 
 @pytest.fixture(scope="module")
-def found() -> tuple[Mesh, Atlas, Links]:
-    """What lies opposite on a small wedge."""
+def found() -> Found:
+    """The translucent pairs of a small wedge."""
     mesh = wedge(12.0, 1.0, 4.0, cells=2)
     atlas = build_atlas(mesh, 64, "stitched")
-    return mesh, atlas, find_links(mesh, atlas, SIGMA)
+    return mesh, atlas, find_pairs(mesh, atlas, SIGMA)
 
 
 def given_by(mesh: Mesh, atlas: Atlas, side: int) -> Samples:
-    """All that give light, whether something lies opposite or not."""
+    """All places that give light, paired or not."""
     return giving(mesh, atlas, texels(atlas), side, np.ones(len(mesh.triangles), bool))
 
 
-def test_the_places_stand_for_all_of_the_surface(found: tuple[Mesh, Atlas, Links]) -> None:
-    mesh, atlas, links = found
-    given = given_by(mesh, atlas, len(links.receiver))
+def test_the_places_stand_for_all_of_the_surface(found: Found) -> None:
+    mesh, atlas, table = found
+    given = given_by(mesh, atlas, len(table.receiver))
     corners = mesh.positions[mesh.triangles].astype(float)
     area = np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
@@ -59,26 +60,26 @@ def test_the_places_stand_for_all_of_the_surface(found: tuple[Mesh, Atlas, Links
     assert len(np.unique(given.cell, axis=0)) == len(given.cell)
 
 
-def test_twin_of_what_lies_opposite(found: tuple[Mesh, Atlas, Links]) -> None:
-    mesh, atlas, links = found
-    given = given_by(mesh, atlas, len(links.receiver))
+def test_twin_of_the_pairs(found: Found) -> None:
+    mesh, atlas, table = found
+    given = given_by(mesh, atlas, len(table.receiver))
     held = surface(atlas, texels(atlas), given.side)
     taken = taking(mesh, atlas, held, np.ones(len(mesh.triangles), bool))
-    radius = float(links.radius_mm)
+    radius = float(table.radius_mm)
     shape = translucency_twins.lie(taken, given, radius)
     far = np.stack([translucency_twins.along(atlas, taken, given, radius, same) for same in (1.6, 0.4)])
     far[1] += 2.0 / atlas.stretch[atlas.own].min()  # what nine texels' mean may add
-    receiver = links.receiver[taken.cell[:, 1], taken.cell[:, 0]]
+    receiver = table.receiver[taken.cell[:, 1], taken.cell[:, 0]]
     assert (receiver > 0).all()
     texel = {tuple(t): j for j, t in enumerate(given.texel)}
-    names = np.array([texel[tuple(t)] for t in links.texel])
+    names = np.array([texel[tuple(t)] for t in table.texel])
     unit = np.array([radius, radius, radius, 1.0]) / 65535.0
     wrong = 0
     for i, r in enumerate(receiver):
-        part = slice(links.first[r], links.first[r + 1])
-        j = names[links.source[part]]
+        part = slice(table.first[r], table.first[r + 1])
+        j = names[table.source[part]]
         assert abs(len(j) - np.count_nonzero(shape[i, :, 2])) <= 2  # at the very edge of a ball
-        made, (low, high) = links.lie[part] * unit, np.minimum(far[:, i, j], radius)
+        made, (low, high) = table.geometry[part] * unit, np.minimum(far[:, i, j], radius)
         wrong += np.count_nonzero(np.abs(made[:, [0, 1, 3]] - shape[i, j]) > 2e-3)
         wrong += np.count_nonzero((made[:, 2] < low - 2e-3) | (made[:, 2] > high + 2e-3))
     assert wrong == 0
@@ -89,28 +90,30 @@ def test_a_narrow_profile_asks_for_no_more_cells_than_memory_holds() -> None:
     atlas = build_atlas(mesh, 64, "stitched")
     sources = _in_cells(given_by(mesh, atlas, 64), 0.01)
     assert sources.size.prod() < 2**22
-    assert len(find_links(mesh, atlas, 0.01).source) == 0
+    assert len(find_pairs(mesh, atlas, 0.01).source) == 0
 
 
 @pytest.mark.parametrize("layout", ["mesh", "stitched", "unwrapped"])
-def test_a_ball_smaller_than_the_profile_spreads_has_links(layout: str) -> None:
+def test_a_ball_smaller_than_the_profile_spreads_has_pairs(layout: str) -> None:
     """Its blurs read nearly all texels, gutters included, which show more than nine times its places."""
     mesh = uv_sphere(3.0, 48, 24)
-    links = find_links(mesh, build_atlas(mesh, 64, layout), SIGMA)
-    assert len(links.source) == links.first[-1] > 1000
-    assert links.source.max() < len(links.texel)
+    table = find_pairs(mesh, build_atlas(mesh, 64, layout), SIGMA)
+    assert len(table.source) == table.first[-1] > 1000
+    assert table.source.max() < len(table.texel)
 
 
-def test_twin_of_what_passes(device: Device, stages: Stages, found: tuple[Mesh, Atlas, Links]) -> None:
-    links = found[2]
-    pairs = upload_pairs(device, links)
-    words = read_buffer(device, stages.opposite.weigh(pairs, BLURRED.variance_mm2, BLURRED.weight))
-    assert (words.reshape(-1, 2)[:, 0] == links.source).all()
+def test_twin_of_what_passes(device: Device, stages: Stages, found: Found) -> None:
+    table = found[2]
+    pairs = upload_pairs(device, table)
+    words = read_buffer(
+        device, stages.translucency_weights.weigh(pairs, BLURRED.variance_mm2, BLURRED.weight)
+    )
+    assert (words.reshape(-1, 2)[:, 0] == table.source).all()
     radius, cell = pairs.radius_mm, pairs.spacing_mm
     unit = np.array([radius, radius, radius, 1.0]) / 65535.0
-    depth, aside, far, share = (links.lie * unit).T
-    far[links.lie[:, 2] == 65535] = np.inf
-    shape, area = np.column_stack([depth, aside, share]), links.area_mm2.astype(float)[links.source]
+    depth, aside, far, share = (table.geometry * unit).T
+    far[table.geometry[:, 2] == 65535] = np.inf
+    shape, area = np.column_stack([depth, aside, share]), table.area_mm2.astype(float)[table.source]
     twin = translucency_twins.passed(shape, far, area, radius, cell, BLURRED.variance_mm2, BLURRED.weight)
     error = np.abs(translucency_twins.decoded(words.reshape(-1, 2)[:, 1]) - twin)
     assert twin.max() > 1e-3
@@ -118,14 +121,21 @@ def test_twin_of_what_passes(device: Device, stages: Stages, found: tuple[Mesh, 
 
 
 def test_what_passes_is_the_same_from_disk(
-    device: Device, found: tuple[Mesh, Atlas, Links], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    device: Device,
+    found: Found,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     variance, weight, made = BLURRED.variance_mm2, BLURRED.weight, 0
-    plain = read_buffer(device, Opposite(device).weigh(upload_pairs(device, found[2]), variance, weight))
+    plain = read_buffer(
+        device, TranslucencyWeights(device).weigh(upload_pairs(device, found[2]), variance, weight)
+    )
     assert not list(tmp_path.rglob("*.npz"))
     for key, factor in (("a", 1.0), ("a", 1.0), ("b", 1.0), ("b", 0.5)):
-        words = Opposite(device).weigh(upload_pairs(device, found[2], key), variance, factor * weight)
+        words = TranslucencyWeights(device).weigh(
+            upload_pairs(device, found[2], key), variance, factor * weight
+        )
         assert np.array_equal(read_buffer(device, words), plain) == (factor == 1.0)
         made = len(list(tmp_path.rglob("*.npz")))
     assert made == (3 if device.adapter.kind == "CPU" else 0)

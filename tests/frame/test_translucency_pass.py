@@ -1,4 +1,4 @@
-"""The sum over links against its twin: alone and in teams, in one row of workgroups and in many."""
+"""The sum over pairs against its twin: alone and in teams, in one row of workgroups and in many."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tolerances import TWIN
 
 from dermis.atlas.atlas import build_atlas
-from dermis.atlas.translucency.pairs import Links, find_links
+from dermis.atlas.translucency.pairs import TranslucentPairs, find_pairs
 from dermis.frame.frame import Stages
 from dermis.frame.levels import FLOATS, make_levels
 from dermis.frame.passes import translucency
@@ -27,14 +27,14 @@ ALONE: Constants = (("TEAM", 1), ("ROUND", 1))
 
 
 @pytest.fixture(scope="module")
-def links() -> Links:
-    """What lies opposite on a small wedge."""
+def table() -> TranslucentPairs:
+    """The translucent pairs of a small wedge."""
     mesh = wedge(12.0, 1.0, 4.0, cells=2)
-    return find_links(mesh, build_atlas(mesh, 64, "stitched"), float(np.sqrt(VARIANCE[-1])))
+    return find_pairs(mesh, build_atlas(mesh, 64, "stitched"), float(np.sqrt(VARIANCE[-1])))
 
 
 def summed(
-    device: Device, stages: Stages, links: Links, levels: NDArray[np.float32], constants: Constants
+    device: Device, stages: Stages, table: TranslucentPairs, levels: NDArray[np.float32], constants: Constants
 ) -> tuple[Floats, Floats]:
     """(n, n, 3) and (n, n, 4) the twin's light, and the shader's with 1 where there is surface.
 
@@ -43,15 +43,15 @@ def summed(
     space = make_levels(device, 64, 2, FLOATS)
     for layer, level in enumerate(levels, start=1):
         upload(device, space.stack, np.dstack([level, np.ones((64, 64))]), layer=layer)
-    thin = thin_of(device, stages.opposite, upload_pairs(device, links), VARIANCE, WEIGHT)
-    words = np.frombuffer(device.handle.queue.read_buffer(thin.links), np.uint32).reshape(-1, 2)
+    thin = thin_of(device, stages.translucency_weights, upload_pairs(device, table), VARIANCE, WEIGHT)
+    words = np.frombuffer(device.handle.queue.read_buffer(thin.weights), np.uint32).reshape(-1, 2)
     frame = Frame(device)
     Transmission(device, constants).draw(frame, space, thin)
     frame.submit()
-    x, y = links.texel[links.source].astype(int).T
+    x, y = table.texel[table.source].astype(int).T
     light = translucency_twins.decoded(words[:, 1]) * levels[thin.layer, y, x]
-    sums = np.stack([part.sum(axis=0) for part in np.split(light, links.first[1:-1].astype(int))])
-    return sums[links.receiver], download(device, thin.light).astype(float)
+    sums = np.stack([part.sum(axis=0) for part in np.split(light, table.first[1:-1].astype(int))])
+    return sums[table.receiver], download(device, thin.light).astype(float)
 
 
 @pytest.mark.parametrize("row", [1, 1024])
@@ -59,7 +59,7 @@ def summed(
 def test_twin_of_what_comes_through(
     device: Device,
     stages: Stages,
-    links: Links,
+    table: TranslucentPairs,
     team: int,
     at_once: int,
     row: int,
@@ -67,40 +67,40 @@ def test_twin_of_what_comes_through(
 ) -> None:
     monkeypatch.setattr(translucency, "_ROW", row)
     levels = np.random.default_rng(8).random((2, 64, 64, 3)).astype(np.float32)
-    twin, made = summed(device, stages, links, levels, (("SIZE", 128), ("TEAM", team), ("ROUND", at_once)))
+    twin, made = summed(device, stages, table, levels, (("SIZE", 128), ("TEAM", team), ("ROUND", at_once)))
     assert twin.max() > 0.1
     assert np.abs(made[..., :3] - twin).max() < TWIN * twin.max()
-    assert ((made[..., 3] == 1) == (links.receiver > 0)).all()
+    assert ((made[..., 3] == 1) == (table.receiver > 0)).all()
 
 
-def test_bright_and_dim_light_are_kept_alike(device: Device, stages: Stages, links: Links) -> None:
+def test_bright_and_dim_light_are_kept_alike(device: Device, stages: Stages, table: TranslucentPairs) -> None:
     """Sources from a millionth to a million: 14 bits of each, over the whole range of floats."""
     powers = np.random.default_rng(9).uniform(-6, 6, (2, 64, 64, 3))
-    twin, made = summed(device, stages, links, (10**powers).astype(np.float32), ALONE)
+    twin, made = summed(device, stages, table, (10**powers).astype(np.float32), ALONE)
     assert twin.max() > 1e4
     assert (np.abs(made[..., :3] - twin) <= 2.0**-14 * twin * 1.01).all()
 
 
 def test_a_head_without_thin_parts_gets_nothing(device: Device, stages: Stages) -> None:
     mesh = uv_sphere(30.0, 24, 12)
-    links = find_links(mesh, build_atlas(mesh, 64, "stitched"), float(np.sqrt(VARIANCE[-1])))
-    pairs = upload_pairs(device, links)
-    thin = thin_of(device, stages.opposite, pairs, VARIANCE, WEIGHT)
+    table = find_pairs(mesh, build_atlas(mesh, 64, "stitched"), float(np.sqrt(VARIANCE[-1])))
+    pairs = upload_pairs(device, table)
+    thin = thin_of(device, stages.translucency_weights, pairs, VARIANCE, WEIGHT)
     frame = Frame(device)
     stages.transmission.draw(frame, make_levels(device, 64, 2, FLOATS), thin)
     frame.submit()
     light = download(device, thin.light)
-    assert len(links.source) == 0
+    assert len(table.source) == 0
     assert (light[..., :3] == 0).all()
-    assert ((light[..., 3] == 1) == (links.receiver > 0)).all()
+    assert ((light[..., 3] == 1) == (table.receiver > 0)).all()
     assert light[..., 3].any()
 
 
-def test_the_view_of_thickness_shows_the_least_depth(device: Device, links: Links) -> None:
-    pairs = upload_pairs(device, links)
-    depth = links.lie[:, 0] * pairs.radius_mm / 65535
-    least = [min(part, default=pairs.radius_mm) for part in np.split(depth, links.first[1:-1].astype(int))]
+def test_the_view_of_thickness_shows_the_least_depth(device: Device, table: TranslucentPairs) -> None:
+    pairs = upload_pairs(device, table)
+    depth = table.geometry[:, 0] * pairs.radius_mm / 65535
+    least = [min(part, default=pairs.radius_mm) for part in np.split(depth, table.first[1:-1].astype(int))]
     assert (
-        np.abs(thickness_mm(device, pairs) - np.array(least)[links.receiver]).max() < 1e-6 * pairs.radius_mm
+        np.abs(thickness_mm(device, pairs) - np.array(least)[table.receiver]).max() < 1e-6 * pairs.radius_mm
     )
     assert min(least) < 0.5 * pairs.radius_mm

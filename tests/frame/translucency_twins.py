@@ -1,4 +1,4 @@
-"""Thin parts once more in numpy float64: which places lie opposite, and how much passes between them."""
+"""Translucency once more in numpy float64: the pairs, and how much light passes between them."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ class Held:
 
 @pytest.fixture
 def held(monkeypatch: pytest.MonkeyPatch) -> Iterator[Held]:
-    found, search = Held(), thin_parts.cached_links
+    found, search = Held(), translucency.cached_pairs
 
     def waiting(mesh: Any, atlas: Any, widest_mm: float) -> Any:
         found.widths.append(widest_mm)
@@ -44,7 +44,7 @@ def held(monkeypatch: pytest.MonkeyPatch) -> Iterator[Held]:
         assert found.may_go_on.wait(60.0)
         return search(mesh, atlas, widest_mm)
 
-    monkeypatch.setattr(translucency, "cached_links", waiting)
+    monkeypatch.setattr(translucency, "cached_pairs", waiting)
     yield found
     found.may_go_on.set()
 
@@ -143,14 +143,14 @@ def test_the_viewer_stays_alive_until_it_is_found(
 def test_a_search_that_fails_is_begun_again(
     studio: Studio, held: Held, state: ViewerState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    waiting = translucency.cached_links
+    waiting = translucency.cached_pairs
 
     def broken(mesh: Any, atlas: Any, widest_mm: float) -> Any:
         raise MemoryError("no room")
 
-    monkeypatch.setattr(translucency, "cached_links", broken)
+    monkeypatch.setattr(translucency, "cached_pairs", broken)
     with pytest.raises(Exception, match="no room"):
         image(studio, skin(state, DARK))
-    monkeypatch.setattr(translucency, "cached_links", waiting)
+    monkeypatch.setattr(translucency, "cached_pairs", waiting)
     held.may_go_on.set()
     assert np.abs(image(studio, skin(state, DARK)) - anew(skin(state, DARK))).max() <= 1

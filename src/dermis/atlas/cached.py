@@ -9,8 +9,8 @@ from dataclasses import fields
 import numpy as np
 
 from dermis.atlas.atlas import GUTTER, REACH_MM, Atlas, build_atlas
-from dermis.atlas.translucency.pairs import FORM as LINKS_FORM
-from dermis.atlas.translucency.pairs import Links, find_links
+from dermis.atlas.translucency.pairs import FORM as PAIRS_FORM
+from dermis.atlas.translucency.pairs import TranslucentPairs, find_pairs
 from dermis.disk import Array, Arrays, stored
 from dermis.mesh.mesh import Mesh
 
@@ -36,20 +36,20 @@ def cached_occlusion(mesh: Mesh, atlas: Atlas, form: str, bake: Callable[[], Arr
     return _baked("occlusion", mesh, atlas, form, bake)
 
 
-def cached_links(mesh: Mesh, atlas: Atlas, widest_mm: float) -> Links:
-    """`find_links`, kept on disk in the same way."""
-    names = [field.name for field in fields(Links)]
+def cached_pairs(mesh: Mesh, atlas: Atlas, widest_mm: float) -> TranslucentPairs:
+    """`find_pairs`, kept on disk in the same way."""
+    names = [field.name for field in fields(TranslucentPairs)]
 
     def make() -> Arrays:
-        links = find_links(mesh, atlas, widest_mm)
-        return {name: getattr(links, name) for name in names}
+        pairs = find_pairs(mesh, atlas, widest_mm)
+        return {name: getattr(pairs, name) for name in names}
 
-    return Links(**stored("opposite", links_key(mesh, atlas, widest_mm), names, make))
+    return TranslucentPairs(**stored("pairs", pairs_key(mesh, atlas, widest_mm), names, make))
 
 
-def links_key(mesh: Mesh, atlas: Atlas, widest_mm: float) -> str:
-    """What stands for the content of `find_links`' result."""
-    return _baked_key(mesh, atlas, f"{LINKS_FORM} {widest_mm!r}")
+def pairs_key(mesh: Mesh, atlas: Atlas, widest_mm: float) -> str:
+    """What stands for the content of `find_pairs`' result."""
+    return _baked_key(mesh, atlas, f"{PAIRS_FORM} {widest_mm!r}")
 
 
 def _baked(folder: str, mesh: Mesh, atlas: Atlas, form: str, bake: Callable[[], Array]) -> Array:

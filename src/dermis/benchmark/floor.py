@@ -105,7 +105,7 @@ def _surface_of_blurs(inputs: Inputs, texels: int) -> float:
 def _through(thin: Thin, levels: Levels) -> float:
     """Bytes of what comes through: pairs and their places read, the light of the sources, and what leaves."""
     pairs, halved = thin.pairs, levels.halvings[1 + thin.layer]
-    lists = sum(buffer.size for buffer in (thin.links, pairs.sources, pairs.receivers))
+    lists = sum(buffer.size for buffer in (thin.weights, pairs.sources, pairs.receivers))
     level = (levels.size >> halved) ** 2
     read = min(_BILINEAR * pairs.source_count, level) * texel_bytes(levels.stack)
     return float(lists + read + pairs.receiver_count * texel_bytes(thin.light))

@@ -16,7 +16,7 @@ class Layout:
 
     lit : resources by the shaders' names: geometry, maps, lights, shadows, surroundings
     scattered : texture of the light that leaves below the surface
-    thin : what lies opposite through thin parts, None where nothing comes through
+    thin : translucent pairs and space for their light, None where no light comes through
     """
 
     head: HeadTextures

@@ -22,7 +22,7 @@ from dermis.frame.passes.screen_space import ScreenSpace
 from dermis.frame.passes.shade import Shade
 from dermis.frame.passes.shadows import Shadows
 from dermis.frame.passes.translucency import Transmission
-from dermis.frame.passes.translucency_weights import Opposite
+from dermis.frame.passes.translucency_weights import TranslucencyWeights
 from dermis.frame.passes.visibility import Visibility
 from dermis.frame.shown import Shown, entered_key, radiance_key, scattered_key, seen_key
 from dermis.gpu import Device, Frame
@@ -51,9 +51,9 @@ class Stages:
         return Published(self._device)
 
     @cached_property
-    def opposite(self) -> Opposite:
+    def translucency_weights(self) -> TranslucencyWeights:
         """For heads with thin parts."""
-        return Opposite(self._device)
+        return TranslucencyWeights(self._device)
 
     @cached_property
     def transmission(self) -> Transmission:
@@ -166,6 +166,6 @@ def _spreading_key(inputs: Inputs, layout: Layout) -> tuple[Any, ...]:
     """Everything that `_spread` reads: numbers, and textures by identity, which are not kept alive."""
     arrays = inputs.blurred_mm2, inputs.level_weight, inputs.clear
     textures = [inputs.levels.stack, layout.scattered, *layout.atlas.resources.values()]
-    textures += [layout.thin.links, layout.thin.light] if layout.thin else []
+    textures += [layout.thin.weights, layout.thin.light] if layout.thin else []
     numbers = inputs.settings.technique, inputs.edge, inputs.scale
     return (*numbers, *(np.asarray(a).tobytes() for a in arrays), *map(weakref.ref, textures))

@@ -126,13 +126,13 @@ class StandingMaker:
         return layouts
 
     def _thin(self, scene: Scene, settings: Settings, split: Split, atlas: Atlas, index: int) -> Thin | None:
-        """What lies opposite a layout's thin parts, and space for the light from there."""
+        """The translucent pairs of a layout, weighted for the skin, and space for their light."""
         if not (len(split.blurred_mm2) and lets_through(settings)):
             return None
         head, widest = scene.head, float(np.sqrt(split.blurred_mm2[-1]))
         widest = shared_width(widest) if scene.skin.has_own_tissue else widest
         pairs = self.thin_parts.pairs(index, head, atlas, widest, changing=scene.skin.has_own_tissue)
-        profile, stage = (split.blurred_mm2, split.weight), self._stages.opposite
+        profile, stage = (split.blurred_mm2, split.weight), self._stages.translucency_weights
         key = (pairs, *(numbers.tobytes() for numbers in profile))
         return self._keep(f"thin {index}", key, lambda: thin_of(self.device, stage, pairs, *profile))
 

@@ -60,7 +60,7 @@ def scattered_key(inputs: Inputs) -> tuple[Any, ...]:
     key += [part.tobytes() for part in (inputs.blurred_mm2, inputs.level_weight, inputs.clear)]
     for layout in inputs.layouts:
         key += [entered_key(inputs, layout), _identity(layout.scattered)]
-        key.append(_identity(layout.thin.links) if layout.thin else None)
+        key.append(_identity(layout.thin.weights) if layout.thin else None)
     return tuple(key)
 
 

@@ -1,4 +1,4 @@
-"""The thin parts of a head: which places lie opposite each other, and space for what passes between them."""
+"""The thin parts of a head: their translucent pairs, and space for the light that passes between them."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
-from dermis.atlas.cached import cached_links, links_key
+from dermis.atlas.cached import cached_pairs, pairs_key
 from dermis.frame.kept import Kept
 from dermis.frame.passes.translucency import Thin
-from dermis.frame.passes.translucency_weights import Opposite, Pairs, source_level, upload_pairs
+from dermis.frame.passes.translucency_weights import Pairs, TranslucencyWeights, source_level, upload_pairs
 from dermis.gpu import Device
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
@@ -29,19 +29,19 @@ def lets_through(settings: Settings) -> bool:
 
 
 def shared_width(widest_mm: float) -> float:
-    """The nearest of a few widths [mm]: skins that differ little share what lies opposite."""
+    """The nearest of a few widths [mm]: similar skins share their pairs."""
     step = round(_WIDTHS_TO_DOUBLE * float(np.log2(max(widest_mm, _LEAST_SHARED_MM))))
     return float(2.0 ** (step / _WIDTHS_TO_DOUBLE))
 
 
 def pairs_of(device: Device, mesh: Mesh, atlas: Atlas, widest_mm: float, *, changing: bool) -> Pairs:
-    """The places that lie opposite each other, made or read from disk.
+    """The translucent pairs of a mesh, searched for or read from disk.
 
     widest_mm : standard deviation of the widest Gaussian [mm]
     changing : whether profiles come and go, so that it is not worth while to keep what each lets pass
     """
-    key = "" if changing else links_key(mesh, atlas, widest_mm)
-    return upload_pairs(device, cached_links(mesh, atlas, widest_mm), key)
+    key = "" if changing else pairs_key(mesh, atlas, widest_mm)
+    return upload_pairs(device, cached_pairs(mesh, atlas, widest_mm), key)
 
 
 @dataclass
@@ -53,7 +53,7 @@ class Latest:
 
 
 class ThinParts:
-    """The places of heads that lie opposite each other, looked for on another thread.
+    """The translucent pairs of heads, searched for on another thread.
 
     patient : whether frames wait for it; else those of the last skin stand in while the search goes on
     """
@@ -105,11 +105,13 @@ class ThinParts:
             raise
 
 
-def thin_of(device: Device, stage: Opposite, pairs: Pairs, variance_mm2: Floats, weight: Floats) -> Thin:
+def thin_of(
+    device: Device, stage: TranslucencyWeights, pairs: Pairs, variance_mm2: Floats, weight: Floats
+) -> Thin:
     """What a profile lets pass between pairs, and space for it.
 
     variance_mm2, weight : (k,) and (k, 3) of the blurred levels
     """
     gathered = device.buffer(np.zeros((pairs.source_count, 2), np.uint32), "STORAGE")
-    links = stage.weigh(pairs, variance_mm2, weight)
-    return Thin(pairs, links, source_level(pairs, variance_mm2), gathered)
+    weights = stage.weigh(pairs, variance_mm2, weight)
+    return Thin(pairs, weights, source_level(pairs, variance_mm2), gathered)

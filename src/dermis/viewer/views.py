@@ -125,13 +125,13 @@ class Views:
 
 
 def thickness_mm(device: Device, pairs: Pairs) -> NDArray[np.float32]:
-    """(n, n) least depth of what lies opposite each cell of the atlas, at most as far as is looked [mm]."""
-    receivers, links = (
+    """(n, n) least depth of the flesh behind each cell of the atlas, at most the search radius [mm]."""
+    receivers, words = (
         np.frombuffer(device.handle.queue.read_buffer(buffer), np.uint32).reshape(-1, 3)
         for buffer in (pairs.receivers, pairs.pairs)
     )
-    depth = (links[:, 1] & 0xFFFF) * (pairs.radius_mm / 0xFFFF)
-    cell, first, end = receivers[np.argsort(receivers[:, 1])].T  # in the order of their links
+    depth = (words[:, 1] & 0xFFFF) * (pairs.radius_mm / 0xFFFF)
+    cell, first, end = receivers[np.argsort(receivers[:, 1])].T  # in the order of their pairs
     least = np.full((pairs.side, pairs.side), pairs.radius_mm, np.float32)
     at = np.repeat(cell, end - first)
     np.minimum.at(least, (at >> 16, at & 0xFFFF), depth[: len(at)])

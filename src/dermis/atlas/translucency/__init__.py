@@ -1,1 +1,1 @@
-"""Which places of the surface lie opposite each other through thin flesh: ears, nostrils, lips, lids."""
+"""Pairs of places of the surface that exchange light through thin flesh: ears, nostrils, lips, lids."""

@@ -1,4 +1,4 @@
-"""Triangles that others may lie opposite: most of a head has none, and need not be searched."""
+"""Triangles that may belong to translucent pairs: most of a head does not, and need not be searched."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _MOST_CELLS = 2**21  # of a grid
 
 
 def facing(mesh: Mesh, shown: NDArray[np.bool_], radius_mm: float) -> NDArray[np.bool_]:
-    """(f,) triangles that may have a place opposite some place of theirs; all that have one are among them.
+    """(f,) triangles that may have a pair across the flesh; all that have one are among them.
 
     shown : (f,) those that light passes through
     radius_mm : how far apart two places are at most

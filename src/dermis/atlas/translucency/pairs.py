@@ -31,14 +31,14 @@ _PARTS = 16  # of the search, shared by the processor's cores
 
 
 @dataclass(frozen=True)
-class Links:
-    """What lies opposite through the flesh, in cells of a coarse atlas.
+class TranslucentPairs:
+    """Pairs of places that exchange light through the flesh, in cells of a coarse atlas.
 
     side : cells of the coarse atlas along a side, which no array says
     receiver : (side, side) int32 0 without surface, 1 where it is thick, from 2 on thin places in order
-    first : (m + 3,) uint32 where the links of 0, 1, 2, ... begin; 0 and 1 have none
-    source : (l,) uint32 the place that each link takes light from
-    lie : (l, 4) uint16 depth under its tangent plane, distance beside its normal, and along the surface
+    first : (m + 3,) uint32 where the pairs of receivers 0, 1, 2, ... begin; 0 and 1 have none
+    source : (l,) uint32 the place that each pair takes light from
+    geometry : (l, 4) uint16 depth under its tangent plane, distance beside its normal, and along the surface
         [1/65535 of the radius; 65535 where no blur leads]; share that counts [1/65535]
     texel : (n, 2) uint16 of the sources, x and y in the atlas
     area_mm2 : (n,) float32 of the sources
@@ -48,14 +48,14 @@ class Links:
     receiver: NDArray[np.int32]
     first: NDArray[np.uint32]
     source: NDArray[np.uint32]
-    lie: NDArray[np.uint16]
+    geometry: NDArray[np.uint16]
     texel: NDArray[np.uint16]
     area_mm2: NDArray[np.float32]
     radius_mm: NDArray[np.float64]
     spacing_mm: NDArray[np.float64]
 
 
-def find_links(mesh: Mesh, atlas: Atlas, widest_mm: float) -> Links:
+def find_pairs(mesh: Mesh, atlas: Atlas, widest_mm: float) -> TranslucentPairs:
     """All pairs of places that face away from each other and are near enough.
 
     widest_mm : standard deviation of the widest Gaussian; 3.2 of them is near enough, 32 mm at most [mm]
@@ -83,8 +83,8 @@ def _mapped(mesh: Mesh, atlas: Atlas) -> NDArray[np.bool_]:
 def _search(
     atlas: Atlas, given: Samples, taken: Samples, shown: NDArray[np.int32], radius_mm: float
 ) -> Found:
-    """How many links each place has that takes light, where they begin, and how they lie."""
-    from dermis.atlas.translucency.kernels.pair_search import Map, Receivers, link
+    """How many pairs each receiver has, their sources, and their geometry."""
+    from dermis.atlas.translucency.kernels.pair_search import Map, Receivers, search
 
     x, y = taken.texel.T
     stretch, shear = (array[y, x].astype(np.float32) for array in (atlas.stretch, atlas.shear))
@@ -95,10 +95,10 @@ def _search(
     # The compiled loop releases the interpreter, so that threads share the work.
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         parts = list(
-            pool.map(lambda part: link(receivers, part, sources, flat, radius_mm, count), pairwise(ends))
+            pool.map(lambda part: search(receivers, part, sources, flat, radius_mm, count), pairwise(ends))
         )
-    index, lie = zip(*parts, strict=True)
-    return count, np.concatenate(index), np.concatenate(lie)
+    index, geometry = zip(*parts, strict=True)
+    return count, np.concatenate(index), np.concatenate(geometry)
 
 
 def _packed(
@@ -107,22 +107,22 @@ def _packed(
     surface: NDArray[np.bool_],
     count: NDArray[np.int64],
     index: NDArray[np.int32],
-    lie: NDArray[np.uint16],
+    geometry: NDArray[np.uint16],
     radius_mm: float,
     spacing_mm: float,
-) -> Links:
-    """The links without what nobody uses."""
+) -> TranslucentPairs:
+    """The pairs, without the sources that no receiver sees."""
     asked, thin = np.zeros(len(given.cell), bool), count > 0
     asked[index] = True
     used, number = np.flatnonzero(asked), np.cumsum(asked, dtype=np.uint32) - np.uint32(1)
     receiver = surface.astype(np.int32)
     receiver[taken.cell[thin, 1], taken.cell[thin, 0]] = np.arange(2, 2 + thin.sum())
     first = np.concatenate([[0, 0, 0], np.cumsum(count[thin])])
-    return Links(
+    return TranslucentPairs(
         receiver,
         first.astype(np.uint32),
         number[index],
-        lie,
+        geometry,
         given.texel[used].astype(np.uint16),
         given.area_mm2[used].astype(np.float32),
         np.array(radius_mm),

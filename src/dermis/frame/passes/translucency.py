@@ -21,14 +21,14 @@ _ROW = 1024  # workgroups, of which no more than 65535 fit in a row
 class Thin:
     """Thin parts of an atlas.
 
-    pairs : places opposite each other
-    links : what `Opposite.weigh` made of them
+    pairs : translucent pairs
+    weights : what `TranslucencyWeights.weigh` made of them
     layer : blurred level, counted from 0, whose light passes
     gathered : buffer for the light of the sources
     """
 
     pairs: Pairs
-    links: Any
+    weights: Any
     layer: int
     gathered: Any
 
@@ -39,7 +39,7 @@ class Thin:
 
 
 class Transmission:
-    """Sums what passes from all places opposite [JensenBuhler2002; dEonLuebke2007].
+    """Sums the light from the sources of each receiver [JensenBuhler2002; dEonLuebke2007].
 
     constants : of translucency.wgsl, what suits the device if left out
     """
@@ -69,7 +69,7 @@ class Transmission:
         }
         leaving = {
             "receivers": pairs.receivers,
-            "links": thin.links,
+            "weights": thin.weights,
             "gathered": thin.gathered,
             "transmitted": pairs.light,
         }

@@ -3,16 +3,16 @@
 
 override SIZE: u32 = 128u; // invocations of a workgroup
 override TEAM: u32 = 32u; // a power of two up to SIZE; 1: no team
-override ROUND: u32 = 4u; // links that an invocation has on their way at once: 1, 2 or 4
+override ROUND: u32 = 4u; // pairs that an invocation has on their way at once: 1, 2 or 4
 
 struct Receiver {
     cell: u32, // of the coarse atlas, x and y packed
-    first: u32, // link
-    end: u32, // of its links
+    first: u32, // pair
+    end: u32, // of its pairs
 }
 
-@group(0) @binding(0) var<storage, read> receivers: array<Receiver>; // those with most links first
-@group(0) @binding(1) var<storage, read> links: array<vec2u>; // source, and the share of its light, as in translucency_weights.wgsl
+@group(0) @binding(0) var<storage, read> receivers: array<Receiver>; // those with most pairs first
+@group(0) @binding(1) var<storage, read> weights: array<vec2u>; // source, and the share of its light, as in translucency_weights.wgsl
 @group(0) @binding(2) var<storage, read> gathered: array<vec2u>; // as in light_words.wgsl
 @group(0) @binding(3) var transmitted: texture_storage_2d<rgba32float, write>;
 
@@ -25,8 +25,8 @@ fn decoded(word: u32) -> vec3f {
 }
 
 fn passed(k: u32, end: u32) -> vec3f {
-    let link = links[min(k, end - 1u)];
-    return select(0.0, 1.0, k < end) * decoded(link.y) * light_of(gathered[link.x]);
+    let pair = weights[min(k, end - 1u)];
+    return select(0.0, 1.0, k < end) * decoded(pair.y) * light_of(gathered[pair.x]);
 }
 
 // Loads that do not wait for each other: memory is far.

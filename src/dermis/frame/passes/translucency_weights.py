@@ -1,4 +1,4 @@
-"""How much light passes between places that lie opposite each other; told once for a profile."""
+"""How much light passes between translucent pairs; computed once for a profile."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.translucency.pairs import Links
+from dermis.atlas.translucency.pairs import TranslucentPairs
 from dermis.disk import cached_array
 from dermis.frame.passes import STAGES
 from dermis.gpu import ComputeProgram, Device, Frame, make_texture, upload
@@ -48,43 +48,43 @@ class Pairs:
     key: str = ""
 
 
-def upload_pairs(device: Device, links: Links, key: str = "") -> Pairs:
-    """The links as the shaders read them.
+def upload_pairs(device: Device, table: TranslucentPairs, key: str = "") -> Pairs:
+    """The pairs as the shaders read them.
 
-    key : what stands for the links, if what passes is to be kept on disk
+    key : what stands for the table, if what passes is to be kept on disk
     """
-    count, number = len(links.source), len(links.texel)
+    count, number = len(table.source), len(table.texel)
     pairs = np.zeros((max(1, count), 3), np.uint32)
-    pairs[:count, 0] = links.source
-    pairs[:count, 1:] = np.ascontiguousarray(links.lie).view(np.uint32)
+    pairs[:count, 0] = table.source
+    pairs[:count, 1:] = np.ascontiguousarray(table.geometry).view(np.uint32)
     sources = np.zeros((max(1, number), 2), np.uint32)
-    sources[:number, 0] = np.ascontiguousarray(links.texel).view(np.uint32)[:, 0]
-    sources[:number, 1] = links.area_mm2.view(np.uint32)
-    receivers = _receivers(links)
+    sources[:number, 0] = np.ascontiguousarray(table.texel).view(np.uint32)[:, 0]
+    sources[:number, 1] = table.area_mm2.view(np.uint32)
+    receivers = _receivers(table)
     return Pairs(
-        side=len(links.receiver),
-        radius_mm=float(links.radius_mm),
-        spacing_mm=float(links.spacing_mm),
+        side=len(table.receiver),
+        radius_mm=float(table.radius_mm),
+        spacing_mm=float(table.spacing_mm),
         receivers=device.buffer(receivers, "STORAGE"),
         pairs=device.buffer(pairs, "STORAGE"),
         sources=device.buffer(sources, "STORAGE"),
         count=len(pairs),
         source_count=len(sources),
         receiver_count=len(receivers),
-        light=_unlit(device, links.receiver > 0),
+        light=_unlit(device, table.receiver > 0),
         key=key,
     )
 
 
-def _receivers(links: Links) -> NDArray[np.uint32]:
-    """(m, 3) cell, x and y packed, where its links begin, and where they end; one without links for none.
+def _receivers(table: TranslucentPairs) -> NDArray[np.uint32]:
+    """(m, 3) cell, x and y packed, where its pairs begin, and where they end; one without pairs for none.
 
-    Those with most links come first: invocations that run side by side, and workgroups that are left for the
+    Those with most pairs come first: invocations that run side by side, and workgroups that are left for the
     end, then have little to wait for.
     """
-    y, x = np.nonzero(links.receiver > 1)
-    which = links.receiver[y, x]
-    first, end = links.first[which], links.first[which + 1]
+    y, x = np.nonzero(table.receiver > 1)
+    which = table.receiver[y, x]
+    first, end = table.first[which], table.first[which + 1]
     order = np.argsort(first.astype(np.int64) - end, kind="stable")
     listed = np.stack([x | (y << 16), first, end], axis=-1)[order].astype(np.uint32)
     return listed if len(listed) else np.zeros((1, 3), np.uint32)
@@ -104,7 +104,7 @@ def source_level(pairs: Pairs, variance_mm2: Floats) -> int:
     return int(smooth[0]) if len(smooth) else len(variance_mm2) - 1
 
 
-class Opposite:
+class TranslucencyWeights:
     """Weighs pairs for a profile. The shader is compiled when it is first wanted."""
 
     def __init__(self, device: Device) -> None:
@@ -122,7 +122,7 @@ class Opposite:
         gaussian = np.zeros((MOST_GAUSSIANS, 4), np.float32)
         gaussian[: len(weight), :3], gaussian[: len(weight), 3] = weight, variance_mm2
         record = self._program.record(
-            "Opposite",
+            "Weighing",
             radius_mm=pairs.radius_mm,
             before_mm2=variance_mm2[source_level(pairs, variance_mm2)],
             cell_mm2=pairs.spacing_mm**2,
@@ -136,15 +136,15 @@ class Opposite:
         told = adapter.name, adapter.driver, self._program.source.text, record.tobytes().hex()
 
         def weigh() -> NDArray[np.uint8]:
-            links = self._weighed(pairs, record)
-            return np.frombuffer(self._device.handle.queue.read_buffer(links), np.uint8)
+            weights = self._weighed(pairs, record)
+            return np.frombuffer(self._device.handle.queue.read_buffer(weights), np.uint8)
 
         return self._device.buffer(cached_array((), f"passing {pairs.key} {told}", weigh), "STORAGE")
 
     def _weighed(self, pairs: Pairs, record: Any) -> Any:
-        links = self._device.handle.create_buffer(size=8 * pairs.count, usage=pairs.pairs.usage)
-        bound = {"opposite": record, "pairs": pairs.pairs, "sources": pairs.sources, "links": links}
+        weights = self._device.handle.create_buffer(size=8 * pairs.count, usage=pairs.pairs.usage)
+        bound = {"weighing": record, "pairs": pairs.pairs, "sources": pairs.sources, "weights": weights}
         frame = Frame(self._device)
-        frame.compute("opposite", self._program, bound, (ROW, -(-pairs.count // ROW)))
+        frame.compute("translucency weights", self._program, bound, (ROW, -(-pairs.count // ROW)))
         frame.submit()
-        return links
+        return weights

@@ -1,6 +1,6 @@
-// How much light passes between places that lie opposite each other through the flesh, beyond what blurs carry round.
+// How much light passes through the flesh between translucent pairs, beyond what the blurs carry round.
 
-struct Opposite {
+struct Weighing {
     radius_mm: f32, // pairs are nearer
     before_mm2: f32, // variance that the sources' light has already
     cell_mm2: f32, // that a source usually stands for
@@ -9,10 +9,10 @@ struct Opposite {
     gaussian: array<vec4f, 24>, // weight per channel, variance [mm^2]
 }
 
-@group(0) @binding(0) var<uniform> opposite: Opposite;
+@group(0) @binding(0) var<uniform> weighing: Weighing;
 @group(0) @binding(1) var<storage, read> pairs: array<u32>; // three words: source; depth, aside; along, share
 @group(0) @binding(2) var<storage, read> sources: array<vec2u>; // texel; area [mm^2]
-@group(0) @binding(3) var<storage, read_write> links: array<vec2u>; // source; share of its light, as encoded says
+@group(0) @binding(3) var<storage, read_write> weights: array<vec2u>; // source; share of its light, as encoded says
 
 const ROW: u32 = 1024u; // of the pairs, as they are spread over invocations
 const PI: f32 = 3.14159265358979;
@@ -33,11 +33,11 @@ fn encoded(c: vec3f) -> u32 {
 // A Gaussian of the distance sqrt(t^2 + r^2) is exp(-t^2 / 2v) G(v, r) [dEonLuebke2007]; what is already in the sources'
 // light need not be added. The blur along the surface has brought its own share: that is taken off.
 fn passed(depth: f32, aside: f32, along: f32, area: f32) -> vec3f {
-    let edge2 = max(opposite.radius_mm * opposite.radius_mm - depth * depth, 0.0);
+    let edge2 = max(weighing.radius_mm * weighing.radius_mm - depth * depth, 0.0);
     var sum = vec3f(0.0);
-    for (var k = 0u; k < opposite.count; k++) {
-        let gaussian = opposite.gaussian[k];
-        let w = max(gaussian.w - opposite.before_mm2, opposite.grain * max(area, opposite.cell_mm2));
+    for (var k = 0u; k < weighing.count; k++) {
+        let gaussian = weighing.gaussian[k];
+        let w = max(gaussian.w - weighing.before_mm2, weighing.grain * max(area, weighing.cell_mm2));
         let disc = max(1.0 - exp(-0.5 * edge2 / w), LEAST_DISC);
         let straight = exp(-0.5 * (depth * depth / gaussian.w + aside * aside / w)) / disc;
         sum += gaussian.rgb * max(0.0, straight - exp(-0.5 * along * along / w)) / w;
@@ -48,16 +48,16 @@ fn passed(depth: f32, aside: f32, along: f32, area: f32) -> vec3f {
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let index = id.y * ROW + id.x;
-    if (id.x >= ROW || index >= arrayLength(&links)) {
+    if (id.x >= ROW || index >= arrayLength(&weights)) {
         return;
     }
     let source = pairs[3u * index];
-    let across = unpack2x16unorm(pairs[3u * index + 1u]) * opposite.radius_mm;
+    let across = unpack2x16unorm(pairs[3u * index + 1u]) * weighing.radius_mm;
     let rest = unpack2x16unorm(pairs[3u * index + 2u]);
-    var along = opposite.radius_mm * rest.x;
+    var along = weighing.radius_mm * rest.x;
     if (rest.x == 1.0) {
         along = FAR_MM; // no blur leads there
     }
     let share = rest.y * passed(across.x, across.y, along, bitcast<f32>(sources[source].y));
-    links[index] = vec2u(source, encoded(share));
+    weights[index] = vec2u(source, encoded(share));
 }

@@ -1,4 +1,4 @@
-"""The search for patches of the surface that may have something opposite."""
+"""The search for patches of the surface that may have others across the flesh."""
 
 from __future__ import annotations
 

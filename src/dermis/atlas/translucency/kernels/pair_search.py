@@ -1,4 +1,4 @@
-"""The search for what lies opposite each place, and how far off it is in each of three ways."""
+"""The search for pairs of places that exchange light through the flesh, and how far apart they are."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ASKEW = 0.5
 """Cosine of two normals from which a place counts."""
 
 _OPPOSED = -0.2  # to which it counts more and more
-_NEIGHBOURS = 3.0  # texels within which nine around one lie
+_NEIGHBOURS = 3.0  # texels within which the nine around one are found
 _ACROSS_AIR = -0.5  # mean cosine to the inward normals at which two places only see each other from outside
 
 
@@ -77,7 +77,7 @@ class Along(NamedTuple):
 
 
 @compiled
-def link(
+def search(
     receivers: Receivers,
     part: tuple[int, int],
     sources: Sources,
@@ -85,7 +85,7 @@ def link(
     radius_mm: float,
     count: Integers,
 ) -> tuple[NDArray[np.int32], NDArray[np.uint16]]:
-    """Sources (l,) of some receivers, one after the other, and (l, 4) how they lie.
+    """Sources (l,) of some receivers, one after the other, and (l, 4) their geometry.
 
     That is: depth under the source's tangent plane, distance beside its normal, distance along the surface
     [1/65535 of the radius; 65535 where no blur leads there]; share that counts [1/65535].
@@ -98,7 +98,7 @@ def link(
     texels = int((flat.shown >= 0).sum())  # in gutters any number of them may show one source
     hits = Hits(np.empty(texels, np.int32), np.empty(texels, np.float32))
     away = Along(np.full(most, np.inf, np.float32), np.zeros(most, np.float32), np.zeros(most, np.int32))
-    index, lie = np.empty(1 << 16, np.int32), np.empty((1 << 16, 4), np.uint16)
+    index, geometry = np.empty(1 << 16, np.int32), np.empty((1 << 16, 4), np.uint16)
     total = 0
     for i in range(part[0], part[1]):
         n = _look_around(receivers.position[i], receivers.normal[i], sources, radius_mm, found, shape)
@@ -113,14 +113,14 @@ def link(
         _forget(hits, marked, away)
         while total + n > len(index):
             index = np.concatenate((index, np.empty_like(index)))
-            lie = np.concatenate((lie, np.empty_like(lie)))
+            geometry = np.concatenate((geometry, np.empty_like(geometry)))
         index[total : total + n] = found[:n]
         for k in range(n):
             for m in range(3):
-                lie[total + k, m] = _part(shape[k, m] / radius_mm)
-            lie[total + k, 3] = _part(shape[k, 3])
+                geometry[total + k, m] = _part(shape[k, m] / radius_mm)
+            geometry[total + k, 3] = _part(shape[k, 3])
         total += n
-    return index[:total], lie[:total]
+    return index[:total], geometry[:total]
 
 
 @compiled
@@ -138,7 +138,7 @@ def _look_around(
     found: NDArray[np.int32],
     shape: NDArray[np.float32],
 ) -> int:
-    """How many sources within a ball are opposite; writes them, and how they lie."""
+    """How many sources within a ball lie across the flesh; writes them and their geometry."""
     n = 0
     low, high = np.empty(3, np.int64), np.empty(3, np.int64)
     for k in range(3):
@@ -152,14 +152,14 @@ def _look_around(
         for y in range(low[1], high[1] + 1):
             row = sources.size[0] * (y + sources.size[1] * z)
             for q in range(sources.first[row + low[0]], sources.first[row + high[0] + 1]):
-                if _opposite(place, normal, sources.position[q], sources.normal[q], radius_mm, shape[n]):
+                if _through_flesh(place, normal, sources.position[q], sources.normal[q], radius_mm, shape[n]):
                     found[n] = sources.listed[q]
                     n += 1
     return n
 
 
 @compiled
-def _opposite(
+def _through_flesh(
     place: Doubles,
     normal: Doubles,
     other: Doubles,
@@ -167,7 +167,7 @@ def _opposite(
     radius_mm: float,
     shape: NDArray[np.float32],
 ) -> bool:
-    """Whether a place lies opposite through flesh; writes depth, distance beside and share."""
+    """Whether flesh lies between two places that face apart; writes depth, distance beside and share."""
     cosine = normal[0] * its_normal[0] + normal[1] * its_normal[1] + normal[2] * its_normal[2]
     if cosine >= ASKEW:  # as on most of the surface around
         return False
