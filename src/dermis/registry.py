@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any, Generic, TypeVar, cast
 
@@ -37,6 +38,15 @@ class Registry(Mapping[str, T], Generic[T]):
         self._entries[name] = entry
         if summary:
             self._summaries[name] = summary
+
+    @contextmanager
+    def including(self, name: str, entry: T | str) -> Iterator[None]:
+        """While it lasts, an entry more."""
+        self.register(name, entry)
+        try:
+            yield
+        finally:
+            del self._entries[name]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -80,10 +90,25 @@ class Registry(Mapping[str, T], Generic[T]):
 class Named:
     """For pydantic: `Annotated[str, Named(REGISTRY)]` is a name that is registered when it is checked."""
 
-    def __init__(self, registry: Registry[Any]) -> None:
-        self.registry = registry
+    def __init__(self, registry: Registry[Any], *others: str) -> None:
+        """others : words that the value may be besides, "none", say"""
+        self.registry, self.others = registry, others
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All that the value may be."""
+        return (*self.registry, *self.others)
+
+    def check(self, name: str) -> str:
+        """The name itself.
+
+        Raises ValueError for one that is neither registered nor one of the others.
+        """
+        if name not in self.names:
+            raise ValueError(f"one of {', '.join(self.names)}")
+        return name
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         from pydantic_core.core_schema import no_info_after_validator_function
 
-        return no_info_after_validator_function(self.registry.check, handler(source))
+        return no_info_after_validator_function(self.check, handler(source))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dermis.frame.passes import SHARED_SHADERS
+from dermis.frame.passes import shader_folders
 from dermis.frame.surface import constants
 from dermis.gpu import ComputeProgram, Device, Frame, make_texture
 from dermis.gpu.textures import texture_from
@@ -70,10 +70,10 @@ class _Bench:
             "sums": make_texture(device, (load.side, load.side), "r32float"),
         }
 
-    def program(self, overrides: dict[str, int]) -> ComputeProgram:
+    def program(self, overrides: dict[str, float]) -> ComputeProgram:
         """The shader with values of its `override`s."""
         constants = {"LIGHTS": self._load.lights, **overrides}
-        program = ComputeProgram(self._device, _SHADER, (SHARED_SHADERS,), constants)
+        program = ComputeProgram(self._device, _SHADER, shader_folders(), constants)
         self._bound["skin"] = program.record("Skin", f0=SKIN_F0, eta=SKIN_ETA)
         return program
 

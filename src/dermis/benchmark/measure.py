@@ -11,7 +11,7 @@ from pathlib import Path
 
 from dermis.benchmark.cases import FRAGMENTS, Case
 from dermis.benchmark.floor import moved_by, stage_bytes
-from dermis.benchmark.gpu_gems_3_fragments import published_as_fragments
+from dermis.benchmark.gpu_gems_3_fragments import FRAGMENTS as AS_FRAGMENTS
 from dermis.benchmark.scenes import scenes_of, settings_of
 from dermis.frame.renderer import Renderer
 from dermis.gpu.device import gpu_failures
@@ -20,6 +20,7 @@ from dermis.gpu.memory import held_bytes
 from dermis.mesh.head import Head
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
+from dermis.scene.techniques import TECHNIQUES
 
 
 @dataclass(frozen=True)
@@ -86,13 +87,13 @@ def measure(renderer: Renderer, case: Case, head: Head, folder: Path, rate: floa
 
     Raises DermisError for frames that the device cannot hold.
     """
-    with gpu_failures(renderer.device), _drawn_as(case, renderer):
+    with gpu_failures(renderer.device), _drawn_as(case):
         return _measured(renderer, case, head, folder, rate, effort)
 
 
-def _drawn_as(case: Case, renderer: Renderer) -> AbstractContextManager[None]:
+def _drawn_as(case: Case) -> AbstractContextManager[None]:
     if case.technique == FRAGMENTS:
-        return published_as_fragments(renderer.device, renderer.stages)
+        return TECHNIQUES.including(FRAGMENTS, AS_FRAGMENTS)
     return nullcontext()
 
 
@@ -124,7 +125,7 @@ def row_ms(renderer: Renderer, scenes: Sequence[Scene], settings: Settings) -> f
 
     def draw() -> None:
         for scene in scenes:
-            renderer.draw(scene, settings, keep_shadows=False, timed=False)
+            renderer.draw(scene, settings, timed=False)
         renderer.device.wait()
 
     return _lasted_ms(draw)
@@ -140,7 +141,7 @@ def stage_ms(
     for scene in scenes[: effort.timed]:
         for way in ways:
             row_ms(renderer, scenes[: effort.between], settings)
-            drawn[way].append(renderer.draw(scene, settings, keep_shadows=False, timed=way).gpu_ms or {})
+            drawn[way].append(renderer.draw(scene, settings, timed=way).gpu_ms or {})
     found = {stage: statistics.median(one[stage] for one in drawn[True]) for stage in drawn[True][0]}
     return found | {"total": statistics.median(one["total"] for one in drawn[ways[-1]])}
 
@@ -156,7 +157,7 @@ def _around(
     for k, scene in enumerate(scenes):
         renderer.device.wait()
         started = time.perf_counter()
-        rendered = renderer.draw(scene, settings, keep_shadows=False, timed=False)
+        rendered = renderer.draw(scene, settings, timed=False)
         before.append(1e3 * (time.perf_counter() - started))
         if k < images:
             renderer.device.wait()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dermis.benchmark.cases import FRAGMENTS, PUBLISHED, Case
+from dermis.benchmark.cases import Case
 from dermis.mesh.head import Head
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
@@ -25,12 +25,11 @@ _TURN_DEGREES = 25.0  # between one round of the studio's lights and the next
 
 def settings_of(case: Case) -> Settings:
     """How the case is rendered."""
-    technique = PUBLISHED if case.technique == FRAGMENTS else case.technique
     return Settings(
         size=case.image,
         atlas=case.atlas,
         samples=case.samples,
-        technique=technique,
+        technique=case.technique,
     )
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from dermis.cli.console import print_lines
-from dermis.specular.names import SpecularName
+from dermis.specular.models import SpecularName
 
 _SKIN, _SETTINGS = ("profile", "specular"), ("technique", "seams", "transmission")
 

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from dermis.cli.console import note, print_json, print_lines, working_on
 from dermis.cli.options import Json, Whole, parse_colour, parse_size
 from dermis.cli.render_scene import assemble
-from dermis.specular.names import EnergyName, FresnelName, SpecularName
+from dermis.specular.models import EnergyName, FresnelName, SpecularName
 
 _MOST_UNSCATTERED = 0.05  # closed eyes and other collapsed charts of real scans stay under it
 

@@ -20,7 +20,7 @@ _HALVING = "halved 1"  # raise when `halved` gives other results
 _LEAST_SHARE = 1e-3  # of the blur at the edge itself: 0 would mean no surface
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AtlasTextures:
     """What the shaders read of an atlas, by the names they use.
 
@@ -38,6 +38,10 @@ class AtlasTextures:
     gathered: Any = None
     coarser: tuple[AtlasTextures, ...] = ()
     usual_per_mm: float = 0.0
+
+    def sheets(self, edge: str) -> tuple[AtlasTextures, ...]:
+        """The atlas at its resolution and at those that blurs with this edge may use."""
+        return (self, *(self.coarser if edge == "repeated" else ()))
 
 
 def upload_atlas(

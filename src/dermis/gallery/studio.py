@@ -80,9 +80,10 @@ class Studio:
 
         chosen = self.settings(**settings)
         self._draw(scene, 1.0, settings)
-        levels = self.renderer.prepare(scene, chosen).levels
-        light = download(self.renderer.device, levels.stack, mip=levels.halvings[level], layer=level)
-        return np.asarray(light, np.float32)[..., :3] / np.float32(levels.scale)
+        inputs = self.renderer.prepare(scene, chosen)
+        stack, blur = inputs.resources.levels.stack, inputs.blurs[0]
+        light = download(self.renderer.device, stack, mip=blur.halvings[level], layer=level)
+        return np.asarray(light, np.float32)[..., :3] / np.float32(blur.scale)
 
     def settings(self, scale: float = 1.0, **settings: Any) -> Settings:
         """A panel's settings."""

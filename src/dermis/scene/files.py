@@ -14,29 +14,13 @@ from dermis.mesh.head import Head
 from dermis.scene.camera import PRESETS, Camera, preset
 from dermis.scene.environment import Environment
 from dermis.scene.heads import HeadTable, load_head
-from dermis.scene.lights import (
-    DirectionalLight,
-    Light,
-    PointLight,
-    RectangleLight,
-    SphereLight,
-    SpotLight,
-    StripeLight,
-)
+from dermis.scene.lights import LIGHTS, Light
 from dermis.scene.model import Scene
 from dermis.scene.plain import ImpossibleError, Plain
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 
 P = TypeVar("P", bound=Plain)
-_KINDS: dict[str, type[Light]] = {
-    "point": PointLight,
-    "spot": SpotLight,
-    "rectangle": RectangleLight,
-    "sphere": SphereLight,
-    "directional": DirectionalLight,
-    "stripe": StripeLight,
-}
 NO_LIGHTS = "none"
 """Name of the rig without lights, for an environment alone."""
 _PARTS = {"head", "skin", "lights", "environment", "camera", "render"}
@@ -154,9 +138,9 @@ def _lights(culprit: object, tables: Any) -> tuple[Light, ...]:
 
 def _light(culprit: object, which: str, table: Any) -> Light:
     kind = table.get("kind", "point") if isinstance(table, dict) else "point"
-    if not isinstance(kind, str) or kind not in _KINDS:
-        refuse(f"{culprit}: {which}", f"a kind of {', '.join(_KINDS)}", f"{kind!r} came", "Correct it")
-    return _made(_KINDS[kind], culprit, which, table)
+    if not isinstance(kind, str) or kind not in LIGHTS:
+        refuse(f"{culprit}: {which}", f"a kind of {', '.join(LIGHTS)}", f"{kind!r} came", "Correct it")
+    return _made(LIGHTS[kind], culprit, which, table)
 
 
 def _made(kind: type[P], culprit: object, part: str, table: Any) -> P:

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from dermis.registry import Registry
 from dermis.scene.plain import Colour, Direction, Plain, Vector
 
 _Degrees = Annotated[float, Field(gt=0, lt=89)]
@@ -25,6 +26,11 @@ class _Source(Plain):
     irradiance: Colour = (3.14, 3.14, 3.14)
     shadows: bool = True
     softness_mm: Annotated[float, Field(gt=0, le=1000)] = 1.5
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """Keys of the bibliography: what its kind is drawn by."""
+        return ()
 
 
 class PointLight(_Source):
@@ -68,6 +74,10 @@ class RectangleLight(PointLight):
     width_mm: _Length = 600.0
     height_mm: _Length = 600.0
 
+    @property
+    def sources(self) -> tuple[str, ...]:
+        return "Baum1989", "Roberts2018"
+
 
 class SphereLight(PointLight):
     """An evenly bright sphere, as a lamp with a globe.
@@ -77,6 +87,10 @@ class SphereLight(PointLight):
 
     kind: Literal["sphere"] = "sphere"  # type: ignore[assignment]
     radius_mm: _Length = 100.0
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        return "ShirleyChiu1997", "Roberts2018"
 
     @model_validator(mode="after")
     def _outside(self) -> SphereLight:
@@ -95,6 +109,10 @@ class DirectionalLight(_Source):
     kind: Literal["directional"] = "directional"
     direction: Direction
     angle_degrees: Annotated[float, Field(ge=0, le=20)] = 0.0
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        return ("Roberts2018",) if self.angle_degrees > 0 else ()
 
 
 class StripeLight(DirectionalLight):
@@ -121,7 +139,21 @@ class StripeLight(DirectionalLight):
         return self
 
 
-Light = PointLight | SpotLight | RectangleLight | SphereLight | DirectionalLight | StripeLight
+Light = PointLight | DirectionalLight
+"""Every kind is one or the other, with more to it."""
+
+LIGHTS: Registry[type[Light]] = Registry(
+    "light",
+    {
+        "point": PointLight,
+        "spot": SpotLight,
+        "rectangle": RectangleLight,
+        "sphere": SphereLight,
+        "directional": DirectionalLight,
+        "stripe": StripeLight,
+    },
+)
+"""The kinds by their word in scene files; `dermis.frame.lights` draws them."""
 
 
 def studio() -> tuple[Light, ...]:

@@ -77,15 +77,15 @@ def help_of(model: type[BaseModel], field: str) -> str:
     """What a field means, on one line, with what each of the names of a registry stands for."""
     info = model.model_fields[field]
     text = re.sub(r"\s+", " ", info.description or "")
-    summaries = [one for registry in _registries(info) for one in registry.summaries()]
+    summaries = [one for named in _named(info) for one in named.registry.summaries()]
     return f"{text} {'; '.join(summaries)}." if summaries else text
 
 
 def choices_of(model: type[BaseModel], field: str) -> tuple[str, ...]:
     """The words that a field may be; none where it is no choice of words."""
     info = model.model_fields[field]
-    for registry in _registries(info):
-        return tuple(registry)
+    for named in _named(info):
+        return named.names
     words = [word for one in _kinds(info) if get_origin(one) is Literal for word in get_args(one)]
     return tuple(words)
 
@@ -100,8 +100,8 @@ def bounds_of(model: type[BaseModel], field: str) -> tuple[float | None, float |
     return _bounds(model.model_fields[field])
 
 
-def _registries(info: FieldInfo) -> list[Any]:
-    return [one.registry for one in info.metadata if isinstance(one, Named)]
+def _named(info: FieldInfo) -> list[Named]:
+    return [one for one in info.metadata if isinstance(one, Named)]
 
 
 def _kinds(info: FieldInfo) -> tuple[Any, ...]:

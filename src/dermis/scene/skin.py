@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from dermis.scene.plain import Plain, slider
-from dermis.specular.names import EnergyName, FresnelName, SpecularName
+from dermis.specular.models import EnergyName, FresnelName, SpecularName
 
 StructureName = Literal["dj2006", "donner2008", "biospec"]
 MOST_LAYERS = 8

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from dermis.scene.environment import Environment
-from dermis.scene.lights import DirectionalLight, Light, RectangleLight, SphereLight
+from dermis.scene.lights import Light
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 
@@ -86,9 +86,5 @@ def _surface(skin: Skin) -> tuple[str, ...]:
 
 
 def _light(lights: Sequence[Light]) -> tuple[str, ...]:
-    rectangles = any(isinstance(light, RectangleLight) for light in lights)
-    spheres = any(isinstance(light, SphereLight) for light in lights)
-    suns = any(isinstance(light, DirectionalLight) and light.angle_degrees > 0 for light in lights)
     keys: tuple[str, ...] = _SHADOWS * any(light.shadows for light in lights)
-    keys += ("Baum1989",) * rectangles + ("ShirleyChiu1997",) * spheres
-    return keys + ("Roberts2018",) * (rectangles or spheres or suns)
+    return keys + tuple(key for light in lights for key in light.sources)

@@ -1,5 +1,7 @@
 // Torrance and Sparrow's microfacets, masked by V-cavities [TorranceSparrow1967] or after Smith [Smith1967].
-//#include "lobes/beckmann.wgsl"
+//#include "beckmann.wgsl"
+//#include "cosines.wgsl"
+//#include "fresnel.wgsl"
 
 const ROOT_PI: f32 = 1.77245385;
 

@@ -1,6 +1,6 @@
 // Reflectance of a smooth surface by angle: Schlick's curve or the exact one.
 
-override FRESNEL: u32 = 0u; // 0 Schlick, 1 exact
+override EXACT_FRESNEL: bool = false;
 
 fn schlick(cos_theta: f32, f0: f32) -> f32 {
     let c = clamp(1.0 - cos_theta, 0.0, 1.0);
@@ -18,7 +18,7 @@ fn dielectric(cos_theta: f32, eta: f32) -> f32 {
 }
 
 fn fresnel(cos_theta: f32) -> f32 {
-    if (FRESNEL == 1u) {
+    if (EXACT_FRESNEL) {
         return dielectric(cos_theta, skin.eta);
     }
     return schlick(cos_theta, skin.f0);

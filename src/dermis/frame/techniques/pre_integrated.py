@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.gpu import ComputeProgram, Device
+from dermis.frame.inputs import Inputs
+from dermis.frame.techniques.technique import Technique
+from dermis.gpu import ComputeProgram, Device, Graph, Memo
 from dermis.gpu.textures import texture_from
 from dermis.optics.fits.separable import preintegrate
 from dermis.optics.gaussians import Floats, GaussianSum
+from dermis.scene.settings import Settings
 
 MOST_CURVED = 0.5
 """Curvature of the last row of spheres [1/mm]: a radius of 2 mm."""
@@ -24,7 +27,7 @@ _SHADOW_TAIL = 0.01  # of the light that a shadow's edge may send farther than i
 _MOST_PENUMBRA_MM = 8.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PreIntegrated:
     """What shade reads in place of light on an atlas.
 
@@ -37,10 +40,29 @@ class PreIntegrated:
     penumbra_mm: float
     relief_mm: Floats
 
-    def record(self, shade: ComputeProgram) -> Any:
-        """The tables' scales as the shading pass reads them."""
-        scales = {"most_curved": MOST_CURVED, "penumbra": self.penumbra_mm, "relief": self.relief_mm}
-        return shade.record("PreIntegrated", **scales)
+
+class PreIntegratedSkin(Technique):
+    """Light by tables over curvature, and across the edges of shadows."""
+
+    name = "pre-integrated"
+    sources = ("Penner2011",)
+    shade_constants = (("PRE_INTEGRATED", 1),)
+
+    def make(self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum) -> PreIntegrated:
+        """The profile's tables."""
+        return memo.keep(pre_integrate, device, profile)
+
+    def describe(self, view: Any, shade: ComputeProgram, own: PreIntegrated) -> None:
+        """The tables' scales."""
+        scales = {"most_curved": MOST_CURVED, "penumbra": own.penumbra_mm, "relief": own.relief_mm}
+        view["pre"] = shade.record("PreIntegrated", **scales)
+
+    def scatter(self, graph: Graph, inputs: Inputs) -> Any:
+        """The tables in place of light on the atlas."""
+        return inputs.resources.own.table
+
+
+TECHNIQUE = PreIntegratedSkin()
 
 
 def pre_integrate(device: Device, profile: GaussianSum) -> PreIntegrated:

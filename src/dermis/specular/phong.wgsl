@@ -1,5 +1,5 @@
 // Powers of r.v: normalised [LafortuneWillems1994], and as first published [Phong1975], divided by the light's cosine.
-//#include "lobes/blinn_phong.wgsl"
+//#include "blinn_phong.wgsl"
 
 fn power_of_r_v(a: Angles, s: f32) -> f32 {
     let r_v = 2.0 * a.n_l * a.n_v - (2.0 * a.v_h * a.v_h - 1.0);

@@ -13,39 +13,31 @@ from numpy.typing import NDArray
 
 from dermis.environment.suns import Sun
 from dermis.errors import refuse
-from dermis.frame.passes.variants import Constants
+from dermis.frame.lights.kind import KINDS, override_of
 from dermis.frame.projection import (
     ShadowView,
     Triple,
     between,
-    frame_of,
     parallel_view,
     place_of,
     point_views,
     unit,
 )
-from dermis.frame.rectangles import facing_irradiance, parts_of
 from dermis.gpu import ComputeProgram
-from dermis.mesh.head import Head
 from dermis.scene.environment import Environment
-from dermis.scene.lights import (
-    DirectionalLight,
-    Light,
-    PointLight,
-    RectangleLight,
-    SphereLight,
-    SpotLight,
-    StripeLight,
-)
+from dermis.scene.lights import DirectionalLight, Light
 from dermis.scene.model import Scene
 
 Floats = NDArray[np.float64]
-_KINDS = (PointLight, SpotLight, DirectionalLight, StripeLight, RectangleLight, SphereLight)
-_MOST_LIGHTS = 64  # in lights.wgsl
-_UP = np.array([0.0, 1.0, 0.0])
+_MOST_LIGHTS = 64
 _WIDEST_SHADOW_FILTER = 6
 _SIDE, _PART_SIDE = 4, 2  # a light of some size is shaded as SIDE x SIDE lights, a part as fewer
 _LINES, _LEAST_LINES, _SUN_LINES = 64, 12, 32  # of sight to places on a light, for its shadow
+
+
+def light_numbers() -> dict[str, float]:
+    """What lights.wgsl fills in."""
+    return {"most_lights": _MOST_LIGHTS, "most_lines": _LINES}
 
 
 def sun_lights(suns: tuple[Sun, ...], environment: Environment) -> tuple[DirectionalLight, ...]:
@@ -66,13 +58,12 @@ def sun_lights(suns: tuple[Sun, ...], environment: Environment) -> tuple[Directi
     return tuple(lights)
 
 
-def light_constants(scene: Scene) -> Constants:
+def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
     """Values of the `override`s of lighting.wgsl that what is lit and what lights it call for."""
-    shapes = StripeLight, RectangleLight, SphereLight
-    wide = any(isinstance(light, DirectionalLight) and light.angle_degrees > 0 for light in scene.lights)
-    shaped = wide or any(isinstance(light, shapes) for light in scene.lights)
+    kinds = {light.kind: KINDS[light.kind] for light in scene.lights}
     named = {
-        "SHAPES": shaped,
+        "SHAPES": any(kinds[light.kind].has_size(light) for light in scene.lights),
+        **{override_of(name): not kind.always for name, kind in sorted(kinds.items())},
         "ENVIRONMENT": scene.environment,
         "HALF_SPACE": scene.skin.direction != "lambertian",
     }
@@ -85,16 +76,18 @@ def light_views(scene: Scene, size: int) -> list[ShadowView | None]:
     Raises DermisError for more lights than the shader holds, and for one that the head reaches into.
     """
     numbered = [
-        (f"light {k}", part) for k, light in enumerate(scene.lights, start=1) for part in parts_of(light)
+        (f"light {number}", part)
+        for number, light in enumerate(scene.lights, start=1)
+        for part in KINDS[light.kind].parts(light)
     ]
     if len(numbered) > _MOST_LIGHTS:
         came = f"there are {len(numbered)}, with the environment's suns and each part of a large rectangle"
         refuse("lights", f"at most {_MOST_LIGHTS}", came, "Leave some out")
     head = scene.head
     for culprit, light in numbered:
-        if isinstance(light, SphereLight):
-            _check_outside(head, light, culprit)
-    points = [(name, one) for name, one in numbered if one.shadows and isinstance(one, PointLight)]
+        KINDS[light.kind].check(light, head, culprit)
+    shadowed = [(culprit, light) for culprit, light in numbered if light.shadows]
+    points = [(culprit, light) for culprit, light in shadowed if not isinstance(light, DirectionalLight)]
     found = iter(point_views(points, head.centre_mm, head.mesh, size))
 
     def view(light: Light) -> ShadowView:
@@ -105,14 +98,6 @@ def light_views(scene: Scene, size: int) -> list[ShadowView | None]:
     return [view(light) if light.shadows else None for _, light in numbered]
 
 
-def _check_outside(head: Head, light: SphereLight, culprit: str) -> None:
-    middle = place_of(light.position, head.centre_mm)
-    near = float(np.linalg.norm(head.mesh.positions - np.array(middle), axis=1).min())
-    if near <= light.radius_mm:
-        came = f"the head is {near:.0f} mm from its middle"
-        refuse(culprit, f"a head outside the sphere of {light.radius_mm:g} mm", came, "Move it away")
-
-
 def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView | None]) -> Any:
     """The shader's array of lights.
 
@@ -120,18 +105,13 @@ def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView 
     """
     record = program.record("Lights", place=places_on_lights())
     lights = record["light"]
-    divided = [(part, len(parts)) for parts in map(parts_of, scene.lights) for part in parts]
+    each = [KINDS[light.kind].parts(light) for light in scene.lights]
+    divided = [(part, len(parts)) for parts in each for part in parts]
     none, layers = dict.fromkeys(lights.dtype.names or (), 0), count()
     made = []
     for (light, siblings), view in zip(divided, views, strict=True):
-        few = isinstance(light, DirectionalLight)
-        one = {
-            **none,
-            **_members(light, scene.head.centre_mm, view),
-            "layer": next(layers) if view else -1,
-            "lines": _SUN_LINES if few else max(_LEAST_LINES, _LINES // siblings),
-            "side": _PART_SIDE if siblings > 1 else _SIDE,
-        }
+        layer = next(layers) if view else -1
+        one = {**none, **_members(light, scene.head.centre_mm, view, siblings), "layer": layer}
         made.append(tuple(one.values()))
     lights[: len(made)] = made  # at once: each place in a record takes as long as a light's arithmetic
     return record
@@ -146,8 +126,12 @@ def places_on_lights() -> Floats:
     return np.hstack([disc, 2.0 * even - 1.0])
 
 
-def _members(light: Light, centre: Triple, view: ShadowView | None) -> dict[str, Any]:
-    """A light's members in the shader's array, without those that are 0."""
+def _members(light: Light, centre: Triple, view: ShadowView | None, siblings: int) -> dict[str, Any]:
+    """A light's members in the shader's array, without those that are 0.
+
+    siblings : how many parts its light has
+    """
+    kind, parallel = KINDS[light.kind], isinstance(light, DirectionalLight)
     distance, texel, place = 1.0, 1.0, (0.0, 0.0, 0.0)
     if isinstance(light, DirectionalLight):
         along: Sequence[float] = light.direction
@@ -160,7 +144,10 @@ def _members(light: Light, centre: Triple, view: ShadowView | None) -> dict[str,
         seen = {"to_map": clip.T, "map_right": right, "map_up": up, "map_near": near, "map_far": far}
     half_width = round(0.5 * light.softness_mm / (texel * distance))
     plain = {
-        "kind": _KINDS.index(type(light)),
+        "kind": KINDS.names.index(light.kind),
+        "parallel": parallel,
+        "round": kind.round,
+        "narrow": kind.narrow,
         "irradiance": light.irradiance,
         "direction": unit(along),
         "position": place,
@@ -169,36 +156,7 @@ def _members(light: Light, centre: Triple, view: ShadowView | None) -> dict[str,
         # A tent of half width h fades over 2 h texels.
         "softness": 0.5 * light.softness_mm,
         "half_width": min(max(half_width, 1), _WIDEST_SHADOW_FILTER),
+        "lines": _SUN_LINES if parallel else max(_LEAST_LINES, _LINES // siblings),
+        "side": 1 if kind.narrow else _PART_SIDE if siblings > 1 else _SIDE,
     }
-    return plain | seen | _shape(light, centre, distance)
-
-
-def _shape(light: Light, centre: Triple, distance: float) -> dict[str, Any]:
-    """What only some kinds have: a cone, a stripe, or a size; lights of some size carry their radiance."""
-    if isinstance(light, SpotLight):
-        inner, outer = math.radians(light.inner_degrees), math.radians(light.outer_degrees)
-        return {"cos_inner": math.cos(inner), "cos_outer": math.cos(outer)}
-    if isinstance(light, StripeLight):
-        right, up, _ = frame_of(np.array(light.direction), np.array(light.up))
-        across, along = 2.0 * right / light.width_mm, 2.0 * up / light.length_mm
-        return {"position": place_of(light.position, centre), "half_u": across, "half_v": along}
-    if isinstance(light, DirectionalLight):
-        return {"extent": math.tan(0.5 * math.radians(light.angle_degrees))}
-    if isinstance(light, RectangleLight):
-        radiance = 1.0 / facing_irradiance(light.width_mm, light.height_mm, distance)
-        return _sided(light, radiance, 0.5 * light.width_mm, 0.5 * light.height_mm)
-    if isinstance(light, SphereLight):
-        radiance = 1.0 / (math.pi * (light.radius_mm / distance) ** 2)
-        return _sided(light, radiance, light.radius_mm, light.radius_mm)
-    return {}
-
-
-def _sided(light: PointLight, radiance: float, half_width: float, half_height: float) -> dict[str, Any]:
-    """radiance : for an irradiance of 1"""
-    right, up, _ = frame_of(np.array(between(light.position, light.target)), _UP)
-    return {
-        "half_u": half_width * right,
-        "half_v": half_height * up,
-        "extent": (half_width, half_height),
-        "irradiance": radiance * np.array(light.irradiance),
-    }
+    return plain | seen | kind.members(light, centre, distance)

@@ -1,4 +1,6 @@
 // Powers of n.h: normalised [Walter2007], and as first used [Blinn1977], divided by the cosine that the caller multiplies by.
+//#include "cosines.wgsl"
+//#include "fresnel.wgsl"
 
 // The power that is as wide as Beckmann's lobe [Walter2007].
 fn exponent(m: f32) -> f32 {
