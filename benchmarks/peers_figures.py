@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from peers_measured import OURS, PUBLISHED, Frames, Measured
+from peers_measured import OF_2007, OURS, Frames, Measured
 
 from dermis.reference.cycles import CyclesPass
 from dermis.reference.metrics import energy_ratio, relative_rmse
@@ -56,8 +56,8 @@ def figures(measured: Measured) -> dict[str, Any]:
     mask = seen(measured)
     means = {method: converged(turns) for method, turns in measured.cycles.items()}
     ours = [_our_row(measured, name, mask) for name in OURS]
-    published = [_our_row(measured, name, mask) for name in PUBLISHED]
-    rows = [*ours, *published, _truth_row(measured, mask)]
+    of_2007 = [_our_row(measured, name, mask) for name in OF_2007]
+    rows = [*ours, *of_2007, _truth_row(measured, mask)]
     for method, mean in means.items():
         rows += _cycles_rows(measured, method, mean, mask)
     told: dict[str, Any] = {
@@ -67,7 +67,7 @@ def figures(measured: Measured) -> dict[str, Any]:
         "rows": [asdict(row) for row in rows],
         "left_out": measured.left_out,
         "ours_energy_put_right": {name: _put_right(measured, name, mask) for name in OURS},
-        "published": {row.setting: _longer(row, ours[0]) for row in published},
+        "published": {row.setting: _longer(row, ours[0]) for row in of_2007},
     }
     if "random-walk" in means:
         told["as_near"] = {row.setting: _as_near(measured, means["random-walk"], row, mask) for row in ours}

@@ -15,9 +15,9 @@ from dermis.environment.mirrors import ROUGHEST, SIDE, SMOOTHEST, equivalent_mir
 from dermis.environment.panorama import directions, load_panorama, resampled, solid_angles
 from dermis.environment.prefilter import ROUGHNESSES, Prefiltered, prefilter
 from dermis.environment.suns import split_suns
-from dermis.frame.passes.occlusion import DIRECTIONS, Occlusion
+from dermis.frame.lights.rectangle import facing_irradiance
+from dermis.frame.passes.occlusion import DIRECTIONS, bake_occlusion
 from dermis.frame.projection import frame_of
-from dermis.frame.rectangles import facing_irradiance
 from dermis.mesh.head import Head
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene import Environment, PointLight, RectangleLight, Scene, Settings, Skin, load_lights
@@ -166,10 +166,9 @@ def occlusion_error(renderer: dermis.Renderer) -> float:
     """Root mean square difference of the open share of the sky from 1024 directions, on the scan."""
     head = dermis.load_head("lee_perry_smith")
     inputs = renderer.prepare(Scene(head), Settings(size=(64, 64), atlas=512, samples=1))
+    texels = inputs.layouts[0].atlas.resources["atlas"]
     few, many = (
-        Occlusion(renderer.device, count).bake(
-            head.mesh, inputs.head, inputs.lit, inputs.layouts[0].atlas.resources["atlas"], 512
-        )[:512]
+        bake_occlusion(renderer.device, head.mesh, inputs.lit, texels, 512, count)[:512]
         for count in (DIRECTIONS, 1024)
     )
     return float(np.sqrt(np.nanmean((few - many) ** 2)))

@@ -1,7 +1,7 @@
 """Writes docs/techniques.md: scattering techniques on the scanned head against truths.
 
-python tools/accuracy_techniques.py [ADAPTER] needs the sample data and Mitsuba. Traced paths are kept on disk,
-so only the first run takes long.
+python tools/accuracy_techniques.py [ADAPTER] needs the sample data and Mitsuba. Traced paths are kept on
+disk, so only the first run takes long.
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import translucency_twins
+from dermis.frame.passes.variants import Constants
 from numpy.typing import NDArray
 from tolerances import TWIN
 
@@ -15,7 +16,6 @@ from dermis.frame.levels import FLOATS, make_levels
 from dermis.frame.passes import translucency
 from dermis.frame.passes.translucency import Transmission
 from dermis.frame.passes.translucency_weights import upload_pairs
-from dermis.frame.passes.variants import Constants
 from dermis.frame.translucency import thin_of
 from dermis.gpu import Device, Frame, download, upload
 from dermis.mesh.primitives import uv_sphere, wedge

@@ -15,8 +15,7 @@ from dermis.specular.comparison import peak, reciprocity_error
 from dermis.specular.cosines import Cosines, cosines
 from dermis.specular.energy import ENERGY
 from dermis.specular.fresnel import FRESNEL, SKIN_F0, schlick
-from dermis.specular.models import MODELS
-from dermis.specular.models import EnergyName, FresnelName, ModelName
+from dermis.specular.models import MODELS, EnergyName, FresnelName, ModelName
 from dermis.specular.torrance_sparrow import smith_masking
 from dermis.specular.two_lobe import NARROW, WIDE
 

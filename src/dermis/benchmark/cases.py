@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-PUBLISHED = "gpu-gems-3"
+GPU_GEMS_3 = "gpu-gems-3"
 FRAGMENTS = "published-fragments"
-"""The passes of 2007 in the graphics pipeline; `PUBLISHED` are the same in compute."""
+"""The passes of 2007 in the graphics pipeline; `GPU_GEMS_3` has the same in compute."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Preset:
     lights: tuple[int, ...]
     subdivide: tuple[int, ...]
     environment: tuple[str, ...] = ("uniform",)
-    technique: tuple[str, ...] = (PUBLISHED, FRAGMENTS)
+    technique: tuple[str, ...] = (GPU_GEMS_3, FRAGMENTS)
 
     def cases(self) -> list[Case]:
         """The usual frame, then the others."""
