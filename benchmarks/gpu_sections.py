@@ -16,12 +16,11 @@ from typing import Any
 
 from other_program import lasted_s
 
-from dermis.benchmark.cases import FRAGMENTS, PRESETS, Case
+from dermis.benchmark.cases import FRAGMENTS, PRESETS, Case, scenes_of
 from dermis.benchmark.lobe_cost import lobe_cost_ns
 from dermis.benchmark.measure import Effort, row_ms, stage_ms
 from dermis.benchmark.report import as_json
 from dermis.benchmark.run import run
-from dermis.benchmark.scenes import scenes_of
 from dermis.cli.console import note
 from dermis.errors import DermisError
 from dermis.frame.renderer import Renderer

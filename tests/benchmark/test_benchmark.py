@@ -10,13 +10,11 @@ import pytest
 
 from dermis.atlas.cached import cached_atlas, cached_pairs
 from dermis.benchmark import run as running
-from dermis.benchmark.cases import FRAGMENTS, GPU_GEMS_3, PRESETS, Case
-from dermis.benchmark.copy_rate import copy_rate
-from dermis.benchmark.floor import moved_by, stage_bytes
+from dermis.benchmark.cases import FRAGMENTS, GPU_GEMS_3, PRESETS, Case, scenes_of, settings_of, with_terms
+from dermis.benchmark.floor import copy_rate, moved_by, stage_bytes
 from dermis.benchmark.measure import ON_CPU, Effort, Row, measure
 from dermis.benchmark.report import COLUMNS, as_json, cells, left_out_lines, stage_table, write_report
 from dermis.benchmark.run import Benchmark, LeftOut, run
-from dermis.benchmark.scenes import scenes_of, settings_of, with_terms
 from dermis.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.frame.seams import REMEDIES

@@ -39,10 +39,9 @@ _ON_CPU, _ON_GPU = _Load(256, 16), _Load(1024, 64)
 
 
 def lobe_cost_ns(device: Device) -> dict[tuple[str, str], float]:
-    """Device time for one evaluation of each model under each Fresnel curve [ns].
+    """Device time of one evaluation by model and Fresnel curve, as named in MODELS and FRESNEL [ns].
 
-    The throughput of the whole device, less what the loop costs without the lobe. By the names in MODELS and
-    FRESNEL.
+    The inverse throughput of the whole device, less the cost of the loop without the lobe.
     """
     load = _ON_CPU if device.adapter.kind == "CPU" else _ON_GPU
     bench = _Bench(device, load)
@@ -78,13 +77,13 @@ class _Bench:
         return program
 
     def warm(self, program: ComputeProgram) -> None:
-        """Keep the device at work until its clocks are up."""
+        """Keep the device busy until its clock rate is up."""
         started = time.perf_counter()
         while time.perf_counter() - started < _WARMING_S:
             self.pass_ms(program)
 
     def pass_ms(self, program: ComputeProgram) -> float:
-        """Time of one pass, on the device's clock or else on the wall's [ms]."""
+        """Time of one pass by the device's clock, or by the wall's without timestamps [ms]."""
         frame = Frame(self._device)
         started = time.perf_counter()
         frame.compute("lobe", program, self._bound, (self._load.side, self._load.side))

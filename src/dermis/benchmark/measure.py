@@ -10,10 +10,9 @@ from dataclasses import asdict, dataclass
 from itertools import cycle, islice
 from pathlib import Path
 
-from dermis.benchmark.cases import FRAGMENTS, Case
+from dermis.benchmark.cases import FRAGMENTS, Case, scenes_of, settings_of
 from dermis.benchmark.floor import moved_by, stage_bytes
 from dermis.benchmark.gpu_gems_3_fragments import FRAGMENTS as AS_FRAGMENTS
-from dermis.benchmark.scenes import scenes_of, settings_of
 from dermis.frame.renderer import Renderer
 from dermis.gpu.device import gpu_failures
 from dermis.gpu.frame import Timed
