@@ -5,7 +5,6 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass
 from itertools import cycle, islice
 from pathlib import Path
@@ -87,14 +86,8 @@ def measure(renderer: Renderer, case: Case, head: Head, folder: Path, rate: floa
 
     Raises DermisError for frames that the device cannot hold.
     """
-    with gpu_failures(renderer.device), _drawn_as(case):
+    with gpu_failures(renderer.device), TECHNIQUES.including(FRAGMENTS, AS_FRAGMENTS):
         return _measured(renderer, case, head, folder, rate, effort)
-
-
-def _drawn_as(case: Case) -> AbstractContextManager[None]:
-    if case.technique == FRAGMENTS:
-        return TECHNIQUES.including(FRAGMENTS, AS_FRAGMENTS)
-    return nullcontext()
 
 
 def _measured(renderer: Renderer, case: Case, head: Head, folder: Path, rate: float, effort: Effort) -> Row:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -34,13 +34,12 @@ class Studio:
         self.side = side
         self._adapter, self._settings = adapter, settings
         self.frames_ms: list[float] = []
-        self._open = cache(lambda: Renderer(self._adapter))
         self._load = cache(load_head)
 
-    @property
+    @cached_property
     def renderer(self) -> Renderer:
         """The renderer, opened on first use."""
-        return self._open()
+        return Renderer(self._adapter)
 
     def head(self, name: str | None = None) -> Head:
         """The head to show, or another one; all but the bust are subdivided once."""
@@ -75,7 +74,7 @@ class Studio:
         return np.asarray(download(self.renderer.device, texture), np.uint8)[..., :3]
 
     def light_map(self, scene: Scene, level: int, **settings: Any) -> NDArray[np.float32]:
-        """(n, n, 3) light on the atlas, irradiance over pi: level 0 as it enters, higher ones more blurred."""
+        """(n, n, 3) light on the atlas, irradiance over pi: level 0 as it enters, higher levels blurred."""
         from dermis.gpu import download
 
         chosen = self.settings(**settings)

@@ -128,7 +128,9 @@ def _three_points(
     """
     flux, mean, square = _central(corners, light, area, first, end)
     centre, total = mean.pop(), np.maximum(flux.sum(axis=1), np.finfo(float).tiny)
-    lengths, axes = _axes(sum(square) / total[:, None, None])
+    squares, axes = np.linalg.eigh(sum(square) / total[:, None, None])
+    # A patch of surface is nearly flat: its two longer axes will do.
+    lengths, axes = np.sqrt(squares[:, 1:].clip(0)), axes[..., 1:]
     arms = np.einsum("kj,nj,naj->nka", _CIRCLE, lengths, axes)
     parts = _shared(flux, mean, lengths, axes)
     safe = np.where(flux > 0, flux, np.inf)
@@ -184,12 +186,6 @@ def _triangle_moments(corners: Floats, light: Floats, area: Floats) -> tuple[Flo
     square = (even + crossed + crossed.swapaxes(1, 2) + own) * (area / 60)[:, None, None]
     moment = (weighted + sum_light[:, None] * sum_place) * (area / 12)[:, None]
     return sum_light * area / 3, moment, square
-
-
-def _axes(covariance: Floats) -> tuple[Floats, Floats]:
-    """Deviations (n, 2) along the two longer axes (n, 3, 2); a patch of surface is nearly flat."""
-    squares, axes = np.linalg.eigh(covariance)
-    return np.sqrt(squares[:, 1:].clip(0)), axes[..., 1:]
 
 
 def _shared(flux: Floats, mean: list[Floats], lengths: Floats, axes: Floats) -> Floats:

@@ -36,11 +36,6 @@ class Patch:
     centre_mm: Floats
     radius_mm: float
 
-    @property
-    def judged(self) -> NDArray[np.bool_]:
-        """Vertices (n,) within the radius of the centre."""
-        return self.holds(self.positions)
-
     def holds(self, positions: Floats) -> NDArray[np.bool_]:
         """Which positions (m, 3) [mm] lie within the radius of the centre."""
         inside: NDArray[np.bool_] = np.linalg.norm(positions - self.centre_mm, axis=1) <= self.radius_mm
