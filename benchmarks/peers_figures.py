@@ -1,4 +1,4 @@
-"""Noise, error against the truth, and how long Cycles needs to get as near to it as we are."""
+"""Noise, error against the truth, and how long Cycles needs to come as close to it as we do."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 NAMES = {"random-walk": "Cycles, random walk", "burley": "Cycles, Burley"}
 CLEAN = 0.05
-"""Noise that is still seen, but no longer hides the picture."""
+"""Noise that is still visible, but no longer hides the picture."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Mean:
 
 
 def figures(measured: Measured) -> dict[str, Any]:
-    """All that is told of one scene, ready for JSON."""
+    """The figures of one scene, ready for JSON."""
     mask = seen(measured)
     means = {method: converged(turns) for method, turns in measured.cycles.items()}
     ours = [_our_row(measured, name, mask) for name in OURS]

@@ -1,4 +1,4 @@
-"""Ours, Cycles and Mitsuba render one scene in turns, so that whatever slows the machine slows them all."""
+"""Ours, Cycles and Mitsuba render a scene in turns, so that whatever slows the machine slows all of them."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ OURS = {
     "half-space skin, atlas 512": Way("texture-space", 512, "half-space"),
     "screen space": Way("screen-space", 64),
 }
-"""By what they are called in the table; screen space has no use for an atlas."""
+"""By their names in the table; screen space needs no atlas."""
 OF_2007 = {"passes of 2007 as compute": Way(GPU_GEMS_3), "passes of 2007 as fragments": Way(FRAGMENTS)}
 """The structure of 2007 in our renderer, to set beside the first of ours."""
 SEEDS = (100, 200)

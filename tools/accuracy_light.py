@@ -31,7 +31,7 @@ UP = np.array([0.0, 1.0, 0.0])
 
 
 def looked_up(layer: Array, towards: Array) -> Array:
-    """(n, 3) of a layer (h, w, 3) in n directions, bilinear, as the shader reads it."""
+    """(n, 3) of a layer (h, w, 3) in n directions, interpolated as in the shader."""
     height, width = layer.shape[:2]
     x = (0.5 + np.arctan2(towards[:, 0], -towards[:, 2]) / (2 * np.pi)) * width - 0.5
     y = np.arccos(np.clip(towards[:, 1], -1, 1)) / np.pi * height - 0.5
@@ -64,7 +64,7 @@ def irradiance_error(name: str, count: int = 200) -> float:
 
 
 def reflection_error(name: str, m: float, cosine: float, count: int = 60) -> float:
-    """Root mean square error of reflected radiance over random normals and views, of its mean."""
+    """Root mean square error of reflected radiance over random normals and views, over its mean."""
     towards, light, made = panorama(name)
     rng = np.random.default_rng(2)
     normals = unit(rng.normal(size=(count, 3)))
@@ -98,7 +98,7 @@ def reflected(layers: Array, towards: Array, m: float) -> Array:
 
 
 def furnace(renderer: dermis.Renderer, head: Head, energy: str, **chosen: str) -> Array:
-    """Least, mean and largest outgoing over incoming radiance of a white head under light from everywhere."""
+    """Least, mean and largest outgoing over incoming radiance of a white head under uniform light."""
     white = replace(head, maps=replace(head.maps, colour=np.ones((4, 4, 3), np.float32)))
     skin = Skin(energy=energy)  # type: ignore[arg-type]
     scene = Scene(white, environment=Environment(name="uniform"), skin=skin)
@@ -149,7 +149,7 @@ def as_points(light: RectangleLight, side: int = 8) -> list[PointLight]:
 
 
 def soft_shadow_error(renderer: dermis.Renderer, rig: str) -> tuple[float, float]:
-    """Bias and root mean square difference from 64 points, of the mean radiance."""
+    """Bias and root mean square difference from 64 point lights, over the mean radiance."""
     light = load_lights(rig)[0]
     assert isinstance(light, RectangleLight)
     head = dermis.load_head("lee_perry_smith")
@@ -175,7 +175,7 @@ def occlusion_error(renderer: dermis.Renderer) -> float:
 
 
 def tables(adapter: str = "auto") -> dict[str, str]:
-    """What the page says of light, by the names in its template."""
+    """The tables of light, by their names in the page's template."""
     renderer = dermis.Renderer(adapter)
     shadows = [(rig, *soft_shadow_error(renderer, rig)) for rig in ("window", "top", "rim")]
     return {

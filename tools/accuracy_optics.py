@@ -142,7 +142,7 @@ def table_note() -> str:
 
 
 def tables() -> dict[str, str]:
-    """Everything that the page has room for, by the names it uses."""
+    """All tables, by their names in the page's template."""
     return {
         "models": models_table(),
         "fits": fits_table(),

@@ -53,7 +53,7 @@ def scattered(
 
 
 def summed(mesh: Mesh, way: Array, places: Array, spacing: float) -> Array:
-    """What the profile brings to places by straight lines, from all of the surface."""
+    """Light at places by the profile of straight-line distance, summed over the surface."""
 
     def light(at: Places) -> Array:
         normals = at.interpolate(mesh, mesh.normals)
@@ -79,7 +79,7 @@ def slabs(renderer: dermis.Renderer) -> str:
 
 
 def across_air(mesh: Mesh, way: Array, places: Array, normals: Array) -> Array:
-    """Red light that the sum brings to places from others which face them and not their inside."""
+    """Red light in the sum that would cross air rather than tissue."""
     atlas = cached_atlas(mesh, ATLAS, "stitched")
     given = giving(mesh, atlas, texels(atlas), ATLAS // 2, np.ones(len(mesh.triangles), bool))
     flux = given.area_mm2 * np.maximum(given.normal @ -way, 0.0)
@@ -160,7 +160,7 @@ def ears(renderer: dermis.Renderer) -> str:
 
 
 def tables(adapter: str = "auto") -> dict[str, str]:
-    """What the page says of thin parts, by the names in its template."""
+    """The tables of thin parts, by their names in the page's template."""
     renderer = dermis.Renderer(adapter)
     return {
         "thin_slabs": slabs(renderer),
