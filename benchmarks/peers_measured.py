@@ -15,8 +15,7 @@ from dermis.comparison.scenes import medium_scene, usual_region
 from dermis.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
-from dermis.optics.media import Medium
-from dermis.optics.presets import media
+from dermis.optics.media import Medium, media
 from dermis.reference.cycles import CyclesPass, Method, cycles_passes
 from dermis.reference.path_traced import SAMPLES_PER_PASS, PathTraced, path_trace
 from dermis.scene.model import Scene

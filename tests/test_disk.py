@@ -15,7 +15,7 @@ from dermis.atlas import cached
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.cached import cached_atlas
 from dermis.disk import cached_array, cached_mips
-from dermis.mesh.cached import cached_mesh
+from dermis.mesh.load import cached_mesh
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import plane, uv_sphere
 

@@ -16,11 +16,14 @@ class Registry(Mapping[str, T], Generic[T]):
     """Entries of one kind by name, in the order in which they were registered.
 
     An entry is the object itself, or "module:attribute" for one that is imported on first use.
+
+    changes : how often entries have been added or taken away
     """
 
     def __init__(self, kind: str, entries: Mapping[str, T | str] | None = None) -> None:
         """kind : what an entry is, for messages: "technique", say"""
         self.kind = kind
+        self.changes = 0
         self._entries: dict[str, T | str] = dict(entries or {})
         self._summaries: dict[str, str] = {}
 
@@ -36,6 +39,7 @@ class Registry(Mapping[str, T], Generic[T]):
                 f"{self.kind} {name}", "a name of its own", "it is registered already", "Choose another name"
             )
         self._entries[name] = entry
+        self.changes += 1
         if summary:
             self._summaries[name] = summary
 
@@ -46,7 +50,13 @@ class Registry(Mapping[str, T], Generic[T]):
         try:
             yield
         finally:
-            del self._entries[name]
+            self.remove(name)
+
+    def remove(self, name: str) -> None:
+        """Take an entry out again; nothing happens when it is not there."""
+        self._entries.pop(name, None)
+        self._summaries.pop(name, None)
+        self.changes += 1
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -57,21 +67,11 @@ class Registry(Mapping[str, T], Generic[T]):
         """What each name stands for, of those that say so: "name: summary"."""
         return [f"{name}: {summary}" for name, summary in self._summaries.items()]
 
-    def check(self, name: str) -> str:
-        """The name itself.
-
-        Raises ValueError for one that is not registered, worded as what was expected.
-        """
-        if name not in self._entries:
-            raise ValueError(f"one of {', '.join(self._entries)}")
-        return name
-
     def __getitem__(self, name: str) -> T:
         """Raises DermisError for a name that is not registered."""
-        try:
-            entry = self._entries[self.check(name)]
-        except ValueError as error:
-            refuse(self.kind, str(error), f"{name!r} came", "Correct it")
+        entry = self._entries.get(name)
+        if entry is None:
+            refuse(self.kind, f"one of {', '.join(self._entries)}", f"{name!r} came", "Correct it")
         if isinstance(entry, str):
             module, _, attribute = entry.partition(":")
             entry = self._entries[name] = cast(T, getattr(import_module(module), attribute))
@@ -102,7 +102,7 @@ class Named:
     def check(self, name: str) -> str:
         """The name itself.
 
-        Raises ValueError for one that is neither registered nor one of the others.
+        Raises ValueError for one that is neither registered nor one of the others, worded as expected.
         """
         if name not in self.names:
             raise ValueError(f"one of {', '.join(self.names)}")

@@ -11,13 +11,12 @@ import numpy as np
 import pytest
 
 from dermis.atlas.atlas import build_atlas
-from dermis.cli.render_scene import assemble
+from dermis.cli.scene_options import SceneOptions, assemble
 from dermis.errors import DermisError
 from dermis.human.bust.regions import REGIONS, region_of
 from dermis.human.regions import apply
-from dermis.human.regions.labels import label_texels
-from dermis.human.regions.landmarks import AVERAGE, average_landmarks, known_landmarks, to_average
-from dermis.human.regions.soften import soften
+from dermis.human.regions.apply import soften
+from dermis.human.regions.labels import AVERAGE, average_landmarks, known_landmarks, label_texels, to_average
 from dermis.human.regions.table import RegionTable, load_table
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -222,13 +221,13 @@ def test_tables_that_cannot_be_are_refused(
 
 def test_the_command_refuses_before_it_loads() -> None:
     with pytest.raises(DermisError, match=r"nowhere.toml: expected default, or regions in TOML"):
-        assemble("nobody.obj", {"regions": "nowhere.toml"})
+        assemble("nobody.obj", SceneOptions(head={"regions": "nowhere.toml"}))
     with pytest.raises(DermisError, match="--rho-s: expected one or the other"):
-        assemble("nobody.obj", {"regions": "default", "rho_s": 0.2})
+        assemble("nobody.obj", SceneOptions(head={"regions": "default"}, skin={"rho_s": 0.2}))
 
 
 def test_the_command_gives_the_scan_its_regions(sample_folder: Path) -> None:
-    scene, _ = assemble(SCAN, {"regions": "default"})
+    scene, _ = assemble(SCAN, SceneOptions(head={"regions": "default"}))
     low, high = load_table("default").values.min(axis=0), load_table("default").values.max(axis=0)
     roughness, specular = scene.head.maps.roughness, scene.head.maps.specular
     assert roughness is not None and specular is not None

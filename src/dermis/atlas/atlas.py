@@ -1,4 +1,4 @@
-"""The surface atlas: which point of the surface each texel of the uv map stands for."""
+"""The surface atlas: the point of the surface that each texel of the uv map stands for."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ class Atlas:
     """Texel -> surface, once per mesh and size. Row 0 is the top of the maps (v = 0).
 
     triangle : (n, n) int32 triangle at the texel's centre, -1 where none is. Beyond a chart's edge it is the
-        nearest one or, in a stitched layout, the one that truly follows there
+        nearest one or, in a stitched layout, the one across the seam
     barycentric : (n, n, 2) uint16 weights of the triangle's second and third corner [1/65535]
     stretch : (n, n, 2) float16 texels per mm along u and v [1/mm]; beyond an edge as they are there
     shear : (n, n) float16 cosine of the angle that the directions of u and v make on the surface
     reach : (n, n, 4) uint16 texels to the left, right, up and down of the same chart without a gap between
     place : (f, 3, 2) float32 uv of each triangle's corners in the atlas, v down
-    gutter : (a, 2) uint16 texels (x, y) beyond a chart's edge, which show what other texels compute
-    source : (a, 2) float32 where that is [texel], whole numbers at texel centres
+    gutter : (a, 2) uint16 texels (x, y) beyond a chart's edge, which copy what other texels compute
+    source : (a, 2) float32 place that each copies [texel], whole numbers at texel centres
     mapped : (f,) triangles that own texels; the others (opaque, collapsed, overlapped in uv) are lit directly
     """
 
@@ -51,13 +51,12 @@ class Atlas:
 
     @property
     def coverage(self) -> NDArray[np.bool_]:
-        """(n, n) texels that hold surface, gutter included."""
-        covered: NDArray[np.bool_] = self.triangle >= 0
-        return covered
+        """(n, n) texels that show surface, gutters included."""
+        return np.asarray(self.triangle >= 0)
 
     @property
     def own(self) -> NDArray[np.bool_]:
-        """(n, n) texels that hold surface of their own, gutter included, the gutters not."""
+        """(n, n) texels that hold surface of their own, without the gutters that copy others."""
         own = self.coverage
         own[self.gutter[:, 1], self.gutter[:, 0]] = False
         return own
@@ -77,8 +76,7 @@ class Atlas:
     ) -> NDArray[np.float64]:
         """(n, n, c) of a (v, c) corner attribute, or those of some rows; undefined outside the coverage."""
         corners = values[mesh.triangles[np.maximum(self.triangle[rows], 0)]].astype(float)
-        total: NDArray[np.float64] = np.einsum("yxk,yxkc->yxc", self.weights(rows), corners)
-        return total
+        return np.asarray(np.einsum("yxk,yxkc->yxc", self.weights(rows), corners))
 
 
 def build_atlas(mesh: Mesh, size: int, layout: str = "mesh", reach_mm: float = REACH_MM) -> Atlas:
@@ -92,12 +90,11 @@ def build_atlas(mesh: Mesh, size: int, layout: str = "mesh", reach_mm: float = R
     Raises DermisError when the size is under 64.
     """
     if size < SMALLEST:
-        refuse(
-            "atlas", f"a size of {SMALLEST} texels or more", f"it is {size}", "Choose --atlas 1024 or 2048"
-        )
+        expected = f"a size of {SMALLEST} texels or more"
+        refuse("atlas", expected, f"it is {size}", "Choose --atlas 1024 or 2048")
     if layout not in LAYOUTS:
         refuse("layout", f"one of {', '.join(LAYOUTS)}", f"{layout} came", "Choose one of these")
-    from dermis.atlas.own import build_own_layout
+    from dermis.atlas.raster import build_own_layout
 
     if layout == "stitched":
         from dermis.atlas.stitched.build import build_stitched

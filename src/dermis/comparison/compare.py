@@ -17,7 +17,7 @@ from dermis.frame.renderer import Renderer
 from dermis.frame.surface_points import surface_points
 from dermis.images.colour import encode_srgb
 from dermis.mesh.head import Head
-from dermis.optics.presets import media
+from dermis.optics.media import media
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 

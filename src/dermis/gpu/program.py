@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import cached_property
 from operator import itemgetter
 from pathlib import Path
@@ -256,27 +256,22 @@ class FragmentProgram(Program):
         return int(wgpu.ShaderStage.FRAGMENT)
 
 
-def compiled(
-    kind: Callable[..., P],
-    device: Device,
-    path: Path,
-    folders: tuple[Folder, ...] = (),
-    constants: Constants = (),
-    suited: Constants = (),
-    **options: Any,
-) -> P:
-    """A program of that kind with these pipeline constants, compiled unless it is one of those used last.
+def compiled(device: Device, shader: Hashable, constants: Constants, make: Callable[[], P]) -> P:
+    """What `make` compiles of a shader with these pipeline constants, unless it is one of those used last.
 
-    suited : constants that suit the device, for shaders that have them
-    options : those of the kind
+    shader : what tells it from others
     """
-    variants: dict[Any, P] = device.programs.setdefault((kind, path, folders, str(options)), {})
+    variants: dict[Constants, P] = device.programs.setdefault(shader, {})
     found = variants.pop(constants, None)
     if found is None:
-        text = compose(path, (*folders, _TOOLKIT_SHADERS)).text
-        own = {name: value for name, value in suited if f"override {name}:" in text}
-        found = kind(device, path, folders, own | dict(constants), **options)
+        found = make()
     variants[constants] = found  # the last one
-    for oldest in list(variants)[:-_MOST_VARIANTS]:
-        del variants[oldest]
+    if len(variants) > _MOST_VARIANTS:
+        del variants[next(iter(variants))]
     return found
+
+
+def declared(path: Path, folders: Sequence[Folder], constants: Constants) -> dict[str, float]:
+    """Those of some pipeline constants that the shader has."""
+    text = compose(path, (*folders, _TOOLKIT_SHADERS)).text
+    return {name: value for name, value in constants if f"override {name}:" in text}

@@ -54,8 +54,7 @@ class Mesh:
     @property
     def size_mm(self) -> NDArray[np.float32]:
         """Extent along x, y and z [mm]."""
-        extent: Floats = self.positions.max(axis=0) - self.positions.min(axis=0)
-        return extent
+        return np.asarray(self.positions.max(axis=0) - self.positions.min(axis=0))
 
     @cached_property
     def outline(self) -> NDArray[np.float64]:

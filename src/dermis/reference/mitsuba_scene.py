@@ -14,7 +14,8 @@ import numpy as np
 from dermis.errors import refuse
 from dermis.mesh.head import Head
 from dermis.optics.media import Layer, Medium
-from dermis.reference.mitsuba_lights import emitter, rgb, surroundings
+from dermis.reference.described import rgb, surroundings
+from dermis.reference.lights import emitter
 from dermis.reference.mitsuba_solid import Solid, inwards, skin_solid
 from dermis.scene.camera import Camera
 from dermis.scene.model import Scene

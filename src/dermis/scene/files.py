@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,8 +14,9 @@ from dermis.human.regions.table import load_table
 from dermis.mesh.head import Head
 from dermis.scene.camera import PRESETS, Camera, preset
 from dermis.scene.environment import Environment
-from dermis.scene.heads import HeadTable, load_head
-from dermis.scene.lights import LIGHTS, Light
+from dermis.scene.head_table import HeadTable
+from dermis.scene.heads import load_head
+from dermis.scene.lights import LIGHTS, Light, preset_lights
 from dermis.scene.model import Scene
 from dermis.scene.plain import ImpossibleError, Plain
 from dermis.scene.settings import Settings
@@ -25,12 +27,6 @@ NO_LIGHTS = "none"
 """Name of the rig without lights, for an environment alone."""
 _PARTS = {"head", "skin", "lights", "environment", "camera", "render"}
 _MAPS = ("colour", "normal", "height", "specular", "roughness")
-
-
-def preset_lights(name: str) -> tuple[Light, ...]:
-    """The lights of a preset of the package."""
-    text = (resources.files("dermis.scene") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
-    return _lights(f"preset {name}", tomllib.loads(text).get("lights"))
 
 
 def load_lights(name: str) -> tuple[Light, ...]:
@@ -68,37 +64,46 @@ def load_scene(path: Path, known: Head | None = None) -> tuple[Scene, Settings]:
     settings = _made(Settings, path, "render", table.get("render", {}))
     described = _made(HeadTable, path, "head", table.get("head"))
     _check_said_once(path, described, skin)
-    head, skin = (known, skin) if known else _head(path, described, skin)
+    head, skin = (known, skin) if known else head_and_skin(described, skin, path.parent)
     environment = _environment(path, table["environment"]) if "environment" in table else None
     lights, camera = table.get("lights"), table.get("camera", "portrait")
     if lights is None:
         lights = "studio" if environment is None else NO_LIGHTS
     return Scene(
         head,
-        lights=load_lights(_beside(path, lights)) if isinstance(lights, str) else _lights(path, lights),
+        lights=load_lights(_beside(path.parent, lights))
+        if isinstance(lights, str)
+        else _lights(path, lights),
         environment=environment,
-        camera=load_camera(_beside(path, camera), head)
+        camera=load_camera(_beside(path.parent, camera), head)
         if isinstance(camera, str)
         else _made(Camera, path, "camera", camera),
-        skin=skin.model_copy(update={"profile": _beside(path, skin.profile)}),
+        skin=skin.model_copy(update={"profile": _beside(path.parent, skin.profile)}),
     ), settings
 
 
 def head_table(path: Path) -> dict[str, Any]:
     """The [head] of a scene's file with names that hold from any folder."""
-    table = dict(_read(path, "a scene in TOML").get("head", {}))
-    for role in ("name", "regions", *_MAPS):
-        if isinstance(table.get(role), str) and (path.parent / table[role]).is_file():
-            table[role] = str((path.parent / table[role]).resolve())
-    return table
+    return with_whole_names(_read(path, "a scene in TOML").get("head", {}), path.parent)
 
 
-def _head(path: Path, table: HeadTable, skin: Skin) -> tuple[Head, Skin]:
-    """The head, and the skin with the mean strength that a table of regions gives it."""
-    regions = None if table.regions is None else load_table(_beside(path, table.regions))
+def with_whole_names(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """A [head] whose files, in a folder, have names that hold from any other."""
+    named = {role: folder / table[role] for role in ("name", "regions", *_MAPS) if role in table}
+    return {**table} | {role: str(file.resolve()) for role, file in named.items() if file.is_file()}
+
+
+def head_and_skin(table: HeadTable, skin: Skin, folder: Path) -> tuple[Head, Skin]:
+    """The head of a [head] table, and the skin with the mean strength that a table of regions gives it.
+
+    folder : where the files lie that the table names
+
+    Raises DermisError for files that cannot be used.
+    """
+    regions = None if table.regions is None else load_table(_beside(folder, table.regions))
     options = table.model_dump(exclude={"name", "regions"}, exclude_none=True)
-    options |= {role: path.parent / options[role] for role in _MAPS if role in options}
-    head = load_head(_beside(path, table.name), **options)
+    options |= {role: folder / options[role] for role in _MAPS if role in options}
+    head = load_head(_beside(folder, table.name), **options)
     if regions is None:
         return head, skin
     head, rho_s = with_regions(head, regions)
@@ -114,12 +119,12 @@ def _check_said_once(path: Path, table: HeadTable, skin: Skin) -> None:
 
 def _environment(path: Path, table: Any) -> Environment:
     environment = _made(Environment, path, "environment", table)
-    return environment.model_copy(update={"name": _beside(path, environment.name)})
+    return environment.model_copy(update={"name": _beside(path.parent, environment.name)})
 
 
-def _beside(path: Path, name: str) -> str:
-    """The file of that name in the scene's folder if there is one, else the name, of a preset mostly."""
-    file = path.parent / name
+def _beside(folder: Path, name: str) -> str:
+    """The file of that name in a scene's folder if there is one, else the name, of a preset mostly."""
+    file = folder / name
     return str(file) if file.is_file() else name
 
 

@@ -8,13 +8,14 @@ from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_ori
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
-from pydantic_core import ErrorDetails
+from pydantic_core import ErrorDetails, PydanticUndefined
 
 from dermis.errors import DermisError
 from dermis.registry import Named
 
 FARTHEST_MM = 1e6
 _LONGEST = 80  # letters of what came
+_VAST = 1e5  # bounds beyond it only keep numbers finite
 
 
 def _direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -49,7 +50,7 @@ class Plain(BaseModel):
     The docstring under a field is its help, in the command line, the viewer and the documentation.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True, defer_build=True)
 
     def __init__(self, **data: Any) -> None:
         try:
@@ -95,9 +96,21 @@ def range_of(model: type[BaseModel], field: str) -> Range | None:
     return _range(model.model_fields[field])
 
 
-def bounds_of(model: type[BaseModel], field: str) -> tuple[float | None, float | None]:
-    """The least and the greatest that a number may be, None where there is no such bound."""
-    return _bounds(model.model_fields[field])
+def values_of(model: type[BaseModel], field: str) -> str:
+    """The words that a field may be, or the bounds of a number where they say something."""
+    low, high = _bounds(model.model_fields[field])
+    if low is not None and high is not None and high < _VAST:
+        return f"{low:g} to {high:g}"
+    return ", ".join(choices_of(model, field))
+
+
+def shown(value: Any) -> str:
+    """A default as it is typed; nothing where a setting is off or left out."""
+    if isinstance(value, tuple):
+        return ("x" if all(isinstance(one, int) for one in value) else ",").join(map(shown, value))
+    if value is None or isinstance(value, bool) or value is PydanticUndefined:
+        return ""
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _named(info: FieldInfo) -> list[Named]:

@@ -77,8 +77,8 @@ class Skin(Plain):
     rho_s: Annotated[float, Field(ge=0, le=1)] = 0.18
     """Strength of the surface reflection."""
     oiliness: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """One dial over both: 1 is shiny skin, with 3 times the strength and 0.6 times the roughness; an artist's
-    mapping, not a measured one."""
+    """One dial over strength and roughness: 1 is shiny skin, 3 times as strong and 0.6 times as rough; an
+    artist's mapping, not a measured one."""
     specular: SpecularName = "kelemen"
     """Model of the surface reflection; "none" leaves it out."""
     fresnel: FresnelName = "schlick"
@@ -86,8 +86,8 @@ class Skin(Plain):
     specular_colour: Literal["white", "wrong"] = "white"
     """Colour of reflections; "wrong" tints them by the colour map, for comparison."""
     energy: EnergyName = "full"
-    """Energy that the surface reflects and that therefore does not enter: all of it ("full"), the deck's, pi
-    times too large ("published"), or "none"."""
+    """Light that the surface reflects does not enter: "full" subtracts it all, "published" as the deck does,
+    pi times too much, "none" nothing."""
     direction: Literal["lambertian", "half-space"] = "lambertian"
     """How skin returns light: "lambertian" alike from and to all directions; "half-space" as a half-space
     of the skin's mean colour: more of what arrives at a slant, and light scattered once leaves at a slant."""

@@ -8,19 +8,9 @@ from dermis.scene.environment import Environment
 from dermis.scene.lights import Light
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
+from dermis.scene.techniques import TECHNIQUES
 
 _FRAME = ("dEonLuebke2007", "Burns2013")
-_TECHNIQUES = {
-    "texture-space": ("dEonLuebke2007", "Geusebroek2003"),
-    "none": (),
-    "one-blur": ("Borshukov2003", "Green2004"),
-    "gpu-gems-3": ("dEonLuebke2007",),
-    "screen-space": ("Jimenez2015",),
-    "pre-integrated": ("Penner2011",),
-}
-_CUT = ("one-blur", "gpu-gems-3")  # which stitch nothing
-_WITH_SEAMS = ("texture-space", *_CUT)
-_WITH_TRANSMISSION = ("texture-space", "gpu-gems-3")
 _FRESNEL = {"schlick": ("Schlick1994", "Dudash2007"), "exact": ("CookTorrance1982",)}
 _HALF_SPACE = ("Chandrasekhar1960", "Jensen2001")
 _TONES = {"none": (), "filmic": ("Hable2010",), "neutral": ("Khronos2024",)}
@@ -58,10 +48,10 @@ def sources_of(
 
 def scattering_sources(settings: Settings) -> tuple[str, ...]:
     """Of the technique, of what it does at the seams, and of light through thin parts."""
-    technique = settings.technique
-    remedied = settings.seams != "stitch" or technique in _CUT
-    keys = _TECHNIQUES[technique] + ("Dudash2007",) * (remedied and technique in _WITH_SEAMS)
-    if settings.transmission == "thin" and technique in _WITH_TRANSMISSION:
+    technique = TECHNIQUES[settings.technique]
+    remedied = settings.seams != "stitch" or not technique.stitches
+    keys: tuple[str, ...] = technique.sources + ("Dudash2007",) * (remedied and technique.on_atlas)
+    if settings.transmission == "thin" and technique.transmits:
         keys += ("JensenBuhler2002",)
     return keys
 

@@ -10,10 +10,10 @@ _HOME = "dermis.frame.techniques"
 
 TECHNIQUES: Registry[Any] = Registry("technique")
 for _name, _summary in {
-    "texture-space": "blurs light over the atlas",
     "none": "dry skin, without scattering",
     "one-blur": "a single blur of the light map",
     "gpu-gems-3": "the passes of 2007 as they were",
+    "texture-space": "blurs light over the atlas",
     "screen-space": "blurs the picture, as engines do",
     "pre-integrated": "tables over curvature, as engines use them",
 }.items():

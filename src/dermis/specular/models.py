@@ -1,4 +1,4 @@
-"""Every model of the surface by its name, behind one protocol; the models are imported when first used."""
+"""Every model of the surface by its name, behind one protocol."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class Lobe(Protocol):
 class Model:
     """A lobe and what is to be said of it.
 
-    Its shader, beside the lobe's module and of the same name, has `fn NAME(a: Angles, m: f32) -> f32` with NAME as
-    in scene files, hyphens turned into underscores.
+    Its shader lies beside the lobe's module under the same name and has `fn NAME(a: Angles, m: f32) -> f32`,
+    NAME as in scene files, with underscores for hyphens.
 
     note : what the model is; for one that is not reciprocal, why
     reciprocal : whether light and view may change places
@@ -63,7 +63,7 @@ MODELS: Registry[Model] = Registry(
         "kelemen-direct": "dermis.specular.kelemen:KELEMEN_DIRECT",
     },
 )
-"""By the names that scenes use."""
+"""By the names that scenes use; imported when needed, so that a command's help is quick."""
 
 SpecularName = Annotated[str, Named(MODELS, "none")]
 FresnelName = Literal["schlick", "exact"]

@@ -50,8 +50,8 @@ PHONG = Model(
 )
 PHONG_PLAIN = Model(
     phong_plain,
-    "a power of the mirror direction as first published; not reciprocal, for its highlight has no cosine of the "
-    "light and its reflectance is that of the angle of incidence",
+    "a power of the mirror direction as first published; not reciprocal, for its highlight has no cosine "
+    "of the light and its reflectance is that of the angle of incidence",
     reciprocal=False,
     sources=("Phong1975",),
 )

@@ -21,9 +21,9 @@ _UP = np.array([0.0, 1.0, 0.0])
 class Kind(Generic[L]):
     """Light from one place or, where it is parallel, in one direction.
 
-    Its shader NAME.wgsl, beside the module, has
-    `fn NAME_incident(light: Light, p: vec3f, part: u32) -> Incident`
-    with NAME as in scene files, hyphens turned into underscores.
+    Its shader lies beside its module under the same name and has
+    `fn NAME_incident(light: Light, p: vec3f, part: u32) -> Incident`,
+    NAME as in scene files, with underscores for hyphens.
 
     always : whether all shaders have it; others are compiled for the scenes that call for them
     narrow : whether all of it comes from its position or along its direction

@@ -21,7 +21,6 @@ MAP_SIZE = 512
 FORM = f"1 {DIRECTIONS} {MAP_SIZE}"
 """Differs when baking gives other results."""
 _BATCH = 32  # depth maps at a time
-_DIRECTIONAL = 2  # lights.wgsl
 
 
 def bake_occlusion(
@@ -62,7 +61,7 @@ def _lights(shader: ComputeProgram, views: list[ShadowView]) -> Any:
     record = shader.record("Lights")
     for layer, view in enumerate(views):
         light = record["light"][layer]
-        light["kind"], light["layer"], light["half_width"] = _DIRECTIONAL, layer, 1
+        light["parallel"], light["layer"], light["half_width"] = 1, layer, 1
         light["direction"] = np.cross(view.up, view.right)
         light["to_map"], light["texel"] = view.clip.T, view.texel
     return record

@@ -16,15 +16,15 @@ from dermis.atlas.atlas import Atlas, build_atlas
 from dermis.disk import cache_folder
 from dermis.errors import refuse
 from dermis.human.bust import BUSTS
+from dermis.human.bust.mesh import bust_mesh, many_charts_mesh
 from dermis.human.bust.parameters import BustParameters
 from dermis.human.bust.regions import REGIONS
-from dermis.human.bust.uv_layout import bust_mesh, many_charts_mesh
 from dermis.human.skin_maps.look import SkinLook
 from dermis.human.skin_maps.paint import Painted, paint_skin
 from dermis.images.codecs import encode_png8, encode_png16
 from dermis.images.colour import encode_srgb8
-from dermis.images.fill import fill_empty
-from dermis.mesh.gltf_write import encode_glb
+from dermis.images.filters import fill_empty
+from dermis.mesh.gltf import encode_glb
 from dermis.mesh.mesh import Mesh
 from dermis.outputs import reason, replacing
 
@@ -35,6 +35,16 @@ SMALLEST, LARGEST = 256, 4096
 _STRIP = 256  # rows painted at a time
 _RELIEF_MM = 1.0  # full scale of the height map
 _STRENGTH = 0.5  # full scale of the specular map
+_MATERIAL = {
+    "name": "skin",
+    "pbrMetallicRoughness": {
+        "baseColorTexture": {"index": "colour"},
+        "metallicRoughnessTexture": {"index": "metallic roughness"},
+        "metallicFactor": 0.0,
+    },
+    "normalTexture": {"index": "normal"},
+    "extensions": {"KHR_materials_ior": {"ior": 1.4}},
+}
 
 
 @dataclass(frozen=True)
@@ -61,13 +71,14 @@ class BustRecipe:
 def cached_bust(name: str) -> Path:
     """The file of a built-in head, made on first use."""
     recipe = BustRecipe(layout="few" if name == BUSTS[0] else "many")
-    path = cache_folder() / "bust" / f"{name}-{_digest(recipe)}.glb"
+    digest = hashlib.sha256(f"{recipe} {_code()}".encode()).hexdigest()[:24]
+    path = cache_folder() / "bust" / f"{name}-{digest}.glb"
     if not path.is_file():
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as fault:
             came = f"it cannot be made ({reason(fault)})"
-            refuse(path.parent, "a folder for what is kept", came, "Name a writable one in DERMIS_CACHE")
+            refuse(path.parent, "a folder for the cache", came, "Name a writable one in DERMIS_CACHE")
         write_bust(path, recipe)
     return path
 
@@ -82,7 +93,7 @@ def write_bust(path: Path, recipe: BustRecipe, report: Report = lambda done, of:
 def encode_bust(recipe: BustRecipe, report: Report = lambda done, of: None) -> bytes:
     """The bytes of the .glb file: mesh, colour, normal and roughness for any program, all maps in its extras.
 
-    report : called with how much is done, and of how much
+    report : called with the rows done and the rows in all
     """
     mesh = bust_of(recipe)
     atlas = build_atlas(mesh, recipe.size)
@@ -97,18 +108,6 @@ def encode_bust(recipe: BustRecipe, report: Report = lambda done, of: None) -> b
 def bust_of(recipe: BustRecipe) -> Mesh:
     """The mesh of a recipe, with uv."""
     return bust_mesh(recipe.shape) if recipe.layout == "few" else many_charts_mesh(recipe.shape)
-
-
-_MATERIAL = {
-    "name": "skin",
-    "pbrMetallicRoughness": {
-        "baseColorTexture": {"index": "colour"},
-        "metallicRoughnessTexture": {"index": "metallic roughness"},
-        "metallicFactor": 0.0,
-    },
-    "normalTexture": {"index": "normal"},
-    "extensions": {"KHR_materials_ior": {"ior": 1.4}},
-}
 
 
 def _paint(recipe: BustRecipe, mesh: Mesh, atlas: Atlas, report: Report) -> Painted:
@@ -170,18 +169,14 @@ def _normals(slopes: Floats) -> NDArray[np.uint8]:
     return _bytes(0.5 * normal + 0.5)
 
 
-def _digest(recipe: BustRecipe) -> str:
-    return hashlib.sha256(f"{recipe} {_code()}".encode()).hexdigest()[:24]
-
-
 @cache
 def _code() -> str:
-    """A digest of what makes busts, so that a changed generator makes them anew."""
+    """A digest of the generator, so that busts are made again when it changes."""
     package = Path(__file__).parents[2]
     below = ("human/bust", "human/skin_maps", "human/skin_maps/kernels", "atlas/unwrap")
     files = [file for folder in below for kind in ("*.py", "*.csv") for file in (package / folder).glob(kind)]
     digest = hashlib.sha256()
-    used = (package / name for name in ("atlas/atlas.py", "mesh/geometry.py", "mesh/gltf_write.py"))
+    used = (package / name for name in ("atlas/atlas.py", "mesh/geometry.py", "mesh/gltf.py"))
     for file in sorted((*files, *used)):
         digest.update(file.read_bytes())
     return digest.hexdigest()
