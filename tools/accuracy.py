@@ -12,7 +12,7 @@ import accuracy_surface as surface
 import accuracy_thin as thin
 import numpy as np
 
-from dermis.atlas.atlas import build_atlas
+from dermis.atlas.build import build_atlas
 from dermis.gpu import Device, download, open_device
 from dermis.gpu.probe import half_store_rounding
 from dermis.mesh.geometry import build_mesh

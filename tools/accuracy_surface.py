@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 import dermis
-from dermis.atlas.atlas import Atlas, build_atlas
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.build import build_atlas
 from dermis.atlas.cached import cached_atlas
 from dermis.frame.atlas_textures import upload_atlas
 from dermis.frame.levels import Blur, Levels, halvings_of, make_levels, usual_texel

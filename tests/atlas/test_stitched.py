@@ -18,7 +18,8 @@ from cut_meshes import (
 )
 from numpy.typing import NDArray
 
-from dermis.atlas.atlas import Atlas, build_atlas
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.build import build_atlas
 from dermis.atlas.unwrap.charts import grow
 from dermis.atlas.unwrap.unwrap import unwrap
 from dermis.human.bust.mesh import build_bust

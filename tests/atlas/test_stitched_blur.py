@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy.special import eval_legendre
 from tolerances import SEAM
 
-from dermis.atlas.atlas import Atlas, build_atlas
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.build import build_atlas
 from dermis.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]

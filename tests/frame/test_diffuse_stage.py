@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from setups import bent_plane
 from tolerances import FLAT, SHEARED_PEAK, SHEARED_VARIANCE, SPREAD_ENERGY, SPREAD_PEAK, SPREAD_VARIANCE, TWIN
 
-from dermis.atlas.atlas import Atlas, build_atlas
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.build import build_atlas
 from dermis.frame.atlas_textures import AtlasTextures, upload_atlas
 from dermis.frame.levels import FLOATS, Blur, halvings_of, make_levels
 from dermis.frame.passes import combine, diffuse

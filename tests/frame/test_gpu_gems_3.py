@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dermis.atlas.atlas import build_atlas
+from dermis.atlas.build import build_atlas
 from dermis.frame.atlas_textures import upload_atlas
 from dermis.frame.levels import Blur
 from dermis.frame.techniques.gpu_gems_3 import TECHNIQUE

@@ -12,7 +12,8 @@ from cut_meshes import cut_sphere
 from numpy.typing import NDArray
 from tolerances import FLAT, HALVED, HALVES, SPREAD_ENERGY
 
-from dermis.atlas.atlas import Atlas, build_atlas
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.build import build_atlas
 from dermis.frame.atlas_textures import AtlasTextures, _coarser, upload_atlas
 from dermis.frame.coarser import Sheet, halved
 from dermis.frame.levels import FLOATS, Blur, halvings_of, make_levels, scale_of
@@ -44,7 +45,7 @@ def test_halvings_are_the_same_from_disk(
 ) -> None:
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     first, second = upload_atlas(device, atlas), upload_atlas(device, atlas)
-    assert len(list(tmp_path.rglob("*.npz"))) == 1 and len(first.coarser) == len(second.coarser) == 3
+    assert len(list(tmp_path.rglob("*.arrays"))) == 1 and len(first.coarser) == len(second.coarser) == 3
     sheet = Sheet(download(device, first.resources["stretch_map"]), atlas.reach, atlas.gutter, atlas.source)
     for one, other in zip(first.coarser, second.coarser, strict=True):
         sheet = halved(sheet)

@@ -13,7 +13,8 @@ from setups import head_of, run_frame, scene_of
 from tolerances import SLAB_THROUGH
 from translucency_truth import hook, straight
 
-from dermis.atlas.atlas import Atlas, build_atlas
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.build import build_atlas
 from dermis.atlas.translucency.pairs import TranslucentPairs, _in_cells, find_pairs
 from dermis.atlas.translucency.samples import Samples, giving, surface, taking, texels
 from dermis.frame.passes.translucency_weights import upload_pairs, weigh
@@ -126,11 +127,11 @@ def test_what_passes_is_the_same_from_disk(
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     variance, weight, made = BLURRED.variance_mm2, BLURRED.weight, 0
     plain = read_buffer(device, weigh(device, upload_pairs(device, found[2]), variance, weight))
-    assert not list(tmp_path.rglob("*.npz"))
+    assert not list(tmp_path.rglob("*.arrays"))
     for key, factor in (("a", 1.0), ("a", 1.0), ("b", 1.0), ("b", 0.5)):
         words = weigh(device, upload_pairs(device, found[2], key), variance, factor * weight)
         assert np.array_equal(read_buffer(device, words), plain) == (factor == 1.0)
-        made = len(list(tmp_path.rglob("*.npz")))
+        made = len(list(tmp_path.rglob("*.arrays")))
     assert made == (3 if device.adapter.kind == "CPU" else 0)
 
 

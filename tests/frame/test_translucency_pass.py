@@ -9,7 +9,7 @@ from dermis.frame.passes.variants import Constants
 from numpy.typing import NDArray
 from tolerances import TWIN
 
-from dermis.atlas.atlas import build_atlas
+from dermis.atlas.build import build_atlas
 from dermis.atlas.translucency.pairs import TranslucentPairs, find_pairs
 from dermis.frame.levels import FLOATS, Blur, make_levels
 from dermis.frame.passes import translucency

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.atlas.atlas import build_atlas
+from dermis.atlas.build import build_atlas
 from dermis.atlas.raster import rasterise
 from dermis.atlas.unwrap.stretch import singular_values
 from dermis.atlas.unwrap.unwrap import PADDING

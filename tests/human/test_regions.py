@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.atlas.atlas import build_atlas
+from dermis.atlas.build import build_atlas
 from dermis.cli.scene_options import SceneOptions, assemble
 from dermis.errors import DermisError
 from dermis.human.bust.regions import REGIONS, region_of

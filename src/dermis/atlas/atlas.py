@@ -7,14 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
 from dermis.mesh.mesh import Mesh
 
 ALL_ROWS = slice(None)
 GUTTER = 3  # texels around each chart of the mesh's own layout, so that interpolation at its edge finds light
-LAYOUTS = ("mesh", "stitched", "unwrapped")
 REACH_MM = 8.0  # of gutters: 3.4 standard deviations of the widest Gaussian added to another [dEonLuebke2007]
-SMALLEST = 64
 MOST_SHEAR = 0.9  # a map that is sheared more is blurred as if by this much
 
 
@@ -77,31 +74,3 @@ class Atlas:
         """(n, n, c) of a (v, c) corner attribute, or those of some rows; undefined outside the coverage."""
         corners = values[mesh.triangles[np.maximum(self.triangle[rows], 0)]].astype(float)
         return np.asarray(np.einsum("yxk,yxkc->yxc", self.weights(rows), corners))
-
-
-def build_atlas(mesh: Mesh, size: int, layout: str = "mesh", reach_mm: float = REACH_MM) -> Atlas:
-    """The atlas of `size` x `size` texels.
-
-    layout : "mesh" is the mesh's own uv; "stitched" has its charts moved apart, with gutters that continue
-        the surface beyond their edges, or the mesh's own uv where there are too many charts for that;
-        "unwrapped" has charts whose seams are elsewhere
-    reach_mm : width of the gutters [mm]
-
-    Raises DermisError when the size is under 64.
-    """
-    if size < SMALLEST:
-        expected = f"a size of {SMALLEST} texels or more"
-        refuse("atlas", expected, f"it is {size}", "Choose --atlas 1024 or 2048")
-    if layout not in LAYOUTS:
-        refuse("layout", f"one of {', '.join(LAYOUTS)}", f"{layout} came", "Choose one of these")
-    from dermis.atlas.raster import build_own_layout
-
-    if layout == "stitched":
-        from dermis.atlas.stitched.build import build_stitched
-
-        return build_stitched(mesh, size, reach_mm) or build_own_layout(mesh, size)
-    if layout == "unwrapped":
-        from dermis.atlas.unwrap.elsewhere import with_other_seams
-
-        return build_own_layout(with_other_seams(mesh), size)
-    return build_own_layout(mesh, size)

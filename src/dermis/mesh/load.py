@@ -27,7 +27,7 @@ Up = Literal["y", "z"]
 
 FARTHEST_UV = 1e4
 """Beyond this uv are damage, not tiles."""
-_FORM = 1  # raise when `load_mesh` gives other results for the same file
+_FORM = 2  # raise when `load_mesh` gives other results for the same file
 
 
 def load_mesh(
@@ -192,13 +192,18 @@ def cached_mesh(data: bytes, options: str, load: Callable[[], Mesh]) -> Mesh:
     def make() -> Arrays:
         mesh = load()
         told = json.dumps([asdict(material) for material in mesh.materials]).encode()
-        return {name: getattr(mesh, name) for name in arrays} | {"materials": np.frombuffer(told, np.uint8)}
+        return {name: getattr(mesh, name) for name in (*arrays, "outline")} | {
+            "materials": np.frombuffer(told, np.uint8)
+        }
 
     digest = hashlib.sha256(f"{_FORM} {options}".encode())
     digest.update(data)
-    found = stored("meshes", digest.hexdigest()[:40], [*arrays, "materials"], make)
+    found = stored("meshes", digest.hexdigest()[:40], [*arrays, "outline", "materials"], make)
     materials = json.loads(found.pop("materials").tobytes())
-    return Mesh(
+    outline = found.pop("outline")
+    mesh = Mesh(
         **found,
         materials=tuple(Material(one["name"], one["kind"], tuple(one["colour"])) for one in materials),
     )
+    vars(mesh)["outline"] = outline  # the import alone of what finds it takes longer than reading it
+    return mesh

@@ -56,7 +56,7 @@ def load_head(
     name, path = str(head), Path(head)
     sample, files = SAMPLES.get(name), dict[str, Any]()
     if name in BUSTS:
-        from dermis.human.bust.build import cached_bust
+        from dermis.human.bust_file import cached_bust
 
         path = cached_bust(name)
     elif sample is not None:

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.atlas import Atlas, build_atlas
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.build import build_atlas
 from dermis.human.bust.fields import Doubles
 from dermis.human.regions.labels import label_texels
 from dermis.human.regions.table import DEFAULT, LIMITS, RegionTable, load_table

@@ -12,8 +12,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.atlas import Atlas, build_atlas
-from dermis.disk import cache_folder
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.build import build_atlas
+from dermis.disk import cache_folder, stored_file
 from dermis.errors import refuse
 from dermis.human.bust import BUSTS
 from dermis.human.bust.mesh import bust_mesh, many_charts_mesh
@@ -69,18 +70,14 @@ class BustRecipe:
 
 
 def cached_bust(name: str) -> Path:
-    """The file of a built-in head, made on first use."""
+    """The file of a built-in head, made on first use and when it is no longer as it was made."""
     recipe = BustRecipe(layout="few" if name == BUSTS[0] else "many")
     digest = hashlib.sha256(f"{recipe} {_code()}".encode()).hexdigest()[:24]
-    path = cache_folder() / "bust" / f"{name}-{digest}.glb"
-    if not path.is_file():
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as fault:
-            came = f"it cannot be made ({reason(fault)})"
-            refuse(path.parent, "a folder for the cache", came, "Name a writable one in DERMIS_CACHE")
-        write_bust(path, recipe)
-    return path
+    try:
+        return stored_file("bust", f"{name}-{digest}.glb", lambda: encode_bust(recipe))
+    except OSError as fault:
+        came, hint = f"it cannot be written ({reason(fault)})", "Name a writable one in DERMIS_CACHE"
+        refuse(cache_folder() / "bust", "a folder for the cache", came, hint)
 
 
 def write_bust(path: Path, recipe: BustRecipe, report: Report = lambda done, of: None) -> None:
@@ -172,11 +169,11 @@ def _normals(slopes: Floats) -> NDArray[np.uint8]:
 @cache
 def _code() -> str:
     """A digest of the generator, so that busts are made again when it changes."""
-    package = Path(__file__).parents[2]
-    below = ("human/bust", "human/skin_maps", "human/skin_maps/kernels", "atlas/unwrap")
+    package = Path(__file__).parents[1]
+    below = ("atlas", "atlas/unwrap", "human", "human/bust", "human/skin_maps", "human/skin_maps/kernels")
     files = [file for folder in below for kind in ("*.py", "*.csv") for file in (package / folder).glob(kind)]
     digest = hashlib.sha256()
-    used = (package / name for name in ("atlas/atlas.py", "mesh/geometry.py", "mesh/gltf.py"))
+    used = (package / name for name in ("mesh/geometry.py", "mesh/gltf.py"))
     for file in sorted((*files, *used)):
         digest.update(file.read_bytes())
     return digest.hexdigest()
