@@ -1,4 +1,4 @@
-"""What a half-space does by directions under a surface of index 1.4, for docs/techniques.md.
+"""Reflection of a half-space by direction under a surface of index 1.4, for docs/techniques.md.
 
 python tools/accuracy_half_space.py prints it within a minute.
 """

@@ -16,8 +16,7 @@ from dermis.optics.media import media
 from dermis.optics.profiles import load_profile
 from dermis.optics.radial import RadialProfile
 from dermis.optics.tissue import Tissue, load_tissue
-from dermis.reference.counted import counted_profile
-from dermis.reference.slab_mc import trace_medium
+from dermis.reference.slab_mc import counted_profile, trace_medium
 
 PHOTONS, SPECTRAL_PHOTONS = 4_000_000, 400_000
 TISSUES = ("skin1", "skin2", "dj3", "light", "medium", "dark")
@@ -142,7 +141,7 @@ def table_note() -> str:
 
 
 def tables() -> dict[str, str]:
-    """Everything that the page has room for, by the names it uses."""
+    """All tables, by their names in the page's template."""
     return {
         "models": models_table(),
         "fits": fits_table(),

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cut_meshes import cut_sphere
 from numpy.typing import NDArray
 from tolerances import FLAT, HALVED, HALVES, SPREAD_ENERGY
 
@@ -20,7 +21,6 @@ from dermis.frame.passes import combine, diffuse
 from dermis.gpu import Device, Frame, download, make_texture, upload
 from dermis.mesh.primitives import plane
 from dermis.optics.profiles import load_profile
-from dermis.reference.cut_meshes import cut_sphere
 
 Floats = NDArray[np.float64]
 HALF = "rgba16float"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from atlas_reading import lit_at, seam_points
+from cut_meshes import cut_sphere
 from numpy.typing import NDArray
 from setups import head_of, place, run_frame, scene_of
 from tolerances import SEAM
@@ -12,8 +14,6 @@ from dermis.atlas.cached import cached_atlas
 from dermis.frame.renderer import Renderer
 from dermis.frame.seams import REMEDIES
 from dermis.gpu import download
-from dermis.reference.atlas_reading import lit_at, seam_points
-from dermis.reference.cut_meshes import cut_sphere
 from dermis.scene.lights import DirectionalLight, StripeLight
 from dermis.scene.model import Scene
 

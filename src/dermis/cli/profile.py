@@ -172,7 +172,7 @@ def _tissue(name: str, given: dict[str, Any], eta: float | None) -> Tissue:
 def _profile(tissue: Tissue, model: Model, clamp: Any, light: dict[str, Any]) -> RadialProfile:
     if model != "montecarlo":
         return tissue.profile(model, clamp)
-    from dermis.reference.counted import counted_profile
+    from dermis.reference.slab_mc import counted_profile
 
     with progress("tracing photons") as report:
         return counted_profile(tissue.medium, tissue.rgb, report=report, **light)

@@ -13,7 +13,7 @@ from dermis.optics.media import Medium
 from dermis.reference.described import UNIT_MM, cycles_looking, world
 from dermis.reference.half_space import diffuse_albedo
 from dermis.reference.lights import lamp
-from dermis.reference.mitsuba_skin import Lambertian
+from dermis.reference.mitsuba_scene import Lambertian
 from dermis.scene.model import Scene
 
 FALLOFFS = {"random-walk": "RANDOM_WALK", "burley": "BURLEY"}
