@@ -1,4 +1,4 @@
-"""From a mesh file of any unit, axis and uv origin to the one `Mesh` of the package."""
+"""Loading of mesh files of any unit, up axis and uv origin, kept on disk by their content."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Origin = Literal["auto", "top", "bottom"]
 Up = Literal["y", "z"]
 
 FARTHEST_UV = 1e4
-"""Beyond this uv are damage, not tiles."""
+"""Larger uv are damage, not tiles."""
 _FORM = 1  # raise when `load_mesh` gives other results for the same file
 
 
@@ -191,8 +191,9 @@ def cached_mesh(data: bytes, options: str, load: Callable[[], Mesh]) -> Mesh:
 
     def make() -> Arrays:
         mesh = load()
-        told = json.dumps([asdict(material) for material in mesh.materials]).encode()
-        return {name: getattr(mesh, name) for name in arrays} | {"materials": np.frombuffer(told, np.uint8)}
+        listed = json.dumps([asdict(material) for material in mesh.materials]).encode()
+        found = {name: getattr(mesh, name) for name in arrays}
+        return found | {"materials": np.frombuffer(listed, np.uint8)}
 
     digest = hashlib.sha256(f"{_FORM} {options}".encode())
     digest.update(data)
