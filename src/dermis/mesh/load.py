@@ -26,7 +26,7 @@ Origin = Literal["auto", "top", "bottom"]
 Up = Literal["y", "z"]
 
 FARTHEST_UV = 1e4
-"""Larger uv are damage, not tiles."""
+"""Beyond this uv are damage, not tiles."""
 _FORM = 1  # raise when `load_mesh` gives other results for the same file
 
 
@@ -191,9 +191,8 @@ def cached_mesh(data: bytes, options: str, load: Callable[[], Mesh]) -> Mesh:
 
     def make() -> Arrays:
         mesh = load()
-        listed = json.dumps([asdict(material) for material in mesh.materials]).encode()
-        found = {name: getattr(mesh, name) for name in arrays}
-        return found | {"materials": np.frombuffer(listed, np.uint8)}
+        told = json.dumps([asdict(material) for material in mesh.materials]).encode()
+        return {name: getattr(mesh, name) for name in arrays} | {"materials": np.frombuffer(told, np.uint8)}
 
     digest = hashlib.sha256(f"{_FORM} {options}".encode())
     digest.update(data)
