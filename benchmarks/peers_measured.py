@@ -20,8 +20,7 @@ from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.fits.gaussian import fit_gaussians
-from dermis.optics.media import Medium
-from dermis.optics.presets import media
+from dermis.optics.media import Medium, media
 from dermis.optics.profiles import TERMS, write_profile
 from dermis.reference.cycles import Method, cycles_passes
 from dermis.reference.cycles_process import CyclesPass

@@ -12,7 +12,7 @@ from functools import partial
 
 import dermis
 from dermis.gallery.picture import main, plotted
-from dermis.optics.fits.single import single_gaussian
+from dermis.optics.fits.gaussian import single_gaussian
 
 INKS = {"red": "#ff6b5e", "green": "#58d68d", "blue": "#5dade2"}
 

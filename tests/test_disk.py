@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -15,7 +18,7 @@ from dermis.atlas import cached
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.cached import cached_atlas
 from dermis.disk import cached_array, cached_mips
-from dermis.mesh.cached import cached_mesh
+from dermis.mesh.load import cached_mesh
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import plane, uv_sphere
 
@@ -47,7 +50,7 @@ def same(a: Atlas, b: Atlas) -> bool:
 
 def only(folder: Path) -> Path:
     (path,) = folder.iterdir()
-    assert path.suffix == ".npz"
+    assert path.suffix == ".arrays"
     return path
 
 
@@ -75,25 +78,36 @@ def test_layouts_and_reaches_are_told_apart(folder: Path, built: list[int]) -> N
     assert len(made[1].gutter) > len(made[2].gutter) > len(made[0].gutter) == len(made[3].gutter) == 0
 
 
-@pytest.mark.parametrize(
-    "garbage",
-    [b"", b"no archive at all", b"PK\x03\x04 half an archive", "cut", "flipped", "packed", "other arrays"],
-)
-def test_a_broken_file_is_made_again(folder: Path, built: list[int], garbage: bytes | str) -> None:
+BROKEN: dict[str, Callable[[bytes], bytes]] = {
+    "empty": lambda whole: b"",
+    "another file": lambda whole: b"PK\x03\x04 half an archive",
+    "a long line": lambda whole: b"x" * 3_000_000,
+    "cut": lambda whole: whole[: len(whole) // 2],
+    "one byte short": lambda whole: whole[:-1],
+    "an array": lambda whole: whole[:-3000] + bytes(b ^ 0xFF for b in whole[-3000:-2900]) + whole[-2900:],
+    "the last bit": lambda whole: whole[:-1] + bytes([whole[-1] ^ 1]),
+    "a shape": lambda whole: whole.replace(b"[64, 64]", b"[32, 128]", 1),
+    "a name": lambda whole: whole.replace(b'"triangle"', b'"triangel"'),
+    "the hash": lambda whole: b"0" * 64 + whole[64:],
+    "objects": lambda whole: forged(whole, lambda told: told["arrays"][0].__setitem__(1, "|O")),
+    "other arrays": lambda whole: forged(whole, lambda told: told["arrays"].pop()),
+    "another key": lambda whole: forged(whole, lambda told: told.update(key="atlas/0")),
+}
+
+
+def forged(whole: bytes, change: Callable[[dict[str, Any]], object]) -> bytes:
+    """A file whose head is another, with the hash that fits."""
+    _, head, data = whole.split(b"\n", 2)
+    change(told := json.loads(head))
+    head = json.dumps(told).encode() + b"\n"
+    return hashlib.sha256(head).hexdigest().encode() + b"\n" + head + data
+
+
+@pytest.mark.parametrize("broken", BROKEN)
+def test_a_broken_file_is_made_again(folder: Path, built: list[int], broken: str) -> None:
     first = cached_atlas(plane(10.0), 64)
     path = only(folder)
-    whole = path.read_bytes()
-    if garbage == "cut":
-        path.write_bytes(whole[: len(whole) // 2])
-    elif garbage == "flipped":
-        path.write_bytes(whole[:3000] + bytes(b ^ 0xFF for b in whole[3000:3100]) + whole[3100:])
-    elif garbage == "packed":  # by a method that does not exist, which the last directory entry tells
-        place = whole.rindex(b"PK\x01\x02") + 10
-        path.write_bytes(whole[:place] + b"\x63\x00" + whole[place + 2 :])
-    elif garbage == "other arrays":
-        np.savez(path, triangle=np.zeros(3))
-    else:
-        path.write_bytes(garbage if isinstance(garbage, bytes) else b"")
+    path.write_bytes(BROKEN[broken](path.read_bytes()))
     assert same(cached_atlas(plane(10.0), 64), first)
     assert built == [64, 64]
     assert same(cached_atlas(plane(10.0), 64), first)
@@ -101,11 +115,55 @@ def test_a_broken_file_is_made_again(folder: Path, built: list[int], garbage: by
     assert only(folder) == path
 
 
-def test_a_file_with_pickled_objects_is_not_opened(folder: Path, built: list[int]) -> None:
+def test_a_file_under_another_name_is_made_again(folder: Path, built: list[int]) -> None:
+    """It is whole, but of another mesh, size or kind."""
     first = cached_atlas(plane(10.0), 64)
-    objects = np.array([{"any": "object"}], dtype=object)
-    np.savez(only(folder), **{f.name: objects for f in fields(Atlas)})
+    path = only(folder)
+    cached_atlas(plane(11.0), 64)
+    (other,) = set(folder.iterdir()) - {path}
+    other.replace(path)
     assert same(cached_atlas(plane(10.0), 64), first)
+    assert built == [64, 64, 64]
+    (folder.parent / "links").mkdir()
+    path.rename(folder.parent / "links" / path.name)
+    assert disk.find("links", path.stem, ["triangle"]) is None
+
+
+def test_a_large_file_is_checked_block_by_block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    large = {"a": np.arange(3_000_000, dtype=np.uint32), "b": np.ones((1000, 777)).T}
+    disk.store("large", "one", large)
+    found = disk.find("large", "one", ["a", "b"])
+    assert found is not None and all(np.array_equal(found[name], large[name]) for name in large)
+    assert found["b"].flags.fnc  # sums over it round as they did
+    path = only(tmp_path / "large")
+    whole = bytearray(path.read_bytes())
+    for place in (len(whole) // 3, len(whole) // 2, len(whole) - 1):
+        whole[place] ^= 1
+        path.write_bytes(whole)
+        assert disk.find("large", "one", ["a", "b"]) is None
+        whole[place] ^= 1
+    path.write_bytes(whole)
+    assert disk.find("large", "one", ["a", "b"]) is not None
+
+
+def test_a_kept_file_that_changed_is_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    made: list[int] = []
+
+    def make() -> bytes:
+        made.append(1)
+        return b"glTF and more"
+
+    path = disk.stored_file("heads", "one.glb", make)
+    assert disk.stored_file("heads", "one.glb", make) == path and len(made) == 1
+    for spoilt in (path, path.with_name("one.glb.sha256")):
+        for content in (b"glTF and mora", b""):
+            spoilt.write_bytes(content)
+            assert disk.stored_file("heads", "one.glb", make).read_bytes() == b"glTF and more"
+    path.unlink()
+    assert disk.stored_file("heads", "one.glb", make).read_bytes() == b"glTF and more"
+    assert len(made) == 6
 
 
 @pytest.mark.parametrize("blocked", ["a file", "a folder in the file's place", "nothing may be written"])
@@ -116,7 +174,7 @@ def test_a_folder_that_cannot_be_used_does_no_harm(
     if blocked == "a file":
         (tmp_path / "here").write_text("")
     elif blocked == "a folder in the file's place":
-        (tmp_path / "here" / "atlas" / f"{cached._key(plane(10.0), 64)}.npz").mkdir(parents=True)
+        (tmp_path / "here" / "atlas" / f"{cached._key(plane(10.0), 64)}.arrays").mkdir(parents=True)
     else:
         monkeypatch.setattr(Path, "mkdir", _refuse)
     assert cached_atlas(plane(10.0), 64).size == 64
@@ -139,10 +197,10 @@ def _refuse(*_: object, **__: object) -> None:
 def test_a_full_disk_leaves_no_part_file(
     folder: Path, built: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def full(file: object, **_: object) -> None:
+    def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(np, "savez", full)
+    monkeypatch.setattr(Path, "replace", full)
     assert cached_atlas(plane(10.0), 64).size == 64
     assert list(folder.iterdir()) == []
 
@@ -227,7 +285,7 @@ def test_of_what_the_folder_cannot_hold_at_once_some_is_kept(
     start(0)
     start(0)
     assert made == [3]
-    for path in tmp_path.rglob("*.npz"):  # another day
+    for path in tmp_path.rglob("*.arrays"):  # another day
         os.utime(path, (1, 1))
     start(10)
     start(10)
@@ -262,7 +320,7 @@ def test_a_mesh_comes_back_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
     first, second = (cached_mesh(b"file", "up y", load) for _ in range(2))
     for one in (first, second):
-        assert one.materials == mesh.materials
+        assert one.materials == mesh.materials and np.array_equal(one.outline, mesh.outline)
         for name in ("positions", "normals", "uv", "dpdu", "dpdv", "point", "triangles", "material"):
             kept, given = getattr(one, name), getattr(mesh, name)
             assert kept.dtype == given.dtype and np.array_equal(kept, given)

@@ -11,7 +11,7 @@ import accuracy_specular as specular
 import accuracy_thin as thin
 import numpy as np
 
-from dermis.atlas.atlas import build_atlas
+from dermis.atlas.build import build_atlas
 from dermis.frame.atlas_textures import upload_atlas
 from dermis.frame.passes.diffuse import Diffuse
 from dermis.gpu import Device, Frame, download, open_device, upload

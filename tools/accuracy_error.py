@@ -17,7 +17,7 @@ from dermis.comparison.truths import (
     surface_integral,
 )
 from dermis.frame.surface_points import surface_points
-from dermis.human.regions.landmarks import known_landmarks
+from dermis.human.regions.labels import known_landmarks
 from dermis.mesh.head import Head
 from dermis.optics.gaussians import GaussianSum
 from dermis.reference.metrics import energy_ratio, relative_rmse

@@ -11,13 +11,19 @@ from dataclasses import replace
 import numpy as np
 
 import dermis
-from dermis.environment.mirrors import ROUGHEST, SIDE, SMOOTHEST, equivalent_mirrors
-from dermis.environment.panorama import directions, load_panorama, resampled, solid_angles
-from dermis.environment.prefilter import ROUGHNESSES, Prefiltered, prefilter
-from dermis.environment.suns import split_suns
+from dermis.environment.panorama import directions, load_panorama, resampled, solid_angles, split_suns
+from dermis.environment.prefilter import (
+    ROUGHEST,
+    ROUGHNESSES,
+    SIDE,
+    SMOOTHEST,
+    Prefiltered,
+    equivalent_mirrors,
+    prefilter,
+)
+from dermis.frame.lights.rectangle import facing_irradiance
 from dermis.frame.passes.occlusion import DIRECTIONS, Occlusion
 from dermis.frame.projection import frame_of
-from dermis.frame.lights.rectangle import facing_irradiance
 from dermis.mesh.head import Head
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene import Environment, PointLight, RectangleLight, Scene, Settings, Skin, load_lights

@@ -6,14 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from dermis.optics.diffusion.models import Model
+from dermis.optics.diffusion.models import Model, cut, through_gaussians, through_slab
 from dermis.optics.diffusion.multipole import Clamp
-from dermis.optics.diffusion.transmission import cut, through_gaussians, through_slab
 from dermis.optics.fits.burley import fit_burley
 from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.fits.separable import fit_separable
 from dermis.optics.fits.targets import ring_error
-from dermis.optics.presets import media
+from dermis.optics.media import media
 from dermis.optics.profiles import load_profile
 from dermis.optics.radial import RadialProfile
 from dermis.optics.tissue import Tissue, load_tissue

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import dermis
-from dermis.atlas.atlas import build_atlas
+from dermis.atlas.build import build_atlas
 from dermis.atlas.cached import cached_atlas
 from dermis.frame.atlas_textures import upload_atlas
 from dermis.frame.frame import scatter

@@ -21,7 +21,7 @@ from dermis.comparison.report import cells
 from dermis.comparison.scenes import comparison_scene, usual_region
 from dermis.frame.surface_points import irradiance_at, surface_points
 from dermis.mesh.head import Head
-from dermis.optics.presets import media
+from dermis.optics.media import media
 from dermis.reference.half_space import directional_albedo
 from dermis.reference.metrics import energy_ratio, relative_rmse
 from dermis.scene import DirectionalLight, Settings

@@ -19,7 +19,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import wedge
-from dermis.optics.diffusion.transmission import through_gaussians
+from dermis.optics.diffusion.models import through_gaussians
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
 from dermis.reference import surface_integral

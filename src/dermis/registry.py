@@ -16,11 +16,14 @@ class Registry(Mapping[str, T], Generic[T]):
     """Entries of one kind by name, in the order in which they were registered.
 
     An entry is the object itself, or "module:attribute" for one that is imported on first use.
+
+    changes : how often entries have been added or taken away
     """
 
     def __init__(self, kind: str, entries: Mapping[str, T | str] | None = None) -> None:
         """kind : what an entry is, for messages: "technique", say"""
         self.kind = kind
+        self.changes = 0
         self._entries: dict[str, T | str] = dict(entries or {})
         self._summaries: dict[str, str] = {}
 
@@ -36,6 +39,7 @@ class Registry(Mapping[str, T], Generic[T]):
                 f"{self.kind} {name}", "a name of its own", "it is registered already", "Choose another name"
             )
         self._entries[name] = entry
+        self.changes += 1
         if summary:
             self._summaries[name] = summary
 
@@ -46,7 +50,13 @@ class Registry(Mapping[str, T], Generic[T]):
         try:
             yield
         finally:
-            del self._entries[name]
+            self.remove(name)
+
+    def remove(self, name: str) -> None:
+        """Take an entry out again; nothing happens when it is not there."""
+        self._entries.pop(name, None)
+        self._summaries.pop(name, None)
+        self.changes += 1
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.atlas.atlas import GUTTER, Atlas, build_atlas
+from dermis.atlas.atlas import GUTTER, Atlas
+from dermis.atlas.build import build_atlas
 from dermis.errors import DermisError
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.mesh import Mesh

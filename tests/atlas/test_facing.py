@@ -7,10 +7,9 @@ import pytest
 from numpy.typing import NDArray
 from translucency_truth import hook
 
-from dermis.atlas.atlas import build_atlas
+from dermis.atlas.build import build_atlas
 from dermis.atlas.translucency import pairs as search
-from dermis.atlas.translucency.facing import facing
-from dermis.atlas.translucency.pairs import TranslucentPairs, find_pairs
+from dermis.atlas.translucency.pairs import TranslucentPairs, facing, find_pairs
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import uv_sphere, wedge
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.atlas.atlas import Atlas, build_atlas
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.build import build_atlas
 from dermis.atlas.unwrap.charts import grow
 from dermis.atlas.unwrap.unwrap import unwrap
 from dermis.human.bust.mesh import build_bust
@@ -101,7 +102,7 @@ def _cross(a: Floats, b: Floats, c: NDArray[np.integer]) -> Floats:
 
 @pytest.mark.parametrize("name", MESHES)
 def test_sources_hold_the_light_of_the_point_shown(name: str) -> None:
-    """And are read from texels that compute their own light, never from an gutter."""
+    """And are read from texels that compute their own light, never from a gutter."""
     mesh, atlas = case(name)
     x, y = atlas.gutter.T
     assert len(x) > 300
@@ -190,13 +191,13 @@ def test_triangles_may_face_either_way_round() -> None:
     triangles = mesh.triangles.copy()
     part = charts(mesh) == 0
     triangles[part] = triangles[part][:, ::-1]
-    turned = build_mesh(mesh.positions, mesh.uv, triangles, mesh.material, mesh.materials, mesh.normals)
-    other = build_atlas(turned, atlas.size, "stitched")
+    flipped = build_mesh(mesh.positions, mesh.uv, triangles, mesh.material, mesh.materials, mesh.normals)
+    other = build_atlas(flipped, atlas.size, "stitched")
     assert other.mapped.all()
     assert len(other.gutter) == pytest.approx(len(atlas.gutter), rel=0.02)
-    held = read(shown(other, turned, own=True), other.source.astype(np.float64))
+    held = read(shown(other, flipped, own=True), other.source.astype(np.float64))
     x, y = other.gutter.T
-    off = np.linalg.norm(held - shown(other, turned)[y, x], axis=1)
+    off = np.linalg.norm(held - shown(other, flipped)[y, x], axis=1)
     assert np.percentile(off, 99.5) < READ * 0.8
 
 

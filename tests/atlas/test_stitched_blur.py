@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.special import eval_legendre
 from tolerances import SEAM
 
-from dermis.atlas.atlas import Atlas, build_atlas
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.build import build_atlas
 from dermis.mesh.mesh import Mesh
 from dermis.reference.atlas_reading import lit_at, read, seam_points, shown
 from dermis.reference.cut_meshes import cut_cylinder, cut_sphere, folded_sheet

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from dermis.atlas.stitched.build import find_pieces
 from dermis.atlas.stitched.overlap_cuts import cut_overlaps, find_conflicts
-from dermis.atlas.stitched.pieces import find_pieces
-from dermis.atlas.stitched.surface import Surface, survey
+from dermis.atlas.stitched.surface import FlatSurface, survey
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.mesh import Mesh
 from dermis.reference.cut_meshes import cut_cone, cut_cylinder, cut_sphere
@@ -19,13 +19,15 @@ FACETS = 3 * CELLS
 WIDTH = 2 * RADIUS * np.sin(np.pi / FACETS)  # of a facet: the mesh is a prism
 
 
-def go(surface: Surface, triangle: NDArray[np.int32], start: Floats, target: Floats) -> tuple[Floats, Floats]:
+def go(
+    surface: FlatSurface, triangle: NDArray[np.int32], start: Floats, target: Floats
+) -> tuple[Floats, Floats]:
     """Where walks end in space, and whether the surface went on so far."""
     from dermis.atlas.stitched.kernels.walk import walk
 
     found, second = np.empty(len(triangle), np.int32), np.empty((len(triangle), 2))
     whole = np.empty(len(triangle), np.bool_)
-    walk(surface.ground, triangle, start, target, found, second, whole)
+    walk(surface.adjacency, triangle, start, target, found, second, whole)
     weights = np.column_stack((1 - second.sum(axis=1), second))
     return np.einsum("nk,nkc->nc", weights, surface.corners[found]), whole
 
@@ -39,26 +41,26 @@ def around(points: Floats) -> Floats:
     return np.column_stack(((facet + 0.5) * WIDTH + within, points[:, 1]))
 
 
-def random_walks(surface: Surface, length: float) -> tuple[NDArray[np.int32], Floats, Floats]:
+def random_walks(surface: FlatSurface, length: float) -> tuple[NDArray[np.int32], Floats, Floats]:
     rng = np.random.default_rng(5)
     triangle = rng.integers(0, len(surface.uv), 2000).astype(np.int32)
-    start = np.einsum("nk,nkc->nc", rng.dirichlet(np.ones(3), 2000), surface.ground.flat[triangle])
+    start = np.einsum("nk,nkc->nc", rng.dirichlet(np.ones(3), 2000), surface.adjacency.flat[triangle])
     angle = rng.uniform(0, 2 * np.pi, 2000)
     return triangle, start, start + length * np.column_stack((np.cos(angle), np.sin(angle)))
 
 
-def prism(turned: bool) -> Mesh:
+def prism(flipped: bool) -> Mesh:
     mesh = cut_cylinder(RADIUS, HEIGHT, CELLS)
     triangles = mesh.triangles.copy()
-    if turned:  # every other triangle is listed the other way round
+    if flipped:  # every other triangle is listed the other way round
         triangles[::2] = triangles[::2, ::-1]
     return build_mesh(mesh.positions, mesh.uv, triangles, mesh.material, mesh.materials)
 
 
-@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("flipped", [False, True])
 @pytest.mark.parametrize("length", [1.0, 20.0, 150.0])
-def test_on_a_prism_walks_are_straight_lines_on_it_unrolled(length: float, turned: bool) -> None:
-    surface = survey(prism(turned))
+def test_on_a_prism_walks_are_straight_lines_on_it_unrolled(length: float, flipped: bool) -> None:
+    surface = survey(prism(flipped))
     triangle, start, target = random_walks(surface, length)
     ends, whole = go(surface, triangle, start, target)
     begins = np.einsum("nk,nkc->nc", _weights(surface, triangle, start), surface.corners[triangle])
@@ -75,14 +77,14 @@ def test_on_a_prism_walks_are_straight_lines_on_it_unrolled(length: float, turne
     assert np.abs(np.abs(ends[beyond, 1]) - HEIGHT / 2).max(initial=0) < 1e-3
 
 
-def _weights(surface: Surface, triangle: NDArray[np.int32], place: Floats) -> Floats:
-    p = surface.ground.flat[triangle]
+def _weights(surface: FlatSurface, triangle: NDArray[np.int32], place: Floats) -> Floats:
+    p = surface.adjacency.flat[triangle]
     matrix = np.concatenate((p.transpose(0, 2, 1), np.ones((len(p), 1, 3))), axis=1)
     right = np.column_stack((place, np.ones(len(p))))[..., None]
     return np.asarray(np.linalg.solve(matrix, right)[..., 0])
 
 
-def _step(surface: Surface, triangle: NDArray[np.int32], step: Floats) -> Floats:
+def _step(surface: FlatSurface, triangle: NDArray[np.int32], step: Floats) -> Floats:
     """A step in a triangle's plane as one along the prism's facets and up."""
     corners = surface.corners[triangle]
     x = corners[:, 1] - corners[:, 0]

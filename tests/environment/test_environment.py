@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from tolerances import PREFILTERED
 
 from dermis.environment.harmonics import analyse, synthesise, zonal
-from dermis.environment.mirrors import equivalent_mirrors, round_lobe
 from dermis.environment.panorama import (
     directions,
     load_panorama,
@@ -18,9 +17,16 @@ from dermis.environment.panorama import (
     panorama_file,
     resampled,
     solid_angles,
+    split_suns,
 )
-from dermis.environment.prefilter import HEIGHT, ROUGHNESSES, mirror_kernel, prefilter
-from dermis.environment.suns import split_suns
+from dermis.environment.prefilter import (
+    HEIGHT,
+    ROUGHNESSES,
+    equivalent_mirrors,
+    mirror_kernel,
+    prefilter,
+    round_lobe,
+)
 from dermis.errors import DermisError
 from dermis.images.colour import luminance
 from dermis.images.io import write_exr, write_png

@@ -16,6 +16,7 @@ from dermis.atlas.cached import cached_atlas
 from dermis.errors import DermisError
 from dermis.frame.lights import light_records, light_views
 from dermis.frame.lights.rectangle import KIND, facing_irradiance, rectangle_irradiance
+from dermis.frame.passes.shade import shade_program
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.gpu.textures import texture_from
@@ -157,7 +158,7 @@ def visibility(renderer: Renderer, head: Any, light: Light, size: int = 1024) ->
         "normals": texture_from(renderer.device, normals, "rgba32float"),
     }
     seen = []
-    records = light_records(renderer.stages.shade.program, scene, views)
+    records = light_records(shade_program(renderer.device), scene, views)
     for one in records["light"][: len(views)].copy():
         records["light"][0] = one
         towards, _ = probe(
@@ -220,7 +221,7 @@ def test_soft_visibility_is_numpys(renderer: Renderer, kind: str) -> None:
         **textures,
         part={"index": 0},
     )
-    depths = download(renderer.device, inputs.shadow_maps.texture).astype(float)
+    depths = download(renderer.device, inputs.resources.shadow_maps.texture).astype(float)
     record = inputs.lit["lights"]["light"][0]
     exact = light_twins.visibility(
         record, depths, points.reshape(-1, 3).astype(float), normals.reshape(-1, 3)

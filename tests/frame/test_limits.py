@@ -2,33 +2,121 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections import Counter
+from functools import partial
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+from setups import settings_of
 
-from dermis.frame.passes import SHARED_SHADERS, SOURCE_SHADERS, STAGES, STORE_SHADERS
+import dermis
+from dermis.frame import renderer as renderer_module
+from dermis.frame.passes import shader_folders
+from dermis.frame.renderer import Renderer
+from dermis.gpu import open_device
+from dermis.gpu.device import DEFAULT_LIMITS
 from dermis.gpu.shader_types import bindings, struct_dtype
 from dermis.gpu.wgsl_source import compose
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.primitives import uv_sphere
+from dermis.scene import Environment, Scene, load_lights
+from dermis.scene.techniques import TECHNIQUES
 
-TOOLKIT = Path(SHARED_SHADERS).parent.parent / "gpu" / "wgsl"
-FOLDERS = (SHARED_SHADERS, TOOLKIT, SOURCE_SHADERS["rgba16float"], STORE_SHADERS["rgba16float"])
-MOST = {"texture": 16, "sampler": 16, "storage_texture": 4, "storage": 8, "uniform": 12}
+PACKAGE = Path(dermis.__file__).parent
+SHADERS = sorted(PACKAGE.rglob("*.wgsl"))
+FOLDERS = (*shader_folders(), *sorted({path.parent for path in SHADERS}))
+MOST = {
+    kind: DEFAULT_LIMITS[f"max-{name}-per-shader-stage"]
+    for kind, name in {
+        "texture": "sampled-textures",
+        "sampler": "samplers",
+        "storage_texture": "storage-textures",
+        "storage": "storage-buffers",
+        "uniform": "uniform-buffers",
+    }.items()
+} | {"dynamic": DEFAULT_LIMITS["max-dynamic-uniform-buffers-per-pipeline-layout"]}
+STORED = re.compile(r"rgba8(unorm|snorm|uint|sint)|rgba16(uint|sint|float)|(r|rg|rgba)32(uint|sint|float)")
+READ_AND_WRITTEN = re.compile(r"r32(uint|sint|float)")
+LARGEST = {"TAKEN": 128, "THREADS": 256}  # that visibility_buffer.py gives
+STRIDES = {"": 4, "u32": 4, "f32": 4, "vec2f": 8, "vec3f": 16, "vec4f": 16}
+WHOLE = {"seams": "multi-uv", "bloom": 0.1, "tone": "filmic"}
 
 
-@pytest.mark.parametrize("path", sorted(STAGES.glob("*.wgsl")), ids=lambda path: path.stem)
+def _programs() -> list[Path]:
+    """Shaders with an entry point: all that Python compiles."""
+    entry = re.compile(r"^@(compute|vertex|fragment)\b", re.MULTILINE)
+    return [path for path in SHADERS if entry.search(compose(path, FOLDERS).text)]
+
+
+@pytest.mark.parametrize("path", _programs(), ids=lambda path: path.stem)
 def test_bindings_fit_any_device(path: Path) -> None:
-    found = bindings(compose(path, FOLDERS).text)
-    assert found
+    text = compose(path, FOLDERS).text
+    found = bindings(text)
     kinds = Counter(_kind(binding.entry) for binding in found)
+    kinds["dynamic"] = kinds["uniform"]  # each has an offset of its own in every frame
     assert not {kind: count for kind, count in kinds.items() if count > MOST[kind]}
     assert len({binding.index for binding in found}) == len(found)
+    for texel, access in re.findall(r"texture_storage_\w+<\s*(\w+)\s*,\s*(\w+)\s*>", text):
+        allowed = READ_AND_WRITTEN if access == "read_write" else STORED
+        assert allowed.fullmatch(texel), f"{texel} for {access} takes a feature"
+    assert not re.findall(r"^\s*enable\s.*", text, re.MULTILINE)
 
 
 def test_uniforms_fit_64_kib() -> None:
-    text = compose(STAGES / "shade.wgsl", (SHARED_SHADERS, TOOLKIT)).text
+    text = compose(next(path for path in SHADERS if path.name == "shade.wgsl"), FOLDERS).text
     for name in ("Skin", "Lights", "Shade"):
-        assert struct_dtype(text, name).itemsize <= 65536
+        assert struct_dtype(text, name).itemsize <= DEFAULT_LIMITS["max-uniform-buffer-binding-size"]
+
+
+@pytest.mark.parametrize("path", _programs(), ids=lambda path: path.stem)
+def test_workgroups_fit_any_device(path: Path) -> None:
+    """wgpu's library does not look at the memory that a workgroup's invocations share."""
+    text = re.sub(r"//[^\n]*", "", compose(path, FOLDERS).text)
+    structs = set(re.findall(r"struct (\w+)", text))
+    held = 0
+    for kind, count in re.findall(r"var<workgroup> \w+: (?:array<(\w+), (\w+)>|atomic<u32>);", text):
+        one = struct_dtype(text, kind).itemsize if kind in structs else STRIDES[kind]
+        held += one * (_number(text, count) if count else 1)
+    assert held <= DEFAULT_LIMITS["max-compute-workgroup-storage-size"]
+    for sides in re.findall(r"@workgroup_size\(([^)]+)\)", text):
+        invocations = [_number(text, side) for side in sides.split(",")]
+        assert math.prod(invocations) <= DEFAULT_LIMITS["max-compute-invocations-per-workgroup"]
+
+
+def _number(text: str, spelled: str) -> int:
+    """The value of an expression: of what Python gives at most, of the shader's constants, of numbers."""
+    if declared := LARGEST.get(spelled):
+        return declared
+    spelled = spelled.removesuffix(".x")
+    if given := re.search(rf"(?:const|override) {spelled}\s*(?::\s*\w+)?\s*=\s*(?:vec2u\()?([^;,]+)", text):
+        return _number(text, given[1])
+    return math.prod(
+        int(part.rstrip("u")) if part[0].isdigit() else _number(text, part)
+        for part in spelled.strip().split(" * ")
+    )
+
+
+@pytest.fixture(scope="module")
+def bare(renderer: Renderer) -> Renderer:
+    """A renderer on a device without any feature, and with the default limits alone."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(renderer_module, "open_device", partial(open_device, bare=True))
+        return Renderer(renderer.device.adapter.name)
+
+
+@pytest.mark.parametrize("given", [*({"technique": name} for name in TECHNIQUES.names), WHOLE], ids=str)
+def test_bare_device_draws_the_same(renderer: Renderer, bare: Renderer, given: dict[str, Any]) -> None:
+    head = Head("ball", uv_sphere(90.0, 24, 12), Maps())
+    lights = [*load_lights("window"), *load_lights("rim"), *load_lights("laser")]
+    scene = Scene(head, lights=lights, environment=Environment(name="uniform", visible=True))
+    settings = settings_of(**({"seams": "stitch"} | given))
+    usual, plain = (one.draw(scene, settings).linear() for one in (renderer, bare))
+    assert np.array_equal(usual, plain) and usual.max() > 0
 
 
 def _kind(entry: dict[str, dict[str, str]]) -> str:

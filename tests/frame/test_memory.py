@@ -16,6 +16,7 @@ from dermis.frame.renderer import Renderer
 from dermis.gpu import Device
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.settings import Settings
+from dermis.scene.techniques import TECHNIQUES
 
 SCENE = scene_of(head_of(uv_sphere(30.0, 24, 12)), frontal())
 KINDS: dict[str, dict[str, Any]] = {
@@ -96,7 +97,7 @@ def test_the_atlas_takes_what_was_foreseen(renderer: Renderer, held: Held, kind:
         found[side] = held.bytes()
     levels = 0 if kind == "none" else 5
     layouts = 2 if kind == "two layouts" else 1
-    foreseen = atlas_texel_bytes(chosen(kind).technique, levels, layouts) if levels else 0
+    foreseen = atlas_texel_bytes(TECHNIQUES[chosen(kind).technique], levels, layouts) if levels else 0
     assert (found[512] - found[256]) / (512**2 - 256**2) == foreseen
 
 

@@ -42,7 +42,7 @@ def striped() -> Scene:
 def jumps(renderer: Renderer, seams: str) -> Floats:
     """Change of the scattered light from one side of each seam to the other, of the light there."""
     inputs = run_frame(renderer, striped(), atlas=SIZE, seams=seams, transmission="none")
-    light = download(renderer.device, inputs.scattered).astype(float)[..., :3]
+    light = download(renderer.device, inputs.resources.scattered).astype(float)[..., :3]
     atlas = cached_atlas(BALL, SIZE, REMEDIES[seams].layouts[0])
     one, other = seam_points(BALL)
     a, b = (lit_at(light, atlas, points) for points in (one, other))
@@ -69,7 +69,7 @@ def test_black_bleeds_in_without_a_remedy(renderer: Renderer, technique: str) ->
     for seams in ("none", "clear-colour", "stretch-map", "alpha"):
         chosen = {"atlas": SIZE, "seams": seams, "technique": technique, "transmission": "none"}
         inputs = run_frame(renderer, striped(), **chosen)
-        light = download(renderer.device, inputs.scattered).astype(float)[..., :3]
+        light = download(renderer.device, inputs.resources.scattered).astype(float)[..., :3]
         one, _ = seam_points(BALL)
         facing = one.on(BALL.normals[BALL.triangles])[:, 2] > 0.4
         darkest[seams] = np.percentile(lit_at(light, cached_atlas(BALL, SIZE), one)[facing, 0], 10)

@@ -33,7 +33,7 @@ def pixel(renderer: Renderer, head: Any = PATCH, **skin: Any) -> Floats:
     """(3,) radiance at the foot of the camera."""
     scene = scene_of(head, LIGHT, camera=front_camera(head), **skin)
     inputs = run_frame(renderer, scene, size=(1, 1), technique="none")
-    return download(renderer.device, inputs.picture.exposed).astype(float)[0, 0, :3]
+    return download(renderer.device, inputs.resources.picture.exposed).astype(float)[0, 0, :3]
 
 
 def parts(m: float, rho_s: float, model: str, fresnel: str, energy: str) -> tuple[Floats, float]:

@@ -1,11 +1,57 @@
-"""A device lets go of its threads."""
+"""A device has what WebGPU promises and what it names, and lets go of its threads."""
 
 from __future__ import annotations
 
 import os
 import threading
+from pathlib import Path
 
-from dermis.gpu import Device, open_device
+import pytest
+
+from dermis.gpu import ComputeProgram, Device, open_device
+from dermis.gpu.adapters import WANTED_FEATURES
+from dermis.gpu.device import DEFAULT_LIMITS
+
+RAISED = {"max-texture-dimension-2d", "max-storage-buffer-binding-size", "max-buffer-size"}
+
+
+@pytest.fixture(scope="module")
+def bare(device: Device) -> Device:
+    return open_device(device.adapter.name, bare=True)
+
+
+def test_limits_are_the_default_ones(device: Device, bare: Device) -> None:
+    limits = {name: device.handle.limits[name] for name in DEFAULT_LIMITS}
+    offered = device.adapter.handle.limits
+    assert limits == DEFAULT_LIMITS | {name: offered[name] for name in RAISED}
+    assert {name: bare.handle.limits[name] for name in DEFAULT_LIMITS} == DEFAULT_LIMITS
+    assert (bare.max_texture_size, bare.max_storage_bytes) == (8192, 128 << 20)
+
+
+def test_only_named_features_are_asked_for(device: Device, bare: Device) -> None:
+    """wgpu's own devices have `core-features-and-limits` in any case."""
+    known = set(device.handle.features) - set(bare.handle.features)
+    assert known <= set(WANTED_FEATURES)
+    assert not set(bare.handle.features) & set(device.adapter.handle.features) - {"core-features-and-limits"}
+    assert not bare.has_timestamps
+
+
+@pytest.mark.parametrize(
+    "declared",
+    [
+        [f"var t{k}: texture_storage_2d<rgba8uint, write>;" for k in range(5)],
+        [f"var<storage, read_write> b{k}: array<u32>;" for k in range(9)],
+        [f"var t{k}: texture_2d<f32>;" for k in range(17)],
+        ["var t: texture_storage_2d<rgba8uint, read_write>;"],
+    ],
+    ids=["storage textures", "storage buffers", "sampled textures", "access"],
+)
+def test_programs_beyond_the_limits_are_refused(device: Device, tmp_path: Path, declared: list[str]) -> None:
+    bound = [f"@group(0) @binding({k}) {text}" for k, text in enumerate(declared)]
+    shader = tmp_path / "greedy.wgsl"
+    shader.write_text("\n".join([*bound, "@compute @workgroup_size(1) fn main() {}"]))
+    with pytest.raises(Exception, match=r"(?i)limit|exceed|too many|access|features"):
+        assert ComputeProgram(device, shader).pipeline
 
 
 def test_a_device_that_is_dropped_begins_nothing_more(device: Device) -> None:

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from dermis.errors import DermisError
-from dermis.human.bust.build import BustRecipe, bust_of, cached_bust, encode_bust
 from dermis.human.bust.parameters import BustParameters
 from dermis.human.bust.regions import REGIONS
+from dermis.human.bust_file import BustRecipe, bust_of, cached_bust, encode_bust
 from dermis.human.skin_maps.look import SkinLook
 from dermis.mesh.geometry import edges, triangle_areas
 from dermis.mesh.head import Head
@@ -100,14 +100,16 @@ def test_built_in_heads_are_kept_on_disk(monkeypatch: pytest.MonkeyPatch, tmp_pa
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     calls = []
 
-    def small(recipe: BustRecipe, report: Any) -> bytes:
+    def small(recipe: BustRecipe, report: Any = None) -> bytes:
         calls.append(recipe)
         return b"glTF"
 
-    monkeypatch.setattr("dermis.human.bust.build.encode_bust", small)
+    monkeypatch.setattr("dermis.human.bust_file.encode_bust", small)
     assert cached_bust("bust") == cached_bust("bust") and len(calls) == 1
     assert cached_bust("bust_many_charts") != cached_bust("bust")
     assert [recipe.layout for recipe in calls] == ["few", "many"]
+    cached_bust("bust").write_bytes(b"glT")  # cut off
+    assert cached_bust("bust").read_bytes() == b"glTF" and len(calls) == 3
 
 
 @pytest.mark.parametrize("size", [0, 255, 128, 3000, 8192])

@@ -9,14 +9,20 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dermis.atlas.atlas import build_atlas
+from dermis.atlas.build import build_atlas
 from dermis.atlas.raster import rasterise
 from dermis.atlas.unwrap.stretch import singular_values
 from dermis.atlas.unwrap.unwrap import PADDING
-from dermis.human.bust.mesh import build_bust
+from dermis.human.bust.mesh import (
+    CHARTS,
+    build_bust,
+    bust_layout,
+    bust_mesh,
+    many_charts_layout,
+    many_charts_mesh,
+)
 from dermis.human.bust.parameters import BustParameters
 from dermis.human.bust.regions import REGIONS, region_of
-from dermis.human.bust.uv_layout import CHARTS, bust_layout, bust_mesh, many_charts_layout, many_charts_mesh
 from dermis.mesh.check import check_mesh
 from dermis.mesh.geometry import edges, triangle_areas, uv_cross
 from dermis.mesh.mesh import Mesh

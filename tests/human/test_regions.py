@@ -10,14 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.atlas.atlas import build_atlas
+from dermis.atlas.build import build_atlas
 from dermis.cli.scene_options import SceneOptions, assemble
 from dermis.errors import DermisError
 from dermis.human.bust.regions import REGIONS, region_of
 from dermis.human.regions import apply
-from dermis.human.regions.labels import label_texels
-from dermis.human.regions.landmarks import AVERAGE, average_landmarks, known_landmarks, to_average
-from dermis.human.regions.soften import soften
+from dermis.human.regions.apply import soften
+from dermis.human.regions.labels import AVERAGE, average_landmarks, known_landmarks, label_texels, to_average
 from dermis.human.regions.table import RegionTable, load_table
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps

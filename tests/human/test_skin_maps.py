@@ -16,15 +16,12 @@ from dermis.human.bust.parameters import BustParameters
 from dermis.human.bust.regions import REGIONS, region_of
 from dermis.human.bust.shape import landmarks, symmetric
 from dermis.human.bust.warp import make_warp
-from dermis.human.skin_maps.face import make_face
-from dermis.human.skin_maps.folds import make_folds
+from dermis.human.skin_maps.face import make_face, make_folds
 from dermis.human.skin_maps.hairs import make_hairs
-from dermis.human.skin_maps.kernels.dots import dots
-from dermis.human.skin_maps.kernels.noise import fractal_noise, gradient_noise
+from dermis.human.skin_maps.kernels.noise import dots, fractal_noise, gradient_noise
 from dermis.human.skin_maps.kernels.places import COLUMNS, locate
-from dermis.human.skin_maps.look import SkinLook
+from dermis.human.skin_maps.look import Patch, SkinLook
 from dermis.human.skin_maps.paint import Painted, paint_skin
-from dermis.human.skin_maps.patch import Patch
 
 Doubles = NDArray[np.float64]
 

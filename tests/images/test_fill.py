@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.images.fill import fill_empty
+from dermis.images.filters import fill_empty
 
 
 def island() -> tuple[np.ndarray, np.ndarray]:

@@ -73,10 +73,10 @@ def test_what_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pytest.Monk
         with pytest.raises(DermisError, match="linear floats"):
             writer.write(tmp_path / "a.exr", picture)
 
-    def full(path: Path, levels: object) -> None:
+    def full(path: Path, levels: object, effort: int) -> None:
         raise DermisError("no space")
 
-    monkeypatch.setattr(writing, "_write_png", full)
+    monkeypatch.setattr(writing, "write_png", full)
     with pytest.raises(DermisError, match="no space"), ImageWriter(threads=1) as writer:
         writer.write(tmp_path / "a.png", picture)
 

@@ -10,7 +10,7 @@ import pytest
 from lit_balls import BALL, LIGHTS, ball_scene
 
 from dermis.errors import DermisError
-from dermis.optics.presets import media
+from dermis.optics.media import media
 from dermis.reference.cycles import Method, cycles_passes, cycles_render
 from dermis.reference.cycles_process import PYTHON_VARIABLE
 from dermis.reference.cycles_scene import describe

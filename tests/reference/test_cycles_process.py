@@ -11,7 +11,7 @@ from lit_balls import LIGHTS, ball_scene
 
 from dermis.errors import DermisError
 from dermis.images.io import write_image
-from dermis.optics.presets import media
+from dermis.optics.media import media
 from dermis.reference import cycles_process
 from dermis.reference.cycles import CyclesRendered, cycles_render
 from dermis.reference.cycles_process import read_passes

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from dermis.gpu.repeated import Recording
 from offscreen_input import ADAPTER
 
-from dermis.gpu.repeated import Recording
 from dermis.scene.environment import Environment
-from dermis.viewer.orbit import orbit
-from dermis.viewer.pace import EFFORTS
+from dermis.viewer.navigation import orbit
+from dermis.viewer.pace import QUALITY_LEVELS
 from dermis.viewer.state import ViewerState
 from dermis.viewer.studio import Studio
 
@@ -173,8 +173,8 @@ def test_shadows_of_another_size_have_light_of_their_own(
     studio: Studio, state: ViewerState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where frames in motion differ from still ones in nothing else."""
-    coarse = replace(EFFORTS[2], shadow_size=64)
-    monkeypatch.setattr("dermis.viewer.pace.EFFORTS", (EFFORTS[0], coarse, coarse, coarse))
+    coarse = replace(QUALITY_LEVELS[2], shadow_size=64)
+    monkeypatch.setattr("dermis.viewer.pace.QUALITY_LEVELS", (QUALITY_LEVELS[0], coarse, coarse, coarse))
     for moving in (True, False):
         stages(studio, turned(state, 0.1), moving)
     for angle, moving in ((0.2, True), (0.2, False), (0.3, True)):
@@ -202,8 +202,8 @@ def test_a_slider_leaves_the_frozen_side(studio: Studio, state: ViewerState) -> 
 def test_states_in_motion_and_still_are_recorded_once(
     studio: Studio, state: ViewerState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    small = replace(EFFORTS[2], atlas=64)
-    monkeypatch.setattr("dermis.viewer.pace.EFFORTS", (EFFORTS[0], small, small, small))
+    small = replace(QUALITY_LEVELS[2], atlas=64)
+    monkeypatch.setattr("dermis.viewer.pace.QUALITY_LEVELS", (QUALITY_LEVELS[0], small, small, small))
     live = state.with_skin(mix=0.9)
     for moving in (True, False):
         both(studio, live, state, moving)

@@ -15,8 +15,8 @@ from dermis.frame.renderer import Renderer
 from dermis.images.io import read_image
 from dermis.scene import Settings
 from dermis.viewer.chart import ATLAS
-from dermis.viewer.orbit import orbit
-from dermis.viewer.pace import EFFORTS
+from dermis.viewer.navigation import orbit
+from dermis.viewer.pace import QUALITY_LEVELS
 from dermis.viewer.state import ViewerState
 from dermis.viewer.studio import Studio
 from dermis.viewer.views import VIEWS
@@ -124,8 +124,8 @@ def assert_same_textures(a: Any, b: Any) -> None:
 def test_going_back_and_forth_between_two_sizes_lights_each_once(
     studio: Studio, state: ViewerState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    small = replace(EFFORTS[2], atlas=64)
-    monkeypatch.setattr("dermis.viewer.pace.EFFORTS", (EFFORTS[0], small, small, small))
+    small = replace(QUALITY_LEVELS[2], atlas=64)
+    monkeypatch.setattr("dermis.viewer.pace.QUALITY_LEVELS", (QUALITY_LEVELS[0], small, small, small))
     moving, still = [(turned(state, 0.1 * k), bool(k % 2)) for k in (1, 2)]
     for one, moves in (moving, still):
         image(studio, one, moves)

@@ -1,4 +1,4 @@
-"""The surface atlas: which point of the surface each texel of the uv map stands for."""
+"""The surface atlas: the point of the surface that each texel of the uv map stands for."""
 
 from __future__ import annotations
 
@@ -7,14 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
 from dermis.mesh.mesh import Mesh
 
 ALL_ROWS = slice(None)
 GUTTER = 3  # texels around each chart of the mesh's own layout, so that interpolation at its edge finds light
-LAYOUTS = ("mesh", "stitched", "unwrapped")
 REACH_MM = 8.0  # of gutters: 3.4 standard deviations of the widest Gaussian added to another [dEonLuebke2007]
-SMALLEST = 64
 MOST_SHEAR = 0.9  # a map that is sheared more is blurred as if by this much
 
 
@@ -23,14 +20,14 @@ class Atlas:
     """Texel -> surface, once per mesh and size. Row 0 is the top of the maps (v = 0).
 
     triangle : (n, n) int32 triangle at the texel's centre, -1 where none is. Beyond a chart's edge it is the
-        nearest one or, in a stitched layout, the one that truly follows there
+        nearest one or, in a stitched layout, the one across the seam
     barycentric : (n, n, 2) uint16 weights of the triangle's second and third corner [1/65535]
     stretch : (n, n, 2) float16 texels per mm along u and v [1/mm]; beyond an edge as they are there
     shear : (n, n) float16 cosine of the angle that the directions of u and v make on the surface
     reach : (n, n, 4) uint16 texels to the left, right, up and down of the same chart without a gap between
     place : (f, 3, 2) float32 uv of each triangle's corners in the atlas, v down
-    gutter : (a, 2) uint16 texels (x, y) beyond a chart's edge, which show what other texels compute
-    source : (a, 2) float32 where that is [texel], whole numbers at texel centres
+    gutter : (a, 2) uint16 texels (x, y) beyond a chart's edge, which copy what other texels compute
+    source : (a, 2) float32 place that each copies [texel], whole numbers at texel centres
     mapped : (f,) triangles that own texels; the others (opaque, collapsed, overlapped in uv) are lit directly
     """
 
@@ -51,13 +48,12 @@ class Atlas:
 
     @property
     def coverage(self) -> NDArray[np.bool_]:
-        """(n, n) texels that hold surface, gutter included."""
-        covered: NDArray[np.bool_] = self.triangle >= 0
-        return covered
+        """(n, n) texels that show surface, gutters included."""
+        return np.asarray(self.triangle >= 0)
 
     @property
     def own(self) -> NDArray[np.bool_]:
-        """(n, n) texels that hold surface of their own, gutter included, the gutters not."""
+        """(n, n) texels that hold surface of their own, without the gutters that copy others."""
         own = self.coverage
         own[self.gutter[:, 1], self.gutter[:, 0]] = False
         return own
@@ -77,34 +73,4 @@ class Atlas:
     ) -> NDArray[np.float64]:
         """(n, n, c) of a (v, c) corner attribute, or those of some rows; undefined outside the coverage."""
         corners = values[mesh.triangles[np.maximum(self.triangle[rows], 0)]].astype(float)
-        total: NDArray[np.float64] = np.einsum("yxk,yxkc->yxc", self.weights(rows), corners)
-        return total
-
-
-def build_atlas(mesh: Mesh, size: int, layout: str = "mesh", reach_mm: float = REACH_MM) -> Atlas:
-    """The atlas of `size` x `size` texels.
-
-    layout : "mesh" is the mesh's own uv; "stitched" has its charts moved apart, with gutters that continue
-        the surface beyond their edges, or the mesh's own uv where there are too many charts for that;
-        "unwrapped" has charts whose seams are elsewhere
-    reach_mm : width of the gutters [mm]
-
-    Raises DermisError when the size is under 64.
-    """
-    if size < SMALLEST:
-        refuse(
-            "atlas", f"a size of {SMALLEST} texels or more", f"it is {size}", "Choose --atlas 1024 or 2048"
-        )
-    if layout not in LAYOUTS:
-        refuse("layout", f"one of {', '.join(LAYOUTS)}", f"{layout} came", "Choose one of these")
-    from dermis.atlas.own import build_own_layout
-
-    if layout == "stitched":
-        from dermis.atlas.stitched.build import build_stitched
-
-        return build_stitched(mesh, size, reach_mm) or build_own_layout(mesh, size)
-    if layout == "unwrapped":
-        from dermis.atlas.unwrap.elsewhere import with_other_seams
-
-        return build_own_layout(with_other_seams(mesh), size)
-    return build_own_layout(mesh, size)
+        return np.asarray(np.einsum("yxk,yxkc->yxc", self.weights(rows), corners))

@@ -8,7 +8,8 @@ from dataclasses import fields
 
 import numpy as np
 
-from dermis.atlas.atlas import GUTTER, REACH_MM, Atlas, build_atlas
+from dermis.atlas.atlas import GUTTER, REACH_MM, Atlas
+from dermis.atlas.build import build_atlas
 from dermis.atlas.translucency.pairs import FORM as PAIRS_FORM
 from dermis.atlas.translucency.pairs import TranslucentPairs, find_pairs
 from dermis.disk import Array, Arrays, stored

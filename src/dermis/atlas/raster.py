@@ -1,14 +1,18 @@
-"""Which texels of the uv map lie in which triangle."""
+"""The atlas on a mesh's own uv, where light does not cross seams, and the texels of its triangles."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.atlas.atlas import GUTTER, MOST_SHEAR, Atlas
+from dermis.mesh.geometry import uv_cross
 from dermis.mesh.mesh import Mesh
+from dermis.mesh.uv import charts, usable
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
+_LEAST_TEXELS = 4.0  # a chart with less uv area than this holds nothing that could be blurred
 
 
 def texel_corners(mesh: Mesh, size: int, triangle: NDArray[np.integer]) -> Floats:
@@ -60,3 +64,125 @@ def _span(p: Floats, y: Index) -> tuple[Floats, Floats]:
 def cross(a: Floats, b: Floats) -> Floats:
     """z of the cross product of (..., 2) vectors."""
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def build_own_layout(mesh: Mesh, size: int) -> Atlas:
+    """The atlas whose texels are those of the mesh's own maps."""
+    chart = charts(mesh)
+    skin = np.array([material.kind == "skin" for material in mesh.materials])
+    fit = usable(mesh, size, _LEAST_TEXELS) & skin[mesh.material]
+    texel, triangle = rasterise(mesh, size, np.flatnonzero(fit))
+    mapped = fit & ~_overlapped(chart, texel, triangle, size)
+    owner, lost = _owners(mesh, mapped, texel, triangle, size)
+    mapped &= ~lost
+    for _ in range(GUTTER):
+        owner = _dilate(owner)
+    mapped &= _readable(mesh, size, owner)
+    barycentric = _barycentric(mesh, size, owner)
+    chart_map = np.where(owner >= 0, chart[np.maximum(owner, 0)], -1)
+    stretch, shear = _metric(mesh, size, owner, barycentric)
+    place = mesh.uv[mesh.triangles]
+    gutter, source = np.zeros((0, 2), np.uint16), np.zeros((0, 2), np.float32)
+    return Atlas(owner, barycentric, stretch, shear, _reach(chart_map), place, gutter, source, mapped)
+
+
+def _overlapped(
+    chart: NDArray[np.integer], texel: NDArray[np.int64], triangle: NDArray[np.int64], size: int
+) -> NDArray[np.bool_]:
+    """Triangles of charts most of whose texels a larger chart covers too."""
+    count = int(chart.max()) + 1
+    area = np.bincount(chart[triangle], minlength=count)
+    order = np.argsort(area[chart[triangle]], kind="stable")  # the largest chart writes last and wins
+    winner = np.full(size * size, -1, dtype=np.int64)
+    winner[texel[order]] = chart[triangle[order]]
+    own = np.bincount(chart[triangle][winner[texel] == chart[triangle]], minlength=count)
+    lost: NDArray[np.bool_] = own < 0.5 * np.maximum(area, 1)
+    return np.asarray(lost[chart])
+
+
+def _owners(
+    mesh: Mesh, mapped: NDArray[np.bool_], texel: NDArray[np.int64], triangle: NDArray[np.int64], size: int
+) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    """The triangle of each texel, and the triangles that lose most of theirs to others of their own chart.
+
+    Two mirrored halves folded onto each other are one chart: the half that is not mirrored in uv wins.
+    """
+    keep = mapped[triangle]
+    texel, triangle = texel[keep], triangle[keep]
+    order = np.argsort(uv_cross(mesh.uv[mesh.triangles])[triangle] < 0, kind="stable")
+    owner: NDArray[np.int32] = np.full((size, size), -1, dtype=np.int32)
+    owner.ravel()[texel[order]] = triangle[order]
+    count = len(mapped)
+    area = np.bincount(triangle, minlength=count)
+    own = np.bincount(triangle[owner.ravel()[texel] == triangle], minlength=count)
+    return owner, own < 0.5 * area
+
+
+def _dilate(owner: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Empty texels take the owner of one of their eight neighbours, straight ones first."""
+    grown = owner.copy()
+    padded = np.pad(owner, 1, constant_values=-1)
+    n = len(owner)
+    for dy, dx in ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1)):
+        neighbour = padded[1 + dy : 1 + dy + n, 1 + dx : 1 + dx + n]
+        np.copyto(grown, neighbour, where=(grown < 0) & (neighbour >= 0))
+    return grown
+
+
+def _readable(mesh: Mesh, size: int, owner: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Triangles at whose corners interpolation finds surface; slivers thinner than a texel may have none."""
+    low = np.floor(texel_corners(mesh, size, np.arange(len(mesh.triangles)))).astype(np.int64)
+    found = np.ones(len(low), dtype=bool)
+    for offset in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        x, y = np.moveaxis(np.clip(low + offset, 0, size - 1), -1, 0)
+        found &= (owner[y, x] >= 0).all(axis=1)
+    return found
+
+
+def _barycentric(mesh: Mesh, size: int, owner: NDArray[np.int32]) -> NDArray[np.uint16]:
+    """Weights at each texel's centre; in the gutter those of the nearest place in the triangle."""
+    y, x = np.nonzero(owner >= 0)
+    p = texel_corners(mesh, size, owner[y, x])
+    q = np.stack([x, y], axis=-1) - p[:, 0]
+    e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
+    area = cross(e1, e2)
+    area = np.where(area == 0, 1.0, area)
+    b = np.clip(np.stack([cross(q, e2) / area, cross(e1, q) / area], axis=-1), 0.0, 1.0)
+    b /= np.maximum(b.sum(axis=-1, keepdims=True), 1.0)
+    whole = np.zeros((size, size, 2), dtype=np.uint16)
+    whole[y, x] = np.floor(b * 65535.0).astype(np.uint16)
+    return whole
+
+
+def _metric(
+    mesh: Mesh, size: int, owner: NDArray[np.int32], barycentric: NDArray[np.uint16]
+) -> tuple[NDArray[np.float16], NDArray[np.float16]]:
+    """Texels per mm along u and v, and the cosine between the two, from the interpolated derivatives."""
+    y, x = np.nonzero(owner >= 0)
+    corners = mesh.triangles[owner[y, x]]
+    b = barycentric[y, x] / np.float32(65535)
+    weights = np.stack([1 - b[:, 0] - b[:, 1], b[:, 0], b[:, 1]])
+    du, dv = (np.linalg.norm(d, axis=1) for d in (mesh.dpdu, mesh.dpdv))
+    cosine = (mesh.dpdu * mesh.dpdv).sum(axis=1) / np.maximum(du * dv, 1e-12)
+    corner = np.stack([du, dv, cosine], axis=-1)
+    interpolated = sum(weights[k][:, None] * corner[corners[:, k]] for k in range(3))
+    stretch = np.zeros((size, size, 2), dtype=np.float16)
+    stretch[y, x] = np.clip(size / np.maximum(interpolated[:, :2], 1e-3), 0.0, 6e4)
+    shear = np.zeros((size, size), dtype=np.float16)
+    shear[y, x] = np.clip(interpolated[:, 2], -MOST_SHEAR, MOST_SHEAR)
+    return stretch, shear
+
+
+def _reach(chart: NDArray[np.integer]) -> NDArray[np.uint16]:
+    """Run lengths of equal chart to the left, right, up and down of each texel."""
+
+    def before(rows: NDArray[np.integer]) -> NDArray[np.int64]:
+        index = np.arange(rows.shape[1])[None, :]
+        breaks = np.ones(rows.shape, dtype=bool)
+        breaks[:, 1:] = rows[:, 1:] != rows[:, :-1]
+        start: NDArray[np.int64] = np.maximum.accumulate(np.where(breaks, index, 0), axis=1)
+        return index - start
+
+    right, down = before(chart[:, ::-1])[:, ::-1], before(chart.T[:, ::-1])[:, ::-1].T
+    runs = before(chart), right, before(chart.T).T, down
+    return np.stack(runs, axis=-1).astype(np.uint16)

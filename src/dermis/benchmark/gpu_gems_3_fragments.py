@@ -10,7 +10,7 @@ import numpy as np
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.inputs import Inputs
 from dermis.frame.levels import FLOATS, HALVES, Blur, Levels
-from dermis.frame.passes import device_constants, shader_folders, surface_texels, translucency
+from dermis.frame.passes import registered, shader_folders, suited, surface_texels, translucency
 from dermis.frame.passes.combine import nothing
 from dermis.frame.techniques.gpu_gems_3 import GpuGems3, Pair, StretchedLevels
 from dermis.gpu import Constants, Device, FragmentProgram, Graph, compiled, make_texture
@@ -81,10 +81,12 @@ class Fragments(GpuGems3):
 
 
 def _program(device: Device, name: str, constants: Constants, targets: list[str]) -> FragmentProgram:
-    suited = device_constants(device)
-    return compiled(
-        FragmentProgram, device, _FOLDER / name, shader_folders(), constants, suited, targets=targets
-    )
+    def make() -> FragmentProgram:
+        path, folders = _FOLDER / name, shader_folders()
+        chosen = suited(device, path, folders, constants)
+        return FragmentProgram(device, path, folders, chosen, targets=targets)
+
+    return compiled(device, (name, registered()), constants, make)
 
 
 FRAGMENTS = Fragments()

@@ -90,8 +90,8 @@ def head(
         few charts, or many: a layout with as many seams as can be, to test them.
     """
     started = time.perf_counter()
-    from dermis.human.bust.build import BustRecipe, write_bust
     from dermis.human.bust.parameters import BustParameters
+    from dermis.human.bust_file import BustRecipe, write_bust
     from dermis.human.skin_maps.look import SkinLook
     from dermis.outputs import check_output
 

@@ -21,7 +21,7 @@ from dermis.images.colour import encode_srgb
 from dermis.mesh.head import Head
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.fits.gaussian import fit_gaussians
-from dermis.optics.presets import media
+from dermis.optics.media import media
 from dermis.optics.profiles import TERMS, write_profile
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin

@@ -1,13 +1,15 @@
-"""Latitude-longitude pictures of the light that arrives from all around."""
+"""Latitude-longitude pictures of distant light, and the sun-like peaks that are taken out of them."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
+from dermis.images.colour import luminance
 from dermis.images.io import read_image
 from dermis.mesh.samples import SAMPLES, fetch
 
@@ -15,16 +17,20 @@ Floats = NDArray[np.float64]
 UNIFORM = "uniform"
 """Name of the panorama with radiance 1 everywhere."""
 _LEAST_ROWS, _MOST_ROWS = 256, 512
-"""Fewer are divided, for sums over texels stand for integrals; more averaged: a fine lobe spans 16 texels."""
+"""Fewer are split, as texel sums stand for integrals; more are averaged: the narrowest lobe spans 16."""
 _BRIGHTEST = 1e12  # far beyond any sun; keeps single precision on the device from overflowing
+MOST_SUNS = 4
+_PEAK = 32.0  # times the mean radiance: what is brighter may belong to a sun
+_NEAR_DEGREES = 8.0
+_LEAST_SHARE = 0.05  # of the irradiance that the mean radiance gives
 
 
 def load_panorama(name: str) -> Floats:
-    """(h, w, 3) radiance, linear Rec. 709; the picture's middle lies at -Z, its right at +X, its top at +Y.
+    """(h, w, 3) radiance, linear Rec. 709; the picture's middle is -Z, its right +X, its top +Y.
 
     name : a sample, a file (.hdr, .exr), or "uniform"
 
-    Raises DermisError for a name that is neither, and for a picture that holds no radiance.
+    Raises DermisError for any other name, and for a picture that holds no radiance.
     """
     path = panorama_file(name)
     if path is None:
@@ -57,15 +63,13 @@ def directions(height: int, width: int) -> Floats:
 def solid_angles(height: int, width: int) -> Floats:
     """(h, 1) solid angle of a texel of each row [sr]."""
     edges = np.cos(np.pi * np.arange(height + 1) / height)
-    angles: Floats = (edges[:-1] - edges[1:])[:, None] * 2.0 * np.pi / width
-    return angles
+    return np.asarray((edges[:-1] - edges[1:])[:, None] * 2.0 * np.pi / width)
 
 
 def mean_radiance(radiance: Floats) -> Floats:
     """(3,) mean over all directions."""
     height, width = radiance.shape[:2]
-    mean: Floats = (radiance * solid_angles(height, width)[..., None]).sum(axis=(0, 1)) / (4.0 * np.pi)
-    return mean
+    return np.asarray((radiance * solid_angles(height, width)[..., None]).sum(axis=(0, 1)) / (4.0 * np.pi))
 
 
 def resampled(radiance: NDArray[np.floating], height: int) -> Floats:
@@ -78,7 +82,7 @@ def resampled(radiance: NDArray[np.floating], height: int) -> Floats:
 
 
 def _means(values: NDArray[np.floating], edges: Floats, wanted: Floats) -> Floats:
-    """Means between each two of `wanted` of what is constant between each two of `edges`; first axis."""
+    """Means over the intervals `wanted`, along the first axis, of values constant over `edges`."""
     first = np.clip(np.searchsorted(edges, wanted[:-1], "right") - 1, 0, len(values) - 1)
     after = np.clip(np.searchsorted(edges, wanted[1:], "left"), 1, len(values))
     means = np.empty((len(first), *values.shape[1:]))
@@ -110,3 +114,72 @@ def panorama_file(name: str) -> Path | None:
 
 def _sample_names() -> list[str]:
     return [name for name, sample in SAMPLES.items() if sample.kind == "environment"]
+
+
+@dataclass(frozen=True)
+class Sun:
+    """A peak as light from one direction.
+
+    direction : (3,) unit vector towards it
+    irradiance : (3,) on a surface that faces it, linear Rec. 709
+    radius : half of the angle that it spans [rad]
+    """
+
+    direction: Floats
+    irradiance: Floats
+    radius: float
+
+
+def split_suns(radiance: Floats) -> tuple[Floats, list[Sun]]:
+    """The panorama without its peaks, and the peaks, strongest first; together they hold all of its light.
+
+    radiance : (h, w, 3)
+
+    Each peak is the light above 32 times the mean within 8 degrees of the middle of what is bright. At most
+    four are taken, and none that gives less than a twentieth of what the mean radiance gives. A lighter
+    cousin of the median cut of light probes [Debevec2005].
+    """
+    mean = float(luminance(mean_radiance(radiance)))
+    brightness = np.asarray(luminance(radiance), np.float64)
+    above = brightness > _PEAK * mean
+    towards = directions(*radiance.shape[:2])[above]
+    weight = np.broadcast_to(solid_angles(*radiance.shape[:2]), above.shape)[above]
+    keep = _PEAK * mean / brightness[above]
+    light = radiance[above] * ((1.0 - keep) * weight)[:, None]
+    left, suns = np.ones(len(keep)), list[Sun]()
+    for inside in sorted(_clusters(brightness[above], towards, weight), key=lambda c: -_strength(light[c])):
+        if len(suns) == MOST_SUNS or _strength(light[inside]) < _LEAST_SHARE * np.pi * mean:
+            break
+        suns.append(_sun(light[inside], towards[inside], weight[inside]))
+        left[inside] = keep[inside]
+    rest = radiance.copy()
+    rest[above] *= left[:, None]
+    return rest, suns
+
+
+def _strength(light: Floats) -> float:
+    return float(luminance(light.sum(axis=0)))
+
+
+def _sun(light: Floats, towards: Floats, weight: Floats) -> Sun:
+    """One light for the texels of a peak (n, 3), as wide as an even disc with the same mean square."""
+    grey = np.asarray(luminance(light), np.float64)
+    middle = grey @ towards
+    solid_angle = grey.sum() ** 2 / (grey**2 / weight).sum()
+    return Sun(middle / np.linalg.norm(middle), light.sum(axis=0), float(np.sqrt(solid_angle / np.pi)))
+
+
+def _clusters(brightness: Floats, towards: Floats, weight: Floats) -> list[NDArray[np.bool_]]:
+    """Bright texels (n,) sorted into peaks: those around the middle of those around the brightest left."""
+    near = np.cos(np.radians(_NEAR_DEGREES))
+    left = np.ones(len(brightness), bool)
+    clusters = []
+    while left.any():
+        peak = np.where(left, brightness, 0.0).argmax()
+        around = left & (towards @ towards[peak] > near)
+        middle = weight[around] @ towards[around]
+        inside = left & (towards @ middle > near * np.linalg.norm(middle))
+        inside[peak] = True
+        left &= ~inside
+        clusters.append(inside)
+    return clusters

@@ -53,9 +53,9 @@ class Preparation:
         profile = self.profile_of(scene.skin)
         surroundings = keep(load_surroundings, device, around.name if around else None)
         scene = with_suns(self.memo, scene, surroundings)
-        lights = tuple(scene.lights)
-        views = keep(_views, head, lights, settings.shadow_size)
-        record = keep(_record, device, head, lights, views)
+        lights = head, tuple(scene.lights)
+        views = keep(_views, *lights, settings.shadow_size, using=(scene,))
+        record = keep(_record, *lights, views, using=(device, scene))
         layers = shadow_layers(views)
         counts = len(views), len(layers.clips)
         asked = Asked(head, scene.skin, profile, settings, around, surroundings, technique, *counts, view)
@@ -84,9 +84,9 @@ def under(layout: AtlasLayout, lights: Any) -> AtlasLayout:
     return replace(layout, lit=layout.lit | {"lights": lights})
 
 
-def _views(head: Head, lights: Lights, size: int) -> Views:
-    return light_views(Scene(head, lights), size)
+def _views(_: Head, __: Lights, size: int, scene: Scene) -> Views:
+    return light_views(scene, size)
 
 
-def _record(device: Device, head: Head, lights: Lights, views: Views) -> Any:
-    return light_records(shade_program(device), Scene(head, lights), views)
+def _record(_: Head, __: Lights, views: Views, device: Device, scene: Scene) -> Any:
+    return light_records(shade_program(device), scene, views)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from dermis.atlas.atlas import SMALLEST
+from dermis.atlas.build import SMALLEST
 from dermis.scene.settings import Settings
 
 FEATHER_MM = 3.0  # width over which an edited stretch map narrows the blur towards an edge

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.cached import cached_occlusion
-from dermis.environment.mirrors import equivalent_mirrors
-from dermis.environment.prefilter import prefilter
-from dermis.environment.suns import Sun
+from dermis.environment.panorama import Sun
+from dermis.environment.prefilter import equivalent_mirrors, prefilter
 from dermis.frame.lights import sun_lights
 from dermis.frame.passes.occlusion import FORM, bake_occlusion, whole_map
 from dermis.frame.surface import model_of

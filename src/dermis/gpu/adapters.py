@@ -11,8 +11,8 @@ from typing import Any
 from dermis.errors import refuse
 from dermis.gpu.native_types import tell_wgpus_types
 
-# None is needed to render; timestamps give stage times, the others tell what more an adapter could do.
-WANTED_FEATURES = ("float32-filterable", "timestamp-query", "shader-f16")
+WANTED_FEATURES = ("timestamp-query",)
+"""Features that a device is opened with where the adapter has them; nothing is lacking without."""
 
 _KINDS = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", "CPU")
 INSTALL_HINT = "On Debian or Ubuntu: sudo apt-get install mesa-vulkan-drivers"

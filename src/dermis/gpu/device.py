@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 from typing import Any
@@ -15,28 +15,67 @@ from numpy.typing import NDArray
 
 from dermis.errors import DermisError
 from dermis.gpu.adapters import Adapter, fitting_adapters
-from dermis.gpu.uniforms import CHUNK_BYTES
 
 _TIMED_PASSES = 2048
 _STAGING_STEP = 4096
+DEFAULT_LIMITS = {
+    "max-texture-dimension-1d": 8192,
+    "max-texture-dimension-2d": 8192,
+    "max-texture-dimension-3d": 2048,
+    "max-texture-array-layers": 256,
+    "max-bind-groups": 4,
+    "max-bindings-per-bind-group": 1000,
+    "max-dynamic-uniform-buffers-per-pipeline-layout": 8,
+    "max-dynamic-storage-buffers-per-pipeline-layout": 4,
+    "max-sampled-textures-per-shader-stage": 16,
+    "max-samplers-per-shader-stage": 16,
+    "max-storage-buffers-per-shader-stage": 8,
+    "max-storage-textures-per-shader-stage": 4,
+    "max-uniform-buffers-per-shader-stage": 12,
+    "max-uniform-buffer-binding-size": 65536,
+    "max-storage-buffer-binding-size": 128 << 20,
+    "max-buffer-size": 256 << 20,
+    "min-uniform-buffer-offset-alignment": 256,
+    "min-storage-buffer-offset-alignment": 256,
+    "max-vertex-buffers": 8,
+    "max-vertex-attributes": 16,
+    "max-vertex-buffer-array-stride": 2048,
+    "max-inter-stage-shader-variables": 16,
+    "max-color-attachments": 8,
+    "max-color-attachment-bytes-per-sample": 32,
+    "max-compute-workgroup-storage-size": 16384,
+    "max-compute-invocations-per-workgroup": 256,
+    "max-compute-workgroup-size-x": 256,
+    "max-compute-workgroup-size-y": 256,
+    "max-compute-workgroup-size-z": 64,
+    "max-compute-workgroups-per-dimension": 65535,
+    "max-immediate-size": 0,
+}
+"""What WebGPU promises on every machine ("Limits" in its specification)."""
 _RAISED_LIMITS = ("max-texture-dimension-2d", "max-storage-buffer-binding-size", "max-buffer-size")
 
 
-def open_device(adapter: str = "auto") -> Device:
+def open_device(adapter: str = "auto", *, bare: bool = False) -> Device:
     """Open "auto" (the best), "cpu" (software) or the first adapter whose name contains the text.
+
+    bare : True asks for nothing beyond what WebGPU promises everywhere
 
     Raises DermisError when there is no such adapter or when it does not open.
     """
     (*others, last), reason = fitting_adapters(adapter)
     for one in others:
         with contextlib.suppress(DermisError):  # listed, but it does not open
-            return Device(one, reason)
-    return Device(last, reason)
+            return Device(one, reason, bare=bare)
+    return Device(last, reason, bare=bare)
 
 
 class Device:
     """A logical device; nothing here is shared between two of them.
 
+    It has WebGPU's default limits, so that a program that needs more fails on every machine alike; only the
+    sizes of textures and buffers are the adapter's own. Of the optional features it has `WANTED_FEATURES`.
+
+    bare : True leaves the sizes at their defaults too, and asks for no feature
     executor : threads for what the driver and the disk do by themselves: compile, read, copy; what they have
         not begun when the device is dropped is left
     ffi, lib, checked : the native library, for the calls of every frame, without what wgpu's Python adds;
@@ -46,17 +85,18 @@ class Device:
     spare_records : memory in which no frame gathers its numbers at the moment; new memory takes longer
     """
 
-    def __init__(self, adapter: Adapter, reason: str) -> None:
+    def __init__(self, adapter: Adapter, reason: str, *, bare: bool = False) -> None:
         from wgpu.backends.wgpu_native import ffi, lib
         from wgpu.backends.wgpu_native._api import libf
 
         self.ffi, self.lib, self.checked = ffi, lib, libf
         self.adapter = adapter
         self.reason = reason
+        features = [] if bare else list(adapter.features)
+        limits = _limits(adapter.handle.limits, () if bare else _RAISED_LIMITS)
         try:
-            limits = {name: adapter.handle.limits[name] for name in _RAISED_LIMITS}
             self.handle: Any = adapter.handle.request_device_sync(
-                label="dermis", required_features=list(adapter.features), required_limits=limits
+                label="dermis", required_features=features, required_limits=limits
             )
         except Exception as error:
             raise DermisError(
@@ -64,7 +104,7 @@ class Device:
                 "Close other programs that use the GPU or choose --adapter cpu."
             ) from error
         self.max_texture_size, self.max_storage_bytes = (int(limits[name]) for name in _RAISED_LIMITS[:2])
-        self.has_timestamps = "timestamp-query" in adapter.features
+        self.has_timestamps = "timestamp-query" in features
         self.executor = ThreadPoolExecutor(os.cpu_count())
         weakref.finalize(self, self.executor.shutdown, wait=False, cancel_futures=True)
         self._timestamps: tuple[Any, Any] | None = None
@@ -112,10 +152,10 @@ class Device:
         """Length of a timestamp's tick [ns]; wgpu hands out the native API's ticks."""
         return float(self.lib.wgpuQueueGetTimestampPeriod(self.handle.queue._internal))
 
-    def uniform_chunk(self, index: int) -> Any:
-        """One of the buffers for the records of frames; made when first asked for."""
+    def uniform_chunk(self, index: int, size: int) -> Any:
+        """One of the buffers for the records of frames [byte]; made when first asked for."""
         while len(self._uniform_chunks) <= index:
-            self._uniform_chunks.append(self.uniform_buffer(CHUNK_BYTES))
+            self._uniform_chunks.append(self.uniform_buffer(size))
         return self._uniform_chunks[index]
 
     def uniform_buffer(self, size: int) -> Any:
@@ -160,6 +200,15 @@ class Device:
             usage = wgpu.BufferUsage.QUERY_RESOLVE | wgpu.BufferUsage.COPY_SRC
             self._timestamps = queries, self.handle.create_buffer(size=8 * _TIMED_PASSES, usage=usage)
         return self._timestamps
+
+
+def _limits(offered: Mapping[str, int], raised: Sequence[str]) -> dict[str, int]:
+    """WebGPU's default limits, the adapter's own where it offers less or the limit is one to raise."""
+    fitting = {
+        name: (max if name.startswith("min-") else min)(default, offered.get(name, default))
+        for name, default in DEFAULT_LIMITS.items()
+    }
+    return fitting | {name: offered[name] for name in raised}
 
 
 @contextlib.contextmanager

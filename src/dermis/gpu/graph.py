@@ -9,7 +9,8 @@ from typing import Any, TypeVar
 from dermis.gpu.access import Slot, slot_of
 from dermis.gpu.device import Device
 from dermis.gpu.frame import Frame, Timed
-from dermis.gpu.program import ComputeProgram, FragmentProgram, RasterProgram, Resources
+from dermis.gpu.listing import Lister, Listing
+from dermis.gpu.program import ComputeProgram, FragmentProgram, Program, RasterProgram, Resources
 from dermis.gpu.readback import Fetched
 from dermis.gpu.recording import Recordings
 
@@ -26,7 +27,7 @@ class Pass:
     needs : passes before it, and the slots in which they leave what it reads
     """
 
-    stage: str
+    stages: tuple[str, ...]
     run: Callable[[Frame], None]
     writes: list[tuple[Slot, int]]
     needs: list[tuple[int, Slot]] = field(default_factory=list)
@@ -40,12 +41,14 @@ class Graph:
     whose result is still where it leaves it does not run, nor does one whose result nobody needs.
 
     ran : stages of the passes that the last frame ran, in order
+    listing : when it is set, the passes of the next frame are written down there
     """
 
     def __init__(self, device: Device) -> None:
         self.device = device
         self.recordings = Recordings()
         self.ran: list[str] = []
+        self.listing: Listing | None = None
         self._epoch = 0
         self._frame = 0
         self._passes: list[Pass] = []
@@ -84,9 +87,14 @@ class Graph:
         access = program.access(resources)
         filled = slot_of(self.device, resources[completes]) if completes else None
         writes = [slot for slot in access.writes if slot is not filled]
-        key = (access.number, groups, program.constants(resources))
+        key = (access.number, groups, program.numbers(resources))
+        self._list(stage, program, resources, groups)
         self._add(
-            stage, key, access.reads, writes, lambda frame: frame.dispatch(stage, program, resources, groups)
+            (stage,),
+            key,
+            access.reads,
+            writes,
+            lambda frame: frame.dispatch(stage, program, resources, groups),
         )
 
     def draw(
@@ -104,12 +112,13 @@ class Graph:
         """Declare a pass that rasterises triangles into cleared targets, as `Frame.draw` does."""
         access, options = program.access(resources), {"layer": layer, "depth": depth, "far": far}
         writes = [slot_of(self.device, one) for one in (depth, target) if one is not None]
-        key = (access.number, vertices, layer, far, program.constants(resources))
+        key = (access.number, vertices, layer, far, program.numbers(resources))
 
         def run(frame: Frame) -> None:
             frame.draw(stage, program, resources, vertices, target=target, **options)
 
-        self._add(stage, key, access.reads, writes, run)
+        self._list(stage, program, resources, (vertices,))
+        self._add((stage,), key, access.reads, writes, run)
 
     def fill(
         self, stage: str, program: FragmentProgram, resources: Resources, targets: Sequence[Any]
@@ -117,9 +126,14 @@ class Graph:
         """Declare a pass for each texel of its targets, as `Frame.fill` does."""
         access = program.access(resources)
         writes = [slot_of(self.device, one) for one in targets]
-        key = (access.number, program.constants(resources))
+        key = (access.number, program.numbers(resources))
+        self._list(stage, program, resources, (3,))
         self._add(
-            stage, key, access.reads, writes, lambda frame: frame.fill(stage, program, resources, targets)
+            (stage,),
+            key,
+            access.reads,
+            writes,
+            lambda frame: frame.fill(stage, program, resources, targets),
         )
 
     def repeat(self, record: Callable[..., T], *args: Any) -> T:
@@ -129,9 +143,10 @@ class Graph:
         """
         recording, result = self.recordings.find(self.device, record, args)
         steps = recording.steps
-        self._add(
-            steps[0].stage, (recording.number,), recording.reads, recording.writes, lambda f: f.run(steps)
-        )
+        if self.listing is not None:
+            record(Lister(self.device, self.listing, len(self._passes)), *args)
+        key = (recording.number,)
+        self._add(recording.stages, key, recording.reads, recording.writes, lambda frame: frame.run(steps))
         return result
 
     def fetch(self, buffer: Any) -> Fetched:
@@ -144,7 +159,11 @@ class Graph:
         """Run what has to be run; returns the frame, which knows how long it took."""
         frame = Frame(self.device, timed=timed)
         try:
-            due = [one for one, runs in zip(self._passes, self._due(), strict=True) if runs]
+            runs = self._due()
+            due = [one for one, now in zip(self._passes, runs, strict=True) if now]
+            if self.listing is not None:
+                self.listing.finish(runs)
+                self.listing = None
             for one in due:
                 one.run(frame)
             for buffer, fetched in self._fetches:
@@ -158,11 +177,20 @@ class Graph:
         for one in due:
             for slot, value in one.writes:
                 slot.hold(value)
-        self.ran = [one.stage for one in due]
+        self.ran = [stage for one in due for stage in one.stages]
         return frame
 
+    def _list(self, stage: str, program: Program, resources: Resources, groups: Sequence[int]) -> None:
+        if self.listing is not None:
+            self.listing.add(stage, program, resources, groups, len(self._passes))
+
     def _add(
-        self, stage: str, key: tuple[Any, ...], reads: Sequence[Slot], writes: Sequence[Slot], run: Any
+        self,
+        stages: tuple[str, ...],
+        key: tuple[Any, ...],
+        reads: Sequence[Slot],
+        writes: Sequence[Slot],
+        run: Any,
     ) -> None:
         now, index = self._frame, len(self._passes)
         needs, found = list[tuple[int, Slot]](), list[int]()
@@ -178,7 +206,7 @@ class Graph:
         left = [(slot, hash((made, number)) or 1) for number, slot in enumerate(writes)]
         for slot, value in left:
             slot.write(now, index, value)
-        self._passes.append(Pass(stage, run, left, needs))
+        self._passes.append(Pass(stages, run, left, needs))
 
     def _due(self) -> list[bool]:
         """Which passes have to run for every resource to hold what all of them together leave."""

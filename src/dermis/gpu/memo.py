@@ -93,6 +93,7 @@ class Memo:
                 found: T = search.value
                 return found
         self._awaited = running
+        self._asked[-1].add((_begin, of))  # or it would go before it is found
         for one in self._making:
             one.provisional = True
         standing_in: T = search.value
@@ -165,7 +166,7 @@ def same(a: Any, b: Any) -> bool:
         return True
     if type(a) is not type(b):
         return False
-    if isinstance(a, tuple):
+    if isinstance(a, tuple | list):
         return len(a) == len(b) and all(map(same, a, b))
     if isinstance(a, np.ndarray):
         return bool(a.shape == b.shape and a.dtype == b.dtype and a.tobytes() == b.tobytes())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import cached_property
 from operator import itemgetter
 from pathlib import Path
@@ -57,9 +57,15 @@ def _entry(binding: Binding, value: Any, given: Any) -> Any:
 class Program:
     """What compute and raster programs share: the composed text, its bindings and their layouts."""
 
-    def __init__(self, device: Device, path: Path, folders: Sequence[Folder] = ()) -> None:
-        self.device = device
-        self.name = path.stem
+    def __init__(
+        self,
+        device: Device,
+        path: Path,
+        folders: Sequence[Folder] = (),
+        constants: Mapping[str, float] | None = None,
+    ) -> None:
+        self.device, self.name = device, path.stem
+        self.constants = dict(constants or {})
         self.source: Source = compose(path, (*folders, _TOOLKIT_SHADERS))
         self.bindings: tuple[Binding, ...] = bindings(self.source.text)
         self._module = self._compile(path)
@@ -110,7 +116,7 @@ class Program:
             self._accesses.keep(key, bound, found)
         return found
 
-    def constants(self, resources: Resources) -> tuple[bytes, ...]:
+    def numbers(self, resources: Resources) -> tuple[bytes, ...]:
         """What the shader reads of the records."""
         try:
             return tuple([read(resources[name]) for name, read in self._read_of.items()])
@@ -168,8 +174,8 @@ class ComputeProgram(Program):
         folders: Sequence[Folder] = (),
         constants: Mapping[str, float] | None = None,
     ) -> None:
-        super().__init__(device, path, folders)
-        stage = {"module": self._module, "entry_point": "main", "constants": dict(constants or {})}
+        super().__init__(device, path, folders, constants)
+        stage = {"module": self._module, "entry_point": "main", "constants": self.constants}
         self._compiled = device.executor.submit(
             device.handle.create_compute_pipeline, layout=self._layout, compute=stage
         )
@@ -206,11 +212,11 @@ class RasterProgram(Program):
         target: str | None,
         depth_compare: str,
     ) -> None:
-        super().__init__(device, path, folders)
+        super().__init__(device, path, folders, constants)
         fragment = {"module": self._module, "entry_point": "fragment", "targets": [{"format": target}]}
         self.pipeline = device.handle.create_render_pipeline(
             layout=self._layout,
-            vertex={"module": self._module, "entry_point": "vertex", "constants": dict(constants or {})},
+            vertex={"module": self._module, "entry_point": "vertex", "constants": self.constants},
             fragment=fragment if target else None,
             primitive={"topology": "triangle-list", "cull_mode": "none"},
             depth_stencil={
@@ -241,8 +247,8 @@ class FragmentProgram(Program):
         *,
         targets: Sequence[str],
     ) -> None:
-        super().__init__(device, path, folders)
-        stage = {"module": self._module, "entry_point": "fragment", "constants": dict(constants or {})}
+        super().__init__(device, path, folders, constants)
+        stage = {"module": self._module, "entry_point": "fragment", "constants": self.constants}
         self.pipeline = device.handle.create_render_pipeline(
             layout=self._layout,
             vertex={"module": self._module, "entry_point": "vertex"},
@@ -256,27 +262,22 @@ class FragmentProgram(Program):
         return int(wgpu.ShaderStage.FRAGMENT)
 
 
-def compiled(
-    kind: Callable[..., P],
-    device: Device,
-    path: Path,
-    folders: tuple[Folder, ...] = (),
-    constants: Constants = (),
-    suited: Constants = (),
-    **options: Any,
-) -> P:
-    """A program of that kind with these pipeline constants, compiled unless it is one of those used last.
+def compiled(device: Device, shader: Hashable, constants: Constants, make: Callable[[], P]) -> P:
+    """What `make` compiles of a shader with these pipeline constants, unless it is one of those used last.
 
-    suited : constants that suit the device, for shaders that have them
-    options : those of the kind
+    shader : what tells it from others
     """
-    variants: dict[Any, P] = device.programs.setdefault((kind, path, folders, str(options)), {})
+    variants: dict[Constants, P] = device.programs.setdefault(shader, {})
     found = variants.pop(constants, None)
     if found is None:
-        text = compose(path, (*folders, _TOOLKIT_SHADERS)).text
-        own = {name: value for name, value in suited if f"override {name}:" in text}
-        found = kind(device, path, folders, own | dict(constants), **options)
+        found = make()
     variants[constants] = found  # the last one
-    for oldest in list(variants)[:-_MOST_VARIANTS]:
-        del variants[oldest]
+    if len(variants) > _MOST_VARIANTS:
+        del variants[next(iter(variants))]
     return found
+
+
+def declared(path: Path, folders: Sequence[Folder], constants: Constants) -> dict[str, float]:
+    """Those of some pipeline constants that the shader has."""
+    text = compose(path, (*folders, _TOOLKIT_SHADERS)).text
+    return {name: value for name, value in constants if f"override {name}:" in text}

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import DermisError
-
-if TYPE_CHECKING:
-    from dermis.gpu.device import Device
+from dermis.gpu.device import Device
 
 
 class Fetched:

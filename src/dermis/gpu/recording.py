@@ -53,6 +53,11 @@ class Recording:
         return tuple(self._writes)
 
     @property
+    def stages(self) -> tuple[str, ...]:
+        """Each once."""
+        return tuple(dict.fromkeys(step.stage for step in self.steps))
+
+    @property
     def is_void(self) -> bool:
         """Whether something that it binds is gone."""
         return len(self.steps) != len(self._pipelines)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from dermis.gpu.device import Device
+from dermis.gpu.device import Device
 
 CHUNK_BYTES = 1 << 18
 _STEP = 256  # WebGPU's default alignment of uniforms in a buffer
@@ -24,7 +24,7 @@ class Uniforms:
 
     def __init__(self, device: Device, chunk: Callable[[int], Any] | None = None) -> None:
         self._device = device
-        self._chunk = chunk or device.uniform_chunk
+        self._chunk = chunk or partial(device.uniform_chunk, size=CHUNK_BYTES)
         self._staged: list[bytearray] = []
         self._end, self._buffer = CHUNK_BYTES, None
         self._placed: dict[int, tuple[tuple[Any, int], NDArray[Any]]] = {}  # which keeps the records' names

@@ -82,7 +82,9 @@ class Source:
 
 
 def compose(path: Path, folders: Sequence[Folder]) -> Source:
-    """The shader at `path` with its directives carried out; files are looked up beside it, then in `folders`.
+    """The shader at `path` with its directives carried out.
+
+    folders : where files are looked up that are not beside the one that asks for them
 
     Raises DermisError for a file, a list or a {word} that is not there.
     """

@@ -1,8 +1,9 @@
-"""Pixels from the bytes of picture files and back, by the libraries that keep every bit."""
+"""Pixels from the bytes of picture files and back, by libraries that keep every bit."""
 
 from __future__ import annotations
 
 import io
+import re
 import struct
 import threading
 import zlib
@@ -22,6 +23,7 @@ EXR_START = b"\x76\x2f\x31\x01"
 PILLOW_STARTS = (_PNG_START, b"\xff\xd8\xff", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 
 _PILLOW_LOCK = threading.Lock()
+RADIANCE_START = b"#?"
 
 
 def decode_exr(path: Path) -> NDArray[np.float32]:
@@ -49,9 +51,9 @@ def decode_with_pillow(data: bytes) -> Pixels:
     ValueError, OSError and others : the data are damaged or hold pixels of another kind
     """
     picture = _open(data)
-    layout = _layout_of_16_bit(data, picture)
-    if layout:
-        return _decode_16_bit(data, layout)
+    deep = _format_of_16_bit(data, picture)
+    if deep:
+        return _decode_16_bit(data, deep)
     if picture.mode in ("P", "PA", "LA", "La"):
         alpha = picture.mode != "P" or "transparency" in picture.info
         picture = picture.convert("RGBA" if alpha else "RGB")
@@ -63,7 +65,7 @@ def decode_with_pillow(data: bytes) -> Pixels:
 
 
 def _open(data: bytes) -> Any:
-    """The picture by Pillow, its header read and its size found bearable."""
+    """The picture opened by Pillow: its header is read and its size accepted."""
     picture = _open_header(data)
     if picture.width * picture.height > MAX_PIXELS:
         raise ValueError(f"it has {picture.width} x {picture.height} pixels, more than 16384 x 16384")
@@ -80,13 +82,13 @@ def _open_header(data: bytes) -> Any:
         try:
             return PIL.Image.open(io.BytesIO(data), formats=("PNG", "JPEG", "TIFF"))
         except PIL.UnidentifiedImageError as fault:
-            raise ValueError("its header makes no sense") from fault
+            raise ValueError("its header cannot be read") from fault
         finally:
             PIL.Image.MAX_IMAGE_PIXELS = limit
 
 
-def _layout_of_16_bit(data: bytes, picture: Any) -> str | None:
-    """FFmpeg's name of the pixels where Pillow would drop the lower 8 of 16 bits, else None."""
+def _format_of_16_bit(data: bytes, picture: Any) -> str | None:
+    """FFmpeg's name of the pixel format where Pillow would drop the lower 8 of 16 bits, else None."""
     if data.startswith(_PNG_START):
         depth, kind = data[24], data[25]
         return {0: "gray16le", 2: "rgb48le", 4: "ya16le", 6: "rgba64le"}[kind] if depth == 16 else None
@@ -94,21 +96,21 @@ def _layout_of_16_bit(data: bytes, picture: Any) -> str | None:
     return {3: "rgb48le", 4: "rgba64le"}.get(len(bits)) if 16 in bits else None
 
 
-def _decode_16_bit(data: bytes, layout: str) -> NDArray[np.uint16]:
+def _decode_16_bit(data: bytes, pixel_format: str) -> NDArray[np.uint16]:
     import imageio.v3
 
-    # Bytes, not the path: FFmpeg would read a percent sign in a name as a numbered sequence.
-    image: NDArray[np.uint16] = imageio.v3.imread(data, plugin="pyav", format=layout, index=0)
-    return image[..., [0, 0, 0, 1]] if layout == "ya16le" else image
+    # bytes, not the path: FFmpeg would take a percent sign in a name for a numbered sequence
+    image: NDArray[np.uint16] = imageio.v3.imread(data, plugin="pyav", format=pixel_format, index=0)
+    return image[..., [0, 0, 0, 1]] if pixel_format == "ya16le" else image
 
 
 def encode_png8(levels: NDArray[Any], effort: int = 6) -> bytes:
     """A PNG file of (H, W, 1, 3 or 4) uint8.
 
-    effort : of the compression, 1 for many pictures in a short time to 9 for small files
+    effort : of the compression, from 1 (fast) to 9 (small files)
 
     Each row is stored as its difference from the one above: for rendered pictures the files are as small as
-    those of libraries that try every filter on every row, in a third to a half of the time.
+    those of libraries that try every filter on every row, in a third to half of the time.
     """
     height, width, channels = levels.shape
     rows = levels.reshape(height, -1)
@@ -116,7 +118,7 @@ def encode_png8(levels: NDArray[Any], effort: int = 6) -> bytes:
     filtered[0, 1:] = rows[0]
     np.subtract(rows[1:], rows[:-1], out=filtered[1:, 1:])
     header = struct.pack(">IIBBBBB", width, height, 8, _PNG_KINDS[channels], 0, 0, 0)
-    pixels = zlib.compress(filtered.data, effort)  # which lets other threads run
+    pixels = zlib.compress(filtered.data, effort)  # releases the GIL
     return _PNG_START + _chunk(b"IHDR", header) + _chunk(b"IDAT", pixels) + _chunk(b"IEND", b"")
 
 
@@ -130,10 +132,82 @@ def encode_png16(levels: NDArray[Any]) -> bytes:
 
     import av
 
-    layout = {1: "gray16", 3: "rgb48", 4: "rgba64"}[levels.shape[2]]
+    pixel_format = {1: "gray16", 3: "rgb48", 4: "rgba64"}[levels.shape[2]]
     pixels = np.ascontiguousarray(levels[..., 0] if levels.shape[2] == 1 else levels)
     encoder = av.CodecContext.create("png", "w")
     encoder.height, encoder.width = pixels.shape[:2]
-    encoder.pix_fmt, encoder.time_base = f"{layout}be", Fraction(1, 1)
-    frame = av.VideoFrame.from_ndarray(pixels, format=f"{layout}le").reformat(format=f"{layout}be")
+    encoder.pix_fmt, encoder.time_base = f"{pixel_format}be", Fraction(1, 1)
+    frame = av.VideoFrame.from_ndarray(pixels, format=f"{pixel_format}le")
+    frame = frame.reformat(format=f"{pixel_format}be")
     return b"".join(bytes(packet) for packet in [*encoder.encode(frame), *encoder.encode(None)])
+
+
+def decode_radiance(data: bytes) -> NDArray[np.float32]:
+    """Linear radiance (H, W, 3) of the bytes of a .hdr file, divided by its EXPOSURE.
+
+    data : the whole file, in the top-down left-to-right order that programs write
+    ValueError : the data are cut off, damaged, or in another order or colour space
+
+    Ours rather than FFmpeg's, which accepts a file that lacks its last bytes.
+    """
+    height, width, exposure, start = _header(data)
+    if height * width > MAX_PIXELS:
+        raise ValueError(f"it has {width} x {height} pixels")
+    rgbe = _scanlines(data, start, height, width)
+    # A mantissa byte counts 1/256 of 2^(E - 128); E = 0 means black, and 2^-136 is black in any case.
+    scale = np.ldexp(np.float32(1 / exposure), rgbe[..., 3].astype(np.int32) - 136)
+    return np.multiply(rgbe[..., :3], scale[..., None], dtype=np.float32)
+
+
+def _header(data: bytes) -> tuple[int, int, float, int]:
+    """(height, width, exposure, where the pixels begin)."""
+    found = re.search(rb"\n\n-Y (\d+) \+X (\d+)\n", data[:65536])
+    if not found:
+        raise ValueError("its header has no size of the form -Y height +X width")
+    lines = data[: found.start()].splitlines()
+    if b"FORMAT=32-bit_rle_rgbe" not in lines:
+        raise ValueError("its header does not say FORMAT=32-bit_rle_rgbe")
+    exposures = [float(line[9:]) for line in lines if line.startswith(b"EXPOSURE=")]
+    return int(found[1]), int(found[2]), float(np.prod(exposures)), found.end()
+
+
+def _scanlines(data: bytes, at: int, height: int, width: int) -> NDArray[np.uint8]:
+    """(H, W, 4) bytes, from run-length coded scanlines or plain ones."""
+    coded = data[at : at + 4] == bytes((2, 2, width >> 8 & 255, width & 255)) and 8 <= width < 32768
+    if not coded:
+        return _plain(data, at, height, width)
+    planes = np.empty((height, 4, width), np.uint8)
+    for row in planes:
+        if data[at : at + 2] != b"\x02\x02":
+            raise ValueError("a scanline does not begin as it should")
+        at += 4
+        for plane in row:
+            at = _runs(data, at, plane)
+    return planes.transpose(0, 2, 1)
+
+
+def _runs(data: bytes, at: int, plane: NDArray[np.uint8]) -> int:
+    """Fill one channel of one scanline; where the next begins."""
+    x, width = 0, plane.size
+    while x < width:
+        if at + 1 >= len(data):
+            raise ValueError("it ends in the middle")
+        count, repeated = data[at], data[at] > 128
+        count = count - 128 if repeated else count
+        if count == 0 or x + count > width:
+            raise ValueError("a run is longer than its scanline")
+        if repeated:
+            plane[x : x + count] = data[at + 1]
+        else:
+            plane[x : x + count] = np.frombuffer(data, np.uint8, count, at + 1)
+        at += 2 if repeated else 1 + count
+        x += count
+    return at
+
+
+def _plain(data: bytes, at: int, height: int, width: int) -> NDArray[np.uint8]:
+    pixels = np.frombuffer(data, np.uint8, height * width * 4, at).reshape(height, width, 4)
+    # (1, 1, 1, n) repeats a pixel in files from before 1991; no program of today writes it.
+    if np.any(np.all(pixels[..., :3] == 1, axis=-1)):
+        raise ValueError("its pixels are in the old run-length code")
+    return pixels

@@ -1,4 +1,4 @@
-"""Filters over whole pictures: smaller copies, and slopes of a height map."""
+"""Filters over whole pictures: mip levels, slopes of a height map, and filling of empty space."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float32]
 
-# Rows filtered at a time: what is touched stays in the cache, which halves the time of a 4096² map.
-_STRIP = 32
+_STRIP = 32  # rows filtered at a time; they stay in the cache, which halves the time of a 4096² map
 
 
 def mip_chain(image: NDArray[np.floating[Any]]) -> list[Floats]:
-    """The picture and its halvings down to one texel, each with the mean of the one before.
+    """The picture and its mip levels down to one texel, each the mean of the one before.
 
     image : (H, W, C) or (H, W), linear values; level k has max(1, H >> k) x max(1, W >> k) texels
 
@@ -48,13 +47,14 @@ def derivatives(
     """(dh/dx, dh/dy): change of height per texel to the right and per texel DOWN, each (H, W).
 
     height : (H, W) in any unit, which the result carries per texel
-    border : "clamp" goes on in a straight line beyond the edge, so that a tilted plane has one slope
-        up to it; "wrap" takes the other side's texels, for a map that tiles
+    border : "clamp" extrapolates linearly, so that a tilted plane keeps its slope up to the edge; "wrap"
+        takes the texels of the other side, for a map that tiles
 
     Central differences smoothed across with Scharr's 3, 10, 3 weights: they keep a slope's direction
     to about a degree and take a third off the noise that 8-bit steps put on a slope.
     """
-    padded = _pad(np.asarray(height, np.float32), border)
+    plain = np.asarray(height, np.float32)
+    padded = np.pad(plain, 1, "wrap") if border == "wrap" else np.pad(plain, 1, "reflect", reflect_type="odd")
     rows, columns = height.shape
     dx, dy = np.empty((rows, columns), np.float32), np.empty((rows, columns), np.float32)
     for top in range(0, rows, _STRIP):
@@ -75,14 +75,8 @@ def _scharr(padded: Floats, dx: Floats, dy: Floats) -> None:
     dy += down[:, 1:-1]
 
 
-def _pad(height: Floats, border: Literal["clamp", "wrap"]) -> Floats:
-    if border == "wrap":
-        return np.pad(height, 1, mode="wrap")
-    return np.pad(height, 1, mode="reflect", reflect_type="odd")
-
-
 def without_steps(height: NDArray[np.floating[Any]]) -> Floats:
-    """A height map smoothed by 1.2 texels: the slopes of 8-bit steps draw contour lines, not pores.
+    """A height map smoothed by 1.2 texels, since 8-bit steps would show as contour lines.
 
     height : (H, W) in any unit
     """
@@ -93,3 +87,36 @@ def without_steps(height: NDArray[np.floating[Any]]) -> Floats:
     for axis in (0, 1):
         smooth = correlate1d(smooth, binomial, axis=axis, mode="nearest")
     return smooth
+
+
+def fill_empty(image: NDArray[np.floating[Any]], known: NDArray[np.bool_]) -> Floats:
+    """The picture with unknown pixels filled with the mean of known ones near by.
+
+    image : (H, W, C) with sides that are powers of two
+    known : (H, W) pixels that stay as they are
+
+    Pull-push: means of ever coarser levels, then back up.
+
+    Source: [Gortler1996] section 3.6.
+    """
+    weight = known[..., None].astype(np.float32)
+    levels: list[tuple[Floats, Floats]] = [(np.where(known[..., None], image, 0).astype(np.float32), weight)]
+    while len(levels[-1][0]) > 1:
+        total, count = (_halved(part) for part in levels[-1])
+        share: Floats = np.minimum(count, np.float32(1.0))
+        mean = np.asarray(total / np.maximum(count, np.float32(1e-6)), np.float32)
+        levels.append((mean * share, share))
+    filled = levels[-1][0]
+    for total, share in reversed(levels[:-1]):
+        filled = total + (1.0 - share) * _doubled(filled)
+    return filled
+
+
+def _halved(part: Floats) -> Floats:
+    """Sums of 2 x 2 pixels."""
+    return part[0::2, 0::2] + part[1::2, 0::2] + part[0::2, 1::2] + part[1::2, 1::2]
+
+
+def _doubled(part: Floats) -> Floats:
+    """Twice the size, each pixel four times."""
+    return part.repeat(2, axis=0).repeat(2, axis=1)

@@ -15,14 +15,15 @@ from dermis.errors import DermisError, refuse
 from dermis.images.codecs import (
     EXR_START,
     PILLOW_STARTS,
+    RADIANCE_START,
     Pixels,
     decode_exr,
+    decode_radiance,
     decode_with_pillow,
     encode_png8,
     encode_png16,
 )
 from dermis.images.colour import encode_srgb8
-from dermis.images.radiance import RADIANCE_START, decode_radiance
 
 OUTPUT_SUFFIXES = (".png", ".exr")
 _READABLE = "a picture (PNG, JPEG, TIFF, EXR or HDR)"
@@ -50,7 +51,7 @@ def read_image(path: str | Path | Picture) -> Pixels:
         give linear float32; told apart by content, not by suffix
     DermisError : the file is missing, is no picture, is cut off, or holds pixels of another kind
 
-    Grey with alpha becomes RGBA. Colour profiles and camera orientation are left aside, as for any texture.
+    Grey with alpha becomes RGBA. Colour profiles and camera orientation are ignored, as for any texture.
     """
     data = read_bytes(path)
     try:
@@ -61,10 +62,10 @@ def read_image(path: str | Path | Picture) -> Pixels:
         elif data.startswith(PILLOW_STARTS):
             image = decode_with_pillow(data)
         else:
-            refuse(path, _READABLE, "its first bytes are those of none", "Convert it to PNG")
+            refuse(path, _READABLE, "its first bytes match none of these", "Convert it to PNG")
     except DermisError:
         raise
-    except Exception as fault:  # decoders raise whatever they like for damaged data
+    except Exception as fault:  # decoders raise anything for damaged data
         raise DermisError(
             f"{path}: expected {_READABLE}, but it cannot be decoded ({outputs.reason(fault)}). "
             "It is cut off, damaged or of an unusual kind: fetch or export it again."
@@ -73,11 +74,11 @@ def read_image(path: str | Path | Picture) -> Pixels:
 
 
 def check_output(path: str | Path) -> Path:
-    """The path, after a trial that a picture can be written there: call it before a long rendering.
+    """The path, once a trial has shown that a picture can be written there: call it before a long rendering.
 
     DermisError : the suffix is none of `OUTPUT_SUFFIXES`, or the folder is missing or not writable
     """
-    return outputs.check_output(path, OUTPUT_SUFFIXES, "Choose .png to look at, .exr to go on with")
+    return outputs.check_output(path, OUTPUT_SUFFIXES, "Choose .png to look at, .exr to work with")
 
 
 def write_image(path: str | Path, linear: NDArray[np.floating[Any]]) -> None:
@@ -95,16 +96,17 @@ def write_image(path: str | Path, linear: NDArray[np.floating[Any]]) -> None:
     write_png(path, levels)
 
 
-def write_png(path: str | Path, levels: NDArray[np.uint8] | NDArray[np.uint16]) -> None:
+def write_png(path: str | Path, levels: NDArray[Any], effort: int = 6) -> None:
     """Write grey levels as they are to an 8- or 16-bit PNG, by dtype.
 
     levels : (H, W), or (H, W, C) with C of 1, 3 or 4; uint8 or uint16
+    effort : of the compression of 8 bits, from 1 (fast) to 9 (small files)
     """
     image = levels[..., None] if levels.ndim == 2 else levels
     if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or image.dtype not in (np.uint8, np.uint16):
         came = f"they have shape {levels.shape} and type {levels.dtype}"
         refuse(path, "pixels (H, W, 1, 3 or 4) of uint8 or uint16", came, "Convert them first")
-    data = encode_png8(image) if image.dtype == np.uint8 else encode_png16(image)
+    data = encode_png8(image, effort) if image.dtype == np.uint8 else encode_png16(image)
     with outputs.replacing(path) as temporary:
         temporary.write_bytes(data)
 
@@ -119,7 +121,7 @@ def write_exr(
 
     linear : (H, W, 3) or (H, W, 4), Rec. 709, stored as channels R, G, B (and A)
     layers : further pictures by name, (H, W) as one channel, (H, W, 3) as name.R, name.G, name.B
-    swift : compress runs of equal bytes only: half of the time, for a rendered head 4 % more bytes
+    swift : compress runs of equal bytes only: half the time, and 4 % more bytes for a rendered head
     """
     import OpenEXR
 

@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.disk import cached_array
-from dermis.mesh.geometry import edges, sum_at, triangle_areas
+from dermis.mesh.geometry import Doubles, edges, sum_at, triangle_areas
 from dermis.mesh.mesh import Floats, Mesh
 
-Doubles = NDArray[np.float64]
 SMOOTH_MM = 3.0
 """Standard deviation of what curvature is averaged over, about the way of light in skin."""
 

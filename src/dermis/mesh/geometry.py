@@ -14,7 +14,7 @@ MIN_UV_CROSS = 1e-12
 
 
 def weld(rows: ArrayLike) -> Ints:
-    """Index of the unique row for each row, rows being equal when all their float32 numbers are.
+    """Index of the unique row for each row; rows are equal when all their float32 numbers are.
 
     rows : (v, k) positions [mm], or positions and uv side by side
     """
@@ -52,16 +52,14 @@ def triangle_areas(corners: NDArray[np.floating]) -> Doubles:
     """Area of each triangle [mm2]; corners : (f, 3, 3) [mm]."""
     places = np.asarray(corners, dtype=np.float64)
     cross = np.cross(places[:, 1] - places[:, 0], places[:, 2] - places[:, 0])
-    areas: Doubles = np.linalg.norm(cross, axis=1) / 2
-    return areas
+    return np.asarray(np.linalg.norm(cross, axis=1) / 2)
 
 
 def uv_cross(corners: NDArray[np.floating]) -> Doubles:
     """Twice the signed uv area of each triangle; corners : (f, 3, 2)."""
     places = np.asarray(corners, dtype=np.float64)
     a, b = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
-    cross: Doubles = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    return cross
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
 def _unit(vectors: Doubles, instead: Doubles) -> Doubles:
@@ -90,8 +88,7 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
     face = _unit(cross[:, 0], np.zeros((len(cross), 3)))
     count = int(point.max()) + 1
     summed = sum_at(point[triangles].ravel(), (face[:, None] * angle[..., None]).reshape(-1, 3), count)
-    smooth: Floats = _unit(summed, np.broadcast_to([0.0, 0.0, 1.0], summed.shape))[point].astype(np.float32)
-    return smooth
+    return np.asarray(_unit(summed, np.broadcast_to([0.0, 0.0, 1.0], summed.shape))[point].astype(np.float32))
 
 
 def tangents(positions: Floats, uv: Floats, normals: Floats, triangles: Ints) -> tuple[Floats, Floats]:
@@ -133,8 +130,7 @@ def _trusted(given: Floats, computed: Floats) -> Floats:
     """The given normals where they are finite and nearly unit, else the computed ones."""
     length = np.linalg.norm(np.where(np.isfinite(given), given, 0).astype(np.float64), axis=1, keepdims=True)
     good = np.isfinite(given).all(axis=1, keepdims=True) & (np.abs(length - 1) < 0.05)
-    trusted: Floats = np.where(good, given / np.where(good, length, 1), computed).astype(np.float32)
-    return trusted
+    return np.asarray(np.where(good, given / np.where(good, length, 1), computed).astype(np.float32))
 
 
 def build_mesh(

@@ -54,15 +54,18 @@ class Mesh:
     @property
     def size_mm(self) -> NDArray[np.float32]:
         """Extent along x, y and z [mm]."""
-        extent: Floats = self.positions.max(axis=0) - self.positions.min(axis=0)
-        return extent
+        return np.asarray(self.positions.max(axis=0) - self.positions.min(axis=0))
 
     @cached_property
     def outline(self) -> NDArray[np.float64]:
         """(n, 3) corners of the convex hull [mm]: from wherever it is seen, no place lies farther out."""
-        from dermis.disk import cached_array  # the import alone of what finds it takes longer
+        from scipy.spatial import ConvexHull, QhullError
 
-        return cached_array(self.positions, "outline 1", lambda: _outline(self.positions))
+        points = self.positions.astype(np.float64)
+        try:
+            return np.asarray(points[ConvexHull(points).vertices])
+        except QhullError:  # it is flat
+            return points
 
     @cached_property
     def outline_columns(self) -> NDArray[np.float32]:
@@ -77,13 +80,3 @@ class Mesh:
         """Halfway between the least and the largest coordinates [mm]."""
         x, y, z = 0.5 * (self.outline.min(axis=0) + self.outline.max(axis=0))
         return float(x), float(y), float(z)
-
-
-def _outline(positions: Floats) -> NDArray[np.float64]:
-    from scipy.spatial import ConvexHull, QhullError
-
-    points = positions.astype(np.float64)
-    try:
-        return np.asarray(points[ConvexHull(points).vertices])
-    except QhullError:  # it is flat
-        return points

@@ -28,11 +28,8 @@ def subdivide(mesh: Mesh, levels: int) -> Mesh:
         refuse("subdivide", f"0 to {MAX_LEVELS} levels", f"{levels} came", "Each level takes 4x the memory")
     if levels == 0:
         return mesh
-    uv, point, triangles = (
-        mesh.uv.astype(np.float64),
-        mesh.point.astype(np.int64),
-        mesh.triangles.astype(np.int64),
-    )
+    uv = mesh.uv.astype(np.float64)
+    point, triangles = mesh.point.astype(np.int64), mesh.triangles.astype(np.int64)
     places = np.zeros((int(point.max()) + 1, 3))
     places[point] = mesh.positions
     for _ in range(levels):
@@ -71,8 +68,7 @@ def _edge_points(places: Doubles, welded: Index, ends: Index, of_side: Index, co
     middle = places[ends].mean(axis=1)
     across = sum_at(of_side, places[welded[:, [2, 0, 1]].T.ravel()], len(ends))
     inside = (counts == 2)[:, None]
-    placed: Doubles = np.where(inside, 0.75 * middle + across / 8, middle)
-    return placed
+    return np.asarray(np.where(inside, 0.75 * middle + across / 8, middle))
 
 
 def _old_points(places: Doubles, ends: Index, counts: Index) -> Doubles:
@@ -85,8 +81,7 @@ def _old_points(places: Doubles, ends: Index, counts: Index) -> Doubles:
     along = 0.75 * places + 0.25 * border_mean
     # where borders meet, and where the surface is not one sheet, the point stays
     held = np.where((on_border == 2)[:, None], along, places)
-    placed: Doubles = np.where((on_border == 0)[:, None], moved, held)
-    return placed
+    return np.asarray(np.where((on_border == 0)[:, None], moved, held))
 
 
 def _towards(places: Doubles, ends: Index) -> tuple[Doubles, Doubles]:

@@ -28,8 +28,7 @@ def charts(mesh: Mesh) -> Ints:
 
 def triangle_uv_area(mesh: Mesh) -> Doubles:
     """Unsigned uv area of each triangle (f,), 1 being the whole map."""
-    area: Doubles = np.abs(uv_cross(mesh.uv[mesh.triangles])) / 2
-    return area
+    return np.asarray(np.abs(uv_cross(mesh.uv[mesh.triangles])) / 2)
 
 
 def chart_uv_area(mesh: Mesh, chart: Ints) -> Doubles:
@@ -50,5 +49,4 @@ def usable(mesh: Mesh, atlas: int, min_texels: float = 4.0) -> NDArray[np.bool_]
     """
     chart = charts(mesh)
     roomy = chart_uv_area(mesh, chart) * atlas**2 >= min_texels
-    flat: NDArray[np.bool_] = roomy[chart] & (2 * triangle_uv_area(mesh) > MIN_UV_CROSS)
-    return flat
+    return np.asarray(roomy[chart] & (2 * triangle_uv_area(mesh) > MIN_UV_CROSS))

@@ -1,4 +1,4 @@
-"""What a half-space returns by where light comes from and leaves to, under a surface that may refract it."""
+"""Light that a half-space returns, by its directions of entry and exit, under a surface that may refract."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ _KEPT = 64  # colours
 
 @dataclass(frozen=True)
 class Directions:
-    """What makes a half-space differ from a diffuse surface, for each of c channels.
+    """How a half-space differs from a diffuse surface, for each of c channels.
 
-    Of light from a direction, `returned` times the profile's share comes back. It leaves in all directions
-    alike, but for what scattered only once: `once` times (1/(a + b) - its mean over where light leaves to),
-    with a and b the cosines of both directions below the surface.
+    Of light from a direction, `returned` times the profile's share comes back. It leaves evenly in all
+    directions, except for light that scattered only once: `once` times (1/(a + b) - its mean over exit
+    directions), with a and b the cosines of both directions below the surface.
 
     eta : index of refraction against the air [-]
     returned : (ROWS, c) by evenly spaced roots of the cosine, 1 from straight above [-]
-    from_everywhere : (c,) the same for light from all directions alike [-]
+    from_everywhere : (c,) the same for uniform light from all directions [-]
     once : (c,) [-]
     mean_once : mean of 1/(a + b) over both directions [-]
     """
@@ -39,13 +39,13 @@ class Directions:
 
 
 def directions(total: ArrayLike, eta: float) -> Directions:
-    """Those of the half-spaces that return given shares of the light that enters from straight above.
+    """The directions of half-spaces that return given shares of the light that enters perpendicularly.
 
     total : (c,) [-]
     eta : index of refraction against the air, at least 1 [-]
 
     Sources: [Chandrasekhar1960] for the half-space, which scatters isotropically; [Jensen2001] for taking
-    light apart that scattered once.
+    single scattering apart.
     """
     channels = [_channel(float(share), eta) for share in np.atleast_1d(np.asarray(total, np.float64))]
     returned, everywhere, once = (np.stack(values, axis=-1) for values in zip(*channels, strict=True))
@@ -66,12 +66,12 @@ def h_function(cosine: ArrayLike, albedo: float) -> Floats:
 
 
 def directional_albedo(cosine: ArrayLike, albedo: float, eta: float) -> Floats:
-    """Share of the light which enters from directions that leaves again, by the cosine in the air [-]."""
+    """Share of light that leaves again, by the cosine of its direction in the air [-]."""
     return _Matched(albedo, eta).returned(refracted(cosine, eta))
 
 
 def mean_of_once(cosine: ArrayLike, eta: float) -> Floats:
-    """Mean of 1/(a + b) over where light leaves to, by the cosine of where it comes from [-]."""
+    """Mean of 1/(a + b) over exit directions, by the cosine of entry [-]."""
     a, critical = np.maximum(refracted(cosine, eta), 1e-4), _critical(eta)
     return np.asarray(2.0 * eta**2 * (1.0 - critical - a * np.log((a + 1.0) / (a + critical))))
 
@@ -82,7 +82,7 @@ def refracted(cosine: ArrayLike, eta: float) -> Floats:
 
 
 class _Matched:
-    """What an index-matched half-space reflects, and a smooth surface above it that throws light back.
+    """An index-matched half-space, and a smooth surface above it that reflects light back into it.
 
     Inside, R reflects light and the surface returns r of it: R + R r R + ... is solved for at once.
     """
@@ -109,7 +109,7 @@ class _Matched:
         return np.asarray(leaving.reshape(np.shape(inside)))
 
     def from_everywhere(self) -> float:
-        """Share of the light that enters from all directions alike that leaves."""
+        """Share of uniform light that leaves again."""
         return float((self.leaving * self.returned(self._mu)).sum() / self.leaving.sum())
 
 
@@ -146,7 +146,7 @@ def _albedo_of(total: float, eta: float) -> float:
 
 
 def _internal_reflectance(cosine: Floats, eta: float) -> Floats:
-    """Share of unpolarised light from inside that the surface throws back."""
+    """Share of unpolarised light from inside that the surface reflects back."""
     outside = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - cosine**2), 0.0))
     across = (eta * cosine - outside) / np.maximum(eta * cosine + outside, 1e-12)
     along = (cosine - eta * outside) / np.maximum(cosine + eta * outside, 1e-12)

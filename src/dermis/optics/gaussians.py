@@ -11,10 +11,10 @@ from dermis.errors import refuse
 
 Floats = NDArray[np.float64]
 MOST_GAUSSIANS = 24
-"""As many as the frame adds up: eight for each of three channels."""
+"""As many as a frame sums: eight for each of three channels."""
 
 WIDEST_MM2 = 1e4
-_MEND = "Mend the profile's table"
+_MEND = "Correct the profile's table"
 
 
 @dataclass(frozen=True)
@@ -46,20 +46,18 @@ class GaussianSum:
         if (variance <= 0).any() or (np.diff(variance) <= 0).any():
             refuse(self.name, "variances above 0 that increase", f"they are {variance.tolist()}", _MEND)
         if (weight < 0).any() or (weight.sum(axis=0) <= 0).any():
-            refuse(self.name, "weights of 0 or more with some in each channel", "they are not so", _MEND)
+            refuse(self.name, "weights of 0 or more, some above 0 in each channel", "they are not", _MEND)
 
     @property
     def albedo(self) -> Floats:
         """Total reflectance per channel: the sum of the weights [-]."""
-        total: Floats = self.weight.sum(axis=0)
-        return total
+        return np.asarray(self.weight.sum(axis=0))
 
     def radiant_exitance(self, radius_mm: ArrayLike) -> Floats:
         """R at distances r from a pencil of unit power, shape (..., c) [1/mm2]."""
         r = np.asarray(radius_mm, dtype=np.float64)[..., None]
         bells = np.exp(-(r**2) / (2 * self.variance_mm2)) / (2 * np.pi * self.variance_mm2)
-        profile: Floats = bells @ self.weight
-        return profile
+        return np.asarray(bells @ self.weight)
 
     def within(self, radius_mm: ArrayLike) -> Floats:
         """Share of the light that leaves within distances r, shape (..., c) [-]."""
@@ -70,21 +68,6 @@ class GaussianSum:
         """Integral of 2 pi r R(r) J0(s r) by frequency s [1/mm], shape (..., c) [-]."""
         s = np.asarray(frequency, dtype=np.float64)[..., None]
         return np.asarray(np.exp(-self.variance_mm2 * s**2 / 2) @ self.weight)
-
-    def widened(self, variance_mm2: float) -> GaussianSum:
-        """The profile after a Gaussian blur of this variance."""
-        return GaussianSum(self.name, self.variance_mm2 + variance_mm2, self.weight)
-
-    def convolved(self, other: GaussianSum) -> GaussianSum:
-        """The profile of light that spreads by this one and then by the other, channel by channel.
-
-        Raises DermisError when that takes more than `MOST_GAUSSIANS`.
-        """
-        sums = np.add.outer(self.variance_mm2, other.variance_mm2).ravel()
-        variance, place = np.unique(sums, return_inverse=True)
-        weight = np.zeros((len(variance), self.weight.shape[1]))
-        np.add.at(weight, place, (self.weight[:, None] * other.weight).reshape(len(sums), -1))
-        return GaussianSum(f"{self.name} * {other.name}", variance, weight)
 
     def inner(self, other: GaussianSum) -> Floats:
         """Integral of r R(r) S(r) with another profile S, (c,) [1/mm2]."""

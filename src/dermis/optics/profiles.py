@@ -14,8 +14,7 @@ import numpy as np
 from dermis.errors import refuse
 from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.media import Floats
-from dermis.optics.presets import read_text, read_toml
+from dermis.optics.media import Floats, read_text, read_toml
 from dermis.optics.tissue import Tissue, load_tissue, names
 from dermis.outputs import replacing
 
@@ -24,7 +23,7 @@ TERMS = 6
 _HEADER = ["variance_mm2", "red", "green", "blue"]
 _FILE_FORM = "a CSV file with the columns " + ",".join(_HEADER)
 _KEPT_FILES = 16
-_MEND = "Mend the profile's table"
+_MEND = "Correct the profile's table"
 
 
 def preset_names() -> tuple[str, ...]:
@@ -45,17 +44,15 @@ def load_profile(
     Raises DermisError when there is no such preset or file, or when its numbers cannot be a profile.
     """
     if pigments:
-        return _fit(name, pigments, near)
+        return fit_profile(load_tissue(name, pigments=pigments), name, near)
     table = find_table(name)
     if table is not None:
         return table
-    if str(name) in names():
-        return _fitted(str(name))
-    return _fit(Path(name))
+    return _fitted(str(name)) if str(name) in names() else fit_profile(load_tissue(Path(name)), name)
 
 
 def find_table(name: str | Path) -> GaussianSum | None:
-    """The Gaussians that a name or file holds as they are; None when it is tissue.
+    """The Gaussians that a name or a file states; None when it names tissue.
 
     Raises DermisError when it is neither, or when its numbers cannot be a profile.
     """
@@ -73,9 +70,9 @@ def find_table(name: str | Path) -> GaussianSum | None:
 
 @lru_cache(_KEPT_FILES)
 def _table(path: Path, written: tuple[int, ...]) -> GaussianSum | None:
-    """The Gaussians of a file, which each frame asks for.
+    """The Gaussians of a file, cached because each frame asks for them.
 
-    written : what tells this file from others of its name
+    written : the state of the file, as `_written` gives it
     """
     if path.suffix.lower() == ".toml":
         document = read_toml(path)
@@ -84,10 +81,10 @@ def _table(path: Path, written: tuple[int, ...]) -> GaussianSum | None:
 
 
 def _written(path: Path) -> tuple[int, ...]:
-    """When a file was written, how large and which one it is; nothing when there is none."""
+    """Time of writing, size and inode of a file; empty when there is none."""
     try:
         found = path.stat()
-    except OSError:  # none, a name too long, or a folder that is not ours
+    except OSError:  # no such file, a name too long, or a folder without access
         return ()
     return found.st_mtime_ns, found.st_size, found.st_ino
 
@@ -97,7 +94,7 @@ def write_profile(path: Path, profile: GaussianSum, remarks: Mapping[str, Any]) 
 
     remarks : further entries: text, numbers, and lists of them
 
-    Raises DermisError when that is not possible.
+    Raises DermisError when it cannot be written.
     """
     lines = ["# Written by dermis profile. Lengths in mm; red, green, blue are linear Rec. 709."]
     lines += [f"{key} = {_toml(value)}" for key, value in remarks.items()]
@@ -121,13 +118,7 @@ def _toml(value: Any) -> str:
 
 @cache
 def _fitted(name: str) -> GaussianSum:
-    return _fit(name)
-
-
-def _fit(
-    name: str | Path, pigments: Mapping[str, float] | None = None, near: GaussianSum | None = None
-) -> GaussianSum:
-    return fit_profile(load_tissue(name, pigments=pigments), name, near)
+    return fit_profile(load_tissue(name), name)
 
 
 def fit_profile(tissue: Tissue, name: str | Path, near: GaussianSum | None = None) -> GaussianSum:
@@ -142,8 +133,9 @@ def fit_profile(tissue: Tissue, name: str | Path, near: GaussianSum | None = Non
 
 @cache
 def _published() -> GaussianSum:
-    text = (resources.files("dermis.optics") / "data" / f"{PUBLISHED}.csv").read_text(encoding="utf-8")
-    return _parse(PUBLISHED, text)
+    return _parse(
+        PUBLISHED, resources.files("dermis.optics").joinpath(f"data/{PUBLISHED}.csv").read_text("utf-8")
+    )
 
 
 def _from_toml(path: Path, document: Mapping[str, Any]) -> GaussianSum:

@@ -1,4 +1,4 @@
-"""A radial profile as numbers: R(r) at radii, and the light that leaves through rings."""
+"""A radial profile in numbers: R(r) at radii, and the light that leaves through rings."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class RadialProfile:
     standard_error : (n, c) of R(r) where it was counted, else None [1/mm2]
     total_error : (c,) of the total, likewise [-]
     incident : whether per power that arrives (surface reflection excluded) or that enters
-    warnings : what makes these numbers doubtful
+    warnings : reasons to doubt these numbers
     sources : citation keys
     """
 
@@ -74,8 +74,7 @@ def resample(radius_mm: Floats, grid_mm: Floats, values: Floats) -> Floats:
     """Values (m, c) on a log-spaced grid, read at other radii with a cubic spline in log r, (n, c)."""
     from scipy.interpolate import CubicSpline
 
-    read: Floats = CubicSpline(np.log(grid_mm), values)(np.log(radius_mm))
-    return read
+    return np.asarray(CubicSpline(np.log(grid_mm), values)(np.log(radius_mm)))
 
 
 def enclosed(radius_mm: Floats, grid_mm: Floats, reflectance: Floats) -> Floats:

@@ -51,15 +51,12 @@ def _split(share: Floats, nodes: int) -> tuple[NDArray[np.int64], Floats]:
 
 
 def colour_table(parameters: SkinParameters) -> ColourTable:
-    """The colours of all skins like this one, by layered diffusion; its melanin and blood do not count."""
+    """The colours of all skins like this one, by layered diffusion; its own melanin and blood are ignored."""
     shares = np.linspace(0.0, 1.0, _NODES) ** 2
     media = [spectral_medium("dj2006", replace(parameters, melanin=share, blood=share)) for share in shares]
     epidermis, dermis = (_stacked([medium.layers[k] for medium in media]) for k in (0, 1))
     n = _NODES
-    pairs = (
-        _picked(epidermis, np.repeat(np.arange(n), n)),
-        _picked(dermis, np.tile(np.arange(n), n)),
-    )
+    pairs = _picked(epidermis, np.repeat(np.arange(n), n)), _picked(dermis, np.tile(np.arange(n), n))
     total = transform(Medium("skins", pairs, media[0].eta), "layered", "layer", STILL)[0]
     spectra = total.reshape(n * n, len(WAVELENGTHS_NM))
     colours = (1.0 - normal_reflectance(media[0].eta)) * spectra @ rgb_weights(WAVELENGTHS_NM).T

@@ -1,4 +1,4 @@
-"""Tissue by name: media in three channels, and skins of pigments in wavelengths."""
+"""Tissue by name: media in three channels, and skins of pigments by wavelength."""
 
 from __future__ import annotations
 
@@ -11,13 +11,11 @@ from numpy.typing import ArrayLike
 
 from dermis.errors import refuse
 from dermis.optics.diffusion.boundary import normal_reflectance
-from dermis.optics.diffusion.models import Model, diffusion_profile
+from dermis.optics.diffusion.models import Model, diffusion_profile, through_slab
 from dermis.optics.diffusion.multipole import Clamp
-from dermis.optics.diffusion.transmission import through_slab
-from dermis.optics.media import Floats, Layer, Medium
+from dermis.optics.media import Floats, Layer, Medium, media, medium_from_toml, read_toml
 from dermis.optics.pigments.skin import EXAMPLES, SkinParameters, Structure, spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
-from dermis.optics.presets import media, medium_from_toml, read_toml
 from dermis.optics.radial import RadialProfile
 
 SPECTRAL = "spectral"
@@ -60,7 +58,7 @@ class Tissue:
 
 
 def names() -> tuple[str, ...]:
-    """What `load_tissue` knows without a file."""
+    """Names that `load_tissue` knows without a file."""
     return (*media(), SPECTRAL, *EXAMPLES)
 
 
@@ -72,7 +70,7 @@ def load_tissue(
     structure : layers of a skin of pigments; by default the file's own, or else "dj2006"
     pigments : fields of `SkinParameters` that replace those of the name
 
-    Raises DermisError for what is neither, and for pigments that a medium without them cannot have.
+    Raises DermisError for any other name, and when pigments are given to a medium that has none.
     """
     given = dict(pigments or {})
     if str(name) == SPECTRAL or str(name) in EXAMPLES:
@@ -111,12 +109,9 @@ def _from_skin_table(
     if unknown:
         known = ", ".join(sorted({"structure", *fields}))
         refuse(path, f"in [skin]: {known}", f"{', '.join(unknown)} came", "Correct the names")
-    wrong = [
-        key for key, value in own.items() if isinstance(value, bool) or not isinstance(value, int | float)
-    ]
+    wrong = [key for key, value in own.items() if type(value) not in (int, float)]
     if wrong or structure not in get_args(Structure):
         what = f"{wrong[0]} = {own[wrong[0]]!r}" if wrong else f"structure = {structure!r}"
-        refuse(
-            path, f"numbers, and a structure of {', '.join(get_args(Structure))}", f"{what} came", "Mend it"
-        )
+        expected = f"numbers, and a structure of {', '.join(get_args(Structure))}"
+        refuse(path, expected, f"{what} came", "Correct it")
     return _spectral(str(document.get("name", path.stem)), wanted or structure, SkinParameters(**own), given)

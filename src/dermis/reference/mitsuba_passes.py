@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import zipfile
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.disk import cache_folder
+from dermis.disk import find, store
 from dermis.environment.panorama import load_panorama
-from dermis.errors import DermisError
 from dermis.optics.media import Medium
-from dermis.outputs import replacing
 from dermis.reference.mitsuba_skin import Lambertian
 from dermis.scene.model import Scene
 
 Floats = NDArray[np.float64]
+_FOLDER = "path-traced"
 _FORM = 1  # raise when the same scene is traced in another way
 
 
@@ -86,32 +83,15 @@ def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], 
 
 def kept_passes(key: str, size: tuple[int, int]) -> Passes | None:
     """The passes of that name, or None when there are none that can be read."""
-    with contextlib.suppress(OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-        with _path(key).open("rb") as file, np.load(file) as stored:
-            notes = tuple(str(note) for note in stored["notes"])
-            passes = Passes(stored["mean"], stored["spread"], stored["mask"], notes)
-            passes.count, passes.seconds = int(stored["count"]), float(stored["seconds"])
-        if passes.mean.shape == (size[1], size[0], 3) and passes.count > 0:
-            return passes
-    return None
+    found = find(_FOLDER, key, ("mean", "spread", "mask", "notes", "count", "seconds"))
+    if found is None or found["mean"].shape != (size[1], size[0], 3):
+        return None
+    notes = tuple(str(note) for note in found["notes"])
+    moments = found["mean"], found["spread"], found["mask"]
+    return Passes(*moments, notes, int(found["count"]), float(found["seconds"]))
 
 
 def store_passes(key: str, passes: Passes) -> None:
     """Keep passes under a name; the disk may fail without harm, and a file is whole or not there."""
-    path = _path(key)
-    with contextlib.suppress(OSError, DermisError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(path) as unfinished:
-            np.savez(
-                unfinished,
-                mean=passes.mean,
-                spread=passes.spread,
-                mask=passes.mask,
-                notes=np.array(passes.notes, np.str_),
-                count=passes.count,
-                seconds=passes.seconds,
-            )
-
-
-def _path(key: str) -> Path:
-    return cache_folder() / "path-traced" / f"{key}.npz"
+    with contextlib.suppress(OSError):
+        store(_FOLDER, key, {name: np.asarray(value) for name, value in vars(passes).items()})

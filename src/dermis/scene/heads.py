@@ -11,7 +11,7 @@ from dermis.errors import refuse
 from dermis.human.bust import BUSTS
 from dermis.mesh.check import check_head_height
 from dermis.mesh.formats import is_gltf
-from dermis.mesh.gltf_maps import embedded_maps
+from dermis.mesh.gltf import embedded_maps
 from dermis.mesh.head import Head
 from dermis.mesh.load import load_mesh
 from dermis.mesh.maps import load_maps
@@ -56,7 +56,7 @@ def load_head(
     name, path = str(head), Path(head)
     sample, files = SAMPLES.get(name), dict[str, Any]()
     if name in BUSTS:
-        from dermis.human.bust.build import cached_bust
+        from dermis.human.bust_file import cached_bust
 
         path = cached_bust(name)
     elif sample is not None:

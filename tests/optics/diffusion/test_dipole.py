@@ -10,10 +10,10 @@ from slabs import case, slab, table
 from tolerances import CLOSED_FORM
 
 from dermis.errors import DermisError
-from dermis.optics.diffusion import better_dipole, dipole
+from dermis.optics.diffusion import dipole
 from dermis.optics.diffusion.boundary import mismatch
 from dermis.optics.diffusion.models import diffusion_profile
-from dermis.optics.presets import media
+from dermis.optics.media import media
 from dermis.optics.radial import enclosed
 
 MARBLE_GREEN = media()["marble"].channel(1).with_eta(1.5)
@@ -93,7 +93,7 @@ def _leaves_after_one_event(eta: float) -> float:
 def test_better_dipole_converges_in_its_sources() -> None:
     layer = slab(0.95).layers[0]
     r = np.geomspace(0.05, 20.0, 40)
-    few, many = (better_dipole.reflectance(r, layer, 1.4, depths=n) for n in (100, 1600))
+    few, many = (dipole.better_reflectance(r, layer, 1.4, depths=n) for n in (100, 1600))
     assert np.allclose(few, many, rtol=0.02)
 
 

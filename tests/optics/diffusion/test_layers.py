@@ -10,11 +10,10 @@ from scipy.special import j0, jn_zeros
 from slabs import TWO_LAYER, case, ring_means, slab, table
 from tolerances import CLOSED_FORM, LAYERED_TOTAL
 
-from dermis.optics.diffusion import dipole, hankel, layered_diffusion, layers
+from dermis.optics.diffusion import dipole, hankel, layered_diffusion, multipole
 from dermis.optics.diffusion.boundary import mismatch
 from dermis.optics.diffusion.models import diffusion_profile
-from dermis.optics.media import Layer, Medium
-from dermis.optics.presets import media
+from dermis.optics.media import Layer, Medium, media
 from dermis.optics.radial import enclosed, resample
 
 A = mismatch(1.4, "exact")
@@ -29,7 +28,7 @@ def test_totals_of_the_table(sample_folder: Path, name: str) -> None:
         if row["case"] != name:
             continue
         medium, A = case(name), row["A"]
-        added = layers.respond(hankel.STILL, medium, A, "none").R_above[0, 0]
+        added = multipole.respond(hankel.STILL, medium, A, "none").R_above[0, 0]
         beam, point = (
             layered_diffusion.respond(hankel.STILL, medium, A, s)[0][0, 0] for s in ("beam", "point")
         )
@@ -44,7 +43,7 @@ def test_profiles_of_the_table(sample_folder: Path, name: str) -> None:
     own = rows[(rows["case"] == name) & (rows["r_mm"] > 0.0)]
     s = hankel.frequencies()
     for transform, column in (
-        (layers.respond(s, case(name), A, "none").R_above, "R_DJ_or_dipole_A_exact"),
+        (multipole.respond(s, case(name), A, "none").R_above, "R_DJ_or_dipole_A_exact"),
         (layered_diffusion.respond(s, case(name), A, "point")[0], "R_layered_point_LP_A_exact"),
     ):
         R = resample(own["r_mm"], hankel.radii(), hankel.to_radius(transform))[:, 0]
@@ -113,7 +112,7 @@ def test_cuts_of_the_table_in_the_multipole(sample_folder: Path) -> None:
         medium = _cut(row["mua"], row["musp"], row["cut_depth_mfp"])
         if row["cut_depth_mfp"] == 1.0:
             continue  # the printed source is just on the cut: either side of it is right
-        total = layers.respond(hankel.STILL, medium, PRINTED_A, "none").R_above[0, 0]
+        total = multipole.respond(hankel.STILL, medium, PRINTED_A, "none").R_above[0, 0]
         assert total == pytest.approx(row["R_total_DJ_two_layers"], rel=CLOSED_FORM)
         uncut = dipole.total(medium.layers[-1], PRINTED_A)[0]
         assert uncut == pytest.approx(row["R_total_uncut_dipole"], rel=CLOSED_FORM)
@@ -135,7 +134,7 @@ def test_white_stack_gives_all_back() -> None:
 
 def test_slab_transmits_alike_in_both_models_when_it_is_thick() -> None:
     thick = slab(0.99, 12.0)
-    T = layers.respond(hankel.STILL, thick, A).T_down[0, 0]
+    T = multipole.respond(hankel.STILL, thick, A).T_down[0, 0]
     assert layered_diffusion.respond(hankel.STILL, thick, A)[1][0, 0] == pytest.approx(T, rel=0.05)
 
 

@@ -93,7 +93,7 @@ def test_the_artists_model_beats_preintegration_by_this_number(counted_skin: Rin
     exact = judge(preintegrate(fit_gaussians(counted_skin, 6, keep_energy=True).profile), counted_skin)
     assert (fitted.error < exact.error).all()
     assert (abs(fitted.energy_error) < 1e-12).all() and (abs(exact.energy_error) < 1e-6).all()
-    near, far = fitted.kernel.sigma_mm
+    near, far = np.sqrt(fitted.kernel.variance_mm2)
     assert (near < far).all() and np.allclose(fitted.kernel.weight.sum(axis=0), 1.0)
 
 

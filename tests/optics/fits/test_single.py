@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dermis.optics.fits.single import single_gaussian
+from dermis.optics.fits.gaussian import single_gaussian
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
 

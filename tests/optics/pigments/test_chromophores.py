@@ -12,7 +12,7 @@ from tolerances import PUBLISHED
 
 from dermis.errors import DermisError
 from dermis.optics.media import Floats
-from dermis.optics.pigments import chromophores, scattering
+from dermis.optics.pigments import chromophores
 
 VISIBLE_NM = np.arange(380.0, 781.0)
 
@@ -62,7 +62,7 @@ def test_coefficients_of_an_independent_computation(sample_folder: Path) -> None
         (chromophores.deoxyhaemoglobin, "eps_Hb_cm1_M1"),
         (chromophores.eumelanin, "mua_melanosome_mm1"),
         (chromophores.baseline, "mua_baseline_mm1"),
-        (scattering.jacques_1998, "musp_mm1"),
+        (chromophores.jacques_1998, "musp_mm1"),
     ]:
         assert np.allclose(name(wavelength), table[column], rtol=PUBLISHED, atol=0.0), column
 
@@ -102,14 +102,14 @@ def test_water_as_measured() -> None:
 
 def test_scattering_in_the_reading_per_millimetre() -> None:
     """6.08 per mm at 550 nm; the dermis, half of it, is the law that others give for skin."""
-    assert scattering.donner_jensen_2006(550.0) == pytest.approx(6.08, abs=0.005)
+    assert chromophores.donner_jensen_2006(550.0) == pytest.approx(6.08, abs=0.005)
     others_per_cm = 73.7 * VISIBLE_NM**-0.22 + 1.1e12 * VISIBLE_NM**-4.0
-    dermis = scattering.DERMIS_SHARE * scattering.donner_jensen_2006(VISIBLE_NM)
+    dermis = chromophores.DERMIS_SHARE * chromophores.donner_jensen_2006(VISIBLE_NM)
     assert np.allclose(10.0 * dermis, others_per_cm, rtol=PUBLISHED)
 
 
-@pytest.mark.parametrize("law", [scattering.donner_jensen_2006, scattering.jacques_1998])
-def test_skin_scatters_blue_more(law: scattering.ScatteringLaw) -> None:
+@pytest.mark.parametrize("law", [chromophores.donner_jensen_2006, chromophores.jacques_1998])
+def test_skin_scatters_blue_more(law: chromophores.ScatteringLaw) -> None:
     assert (np.diff(law(VISIBLE_NM)) < 0.0).all()
 
 
@@ -123,8 +123,8 @@ def test_skin_scatters_blue_more(law: scattering.ScatteringLaw) -> None:
         chromophores.oxyhaemoglobin,
         chromophores.deoxyhaemoglobin,
         chromophores.water,
-        scattering.donner_jensen_2006,
-        scattering.jacques_1998,
+        chromophores.donner_jensen_2006,
+        chromophores.jacques_1998,
     ],
 )
 def test_invisible_light_is_refused(spectrum: Callable[[ArrayLike], Floats], wavelength: ArrayLike) -> None:

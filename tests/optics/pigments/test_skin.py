@@ -12,8 +12,7 @@ from dermis import cite
 from dermis.errors import DermisError
 from dermis.optics.diffusion.boundary import mismatch
 from dermis.optics.media import Floats, Layer
-from dermis.optics.pigments.chromophores import baseline, blood, melanosome
-from dermis.optics.pigments.scattering import donner_jensen_2006, jacques_1998
+from dermis.optics.pigments.chromophores import baseline, blood, donner_jensen_2006, jacques_1998, melanosome
 from dermis.optics.pigments.skin import EXAMPLES, LEAKED_MELANIN, SkinParameters, Structure, spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 

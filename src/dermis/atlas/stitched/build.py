@@ -1,4 +1,4 @@
-"""The stitched atlas, made step by step."""
+"""The stitched atlas, step by step: pieces, cuts, packing, gutters."""
 
 from __future__ import annotations
 
@@ -6,67 +6,107 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import MOST_SHEAR, Atlas
-from dermis.atlas.stitched.border import Gutter, Placing, find_border
-from dermis.atlas.stitched.cover import Cover, cover
-from dermis.atlas.stitched.measure import metric_of, roots_of, runs_of
+from dermis.atlas.stitched.cover import Cover, cover, metric_of, roots_of, runs_of
+from dermis.atlas.stitched.gutter import GutterWidth, Packing, find_border
 from dermis.atlas.stitched.overlap_cuts import cut_overlaps
-from dermis.atlas.stitched.pieces import find_pieces
-from dermis.atlas.stitched.placing import lay_out
-from dermis.atlas.stitched.surface import Surface, survey
+from dermis.atlas.stitched.pack import pack_pieces
+from dermis.atlas.stitched.surface import Doubles, FlatSurface, Index, survey
+from dermis.atlas.unwrap.charts import pieces as connected
 from dermis.mesh.mesh import Mesh
 
-Doubles = NDArray[np.float64]
-Index = NDArray[np.int64]
-
+_COLLAPSED = 0.05  # of the mesh's mean density: what has less holds nothing that could be blurred
+_SPECK_MM2 = 1.0  # mirrored parts under this stay with the chart around them
+_EVEN = (0.5, 1.4)  # of the mean density: charts that have more or less are moved halfway towards it
 _WIDEST = 1 / 8  # of the map's side, for gutters
 
 
-def build_stitched(mesh: Mesh, size: int, reach_mm: float) -> Atlas | None:
-    """The atlas in which every chart has a place of its own and an gutter of what lies across its seams.
+def find_pieces(surface: FlatSurface) -> tuple[Index, Doubles]:
+    """Piece of each triangle (f,), -1 without a place, and scale (f,) of its uv that evens out density."""
+    mirrored = (surface.area_uv < 0).astype(np.int64)
+    beside = surface.beside_uv
+    chart = connected(np.zeros(len(mirrored), np.int64), beside)
+    piece = connected(2 * chart + mirrored, beside)
+    piece = _with_specks(surface, chart, piece)
+    piece = np.where(surface.sound, piece, -1)
+    density, mean = _density(surface, piece)
+    piece[density < _COLLAPSED * mean] = -1
+    density, mean = _density(surface, piece)
+    low, high = (limit * mean for limit in _EVEN)
+    wanted = np.where(density < low, np.sqrt(low * density), density)
+    wanted = np.where(density > high, np.sqrt(high * density), wanted)
+    return numbered(piece), np.where(piece >= 0, wanted / np.maximum(density, 1e-12), 1.0)
 
-    None when there are too many charts for so few texels.
+
+def numbered(piece: Index) -> Index:
+    """The same pieces (f,), counted from 0; -1 stays."""
+    numbers, again = np.unique(piece, return_inverse=True)
+    return np.asarray(again.reshape(-1) - np.count_nonzero(numbers < 0), dtype=np.int64)
+
+
+def _with_specks(surface: FlatSurface, chart: Index, piece: Index) -> Index:
+    """Pieces with the small ones given to the largest of their chart."""
+    area = np.bincount(piece, surface.area_mm2 * surface.sound)
+    order = np.argsort(area[piece], kind="stable")
+    largest = np.zeros(int(chart.max()) + 1, np.int64)
+    largest[chart[order]] = piece[order]
+    return np.where(area[piece] < _SPECK_MM2, largest[chart], piece)
+
+
+def _density(surface: FlatSurface, piece: Index) -> tuple[Doubles, float]:
+    """Side of each triangle's piece in uv over that in space (f,) [1/mm], and of all together."""
+    inside, number = piece >= 0, np.maximum(piece, 0)
+    uv = np.bincount(number, np.abs(surface.area_uv) * inside)
+    mm2 = np.bincount(number, surface.area_mm2 * inside)
+    mean = float(np.sqrt(uv.sum() / max(mm2.sum(), 1e-12)))
+    return np.where(inside, np.sqrt(uv / np.maximum(mm2, 1e-12))[number], mean), mean
+
+
+def build_stitched(mesh: Mesh, size: int, reach_mm: float) -> Atlas | None:
+    """The atlas in which every chart has room of its own, and a gutter that shows what lies across its seams.
+
+    None when there are too many charts for the texels.
 
     reach_mm : width of the gutters
     """
     surface = survey(mesh)
     piece, scale = find_pieces(surface)
     piece = cut_overlaps(surface, piece, reach_mm)
-    width = Gutter(reach_mm, _WIDEST * size)
-    placing = lay_out(surface, piece, scale, size, width)
-    if placing is None:
+    width = GutterWidth(reach_mm, _WIDEST * size)
+    packing = pack_pieces(surface, piece, scale, size, width)
+    if packing is None:
         return None
-    made = _cover(surface, piece, placing, width, size)
+    made = _cover(surface, piece, packing, width, size)
     # where a piece lies on itself only one layer has light: gutters must not read the other
-    lost = _lost(piece, placing, made)
+    lost = _lost(piece, packing, made)
     if lost.any():
         piece = np.where(lost, -1, piece)
-        made = _cover(surface, piece, placing, width, size)
-    return _atlas(surface, placing, made, piece >= 0)
+        made = _cover(surface, piece, packing, width, size)
+    return _atlas(surface, packing, made, piece >= 0)
 
 
-def _cover(surface: Surface, piece: Index, placing: Placing, width: Gutter, size: int) -> Cover:
+def _cover(surface: FlatSurface, piece: Index, packing: Packing, width: GutterWidth, size: int) -> Cover:
     own = np.flatnonzero(piece >= 0)
-    return cover(surface, piece, own, find_border(surface, piece, own), placing, width, (size, size))
+    return cover(surface, piece, own, find_border(surface, piece, own), packing, width, (size, size))
 
 
-def _lost(piece: Index, placing: Placing, made: Cover) -> NDArray[np.bool_]:
+def _lost(piece: Index, packing: Packing, made: Cover) -> NDArray[np.bool_]:
     """Triangles (f,) most of whose texels are owned by others."""
     from dermis.atlas.stitched.kernels.fill import count
 
     inside, owned = np.zeros((2, len(piece)), np.int64)
-    count(placing.places, np.flatnonzero(piece >= 0), made.rooted, inside, owned)
+    count(packing.places, np.flatnonzero(piece >= 0), made.rooted, inside, owned)
     return np.asarray(owned < 0.5 * inside)
 
 
-def _atlas(surface: Surface, placing: Placing, made: Cover, mapped: NDArray[np.bool_]) -> Atlas:
+def _atlas(surface: FlatSurface, packing: Packing, made: Cover, mapped: NDArray[np.bool_]) -> Atlas:
     size = len(made.triangle)
-    metric = metric_of(surface, placing, made)
-    reach = runs_of(surface, made, made.piece, metric, roots_of(placing, made))
+    metric = metric_of(surface, packing, made)
+    reach = runs_of(surface, made, made.piece, metric, roots_of(packing, made))
     y, x = np.nonzero(made.gutter)
     second = made.weights[y, x].astype(np.float64)
     weights = np.column_stack((1 - second.sum(axis=1), second))
-    source = np.einsum("nk,nka->na", weights, placing.places[made.triangle[y, x]])
-    place = np.where(mapped[:, None, None], (placing.places + 0.5) / size, 0.0)
+    source = np.einsum("nk,nka->na", weights, packing.places[made.triangle[y, x]])
+    place = np.where(mapped[:, None, None], (packing.places + 0.5) / size, 0.0)
     shear = np.clip(metric[..., 2], -MOST_SHEAR, MOST_SHEAR)
     return Atlas(
         triangle=made.triangle,

@@ -1,21 +1,15 @@
-"""Slits: places where two parts of a piece's border would need the same texels for what lies beyond them."""
+"""Cuts of pieces where the gutters of two parts of a border would overlap."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dermis.atlas.stitched.border import Gutter, Placing, find_border
-from dermis.atlas.stitched.cover import Cover, cover
-from dermis.atlas.stitched.measure import metric_of, roots_of, runs_of
-from dermis.atlas.stitched.surface import Surface
+from dermis.atlas.stitched.cover import Cover, cover, metric_of, roots_of, runs_of
+from dermis.atlas.stitched.gutter import GutterWidth, Packing, find_border
+from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
 from dermis.atlas.unwrap.charts import pieces as connected
-
-Doubles = NDArray[np.float64]
-Index = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 _FINEST_MM = 0.5  # texels of the grids on which overlaps are looked for
 _MOST_TEXELS = 300_000  # of a piece on such a grid
@@ -31,7 +25,7 @@ _GROWTH = 0.25  # of all pieces by gutters along cuts, at most
 
 
 class Conflicts(NamedTuple):
-    """Where a piece's gutters meet that do not belong together.
+    """Texels at which a piece's gutters overlap.
 
     one, other : (n, 2) the two places of the piece that these gutters belong to [texel]
     inside : (m, 2) texels of the piece
@@ -51,8 +45,8 @@ class Conflicts(NamedTuple):
         return len(self.one) * self.texel_mm
 
 
-def cut_overlaps(surface: Surface, piece: Index, reach_mm: float) -> Index:
-    """Pieces (f,) cut along lines until hardly any gutter is in the way of another.
+def cut_overlaps(surface: FlatSurface, piece: Index, reach_mm: float) -> Index:
+    """Pieces (f,) cut along lines until gutters hardly overlap.
 
     reach_mm : width of the gutters
     """
@@ -74,7 +68,7 @@ def cut_overlaps(surface: Surface, piece: Index, reach_mm: float) -> Index:
     return done
 
 
-def _cut_mm(surface: Surface, own: Index, part: Index) -> float:
+def _cut_mm(surface: FlatSurface, own: Index, part: Index) -> float:
     """Length of all sides between parts of the triangles `own`."""
     of = np.full(len(surface.uv), -1, np.int64)
     of[own] = part
@@ -83,8 +77,8 @@ def _cut_mm(surface: Surface, own: Index, part: Index) -> float:
     return float(length[(other >= 0) & (other != part[:, None])].sum()) / 2
 
 
-def _cut(surface: Surface, placed: Flags, own: Index, reach_mm: float) -> Index | None:
-    """Part of each triangle of one piece, None when it is well as it is."""
+def _cut(surface: FlatSurface, placed: Flags, own: Index, reach_mm: float) -> Index | None:
+    """Part of each triangle of one piece, None when it needs no cut."""
     found = find_conflicts(surface, placed, own, reach_mm)
     reach = reach_mm / found.texel_mm
     part = np.zeros(len(own), np.int64)
@@ -114,12 +108,12 @@ def _clusters(found: Conflicts, reach: float) -> list[Index]:
     if not len(middle):
         return []
     a, b = KDTree(middle).query_pairs(reach, output_type="ndarray").T
-    links = coo_array((np.ones(len(a)), (a, b)), shape=(len(middle),) * 2)
-    count, label = connected_components(links, directed=False)
+    graph = coo_array((np.ones(len(a)), (a, b)), shape=(len(middle),) * 2)
+    count, label = connected_components(graph, directed=False)
     return [np.flatnonzero(label == k) for k in range(count)]
 
 
-def _strip(surface: Surface, own: Index, overlap: Conflicts, half: Flags, reach: float) -> Flags:
+def _strip(surface: FlatSurface, own: Index, overlap: Conflicts, half: Flags, reach: float) -> Flags:
     """Triangles along that side of a overlap on which they are smaller."""
     from scipy.spatial import KDTree
 
@@ -133,7 +127,7 @@ def _strip(surface: Surface, own: Index, overlap: Conflicts, half: Flags, reach:
     return near & (half if area[near & half].sum() < area[near & ~half].sum() else ~half)
 
 
-def find_conflicts(surface: Surface, placed: Flags, own: Index, reach_mm: float) -> Conflicts:
+def find_conflicts(surface: FlatSurface, placed: Flags, own: Index, reach_mm: float) -> Conflicts:
     """Conflicts of the piece that consists of the triangles `own`, on a grid of its own.
 
     placed : (f,) triangles of any piece
@@ -149,21 +143,23 @@ def find_conflicts(surface: Surface, placed: Flags, own: Index, reach_mm: float)
     places = np.zeros(surface.uv.shape)
     places[own] = (surface.uv[own] - low) * per_uv + widest + 2
     every = np.ones(len(piece))
-    placing = Placing(places, per_uv * every, every / texel_mm)
+    packing = Packing(places, per_uv * every, every / texel_mm)
     width, height = np.ceil((high - low) * per_uv + 2 * widest + 5).astype(int)
     border = find_border(surface, piece, own)
-    made = cover(surface, piece, own, border, placing, Gutter(reach_mm, widest), (int(height), int(width)))
+    made = cover(
+        surface, piece, own, border, packing, GutterWidth(reach_mm, widest), (int(height), int(width))
+    )
     origin = low * per_uv - widest - 2
-    one, other = _meetings(surface, placing, made, _NEAR * reach_mm)
+    one, other = _meetings(surface, packing, made, _NEAR * reach_mm)
     y, x = np.nonzero((made.rooted >= 0) & (made.away_mm == 0))
     return Conflicts(one + origin, other + origin, np.column_stack((x, y)) + origin, per_uv, float(texel_mm))
 
 
-def _meetings(surface: Surface, placing: Placing, made: Cover, near_mm: float) -> tuple[Doubles, Doubles]:
+def _meetings(surface: FlatSurface, packing: Packing, made: Cover, near_mm: float) -> tuple[Doubles, Doubles]:
     """Places (n, 2) that texels on both sides of gaps belong to [texel]."""
     near = np.where(made.away_mm < near_mm, made.piece, -1)
-    roots = roots_of(placing, made)
-    reach = runs_of(surface, made, near, metric_of(surface, placing, made), roots)
+    roots = roots_of(packing, made)
+    reach = runs_of(surface, made, near, metric_of(surface, packing, made), roots)
     left = (near[:, 1:] >= 0) & (near[:, :-1] >= 0) & (reach[:, 1:, 0] == 0)
     up = (near[1:] >= 0) & (near[:-1] >= 0) & (reach[1:, :, 2] == 0)
     one = np.concatenate((roots[:, 1:][left], roots[1:][up])).astype(np.float64)
@@ -191,8 +187,8 @@ def _best_line(overlap: Conflicts, reach: float) -> tuple[Doubles, float, int]:
     return line
 
 
-def _parts(surface: Surface, own: Index, part: Index, reach_mm: float) -> Index | None:
-    """Connected parts; crumbs along the cut go to the largest part beside them. None when all is one."""
+def _parts(surface: FlatSurface, own: Index, part: Index, reach_mm: float) -> Index | None:
+    """Connected parts; crumbs along the cut join the largest part beside them. None for a single part."""
     index = np.full(len(surface.uv), -1, np.int64)
     index[own] = np.arange(len(own))
     there = index[surface.beside_uv[own]]

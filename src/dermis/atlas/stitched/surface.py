@@ -1,13 +1,13 @@
-"""A mesh as the layout sees it: triangles in planes of their own, and what lies across each side."""
+"""A mesh as the stitched layout sees it: each triangle in its own plane, and what lies across each side."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.stitched.ground import Ground
 from dermis.atlas.unwrap.charts import across
 from dermis.mesh.geometry import MIN_UV_CROSS, tangents, triangle_areas, uv_cross, weld
 from dermis.mesh.mesh import Mesh
@@ -15,20 +15,38 @@ from dermis.mesh.mesh import Mesh
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]
-
 _LEAST_MM = 1e-9
 
 
+class Adjacency(NamedTuple):
+    """Adjacency of triangles, for walks over them; sides are 01, 12, 20 of each triangle.
+
+    flat : (f, 3, 2) corners of each triangle in its own plane, counter-clockwise from outside [mm]
+    beside : (f, 3) triangle across each side, -1 where there is none
+    entry : (f, 3) that triangle's side of this edge
+    flipped : (f, 3) whether that triangle faces the other way
+    apex : (f, 3, 2) the third corner from each side's start, along and left of the side, in its lengths
+    free : (f,) triangles that may be walked on
+    """
+
+    flat: NDArray[np.float64]
+    beside: NDArray[np.int32]
+    entry: NDArray[np.int8]
+    flipped: NDArray[np.bool_]
+    apex: NDArray[np.float64]
+    free: NDArray[np.bool_]
+
+
 @dataclass(frozen=True)
-class Surface:
-    """What does not depend on where anything lies in the atlas. Sides are 01, 12, 20 of each triangle.
+class FlatSurface:
+    """Triangles laid flat, whatever their place in the atlas. Sides are 01, 12, 20 of each triangle.
 
     corners : (f, 3, 3) positions [mm]
     uv : (f, 3, 2)
     area_mm2, area_uv : (f,) the latter negative where u and v are mirrored as seen from outside
     skin : (f,) triangles that light may cross
     sound : (f,) skin that has an area in space and in uv
-    ground : what walks need
+    adjacency : what walks need
     beside_uv : (f, 3) triangle across each side in uv too, itself where the map is cut
     along : (f, 3, 2, 2) at each corner the steps for u and for v, in the triangle's plane [mm per unit of uv]
     lengths : (f, 3, 3) at each corner the length of both steps and the cosine between them
@@ -40,18 +58,18 @@ class Surface:
     area_uv: Doubles
     skin: Flags
     sound: Flags
-    ground: Ground
+    adjacency: Adjacency
     beside_uv: Index
     along: Doubles
     lengths: Doubles
 
-    def part(self, own: Index) -> Surface:
-        """Some of its triangles, not to be walked on: they name those beside them by their old numbers."""
-        names = [field.name for field in fields(self) if field.name != "ground"]
+    def part(self, own: Index) -> FlatSurface:
+        """Some of its triangles, not to be walked on: their neighbours keep their old numbers."""
+        names = [field.name for field in fields(self) if field.name != "adjacency"]
         return replace(self, **{name: getattr(self, name)[own] for name in names})
 
 
-def survey(mesh: Mesh) -> Surface:
+def survey(mesh: Mesh) -> FlatSurface:
     """The surface of a mesh."""
     corners = mesh.positions[mesh.triangles].astype(np.float64)
     uv = mesh.uv[mesh.triangles].astype(np.float64)
@@ -64,8 +82,8 @@ def survey(mesh: Mesh) -> Surface:
     along, lengths = _steps(mesh, flat, axes, uv, area_uv)
     same_uv = weld(np.hstack((mesh.positions, mesh.uv)))[mesh.triangles]
     beside_uv = (across(same_uv.astype(np.int64)) % len(uv)).reshape(3, -1).T
-    return Surface(
-        corners, uv, area, area_uv, skin, sound, _ground(mesh, flat, skin), beside_uv, along, lengths
+    return FlatSurface(
+        corners, uv, area, area_uv, skin, sound, _adjacency(mesh, flat, skin), beside_uv, along, lengths
     )
 
 
@@ -79,19 +97,19 @@ def _flat(corners: Doubles) -> tuple[Doubles, Doubles]:
     return np.einsum("fki,fai->fka", corners - corners[:, :1], axes), axes
 
 
-def _ground(mesh: Mesh, flat: Doubles, skin: Flags) -> Ground:
+def _adjacency(mesh: Mesh, flat: Doubles, skin: Flags) -> Adjacency:
     points, count = mesh.point[mesh.triangles].astype(np.int64), len(flat)
     side = np.arange(3 * count)
     other = across(points)
     start = points.T.ravel()
     beside = np.where(other == side, -1, other % count).reshape(3, -1).T
     entry = (other // count).reshape(3, -1).T
-    turned = (start[other] == start).reshape(3, -1).T
-    return Ground(
+    flipped = (start[other] == start).reshape(3, -1).T
+    return Adjacency(
         flat,
         np.ascontiguousarray(beside, np.int32),
         np.ascontiguousarray(entry, np.int8),
-        np.ascontiguousarray(turned),
+        np.ascontiguousarray(flipped),
         _apexes(flat),
         skin,
     )
@@ -110,7 +128,7 @@ def _apexes(flat: Doubles) -> Doubles:
 def _steps(
     mesh: Mesh, flat: Doubles, axes: Doubles, uv: Doubles, area_uv: Doubles
 ) -> tuple[Doubles, Doubles]:
-    """`along` and `lengths` of a `Surface`: at each corner the mean of triangles mirrored alike in uv."""
+    """`along` and `lengths` of a `FlatSurface`: at each corner the mean of triangles mirrored alike in uv."""
     count = len(mesh.positions)
     corner = mesh.triangles + count * (area_uv < 0)[:, None].astype(np.int32)
     positions, uvs, normals = (np.concatenate((a, a)) for a in (mesh.positions, mesh.uv, mesh.normals))

@@ -1,4 +1,4 @@
-"""The atlas in coarse cells: places that give light through thin parts, and places that take it."""
+"""The atlas in coarse cells: sources that give light through thin parts, and receivers that take it."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ def texel_mm(atlas: Atlas) -> float:
 
 @dataclass(frozen=True)
 class Texels:
-    """What the texels of an atlas show.
+    """The surface that the texels of an atlas show.
 
-    nearest : (n, n, 2) the texel, x and y from -1 to n, at or beside which the surface is
-    inside : (n, n) those that own it, but for the edges of charts
+    nearest : (n, n, 2) x and y, from -1 to n, of the texel that owns it or lies beside it
+    inside : (n, n) texels that own it, except at the edges of charts
     """
 
     nearest: NDArray[np.int16]
@@ -53,15 +53,15 @@ class Texels:
 
 
 def texels(atlas: Atlas) -> Texels:
-    """Of an atlas."""
-    from dermis.atlas.translucency.kernels.texels import places
+    """The texels of an atlas."""
+    from dermis.atlas.translucency.kernels.facing import places
 
     nearest, inside = places(atlas.triangle, atlas.barycentric, atlas.place)
     return Texels(nearest, inside & atlas.own)
 
 
 def surface(atlas: Atlas, seen: Texels, side: int) -> NDArray[np.bool_]:
-    """(side, side) cells that hold surface, and those beside them that show where it goes on."""
+    """(side, side) cells that hold surface, and neighbours that show its continuation."""
     held, middle = np.zeros((side, side), bool), middles(atlas.size, side)
     every = _stride(atlas, side)
     y, x = (every * axis * side // atlas.size for axis in np.nonzero(seen.inside[::every, ::every]))
@@ -70,7 +70,7 @@ def surface(atlas: Atlas, seen: Texels, side: int) -> NDArray[np.bool_]:
 
 
 def giving(mesh: Mesh, atlas: Atlas, seen: Texels, side: int, thin: Chosen) -> Samples:
-    """For each cell that holds surface of its own, all of that, and the texel nearest the middle.
+    """One source for each cell with surface of its own: its area, and the texel nearest the middle.
 
     thin : (f,) triangles; cells without them, and without a neighbour that has some, are left out
     """
@@ -114,10 +114,7 @@ def taking(mesh: Mesh, atlas: Atlas, surface: Chosen, thin: Chosen) -> Samples:
 
 
 def shown(atlas: Atlas, seen: Texels, given: Samples) -> NDArray[np.int32]:
-    """(n, n) the sample at or beside whose texel each texel's light is; -1 where none is.
-
-    In the gutters that is one from elsewhere.
-    """
+    """(n, n) the sample at or beside which each texel's light lies, -1 for none; in gutters, elsewhere."""
     beside = np.full((atlas.size + 2, atlas.size + 2), -1, np.int32)
     x, y = given.texel.T + 1
     for dy, dx in (*np.ndindex(3, 3), (1, 1)):  # a sample's own texel last

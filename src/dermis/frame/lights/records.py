@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.environment.suns import Sun
+from dermis.environment.panorama import Sun
 from dermis.errors import refuse
 from dermis.frame.lights.kind import KINDS, override_of
 from dermis.frame.projection import (

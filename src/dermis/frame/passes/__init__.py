@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from dermis.frame.lights import light_numbers
 from dermis.frame.lights.kind import light_shaders
 from dermis.frame.surface import lobe_shaders, surface_numbers
 from dermis.gpu import ComputeProgram, Constants, Device, compiled
+from dermis.gpu.program import declared
 from dermis.gpu.wgsl_source import Folder, ShaderFolder
+from dermis.scene.lights import LIGHTS
+from dermis.specular.models import MODELS
 
 PASSES = Path(__file__).parent
 TECHNIQUES = PASSES.parent / "techniques"
@@ -42,14 +46,24 @@ def program(
 
     What suits the device is added to them; see `shader_folders` for the formats.
     """
-    return compiled(
-        ComputeProgram,
-        device,
-        PASSES / path,
-        shader_folders(source, store),
-        constants,
-        device_constants(device),
-    )
+
+    def make() -> ComputeProgram:
+        file, folders = PASSES / path, shader_folders(source, store)
+        return ComputeProgram(device, file, folders, suited(device, file, folders, constants))
+
+    return compiled(device, (path, source, store, registered()), constants, make)
+
+
+def suited(
+    device: Device, path: Path, folders: Sequence[Folder], constants: Constants = ()
+) -> dict[str, float]:
+    """Pipeline constants, with those that the shader has of what suits the device."""
+    return declared(path, folders, device_constants(device)) | dict(constants)
+
+
+def registered() -> int:
+    """Another number whenever a light or a lobe has been added to the shaders, or taken away."""
+    return LIGHTS.changes + MODELS.changes
 
 
 def device_constants(device: Device) -> Constants:

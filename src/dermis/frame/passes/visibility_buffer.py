@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from dermis.frame.geometry import HeadResources
-from dermis.frame.passes import PASSES, device_constants, program, shader_folders
+from dermis.frame.passes import PASSES, program, shader_folders, suited
 from dermis.frame.projection import Matrix, Views
 from dermis.gpu import Constants, Device, Frame, Graph, RasterProgram, Recorder, compiled, make_texture
 from dermis.gpu.program import Program
@@ -148,10 +148,12 @@ def _draw_raster(graph: Drawer, stage: str, layers: Layers, clips: Matrix, head:
 
 
 def _raster_program(device: Device, triangles: bool) -> RasterProgram:
-    path, target = PASSES / "visibility_buffer_raster.wgsl", "r32uint" if triangles else None
-    options = {"target": target, "depth_compare": "greater"}
-    suited = device_constants(device)
-    return compiled(RasterProgram, device, path, shader_folders(), (), suited, **options)
+    def make() -> RasterProgram:
+        path, folders = PASSES / "visibility_buffer_raster.wgsl", shader_folders()
+        chosen, target = suited(device, path, folders), "r32uint" if triangles else None
+        return RasterProgram(device, path, folders, chosen, target=target, depth_compare="greater")
+
+    return compiled(device, ("visibility buffer", triangles), (), make)
 
 
 def _views(shader: Program, layers: Layers, clips: Matrix, head: HeadResources) -> Any:

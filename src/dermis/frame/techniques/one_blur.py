@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dermis.frame.techniques.texture_space import TextureSpace
-from dermis.optics.fits.single import single_gaussian
+from dermis.optics.fits.gaussian import single_gaussian
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.settings import Settings
 

@@ -14,12 +14,12 @@ from dermis.human.bust.fields import (
     cone,
     ellipsoid,
     rise,
+    rotation,
     smooth_difference,
     smooth_intersection,
     smooth_union,
     spline,
     tube,
-    turned,
 )
 from dermis.human.bust.parameters import BustParameters
 
@@ -28,9 +28,9 @@ _FLARE, _TILT, _LEAN = 25.0, 13.0, 7.0  # backwards-outwards, top backwards, top
 # Rows of the frame: u backwards along the ear, v upwards along it, w outwards from the head.
 FRAME = (
     np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
-    @ turned(1, -_FLARE).T
-    @ turned(2, -_LEAN).T
-    @ turned(0, -_TILT).T
+    @ rotation(1, -_FLARE).T
+    @ rotation(2, -_LEAN).T
+    @ rotation(0, -_TILT).T
 )
 # Artist's values in the plane of the ear [mm].
 OUTLINE = [
@@ -108,7 +108,7 @@ def _auricle(q: Doubles) -> Doubles:
     taper = 0.55 * np.maximum(-6 - q[:, 2], 0)
     rest = smooth_intersection(smooth_intersection(w - 1.25, concha - 1.5 + taper, 3), -17 - q[:, 2], 5)
     whole = smooth_union(smooth_union(sheet, rest, 1), tube(q, HELIX), 2.4)
-    antitragus = ellipsoid(q, (8.5, -15.0, 1.2), (4.5, 2.8, 2.6), turned(2, -20))
+    antitragus = ellipsoid(q, (8.5, -15.0, 1.2), (4.5, 2.8, 2.6), rotation(2, -20))
     lobe = ellipsoid(q, (7.6, -23.6, 0.3), (6.8, 7.2, 1.9))
     root = np.minimum(cone(q, (3, -17, -4), (2, -10, -4), 2.5, 3), cone(q, (1.5, 6, -3), (3.5, 20, -3), 3, 3))
     return smooth_union(smooth_union(smooth_union(whole, antitragus, 2.5), lobe, 4), root, 3)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 Doubles = NDArray[np.float64]
 Field = Callable[[Doubles], Doubles]
 """Distance (n,) [mm] of points (n, 3) [mm]."""
+_TETRAHEDRON = np.array([[1.0, -1, -1], [-1, -1, 1], [-1, 1, -1], [1, 1, 1]])
 
 
 def smooth_union(a: Doubles, b: Doubles, radius: float | Doubles) -> Doubles:
@@ -38,8 +39,7 @@ def ellipsoid(points: Doubles, centre: ArrayLike, radii: ArrayLike, axes: Double
     scaled = local / radii
     reach = np.sqrt(np.einsum("ni,ni->n", scaled, scaled)) + 1e-9
     slope = np.sqrt(np.einsum("ni,ni->n", scaled / radii, scaled / radii)) + 1e-9
-    distance: Doubles = reach * (reach - 1) / slope
-    return distance
+    return np.asarray(reach * (reach - 1) / slope)
 
 
 def cone(points: Doubles, start: ArrayLike, end: ArrayLike, radius: float, end_radius: float) -> Doubles:
@@ -49,8 +49,7 @@ def cone(points: Doubles, start: ArrayLike, end: ArrayLike, radius: float, end_r
     local = points - first
     t = np.clip(local @ along / (along @ along), 0, 1)
     away = local - t[:, None] * along
-    distance: Doubles = np.sqrt(np.einsum("ni,ni->n", away, away)) - (radius + (end_radius - radius) * t)
-    return distance
+    return np.asarray(np.sqrt(np.einsum("ni,ni->n", away, away)) - (radius + (end_radius - radius) * t))
 
 
 def tube(points: Doubles, knots: ArrayLike, pieces: int = 4) -> Doubles:
@@ -80,17 +79,13 @@ def spline(knots: ArrayLike, pieces: int, closed: bool = False) -> Doubles:
 def bump(points: Doubles, centre: ArrayLike, radii: ArrayLike) -> Doubles:
     """A soft spot, 1 at its centre and exp(-1) at its radii."""
     scaled = (points - np.asarray(centre)) / np.asarray(radii)
-    height: Doubles = np.exp(-np.einsum("ni,ni->n", scaled, scaled))
-    return height
+    return np.asarray(np.exp(-np.einsum("ni,ni->n", scaled, scaled)))
 
 
 def rise(values: Doubles, low: float, high: float) -> Doubles:
     """From 0 at `low` to 1 at `high` with level ends; downwards when `low` is the greater."""
     t: Doubles = np.clip((values - low) / (high - low), 0, 1)
     return t * t * (3 - 2 * t)
-
-
-_TETRAHEDRON = np.array([[1.0, -1, -1], [-1, -1, 1], [-1, 1, -1], [1, 1, 1]])
 
 
 def gradient(field: Field, points: Doubles, step: float | Doubles = 0.05) -> Doubles:
@@ -104,7 +99,7 @@ def gradient(field: Field, points: Doubles, step: float | Doubles = 0.05) -> Dou
     return np.asarray((values.T @ _TETRAHEDRON) / (4 * steps[:, None]))
 
 
-def turned(axis: int, degrees: float) -> Doubles:
+def rotation(axis: int, degrees: float) -> Doubles:
     """Rotation matrix (3, 3) about x, y or z (0, 1, 2)."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     matrix = np.eye(3)

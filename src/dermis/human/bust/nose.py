@@ -10,10 +10,10 @@ from dermis.human.bust.fields import (
     cone,
     ellipsoid,
     rise,
+    rotation,
     smooth_difference,
     smooth_union,
     tube,
-    turned,
 )
 from dermis.human.bust.parameters import BustParameters
 
@@ -49,16 +49,16 @@ def growth(parameters: BustParameters) -> Doubles:
 
 
 def _body(p: Doubles) -> Doubles:
-    walls = ellipsoid(p, (0, -22, 84), (13.5, 24, 17), turned(0, 24))
+    walls = ellipsoid(p, (0, -22, 84), (13.5, 24, 17), rotation(0, 24))
     bridge = smooth_union(tube(p, BRIDGE), walls, 9)
     dome = ellipsoid(p, (3.4, -37.8, 107.4), (5.6, 6.2, 6.8))
     tip = smooth_union(ellipsoid(p, (0, -37.0, 106.0), (6.6, 7.0, 9.0)), dome, 5)
     septum = cone(p, (0, -42.6, 107.5), (0, -46.2, 96.0), 3.2, 4.2)
     flank = ellipsoid(p, (7.0, -34.0, 95.0), (6.0, 9.0, 10.0))
-    wing = ellipsoid(p, (10.7, -41.8, 97.6), (4.4, 5.6, 9.4), turned(1, 26) @ turned(0, -16))
+    wing = ellipsoid(p, (10.7, -41.8, 97.6), (4.4, 5.6, 9.4), rotation(1, 26) @ rotation(0, -16))
     body = smooth_union(bridge, smooth_union(tip, septum, 5), 9)
     return smooth_union(smooth_union(body, flank, 9), wing, 8)
 
 
 def _nostril(p: Doubles) -> Doubles:
-    return ellipsoid(p, (6.3, -46.2, 101.2), (2.9, 5.8, 5.6), turned(1, -20) @ turned(0, 12))
+    return ellipsoid(p, (6.3, -46.2, 101.2), (2.9, 5.8, 5.6), rotation(1, -20) @ rotation(0, 12))

@@ -7,6 +7,16 @@ from numbers import Integral
 
 from dermis.errors import refuse
 
+RANGES = {
+    "width": (0.9, 1.1),
+    "nose": (0.8, 1.25),
+    "ears": (0.8, 1.2),
+    "jaw": (0.88, 1.12),
+    "fullness": (-1.0, 1.0),
+    "asymmetry": (0.0, 2.0),
+    "seed": (0, 2**32 - 1),
+}
+
 
 @dataclass(frozen=True)
 class BustParameters:
@@ -37,14 +47,3 @@ class BustParameters:
                 refuse(field.name, f"a number from {low:g} to {high:g}", f"{value!r} came", "Choose within")
         if not isinstance(self.seed, Integral):
             refuse("seed", "a whole number", f"{self.seed!r} came", "Round it")
-
-
-RANGES = {
-    "width": (0.9, 1.1),
-    "nose": (0.8, 1.25),
-    "ears": (0.8, 1.2),
-    "jaw": (0.88, 1.12),
-    "fullness": (-1.0, 1.0),
-    "asymmetry": (0.0, 2.0),
-    "seed": (0, 2**32 - 1),
-}

@@ -1,42 +1,84 @@
-"""Even triangles on an implicit surface: split, collapse, flip, relax and project, all by whole arrays.
+"""Half a bust as even triangles on an implicit mesh: marching cubes, then whole-array remeshing.
 
-The mesh is half a bust: its border lies in the plane x = 0 and stays there. Source: [BotschKobbelt2004].
+Remeshing splits, collapses, flips, relaxes and projects. The border of the half lies in the plane x = 0 and
+stays there. Source: [BotschKobbelt2004].
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from dermis.human.bust.collapse import collapse
 from dermis.human.bust.fields import Doubles, Field, gradient
-from dermis.human.bust.flip import flip
-from dermis.human.bust.surface import Flags, Index, Surface
+from dermis.human.bust.half_mesh import Flags, HalfMesh, Index, collapse, flip
 from dermis.mesh.geometry import edges, sum_at
 
+# Stretches along x, y and z: start, end, spacing [mm]; fine where ears and nose are.
+_STRETCHES = (
+    ((0, 60, 3.0), (60, 105, 1.5), (105, 225, 6.0)),
+    ((-275, -120, 6.0), (-120, 45, 2.5), (45, 130, 5.0)),
+    ((-125, -60, 5.0), (-60, 25, 2.0), (25, 130, 3.0)),
+)
+_STRIDE = 3  # nodes of the first, coarse look at the field
 _COARSENING = 10  # passes that thin out what marching cubes made too fine
 
 
-def remesh(surface: Surface, field: Field, size: Field, rounds: int) -> Surface:
+def polygonise(field: Field) -> HalfMesh:
+    """Marching cubes [Lewiner2003] over an uneven grid for x >= 0, open in the plane x = 0."""
+    from skimage import measure
+
+    marching_cubes: Any = measure.marching_cubes
+    axes = [_axis(stretches) for stretches in _STRETCHES]
+    places, triangles, _, _ = marching_cubes(_sample(field, axes), 0.0)
+    points = [np.interp(places[:, k], np.arange(len(axis)), axis) for k, axis in enumerate(axes)]
+    return HalfMesh(np.column_stack(points), triangles.astype(np.int64))
+
+
+def _axis(stretches: tuple[tuple[float, float, float], ...]) -> Doubles:
+    """Coordinates along stretches that follow each other [mm]."""
+    parts = [np.arange(start, end - 1e-6, step) for start, end, step in stretches]
+    return np.concatenate([*parts, [stretches[-1][1]]])
+
+
+def _sample(field: Field, axes: list[Doubles]) -> Doubles:
+    """The field at all nodes: in full near the surface, elsewhere as at the nearest node of a coarse grid."""
+    nearest = [np.minimum((np.arange(len(axis)) + 1) // _STRIDE * _STRIDE, len(axis) - 1) for axis in axes]
+    grid = _grid(axes)
+    away = np.linalg.norm(grid - _grid([axis[k] for axis, k in zip(axes, nearest, strict=True)]), axis=-1)
+    kept = [np.unique(k, return_inverse=True) for k in nearest]
+    coarse = grid[np.ix_(*[nodes for nodes, _ in kept])]
+    values = field(coarse.reshape(-1, 3)).reshape(coarse.shape[:3])[np.ix_(*[back for _, back in kept])]
+    near = np.abs(values) < 1.6 * away + 6
+    values[near] = field(grid[near])
+    return values
+
+
+def _grid(axes: list[Doubles]) -> Doubles:
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+
+
+def remesh(mesh: HalfMesh, field: Field, size: Field, rounds: int) -> HalfMesh:
     """The surface with edges of about `size` [mm] at each place, its points on the field's zero."""
     for _ in range(_COARSENING):
-        surface = collapse(surface, size)
+        mesh = collapse(mesh, size)
     for turn in range(rounds):
-        surface = split(surface, size)
-        surface = collapse(surface, size)
-        surface = collapse(surface, size)
-        surface = flip(flip(surface))
-        surface = relax(surface, field, size, passes=2 if turn < rounds - 1 else 3)
-        surface = flip(surface)
-    return part_bridges(surface, field)
+        mesh = split(mesh, size)
+        mesh = collapse(mesh, size)
+        mesh = collapse(mesh, size)
+        mesh = flip(flip(mesh))
+        mesh = relax(mesh, field, size, passes=2 if turn < rounds - 1 else 3)
+        mesh = flip(mesh)
+    return part_bridges(mesh, field)
 
 
-def part_bridges(surface: Surface, field: Field) -> Surface:
+def part_bridges(mesh: HalfMesh, field: Field) -> HalfMesh:
     """Edges inside the half that join two points of its border, cut: they would be their own images."""
-    p, t, border = surface.points, surface.triangles, surface.on_border
+    p, t, border = mesh.points, mesh.triangles, mesh.on_border
     ends, of_side, counts = edges(t)
     bridge = (counts == 2) & border[ends].all(axis=1)
     if not bridge.any():
-        return surface
+        return mesh
     opposite = np.roll(t, 1, axis=1).T.ravel()  # the corner that faces each side
     sides = bridge[of_side]
     number = np.full(len(ends), -1, dtype=np.int64)
@@ -46,19 +88,19 @@ def part_bridges(surface: Surface, field: Field) -> Surface:
     for _ in range(3):
         slope = gradient(field, points, np.full(len(points), 0.1))
         points -= slope * (field(points) / np.einsum("ni,ni->n", slope, slope))[:, None]
-    return Surface(np.vstack((p, points)), _cut_triangles(p, t, number[of_side].reshape(3, -1).T))
+    return HalfMesh(np.vstack((p, points)), _cut_triangles(p, t, number[of_side].reshape(3, -1).T))
 
 
-def split(surface: Surface, size: Field) -> Surface:
+def split(mesh: HalfMesh, size: Field) -> HalfMesh:
     """Each edge longer than 4/3 of the size cut in its middle; triangles become two, three or four."""
-    p, t = surface.points, surface.triangles
+    p, t = mesh.points, mesh.triangles
     ends, of_side, _ = edges(t)
     middle = p[ends].mean(axis=1)
     long = np.linalg.norm(p[ends[:, 0]] - p[ends[:, 1]], axis=1) > 4 / 3 * size(middle)
     number = np.full(len(ends), -1, dtype=np.int64)
     number[long] = len(p) + np.arange(long.sum())
     cut = number[of_side].reshape(3, -1).T
-    return Surface(np.vstack((p, middle[long])), _cut_triangles(p, t, cut))
+    return HalfMesh(np.vstack((p, middle[long])), _cut_triangles(p, t, cut))
 
 
 def _cut_triangles(p: Doubles, t: Index, cut: Index) -> Index:
@@ -81,9 +123,9 @@ def _columns(chosen: Flags, *columns: Index) -> Index:
     return np.column_stack([column[chosen] for column in columns])
 
 
-def relax(surface: Surface, field: Field, size: Field, passes: int) -> Surface:
+def relax(mesh: HalfMesh, field: Field, size: Field, passes: int) -> HalfMesh:
     """Points moved along the surface to the middle of their triangles, then onto the field's zero."""
-    p, t, border = surface.points.copy(), surface.triangles, surface.on_border
+    p, t, border = mesh.points.copy(), mesh.triangles, mesh.on_border
     for _ in range(passes):
         corners = p[t]
         centre = corners.mean(axis=1)
@@ -99,14 +141,13 @@ def relax(surface: Surface, field: Field, size: Field, passes: int) -> Surface:
         towards[border, 0] = 0
         p = project(p + 0.6 * towards, field, size)
         p[border, 0] = 0
-    return Surface(p, t)
+    return HalfMesh(p, t)
 
 
 def _vertex_normals(p: Doubles, t: Index) -> Doubles:
     faces = np.cross(p[t[:, 1]] - p[t[:, 0]], p[t[:, 2]] - p[t[:, 0]])
     summed = sum_at(t.ravel(), np.repeat(faces, 3, axis=0), len(p))
-    normals: Doubles = summed / np.maximum(np.linalg.norm(summed, axis=1, keepdims=True), 1e-12)
-    return normals
+    return np.asarray(summed / np.maximum(np.linalg.norm(summed, axis=1, keepdims=True), 1e-12))
 
 
 def project(points: Doubles, field: Field, size: Field) -> Doubles:

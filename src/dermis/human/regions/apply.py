@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.atlas import Atlas, build_atlas
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.build import build_atlas
+from dermis.human.bust.fields import Doubles
 from dermis.human.regions.labels import label_texels
-from dermis.human.regions.soften import soften
 from dermis.human.regions.table import DEFAULT, LIMITS, RegionTable, load_table
 from dermis.mesh.head import Head
 
@@ -19,9 +20,12 @@ Floats = NDArray[np.float32]
 SIZE = 1024
 """Side of the maps in texels; maps of the head that are larger keep their size."""
 EDGE_MM = 2.5
-"""Borders between regions go over softly: standard deviation of the blur [mm]."""
+"""Borders between regions are blurred: standard deviation [mm]."""
 _DETAIL_MM = 6.0  # what is finer stays in the head's own maps; what is coarser comes from the table
-_DARKEST, _BRIGHTEST = 0.4, 3.0  # of the mean, of what is around: else specks in black would outshine all
+_DARKEST, _BRIGHTEST = 0.4, 3.0  # of the mean and of the surroundings: else specks in black would glare
+_CELL_MM = 2.0
+_MOST_CELLS = 256  # along the longest side
+_REACH = 3  # standard deviations
 
 
 def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT) -> tuple[Head, float]:
@@ -29,9 +33,10 @@ def with_regions(head: Head, table: RegionTable | str | Path = DEFAULT) -> tuple
 
     table : what `load_table` gives or takes
 
-    The specular map holds rho_s itself; who scales maps to a mean takes the one returned. Pores and blotches
-    of the head's own two maps stay, as a factor of what is around them.
-    Raises DermisError when the head's regions are not known, and for tables that cannot be.
+    The specular map holds rho_s itself; to scale maps to a mean, take the one returned. Pores and blotches of
+    the head's own two maps stay, as a factor of their surroundings.
+
+    Raises DermisError when the head's regions are not known, and for invalid tables.
     """
     if not isinstance(table, RegionTable):
         table = load_table(table)
@@ -79,3 +84,29 @@ def _resized(picture: Floats, shape: tuple[int, int]) -> Floats:
         return picture
     factors = shape[0] / picture.shape[0], shape[1] / picture.shape[1]
     return np.asarray(zoom(picture, factors, order=1, mode="nearest", grid_mode=True), np.float32)
+
+
+def soften(points: Doubles, values: Doubles, sigma_mm: float) -> Doubles:
+    """Gaussian mean (n, c) of the values around each place, by distance in space: seams do not show.
+
+    points : (n, 3) [mm]
+    values : (n, c)
+    sigma_mm : standard deviation [mm]
+    """
+    from scipy.ndimage import gaussian_filter, map_coordinates
+
+    low, extent = points.min(axis=0), np.ptp(points, axis=0)
+    side = max(_CELL_MM, float(extent.max()) / _MOST_CELLS)
+    place = (points - low) / side + 1
+    shape = tuple(int(length) + 4 for length in extent / side)
+    cell = np.ravel_multi_index(tuple(np.rint(place).astype(int).T), shape)
+    count = np.bincount(cell, minlength=int(np.prod(shape)))
+
+    def spread(quantity: Doubles) -> Doubles:
+        grid = np.divide(quantity, count, out=np.zeros(len(count)), where=count > 0).reshape(shape)
+        smooth = gaussian_filter(grid, sigma_mm / side, mode="constant", truncate=_REACH)
+        return np.asarray(map_coordinates(smooth, place.T, order=1))
+
+    weight = spread(count.astype(np.float64))
+    sums = [np.bincount(cell, column, minlength=len(count)).astype(np.float64) for column in values.T]
+    return np.stack([spread(column) / weight for column in sums], axis=-1)

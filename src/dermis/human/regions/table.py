@@ -15,14 +15,14 @@ from dermis.errors import refuse
 from dermis.human.bust.regions import REGIONS
 
 DEFAULT = "default"
-"""Name of the package's own table, whose numbers are an artist's."""
+"""Name of the package's own table, of artist's values."""
 LIMITS = {"m": (0.05, 1.0), "rho_s": (0.0, 1.0)}
 _FILES = ("landmarks", "labels")
 
 
 @dataclass(frozen=True)
 class RegionTable:
-    """What a table says.
+    """Roughness and strength by region.
 
     values : (10, 2) roughness m and strength rho_s [-] in the order of `bust.regions.REGIONS`
     landmarks : file of the head's landmarks, for heads that the package does not know
@@ -37,7 +37,7 @@ class RegionTable:
 def load_table(name: str | Path) -> RegionTable:
     """The table of a TOML file, or the package's own by the name "default".
 
-    Raises DermisError when a region is missing, unknown, or has numbers that cannot be.
+    Raises DermisError when a region is missing, unknown, or has invalid numbers.
     """
     if str(name) == DEFAULT:
         own = resources.files(__package__).joinpath("default.toml").read_text("utf-8")

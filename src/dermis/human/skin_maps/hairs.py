@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.human.bust import eyes
 from dermis.human.bust.anatomy import nominal
-from dermis.human.skin_maps.patch import Doubles
+from dermis.human.bust.fields import Doubles
 
 _BROW_HAIRS, _LASHES = 1100, 130
 WIDEST_TEXEL_MM = 0.8
@@ -118,13 +118,5 @@ def _sorted(pieces: Doubles, reach_mm: float) -> Hairs:
     ]
     cell, member = np.array(sorted(cells), dtype=np.int64).T
     first = np.searchsorted(cell, np.arange(columns * lines + 1))
-    return Hairs(
-        pieces,
-        first,
-        np.ascontiguousarray(member),
-        float(corner[0]),
-        float(corner[1]),
-        _CELL_MM,
-        columns,
-        lines,
-    )
+    left, bottom = (float(x) for x in corner)
+    return Hairs(pieces, first, np.ascontiguousarray(member), left, bottom, _CELL_MM, columns, lines)

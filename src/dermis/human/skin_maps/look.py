@@ -1,10 +1,30 @@
-"""What makes one skin look different from another on the same head."""
+"""What makes one skin look different from another, and the patches of it that are painted at once."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 from dermis.errors import refuse
+from dermis.human.bust.fields import Doubles
+
+RANGES = {"seed": (0, 2**32 - 1)}
+"""Least and greatest values of fields that do not go from 0 to 1."""
+
+
+class Patch(NamedTuple):
+    """Places on the skin, as the kernels take them.
+
+    points : (n, 3) [mm]
+    normals : (n, 3) unit normals of the smooth surface
+    texel_mm : (n,) how far apart the places around each are [mm]
+    seed : where the random numbers of all textures begin
+    """
+
+    points: Doubles
+    normals: Doubles
+    texel_mm: Doubles
+    seed: int
 
 
 @dataclass(frozen=True)
@@ -22,7 +42,7 @@ class SkinLook:
     age : depth of folds and lines, from youth to old age, 0 to 1 [-]
     seed : which spots, hairs and lines, any integer from 0
 
-    The epidermis is that of `colour.EPIDERMIS_MM`: what absorbs is melanin times thickness.
+    The epidermis is `reflection.EPIDERMIS_MM` thick; absorption goes with melanin times thickness.
     """
 
     melanin: float = 0.018
@@ -43,7 +63,3 @@ class SkinLook:
             if not low <= value <= high or (field.name == "seed" and value != int(value)):
                 expected = f"a number from {low} to {high}"
                 refuse(f"--{field.name}", expected, f"{value!r} came", "Choose within")
-
-
-RANGES = {"seed": (0, 2**32 - 1)}
-"""Least and greatest value of what does not go from 0 to 1."""

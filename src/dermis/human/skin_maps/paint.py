@@ -11,15 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.human.bust.fields import Doubles
 from dermis.human.bust.parameters import BustParameters
 from dermis.human.bust.regions import REGIONS, region_of
-from dermis.human.skin_maps.colour import colour_of
-from dermis.human.skin_maps.face import make_face
-from dermis.human.skin_maps.folds import make_folds
-from dermis.human.skin_maps.gloss import gloss
+from dermis.human.skin_maps.face import make_face, make_folds
 from dermis.human.skin_maps.hairs import make_hairs
-from dermis.human.skin_maps.look import SkinLook
-from dermis.human.skin_maps.patch import Doubles, Patch
+from dermis.human.skin_maps.look import Patch, SkinLook
+from dermis.human.skin_maps.reflection import colour_of, gloss
 
 Floats = NDArray[np.float32]
 
@@ -67,7 +65,7 @@ def paint_skin(
         return brush.paint(Patch(place, normal, texel, look.seed * _TEXTURES))
 
     starts = range(0, max(len(points), 1), _CHUNK)
-    # the loops let go of the interpreter, so that threads share the work
+    # the kernels release the GIL, so that threads share the work
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         parts = list(pool.map(paint, (slice(start, start + _CHUNK) for start in starts)))
     return Painted(*(np.concatenate(pieces) for pieces in zip(*parts, strict=True)))
@@ -79,7 +77,7 @@ def _brush(parameters: BustParameters, look: SkinLook) -> _Brush:
 
 
 class _Brush:
-    """What is made once for all places."""
+    """Tables of a bust and a look, made once for all places."""
 
     def __init__(self, parameters: BustParameters, look: SkinLook) -> None:
         self.look = look
@@ -89,7 +87,7 @@ class _Brush:
         self.hairs = make_hairs(look.seed)
 
     def paint(self, patch: Patch) -> Painted:
-        from dermis.human.skin_maps.kernels import marks, pigments, places, relief
+        from dermis.human.skin_maps.kernels import marks, places, relief
 
         look, count = self.look, len(patch.points)
         place, mark = np.empty((count, places.COLUMNS)), np.empty((count, marks.COLUMNS))
@@ -97,12 +95,12 @@ class _Brush:
         places.locate(patch, self.face, place)
         marks.mark(patch, place, self.hairs, look.freckles, look.moles, look.stubble, mark)
         relief.raise_skin(patch, place, mark, self.folds, look.age, height)
-        pigments.spread(patch, place, mark, look.melanin, look.blood, pigment)
+        marks.spread_pigments(patch, place, mark, look.melanin, look.blood, pigment)
         colour = colour_of(look, pigment, place, mark)
         return Painted(colour, height.astype(np.float32), *gloss(look, place, mark), self._regions(place))
 
     def _regions(self, place: Doubles) -> NDArray[np.uint8]:
-        """Labels; most of the head is quickly seen to be neither face nor ear."""
+        """Labels; boxes rule out face and ear for most of the head."""
         points = place[:, :3]
         x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
         face = (z > -5) & (y > -118) & (y < 80)

@@ -1,4 +1,4 @@
-"""What a smooth dielectric surface does to light that meets it, from without and from within."""
+"""Reflection at a smooth dielectric surface, from outside and from inside."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def internal_moment(order: int, eta: float, nodes: int = 64) -> float:
 
 
 def diffuse_reflectance(eta: float, kind: Diffuse = "polynomial") -> float:
-    """Share of diffuse light that the surface throws back inside, F_dr [-].
+    """Share of diffuse light that the surface reflects back inside, F_dr [-].
 
     kind : the polynomial that the published models use, or the exact integral
 

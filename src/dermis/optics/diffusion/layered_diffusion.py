@@ -1,7 +1,7 @@
 """Diffusion through a stack with fluence and flux continuous at each interface.
 
 In the Hankel domain each layer obeys D phi'' - D q^2 phi = -S(z). From the bottom up the recursion carries
-what a layer needs to know of all below it: D phi' = W - Z phi at its lower face.
+the boundary condition that all layers below impose: D phi' = W - Z phi at the lower face.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class _Face(NamedTuple):
 
 
 class _Passage(NamedTuple):
-    """What carries the fluence from a sheet's upper to its lower face."""
+    """Carries the fluence from a sheet's upper to its lower face."""
 
     across: Floats
     added: Floats

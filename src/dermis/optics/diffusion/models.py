@@ -1,16 +1,19 @@
-"""A medium's diffusion profile under each of the diffusion models."""
+"""A medium's diffusion profile under each diffusion model, and the light that comes through its slabs."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dermis.errors import refuse
-from dermis.optics.diffusion import better_dipole, dipole, hankel, layered_diffusion, layers, multipole
+from dermis.optics.diffusion import dipole, hankel, layered_diffusion, multipole
 from dermis.optics.diffusion.boundary import mismatch, normal_reflectance
 from dermis.optics.diffusion.multipole import Clamp
+from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats, Medium
 from dermis.optics.radial import (
     NOTABLE_SHARE,
@@ -57,13 +60,13 @@ def diffusion_profile(
     if closed or model == "better-dipole":
         grid = np.geomspace(1e-6, 1e3, 1500)
         values = _pointwise(medium, model, clamp, grid)
-        total = (
-            enclosed(grid[-1:], grid, values)[0] if model == "better-dipole" else _total(medium, model, clamp)
-        )
     else:
         grid = hankel.radii()
         values = hankel.to_radius(transform(medium, model, clamp, hankel.frequencies()))
-        total = _total(medium, model, clamp)
+    if model == "better-dipole":
+        total = enclosed(grid[-1:], grid, values)[0]
+    else:
+        total = transform(medium, model, clamp, hankel.STILL)[0]
     near = (grid > 1e-7) & (grid < 1e3)  # beyond, the numbers are noise
     return _assemble(medium, model, clamp, grid[near], values[near], total, rgb)
 
@@ -74,12 +77,7 @@ def transform(medium: Medium, model: Model, clamp: Clamp, frequency: Floats) -> 
         A = mismatch(medium.eta, "exact")
         source: layered_diffusion.Source = "beam" if model == "layered" else "point"
         return layered_diffusion.respond(frequency, medium, A, source)[0]
-    return layers.respond(frequency, medium, mismatch(medium.eta), clamp).R_above
-
-
-def _total(medium: Medium, model: Model, clamp: Clamp) -> Floats:
-    total: Floats = transform(medium, model, clamp, hankel.STILL)[0]
-    return total
+    return multipole.respond(frequency, medium, mismatch(medium.eta), clamp).R_above
 
 
 def _need_half_space(medium: Medium, model: Model) -> None:
@@ -92,10 +90,10 @@ def _need_half_space(medium: Medium, model: Model) -> None:
 def _pointwise(medium: Medium, model: Model, clamp: Clamp, radius_mm: Floats) -> Floats:
     layer = medium.layers[0]
     if model == "better-dipole":
-        return better_dipole.reflectance(radius_mm, layer, medium.eta)
+        return dipole.better_reflectance(radius_mm, layer, medium.eta)
     if model == "dipole":
         return dipole.reflectance(radius_mm, layer, mismatch(medium.eta))
-    return multipole.reflectance(radius_mm, layers.slabs_of(medium, mismatch(medium.eta), clamp)[0])
+    return multipole.reflectance(radius_mm, multipole.slabs_of(medium, mismatch(medium.eta), clamp)[0])
 
 
 def _assemble(
@@ -127,16 +125,13 @@ def _assemble(
 
 
 def _doubts(medium: Medium, model: Model, clamp: Clamp) -> list[str]:
-    """What of the medium the model takes badly."""
+    """Warnings of what in the medium the model handles badly."""
     found = []
     for number, layer in enumerate(medium.layers, 1):
         thin = layer.thickness_mm < layer.mean_free_path_mm
         if model == "multipole" and thin.any():
-            what = (
-                "its source lies below it, light is lost"
-                if clamp == "none"
-                else "its source is moved into it"
-            )
+            lost = "its source lies below it, light is lost"
+            what = lost if clamp == "none" else "its source is moved into it"
             found.append(f"layer {number} ({layer.name}) is thinner than a reduced mean free path: {what}")
     worst = float(_early_albedo(medium).min())
     if worst < _ABSORBING:
@@ -157,7 +152,7 @@ def _early_albedo(medium: Medium) -> Floats:
 
 
 def _flaws(total: Floats, ring_energy: Floats) -> Sequence[str]:
-    """What of the result no real light does, or no ring holds."""
+    """Warnings of what in the result is unphysical, or missing from the rings."""
     found = light_beyond(total, ring_energy)
     if (total < 0.0).any():
         found.append(f"a total reflectance is negative: {np.round(total, 4).tolist()}")
@@ -172,3 +167,51 @@ def _flaws(total: Floats, ring_energy: Floats) -> Sequence[str]:
     if surplus > NOTABLE_SHARE:
         found.append(f"R(r) holds {surplus:.0%} more light than the total: it is finer than its numbers")
     return found
+
+
+def through_gaussians(profile: GaussianSum, thickness_mm: ArrayLike) -> Floats:
+    """What the profile itself lets through from an evenly lit far side, (n, 3) [-].
+
+    A Gaussian at a distance of sqrt(r^2 + d^2) is exp(-d^2 / 2v) G(v, r), v being the variance: each weight
+    falls by that factor.
+
+    Source: [dEonLuebke2007] section 14.5.
+    """
+    d = np.asarray(thickness_mm, dtype=np.float64)[..., None]
+    return np.asarray(np.exp(-(d**2) / (2.0 * profile.variance_mm2)) @ profile.weight)
+
+
+def through_slab(
+    medium: Medium, thickness_mm: ArrayLike, model: Literal["layered", "multipole"] = "layered"
+) -> Floats:
+    """Transmittance of the medium cut at each thickness, per power that enters, (n, c) [-].
+
+    model : layered diffusion lets what meets no event pass, by the reduced extinction; the multipole
+        scatters all light at one depth, and errs where a cut leaves a layer thinner than a mean free path
+
+    Source: [DonnerJensen2005] eq. 7, 8 for the multipole.
+    """
+    found = []
+    for thickness in np.atleast_1d(np.asarray(thickness_mm, dtype=np.float64)):
+        slab = cut(medium, float(thickness))
+        if model == "layered":
+            depth = sum(layer.sigma_t_prime * layer.thickness_mm for layer in slab.layers)
+            straight = (1.0 - normal_reflectance(medium.eta)) * np.exp(-depth)
+            diffuse = layered_diffusion.respond(hankel.STILL, slab, mismatch(medium.eta, "exact"))[1][0]
+            found.append(diffuse + straight)
+        else:
+            found.append(multipole.respond(hankel.STILL, slab, mismatch(medium.eta)).T_down[0])
+    return np.stack(found)
+
+
+def cut(medium: Medium, thickness_mm: float) -> Medium:
+    """The medium's upper part, or all of it if it is thinner, with air below [mm]."""
+    if not 0.0 < thickness_mm < np.inf:
+        refuse("thickness", "a length above 0 mm", f"{thickness_mm:g} came", "Correct it")
+    kept, left = [], thickness_mm
+    for layer in medium.layers:
+        kept.append(replace(layer, thickness_mm=min(layer.thickness_mm, left)))
+        left -= layer.thickness_mm
+        if left <= 0.0:
+            break
+    return replace(medium, layers=tuple(kept))

@@ -1,4 +1,4 @@
-"""The multipole: a slab's reflectance and transmittance from mirror images in both of its faces."""
+"""The multipole: a slab by mirror images in both of its faces, and stacks of slabs by frequency."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.optics.diffusion import dipole
-from dermis.optics.media import Floats, Layer
+from dermis.optics.media import Floats, Layer, Medium
 
 Clamp = Literal["none", "layer"]
 
@@ -58,7 +58,7 @@ def reflectance_hankel(frequency: ArrayLike, slab: Slab) -> Floats:
     if np.isinf(slab.layer.thickness_mm):
         return dipole.reflectance_hankel(frequency, slab.layer, slab.A_top)
     l, top = slab.source_mm, slab.z_b[0]
-    return _sum(frequency, slab, l, -l - 2.0 * top)
+    return _image_sum(frequency, slab, l, -l - 2.0 * top)
 
 
 def transmittance_hankel(frequency: ArrayLike, slab: Slab) -> Floats:
@@ -66,7 +66,7 @@ def transmittance_hankel(frequency: ArrayLike, slab: Slab) -> Floats:
     l, top, d = slab.source_mm, slab.z_b[0], slab.layer.thickness_mm
     if np.isinf(d):
         return np.zeros((*np.shape(frequency), len(l)))
-    return _sum(frequency, slab, d - l, d + l + 2.0 * top)
+    return _image_sum(frequency, slab, d - l, d + l + 2.0 * top)
 
 
 def reflectance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> Floats:
@@ -97,7 +97,7 @@ def transmittance(radius_mm: ArrayLike, slab: Slab, tolerance: float = 1e-8) -> 
     return _series(radius_mm, slab, lambda shift: (d - l - shift, d + l + 2.0 * top - shift), tolerance)
 
 
-def _sum(frequency: ArrayLike, slab: Slab, real: Floats, image: Floats) -> Floats:
+def _image_sum(frequency: ArrayLike, slab: Slab, real: Floats, image: Floats) -> Floats:
     """Half the albedo times the sum over i of the signed exp(-|z + i P| q) of a real source less an image."""
     q = np.sqrt(slab.layer.sigma_tr**2 + np.asarray(frequency, dtype=np.float64)[..., None] ** 2)
     P = slab.period_mm
@@ -132,3 +132,56 @@ def pairs_needed(slab: Slab, tolerance: float, most: int = 2000) -> int:
         return most
     left = np.log(4.0 / (tolerance * -np.expm1(-decay)))
     return int(min(most, np.ceil(left / decay) + 2))
+
+
+@dataclass(frozen=True)
+class Response:
+    """Hankel transforms, (n, c) each, of what a stack does to light from above and from below [-]."""
+
+    R_above: Floats
+    T_down: Floats
+    R_below: Floats
+    T_up: Floats
+
+    def over(self, lower: Response) -> Response:
+        """This stack on top of another.
+
+        Source: [DonnerJensen2005] section 3.3, after Kubelka's addition of layers.
+        """
+        between = 1.0 / (1.0 - self.R_below * lower.R_above)
+        return Response(
+            self.R_above + self.T_down * lower.R_above * between * self.T_up,
+            self.T_down * between * lower.T_down,
+            lower.R_below + lower.T_up * self.R_below * between * lower.T_down,
+            lower.T_up * between * self.T_up,
+        )
+
+
+def respond(frequency: ArrayLike, medium: Medium, A: float, clamp: Clamp = "layer") -> Response:
+    """The response of all layers by frequency s [1/mm].
+
+    A : boundary mismatch against the air, above and below; inner faces are index-matched [-]
+    clamp : where the source of a layer thinner than a mean free path goes, see `Slab`
+    """
+    slabs = slabs_of(medium, A, clamp)
+    stack = _one(frequency, slabs[-1])
+    for slab in reversed(slabs[:-1]):
+        stack = _one(frequency, slab).over(stack)
+    return stack
+
+
+def slabs_of(medium: Medium, A: float, clamp: Clamp = "layer") -> list[Slab]:
+    """The medium's layers with their faces."""
+    last = len(medium.layers) - 1
+    return [
+        Slab(layer, A if i == 0 else 1.0, A if i == last else 1.0, clamp)
+        for i, layer in enumerate(medium.layers)
+    ]
+
+
+def _one(frequency: ArrayLike, slab: Slab) -> Response:
+    R, T = reflectance_hankel(frequency, slab), transmittance_hankel(frequency, slab)
+    if np.isinf(slab.layer.thickness_mm):  # nothing comes from below
+        return Response(R, T, np.zeros_like(R), np.zeros_like(R))
+    below = slab.flipped()
+    return Response(R, T, reflectance_hankel(frequency, below), transmittance_hankel(frequency, below))

@@ -1,4 +1,4 @@
-"""Kernels a(x) a(y), which two passes of a blur apply: not round, and judged as such."""
+"""Separable kernels a(x) a(y), applied in two passes: not round, and judged as such."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats
 
 SECTORS = 16
-"""Equal sectors of a quarter turn, the cells of each ring."""
+"""Equal sectors of a quarter turn into which each ring is cut."""
 
 _NODES = 8
 _STARTS = ((0.3, 0.9), (0.1, 0.6))  # shares of the light within the near and the far Gaussian
@@ -32,11 +32,6 @@ class SeparableKernel:
     albedo: Floats
     variance_mm2: Floats
     weight: Floats
-
-    @property
-    def sigma_mm(self) -> Floats:
-        """Standard deviations, (k, c) [mm]."""
-        return np.sqrt(self.variance_mm2)
 
     def line(self, offset_mm: ArrayLike) -> Floats:
         """a(x) of one pass, shape (..., c) [1/mm]."""

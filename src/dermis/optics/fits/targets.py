@@ -1,4 +1,4 @@
-"""What a profile's approximation is fitted to and judged by: R(r) at points, or the light through rings."""
+"""Targets of a fit, by which it is also judged: R(r) at points, or the light through rings."""
 
 from __future__ import annotations
 
@@ -140,11 +140,10 @@ def _check(kind: str, radius_mm: Floats, values: Floats, total: Floats) -> None:
     if not (np.isfinite(radius_mm).all() and np.isfinite(values).all() and np.isfinite(total).all()):
         refuse(place, "finite numbers", "NaN or infinity came", "Correct the arrays")
     if len(radius_mm) < 2 or not (np.diff(radius_mm) > 0.0).all():
-        refuse(place, "two radii or more that increase", "they do not", "Sort them")
+        refuse(place, "two or more increasing radii", "they do not increase", "Sort them")
     dark = [i for i in range(values.shape[1]) if not (values[:, i].any() and total[i] > 0.0)]
     if dark:
         peak, sum_ = values[:, dark[0]].max(), total[dark[0]]
         came = f"channel {dark[0]} holds {peak:.3g} at most and {sum_:.3g} in all"
-        refuse(
-            place, "light in every channel", came, "Leave it out, or take another model, skin or more photons"
-        )
+        remedy = "Leave it out, or take another model, another skin or more photons"
+        refuse(place, "light in every channel", came, remedy)

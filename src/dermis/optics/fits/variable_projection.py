@@ -1,4 +1,4 @@
-"""Least squares in the variances of Gaussians, the best weights being found anew for each guess.
+"""Least squares over the variances of Gaussians, with the best weights solved for at each step.
 
 Source: [GolubPereyra1973] with the slopes of [Kaufman1975], steps after [Marquardt1963].
 """
@@ -31,7 +31,7 @@ class Fit(NamedTuple):
 
 
 def descend(design: Design, samples: Floats, log_variance: Floats, bounds: tuple[float, float]) -> Fit:
-    """The fit at the bottom of the valley that the start lies in.
+    """The local minimum that descent from a start reaches.
 
     design : what a unit Gaussian of each variance adds to the samples, and its slope by log variance
     samples : (n, c)

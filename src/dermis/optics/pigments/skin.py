@@ -9,8 +9,14 @@ from typing import Final, Literal, get_args
 
 from dermis.errors import refuse
 from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium
-from dermis.optics.pigments.chromophores import baseline, blood, melanosome
-from dermis.optics.pigments.scattering import DERMIS_SHARE, ScatteringLaw, donner_jensen_2006
+from dermis.optics.pigments.chromophores import (
+    DERMIS_SHARE,
+    ScatteringLaw,
+    baseline,
+    blood,
+    donner_jensen_2006,
+    melanosome,
+)
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, visible
 
 Structure = Literal["dj2006", "donner2008", "biospec"]
@@ -22,6 +28,8 @@ _SHEET_MM = 0.001
 _CORNEUM_MM, _PAPILLARY_MM = 0.01, 0.2
 _RETICULAR_BLOOD = 0.0091 / 0.012
 _THICKEST_EPIDERMIS_MM = 2.0
+_ONE_INDEX = f"all layers have the index {SKIN_ETA:g}: light meets no surface between them"
+_THIN = "the multipole misjudges so thin a layer: take layered diffusion"
 
 
 @dataclass(frozen=True)
@@ -57,9 +65,8 @@ class SkinParameters:
             refuse(_option("epidermis_mm"), expected, f"{self.epidermis_mm:g} mm came", "Correct it")
         if self.melanin + self.epidermal_blood > 1.0:
             both = f"{_option('melanin')} and {_option('epidermal_blood')}"
-            refuse(
-                both, "at most 1 together", f"{self.melanin:g} and {self.epidermal_blood:g} came", "Lower one"
-            )
+            came = f"{self.melanin:g} and {self.epidermal_blood:g} came"
+            refuse(both, "at most 1 together", came, "Lower one")
 
 
 EXAMPLES: Final[Mapping[str, SkinParameters]] = MappingProxyType(
@@ -80,7 +87,7 @@ def spectral_medium(
 ) -> Medium:
     """The layers of a skin, with a channel for each wavelength.
 
-    structure : "dj2006" is an epidermis on a dermis without end; "donner2008" has a thin sheet of melanin
+    structure : "dj2006" is an epidermis on a semi-infinite dermis; "donner2008" has a thin sheet of melanin
         between them and blood in both; "biospec" has a stratum corneum, an epidermis and two layers of dermis
     parameters : what they are made of
     wavelength_nm : (n,) from 380 to 780 [nm]
@@ -140,7 +147,7 @@ def _epidermis(
 
 
 def _dermis(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, name: str = "dermis") -> Layer:
-    """Blood, and tissue in the rest of the volume; without end."""
+    """Blood, and tissue in the rest of the volume; semi-infinite."""
     sigma_a = p.blood * blood(wavelength_nm, p.oxygen) + (1.0 - p.blood) * baseline(wavelength_nm)
     return Layer(sigma_a, DERMIS_SHARE * sigma_s_prime, name=name)
 
@@ -151,8 +158,6 @@ def _option(name: str) -> str:
 
 _Build = Callable[[SkinParameters, Floats, Floats], tuple[Layer, ...]]
 
-_ONE_INDEX = f"all layers have the index {SKIN_ETA:g}: light meets no surface between them"
-_THIN = "the multipole misjudges so thin a layer: take layered diffusion"
 _STRUCTURES: dict[str, tuple[_Build, str, tuple[str, ...]]] = {
     "dj2006": (
         _dj2006,

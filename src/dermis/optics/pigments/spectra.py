@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from functools import cache
-from importlib import resources
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dermis.errors import refuse
 from dermis.optics.media import Floats
+from dermis.tables import numbers, read_rows
 
 SHORTEST_NM, LONGEST_NM = 380.0, 780.0
 
@@ -28,10 +28,8 @@ def visible(wavelength_nm: ArrayLike) -> Floats:
     wavelength = np.asarray(wavelength_nm, dtype=np.float64)
     within = (wavelength >= SHORTEST_NM) & (wavelength <= LONGEST_NM)
     if not within.all():
-        came = f"{np.atleast_1d(wavelength)[~np.atleast_1d(within)][0]:g} nm came"
-        refuse(
-            "wavelength", f"{SHORTEST_NM:g} to {LONGEST_NM:g} nm", came, "Give wavelengths of visible light"
-        )
+        expected, came = f"{SHORTEST_NM:g} to {LONGEST_NM:g} nm", f"{wavelength[~within].flat[0]:g} nm came"
+        refuse("wavelength", expected, came, "Give wavelengths of visible light")
     return wavelength
 
 
@@ -56,21 +54,11 @@ def rgb_weights(wavelength_nm: Floats = WAVELENGTHS_NM) -> Floats:
     """
     grid = visible(wavelength_nm)
     if grid.ndim != 1 or len(grid) == 0 or (np.diff(grid) <= 0.0).any():
-        refuse(
-            "wavelengths",
-            "a list that increases",
-            f"{grid.tolist()} came",
-            "Sort it and take out repetitions",
-        )
+        refuse("wavelengths", "a list that increases", f"{grid.tolist()} came", "Sort it without repetitions")
     fine = _read("cie-1931-d65")["wavelength_nm"]
     hats = np.array([np.interp(fine, grid, one) for one in np.eye(len(grid))])
     weights = np.linalg.solve(_primaries_xyz(), _observer() @ hats.T)
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
-
-
-def outside_gamut(colour: ArrayLike) -> NDArray[np.bool_]:
-    """Whether colours (..., 3) are too saturated for Rec. 709: one of the channels is negative."""
-    return np.asarray((np.asarray(colour) < 0.0).any(axis=-1))
 
 
 def _observer() -> Floats:
@@ -87,9 +75,5 @@ def _primaries_xyz() -> Floats:
 
 @cache
 def _read(table: str) -> dict[str, Floats]:
-    text = (resources.files("dermis.optics") / "data" / "spectra" / f"{table}.csv").read_text(
-        encoding="utf-8"
-    )
-    header, *rows = (line for line in text.splitlines() if not line.startswith("#"))
-    columns = np.array([row.split(",") for row in rows], dtype=np.float64).T
-    return dict(zip(header.split(","), columns, strict=True))
+    rows = read_rows("dermis.optics", f"data/spectra/{table}")
+    return {name: numbers(rows, name)[:, 0] for name in rows[0]}

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.stitched.ground import Ground
+from dermis.atlas.stitched.surface import Adjacency
 from dermis.machine_code import compiled
 
 Doubles = NDArray[np.float64]
@@ -19,7 +19,7 @@ _MOST_STEPS = 4096
 
 @compiled
 def walk(
-    ground: Ground,
+    adjacency: Adjacency,
     triangle: NDArray[np.int32],
     start: Doubles,
     target: Doubles,
@@ -38,14 +38,14 @@ def walk(
     """
     for n in range(len(triangle)):
         f = triangle[n]
-        p = ground.flat[f]
+        p = adjacency.flat[f]
         third = 1.0 - _FIRST - _SECOND
         inner_x = _FIRST * p[0, 0] + _SECOND * p[1, 0] + third * p[2, 0]
         inner_y = _FIRST * p[0, 1] + _SECOND * p[1, 1] + third * p[2, 1]
         sx = start[n, 0] + _INWARD * (inner_x - start[n, 0])
         sy = start[n, 1] + _INWARD * (inner_y - start[n, 1])
         found[n], weights[n, 0], weights[n, 1], whole[n] = _trace(
-            ground, f, sx, sy, target[n, 0], target[n, 1]
+            adjacency, f, sx, sy, target[n, 0], target[n, 1]
         )
 
 
@@ -69,10 +69,10 @@ def _first_exit(p: Any, sx: float, sy: float, tx: float, ty: float) -> int:
 
 @compiled
 def _trace(
-    ground: Ground, f: int, sx: float, sy: float, tx: float, ty: float
+    adjacency: Adjacency, f: int, sx: float, sy: float, tx: float, ty: float
 ) -> tuple[int, float, float, bool]:
     """Triangle in which the way from s to t ends, the weights there, and whether it is the whole way."""
-    p = ground.flat[f]
+    p = adjacency.flat[f]
     dx, dy = tx - sx, ty - sy
     k = _first_exit(p, sx, sy, tx, ty)
     if k < 0:
@@ -82,17 +82,17 @@ def _trace(
     bx, by = p[(k + 1) % 3]
     hand = 1.0
     for _ in range(_MOST_STEPS):
-        g = ground.beside[f, k]
-        if g < 0 or not ground.free[g]:
+        g = adjacency.beside[f, k]
+        if g < 0 or not adjacency.free[g]:
             second, third = _in_order(k, _met(dx, dy, ax - sx, ay - sy, bx - sx, by - sy), 0.0)
             return f, second, third, False
-        j = ground.entry[f, k]
-        if ground.turned[f, k]:
+        j = adjacency.entry[f, k]
+        if adjacency.flipped[f, k]:
             hand = -hand
         else:
             ax, ay, bx, by = bx, by, ax, ay
         # now a and b are where corners j and j + 1 of g come to lie
-        forth, up = ground.apex[g, j]
+        forth, up = adjacency.apex[g, j]
         cx = ax + forth * (bx - ax) - hand * up * (by - ay)
         cy = ay + forth * (by - ay) + hand * up * (bx - ax)
         left = _cross(dx, dy, cx - sx, cy - sy) > 0.0

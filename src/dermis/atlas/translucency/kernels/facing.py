@@ -1,4 +1,4 @@
-"""The search for patches of the surface that may have others across the flesh."""
+"""Kernels before the pair search: the surface that texels show, and the patches that may have pairs."""
 
 from __future__ import annotations
 
@@ -11,14 +11,42 @@ from numpy.typing import NDArray
 from dermis.atlas.translucency.kernels.pair_search import ASKEW
 from dermis.machine_code import compiled
 
+_INSIDE = 0.1  # texels; the place of a texel beside a chart is on its edge, or in another chart
 Doubles = NDArray[np.float64]
 Integers = NDArray[np.int64]
 _ACROSS = math.sqrt(1.0 - ASKEW**2)
 _ROUNDING = 1e-6  # of cosines
 
 
+@compiled
+def places(
+    triangle: NDArray[np.int32], barycentric: NDArray[np.uint16], corner: NDArray[np.float32]
+) -> tuple[NDArray[np.int16], NDArray[np.bool_]]:
+    """(n, n, 2) the texel nearest what each shows, x and y from -1 to n, and (n, n) whether that is its own.
+
+    triangle, barycentric, corner : as `Atlas` has them, the last by the name `place`
+    """
+    size = len(triangle)
+    nearest = np.full((size, size, 2), -1, np.int16)
+    inside = np.zeros((size, size), np.bool_)
+    at = np.empty(2, np.float64)
+    for y in range(size):
+        for x in range(size):
+            t = triangle[y, x]
+            if t < 0:
+                continue
+            b, c = barycentric[y, x, 0] / 65535.0, barycentric[y, x, 1] / 65535.0
+            for k in range(2):
+                first = np.float64(corner[t, 0, k])
+                along = b * (np.float64(corner[t, 1, k]) - first) + c * (np.float64(corner[t, 2, k]) - first)
+                at[k] = (first + along) * size - 0.5
+                nearest[y, x, k] = np.int16(min(max(np.rint(at[k]), -1.0), size))
+            inside[y, x] = max(abs(at[0] - x), abs(at[1] - y)) < _INSIDE
+    return nearest, inside
+
+
 class Patches(NamedTuple):
-    """Triangles that are near each other.
+    """Groups of triangles that are near each other.
 
     low, high : (p, 3) corners of a box around each patch [mm]
     axis : (p, 3) mean normal
@@ -33,7 +61,7 @@ class Patches(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """A grid whose cells list the patches that reach into them."""
+    """A grid whose cells list the patches that overlap them."""
 
     low: Doubles
     cell_mm: float
@@ -78,7 +106,7 @@ def _askew(i: int, j: int, patches: Patches) -> bool:
     between = 0.0
     for k in range(3):
         between += patches.axis[i, k] * patches.axis[j, k]
-    # Both angles are taken off the one from which a place counts.
+    # both cones of normals may narrow the angle between the axes
     return bool(between <= ASKEW * cosine + _ACROSS * sine + _ROUNDING)
 
 

@@ -1,14 +1,33 @@
-"""What lies on the skin in single pieces: pores, freckles, moles and hairs."""
+"""Single pieces on the skin (pores, freckles, moles, hairs), and the melanin and blood around them."""
 
 from __future__ import annotations
 
 import math
 
+from dermis.human.bust.fields import Doubles
 from dermis.human.skin_maps.hairs import WIDEST_TEXEL_MM, Hairs
-from dermis.human.skin_maps.kernels.dots import dots
-from dermis.human.skin_maps.kernels.noise import blobs, smooth_step, visible
-from dermis.human.skin_maps.kernels.places import FRECKLES, LIP, PORES, SCALP, X, Y, Z
-from dermis.human.skin_maps.patch import Doubles, Patch
+from dermis.human.skin_maps.kernels.noise import (
+    blobs,
+    dots,
+    fractal_noise,
+    gradient_noise,
+    smooth_step,
+    visible,
+)
+from dermis.human.skin_maps.kernels.places import (
+    BLOOD,
+    FRECKLES,
+    LID,
+    LIP,
+    MELANIN,
+    MOUTH,
+    PORES,
+    SCALP,
+    X,
+    Y,
+    Z,
+)
+from dermis.human.skin_maps.look import Patch
 from dermis.machine_code import compiled
 
 # Columns of what `mark` gives: how much of each is at a place [-].
@@ -19,6 +38,12 @@ COLUMNS = 6
 # Artist's values.
 _PORE_SPACING_MM, _MOLE_SPACING_MM, _STUBBLE_SPACING_MM = 1.15, 28.0, 0.85
 _FRECKLE_SPACING_MM, _SMALL_FRECKLE_SPACING_MM = 4.2, 2.2
+# Artist's values, in doublings of the pigment.
+_BLOTCHES, _BLOTCH_BLOB_MM, _BLOTCH_GAIN = 0.55, 19.0, 0.86
+_PATCHES, _PATCH_BLOB_MM, _PATCH_GAIN = 0.22, 24.0, 0.75
+_FRECKLE, _MOLE, _PORE, _RED_PORE = 1.7, 3.4, 0.7, 0.4
+_LIP_BLOOD, _LIP_MELANIN = 2.3, 0.5
+_RED_LIDS, _RED_SLIT = 0.8, 1.2
 
 
 @compiled
@@ -57,14 +82,7 @@ def _pore(x: float, y: float, z: float, normal: Doubles, place: Doubles, texel: 
 
 @compiled
 def _freckle(
-    x: float,
-    y: float,
-    z: float,
-    normal: Doubles,
-    place: Doubles,
-    freckles: float,
-    texel: float,
-    seed: int,
+    x: float, y: float, z: float, normal: Doubles, place: Doubles, freckles: float, texel: float, seed: int
 ) -> float:
     """Ragged spots of two sizes, most where the sun shines."""
     kept = freckles * (0.12 + 0.88 * min(max(place[FRECKLES], 0.0), 1.0))
@@ -105,3 +123,30 @@ def _hair(x: float, y: float, hairs: Hairs, texel: float) -> float:
         beside = max(1.0 - (dx * dx + dy * dy) / reach, 0.0)
         bare *= 1.0 - piece[6] * beside * beside * width / math.sqrt(reach)
     return 1.0 - bare
+
+
+@compiled
+def spread_pigments(
+    patch: Patch, places: Doubles, marks: Doubles, melanin: float, blood: float, out: Doubles
+) -> None:
+    """Fill `out` (n, 2) with the shares of melanin and blood [-]."""
+    for row in range(len(patch.points)):
+        x, y, z = patch.points[row]
+        place, mark, texel, seed = places[row], marks[row], patch.texel_mm[row], patch.seed
+        brown = place[MELANIN] + _LIP_MELANIN * place[LIP]
+        brown += _PATCHES * fractal_noise(x, y, z, _PATCH_BLOB_MM, _PATCH_GAIN, texel, seed + 121)
+        brown += _FRECKLE * mark[FRECKLE] + _MOLE * mark[MOLE] + _PORE * mark[PORE]
+        red = place[BLOOD] + _RED_PORE * mark[PORE]
+        red += _BLOTCHES * fractal_noise(x, y, z, _BLOTCH_BLOB_MM, _BLOTCH_GAIN, texel, seed + 131)
+        red += place[LIP] * _lip(x, y, z, place, seed)
+        red += _RED_LIDS * (1.0 - smooth_step(0.3, 2.0, place[LID]))
+        out[row, 0] = min(melanin * math.exp2(brown), 1.0)
+        out[row, 1] = min(blood * math.exp2(red), 1.0)
+
+
+@compiled
+def _lip(x: float, y: float, z: float, place: Doubles, seed: int) -> float:
+    """Blood of the lips over that of other skin [doublings], most where they meet."""
+    streaks = 0.3 * gradient_noise(x / 1.6, y / 9.0, z / 9.0, seed + 141)
+    slit = _RED_SLIT * (1.0 - smooth_step(0.0, 2.2, abs(place[MOUTH])))
+    return float(_LIP_BLOOD + streaks + slit - max(place[BLOOD], 0.0))
