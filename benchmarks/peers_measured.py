@@ -15,17 +15,8 @@ from dermis.comparison.scenes import medium_scene, usual_region
 from dermis.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
-<<<<<<< HEAD
 from dermis.optics.media import Medium, media
 from dermis.reference.cycles import CyclesPass, Method, cycles_passes
-=======
-from dermis.optics.diffusion.models import diffusion_profile
-from dermis.optics.fits.gaussian import fit_gaussians
-from dermis.optics.media import Medium, media
-from dermis.optics.profiles import TERMS, write_profile
-from dermis.reference.cycles import Method, cycles_passes
-from dermis.reference.cycles_process import CyclesPass
->>>>>>> lower
 from dermis.reference.path_traced import SAMPLES_PER_PASS, PathTraced, path_trace
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings

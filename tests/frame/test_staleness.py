@@ -172,7 +172,7 @@ RUNS: dict[str, tuple[Callable[[], tuple[Scene, Settings]], tuple[str, ...]]] = 
     ),
     "exposure": (lambda: (BASE, SETTINGS.model_copy(update={"exposure": 2.0})), ("post",)),
     "profile": (
-        lambda: (replace(BASE, skin=Skin(profile="skin1")), SETTINGS),
+        lambda: (replace(BASE, skin=Skin(profile="dj3")), SETTINGS),
         (*SPREAD, *SEEN),
     ),
     "roughness": (
