@@ -63,7 +63,7 @@ class Memo:
         kept = self._kept.setdefault(role, [])
         found = next((one for one in kept if same(one.args, args)), None)
         if found is None or found.provisional:
-            kept[:] = [one for one in kept if one is not found][: self._depth - 1]  # whose space may be needed
+            kept[:] = [one for one in kept if one is not found][: self._depth - 1]  # space may be needed
             found = self._made(make, args, using)
         self._touch(role, found)
         if self._making:
