@@ -63,9 +63,8 @@ class Memo:
         kept = self._kept.setdefault(role, [])
         found = next((one for one in kept if same(one.args, args)), None)
         if found is None or found.provisional:
-            kept[:] = [one for one in kept if one is not found][
-                : self._depth - 1
-            ]  # whose space may be needed
+            others = [one for one in kept if one is not found]
+            kept[:] = others[: self._depth - 1]  # before making, which may need the space
             found = self._made(make, args, using)
         self._touch(role, found)
         if self._making:
