@@ -10,8 +10,8 @@ from pathlib import Path
 
 import dermis
 from dermis.gallery.picture import main
-from dermis.human.bust_file import BustRecipe, write_bust
 from dermis.human.bust.parameters import BustParameters
+from dermis.human.bust_file import BustRecipe, write_bust
 from dermis.human.skin_maps.look import SkinLook
 
 FAMILY = [
