@@ -1,4 +1,4 @@
-"""What is told of a GPU beside `dermis bench`: lights, options, sequences of images, lobes, a cold start."""
+"""What is measured on a GPU besides `dermis bench`: lights, options, image sequences, lobes, a cold start."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
 from other_program import lasted_s
 
-from dermis.benchmark.cases import FRAGMENTS, PRESETS, Case
+from dermis.benchmark.cases import FRAGMENTS, PRESETS, Case, scenes_of
 from dermis.benchmark.lobe_cost import lobe_cost_ns
 from dermis.benchmark.measure import Effort, row_ms, stage_ms
 from dermis.benchmark.report import as_json
 from dermis.benchmark.run import run
-from dermis.benchmark.scenes import scenes_of
 from dermis.cli.console import note
 from dermis.errors import DermisError
 from dermis.frame.renderer import Renderer
@@ -29,13 +29,14 @@ from dermis.mesh.head import Head
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
+from dermis.scene.techniques import TECHNIQUES
 
 ENVIRONMENTS: dict[str, tuple[bool, str | None]] = {
     "studio": (True, None),
     "studio in lebombo": (True, "lebombo"),
     "royal_esplanade": (False, "royal_esplanade"),
 }
-"""Whether the studio's lights shine, and the panorama."""
+"""Whether the studio's lights are on, and the panorama."""
 OPTIONS: dict[str, dict[str, Any]] = {
     "usual": {},
     "seams alpha": {"seams": "alpha"},
@@ -44,12 +45,9 @@ OPTIONS: dict[str, dict[str, Any]] = {
         "stretch": "axes",
         "transmission": "none",
     },
-    "one-blur": {"technique": "one-blur"},
-    "screen-space": {"technique": "screen-space"},
-    "pre-integrated": {"technique": "pre-integrated"},
-    "none": {"technique": "none"},
+    **{name: {"technique": name} for name in TECHNIQUES if name != Settings().technique},
 }
-_VIEWER_S, _LATE_S = 90.0, 20.0  # what the viewer's benchmark is given, and how late it may be
+_VIEWER_S, _LATE_S = 90.0, 20.0  # time limit of the viewer's benchmark, and how far it may overrun
 
 
 @dataclass(frozen=True)
@@ -57,10 +55,10 @@ class Plan:
     """What is measured, and how large it is.
 
     head : sample or file
-    usual : the frame of lights and options
+    usual : frame for lights and options
     cases, film : frames of `dermis bench`
     effort : for lights and options
-    images : of a sequence, and their settings
+    images, image : number in a sequence, and their settings
     viewer : options of `benchmarks/viewer.py`
     """
 
@@ -132,7 +130,7 @@ def options(plan: Plan, head: Head, renderer: Renderer) -> Any:
 
 
 def sequences(plan: Plan, head: Head, renderer: Renderer) -> Any:
-    """Images a second, camera and lights of their own each: handed out, as PNG files, and as EXR files."""
+    """Images per second, each with its own camera and lights: as arrays, PNG files and EXR files."""
     scenes = _scenes(replace(plan.usual, lights=1), head, plan.images)
 
     def bytes_of() -> Iterable[Any]:
@@ -155,7 +153,7 @@ def lobes(plan: Plan, head: Head, renderer: Renderer) -> Any:
 
 
 def start(plan: Plan, head: Head, renderer: Renderer) -> Any:
-    """A process that renders one image and ends [s]; the second one finds everything on disk."""
+    """Time of a process that renders one image [s]; the second one finds everything in the disk cache."""
     size = "x".join(map(str, plan.image["size"]))
     with tempfile.TemporaryDirectory() as folder:
         image = str(Path(folder) / "image.png")
@@ -165,7 +163,7 @@ def start(plan: Plan, head: Head, renderer: Renderer) -> Any:
 
 
 def viewer(plan: Plan, head: Head, renderer: Renderer) -> Any:
-    """`benchmarks/viewer.py` without its hours of watching the memory; what it has when it ends early."""
+    """`benchmarks/viewer.py` without its long memory test; partial results when it ends early."""
     with tempfile.TemporaryDirectory() as folder:
         told = Path(folder) / "viewer.json"
         words = ["--head", plan.head, "--adapter", plan.adapter, "--output", str(told)]
@@ -187,20 +185,20 @@ def _settings(case: Case) -> Settings:
 
 
 def _scenes(case: Case, head: Head, count: int) -> list[Scene]:
-    """Moving ones with the published profile by its name, for they outlive the folder."""
+    """Moving scenes with a profile named rather than in a file, because they outlive the folder."""
     with tempfile.TemporaryDirectory() as folder:
         moving = scenes_of(case, head, Path(folder), max(2, count))
     return [replace(scene, skin=scene.skin.model_copy(update={"profile": "gpu-gems-3"})) for scene in moving]
 
 
 def _stages(renderer: Renderer, scenes: list[Scene], settings: Settings, effort: Effort) -> dict[str, float]:
-    renderer.draw(scenes[0], settings)
-    row_ms(renderer, scenes[: effort.warming], settings)
-    return stage_ms(renderer, scenes, settings, effort)
+    moving = cycle(scenes)
+    row_ms(renderer, moving, 1 + effort.warming, settings)
+    return stage_ms(renderer, moving, settings, effort)
 
 
 def _or_reason(measured: Callable[[], Any]) -> Any:
-    """What was measured, or why it could not be."""
+    """The measurements, or why there are none."""
     try:
         return measured()
     except DermisError as fault:
@@ -208,7 +206,7 @@ def _or_reason(measured: Callable[[], Any]) -> Any:
 
 
 def _drained(images: Iterable[Any], suffix: str) -> float:
-    """Time of all images, and of their files where they get a suffix [s]."""
+    """Time to consume all images, and to write them where there is a suffix [s]."""
     started = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder, ImageWriter() as writer:
         for number, image in enumerate(images):

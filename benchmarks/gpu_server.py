@@ -1,7 +1,7 @@
-"""All that docs/performance.md tells of a GPU, in one go: python benchmarks/gpu_server.py -o result.json
+"""Measures all that docs/performance.md says of a GPU: python benchmarks/gpu_server.py -o result.json
 
 For a server without a screen; it ends within --minutes. Each part is written as soon as it is measured, so
-that what ends early loses little. --quick is a trial of all parts at tiny sizes, on any adapter.
+a run that is cut short loses little. --quick tries all parts at tiny sizes, on any adapter.
 """
 
 from __future__ import annotations

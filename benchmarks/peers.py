@@ -1,9 +1,9 @@
-"""Ours beside Cycles and Mitsuba: the same head, lights, camera and CPU, in one run, at stated error.
+"""Ours against Cycles and Mitsuba: the same head, lights, camera and CPU, in one run, at stated error.
 
 DERMIS_BLENDER_PYTHON=blender/bin/python python benchmarks/peers.py
 
-About twelve minutes on two cores that have nothing else to do; --quick takes one or two. It wants the sample
-data, Mitsuba, and for Cycles a Python that has bpy. Times differ from run to run, images do not.
+About twelve minutes on two idle cores; --quick takes one or two. Needs the sample data, Mitsuba, and for
+Cycles a Python that has bpy. Times differ from run to run, images do not.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from dermis.cli.console import note, print_lines, progress
 from dermis.comparison.scenes import LIGHTS as SCENES
 from dermis.errors import DermisError, refuse
 from dermis.outputs import check_output, replacing
-from dermis.reference.cycles_process import blender_python
+from dermis.reference.cycles import blender_python
 from dermis.reference.mitsuba_scene import load_mitsuba
 
 ROOT = Path(__file__).resolve().parent
@@ -87,8 +87,9 @@ def main(
 def compare_peers(head: str, lights: list[str], plan: Plan, adapter: str) -> dict[str, Any]:
     """The whole report, ready for JSON.
 
-    Without Cycles its rows are left out. Raises DermisError for lights that are none, and without Mitsuba,
-    which gives the truth.
+    Without Cycles its rows are left out.
+
+    Raises DermisError for unknown lights, and without Mitsuba, which gives the truth.
     """
     for light in lights:
         if light not in SCENES:

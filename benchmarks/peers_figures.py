@@ -1,4 +1,4 @@
-"""Noise, error against the truth, and how long Cycles needs to get as near to it as we are."""
+"""Noise, error against the truth, and how long Cycles needs to come as close to it as we do."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from peers_measured import OURS, PUBLISHED, Frames, Measured
+from peers_measured import OF_2007, OURS, Frames, Measured
 
-from dermis.reference.cycles_process import CyclesPass
+from dermis.reference.cycles import CyclesPass
 from dermis.reference.metrics import energy_ratio, relative_rmse
 from dermis.reference.path_traced import PathTraced
 
@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 NAMES = {"random-walk": "Cycles, random walk", "burley": "Cycles, Burley"}
 CLEAN = 0.05
-"""Noise that is still seen, but no longer hides the picture."""
+"""Noise that is still visible, but no longer hides the picture."""
 
 
 @dataclass(frozen=True)
@@ -52,12 +52,12 @@ class Mean:
 
 
 def figures(measured: Measured) -> dict[str, Any]:
-    """All that is told of one scene, ready for JSON."""
+    """The figures of one scene, ready for JSON."""
     mask = seen(measured)
     means = {method: converged(turns) for method, turns in measured.cycles.items()}
     ours = [_our_row(measured, name, mask) for name in OURS]
-    published = [_our_row(measured, name, mask) for name in PUBLISHED]
-    rows = [*ours, *published, _truth_row(measured, mask)]
+    of_2007 = [_our_row(measured, name, mask) for name in OF_2007]
+    rows = [*ours, *of_2007, _truth_row(measured, mask)]
     for method, mean in means.items():
         rows += _cycles_rows(measured, method, mean, mask)
     told: dict[str, Any] = {
@@ -67,7 +67,7 @@ def figures(measured: Measured) -> dict[str, Any]:
         "rows": [asdict(row) for row in rows],
         "left_out": measured.left_out,
         "ours_energy_put_right": {name: _put_right(measured, name, mask) for name in OURS},
-        "published": {row.setting: _longer(row, ours[0]) for row in published},
+        "published": {row.setting: _longer(row, ours[0]) for row in of_2007},
     }
     if "random-walk" in means:
         told["as_near"] = {row.setting: _as_near(measured, means["random-walk"], row, mask) for row in ours}

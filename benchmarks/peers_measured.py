@@ -1,34 +1,27 @@
-"""Ours, Cycles and Mitsuba render one scene in turns, so that whatever slows the machine slows them all."""
+"""Ours, Cycles and Mitsuba render a scene in turns, so that whatever slows the machine slows all of them."""
 
 from __future__ import annotations
 
-import tempfile
 import time
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.benchmark.gpu_gems_3_fragments import published_as_fragments
-from dermis.comparison.scenes import comparison_scene, usual_region
-from dermis.comparison.truths import matched
+from dermis.benchmark.cases import FRAGMENTS, GPU_GEMS_3
+from dermis.benchmark.gpu_gems_3_fragments import FRAGMENTS as AS_FRAGMENTS
+from dermis.comparison.scenes import medium_scene, usual_region
 from dermis.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
-from dermis.optics.diffusion.models import diffusion_profile
-from dermis.optics.fits.gaussian import fit_gaussians
-from dermis.optics.media import Medium
-from dermis.optics.presets import media
-from dermis.optics.profiles import TERMS, write_profile
-from dermis.reference.cycles import Method, cycles_passes
-from dermis.reference.cycles_process import CyclesPass
+from dermis.optics.media import Medium, media
+from dermis.reference.cycles import CyclesPass, Method, cycles_passes
 from dermis.reference.path_traced import SAMPLES_PER_PASS, PathTraced, path_trace
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
+from dermis.scene.techniques import TECHNIQUES
 
 METHODS: tuple[Method, ...] = ("random-walk", "burley")
 
@@ -48,10 +41,9 @@ OURS = {
     "half-space skin, atlas 512": Way("texture-space", 512, "half-space"),
     "screen space": Way("screen-space", 64),
 }
-"""By what they are called in the table; screen space has no use for an atlas."""
-COMPUTE, FRAGMENTS = "passes of 2007 as compute", "passes of 2007 as fragments"
-PUBLISHED = {name: Way("published") for name in (COMPUTE, FRAGMENTS)}
-"""The published structure in our renderer, to set beside the first of ours."""
+"""By their names in the table; screen space needs no atlas."""
+OF_2007 = {"passes of 2007 as compute": Way(GPU_GEMS_3), "passes of 2007 as fragments": Way(FRAGMENTS)}
+"""The structure of 2007 in our renderer, to set beside the first of ours."""
 SEEDS = (100, 200)
 """Of the first pass of each turn; the passes of a turn have the following ones."""
 _WORK = {"ours": 35, "random-walk": 5, "burley": 2, "path-traced": 20}
@@ -96,7 +88,7 @@ class Frames:
 class Measured:
     """What all renderers made of one scene.
 
-    ours : by the names of OURS and PUBLISHED
+    ours : by the names of OURS and OF_2007
     cycles : by method, then for each seed the passes of `Plan.samples`
     left_out : why a method is missing
     truth_core_seconds : of Mitsuba, scene and all
@@ -118,7 +110,7 @@ def measure(
 
     report : told how much work is done since it was last told
     """
-    body = matched(media()["skin1"])
+    body = media()["skin1"].with_eta(1.0)
     settings = Settings(size=(plan.side, plan.side))
     cycles: dict[str, list[list[CyclesPass]]] = {method: [] for method in METHODS}
     ours: dict[str, Frames] = {}
@@ -127,7 +119,8 @@ def measure(
     def per_pass(done: int, of: int) -> None:
         report(SAMPLES_PER_PASS * _WORK["path-traced"])
 
-    with _scene(head, light, body) as scene:
+    of_scene = medium_scene(head, light, usual_region(light), body)
+    with TECHNIQUES.including(FRAGMENTS, AS_FRAGMENTS), of_scene as (scene, _):
         for seed in SEEDS:
             for method in METHODS:
                 _add_frames(ours, renderer, scene, plan)
@@ -148,15 +141,6 @@ def measure(
     return Measured(light, usual_region(light), ours, whole, left_out, truth, core_seconds)
 
 
-@contextmanager
-def _scene(head: Head, light: str, body: Medium) -> Iterator[Scene]:
-    """White skin with the medium's profile; its file lives as long as the context."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "profile.toml"
-        write_profile(file, fit_gaussians(diffusion_profile(body).rings(), TERMS, name=body.name).profile, {})
-        yield comparison_scene(head, light, usual_region(light), str(file))
-
-
 def _passes(
     scene: Scene, body: Medium, plan: Plan, settings: Settings, method: Method, seed: int
 ) -> list[CyclesPass]:
@@ -165,22 +149,17 @@ def _passes(
 
 
 def _add_frames(ours: dict[str, Frames], renderer: Renderer, scene: Scene, plan: Plan) -> None:
-    """Warm frames with everything computed anew, shadows too."""
-    for name, way in (OURS | PUBLISHED).items():
+    """Warm frames with everything computed anew."""
+    for name, way in (OURS | OF_2007).items():
         settings = Settings.model_validate(
             {"size": (plan.side, plan.side), "technique": way.technique, "atlas": way.atlas}
         )
         skin = Skin(**(scene.skin.model_dump() | {"direction": way.direction}))
         turned = replace(scene, skin=skin)
-        with _drawn_as(name, renderer):
-            drawn = renderer.draw(turned, settings, keep_shadows=False)
-            frames = ours.setdefault(name, Frames(drawn.linear()))
-            for _ in range(plan.frames):
-                began, worked = time.perf_counter(), time.process_time()
-                renderer.draw(turned, settings, keep_shadows=False)
-                frames.seconds.append(time.perf_counter() - began)
-                frames.core_seconds.append(time.process_time() - worked)
-
-
-def _drawn_as(name: str, renderer: Renderer) -> AbstractContextManager[None]:
-    return published_as_fragments(renderer.device, renderer.stages) if name == FRAGMENTS else nullcontext()
+        drawn = renderer.draw(turned, settings, anew=True)
+        frames = ours.setdefault(name, Frames(drawn.linear()))
+        for _ in range(plan.frames):
+            began, worked = time.perf_counter(), time.process_time()
+            renderer.draw(turned, settings, anew=True)
+            frames.seconds.append(time.perf_counter() - began)
+            frames.core_seconds.append(time.process_time() - worked)

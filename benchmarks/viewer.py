@@ -23,7 +23,7 @@ from typing import Any
 from cyclopts import run
 from viewer_clock import Clock
 from viewer_delays import delays
-from viewer_input import Plan, offscreen, slider_place, speeds
+from viewer_input import Plan, offscreen, slider_position, speeds
 from viewer_memory import endured
 from viewer_page import through_the_page
 from viewer_tables import tables
@@ -96,7 +96,7 @@ def main(
     found.take("speed", partial(speeds, driver, plan))
     found.take("delay", partial(delays, driver, plan))
     if browser:
-        found.take("page", partial(through_the_page, plan, slider_place(driver, "melanin")))
+        found.take("page", partial(through_the_page, plan, slider_position(driver, "melanin")))
     del driver
     if minutes or changes:
         watched = _halved(plan) if software else plan  # a thousand changes in ten minutes

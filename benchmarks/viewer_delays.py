@@ -11,7 +11,7 @@ import numpy as np
 from viewer_clock import Clock
 from viewer_input import FEWEST, MOTIONS, STEP, InputDriver, Plan, counted
 
-from dermis.viewer.orbit import orbit
+from dermis.viewer.navigation import orbit
 
 _PATIENCE = 100  # frames
 _PIXELS = 6.0  # of a drag between two frames
@@ -41,7 +41,7 @@ def _frame_s(driver: InputDriver) -> float:
     times = []
     for _ in range(FEWEST):
         began = time.perf_counter()
-        driver.go_on(MOTIONS["camera"].change(driver.viewer.desk.state, 0))
+        driver.go_on(MOTIONS["camera"].change(driver.viewer.session.state, 0))
         driver.frame()
         times.append(time.perf_counter() - began)
     return min(times)
@@ -71,7 +71,7 @@ def _delay_in_frame(driver: InputDriver, x: float, y: float, wait_s: float) -> f
     mover = threading.Thread(target=move)
     mover.start()
     driver.go_on(
-        driver.viewer.desk.state.with_camera(orbit(driver.viewer.desk.state.scene.camera, STEP, 0.0))
+        driver.viewer.session.state.with_camera(orbit(driver.viewer.session.state.scene.camera, STEP, 0.0))
     )
     driver.frame()
     mover.join()

@@ -1,4 +1,4 @@
-"""Motion in a viewer without a window: how many frames a second."""
+"""Frame rates of motion in a viewer without a window."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from viewer_clock import Clock
 from dermis.scene.heads import load_head
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
-from dermis.viewer.lamp import drag_light
-from dermis.viewer.orbit import orbit
+from dermis.viewer.navigation import drag_light, orbit
 from dermis.viewer.pace import Pace
 from dermis.viewer.state import ViewerState, changed
 from dermis.viewer.viewer import Viewer
@@ -31,7 +30,7 @@ FEWEST = 3  # that a median is made of, however little time is left
 
 @dataclass(frozen=True)
 class Plan:
-    """What is drawn on what.
+    """What is drawn, and on which adapter.
 
     size : of the picture [pixel]
     frames : of each kind of motion
@@ -57,7 +56,7 @@ class Motion:
 
 
 class Steady(Pace):
-    """The same effort for every frame: what is asked for."""
+    """The same quality for every frame: what the settings ask for."""
 
     def settings(self, wanted: Settings, size: tuple[int, int], moving: bool) -> Settings:
         """The wanted ones at the window's size."""
@@ -68,7 +67,7 @@ class InputDriver:
     """A viewer on an offscreen canvas, without its panel."""
 
     def __init__(self, viewer: Viewer, canvas: Any) -> None:
-        self.viewer, self.canvas, self.first = viewer, canvas, viewer.desk.state
+        self.viewer, self.canvas, self.first = viewer, canvas, viewer.session.state
         self._fault: Exception | None = None
         canvas.request_draw(self._draw)
 
@@ -91,7 +90,7 @@ class InputDriver:
         return picture
 
     def rest(self) -> None:
-        """Draw until nothing moves any more.
+        """Draw until nothing moves.
 
         Raises RuntimeError when that takes too long.
         """
@@ -102,8 +101,8 @@ class InputDriver:
             self.frame()
 
     def go_on(self, state: ViewerState) -> None:
-        """Another state, in a gesture, so that the history does not grow."""
-        self.viewer.desk.change(state, "benchmark")
+        """Go to another state within one gesture, so that the undo history does not grow."""
+        self.viewer.session.change(state, "benchmark")
 
     def event(self, kind: str, x: float, y: float, **fields: Any) -> None:
         """Of a pointer with its left button down."""
@@ -112,7 +111,7 @@ class InputDriver:
 
 
 def offscreen(plan: Plan) -> InputDriver:
-    """A viewer that draws every frame at the plan's effort."""
+    """A viewer that draws every frame at the plan's quality."""
     from rendercanvas.offscreen import OffscreenRenderCanvas
 
     settings = Settings(atlas=plan.atlas, samples=plan.samples, shadow_size=plan.atlas)
@@ -120,18 +119,18 @@ def offscreen(plan: Plan) -> InputDriver:
     state = ViewerState(Scene(load_head(plan.head)), settings, {"name": plan.head})
     viewer = Viewer(state, canvas, plan.adapter)
     viewer.panel.visible = False
-    viewer.desk.studio.pace = Steady(viewer.desk.studio.pace.software)
+    viewer.session.studio.pace = Steady(viewer.session.studio.pace.software)
     return InputDriver(viewer, canvas)
 
 
-def slider_place(driver: InputDriver, name: str) -> tuple[float, float] | None:
-    """Where a slider of skin with pigments is in the window, None where one had to scroll to it."""
+def slider_position(driver: InputDriver, name: str) -> tuple[float, float] | None:
+    """Position of a pigment's slider in the window, None when it would have to be scrolled to."""
     driver.viewer.panel.visible = True
     driver.go_on(driver.first.with_skin(profile=PIGMENTED))
     for _ in range(FEWEST):
         driver.frame()
     driver.viewer.panel.visible = False
-    place = driver.viewer.desk.places[name]
+    place = driver.viewer.session.positions[name]
     return place if place[1] < driver.canvas.get_logical_size()[1] else None
 
 
@@ -169,19 +168,19 @@ def speeds(driver: InputDriver, plan: Plan, clock: Clock) -> Iterator[tuple[str,
 
 
 def _speed(driver: InputDriver, motion: Motion, frames: int, clock: Clock) -> dict[str, Any]:
-    desk = driver.viewer.desk
+    session = driver.viewer.session
     driver.go_on(motion.start(driver.first))
     for k in range(_SETTLING):
-        driver.go_on(motion.change(desk.state, k))
+        driver.go_on(motion.change(session.state, k))
         driver.frame()
     times, prepared, processor = [], [], processor_s()
     for k in counted(frames, clock):
         began = time.perf_counter()
-        driver.go_on(motion.change(desk.state, _SETTLING + k))
+        driver.go_on(motion.change(session.state, _SETTLING + k))
         driver.frame()
         times.append(time.perf_counter() - began)
-        prepared.append(desk.studio.rendered.setup_ms if desk.studio.rendered else 0.0)
-    rendered = desk.studio.rendered
+        prepared.append(session.studio.rendered.setup_ms if session.studio.rendered else 0.0)
+    rendered = session.studio.rendered
     return {
         "frames": len(times),
         "frames_per_s": len(times) / sum(times),

@@ -1,4 +1,4 @@
-"""What the viewer holds while everything in it is changed again and again."""
+"""The viewer's memory while everything in it is changed again and again."""
 
 from __future__ import annotations
 
@@ -15,13 +15,12 @@ from dermis.gpu.memory import held_bytes
 from dermis.scene.environment import Environment
 from dermis.scene.files import light_presets
 from dermis.viewer.controls import CAMERAS
-from dermis.viewer.lamp import drag_light
-from dermis.viewer.orbit import dolly, orbit, pan
+from dermis.viewer.navigation import dolly, drag_light, orbit, pan
 from dermis.viewer.state import ViewerState
 
 Kind = Callable[[ViewerState, random.Random], ViewerState]
 _SAMPLES = 60  # of the memory, over all the time
-_BY_HAND = ("split", "undo", "redo", "size", "panel", "preset", "start again")
+_ACTIONS = ("split", "undo", "redo", "size", "panel", "preset", "start again")
 
 
 def _one(chance: random.Random, *names: Any) -> Any:
@@ -29,9 +28,9 @@ def _one(chance: random.Random, *names: Any) -> Any:
 
 
 KINDS: dict[str, Kind] = {
-    "turn": lambda s, r: s.with_camera(orbit(s.scene.camera, r.uniform(-1, 1), r.uniform(-0.3, 0.3))),
+    "orbit": lambda s, r: s.with_camera(orbit(s.scene.camera, r.uniform(-1, 1), r.uniform(-0.3, 0.3))),
     "pan": lambda s, r: s.with_camera(pan(s.scene.camera, r.uniform(-0.1, 0.1), r.uniform(-0.1, 0.1))),
-    "come nearer": lambda s, r: s.with_camera(dolly(s.scene.camera, r.uniform(0.8, 1.25))),
+    "dolly": lambda s, r: s.with_camera(dolly(s.scene.camera, r.uniform(0.8, 1.25))),
     "light": lambda s, r: drag_light(s, 0, r.uniform(-0.5, 0.5), r.uniform(-0.2, 0.2)),
     "rig": lambda s, r: s.with_rig(_one(r, *light_presets())),
     "environment": lambda s, r: s.with_environment(_one(r, None, Environment(name="uniform", exposure=0.5))),
@@ -47,7 +46,7 @@ KINDS: dict[str, Kind] = {
     ),
     "colour": lambda s, r: s.with_skin(albedo=_one(r, "map", "profile")),
     "technique": lambda s, r: s.with_settings(
-        technique=_one(r, "texture-space", "one-blur", "published", "screen-space", "pre-integrated", "none")
+        technique=_one(r, "texture-space", "one-blur", "gpu-gems-3", "screen-space", "pre-integrated", "none")
     ),
     "stretch": lambda s, r: s.with_settings(stretch=_one(r, "full", "axes", "none")),
     "seams": lambda s, r: s.with_settings(seams=_one(r, "stitch", "none", "alpha", "multi-uv")),
@@ -64,13 +63,13 @@ KINDS: dict[str, Kind] = {
 
 def endured(driver: InputDriver, plan: Plan, minutes: float, changes: int) -> dict[str, Any]:
     """The memory over at least so many minutes and changes; each change is drawn."""
-    chance, desk = random.Random(11), driver.viewer.desk
+    chance, session = random.Random(11), driver.viewer.session
     done, taken = 0, list[dict[str, float]]()
-    counts = dict.fromkeys((*KINDS, *_BY_HAND), 0)
+    counts = dict.fromkeys((*KINDS, *_ACTIONS), 0)
     for kind in counts:  # all that is ever compiled and loaded, before anything is counted
         _change(driver, kind, chance, plan)
         driver.frame()
-    desk.change(driver.first)
+    session.change(driver.first)
     begun = time.perf_counter()
     while (now := time.perf_counter() - begun) < 60.0 * minutes or done < changes:
         part = min(now / max(1e-9, 60.0 * minutes), done / max(1, changes))
@@ -91,23 +90,23 @@ def _sample(seconds: float, changes: int) -> dict[str, float]:
 
 
 def _change(driver: InputDriver, kind: str, chance: random.Random, plan: Plan) -> None:
-    desk = driver.viewer.desk
+    session = driver.viewer.session
     if kind in KINDS:
-        desk.change(KINDS[kind](desk.state, chance))
+        session.change(KINDS[kind](session.state, chance))
     elif kind == "split":
-        desk.split.release() if desk.split.before else desk.split.freeze(desk.state)
+        session.split.release() if session.split.before else session.split.freeze(session.state)
     elif kind == "undo":
-        desk.history.undo()
+        session.history.undo()
     elif kind == "redo":
-        desk.history.redo()
+        session.history.redo()
     elif kind == "panel":
         driver.viewer.panel.visible = not driver.viewer.panel.visible
     elif kind == "size":
         driver.canvas.set_logical_size(*(round(side * chance.choice((0.5, 0.75, 1.0))) for side in plan.size))
     elif kind == "preset":
-        desk.controls.look(chance.choice(CAMERAS))
+        session.controls.look(chance.choice(CAMERAS))
     else:
-        desk.change(driver.first)
+        session.change(driver.first)
 
 
 def growth(taken: Sequence[dict[str, float]]) -> dict[str, Any]:

@@ -32,7 +32,7 @@ def _title(found: dict[str, Any]) -> str:
 
 def _speed(found: dict[str, Any]) -> str:
     rows = [
-        "| what moves | frames/s | frame [ms] | 95 % within, longest [ms] | processor time [ms] | stages |",
+        "| motion | frames/s | frame [ms] | 95 % within, longest [ms] | processor time [ms] | stages |",
         "|---|---|---|---|---|---|",
     ]
     for name, one in _figures(found, "speed").items():
@@ -52,7 +52,7 @@ def _late(one: dict[str, float]) -> str:
 
 
 def _delay(found: dict[str, Any]) -> str:
-    rows = ["| from a move to the picture | median [ms] | 95 % within [ms] |", "|---|---|---|"]
+    rows = ["| latency from a move to the picture | median [ms] | 95 % within [ms] |", "|---|---|---|"]
     page, several = _figures(found, "page"), _figures(found, "delay")
     if "delay" in page:
         several["in the page, from rest"] = page["delay"]

@@ -1,4 +1,4 @@
-"""Pages that Sphinx makes from the code: the gallery, the reference of public names, the bibliography."""
+"""Pages that Sphinx makes from the code: gallery, settings of a scene, public names, bibliography."""
 
 from __future__ import annotations
 
@@ -8,9 +8,25 @@ from typing import Any
 
 import dermis
 from dermis import cite
+from dermis.cli.options import is_option, option_name
+from dermis.cli.scene_options import AROUND, HEAD
 from dermis.gallery.script import Script, find_scripts
+from dermis.scene import Camera, Environment, Settings, Skin
+from dermis.scene.head_table import HeadTable
+from dermis.scene.plain import Plain, help_of, shown, values_of
+from dermis.scene.skin import Pigments, TissueLayer
 
 HERE = Path(__file__).parent
+TABLES: dict[str, tuple[type[Plain], dict[str, str] | None]] = {
+    "[head]": (HeadTable, {"name": ""} | HEAD),
+    "[skin]": (Skin, {}),
+    "[skin.pigments]": (Pigments, None),
+    "[[skin.layers]]": (TissueLayer, None),
+    "[environment]": (Environment, AROUND),
+    "[camera]": (Camera, None),
+    "[render]": (Settings, {}),
+}
+"""The tables of a scene's file: their models, and options by field where these are called otherwise."""
 _FIELD = re.compile(r"^(?P<names>\w+(?:, \w+)*) : (?P<meaning>.*)$")
 _KEY = re.compile(r"\[([A-Za-z]{2,}\d{4}[a-z]?)\]")
 
@@ -23,9 +39,10 @@ def setup(app: Any) -> dict[str, bool]:
 
 
 def write_pages(folder: Path) -> None:
-    """Write the three pages."""
+    """Write the pages."""
     folder.mkdir(exist_ok=True)
-    pages = {"gallery": gallery(), "reference": reference(), "bibliography": bibliography()}
+    pages = {"gallery": gallery(), "settings": settings()}
+    pages |= {"reference": reference(), "bibliography": bibliography()}
     for name, text in pages.items():
         (folder / f"{name}.md").write_text(text, encoding="utf-8")
 
@@ -44,6 +61,27 @@ def _picture(script: Script) -> str:
     return "\n".join([*lines, " · ".join(told), ""])
 
 
+def settings() -> str:
+    """The tables of a scene's file, key by key."""
+    intro = "The tables of a scene's file, and the options of `dermis render` and `dermis view` for each key."
+    parts = [f"## {title}\n\n{table_of(model, names)}" for title, (model, names) in TABLES.items()]
+    return "\n".join(["# Settings", "", intro, "", *parts])
+
+
+def table_of(model: type[Plain], names: dict[str, str] | None) -> str:
+    """A model's fields as a table.
+
+    names : options by field where they are called otherwise; None for a model without options
+    """
+    rows = ["| key | option | values | default | meaning |", "|---|---|---|---|---|"]
+    for field, info in model.model_fields.items():
+        known = names is not None and names.get(field) != "" and is_option(model, field)
+        option = f"`{option_name(field, names)}`" if known else ""
+        values, default = values_of(model, field), shown(info.get_default())
+        rows.append(f"| `{field}` | {option} | {values} | {default} | {help_of(model, field)} |")
+    return "\n".join([*rows, ""])
+
+
 def reference() -> str:
     """The public names, each with its docstring."""
     entries = []
@@ -53,7 +91,9 @@ def reference() -> str:
         kind = "autoexception" if isinstance(thing, type) and issubclass(thing, Exception) else kind
         members = "\n:members:" if kind == "autoclass" and name in ("Renderer", "Tissue") else ""
         home = f"dermis.{dermis._HOME[name]}.{name}"
-        entries.append(f"## {name}\n\n```{{eval-rst}}\n.. {kind}:: {home}{_indented(members)}\n```\n")
+        entry = f"## {name}\n\n```{{eval-rst}}\n.. {kind}:: {home}{_indented(members)}\n```\n"
+        told = isinstance(thing, type) and issubclass(thing, Plain)
+        entries.append(f"{entry}\n{table_of(thing, None)}" if told else entry)
     return "# Reference\n\nAll of these are names of `dermis`.\n\n" + "\n".join(entries)
 
 

@@ -1,6 +1,6 @@
 """The whole technique in studio light.
 
-A white rough reflection over light that has spread below the surface: pores stay sharp in the highlights,
+White, rough reflection over light that has scattered below the surface: pores stay sharp in the highlights,
 shadow edges turn soft and red, thin parts glow.
 
 Deck: S1, S7, S25

@@ -1,8 +1,7 @@
 """Scanned detail, off and on.
 
-The mesh alone is smooth. Pores and wrinkles come from maps: slopes of the normal map, and heights in mm at
-up to 4096 texels, from which slopes are taken too. What a pixel cannot resolve makes its surface rougher
-instead.
+The mesh alone is smooth. Pores and wrinkles come from a normal map and from a height map of up to 4096
+texels a side, in mm. Detail that is too fine for a pixel makes its surface rougher instead.
 
 Deck: S1
 Sources: dEonLuebke2007, OlanoBaker2010

@@ -1,7 +1,7 @@
-"""The two components, taken apart.
+"""The two components by themselves.
 
-What the oily surface reflects is white and shows every pore. What comes back from below has the skin's
-colour and is soft. Their sum is skin.
+Reflection off the oily surface is white and shows every pore. Light scattered below is soft and has the
+skin's colour. Their sum is skin.
 
 Deck: S2, S7
 Equation: L = L_reflected + L_scattered

@@ -1,7 +1,7 @@
 """One roughness for the face, or one for each region.
 
-Roughness and strength by region, and one roughness; each also as what it reflects alone, three times as
-bright. Then both as grey: roughness 0.2 to 0.4, strength 0 to 0.4. Values are an artist's, not measured.
+Roughness and strength by region, and one value for all; beside each its reflection alone, three times as
+bright. Below, both maps in grey: roughness 0.2 to 0.4, strength 0 to 0.4. The values are an artist's choice.
 
 Deck: S9, S10
 Sources: Weyrich2006

@@ -1,7 +1,7 @@
 """White reflections, and tinted ones.
 
-Skin is no metal: what its surface reflects has the colour of the light. Multiplied by the colour map it
-looks like painted clay. Shown on oily skin.
+Skin is no metal: its surface reflects in the colour of the light. Multiplied by the colour map, it looks like
+painted clay. Shown on oily skin.
 
 Deck: S7
 Sources: Dudash2007

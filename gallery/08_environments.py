@@ -1,7 +1,7 @@
-"""Light from all around.
+"""Image-based light.
 
-A hall with many lamps and a room with one large window, each turned about the head. Reflections take a
-panorama that was blurred for each roughness, scattered light its irradiance; peaks as small as a sun become
+A hall with many lamps and a room with one large window, each rotated about the head. Reflections read a
+panorama prefiltered for each roughness, scattered light its irradiance; peaks as small as a sun become
 lights with shadows.
 
 Deck: S8

@@ -1,6 +1,6 @@
-"""With and without light below the surface.
+"""With and without subsurface scattering.
 
-The same lights on the same skin. Without scattering shadows are hard and grey, and skin looks dry.
+The same lights on the same skin. Without scattering, shadows are hard and grey, and skin looks dry.
 
 Deck: S11
 Sources: dEonLuebke2007

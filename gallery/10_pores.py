@@ -1,6 +1,6 @@
-"""The cheek from close by, 48 mm of it.
+"""A close-up of 48 mm of cheek.
 
-Pores stay sharp in what the surface reflects and soften in what has scattered.
+Pores stay sharp in the surface reflection and soften in the scattered light.
 
 Deck: S1, S11
 Sources: dEonLuebke2007

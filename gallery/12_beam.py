@@ -1,8 +1,8 @@
 """A narrow white beam on a slab of skin.
 
-A beam as thin as a hair enters in the middle; red light leaves up to a centimetre away. Above the middle
-photons counted one by one, below it the six Gaussians that a frame uses. Each picture is 8 mm wide,
-and red is exposed alike a millimetre from the beam.
+A beam as thin as a hair enters in the centre; red light leaves up to a centimetre away. The upper half shows
+a Monte Carlo count of photons, the lower half the six Gaussians that a frame uses. Each picture is 8 mm wide,
+exposed so that red is equally bright a millimetre from the beam.
 
 Deck: S14
 Sources: DonnerJensen2005, Wang1995
@@ -12,7 +12,7 @@ import numpy as np
 
 import dermis
 from dermis.gallery.picture import main
-from dermis.reference.counted import counted_profile
+from dermis.reference.slab_mc import counted_profile
 
 HALF_MM, EXPOSED_MM, PHOTONS = 4.0, 1.0, 400_000
 

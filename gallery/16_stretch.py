@@ -1,8 +1,8 @@
 """A map stretches skin, so blurs must be stretched too.
 
-A fine grid of light on the ear, under the same Gaussians: with one width for the whole map, with widths
-corrected along u and v, and with the full metric, which knows that u and v are seldom at right angles. Then
-the map's stretch.
+A fine grid of light on the ear, blurred by the same Gaussians: with one width for the whole map, with widths
+corrected along u and v, and with the full metric, which knows that u and v are rarely perpendicular. Then the
+map's stretch.
 
 Deck: S17
 Equation: σ_u = σ |∂(u,v)/∂x|, slanted where u and v are

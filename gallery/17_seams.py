@@ -1,9 +1,8 @@
-"""Seams of the map, and what helps.
+"""Seams of the map, and the remedies.
 
-Blurs know only the map, so light stops or bleeds at its seams: without a remedy, with a colour around the
-charts, with blurs that narrow at their edges, with blurs that leave out what lies beside them, with a
-second map cut elsewhere, and with blurs that go on across the seam on the surface itself. Below each four
-times its difference from the last.
+Blurs work on the map, so light stops or bleeds at its seams. From left: no remedy, a colour around the
+charts, blurs that narrow at chart edges, blurs that skip empty texels, a second map cut elsewhere, and
+blurs that continue across the seam along the surface. Below each, four times its difference from the last.
 
 Deck: S18
 Sources: Dudash2007

@@ -1,7 +1,7 @@
 """A laser's line on cheek and ear.
 
-A vertical sheet of light shows how far light spreads on curved skin. Dry, as this package spreads it, and
-the truth: paths of light followed one by one through the medium itself.
+A vertical sheet of light shows how far light spreads on curved skin: without scattering, as this package
+scatters it, and the truth, path traced through the medium itself.
 
 Deck: S19
 Sources: Dudash2007, JensenBuhler2002, Jakob2022

@@ -1,7 +1,7 @@
-"""Light counted in linear numbers, and in encoded ones.
+"""Lighting in linear values, and in gamma-encoded ones.
 
-Colour maps are decoded, light is added linearly, the picture is encoded at the end. Without the first and
-the last, colours are too strong and shading falls off too fast.
+Colour maps are decoded, light is added linearly, and the picture is encoded at the end. Without decoding and
+encoding, colours are too strong and shading falls off too fast.
 
 Deck: S23
 Sources: SRGB1999, Dudash2007

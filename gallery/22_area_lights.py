@@ -1,7 +1,7 @@
-"""Shadows of a point, a sphere and a rectangle in one place.
+"""Shadows of a point, a sphere and a rectangle in the same place.
 
-The larger the light, the softer what it casts; yet every shadow is sharp where it begins, below the wing of
-the nose and between the lips, and goes soft with distance.
+The larger the light, the softer its shadows; yet every shadow is sharp at contact, below the wing of the nose
+and between the lips, and softens with distance.
 
 Deck: S7
 Sources: Fernando2005

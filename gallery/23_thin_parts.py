@@ -1,7 +1,7 @@
 """Ears lit from behind.
 
-Light that enters behind an ear leaves in front. Red light reaches deepest, so it is red, and strongest
-where the ear is thinnest. Above the head of this gallery, below the package's own.
+Light that enters behind an ear leaves in front. Red light penetrates deepest, so the glow is red, and
+strongest where the ear is thinnest. Above the head of this gallery, below the package's own.
 
 Deck: +
 Equation: E_through = Σ_places A (R(straight distance) − R(way along the surface)) E_there

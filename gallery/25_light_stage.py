@@ -1,8 +1,7 @@
-"""A light stage: relighting by adding pictures up.
+"""A light stage: relighting by adding pictures.
 
-The head under 48 lights around it, one after the other, as a light stage photographs it. Any surroundings
-are then a weighted sum of these pictures, and nothing is rendered. Beside it the same room rendered at
-once.
+The head under 48 surrounding lights, one at a time, as a light stage photographs it. Any environment is
+then a weighted sum of these pictures, without rendering. Beside it the same room rendered directly.
 
 Deck: S24
 Equation: L = Σ_i E_i L_i

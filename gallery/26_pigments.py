@@ -1,7 +1,6 @@
 """Skin by its pigments, melanin across and blood down.
 
-Each patch is the light that leaves a skin of two layers under daylight, without the reflection of its
-surface.
+Each patch is the colour of two-layered skin under daylight, without surface reflection.
 
 Deck: S24
 Sources: DonnerJensen2006, KrishnaswamyBaranoski2004, Jacques1998

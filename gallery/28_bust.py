@@ -1,7 +1,7 @@
-"""The head that the package makes.
+"""The head that the package generates.
 
-From numbers alone: a shape of signed distances, maps of pigments, pores and folds. No scan, no file, no
-network. Scattered above, dry below.
+From numbers alone: a shape of signed distances, and maps of pigments, pores and folds. No scan, no file, no
+network. With scattering above, without below.
 
 Deck: S11
 Columns: 3

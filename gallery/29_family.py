@@ -1,6 +1,7 @@
 """Six heads of one generator.
 
-Shape, age, melanin, blood, freckles and oil by numbers; each is a mesh with maps that other programs open.
+Shape, age, melanin, blood, freckles and oil are parameters; each head is a mesh with maps that other programs
+can open.
 
 Columns: 3
 """

@@ -1,7 +1,7 @@
 """Light that the lens scatters.
 
-A share of the picture's light, spread by ever wider Gaussians over the whole of it, as lens and eye do
-around what is bright. Overdone here to be seen.
+A share of the picture's light, spread by ever wider Gaussians, as lens and eye do around bright spots.
+Exaggerated here to be visible.
 
 Deck: +
 Sources: dEonLuebke2007

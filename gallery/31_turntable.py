@@ -1,6 +1,6 @@
-"""Turned about, frame by frame.
+"""A turntable, frame by frame.
 
-Camera and lights are free: only what moved is computed again.
+Camera and lights move freely: only what changed is computed again.
 
 Deck: S25
 Sources: dEonLuebke2007

@@ -1,8 +1,9 @@
 """Skin that looks the same from everywhere, and skin that does not.
 
-A Lambertian surface returns light alike by all directions. A half space of tissue returns more of what comes
-aslant, and what scattered only once leaves mostly aslant: cheeks are flatter, outlines and edges of shadow
-brighter. Beside both, paths of light followed one by one, and relative RMSE from them. No surface's lobe.
+A Lambertian surface reflects the same in all directions. A half-space of tissue reflects more of light at
+grazing angles, and light that scattered only once leaves mostly at grazing angles: cheeks look flatter,
+outlines and shadow edges brighter. Beside both a path-traced picture, and their relative RMSE from it.
+Without surface reflection.
 
 Deck: +
 Sources: Chandrasekhar1960, Jensen2001, Jakob2022

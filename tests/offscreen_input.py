@@ -34,7 +34,7 @@ class InputDriver:
         """The picture when nothing moves any more."""
         for _ in range(60):
             self.frame()
-            while self.viewer.desk.studio.is_searching:  # which takes time, not frames
+            while self.viewer.session.studio.is_searching:  # which takes time, not frames
                 time.sleep(0.005)
             if self.viewer.is_still:
                 return self.frame()
@@ -59,18 +59,18 @@ class InputDriver:
     def click(self, place: tuple[float, float]) -> None:
         self.drag(place, place)
 
-    def place(self, label: str) -> tuple[float, float]:
+    def position(self, label: str) -> tuple[float, float]:
         """Where a control of the panel is; the panel must be drawn."""
         self.frame()
-        found: tuple[float, float] = self.viewer.desk.places[label]
+        found: tuple[float, float] = self.viewer.session.positions[label]
         return found
 
     def press(self, label: str) -> None:
         """Click on a control of the panel."""
-        self.click(self.place(label))
+        self.click(self.position(label))
         self.frame()
 
     def choose(self, label: str, name: str) -> None:
         """One of the names of a list of the panel."""
         self.press(label)
-        self.click(self.place(f"{label}/{name}"))
+        self.click(self.position(f"{label}/{name}"))

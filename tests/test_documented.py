@@ -21,7 +21,10 @@ SCRIPTS = [path for folder in ("tools", "benchmarks") for path in sorted((ROOT /
 FENCE = re.compile(r"^ *```(?P<kind>\w*)\n(?P<text>.*?)^ *```$", re.MULTILINE | re.DOTALL)
 INLINE = re.compile(r"`(dermis [^`]+)`")
 FILE = re.compile(r"`(?:python )?([\w./-]+/[\w.-]+\.(?:py|wgsl|toml|csv|json|bib|md))`")
+BARE = re.compile(r"`(\w+\.(?:py|wgsl))`")
 LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")
+FOLDERS = ("src", "gallery", "tools", "benchmarks", "docs", "tests")
+NAMES = {path.name for folder in FOLDERS for path in (ROOT / folder).rglob("*.*")}
 MADE_UP = {"src/dermis/viewer/panel/sections/name.py"}  # an example's name
 
 
@@ -85,6 +88,7 @@ def test_files_are_there(page: Path) -> None:
         for name in set(FILE.findall(text)) - MADE_UP
         if not any((folder / name).is_file() for folder in folders)
     ]
+    missing += [name for name in BARE.findall(text) if name not in NAMES]
     missing += [link for link in LINK.findall(text) if not (page.parent / link).exists()]
     assert missing == []
 

@@ -8,13 +8,12 @@ from pathlib import Path
 import accuracy_light as light
 import accuracy_optics as optics
 import accuracy_specular as specular
+import accuracy_surface as surface
 import accuracy_thin as thin
 import numpy as np
 
 from dermis.atlas.build import build_atlas
-from dermis.frame.atlas_textures import upload_atlas
-from dermis.frame.passes.diffuse import Diffuse
-from dermis.gpu import Device, Frame, download, open_device, upload
+from dermis.gpu import Device, download, open_device
 from dermis.gpu.probe import half_store_rounding
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.mesh import Mesh
@@ -28,14 +27,8 @@ SIZE = 256
 
 def spread(device: Device, mesh: Mesh, light: np.ndarray, stretch: str = "full") -> list[np.ndarray]:
     """The blurred levels of light (n, n) on a mesh's atlas."""
-    stage = Diffuse(device)
-    variance = load_profile("gpu-gems-3").variance_mm2[1:]
-    levels = stage.make_levels(len(light), len(variance))
-    upload(device, levels.stack, np.dstack([light, light, light, np.ones_like(light)]))
-    frame = Frame(device)
-    stage.draw(frame, levels, upload_atlas(device, build_atlas(mesh, len(light)), stretch), variance)
-    frame.submit()
-    return [download(device, levels.stack, layer=k + 1)[..., 0] for k in range(len(variance))]
+    levels, blur = surface.spread(device, build_atlas(mesh, len(light)), light[..., None], stretch)
+    return [download(device, levels.stack, layer=k + 1)[..., 0] for k in range(len(blur.variance_mm2))]
 
 
 def point_of_light(device: Device, texels_per_mm: float) -> str:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dermis.comparison.compare import by_channel, compare
+import numpy as np
+
+from dermis.comparison.compare import compare
 from dermis.comparison.report import cells
 from dermis.comparison.scenes import usual_region
+from dermis.comparison.truths import Truth
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
+from dermis.reference.metrics import energy_ratio, relative_rmse
 from dermis.scene import Settings
 
 HEAD = """|  |  |  | relative RMSE | in red, green, blue | FLIP | energy ratio | in red, green, blue |
@@ -44,10 +48,14 @@ def _rows(head: Head, light: str, region: str, samples: int, settings: Settings,
                 adapter=adapter,
             )
             _, error, flip, energy, _ = cells(made.rows[0])
-            found = by_channel(made, "texture-space")
-            errors, energies = (
-                " / ".join(f"{value:.3f}" for value in found[name]) for name in ("relrmse", "energy_ratio")
-            )
+            errors, energies = by_channel(made.images["texture-space"], made.truth, made.truth.mask)
             figures = (error, errors, flip, energy, energies)
             lines.append(f"| {place}{light} | {medium} | {direction} | " + " | ".join(figures) + " |")
     return lines
+
+
+def by_channel(image: np.ndarray, truth: Truth, mask: np.ndarray) -> list[str]:
+    """Relative RMSE, and energy ratio, in red, green and blue."""
+    parts = [(image[..., c], truth.image[..., c], mask, truth.variance[..., c]) for c in range(3)]
+    measures = (relative_rmse, energy_ratio)
+    return [" / ".join(f"{measure(*part).value:.3f}" for part in parts) for measure in measures]

@@ -1,4 +1,4 @@
-"""What the error of texture space against the surface integral is made of, as tables."""
+"""Where the error of texture space against the surface integral comes from, as tables."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ PLACES: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "back": {"ear": ("left ear top", "left ear lobe", "left ear back")},
 }
-"""Places that are seen under a light, each the mean of its landmarks."""
+"""Places that are visible under a light, each the mean of its landmarks."""
 
 
 def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
@@ -63,7 +63,7 @@ def drawn(subject: Subject, technique: str, **changes: object) -> np.ndarray:
 
 
 def by_atlas(subject: Subject, straight: Truth, light: str) -> list[str]:
-    """Texture space by the size of its map, beside none."""
+    """Texture space by the size of its map, compared with no scattering."""
 
     def error(image: np.ndarray) -> float:
         return relative_rmse(image, straight.image, straight.mask).value
@@ -77,7 +77,7 @@ def by_atlas(subject: Subject, straight: Truth, light: str) -> list[str]:
 
 
 def zero_width(subject: Subject, light: str) -> str:
-    """The truth of a profile that hardly spreads, beside the light that enters: what its samples cost."""
+    """The error of the truth's sampling: a profile that hardly spreads against the light that enters."""
     narrow = GaussianSum("narrow", np.array([0.05**2]), np.ones((1, 3)))
     truth = surface_integral(replace(subject, profile=narrow), 0)
     entered = drawn(subject, "none") / subject.profile.albedo
@@ -86,7 +86,7 @@ def zero_width(subject: Subject, light: str) -> str:
 
 
 def even_light(subject: Subject) -> str:
-    """What the integral makes of light that is the same everywhere: mean and 95th percentile by channel."""
+    """The integral of uniform light: mean and 95th percentile by channel."""
     lit = irradiance_samples(subject)
     evenly = replace(lit, irradiance=np.ones_like(lit.irradiance))
     seen = surface_points(subject.renderer, subject.scene, subject.settings)
@@ -97,7 +97,7 @@ def even_light(subject: Subject) -> str:
 
 
 def places(subject: Subject, straight: Truth, light: str) -> list[str]:
-    """Where the error is, and how much of it a perfect map would have."""
+    """The error by place, and how much of it would remain with a perfect map."""
     landmarks = known_landmarks(subject.scene.head)
     assert landmarks is not None
     none, ours = drawn(subject, "none"), drawn(subject, "texture-space")

@@ -1,4 +1,4 @@
-"""What a half-space does by directions under a surface of index 1.4, for docs/techniques.md.
+"""Reflection of a half-space by direction under a surface of index 1.4, for docs/techniques.md.
 
 python tools/accuracy_half_space.py prints it within a minute.
 """
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.optics.directions import directional_albedo, directions, mean_of_once, refracted
-from dermis.optics.presets import media
+from dermis.optics.media import media
 from dermis.reference.half_space import reflected_radiance
 from dermis.scene import Scene, Settings, Skin
 from dermis.scene.heads import load_head

@@ -21,9 +21,9 @@ from dermis.environment.prefilter import (
     equivalent_mirrors,
     prefilter,
 )
-from dermis.frame.passes.occlusion import DIRECTIONS, Occlusion
+from dermis.frame.lights.rectangle import facing_irradiance
+from dermis.frame.passes.occlusion import DIRECTIONS, bake_occlusion
 from dermis.frame.projection import frame_of
-from dermis.frame.rectangles import facing_irradiance
 from dermis.mesh.head import Head
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene import Environment, PointLight, RectangleLight, Scene, Settings, Skin, load_lights
@@ -37,7 +37,7 @@ UP = np.array([0.0, 1.0, 0.0])
 
 
 def looked_up(layer: Array, towards: Array) -> Array:
-    """(n, 3) of a layer (h, w, 3) in n directions, bilinear, as the shader reads it."""
+    """(n, 3) of a layer (h, w, 3) in n directions, interpolated as in the shader."""
     height, width = layer.shape[:2]
     x = (0.5 + np.arctan2(towards[:, 0], -towards[:, 2]) / (2 * np.pi)) * width - 0.5
     y = np.arccos(np.clip(towards[:, 1], -1, 1)) / np.pi * height - 0.5
@@ -70,7 +70,7 @@ def irradiance_error(name: str, count: int = 200) -> float:
 
 
 def reflection_error(name: str, m: float, cosine: float, count: int = 60) -> float:
-    """Root mean square error of reflected radiance over random normals and views, of its mean."""
+    """Root mean square error of reflected radiance over random normals and views, over its mean."""
     towards, light, made = panorama(name)
     rng = np.random.default_rng(2)
     normals = unit(rng.normal(size=(count, 3)))
@@ -104,7 +104,7 @@ def reflected(layers: Array, towards: Array, m: float) -> Array:
 
 
 def furnace(renderer: dermis.Renderer, head: Head, energy: str, **chosen: str) -> Array:
-    """Least, mean and largest outgoing over incoming radiance of a white head under light from everywhere."""
+    """Least, mean and largest outgoing over incoming radiance of a white head under uniform light."""
     white = replace(head, maps=replace(head.maps, colour=np.ones((4, 4, 3), np.float32)))
     skin = Skin(energy=energy)  # type: ignore[arg-type]
     scene = Scene(white, environment=Environment(name="uniform"), skin=skin)
@@ -155,7 +155,7 @@ def as_points(light: RectangleLight, side: int = 8) -> list[PointLight]:
 
 
 def soft_shadow_error(renderer: dermis.Renderer, rig: str) -> tuple[float, float]:
-    """Bias and root mean square difference from 64 points, of the mean radiance."""
+    """Bias and root mean square difference from 64 point lights, over the mean radiance."""
     light = load_lights(rig)[0]
     assert isinstance(light, RectangleLight)
     head = dermis.load_head("lee_perry_smith")
@@ -172,17 +172,16 @@ def occlusion_error(renderer: dermis.Renderer) -> float:
     """Root mean square difference of the open share of the sky from 1024 directions, on the scan."""
     head = dermis.load_head("lee_perry_smith")
     inputs = renderer.prepare(Scene(head), Settings(size=(64, 64), atlas=512, samples=1))
+    texels = inputs.layouts[0].atlas.resources["atlas"]
     few, many = (
-        Occlusion(renderer.device, count).bake(
-            head.mesh, inputs.head, inputs.lit, inputs.layouts[0].atlas.resources["atlas"], 512
-        )[:512]
+        bake_occlusion(renderer.device, head.mesh, inputs.lit, texels, 512, count)[:512]
         for count in (DIRECTIONS, 1024)
     )
     return float(np.sqrt(np.nanmean((few - many) ** 2)))
 
 
 def tables(adapter: str = "auto") -> dict[str, str]:
-    """What the page says of light, by the names in its template."""
+    """The tables of light, by their names in the page's template."""
     renderer = dermis.Renderer(adapter)
     shadows = [(rig, *soft_shadow_error(renderer, rig)) for rig in ("window", "top", "rim")]
     return {

@@ -6,19 +6,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from dermis.optics.diffusion.models import Model
+from dermis.optics.diffusion.models import Model, cut, through_gaussians, through_slab
 from dermis.optics.diffusion.multipole import Clamp
-from dermis.optics.diffusion.transmission import cut, through_gaussians, through_slab
 from dermis.optics.fits.burley import fit_burley
 from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.fits.separable import fit_separable
 from dermis.optics.fits.targets import ring_error
-from dermis.optics.presets import media
+from dermis.optics.media import media
 from dermis.optics.profiles import load_profile
 from dermis.optics.radial import RadialProfile
 from dermis.optics.tissue import Tissue, load_tissue
-from dermis.reference.counted import counted_profile
-from dermis.reference.slab_mc import trace_medium
+from dermis.reference.slab_mc import counted_profile, trace_medium
 
 PHOTONS, SPECTRAL_PHOTONS = 4_000_000, 400_000
 TISSUES = ("skin1", "skin2", "dj3", "light", "medium", "dark")
@@ -143,7 +141,7 @@ def table_note() -> str:
 
 
 def tables() -> dict[str, str]:
-    """Everything that the page has room for, by the names it uses."""
+    """All tables, by their names in the page's template."""
     return {
         "models": models_table(),
         "fits": fits_table(),

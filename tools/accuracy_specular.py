@@ -76,7 +76,7 @@ def furnace_rows() -> str:
 
 
 def tables() -> dict[str, str]:
-    """Everything that the page has room for, by the names it uses."""
+    """All tables, by their names in the page's template."""
     below = (np.arange(4000) + 0.5) / 4000
     kelemen = float((directional_albedo(below, 0.3) * below).sum() / below.sum())
     return {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -11,21 +12,25 @@ from pathlib import Path
 import numpy as np
 
 import dermis
+from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
 from dermis.atlas.cached import cached_atlas
 from dermis.frame.atlas_textures import upload_atlas
-from dermis.frame.frame import scatter
-from dermis.frame.levels import Levels
+from dermis.frame.levels import Blur, Levels, halvings_of, make_levels, usual_texel
+from dermis.frame.passes import diffuse
 from dermis.frame.renderer import Renderer
 from dermis.frame.seams import REMEDIES
-from dermis.gpu import Frame, download, upload
+from dermis.gpu import Device, Frame, download, upload
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.optics.profiles import load_profile
-from dermis.reference.atlas_reading import Points, lit_at, seam_points, shown
-from dermis.reference.cut_meshes import cut_sphere
 from dermis.scene import DirectionalLight, Light, Scene, Settings, Skin, StripeLight
 
+sys.path.append(str(Path(__file__).parent.parent / "tests"))  # the surfaces are the tests' own
+from atlas_reading import Points, lit_at, seam_points, shown
+from cut_meshes import cut_sphere
+
+PROFILE = load_profile("gpu-gems-3")
 Choice = Callable[[np.ndarray], np.ndarray]
 HUMAN = "heads/makehuman/head_young_male_light.obj"
 RADII_MM = (5.0, 10.0, 20.0, 50.0, 100.0)
@@ -43,32 +48,41 @@ def tables(adapter: str) -> dict[str, str]:
 
 def first_harmonic(renderer: Renderer, radius_mm: float) -> str:
     """What the widest Gaussian leaves of light in proportion to x on a sphere: by map, heat and chords."""
-    mesh, stage = cut_sphere(radius_mm, 20), renderer.stages.diffuse
-    variances = load_profile("gpu-gems-3").variance_mm2[1:]
+    mesh = cut_sphere(radius_mm, 20)
     atlas = build_atlas(mesh, BALL_SIDE, "stitched")
     light = np.nan_to_num(shown(atlas, mesh, own=True))[..., :1] / radius_mm
-    levels = stage.make_levels(BALL_SIDE, len(variances))
-    upload(renderer.device, levels.stack, np.dstack([light, light, light, np.ones_like(light)]))
-    frame = Frame(renderer.device)
-    stage.draw(frame, levels, upload_atlas(renderer.device, atlas), variances)
-    frame.submit()
-    left = widest(renderer, levels)
+    left = widest(renderer, *spread(renderer.device, atlas, light))
     density = np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
     area = atlas.own[..., None] / density
     map_share = (area * left * light).sum() / (area * light**2).sum()
-    v = variances[-1] / radius_mm**2
+    v = PROFILE.variance_mm2[-1] / radius_mm**2
     whole = np.exp(-2 / v)
     chords = (1 - whole) - v * (1 - (1 + 2 / v) * whole)
     return f"| {radius_mm:g} | {map_share:.3f} | {np.exp(-v):.3f} | {chords:.3f} |"
 
 
-def widest(renderer: Renderer, levels: Levels) -> np.ndarray:
+def spread(device: Device, atlas: Atlas, light: np.ndarray, stretch: str = "full") -> tuple[Levels, Blur]:
+    """Grey light (n, n, 1) on an atlas, blurred by all Gaussians of PROFILE but the narrowest."""
+    textures, variance = upload_atlas(device, atlas, stretch), PROFILE.variance_mm2[1:]
+    most = len(textures.sheets("repeated")) - 1
+    halvings = halvings_of(variance, textures.usual_per_mm, most)
+    blur = Blur(variance, PROFILE.weight[1:], halvings)
+    levels = make_levels(device, len(light), len(variance), usual_texel(device))
+    upload(device, levels.stack, np.dstack([light, light, light, np.ones_like(light)]))
+    frame = Frame(device)
+    diffuse.draw(frame, levels, textures, blur)
+    frame.submit()
+    return levels, blur
+
+
+def widest(renderer: Renderer, levels: Levels, blur: Blur) -> np.ndarray:
     """(n, n, 1) the widest level, read between the texels of its own resolution."""
     from scipy.ndimage import zoom
 
-    halvings = levels.halvings[-1]
-    layer = download(renderer.device, levels.stack, mip=halvings, layer=len(levels.halvings) - 1)[..., 0]
-    return zoom(layer, 2**halvings, order=1, mode="nearest", grid_mode=True)[..., None] / levels.scale
+    halvings = blur.halvings[-1]
+    layer = download(renderer.device, levels.stack, mip=halvings, layer=len(blur.halvings) - 1)[..., 0]
+    wide: np.ndarray = zoom(layer, 2**halvings, order=1, mode="nearest", grid_mode=True)
+    return wide[..., None]
 
 
 def seams(renderer: Renderer) -> list[str]:
@@ -139,11 +153,9 @@ def jumps(renderer: Renderer, scene: Scene, remedy: str, side: int, one: Points,
     settings = Settings.model_validate(
         {"size": (16, 16), "atlas": side, "seams": remedy, "transmission": "none"}
     )
-    inputs = renderer.prepare(scene, settings)
-    frame = Frame(renderer.device)
-    scatter(frame, renderer.stages, inputs)
-    frame.submit()
-    light = download(renderer.device, inputs.scattered).astype(float)[..., :3]
+    renderer.draw(scene, settings)
+    scattered = renderer.prepare(scene, settings).resources.scattered
+    light = download(renderer.device, scattered).astype(float)[..., :3]
     atlas = cached_atlas(scene.head.mesh, side, REMEDIES[remedy].layouts[0])
     a, b = (lit_at(light, atlas, points)[:, 0] for points in (one, other))
     return np.abs(a - b) / np.maximum((a + b) / 2, 1e-9)

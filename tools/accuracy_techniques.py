@@ -1,7 +1,7 @@
-"""Write docs/techniques.md: techniques of scattering on the scanned head against truths.
+"""Writes docs/techniques.md: scattering techniques on the scanned head against truths.
 
-python tools/accuracy_techniques.py [ADAPTER]; the sample data and Mitsuba are needed. Paths that were traced
-are kept on disk, so that only the first run takes its time.
+python tools/accuracy_techniques.py [ADAPTER] needs the sample data and Mitsuba. Traced paths are kept on
+disk, so only the first run takes long.
 """
 
 from __future__ import annotations
@@ -21,13 +21,12 @@ from dermis.comparison.report import cells
 from dermis.comparison.scenes import comparison_scene, usual_region
 from dermis.frame.surface_points import irradiance_at, surface_points
 from dermis.mesh.head import Head
-from dermis.optics.presets import media
+from dermis.optics.media import media
 from dermis.reference.half_space import directional_albedo
-from dermis.reference.metrics import energy_ratio, relative_rmse
 from dermis.scene import DirectionalLight, Settings
+from dermis.scene.techniques import TECHNIQUES
 
 PAGE = Path(__file__).parent.parent / "docs" / "techniques.md"
-TECHNIQUES = ("none", "one-blur", "published", "texture-space", "screen-space", "pre-integrated")
 LIGHTS = {"front": 64, "back": 256, "laser": 256}  # paths through each pixel
 SETTINGS = Settings(size=(256, 256), atlas=1024)
 HEAD = "|  | technique | relative RMSE | FLIP | energy ratio | ms |\n|---|---|---|---|---|---|"
@@ -42,7 +41,7 @@ def table(head: Head, against: str, medium: str, adapter: str) -> tuple[str, dic
     rows, made = [HEAD], {}
     for light, samples in LIGHTS.items():
         region = "ear" if against == "heat" else usual_region(light)
-        techniques = ("none", "published", "texture-space") if against == "heat" else TECHNIQUES
+        techniques = ("none", "gpu-gems-3", "texture-space") if against == "heat" else TECHNIQUES.names
         made[light] = compare(
             head,
             against,
@@ -66,7 +65,7 @@ def finer_heat(head: Head, adapter: str) -> str:
 
 
 def floor(head: Head, medium: str, traced: Comparison, adapter: str) -> str:
-    """The front light on skin that sends what a half space reflects of it in all directions alike."""
+    """The front light on lambertian skin with the albedo of a half-space for light from its direction."""
     renderer = dermis.Renderer(adapter)
     scene = comparison_scene(head, "front", usual_region("front"), "gpu-gems-3")
     seen = surface_points(renderer, scene, SETTINGS)
@@ -87,12 +86,7 @@ def floor(head: Head, medium: str, traced: Comparison, adapter: str) -> str:
     entered = irradiance_at(renderer, scene, SETTINGS, seen.triangle, seen.barycentric)
     image = np.zeros((*seen.mask.shape, 3))
     image[seen.mask] = entered * albedo / np.pi
-    truth, mask = traced.truth, traced.truth.mask & seen.mask
-    figures = [
-        [measure(image[..., c], truth.image[..., c], mask, truth.variance[..., c]).value for c in range(3)]
-        for measure in (relative_rmse, energy_ratio)
-    ]
-    error, energy = (" / ".join(f"{value:.3f}" for value in values) for values in figures)
+    error, energy = direction.by_channel(image, traced.truth, traced.truth.mask & seen.mask)
     return f"relative RMSE {error} and energy {energy} in red, green and blue"
 
 

@@ -13,13 +13,12 @@ from scipy.spatial import cKDTree
 import dermis
 from dermis.atlas.cached import cached_atlas
 from dermis.atlas.translucency.samples import giving, texels
-from dermis.frame.frame import draw_frame
-from dermis.gpu import Frame, download
+from dermis.gpu import download
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import wedge
-from dermis.optics.diffusion.transmission import through_gaussians
+from dermis.optics.diffusion.models import through_gaussians
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
 from dermis.reference import surface_integral
@@ -42,21 +41,19 @@ def scattered(
     light = DirectionalLight(direction=tuple(way), irradiance=(1.0, 1.0, 1.0), shadows=False)
     scene = Scene(Head("thin", mesh, Maps()), lights=[light], skin=Skin(albedo="profile", rho_s=0.0))
     settings = Settings(size=(16, 16), atlas=atlas, samples=1, transmission=transmission)  # type: ignore[arg-type]
+    renderer.draw(scene, settings)
     inputs = renderer.prepare(scene, settings)
-    frame = Frame(renderer.device)
-    draw_frame(frame, renderer.stages, inputs)
-    frame.submit()
     texels = download(renderer.device, inputs.layouts[0].atlas.resources["atlas"])
     own = texels[..., 0] > 0
     w = np.stack([texels[own][:, 1] & 0xFFFF, texels[own][:, 1] >> 16], axis=-1) / 65535.0
     w = np.column_stack([1 - w.sum(axis=1), w])
     corners = mesh.triangles[texels[own][:, 0].astype(int) - 1]
     places, normals = (np.einsum("nk,nkc->nc", w, a[corners]) for a in (mesh.positions, mesh.normals))
-    return places, normals, download(renderer.device, inputs.scattered)[own][:, :3].astype(float)
+    return places, normals, download(renderer.device, inputs.resources.scattered)[own][:, :3].astype(float)
 
 
 def summed(mesh: Mesh, way: Array, places: Array, spacing: float) -> Array:
-    """What the profile brings to places by straight lines, from all of the surface."""
+    """Light at places by the profile of straight-line distance, summed over the surface."""
 
     def light(at: Places) -> Array:
         normals = at.interpolate(mesh, mesh.normals)
@@ -82,7 +79,7 @@ def slabs(renderer: dermis.Renderer) -> str:
 
 
 def across_air(mesh: Mesh, way: Array, places: Array, normals: Array) -> Array:
-    """Red light that the sum brings to places from others which face them and not their inside."""
+    """Red light in the sum that would cross air rather than tissue."""
     atlas = cached_atlas(mesh, ATLAS, "stitched")
     given = giving(mesh, atlas, texels(atlas), ATLAS // 2, np.ones(len(mesh.triangles), bool))
     flux = given.area_mm2 * np.maximum(given.normal @ -way, 0.0)
@@ -163,7 +160,7 @@ def ears(renderer: dermis.Renderer) -> str:
 
 
 def tables(adapter: str = "auto") -> dict[str, str]:
-    """What the page says of thin parts, by the names in its template."""
+    """The tables of thin parts, by their names in the page's template."""
     renderer = dermis.Renderer(adapter)
     return {
         "thin_slabs": slabs(renderer),

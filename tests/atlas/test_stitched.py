@@ -6,6 +6,16 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from atlas_reading import lit_at, random_points, read, shown
+from cut_meshes import (
+    CYLINDER_LAYS,
+    SPHERE_LAYS,
+    Lay,
+    cut_cone,
+    cut_cylinder,
+    cut_sphere,
+    folded_sheet,
+)
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
@@ -18,16 +28,6 @@ from dermis.mesh.geometry import build_mesh, triangle_areas, uv_cross
 from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.primitives import plane
 from dermis.mesh.uv import charts
-from dermis.reference.atlas_reading import lit_at, random_points, read, shown
-from dermis.reference.cut_meshes import (
-    CYLINDER_LAYS,
-    SPHERE_LAYS,
-    Lay,
-    cut_cone,
-    cut_cylinder,
-    cut_sphere,
-    folded_sheet,
-)
 
 Floats = NDArray[np.float64]
 

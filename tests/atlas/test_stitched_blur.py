@@ -7,6 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import twins
+from atlas_reading import lit_at, read, seam_points, shown
+from cut_meshes import cut_cylinder, cut_sphere, folded_sheet
 from numpy.typing import NDArray
 from scipy.special import eval_legendre
 from tolerances import SEAM
@@ -14,8 +16,6 @@ from tolerances import SEAM
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
 from dermis.mesh.mesh import Mesh
-from dermis.reference.atlas_reading import lit_at, read, seam_points, shown
-from dermis.reference.cut_meshes import cut_cylinder, cut_sphere, folded_sheet
 
 Floats = NDArray[np.float64]
 VARIANCES = (0.567, 1.99, 7.41)  # [mm2] those of the widely used profile that are not finer than texels here

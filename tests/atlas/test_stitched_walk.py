@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from cut_meshes import cut_cone, cut_cylinder, cut_sphere
 from numpy.typing import NDArray
 
 from dermis.atlas.stitched.build import find_pieces
@@ -11,7 +12,6 @@ from dermis.atlas.stitched.overlap_cuts import cut_overlaps, find_conflicts
 from dermis.atlas.stitched.surface import FlatSurface, survey
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.mesh import Mesh
-from dermis.reference.cut_meshes import cut_cone, cut_cylinder, cut_sphere
 
 Floats = NDArray[np.float64]
 RADIUS, HEIGHT, CELLS = 30.0, 80.0, 12

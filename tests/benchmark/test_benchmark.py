@@ -10,16 +10,14 @@ import pytest
 
 from dermis.atlas.cached import cached_atlas, cached_pairs
 from dermis.benchmark import run as running
-from dermis.benchmark.cases import FRAGMENTS, PRESETS, PUBLISHED, Case
-from dermis.benchmark.copy_rate import copy_rate
-from dermis.benchmark.floor import moved_by, stage_bytes
+from dermis.benchmark.cases import FRAGMENTS, GPU_GEMS_3, PRESETS, Case, scenes_of, settings_of, with_terms
+from dermis.benchmark.floor import copy_rate, moved_by, stage_bytes
 from dermis.benchmark.measure import ON_CPU, Effort, Row, measure
 from dermis.benchmark.report import COLUMNS, as_json, cells, left_out_lines, stage_table, write_report
 from dermis.benchmark.run import Benchmark, LeftOut, run
-from dermis.benchmark.scenes import scenes_of, settings_of, with_terms
 from dermis.errors import DermisError
 from dermis.frame.renderer import Renderer
-from dermis.frame.seams import laid_out
+from dermis.frame.seams import REMEDIES
 from dermis.gpu import Device, download
 from dermis.gpu.textures import texel_bytes
 from dermis.optics.profiles import load_profile
@@ -52,7 +50,7 @@ def row(renderer: Renderer, head_file: str, tmp_path_factory: pytest.TempPathFac
 def test_cases_vary_in_one_thing(preset: object) -> None:
     usual, *others = preset.cases()  # type: ignore[attr-defined]
     assert usual.varies == ""
-    assert {PUBLISHED, FRAGMENTS} == {case.technique for case in others if case.varies == "technique"}
+    assert {GPU_GEMS_3, FRAGMENTS} == {case.technique for case in others if case.varies == "technique"}
     for case in others:
         told = asdict(replace(case, varies=""))
         assert [name for name, value in asdict(usual).items() if told[name] != value] == [case.varies]
@@ -84,14 +82,14 @@ def test_the_floor_by_hand(renderer: Renderer, head_file: str, tmp_path: Path) -
     assert 0 < moved.texels < 64 * 64
     found = stage_bytes(moved)
     geometry = 16 * len(head.mesh.triangles) + 16 * len(head.mesh.positions)
-    depth = download(renderer.device, moved.inputs.shadow_maps.texture)
+    depth = download(renderer.device, moved.inputs.resources.shadow_maps.texture)
     drawn = int((depth > 0).sum())
     assert 0.1 < drawn / settings.shadow_size**2 < 0.9
     assert found["shadows"] == drawn * 4 + geometry
     assert found["visibility"] == moved.seen * 2 * 4 + geometry
     assert found["post"] == 48 * 32 * (16 + 16 + 4)
     # the narrower of the two is lit again, not blurred; the other one's blur knows stretch and reach by texel
-    light = texel_bytes(moved.inputs.levels.stack)
+    light = texel_bytes(moved.inputs.resources.levels.stack)
     gutter = moved.inputs.layouts[0].atlas.gutter.size // 16
     assert gutter > 0
     assert found["irradiance"] == moved.texels * (32 + 4 + light)
@@ -110,16 +108,16 @@ def test_the_floor_of_thin_parts_is_their_buffers(renderer: Renderer, tmp_path: 
     (scene,), settings = scenes_of(case, head, tmp_path, 1), settings_of(case)
     renderer.draw(scene, settings)
     moved = moved_by(renderer.device, renderer.prepare(scene, settings), len(head.mesh.positions))
-    atlases = laid_out(settings, len(moved.inputs.blurred_mm2), False)
-    atlas = cached_atlas(head.mesh, atlases.side, atlases.layouts[0])
-    table = cached_pairs(head.mesh, atlas, float(np.sqrt(moved.inputs.blurred_mm2[-1])))
+    blur = moved.inputs.blurs[0]
+    atlas = cached_atlas(head.mesh, settings.atlas, REMEDIES[settings.seams].layouts[0])
+    table = cached_pairs(head.mesh, atlas, float(np.sqrt(blur.variance_mm2[-1])))
     assert len(table.source) > 100
     receivers = len(table.first) - 3  # of 12 bytes; their cells alone are written
     pairs = 8 * len(table.source) + 8 * len(table.texel) + 12 * receivers
-    thin, levels = moved.inputs.layouts[0].thin, moved.inputs.levels
+    thin, levels = moved.inputs.layouts[0].translucency, moved.inputs.resources.levels
     assert thin is not None
-    light = min(4 * len(table.texel), (levels.size >> levels.halvings[1 + thin.layer]) ** 2)
-    assert stage_bytes(moved)["transmission"] == pairs + light * texel_bytes(levels.stack) + 16 * receivers
+    light = min(4 * len(table.texel), (levels.size >> blur.halvings[1 + thin.layer]) ** 2)
+    assert stage_bytes(moved)["translucency"] == pairs + light * texel_bytes(levels.stack) + 16 * receivers
 
 
 def test_a_row_is_complete(row: Row) -> None:
@@ -147,7 +145,7 @@ def made(row: Row) -> Benchmark:
     """A benchmark of which one row was measured."""
     others = [
         replace(row, case=replace(TINY, atlas=128, varies="atlas")),
-        replace(row, case=replace(TINY, technique=PUBLISHED, varies="technique"), gpu_ms={"total": 1e3}),
+        replace(row, case=replace(TINY, technique=GPU_GEMS_3, varies="technique"), gpu_ms={"total": 1e3}),
         replace(row, case=replace(TINY, technique=FRAGMENTS, varies="technique"), gpu_ms={"total": 5e3}),
     ]
     left_out = LeftOut(replace(TINY, image=(9999, 32), varies="image"), "size: <too large>")
@@ -156,10 +154,10 @@ def made(row: Row) -> Benchmark:
 
 
 def test_the_published_passes_are_compared(made: Benchmark, row: Row) -> None:
-    assert made.ratio(PUBLISHED) == 1e3 / row.gpu_ms["total"]
+    assert made.ratio(GPU_GEMS_3) == 1e3 / row.gpu_ms["total"]
     assert made.ratio(FRAGMENTS) == 5e3 / row.gpu_ms["total"]
-    assert replace(made, rows=(row,)).ratio(PUBLISHED) is None
-    assert replace(made, rows=made.rows[1:]).ratio(PUBLISHED) is None
+    assert replace(made, rows=(row,)).ratio(GPU_GEMS_3) is None
+    assert replace(made, rows=made.rows[1:]).ratio(GPU_GEMS_3) is None
 
 
 def test_the_json_has_what_was_asked_for(made: Benchmark) -> None:
@@ -171,7 +169,7 @@ def test_the_json_has_what_was_asked_for(made: Benchmark) -> None:
     assert told["rows"][0]["image"] == [48, 32] and told["copy_gb_s"] == 2.0
     assert "total" in told["rows"][0]["gpu_ms"]
     assert (told["published_ratio"], told["published_fragments_ratio"]) == (
-        made.ratio(PUBLISHED),
+        made.ratio(GPU_GEMS_3),
         made.ratio(FRAGMENTS),
     )
     (left_out,) = told["left_out"]
@@ -211,7 +209,7 @@ def test_a_run_measures_every_case(device: Device, head_file: str, monkeypatch: 
     steps: list[tuple[int, int]] = []
     cases = [
         TINY,
-        replace(TINY, technique=PUBLISHED, varies="technique"),
+        replace(TINY, technique=GPU_GEMS_3, varies="technique"),
         replace(TINY, technique=FRAGMENTS, varies="technique"),
         replace(TINY, atlas=device.max_texture_size + 1, varies="atlas"),
         replace(TINY, subdivide=1, varies="subdivide"),
@@ -221,7 +219,7 @@ def test_a_run_measures_every_case(device: Device, head_file: str, monkeypatch: 
     assert [row.case for row in benchmark.rows] == [*cases[:3], cases[4]]
     assert benchmark.rows[3].triangles == 4 * benchmark.rows[0].triangles
     assert benchmark.adapter == device.adapter.name and benchmark.versions["wgpu"]
-    for technique in (PUBLISHED, FRAGMENTS):
+    for technique in (GPU_GEMS_3, FRAGMENTS):
         assert (benchmark.ratio(technique) or 0.0) > 0.0
     (left_out,) = benchmark.left_out
     assert left_out.case == cases[3] and "atlas" in left_out.reason

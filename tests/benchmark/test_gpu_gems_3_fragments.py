@@ -8,17 +8,18 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from setups import front_camera, head_of, run_frame, scene_of
+from setups import front_camera, head_of, scene_of, settings_of
 from tolerances import HALVES
 
-from dermis.benchmark import gpu_gems_3_fragments
-from dermis.benchmark.gpu_gems_3_fragments import published_as_fragments
+from dermis.benchmark.cases import FRAGMENTS, GPU_GEMS_3
+from dermis.benchmark.gpu_gems_3_fragments import FRAGMENTS as AS_FRAGMENTS
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Frame, download
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.primitives import SKIN, uv_sphere
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.model import Scene
+from dermis.scene.techniques import TECHNIQUES
 
 Floats = NDArray[np.float64]
 
@@ -54,7 +55,8 @@ def leaf() -> Scene:
     return scene_of(head, *lights, camera=front_camera(head, frame_mm=70.0))
 
 
-def drawn(renderer: Renderer, scene: Scene, seams: str) -> Drawn:
+def drawn(renderer: Renderer, scene: Scene, technique: str, seams: str) -> Drawn:
+    settings = settings_of(technique=technique, atlas=128, seams=seams)
     with pytest.MonkeyPatch.context() as patch:
         filled: list[str] = []
         fill = Frame.fill
@@ -64,11 +66,12 @@ def drawn(renderer: Renderer, scene: Scene, seams: str) -> Drawn:
             fill(frame, stage, *rest)
 
         patch.setattr(Frame, "fill", counted)
-        inputs = run_frame(renderer, scene, technique="published", atlas=128, seams=seams)
-    device, levels, layout = renderer.device, inputs.levels, inputs.layouts[0]
-    assert layout.thin is not None
-    stack = [download(device, levels.stack, layer=k) for k in range(1 + len(inputs.blurred_mm2))]
-    results = layout.scattered, layout.thin.light, inputs.picture.radiance
+        renderer.draw(scene, settings, anew=True)
+    inputs = renderer.prepare(scene, settings)
+    device, levels, layout = renderer.device, inputs.resources.levels, inputs.layouts[0]
+    assert layout.translucency is not None
+    stack = [download(device, levels.stack, layer=k) for k in range(1 + len(inputs.blurs[0].variance_mm2))]
+    results = layout.scattered, layout.translucency.light, inputs.resources.picture.radiance
     return Drawn(
         [level.astype(float) for level in stack],
         [download(device, one).astype(float) for one in results],
@@ -78,9 +81,9 @@ def drawn(renderer: Renderer, scene: Scene, seams: str) -> Drawn:
 
 @pytest.fixture(scope="module", params=["clear-colour", "alpha"])
 def both(renderer: Renderer, leaf: Scene, request: pytest.FixtureRequest) -> tuple[Drawn, Drawn]:
-    compute = drawn(renderer, leaf, request.param)
-    with published_as_fragments(renderer.device, renderer.stages):
-        fragments = drawn(renderer, leaf, request.param)
+    compute = drawn(renderer, leaf, GPU_GEMS_3, request.param)
+    with TECHNIQUES.including(FRAGMENTS, AS_FRAGMENTS):
+        fragments = drawn(renderer, leaf, FRAGMENTS, request.param)
     return compute, fragments
 
 
@@ -107,23 +110,8 @@ def test_so_are_their_sum_what_comes_through_and_the_image(both: tuple[Drawn, Dr
 
 
 def test_afterwards_all_is_compute_again(renderer: Renderer, leaf: Scene) -> None:
-    before = renderer.stages.irradiance, renderer.stages.published, renderer.stages.combine
-    with pytest.raises(KeyError), published_as_fragments(renderer.device, renderer.stages):
-        assert renderer.stages.combine is not before[2]
+    with pytest.raises(KeyError), TECHNIQUES.including(FRAGMENTS, AS_FRAGMENTS):
+        assert drawn(renderer, leaf, FRAGMENTS, "alpha").filled > 0
         raise KeyError
-    assert (renderer.stages.irradiance, renderer.stages.published, renderer.stages.combine) == before
-    assert drawn(renderer, leaf, "alpha").filled == 0
-
-
-def test_what_cannot_be_compiled_changes_nothing(
-    renderer: Renderer, leaf: Scene, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Frames that follow are drawn as before, as those of a benchmark that leaves a case out."""
-
-    def fail(*_: Any) -> None:
-        raise MemoryError
-
-    monkeypatch.setattr(gpu_gems_3_fragments, "FragmentSum", fail)
-    with pytest.raises(MemoryError), published_as_fragments(renderer.device, renderer.stages):
-        pass
-    assert drawn(renderer, leaf, "alpha").filled == 0
+    assert FRAGMENTS not in TECHNIQUES
+    assert drawn(renderer, leaf, GPU_GEMS_3, "alpha").filled == 0

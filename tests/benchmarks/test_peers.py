@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,11 +12,12 @@ import numpy as np
 import pytest
 
 import dermis
+from dermis.benchmark.cases import FRAGMENTS, GPU_GEMS_3
 from dermis.errors import DermisError, refuse
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
-from dermis.reference.cycles_process import CyclesPass
+from dermis.reference.cycles import CyclesPass
 from dermis.reference.path_traced import PathTraced
 
 BALL = Head("ball", uv_sphere(100.0, 24, 12), Maps())
@@ -58,19 +57,12 @@ def path_trace(
 class FakeRenderer:
     def __init__(self, adapter: str = "cpu") -> None:
         self.device = SimpleNamespace(adapter=SimpleNamespace(name=adapter))
-        self.stages = "stages"
         self.techniques: list[str] = []
 
-    def draw(self, scene: Any, settings: Any, keep_shadows: bool) -> Any:
-        assert not keep_shadows and settings.size == (SIDE, SIDE)
+    def draw(self, scene: Any, settings: Any, anew: bool) -> Any:
+        assert anew and settings.size == (SIDE, SIDE)
         self.techniques.append(settings.technique)
         return SimpleNamespace(linear=lambda: picture(1.0 + OURS))
-
-
-@contextmanager
-def as_fragments(device: Any, stages: Any) -> Iterator[None]:
-    assert (device.adapter.name, stages) == ("cpu", "stages")
-    yield
 
 
 @pytest.fixture
@@ -83,7 +75,6 @@ def peers(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     monkeypatch.setattr(peers_measured, "cycles_passes", cycles_passes)
     monkeypatch.setattr(peers_measured, "path_trace", path_trace)
-    monkeypatch.setattr(peers_measured, "published_as_fragments", as_fragments)
     monkeypatch.setattr(peers, "load_mitsuba", lambda: None)
     monkeypatch.setattr(peers, "blender_python", lambda: Path("python"))
     monkeypatch.setattr(peers, "version", lambda name: "1.0")
@@ -164,7 +155,8 @@ def test_bar_ends_with_the_work(peers: Any) -> None:
     measured, renderer = sys.modules["peers_measured"], FakeRenderer()
     measured.measure(BALL, "front", peers.QUICK, renderer, done.append)  # type: ignore[attr-defined]
     assert sum(done) == peers.QUICK.work
-    assert renderer.techniques.count("published") == 2 * renderer.techniques.count("screen-space")
+    assert renderer.techniques.count(GPU_GEMS_3) == renderer.techniques.count(FRAGMENTS)
+    assert renderer.techniques.count(GPU_GEMS_3) == renderer.techniques.count("screen-space")
 
 
 def test_the_passes_of_2007_are_set_beside_ours(peers: Any, tmp_path: Path, capsys: Any) -> None:
@@ -189,7 +181,7 @@ def test_unknown_lights_are_named(peers: Any, capsys: Any) -> None:
 
 def test_a_bias_above_ours_is_never_made_up_for(peers: Any, tmp_path: Path, capsys: Any) -> None:
     class Nearer(FakeRenderer):
-        def draw(self, scene: Any, settings: Any, keep_shadows: bool) -> Any:
+        def draw(self, scene: Any, settings: Any, anew: bool) -> Any:
             return SimpleNamespace(linear=lambda: picture(1.0 + 0.5 * BIAS))
 
     dermis.Renderer = Nearer  # type: ignore[misc]  # put back by the fixture's patch

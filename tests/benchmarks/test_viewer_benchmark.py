@@ -140,7 +140,7 @@ def test_all_kinds_of_change_are_drawn_and_the_memory_is_watched(
 ) -> None:
     import viewer_memory
 
-    some = {name: viewer_memory.KINDS[name] for name in ("turn", "light", "mix", "view")}
+    some = {name: viewer_memory.KINDS[name] for name in ("orbit", "light", "mix", "view")}
     monkeypatch.setattr(viewer_memory, "KINDS", some)
     found = viewer_memory.endured(driver, plan, minutes=0.0, changes=3)
     assert found["changes"] == 3 == sum(found["kinds"].values())

@@ -36,9 +36,9 @@ MESHES = {
     "too small": Bad("head.obj --unit-mm 0.1", "head.obj", "it is 24 mm high"),
     "too large": Bad("head.obj --unit-mm 10", "head.obj", "it is 2400 mm high"),
     "metres": Bad("metres.obj", "metres.obj", "it is 0.24 mm high"),
-    "unit of 0": Bad("head.obj --unit-mm 0", "head.obj", "0.0 came"),
-    "unit of 0 for a sample": Bad("lee_perry_smith --unit-mm 0", "LeePerrySmith.glb", "0.0 came"),
-    "unit NaN": Bad("head.obj --unit-mm nan", "head.obj", "nan came"),
+    "unit of 0": Bad("head.obj --unit-mm 0", "--unit-mm", "0.0 came"),
+    "unit of 0 for a sample": Bad("lee_perry_smith --unit-mm 0", "--unit-mm", "0.0 came"),
+    "unit NaN": Bad("head.obj --unit-mm nan", "--unit-mm", "nan came"),
     "subdivided too often": Bad("head.obj --subdivide 4", "subdivide", "4 came"),
     "unknown axis": Bad("head.obj --up x", "--up", "'x' came"),
 }
@@ -55,8 +55,8 @@ MAPS = {
     "colour for normals": Bad("head.obj --normal red.png", "red.png", "no unit vectors"),
     "height without mm": Bad("head.obj --height grey.png", "grey.png", "none was given"),
     "mm without height": Bad("head.obj --height-mm 0.02", "height_mm", "without a height map"),
-    "negative mm": Bad("head.obj --height grey.png --height-mm -1", "grey.png", "-1"),
-    "NaN mm": Bad("head.obj --height grey.png --height-mm nan", "grey.png", "nan"),
+    "negative mm": Bad("head.obj --height grey.png --height-mm -1", "--height-mm", "-1"),
+    "NaN mm": Bad("head.obj --height grey.png --height-mm nan", "--height-mm", "nan"),
 }
 NUMBERS = {
     "size of nothing": Bad("head.obj --size 0x0", "--size", "0 came"),

@@ -39,7 +39,7 @@ def test_as_json_with_a_report(bench: Run, tmp_path: Path, device: Any) -> None:
     assert told["adapter"] == device.adapter.name and told["head"] == "head.obj"
     assert [row["technique"] for row in told["rows"]] == [
         "texture-space",
-        "published",
+        "gpu-gems-3",
         "published-fragments",
     ]
     for row in told["rows"]:
@@ -74,7 +74,7 @@ def test_interrupted_it_leaves_nothing(bench: Run, monkeypatch: pytest.MonkeyPat
     before = set(tmp_path.rglob("*"))
 
     def interrupted(renderer: Any, case: Case, *rest: Any) -> Any:
-        if case.technique == "published":
+        if case.technique == "gpu-gems-3":
             raise KeyboardInterrupt
         return measure(renderer, case, *rest)
 

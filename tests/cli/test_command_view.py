@@ -135,11 +135,9 @@ def test_a_notebook_displays_the_same_viewer(folder: Path, monkeypatch: pytest.M
         def _repr_mimebundle_(self, **options: Any) -> dict[str, str]:
             return {"text/plain": "shown"}
 
-    cell: Any = ModuleType("dermis.viewer.notebook")
-    cell.CellCanvas = Canvas
     for name in ("anywidget", "rendercanvas.anywidget"):
         monkeypatch.setitem(sys.modules, name, ModuleType(name))
-    monkeypatch.setitem(sys.modules, "dermis.viewer.notebook", cell)
+    monkeypatch.setattr("dermis.viewer.windows._notebook_canvas", lambda backend: Canvas)
     state = ViewerState(Scene(load_head(folder / "head.obj"))).with_settings(atlas=64, samples=1)
     viewer = notebook_viewer(state, "cpu", (64, 48))
     assert viewer._repr_mimebundle_() == {"text/plain": "shown"}

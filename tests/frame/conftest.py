@@ -7,8 +7,7 @@ import os
 import pytest
 from tolerances import HALVES, TWIN
 
-from dermis.frame.frame import Stages
-from dermis.frame.levels import FLOATS
+from dermis.frame.levels import FLOATS, usual_texel
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device
 
@@ -19,16 +18,11 @@ def renderer() -> Renderer:
 
 
 @pytest.fixture(scope="session")
-def close(renderer: Renderer) -> float:
+def close(device: Device) -> float:
     """How close light is to its twin after the blurs, of its scale."""
-    return TWIN if renderer.stages.diffuse.texel == FLOATS else HALVES
+    return TWIN if usual_texel(device) == FLOATS else HALVES
 
 
 @pytest.fixture(scope="session")
 def device(renderer: Renderer) -> Device:
     return renderer.device
-
-
-@pytest.fixture(scope="session")
-def stages(renderer: Renderer) -> Stages:
-    return renderer.stages

@@ -86,7 +86,7 @@ def part_of(light: Any, points: Floats, part: int) -> tuple[Floats, Floats]:
     place = (2.0 * np.array([part % side, part // side]) + 1.0) / side - 1.0
     radiance = light["irradiance"].astype(float)
     u, v, position = (light[name].astype(float) for name in ("half_u", "half_v", "position"))
-    if light["kind"] == 4:
+    if not light["round"]:
         d = position + place[0] * u + place[1] * v - points
         to_light = unit(d)
         area = 4.0 * np.linalg.norm(u) * np.linalg.norm(v) / side**2
@@ -119,7 +119,7 @@ def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) ->
     right, up = light["map_right"].astype(float), light["map_up"].astype(float)
     frame = np.stack([right, up, np.cross(up, right)])
     near, far, texel = (float(light[name]) for name in ("map_near", "map_far", "texel"))
-    parallel = light["kind"] == 2
+    parallel = bool(light["parallel"])
     p, n = (points - light["position"].astype(float)) @ frame.T, normals @ frame.T
     depth, height = p[:, 2], dot(n, p)
     place = p[:, :2] if parallel else p[:, :2] / depth[:, None]
@@ -136,7 +136,7 @@ def visibility(light: Any, nearness: Floats, points: Floats, normals: Floats) ->
         even = (0.5 + index * np.array([0.7548776662, 0.5698402910])) % 1
         turn = 2 * np.pi * even[1]
         disc = np.sqrt(even[0]) * np.array([np.cos(turn), np.sin(turn)])
-        spot = 2 * even - 1 if light["kind"] == 4 else disc
+        spot = 2 * even - 1 if not light["round"] else disc
         lateral = spot * light["extent"].astype(float)
         straight = np.column_stack([lateral - p[:, :2], -depth])
         towards = np.array([*lateral, -1.0]) if parallel else straight

@@ -15,9 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.frame.frame import draw_frame
 from dermis.frame.inputs import Inputs
 from dermis.frame.passes import SHARED_SHADERS
-from dermis.frame.passes.variants import Constants
 from dermis.frame.renderer import Renderer
-from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture
+from dermis.gpu import ComputeProgram, Constants, Device, Frame, download, make_texture
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -28,6 +27,7 @@ from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
+from dermis.scene.techniques import TECHNIQUES
 
 Floats = NDArray[np.float64]
 AnyLight = PointLight | SpotLight | DirectionalLight
@@ -35,8 +35,8 @@ AnyLight = PointLight | SpotLight | DirectionalLight
 
 def entered_light(renderer: Renderer, inputs: Inputs) -> NDArray[np.float64]:
     """(n, n, 4) light that has entered the skin, and 1 where there is any; as halves on GPUs."""
-    made = download(renderer.device, inputs.levels.stack).astype(float)
-    return made / [*(3 * [inputs.scale]), 1.0]
+    made = download(renderer.device, inputs.resources.levels.stack).astype(float)
+    return made / [*(3 * [inputs.blurs[0].scale]), 1.0]
 
 
 def head_of(mesh: Mesh, **maps: Any) -> Head:
@@ -71,11 +71,11 @@ def settings_of(**given: Any) -> Settings:
 
 
 def run_frame(renderer: Renderer, scene: Scene, **given: Any) -> Inputs:
-    """A whole frame; what its stages made can be downloaded from the result."""
-    inputs = renderer.prepare(scene, settings_of(**given))
-    frame = Frame(renderer.device)
-    draw_frame(frame, renderer.stages, inputs)
-    frame.submit()
+    """A whole frame; what its passes made can be downloaded from the result."""
+    inputs, graph = renderer.prepare(scene, settings_of(**given)), renderer.graph
+    graph.begin()
+    draw_frame(graph, inputs, TECHNIQUES[inputs.settings.technique])
+    graph.submit()
     return inputs
 
 

@@ -15,7 +15,8 @@ from twins import surface
 from dermis.atlas.cached import cached_atlas
 from dermis.errors import DermisError
 from dermis.frame.lights import light_records, light_views
-from dermis.frame.rectangles import facing_irradiance, parts_of, rectangle_irradiance
+from dermis.frame.lights.rectangle import KIND, facing_irradiance, rectangle_irradiance
+from dermis.frame.passes.shade import shade_program
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.gpu.textures import texture_from
@@ -24,7 +25,6 @@ from dermis.scene.lights import DirectionalLight, Light, RectangleLight, SphereL
 
 Floats = NDArray[np.float64]
 SIZE = 32
-SHAPED = (("SHAPES", 1),)
 FLOOR = head_of(plane(200.0, 4))
 PLATE = head_of(
     joined((plane(120.0, 6), (0, 0, 0), (0, 0, 0.7)), (plane(30.0, 2), (-15, 0, 12), (0.75, 0.75, 0.2)))
@@ -53,7 +53,7 @@ def test_the_closed_form_is_the_tabulated_one() -> None:
 @pytest.mark.parametrize("size", [(40, 40), (300, 200), (100, 900)])
 def test_parts_of_a_rectangle_are_the_whole(size: tuple[float, float]) -> None:
     light = RectangleLight(position=(200, 300, 400), target=(0, 10, 0), width_mm=size[0], height_mm=size[1])
-    parts = parts_of(light)
+    parts = KIND.parts(light)
     assert all(isinstance(part, RectangleLight) for part in parts)
     area = sum(part.width_mm * part.height_mm for part in parts if isinstance(part, RectangleLight))
     assert area == pytest.approx(size[0] * size[1])
@@ -108,7 +108,7 @@ def test_parts_are_numpys(renderer: Renderer, kind: str, part: int) -> None:
         "rectangle": RectangleLight(**given, width_mm=60, height_mm=90),
         "sphere": SphereLight(**given, radius_mm=120),
     }[kind]
-    lit = run_frame(renderer, scene_of(FLOOR, light)).lit
+    inputs = run_frame(renderer, scene_of(FLOOR, light))
     textures = {
         name: texture_from(renderer.device, np.dstack([values, np.ones((SIZE, SIZE))]), "rgba32float")
         for name, values in {"points": points, "normals": np.broadcast_to([0, 0, 1.0], points.shape)}.items()
@@ -118,12 +118,12 @@ def test_parts_are_numpys(renderer: Renderer, kind: str, part: int) -> None:
         "light_probe",
         (SIZE, SIZE),
         ["towards", "arriving"],
-        SHAPED,
-        **lit,
+        inputs.light_constants,
+        **inputs.lit,
         **textures,
         part={"index": part},
     )
-    direction, irradiance = light_twins.part_of(lit["lights"]["light"][0], points.astype(float), part)
+    direction, irradiance = light_twins.part_of(inputs.lit["lights"]["light"][0], points.astype(float), part)
     assert np.abs(towards[..., :3] - direction).max() < TWIN
     assert np.abs(arriving[..., :3] - irradiance).max() < TWIN * irradiance.max()
     assert (towards[..., 3] == 1).all()
@@ -158,7 +158,7 @@ def visibility(renderer: Renderer, head: Any, light: Light, size: int = 1024) ->
         "normals": texture_from(renderer.device, normals, "rgba32float"),
     }
     seen = []
-    records = light_records(renderer.stages.shade.program, scene, views)
+    records = light_records(shade_program(renderer.device), scene, views)
     for one in records["light"][: len(views)].copy():
         records["light"][0] = one
         towards, _ = probe(
@@ -166,7 +166,7 @@ def visibility(renderer: Renderer, head: Any, light: Light, size: int = 1024) ->
             "light_probe",
             (SIZE, SIZE),
             ["towards", "arriving"],
-            SHAPED,
+            inputs.light_constants,
             **(inputs.lit | {"lights": records}),
             **textures,
             part={"index": 0},
@@ -216,12 +216,12 @@ def test_soft_visibility_is_numpys(renderer: Renderer, kind: str) -> None:
         "light_probe",
         (SIZE, SIZE),
         ["towards", "arriving"],
-        SHAPED,
+        inputs.light_constants,
         **inputs.lit,
         **textures,
         part={"index": 0},
     )
-    depths = download(renderer.device, inputs.shadow_maps.texture).astype(float)
+    depths = download(renderer.device, inputs.resources.shadow_maps.texture).astype(float)
     record = inputs.lit["lights"]["light"][0]
     exact = light_twins.visibility(
         record, depths, points.reshape(-1, 3).astype(float), normals.reshape(-1, 3)

@@ -15,9 +15,8 @@ from tolerances import FLAT, SHEARED_PEAK, SHEARED_VARIANCE, SPREAD_ENERGY, SPRE
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
 from dermis.frame.atlas_textures import AtlasTextures, upload_atlas
-from dermis.frame.frame import Stages
-from dermis.frame.levels import FLOATS, make_levels
-from dermis.frame.passes.diffuse import Diffuse
+from dermis.frame.levels import FLOATS, Blur, halvings_of, make_levels
+from dermis.frame.passes import combine, diffuse
 from dermis.gpu import Device, Frame, download, make_texture, upload
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.optics.profiles import load_profile
@@ -27,26 +26,17 @@ PROFILE = load_profile("gpu-gems-3")
 BLURRED = PROFILE.variance_mm2[1:]
 
 
-@pytest.fixture(scope="module")
-def diffuse(device: Device) -> Diffuse:
-    """The stage with levels of 32-bit floats, whatever the adapter's frame takes."""
-    return Diffuse(device, FLOATS)
-
-
 def blur(
-    device: Device,
-    diffuse: Diffuse,
-    source: Floats,
-    atlas: AtlasTextures,
-    variances: Floats = BLURRED,
-    **edge: Any,
+    device: Device, source: Floats, atlas: AtlasTextures, variances: Floats = BLURRED, **edge: Any
 ) -> list[Floats]:
-    """Levels of the stage over an (n, n, 3) source, or (n, n, 4) with its coverage."""
+    """Levels of 32-bit floats over an (n, n, 3) source, or (n, n, 4) with its coverage."""
     size = len(source)
-    space = diffuse.make_levels(size, len(variances))
+    space = make_levels(device, size, len(variances), FLOATS)
+    most = len(atlas.sheets(edge.get("edge", "repeated"))) - 1
+    halvings = halvings_of(variances, atlas.usual_per_mm, most)
     upload(device, space.stack, np.dstack([source, np.ones((size, size))])[..., :4])
     frame = Frame(device)
-    diffuse.draw(frame, space, atlas, variances, **edge)
+    diffuse.draw(frame, space, atlas, Blur(variances, np.zeros((len(variances), 3)), halvings, **edge))
     frame.submit()
     return [download(device, space.stack, layer=k + 1)[..., :3].astype(float) for k in range(len(variances))]
 
@@ -74,28 +64,27 @@ def metric(atlas: Atlas) -> Floats:
 
 @pytest.mark.parametrize("shear", [0.0, 0.8])
 @pytest.mark.parametrize("edge", ["repeated", "skipped"])
-def test_twin(device: Device, diffuse: Diffuse, shear: float, edge: str) -> None:
+def test_twin(device: Device, shear: float, edge: str) -> None:
     atlas = random_atlas(64, shear)
     source = np.random.default_rng(2).random((64, 64, 3)).astype(np.float32).astype(float)
-    made = blur(device, diffuse, source, upload_atlas(device, atlas), edge=edge)
+    made = blur(device, source, upload_atlas(device, atlas), edge=edge)
     reach = atlas.reach if edge == "repeated" else None
     for level, twin in zip(made, twins.levels(source, metric(atlas), reach, BLURRED), strict=True):
         assert np.abs(level - twin).max() < TWIN
 
 
-def test_empty_texels_show_the_clear_colour(device: Device, diffuse: Diffuse) -> None:
+def test_empty_texels_show_the_clear_colour(device: Device) -> None:
     """Black bleeds in where they are black; constant light stays constant where they have its colour."""
     atlas = build_atlas(plane(60.0, 2, uv_scale=0.7), 64)
     source, resources = atlas.coverage[..., None] * np.ones(4), upload_atlas(device, atlas)
     black, white = (
-        blur(device, diffuse, source, resources, edge="cleared", clear=(level,) * 3)[-1]
-        for level in (0.0, 1.0)
+        blur(device, source, resources, edge="cleared", clear=(level,) * 3)[-1] for level in (0.0, 1.0)
     )
     assert black[atlas.coverage].min() < 0.8
     assert np.abs(white[atlas.coverage] - 1).max() < FLAT
 
 
-def test_combined_twin(device: Device, stages: Stages) -> None:
+def test_combined_twin(device: Device) -> None:
     rng = np.random.default_rng(4)
     space = make_levels(device, 64, 5, FLOATS)
     values = rng.random((5, 64, 64, 4)).astype(np.float32)
@@ -103,7 +92,7 @@ def test_combined_twin(device: Device, stages: Stages) -> None:
         upload(device, space.stack, value, layer=k + 1)
     weight = rng.random((5, 3))
     into, frame = make_texture(device, (64, 64), "rgba32float"), Frame(device)
-    stages.combine.draw(frame, space, weight, into)
+    combine.draw(frame, space, Blur(np.arange(1.0, 6.0), weight, (0,) * 6), into)
     frame.submit()
     twin = np.einsum("kyxc,kc->yxc", values[..., :3].astype(float), weight)
     assert np.abs(download(device, into)[..., :3] - twin).max() < TWIN * twin.max()
@@ -130,11 +119,11 @@ def point_of_light(atlas: Atlas) -> tuple[Floats, tuple[int, int], Floats, float
 
 
 @pytest.mark.parametrize("name", [*UNIFORM, "2 : 1"])
-def test_point_of_light_is_the_sum_of_gaussians(device: Device, diffuse: Diffuse, name: str) -> None:
+def test_point_of_light_is_the_sum_of_gaussians(device: Device, name: str) -> None:
     """A lit texel of power 1 receives R(r) times a texel's area from itself; the unblurred level aside."""
     atlas = patch(*(UNIFORM | UNEVEN)[name])
     source, (y, x), r2, area = point_of_light(atlas)
-    parts = blur(device, diffuse, source, upload_atlas(device, atlas))
+    parts = blur(device, source, upload_atlas(device, atlas))
     image = sum(weight * part for weight, part in zip(PROFILE.weight[1:], parts, strict=True))
     exact = twins.gaussian_sum(PROFILE, 1, r2) * area
     rows, columns = np.indices((256, 256))
@@ -145,13 +134,13 @@ def test_point_of_light_is_the_sum_of_gaussians(device: Device, diffuse: Diffuse
 
 
 @pytest.mark.parametrize("name", UNIFORM | UNEVEN)
-def test_blurred_point_is_round_and_as_wide_as_asked(device: Device, diffuse: Diffuse, name: str) -> None:
+def test_blurred_point_is_round_and_as_wide_as_asked(device: Device, name: str) -> None:
     """Second moments in mm2, along x and along y, at every level."""
     atlas = patch(*(UNIFORM | UNEVEN)[name])
     source, (y, x), _, _ = point_of_light(atlas)
     per_mm = atlas.stretch[y, x].astype(float)
     rows, columns = np.indices((256, 256))
-    parts = blur(device, diffuse, source, upload_atlas(device, atlas))
+    parts = blur(device, source, upload_atlas(device, atlas))
     for variance, part in zip(BLURRED, parts, strict=True):
         image = np.where(atlas.coverage, part[..., 0], 0.0)
         along_x = (image * (columns - x) ** 2).sum() / per_mm[0] ** 2
@@ -162,40 +151,41 @@ def test_blurred_point_is_round_and_as_wide_as_asked(device: Device, diffuse: Di
 
 @pytest.mark.parametrize("size", [64, 200])
 @pytest.mark.parametrize("mesh", [uv_sphere(40.0, 24, 12), plane(60.0, 2, uv_scale=0.7)])
-def test_constant_light_stays_constant(device: Device, diffuse: Diffuse, mesh: Any, size: int) -> None:
+def test_constant_light_stays_constant(device: Device, mesh: Any, size: int) -> None:
     """Up to the edges of charts and beyond, in the gutter."""
     atlas = build_atlas(mesh, size)
     colour = np.array([1.0, 0.3, 2.7])
     source = atlas.coverage[..., None] * colour
-    for level in blur(device, diffuse, source, upload_atlas(device, atlas)):
+    for level in blur(device, source, upload_atlas(device, atlas)):
         assert np.abs(level[atlas.coverage] / colour - 1).max() < FLAT
         assert not level[~atlas.coverage].any()
 
 
-def test_the_order_of_the_axes_does_not_matter(device: Device, diffuse: Diffuse) -> None:
+def test_the_order_of_the_axes_does_not_matter(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the stretch is the same everywhere, first along v and then along u is the same blur."""
     atlas = build_atlas(plane(40.0), 64)
     source = np.random.default_rng(9).random((64, 64, 3))
-    other, resources = Diffuse(device, FLOATS), upload_atlas(device, atlas)
-    other._along(resources.sheared, "repeated").reverse()
-    first, swapped = (blur(device, stage, source, resources) for stage in (diffuse, other))
+    resources, along = upload_atlas(device, atlas), diffuse._along
+    first = blur(device, source, resources)
+    monkeypatch.setattr(diffuse, "_along", lambda *given: along(*given[:2], 1 - given[2], *given[3:]))
+    swapped = blur(device, source, resources)
     assert max(np.abs(a - b).max() for a, b in zip(first, swapped, strict=True)) < TWIN
 
 
-def test_a_symmetric_patch_stays_symmetric(device: Device, diffuse: Diffuse) -> None:
+def test_a_symmetric_patch_stays_symmetric(device: Device) -> None:
     atlas = build_atlas(plane(40.0), 64)
     source = np.random.default_rng(9).random((64, 64, 3))
     source = source + source.transpose(1, 0, 2)
-    for level in blur(device, diffuse, source, upload_atlas(device, atlas)):
+    for level in blur(device, source, upload_atlas(device, atlas)):
         assert np.abs(level - level.transpose(1, 0, 2)).max() < TWIN * level.max()
 
 
 @pytest.mark.parametrize("texels_per_mm", [1.0, 3.0, 6.0])
-def test_one_wide_gaussian_alone_is_smooth(device: Device, diffuse: Diffuse, texels_per_mm: float) -> None:
+def test_one_wide_gaussian_alone_is_smooth(device: Device, texels_per_mm: float) -> None:
     """No narrower level prepares the source: it must not be read sparsely."""
     atlas = build_atlas(plane(256 / texels_per_mm), 256)
     source, _, r2, area = point_of_light(atlas)
-    (image,) = blur(device, diffuse, source, upload_atlas(device, atlas), np.array([7.41]))
+    (image,) = blur(device, source, upload_atlas(device, atlas), np.array([7.41]))
     exact = np.exp(-r2 / (2 * 7.41)) / (2 * np.pi * 7.41) * area
     assert np.abs(image[..., 0] - exact).max() < SPREAD_PEAK * exact.max()
     assert image[..., 0].sum() == pytest.approx(1.0, rel=SPREAD_ENERGY)
@@ -211,7 +201,7 @@ SHEARED = {
 
 
 @pytest.mark.parametrize("name", SHEARED)
-def test_sheared_maps_spread_light_in_circles(device: Device, diffuse: Diffuse, name: str) -> None:
+def test_sheared_maps_spread_light_in_circles(device: Device, name: str) -> None:
     """Against the sum of Gaussians by distance on the surface, and in all directions alike."""
     mesh = bent_plane(60.0, SHEARED[name])
     atlas = build_atlas(mesh, 256)
@@ -224,9 +214,7 @@ def test_sheared_maps_spread_light_in_circles(device: Device, diffuse: Diffuse, 
     matrix = np.array(SHEARED[name])[:, :2]
     area = (60.0 / 256) ** 2 / abs(np.linalg.det(matrix))
     away = position - position[y, x]
-    for variance, level in zip(
-        BLURRED, blur(device, diffuse, source, upload_atlas(device, atlas)), strict=True
-    ):
+    for variance, level in zip(BLURRED, blur(device, source, upload_atlas(device, atlas)), strict=True):
         if variance * 256**2 / 60**2 * np.linalg.eigvalsh(matrix @ matrix.T)[0] < 2.0:
             continue  # finer than the texels are wide
         image = np.where(atlas.coverage, level[..., 0], 0.0)

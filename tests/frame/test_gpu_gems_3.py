@@ -2,31 +2,35 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from dermis.atlas.build import build_atlas
 from dermis.frame.atlas_textures import upload_atlas
-from dermis.frame.frame import Stages
+from dermis.frame.levels import Blur
+from dermis.frame.techniques.gpu_gems_3 import TECHNIQUE
 from dermis.gpu import Device, Frame, download, upload
 from dermis.mesh.primitives import plane
 
 SIZE = 256
 TEXELS_PER_MM = 4.0
 VARIANCES = np.array([0.0484, 0.187, 0.567, 1.99])
+BLUR = Blur(VARIANCES, np.zeros((4, 3)), (0,) * 5)
 
 
 @pytest.fixture(scope="module")
-def levels(device: Device, stages: Stages) -> list[np.ndarray]:
+def levels(device: Device) -> list[np.ndarray]:
     """A lit texel spread over a plane."""
     atlas = build_atlas(plane(SIZE / TEXELS_PER_MM), SIZE)
-    space = stages.published.make_levels(SIZE, len(VARIANCES))
+    space = TECHNIQUE.make_levels(device, SIZE, len(VARIANCES))
     light = np.zeros((SIZE, SIZE, 4))
     light[..., 3] = 1.0
     light[SIZE // 2, SIZE // 2, :3] = 1000.0
     upload(device, space.stack, light)
     frame = Frame(device)
-    stages.published.draw(frame, space, upload_atlas(device, atlas), VARIANCES)
+    TECHNIQUE.fill(frame, space, upload_atlas(device, atlas), BLUR)
     frame.submit()
     return [
         download(device, space.stack, layer=k + 1)[..., 0].astype(float) / 1000.0
@@ -55,13 +59,13 @@ def test_between_seven_taps_there_are_gaps(levels: list[np.ndarray]) -> None:
     assert np.abs(row / row.max() - exact)[SIZE // 2 - 12 : SIZE // 2 + 13].max() > 0.01
 
 
-def test_the_clear_colour_takes_no_light_away(device: Device, stages: Stages) -> None:
+def test_the_clear_colour_takes_no_light_away(device: Device) -> None:
     """Weights of 1.001 make no texel more than covered, which would take that colour's light off."""
-    space = stages.published.make_levels(SIZE, len(VARIANCES))
+    space = TECHNIQUE.make_levels(device, SIZE, len(VARIANCES))
     upload(device, space.stack, np.dstack([np.zeros((SIZE, SIZE, 3)), np.ones((SIZE, SIZE))]))
     frame = Frame(device)
     atlas = upload_atlas(device, build_atlas(plane(SIZE / TEXELS_PER_MM), SIZE))
-    stages.published.draw(frame, space, atlas, VARIANCES, clear=(0.5, 0.35, 0.3))
+    TECHNIQUE.fill(frame, space, atlas, replace(BLUR, edge="cleared", clear=(0.5, 0.35, 0.3)))
     frame.submit()
     dark = download(device, space.stack, layer=len(VARIANCES))
     assert np.abs(dark[8:-8, 8:-8, :3]).max() == 0.0 and dark[8:-8, 8:-8, 3].max() == 1.0

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cut_meshes import cut_sphere
 from numpy.typing import NDArray
 from tolerances import FLAT, HALVED, HALVES, SPREAD_ENERGY
 
@@ -15,13 +16,11 @@ from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
 from dermis.frame.atlas_textures import AtlasTextures, _coarser, upload_atlas
 from dermis.frame.coarser import Sheet, halved
-from dermis.frame.levels import FLOATS, halvings_of, scale_of
-from dermis.frame.passes.combine import Combine
-from dermis.frame.passes.diffuse import Diffuse
+from dermis.frame.levels import FLOATS, Blur, halvings_of, make_levels, scale_of
+from dermis.frame.passes import combine, diffuse
 from dermis.gpu import Device, Frame, download, make_texture, upload
 from dermis.mesh.primitives import plane
 from dermis.optics.profiles import load_profile
-from dermis.reference.cut_meshes import cut_sphere
 
 Floats = NDArray[np.float64]
 HALF = "rgba16float"
@@ -70,14 +69,16 @@ def combined(
     device: Device, texel: str, textures: AtlasTextures, light: Floats, scale: float = 1.0
 ) -> tuple[Floats, tuple[int, ...]]:
     """The sum of the blurred levels, and how often each was halved."""
-    diffuse, side = Diffuse(device, texel), len(light)
-    space, into = diffuse.make_levels(side, len(BLURRED)), make_texture(device, (side, side), FLOATS)
+    side, halvings = len(light), halvings_of(BLURRED, textures.usual_per_mm, len(textures.coarser))
+    blur = Blur(BLURRED, WEIGHT, halvings, scale)
+    space = make_levels(device, side, len(BLURRED), texel)
+    into = make_texture(device, (side, side), FLOATS)
     upload(device, space.stack, light * [scale, scale, scale, 1.0])
     frame = Frame(device)
-    diffuse.draw(frame, space, textures, BLURRED, scale=scale)
-    Combine(device).draw(frame, space, WEIGHT, into)
+    diffuse.draw(frame, space, textures, blur)
+    combine.draw(frame, space, blur, into)
     frame.submit()
-    return download(device, into)[..., :3].astype(float), space.halvings
+    return download(device, into)[..., :3].astype(float), halvings
 
 
 def error(made: Floats, exact: Floats, own: NDArray[np.bool_]) -> float:
@@ -112,14 +113,15 @@ def test_what_halving_adds_too_much_is_taken_off_the_next_level(device: Device) 
     metric[..., :2] = atlas.stretch
     coarser = _coarser(device, Sheet(metric, atlas.reach, atlas.gutter, atlas.source))
     textures = replace(upload_atlas(device, atlas), coarser=coarser, usual_per_mm=2.0)
-    variances, diffuse = np.array([0.5, 0.9, 3.0]), Diffuse(device, FLOATS)
-    space, light = diffuse.make_levels(256, 3), np.zeros((256, 256, 4))
+    variances = np.array([0.5, 0.9, 3.0])
+    halvings = halvings_of(variances, 2.0, len(coarser))
+    space, light = make_levels(device, 256, 3, FLOATS), np.zeros((256, 256, 4))
     light[..., 3], light[128, 128, :3] = 1.0, 1.0
     upload(device, space.stack, light)
     frame = Frame(device)
-    diffuse.draw(frame, space, textures, variances)
+    diffuse.draw(frame, space, textures, Blur(variances, np.zeros((3, 3)), halvings))
     frame.submit()
-    assert space.halvings == (0, 0, 1, 1)
+    assert halvings == (0, 0, 1, 1)
     for level, variance in ((2, 0.5 + 1.0), (3, 3.0)):
         made = download(device, space.stack, layer=level, mip=1)[..., 0].astype(float)
         x = 2 * np.arange(128) + 0.5 - 128  # from the lit texel [mm]

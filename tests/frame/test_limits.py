@@ -7,7 +7,7 @@ import re
 from collections import Counter
 from functools import partial
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from setups import settings_of
 
 import dermis
 from dermis.frame import renderer as renderer_module
-from dermis.frame.passes import SHARED_SHADERS
+from dermis.frame.passes import shader_folders
 from dermis.frame.renderer import Renderer
 from dermis.gpu import open_device
 from dermis.gpu.device import DEFAULT_LIMITS
@@ -24,11 +24,12 @@ from dermis.gpu.wgsl_source import compose
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
-from dermis.scene import Environment, Scene, Settings, load_lights
+from dermis.scene import Environment, Scene, load_lights
+from dermis.scene.techniques import TECHNIQUES
 
 PACKAGE = Path(dermis.__file__).parent
 SHADERS = sorted(PACKAGE.rglob("*.wgsl"))
-FOLDERS = (SHARED_SHADERS, *sorted({path.parent for path in SHADERS}))
+FOLDERS = (*shader_folders(), *sorted({path.parent for path in SHADERS}))
 MOST = {
     kind: DEFAULT_LIMITS[f"max-{name}-per-shader-stage"]
     for kind, name in {
@@ -44,7 +45,6 @@ READ_AND_WRITTEN = re.compile(r"r32(uint|sint|float)")
 LARGEST = {"TAKEN": 128, "THREADS": 256}  # that visibility_buffer.py gives
 STRIDES = {"": 4, "u32": 4, "f32": 4, "vec2f": 8, "vec3f": 16, "vec4f": 16}
 WHOLE = {"seams": "multi-uv", "bloom": 0.1, "tone": "filmic"}
-TECHNIQUES = get_args(Settings.model_fields["technique"].annotation)
 
 
 def _programs() -> list[Path]:
@@ -109,7 +109,7 @@ def bare(renderer: Renderer) -> Renderer:
         return Renderer(renderer.device.adapter.name)
 
 
-@pytest.mark.parametrize("given", [*({"technique": name} for name in TECHNIQUES), WHOLE], ids=str)
+@pytest.mark.parametrize("given", [*({"technique": name} for name in TECHNIQUES.names), WHOLE], ids=str)
 def test_bare_device_draws_the_same(renderer: Renderer, bare: Renderer, given: dict[str, Any]) -> None:
     head = Head("ball", uv_sphere(90.0, 24, 12), Maps())
     lights = [*load_lights("window"), *load_lights("rim"), *load_lights("laser")]

@@ -16,12 +16,13 @@ from dermis.frame.renderer import Renderer
 from dermis.gpu import Device
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.settings import Settings
+from dermis.scene.techniques import TECHNIQUES
 
 SCENE = scene_of(head_of(uv_sphere(30.0, 24, 12)), frontal())
 KINDS: dict[str, dict[str, Any]] = {
     "texture-space": {},
     "two layouts": {"seams": "multi-uv"},
-    "published": {"technique": "published"},
+    "gpu-gems-3": {"technique": "gpu-gems-3"},
     "screen-space": {"technique": "screen-space"},
     "pre-integrated": {"technique": "pre-integrated"},
     "none": {"technique": "none"},
@@ -84,7 +85,7 @@ def test_a_frame_leaves_nothing_of_the_one_before(renderer: Renderer, held: Held
         assert held.bytes() == alone[kind], kind
 
 
-@pytest.mark.parametrize("kind", ["texture-space", "two layouts", "published", "none"])
+@pytest.mark.parametrize("kind", ["texture-space", "two layouts", "gpu-gems-3", "none"])
 def test_the_atlas_takes_what_was_foreseen(renderer: Renderer, held: Held, kind: str) -> None:
     """The difference of two sizes, so that all that has another size does not count."""
     if renderer.device.adapter.kind != "CPU":
@@ -96,7 +97,7 @@ def test_the_atlas_takes_what_was_foreseen(renderer: Renderer, held: Held, kind:
         found[side] = held.bytes()
     levels = 0 if kind == "none" else 5
     layouts = 2 if kind == "two layouts" else 1
-    foreseen = atlas_texel_bytes(chosen(kind).technique, levels, layouts) if levels else 0
+    foreseen = atlas_texel_bytes(TECHNIQUES[chosen(kind).technique], levels, layouts) if levels else 0
     assert (found[512] - found[256]) / (512**2 - 256**2) == foreseen
 
 

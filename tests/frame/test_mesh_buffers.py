@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from setups import frontal, head_of, probe, run_frame, scene_of
 
 from dermis.atlas.cached import cached_atlas
-from dermis.frame import geometry
+from dermis.frame.geometry import upload_geometry
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import uv_sphere
 
@@ -17,8 +19,10 @@ IN_BUFFERS = (("MESH_IN_BUFFERS", 1),)
 
 def test_buffers_hold_what_textures_hold(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     inputs = run_frame(renderer, scene_of(BALL, frontal()), atlas=64)
-    monkeypatch.setattr(geometry, "mesh_constants", lambda _: IN_BUFFERS)
-    held = geometry.upload_geometry(renderer.device, BALL.mesh, cached_atlas(BALL.mesh, 64))
+    adapter = replace(renderer.device.adapter, kind="DiscreteGPU")  # which reads buffers
+    with monkeypatch.context() as patch:
+        patch.setattr(renderer.device, "adapter", adapter)
+        held = upload_geometry(renderer.device, BALL.mesh, cached_atlas(BALL.mesh, 64))
     atlas = inputs.layouts[0].atlas.resources["atlas"]
     bound = inputs.lit | held | {"atlas": atlas, "footprint": {"side": 1 / 64}}
     outputs = ["relief", "arriving"]

@@ -14,7 +14,7 @@ from twins import surface
 
 from dermis.atlas.cached import cached_atlas
 from dermis.frame import surroundings
-from dermis.frame.passes.occlusion import Occlusion, fibonacci_sphere, whole_map
+from dermis.frame.passes.occlusion import bake_occlusion, fibonacci_sphere, whole_map
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.mesh.head import Head
@@ -48,8 +48,8 @@ def corner() -> Head:
 def baked(renderer: Renderer, head: Head, side: int = SIDE, **options: Any) -> NDArray[np.float32]:
     """Rows of the bake: the atlas and the vertices."""
     inputs = renderer.prepare(scene_of(head), settings_of(atlas=side))
-    stage = Occlusion(renderer.device, **options)
-    return stage.bake(head.mesh, inputs.head, inputs.lit, inputs.layouts[0].atlas.resources["atlas"], side)
+    texels = inputs.layouts[0].atlas.resources["atlas"]
+    return bake_occlusion(renderer.device, head.mesh, inputs.lit, texels, side, **options)
 
 
 def test_directions_share_the_sphere() -> None:
@@ -103,7 +103,7 @@ def test_the_map_has_no_gaps() -> None:
 
 def seen(renderer: Renderer, scene: Scene, **settings: Any) -> Floats:
     inputs = run_frame(renderer, scene, **({"size": (64, 64), "atlas": SIDE} | settings))
-    return download(renderer.device, inputs.picture.exposed)[..., :3].astype(float)
+    return download(renderer.device, inputs.resources.picture.exposed)[..., :3].astype(float)
 
 
 def test_corners_are_darker_and_can_be_left_bright(renderer: Renderer) -> None:
@@ -142,5 +142,5 @@ def test_baked_once(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None
     scene = replace(scene_of(head, rho_s=0.0), environment=Environment(name="uniform"))
     first = seen(renderer, scene)
     renderer.forget()
-    monkeypatch.setattr(surroundings, "Occlusion", None)
+    monkeypatch.setattr(surroundings, "bake_occlusion", None)
     assert np.array_equal(seen(renderer, scene), first)

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from setups import front_camera, head_of, joined, place, run_frame, scene_of, settings_of
 from tolerances import TWIN
 
-from dermis.frame.pre_integrated import (
+from dermis.frame.renderer import Renderer
+from dermis.frame.techniques.pre_integrated import (
     MOST_CURVED,
     half_light_sigma,
     lit_spheres,
@@ -20,7 +21,6 @@ from dermis.frame.pre_integrated import (
     shadow_edge,
     spread_cosine,
 )
-from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.primitives import plane, uv_sphere
@@ -110,7 +110,7 @@ def test_relief_is_smoothed_by_the_radius_of_half_the_light() -> None:
 
 def image(renderer: Renderer, scene: Scene, technique: str = "pre-integrated", **settings: Any) -> Floats:
     inputs = run_frame(renderer, scene, **({"size": (64, 64)} | settings), technique=technique)
-    return download(renderer.device, inputs.picture.exposed).astype(float)
+    return download(renderer.device, inputs.resources.picture.exposed).astype(float)
 
 
 RADIUS = 10.0

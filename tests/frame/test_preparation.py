@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from setups import front_camera, frontal, head_of, scene_of, settings_of
 
+from dermis.frame import preparation, resources
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.environment import Environment
@@ -23,17 +24,15 @@ def scene(**changed: Any) -> Scene:
     return replace(scene_of(BALL, LAMP, camera=front_camera(BALL, frame_mm=70.0)), **changed)
 
 
-def made(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Grows whenever something is made that stands."""
+def made(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Grows whenever resources are made."""
     log: list[int] = []
-    maker = renderer._preparation._maker
-    make = maker.make
 
     def counted(*given: Any) -> Any:
         log.append(1)
-        return make(*given)
+        return resources.make_resources(*given)
 
-    monkeypatch.setattr(maker, "make", counted)
+    monkeypatch.setattr(preparation, "make_resources", counted)
     return log
 
 
@@ -46,14 +45,14 @@ def moved(k: int) -> Scene:
 
 
 def test_cameras_and_lights_leave_the_rest(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    log, settings = made(renderer, monkeypatch), settings_of()
+    log, settings = made(monkeypatch), settings_of()
     found = [renderer.prepare(moved(k), settings) for k in range(3)]
     assert len(log) == 1
-    assert len({one.shadow_key for one in found}) == 3
+    assert len({one.shadow_views.clips.tobytes() for one in found}) == 3
     assert len({one.view.tobytes() for one in found}) == 3
     assert len({one.camera.clips.tobytes() for one in found}) == 3
     assert len({one.lit["lights"].tobytes() for one in found}) == 3
-    assert len({id(one.levels) for one in found}) == 1
+    assert len({id(one.resources.levels) for one in found}) == 1
 
 
 @pytest.mark.parametrize(
@@ -70,13 +69,12 @@ def test_cameras_and_lights_leave_the_rest(renderer: Renderer, monkeypatch: pyte
 def test_all_else_is_seen(
     renderer: Renderer, changed: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    settings = settings_of()
+    log, settings = made(monkeypatch), settings_of()
     renderer.prepare(scene(), settings)
-    log = made(renderer, monkeypatch)
     renderer.prepare(scene(**changed), settings)
     renderer.prepare(scene(), settings.model_copy(update={"exposure": 2.0}))
     renderer.prepare(scene(), settings.model_copy(update={"exposure": 2.0}), "elsewhere")
-    assert len(log) == 3
+    assert len(log) == 4
 
 
 def test_what_was_drawn_before_is_let_go_of(renderer: Renderer) -> None:
@@ -84,10 +82,10 @@ def test_what_was_drawn_before_is_let_go_of(renderer: Renderer) -> None:
     two = Renderer(renderer.device.adapter.name, depth=2)
     settings = settings_of()
     two.prepare(scene(), settings, "left")
+    assert (resources._make_levels, "left") in two.memo._kept
     for _ in range(8):
         two.prepare(scene(), settings)
-    roles = two._preparation._kept._things
-    assert "levels" in roles and "levelsleft" not in roles
+    assert {of for make, of in two.memo._kept if make is resources._make_levels} == {""}
 
 
 def test_frames_that_move_look_as_if_they_were_the_first(renderer: Renderer) -> None:

@@ -15,7 +15,7 @@ from dermis.errors import DermisError
 from dermis.frame import resources
 from dermis.frame.renderer import Renderer, render
 from dermis.frame.seams import REMEDIES
-from dermis.gpu import download
+from dermis.gpu import Frame, download
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.primitives import SKIN, plane, uv_sphere
@@ -63,11 +63,15 @@ def test_an_older_image_is_not_mistaken_for_the_newest(renderer: Renderer) -> No
 def test_a_failed_frame_leaves_no_half_drawn_shadows(monkeypatch: pytest.MonkeyPatch) -> None:
     renderer = Renderer(ADAPTER)
 
-    def fail(*_: Any) -> None:
-        raise ValueError
+    dispatch = Frame.dispatch
+
+    def fail(frame: Frame, stage: str, *given: Any) -> None:
+        if stage == "shade":
+            raise ValueError
+        dispatch(frame, stage, *given)
 
     with monkeypatch.context() as patch:
-        patch.setattr(renderer.stages.shade, "draw", fail)
+        patch.setattr(Frame, "dispatch", fail)
         with pytest.raises(ValueError):
             renderer.draw(scene(), settings_of())
     assert drawn(renderer, scene()).tobytes() == drawn(Renderer(ADAPTER), scene()).tobytes()
@@ -101,11 +105,11 @@ CHANGES: dict[str, tuple[Callable[[], Scene], dict[str, Any]]] = {
     "samples": (scene, {"samples": 4}),
     **{
         f"technique {name}": (scene, {"technique": name})
-        for name in ("none", "one-blur", "published", "screen-space", "pre-integrated")
+        for name in ("none", "one-blur", "gpu-gems-3", "screen-space", "pre-integrated")
     },
     **{f"seams {name}": (lambda: scene(LEANING), {"seams": name}) for name in REMEDIES},
     "seam colour": (lambda: scene(LEANING), {"seams": "clear-colour", "seam_colour": (0.1, 0.2, 0.9)}),
-    "published on two atlases": (scene, {"technique": "published", "seams": "multi-uv"}),
+    "published on two atlases": (scene, {"technique": "gpu-gems-3", "seams": "multi-uv"}),
     "axes": (lambda: scene(LEANING), {"stretch": "axes"}),
     "one density": (scene, {"stretch": "none"}),
     "thin": (lambda: scene(LEAF), {}),
@@ -170,8 +174,9 @@ def test_shadows_of_another_head_do_not_linger(renderer: Renderer, other: Render
         drawn(renderer, left, **bare)
     made = drawn(renderer, right, **bare)
     assert np.array_equal(made, fresh(other, right, **bare))
-    keys = [renderer.prepare(one, settings_of(**bare)).shadow_key for one in (left, right)]
-    assert keys[0] == keys[1] and not np.array_equal(made, drawn(renderer, left, **bare))
+    first, second = (renderer.prepare(one, settings_of(**bare)).shadow_views for one in (left, right))
+    assert np.array_equal(first.clips, second.clips)
+    assert not np.array_equal(made, drawn(renderer, left, **bare))
 
 
 @pytest.mark.parametrize("samples", [1, 2, 3, 4, 5])
@@ -269,12 +274,13 @@ def test_exposure_scales_the_image(renderer: Renderer) -> None:
 
 
 def test_what_a_frame_reports(renderer: Renderer) -> None:
-    rendered = renderer.draw(scene(), settings_of())
+    rendered = renderer.draw(scene(), settings_of(), anew=True)
     assert rendered.gaussians == 6
     assert rendered.frame_ms > 0 and rendered.setup_ms > 0
     if rendered.gpu_ms is not None:
-        stages = {"irradiance", "diffuse", "transmission", "combine", "visibility", "shade", "post"}
-        assert stages <= set(rendered.gpu_ms) <= stages | {"shadows", "transmission", "total"}
+        lit = {"surface", "irradiance", "diffuse", "translucency", "combine"}
+        stages = lit | {"visibility", "shade", "post"}
+        assert stages <= set(rendered.gpu_ms) <= stages | {"shadows", "total"}
 
 
 def test_one_call_is_enough(renderer: Renderer) -> None:

@@ -10,14 +10,14 @@ import pytest
 from numpy.typing import NDArray
 from tolerances import FLAT, TWIN
 
-from dermis.frame.frame import Stages
-from dermis.frame.passes.screen_space import ScreenSpread, kernel_table
+from dermis.frame.techniques.screen_space import draw, kernel_table, make_apart, make_kernel
 from dermis.gpu import Device, Frame, download, make_texture, upload
 from dermis.optics.fits.separable import SeparableKernel, preintegrate
 from dermis.optics.profiles import load_profile
 
 Floats = NDArray[np.float64]
-KERNEL = preintegrate(load_profile("gpu-gems-3"))
+PROFILE = load_profile("gpu-gems-3")
+KERNEL = preintegrate(PROFILE)
 TABLE, REACH = kernel_table(KERNEL)
 TAPS, STEEPEST = 16, 4.0
 
@@ -42,14 +42,13 @@ class View(NamedTuple):
         return np.asarray(depth[..., None] * np.stack([right, up, np.ones(depth.shape)], axis=-1))
 
 
-def spread(device: Device, stages: Stages, view: View, light: Floats, depth: Floats) -> Floats:
+def spread(device: Device, view: View, light: Floats, depth: Floats) -> Floats:
     """(h, w, 3) light after both passes, as it comes out where all of it leaves and nothing lies over it."""
-    stage = stages.screen_space
-    apart = stage.make_apart(view.size)
+    apart = make_apart(device, view.size)
     upload(device, apart.layers, np.dstack([light, depth]), layer=0)
     upload(device, apart.layers, np.ones((*depth.shape, 4)), layer=1)
     over, frame = make_texture(device, view.size, "rgba32float"), Frame(device)
-    result = stage.draw(frame, ScreenSpread(apart, stage.make_kernel(KERNEL), view.half), over)
+    result = draw(frame, apart, make_kernel(device, PROFILE), view.half, over)
     frame.submit()
     return download(device, result)[..., :3].astype(float)
 
@@ -116,21 +115,21 @@ def rough_depth(size: tuple[int, int]) -> Floats:
 
 
 @pytest.mark.parametrize("width_mm", [4.0, 24.0, 150.0])
-def test_twin(device: Device, stages: Stages, width_mm: float) -> None:
+def test_twin(device: Device, width_mm: float) -> None:
     """Close, where taps are far apart; as portraits are; and far, where the kernel is a few pixels wide."""
     view = View((0.5 * width_mm / 400, 0.5 * width_mm / 400 * 20 / 28), (28, 20))
     depth = rough_depth(view.size)
     light = np.random.default_rng(4).random((*depth.shape, 3)).astype(np.float32) * (depth > 0)[..., None]
-    made = spread(device, stages, view, light.astype(float), depth)
+    made = spread(device, view, light.astype(float), depth)
     assert np.abs(made - twin(view, light.astype(float), depth)).max() < TWIN
 
 
 @pytest.mark.parametrize("width_mm", [4.0, 24.0, 150.0])
-def test_even_light_stays_even(device: Device, stages: Stages, width_mm: float) -> None:
+def test_even_light_stays_even(device: Device, width_mm: float) -> None:
     """On a plane that faces the camera, and on any other skin, to the rims of its holes."""
     view = View.over(width_mm, 400.0, 48)
     for depth in (np.full((48, 48), 400.0), rough_depth(view.size)):
-        made = spread(device, stages, view, (depth > 0)[..., None] * np.array([1.0, 0.3, 2.7]), depth)
+        made = spread(device, view, (depth > 0)[..., None] * np.array([1.0, 0.3, 2.7]), depth)
         assert np.abs(made[depth > 0] / [1.0, 0.3, 2.7] - 1).max() < FLAT
         assert not made[depth == 0].any()
 
@@ -151,27 +150,27 @@ def across(kernel: SeparableKernel, pixel_mm: float, side: int) -> Floats:
 
 
 @pytest.mark.parametrize("pixel_mm", [0.45, 1.0])
-def test_point_of_light(device: Device, stages: Stages, pixel_mm: float) -> None:
+def test_point_of_light(device: Device, pixel_mm: float) -> None:
     """Where taps lie on neighbouring pixels each gets what the kernel sends there, and nothing is lost."""
     side = 63
     view = View.over(side * pixel_mm, 500.0, side)
     light = np.zeros((side, side, 3))
     light[31, 31] = 1.0
-    made = spread(device, stages, view, light, np.full((side, side), 500.0))
+    made = spread(device, view, light, np.full((side, side), 500.0))
     exact = across(KERNEL, pixel_mm, side)
     assert np.abs(made - exact).max() < 1e-3 * exact.max()
     assert np.abs(made.sum(axis=(0, 1)) - 1).max() < 2e-3
 
 
 @pytest.mark.parametrize("pixel_mm", [0.05, 0.1, 0.2])
-def test_spot_of_light_seen_closely(device: Device, stages: Stages, pixel_mm: float) -> None:
+def test_spot_of_light_seen_closely(device: Device, pixel_mm: float) -> None:
     """A spot of sigma 1 mm under taps up to 0.8 mm apart: energy and shape against the analytic sum."""
     side = int(20.0 / pixel_mm) | 1
     view = View.over(side * pixel_mm, 500.0, side)
     axis = (np.arange(side) - side // 2) * pixel_mm
     x, y = np.meshgrid(axis, axis)
     bell = np.exp(-0.5 * (x**2 + y**2))
-    made = spread(device, stages, view, np.repeat(bell[..., None], 3, axis=2), np.full(bell.shape, 500.0))
+    made = spread(device, view, np.repeat(bell[..., None], 3, axis=2), np.full(bell.shape, 500.0))
     wide = KERNEL.variance_mm2[:, 0] + 1.0
     line = (
         KERNEL.weight[:, None]
@@ -182,14 +181,12 @@ def test_spot_of_light_seen_closely(device: Device, stages: Stages, pixel_mm: fl
     assert np.abs(made.sum(axis=(0, 1)) / exact.sum(axis=(0, 1)) - 1).max() < 0.01
 
 
-def test_one_line_of_light_is_the_profile_itself(device: Device, stages: Stages) -> None:
+def test_one_line_of_light_is_the_profile_itself(device: Device) -> None:
     """Seen from its side the separable kernel is exact: a line of light spreads as the profile does."""
     profile, pixel_mm, side = load_profile("gpu-gems-3"), 0.45, 63
     light = np.zeros((side, side, 3))
     light[:, 31] = 1.0 / pixel_mm
-    made = spread(
-        device, stages, View.over(side * pixel_mm, 500.0, side), light, np.full((side, side), 500.0)
-    )
+    made = spread(device, View.over(side * pixel_mm, 500.0, side), light, np.full((side, side), 500.0))
     edges = (np.arange(side + 1) - 31.5) * pixel_mm
     y = np.linspace(-40, 40, 8001)
     fine = np.linspace(0.0, 12.0, 241)
@@ -200,7 +197,7 @@ def test_one_line_of_light_is_the_profile_itself(device: Device, stages: Stages)
     assert np.abs(made[31] - exact)[off & (np.abs(middle) < 12)].max() < 0.01 * exact[off].max()
 
 
-def test_tilted_skin_spreads_as_far_on_its_surface(device: Device, stages: Stages) -> None:
+def test_tilted_skin_spreads_as_far_on_its_surface(device: Device) -> None:
     """A stripe on a plane turned by 60 degrees about the vertical: its spread is measured on the plane."""
     side, tilt = 201, np.radians(60.0)
     view = View.over(40.0, 5000.0, side)
@@ -210,7 +207,7 @@ def test_tilted_skin_spreads_as_far_on_its_surface(device: Device, stages: Stage
     along = np.linalg.norm(places - places[side // 2], axis=-1) * np.sign(np.arange(side) - side // 2)
     bell = np.exp(-0.5 * (along / 2.0) ** 2)
     light = np.repeat(np.repeat(bell[None, :, None], side, axis=0), 3, axis=2)
-    made = spread(device, stages, view, light, depth)[side // 2]
+    made = spread(device, view, light, depth)[side // 2]
     wide = KERNEL.variance_mm2[:, 0] + 4.0
     exact = (
         KERNEL.weight[None] * (np.exp(-(along[:, None] ** 2) / (2 * wide)) * np.sqrt(4.0 / wide))[..., None]
@@ -221,33 +218,33 @@ def test_tilted_skin_spreads_as_far_on_its_surface(device: Device, stages: Stage
 
 
 @pytest.mark.parametrize(("gap_mm", "leak"), [(20.0, 0.0), (8.0, 2e-4), (4.0, 0.02)])
-def test_light_stays_on_its_own_surface(device: Device, stages: Stages, gap_mm: float, leak: float) -> None:
+def test_light_stays_on_its_own_surface(device: Device, gap_mm: float, leak: float) -> None:
     """A lit surface before a dark one: what the straight distance between them lets across, and no more."""
     side = 64
     view = View.over(side * 0.25, 500.0, side)
     front = np.arange(side) < 32
     depth = np.repeat(np.where(front, 500.0, 500.0 + gap_mm)[None], side, axis=0)
     light = np.repeat(np.repeat(front.astype(float)[None, :, None], side, axis=0), 3, axis=2)
-    made = spread(device, stages, view, light, depth)[32]
+    made = spread(device, view, light, depth)[32]
     assert made[32:].max() <= leak + 1e-6
     assert (1 - made[:32]).max() <= leak + 1e-6
 
 
 @pytest.mark.parametrize("gap_mm", [2.0, 90.0])
-def test_light_passes_a_slit(device: Device, stages: Stages, gap_mm: float) -> None:
+def test_light_passes_a_slit(device: Device, gap_mm: float) -> None:
     """A pixel that shows something dark behind takes no light from the skin on its sides."""
     side, middle = 64, 32
     view = View.over(side * 0.1, 500.0, side)
     x = np.broadcast_to(np.arange(side), (side, side))
     light = np.repeat((x > middle).astype(float)[..., None], 3, axis=2)
     whole, slit = np.full((side, side), 500.0), np.where(x == middle, 500.0 + gap_mm, 500.0)
-    closed, open_ = (spread(device, stages, view, light, depth)[middle] for depth in (whole, slit))
+    closed, open_ = (spread(device, view, light, depth)[middle] for depth in (whole, slit))
     dark = slice(middle - 8, middle)
     assert closed[dark, 0].min() > 0.1
     assert np.abs(open_ - closed)[dark].max() < 0.01
 
 
-def test_other_materials_neither_give_nor_take(device: Device, stages: Stages) -> None:
+def test_other_materials_neither_give_nor_take(device: Device) -> None:
     """Pixels without skin (depth 0) may hold anything."""
     side = 48
     view = View.over(side * 0.25, 500.0, side)
@@ -256,17 +253,17 @@ def test_other_materials_neither_give_nor_take(device: Device, stages: Stages) -
     rng = np.random.default_rng(1)
     light = rng.random((side, side, 3))
     marked = np.where((depth > 0)[..., None], light, 100.0)
-    one, other = (spread(device, stages, view, source, depth) for source in (light, marked))
+    one, other = (spread(device, view, source, depth) for source in (light, marked))
     assert np.array_equal(one[depth > 0], other[depth > 0])
 
 
-def test_rings_of_the_separable_kernel(device: Device, stages: Stages) -> None:
+def test_rings_of_the_separable_kernel(device: Device) -> None:
     """A point of light against the round profile: within 1 mm the kernel, a cross, lacks 6 % of red."""
     profile, pixel_mm, side = load_profile("gpu-gems-3"), 0.45, 63
     light = np.zeros((side, side, 3))
     light[31, 31] = 1.0
     view = View.over(side * pixel_mm, 500.0, side)
-    made = spread(device, stages, view, light, np.full((side, side), 500.0))
+    made = spread(device, view, light, np.full((side, side), 500.0))
     y, x = np.indices((side, side)) - 31
     radius = np.hypot(x, y) * pixel_mm
     found = np.array([made[radius <= r].sum(axis=0) for r in (1.0, 2.0, 3.0, 5.0, 8.0)])

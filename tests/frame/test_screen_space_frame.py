@@ -23,7 +23,7 @@ SIDE_LIGHT = DirectionalLight(direction=(-2, -1, -1), irradiance=(3.0, 2.0, 1.0)
 
 def image(renderer: Renderer, scene: Scene, technique: str, **settings: Any) -> Floats:
     inputs = run_frame(renderer, scene, **({"size": (64, 64)} | settings), technique=technique)
-    return download(renderer.device, inputs.picture.exposed).astype(float)
+    return download(renderer.device, inputs.resources.picture.exposed).astype(float)
 
 
 def narrow(folder: Path) -> str:

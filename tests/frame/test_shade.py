@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 from setups import front_camera, frontal, head_of, joined, place, run_frame, scene_of
 from tolerances import TWIN
 
+from dermis.frame import passes
+from dermis.frame.passes import shade
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Frame, download, upload
 from dermis.mesh.geometry import build_mesh
@@ -32,7 +35,7 @@ WEIGHTS = load_profile("gpu-gems-3").weight
 
 def image(renderer: Renderer, scene: Scene, **settings: Any) -> Floats:
     inputs = run_frame(renderer, scene, **({"size": SIZE} | settings))
-    return download(renderer.device, inputs.picture.exposed).astype(float)
+    return download(renderer.device, inputs.resources.picture.exposed).astype(float)
 
 
 def seen_points(scene: Scene) -> tuple[Floats, Floats]:
@@ -211,14 +214,14 @@ def test_software_adapters_get_the_picture_of_gpus(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, technique: str, samples: int
 ) -> None:
     """Strips of pixels, the last one cut off, past what shows nothing; lights from behind passed over."""
-    shade, irradiance = renderer.stages.shade, renderer.stages.irradiance
     sun = DirectionalLight(direction=(2, -1, 1), shadows=False)
     scene = scene_of(head_of(uv_sphere(30.0, 24, 12)), sun, LIGHTS["spot"], frontal(), sun)
+    own = [one for one in passes.device_constants(renderer.device) if one[0] == "MESH_IN_BUFFERS"]
     made = []
-    for strip, constants in ((1, ()), (16, (("PASSES_DARK", 1),))):
-        monkeypatch.setattr(shade, "_strip", strip)
-        for stage in (shade, irradiance):
-            monkeypatch.setattr(stage, "_suited", constants)
+    for constants in ((), (("PASSES_DARK", 1), ("STRIP", 16))):
+        for module in (passes, shade):
+            monkeypatch.setattr(module, "device_constants", lambda _, more=constants: (*own, *more))
+        monkeypatch.setattr(renderer.device, "programs", {})
         made.append(image(renderer, scene, size=(45, 37), samples=samples, technique=technique))
     assert made[0].max() > 0.1 and np.array_equal(*made)
 
@@ -229,11 +232,12 @@ def test_a_strip_is_left_at_its_end(renderer: Renderer) -> None:
     camera = front_camera(head, (0, 10.0, 0), frame_mm=40.0)  # its upper edge is in the middle of the picture
     scene, size = scene_of(head, frontal(), camera=camera), (16, 256)
     inputs = run_frame(renderer, scene, size=size, technique="none")
-    radiance = inputs.picture.radiance
+    resources = inputs.resources
+    radiance, half = resources.picture.radiance, replace(resources.picture, size=(16, 128))
     upload(renderer.device, radiance, np.full((256, 16, 4), 7.0, np.float32))
-    frame, half = Frame(renderer.device), (16, 128)
-    told = inputs.lit, inputs.view, inputs.constants, inputs.seen, inputs.scattered, radiance
-    renderer.stages.shade.draw(frame, *told, half)
+    frame, look = Frame(renderer.device), (inputs.lit, inputs.view, inputs.constants)
+    shade.draw(frame, *look, resources.visibility, resources.scattered, half)
     frame.submit()
+    renderer.graph.forget()  # it knows nothing of this
     made = download(renderer.device, radiance)
     assert not made[:128].any() and (made[128:] == 7.0).all()

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from setups import head_of, joined, place, run_frame, scene_of
 
+from dermis.frame.passes import irradiance
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Frame, download, upload
 from dermis.mesh.primitives import plane, uv_sphere
@@ -34,7 +35,9 @@ def squares(depth: NDArray[np.float32], side: int) -> NDArray[np.float32]:
 
 @pytest.mark.parametrize("size", [128, 320])
 def test_each_level_holds_the_nearest_of_its_squares(renderer: Renderer, size: int) -> None:
-    maps = run_frame(renderer, scene_of(BALLS, LIGHTS["sun"]), atlas=64, shadow_size=size).shadow_maps
+    maps = run_frame(
+        renderer, scene_of(BALLS, LIGHTS["sun"]), atlas=64, shadow_size=size
+    ).resources.shadow_maps
     depth = download(renderer.device, maps.texture)
     bounds = download(renderer.device, maps.bounds)
     height = len(bounds)
@@ -52,16 +55,16 @@ def test_what_is_passed_over_hides_nothing(renderer: Renderer, name: str, shadow
     inputs = run_frame(renderer, scene_of(BALLS, LIGHTS[name]), atlas=256, shadow_size=shadow_size)
 
     def light() -> Any:
-        frame, into = Frame(renderer.device), inputs.scattered
-        renderer.stages.irradiance.draw(frame, inputs.layouts[0], inputs.light_constants, into, 256)
+        frame, into = Frame(renderer.device), inputs.resources.scattered
+        irradiance.draw(frame, inputs.layouts[0], inputs.light_constants, into, 256)
         frame.submit()
         return download(renderer.device, into)[..., :3]
 
     bounded = light()
-    bounds = inputs.shadow_maps.bounds
+    bounds = inputs.resources.shadow_maps.bounds
     upload(renderer.device, bounds, np.ones((bounds.size[1], bounds.size[0]), np.float32))
     everywhere = light()
-    inputs.shadow_maps.drawn = b""
+    renderer.graph.forget()  # it knows nothing of this
     lit = bounded.max(axis=-1)
     assert (lit > 0.5 * lit.max()).any() and (lit[lit > 0] < 0.2 * lit.max()).any()
     assert np.array_equal(bounded, everywhere)

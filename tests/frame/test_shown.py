@@ -1,22 +1,24 @@
-"""Light that a camera's move leaves on the atlas is the light that would be drawn anew."""
+"""What is left as it is, since it is there already, is what would be drawn anew."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from setups import front_camera, frontal, head_of, scene_of, settings_of
 
-from dermis.frame.passes.diffuse import Diffuse
+from dermis.frame.levels import HALVES
 from dermis.frame.renderer import Renderer
+from dermis.frame.techniques import technique
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.model import Scene
 
 HEAD = head_of(uv_sphere(30.0, 24, 12))
 SEQUENCES: dict[str, list[dict[str, Any]]] = {
     "back from two layouts": [{"seams": "stitch"}, {"seams": "multi-uv"}, {"seams": "stitch"}],
-    "back from other blurs": [{}, {"technique": "published"}, {}, {"technique": "one-blur"}, {}],
+    "back from other blurs": [{}, {"technique": "gpu-gems-3"}, {}, {"technique": "one-blur"}, {}],
     "exposure": [{"exposure": 1e-6}, {"exposure": 1.0}],
     "colour beside the charts": [{"seams": "clear-colour", "seam_colour": (c, 0.1, 0.1)} for c in (0.1, 0.9)],
     "size": [{"atlas": 64}, {"atlas": 100}, {"atlas": 64}],
@@ -24,19 +26,19 @@ SEQUENCES: dict[str, list[dict[str, Any]]] = {
 
 
 @pytest.fixture(scope="module")
-def keeping() -> Renderer:
+def keeping() -> Iterator[Renderer]:
     """Keeps two of each thing, and levels in halves, whatever the adapter."""
-    renderer = Renderer(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"), depth=2)
-    renderer.stages.diffuse = Diffuse(renderer.device, "rgba16float")
-    return renderer
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(technique, "usual_texel", lambda _: HALVES)
+        yield Renderer(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"), depth=2)
 
 
 def scene(frame_mm: float = 70.0) -> Scene:
     return scene_of(HEAD, frontal(), camera=front_camera(HEAD, frame_mm=frame_mm))
 
 
-def drawn(renderer: Renderer, settings: dict[str, Any], *, keep_stages: bool) -> bytes:
-    return renderer.draw(scene(), settings_of(**settings), keep_stages=keep_stages).linear().tobytes()
+def drawn(renderer: Renderer, settings: dict[str, Any], **draw: Any) -> bytes:
+    return renderer.draw(scene(), settings_of(**settings), **draw).linear().tobytes()
 
 
 @pytest.mark.parametrize("name", SEQUENCES)
@@ -44,24 +46,25 @@ def test_kept_light_never_shows(keeping: Renderer, name: str) -> None:
     anew = []
     for settings in SEQUENCES[name]:
         keeping.forget()
-        anew.append(drawn(keeping, settings, keep_stages=False))
+        anew.append(drawn(keeping, settings))
     keeping.forget()
-    kept = [drawn(keeping, settings, keep_stages=True) for settings in SEQUENCES[name]]
+    kept = [drawn(keeping, settings) for settings in SEQUENCES[name]]
     assert [a == b for a, b in zip(kept, anew, strict=True)] == [True] * len(anew)
+    assert drawn(keeping, SEQUENCES[name][-1], anew=True) == anew[-1]
 
 
-def test_a_camera_that_moves_leaves_the_light(keeping: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_there_is_left_as_it_is(keeping: Renderer) -> None:
+    """Stages that run in a frame like the last one, after another exposure, camera and light."""
     keeping.forget()
-    lit = []
-    draw = keeping.stages.irradiance.draw
-
-    def counted(*args: Any) -> None:
-        lit.append(1)
-        draw(*args)
-
-    monkeypatch.setattr(keeping.stages.irradiance, "draw", counted)
-    for frame_mm in (70.0, 60.0, 50.0):
-        keeping.draw(scene(frame_mm), settings_of(), keep_stages=True)
-    assert len(lit) == 1
-    keeping.draw(scene(), settings_of())
-    assert len(lit) == 2
+    plain, near = scene(), scene(60.0)
+    brighter = scene_of(HEAD, frontal(4.0), camera=near.camera)
+    frames = ((plain, 1.0), (plain, 1.0), (plain, 2.0), (near, 2.0), (brighter, 2.0))
+    ran = []
+    for one, exposure in frames:
+        keeping.draw(one, settings_of(exposure=exposure))
+        ran.append(set(keeping.graph.ran))
+    lit = {"irradiance", "diffuse"}  # which stands for what is recorded with it
+    whole = lit | {"surface", "visibility", "shade", "post"}
+    assert ran == [whole, set(), {"post"}, {"visibility", "shade", "post"}, lit | {"shade", "post"}]
+    keeping.draw(brighter, settings_of(exposure=2.0), anew=True)
+    assert set(keeping.graph.ran) == whole

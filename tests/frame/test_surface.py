@@ -33,7 +33,7 @@ def pixel(renderer: Renderer, head: Any = PATCH, **skin: Any) -> Floats:
     """(3,) radiance at the foot of the camera."""
     scene = scene_of(head, LIGHT, camera=front_camera(head), **skin)
     inputs = run_frame(renderer, scene, size=(1, 1), technique="none")
-    return download(renderer.device, inputs.picture.exposed).astype(float)[0, 0, :3]
+    return download(renderer.device, inputs.resources.picture.exposed).astype(float)[0, 0, :3]
 
 
 def parts(m: float, rho_s: float, model: str, fresnel: str, energy: str) -> tuple[Floats, float]:
@@ -89,4 +89,4 @@ def test_strength_stays_within_one() -> None:
 def test_only_other_models_than_the_default_ask_for_another_pipeline() -> None:
     assert surface.constants(Skin()) == surface.constants(Skin(specular="none")) == ()
     assert surface.constants(Skin(specular="phong")) == (("MODEL", 5),)
-    assert surface.constants(Skin(fresnel="exact")) == (("FRESNEL", 1),)
+    assert surface.constants(Skin(fresnel="exact")) == (("EXACT_FRESNEL", 1),)

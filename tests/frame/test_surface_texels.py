@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import gc
 import weakref
-from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from setups import entered_light, frontal, head_of, probe, run_frame, scene_of
 
-from dermis.frame.passes.surface_texels import SURFACE_BYTES, SurfaceTexels
+from dermis.frame.passes.surface_texels import SURFACE_BYTES
 from dermis.frame.renderer import Renderer
 from dermis.gpu.textures import texture_from
 from dermis.mesh.primitives import uv_sphere
+from dermis.scene.model import Scene
 
 SIZE = 64
 HEAD = head_of(uv_sphere(40.0, 24, 12))
@@ -58,30 +58,24 @@ def test_colours_and_heights(packed: tuple[Floats, Floats, list[Floats]]) -> Non
         assert np.allclose(made[..., 3], 0.5 + 0.4 * direction, rtol=1e-3)
 
 
-def drawn(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """The atlases whose surface is drawn from now on."""
-    found: list[Any] = []
-    draw = SurfaceTexels._draw
-
-    def noted(self: SurfaceTexels, bound: dict[str, Any], size: tuple[int, ...]) -> None:
-        found.append(size[0])
-        draw(self, bound, size)
-
-    monkeypatch.setattr(SurfaceTexels, "_draw", noted)
-    renderer.forget()
+def drawn(renderer: Renderer, *scenes: Scene, atlas: int = SIZE) -> list[int]:
+    """How often the surface is drawn in each of some frames."""
+    found = []
+    for scene in scenes:
+        run_frame(renderer, scene, atlas=atlas)
+        assert "irradiance" in renderer.graph.ran or scene is SCENE
+        found.append(renderer.graph.ran.count("surface"))
     return found
 
 
-def test_drawn_only_when_it_changes(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = drawn(renderer, monkeypatch)
-    for scene in (SCENE, SCENE, scene_of(HEAD, frontal(2.0), mix=0.2), scene_of(HEAD, energy="none")):
-        run_frame(renderer, scene, atlas=SIZE)
-    assert found == [SIZE]  # neither lights nor what the frame multiplies with
-    for scene in (scene_of(HEAD, frontal(), roughness=0.4), scene_of(HEAD, frontal(), rho_s=0.3), SCENE):
-        run_frame(renderer, scene, atlas=SIZE)
-    assert found == [SIZE] * 4
-    run_frame(renderer, SCENE, atlas=2 * SIZE)
-    assert found == [SIZE] * 4 + [2 * SIZE]
+def test_drawn_only_when_it_changes(renderer: Renderer) -> None:
+    renderer.forget()
+    assert drawn(renderer, SCENE, SCENE) == [1, 0]
+    multiplied = scene_of(HEAD, frontal(2.0), mix=0.2), scene_of(HEAD, energy="none")
+    assert drawn(renderer, *multiplied) == [0, 0]  # neither lights nor what the frame multiplies with
+    others = scene_of(HEAD, frontal(), roughness=0.4), scene_of(HEAD, frontal(), rho_s=0.3)
+    assert drawn(renderer, *others, SCENE) == [1, 1, 1]
+    assert drawn(renderer, SCENE, atlas=2 * SIZE) == [1]
 
 
 def test_what_changed_is_seen(renderer: Renderer) -> None:
@@ -98,12 +92,11 @@ def test_what_changed_is_seen(renderer: Renderer) -> None:
 
 def test_gone_with_its_atlas(renderer: Renderer) -> None:
     inputs = run_frame(renderer, SCENE, atlas=SIZE)
-    texture = renderer.stages.irradiance._surfaces.of(inputs.layouts[0])
+    texture = inputs.layouts[0].surfaces
     assert texture.size == (SIZE, SIZE, 2) and SURFACE_BYTES == 2 * 16
     gone = weakref.ref(texture)
     del texture, inputs
     renderer.forget()
-    renderer.stages.shown.forget_all()
     gc.collect()
     run_frame(renderer, scene_of(head_of(uv_sphere(30.0, 12, 6)), frontal()), atlas=SIZE)
     gc.collect()

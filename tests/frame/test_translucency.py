@@ -17,13 +17,12 @@ from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
 from dermis.atlas.translucency.pairs import TranslucentPairs, _in_cells, find_pairs
 from dermis.atlas.translucency.samples import Samples, giving, surface, taking, texels
-from dermis.frame.frame import Stages
-from dermis.frame.passes.translucency_weights import TranslucencyWeights, upload_pairs
+from dermis.frame.passes.translucency_weights import upload_pairs, weigh
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device, download
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import uv_sphere, wedge
-from dermis.optics.diffusion.transmission import through_gaussians
+from dermis.optics.diffusion.models import through_gaussians
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
 from dermis.scene.lights import DirectionalLight
@@ -103,12 +102,10 @@ def test_a_ball_smaller_than_the_profile_spreads_has_pairs(layout: str) -> None:
     assert table.source.max() < len(table.texel)
 
 
-def test_twin_of_what_passes(device: Device, stages: Stages, found: Found) -> None:
+def test_twin_of_what_passes(device: Device, found: Found) -> None:
     table = found[2]
     pairs = upload_pairs(device, table)
-    words = read_buffer(
-        device, stages.translucency_weights.weigh(pairs, BLURRED.variance_mm2, BLURRED.weight)
-    )
+    words = read_buffer(device, weigh(device, pairs, BLURRED.variance_mm2, BLURRED.weight))
     assert (words.reshape(-1, 2)[:, 0] == table.source).all()
     radius, cell = pairs.radius_mm, pairs.spacing_mm
     unit = np.array([radius, radius, radius, 1.0]) / 65535.0
@@ -129,14 +126,10 @@ def test_what_passes_is_the_same_from_disk(
 ) -> None:
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     variance, weight, made = BLURRED.variance_mm2, BLURRED.weight, 0
-    plain = read_buffer(
-        device, TranslucencyWeights(device).weigh(upload_pairs(device, found[2]), variance, weight)
-    )
+    plain = read_buffer(device, weigh(device, upload_pairs(device, found[2]), variance, weight))
     assert not list(tmp_path.rglob("*.arrays"))
     for key, factor in (("a", 1.0), ("a", 1.0), ("b", 1.0), ("b", 0.5)):
-        words = TranslucencyWeights(device).weigh(
-            upload_pairs(device, found[2], key), variance, factor * weight
-        )
+        words = weigh(device, upload_pairs(device, found[2], key), variance, factor * weight)
         assert np.array_equal(read_buffer(device, words), plain) == (factor == 1.0)
         made = len(list(tmp_path.rglob("*.arrays")))
     assert made == (3 if device.adapter.kind == "CPU" else 0)
@@ -157,7 +150,7 @@ def scattered(
     scene = scene_of(head, *(lights or (BEHIND,)), albedo="profile", rho_s=0.0)
     inputs = run_frame(renderer, scene, atlas=atlas, **given)
     texels = download(renderer.device, inputs.layouts[0].atlas.resources["atlas"])
-    light = download(renderer.device, inputs.scattered)[..., :3].astype(float)
+    light = download(renderer.device, inputs.resources.scattered)[..., :3].astype(float)
     own = texels[..., 0] > 0
     w = np.stack([texels[own][:, 1] & 0xFFFF, texels[own][:, 1] >> 16], axis=-1) / 65535.0
     w = np.column_stack([1 - w.sum(axis=1), w])

@@ -10,19 +10,17 @@ from tolerances import TWIN
 
 from dermis.atlas.build import build_atlas
 from dermis.atlas.translucency.pairs import TranslucentPairs, find_pairs
-from dermis.frame.frame import Stages
-from dermis.frame.levels import FLOATS, make_levels
+from dermis.frame.levels import FLOATS, Blur, make_levels
 from dermis.frame.passes import translucency
-from dermis.frame.passes.translucency import Transmission
 from dermis.frame.passes.translucency_weights import upload_pairs
-from dermis.frame.passes.variants import Constants
-from dermis.frame.translucency import thin_of
-from dermis.gpu import Device, Frame, download, upload
+from dermis.frame.translucency import translucency_from
+from dermis.gpu import Constants, Device, Frame, download, upload
 from dermis.mesh.primitives import uv_sphere, wedge
 from dermis.viewer.views import thickness_mm
 
 Floats = NDArray[np.float64]
 VARIANCE, WEIGHT = np.array([0.5, 7.0]), np.array([[0.1, 0.3, 0.4], [0.5, 0.2, 0.1]])
+BLUR = Blur(VARIANCE, WEIGHT, (0, 0, 0))
 ALONE: Constants = (("TEAM", 1), ("ROUND", 1))
 
 
@@ -34,7 +32,7 @@ def table() -> TranslucentPairs:
 
 
 def summed(
-    device: Device, stages: Stages, table: TranslucentPairs, levels: NDArray[np.float32], constants: Constants
+    device: Device, table: TranslucentPairs, levels: NDArray[np.float32], constants: Constants
 ) -> tuple[Floats, Floats]:
     """(n, n, 3) and (n, n, 4) the twin's light, and the shader's with 1 where there is surface.
 
@@ -43,10 +41,10 @@ def summed(
     space = make_levels(device, 64, 2, FLOATS)
     for layer, level in enumerate(levels, start=1):
         upload(device, space.stack, np.dstack([level, np.ones((64, 64))]), layer=layer)
-    thin = thin_of(device, stages.translucency_weights, upload_pairs(device, table), VARIANCE, WEIGHT)
+    thin = translucency_from(device, upload_pairs(device, table), VARIANCE, WEIGHT)
     words = np.frombuffer(device.handle.queue.read_buffer(thin.weights), np.uint32).reshape(-1, 2)
     frame = Frame(device)
-    Transmission(device, constants).draw(frame, space, thin)
+    translucency.draw(frame, space, BLUR, thin, constants)
     frame.submit()
     x, y = table.texel[table.source].astype(int).T
     light = translucency_twins.decoded(words[:, 1]) * levels[thin.layer, y, x]
@@ -58,7 +56,6 @@ def summed(
 @pytest.mark.parametrize(("team", "at_once"), [(1, 1), (1, 4), (8, 2), (32, 4), (128, 1)])
 def test_twin_of_what_comes_through(
     device: Device,
-    stages: Stages,
     table: TranslucentPairs,
     team: int,
     at_once: int,
@@ -67,27 +64,27 @@ def test_twin_of_what_comes_through(
 ) -> None:
     monkeypatch.setattr(translucency, "_ROW", row)
     levels = np.random.default_rng(8).random((2, 64, 64, 3)).astype(np.float32)
-    twin, made = summed(device, stages, table, levels, (("SIZE", 128), ("TEAM", team), ("ROUND", at_once)))
+    twin, made = summed(device, table, levels, (("SIZE", 128), ("TEAM", team), ("ROUND", at_once)))
     assert twin.max() > 0.1
     assert np.abs(made[..., :3] - twin).max() < TWIN * twin.max()
     assert ((made[..., 3] == 1) == (table.receiver > 0)).all()
 
 
-def test_bright_and_dim_light_are_kept_alike(device: Device, stages: Stages, table: TranslucentPairs) -> None:
+def test_bright_and_dim_light_are_kept_alike(device: Device, table: TranslucentPairs) -> None:
     """Sources from a millionth to a million: 14 bits of each, over the whole range of floats."""
     powers = np.random.default_rng(9).uniform(-6, 6, (2, 64, 64, 3))
-    twin, made = summed(device, stages, table, (10**powers).astype(np.float32), ALONE)
+    twin, made = summed(device, table, (10**powers).astype(np.float32), ALONE)
     assert twin.max() > 1e4
     assert (np.abs(made[..., :3] - twin) <= 2.0**-14 * twin * 1.01).all()
 
 
-def test_a_head_without_thin_parts_gets_nothing(device: Device, stages: Stages) -> None:
+def test_a_head_without_thin_parts_gets_nothing(device: Device) -> None:
     mesh = uv_sphere(30.0, 24, 12)
     table = find_pairs(mesh, build_atlas(mesh, 64, "stitched"), float(np.sqrt(VARIANCE[-1])))
     pairs = upload_pairs(device, table)
-    thin = thin_of(device, stages.translucency_weights, pairs, VARIANCE, WEIGHT)
+    thin = translucency_from(device, pairs, VARIANCE, WEIGHT)
     frame = Frame(device)
-    stages.transmission.draw(frame, make_levels(device, 64, 2, FLOATS), thin)
+    translucency.draw(frame, make_levels(device, 64, 2, FLOATS), BLUR, thin)
     frame.submit()
     light = download(device, thin.light)
     assert len(table.source) == 0

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from setups import front_camera, frontal, head_of, joined, place, run_frame, scene_of
 
-from dermis.frame.passes.visibility_buffer import Nearest
+from dermis.frame.passes.visibility_buffer import draw_layers, make_layers
 from dermis.frame.renderer import Renderer
 from dermis.frame.samples import pixel_samples
 from dermis.gpu import Frame, download
@@ -81,9 +81,9 @@ def nearest(
 ) -> list[NDArray[Any]]:
     """Layers for the samples of a pixel by one of the two ways there are."""
     inputs = run_frame(renderer, scene, size=SIZE, samples=samples)
-    finder = Nearest(renderer.device, triangles=triangles, compute=compute)
-    layers, frame = finder.make_layers(SIZE, samples), Frame(renderer.device)
-    finder.draw(frame, "nearest", layers, inputs.camera, inputs.head)
+    layers = make_layers(renderer.device, SIZE, samples, triangles=triangles, compute=compute)
+    frame = Frame(renderer.device)
+    draw_layers(frame, "nearest", layers, inputs.camera, inputs.resources.head)
     frame.submit()
     return [download(renderer.device, layers.texture, layer=k) for k in range(samples)]
 
@@ -142,12 +142,12 @@ def test_triangles_that_reach_behind_the_eye(renderer: Renderer, compute: bool) 
 @pytest.mark.parametrize("triangles", [False, True])
 def test_nothing_is_left_of_the_view_before(renderer: Renderer, triangles: bool) -> None:
     """Layers that were drawn to hold only what they are drawn with."""
-    finder = Nearest(renderer.device, triangles=triangles, compute=True)
-    used, fresh = (finder.make_layers(SIZE, 2) for _ in range(2))
+    options = {"triangles": triangles, "compute": True}
+    used, fresh = (make_layers(renderer.device, SIZE, 2, **options) for _ in range(2))
     for turned, layers in ((False, used), (True, used), (True, fresh)):
         inputs = run_frame(renderer, view_of(HEADS["sphere"], turned), size=SIZE, samples=2)
         frame = Frame(renderer.device)
-        finder.draw(frame, "nearest", layers, inputs.camera, inputs.head)
+        draw_layers(frame, "nearest", layers, inputs.camera, inputs.resources.head)
         frame.submit()
     for layer in range(2):
         left, right = (download(renderer.device, layers.texture, layer=layer) for layers in (used, fresh))

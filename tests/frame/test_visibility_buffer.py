@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from setups import front_camera, frontal, head_of, scene_of, settings_of
 
 from dermis.frame.passes import visibility_buffer
-from dermis.frame.passes.visibility_buffer import Layers, Nearest
+from dermis.frame.passes.visibility_buffer import Layers, draw_layers, make_layers
 from dermis.frame.projection import parallel_view
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Frame, download
@@ -70,14 +70,12 @@ def truth_of_soup(numbers: bytes) -> Truth:
     return Truth(first, np.where(first > 0, every.argmax(axis=0), 0), sure)
 
 
-def shown(
-    finder: Nearest, layers: Layers, renderer: Renderer, head: Head, camera: Camera, samples: int
-) -> Any:
+def shown(layers: Layers, renderer: Renderer, head: Head, camera: Camera, samples: int) -> Any:
     """Layers after a view was drawn into them, and its matrices."""
     settings = settings_of(size=SIZE, samples=samples)
     inputs = renderer.prepare(scene_of(head, frontal(), camera=camera), settings)
     frame = Frame(renderer.device)
-    finder.draw(frame, "nearest", layers, inputs.camera, inputs.head)
+    draw_layers(frame, "nearest", layers, inputs.camera, inputs.resources.head)
     frame.submit()
     made = [download(renderer.device, layers.texture, layer=k) for k in range(layers.count)]
     return made, inputs.camera.matrices(SIZE)
@@ -96,8 +94,8 @@ def test_triangles_of_all_sizes(
     """In workgroups of few and of many triangles, with a word or two for each sample."""
     monkeypatch.setattr(visibility_buffer, "_GROUPS", groups)
     monkeypatch.setattr(visibility_buffer, "_COARSEST_MM", 0.0 if "after" in what else 0.1)
-    finder = Nearest(renderer.device, triangles=what != "depth", compute=True)
-    made, clips = shown(finder, finder.make_layers(SIZE, samples), renderer, SOUP, TURNED, samples)
+    layers = make_layers(renderer.device, SIZE, samples, triangles=what != "depth", compute=True)
+    made, clips = shown(layers, renderer, SOUP, TURNED, samples)
     for layer, clip in zip(made, clips, strict=True):
         truth = truth_of_soup(clip.tobytes())
         assert truth.sure.mean() > 0.9 and 0.3 < (truth.depth > 0).mean() < 1
@@ -113,9 +111,8 @@ def test_more_blocks_than_a_workgroup_lists(renderer: Renderer, monkeypatch: pyt
     monkeypatch.setattr(visibility_buffer, "_GROUPS", 1)
     monkeypatch.setattr(visibility_buffer, "_RUN", 128)
     head = head_of(plane(80.0, 8))
-    finder = Nearest(renderer.device, triangles=True, compute=True)
-    layers = finder.make_layers(SIZE, 1)
-    (layer,), _ = shown(finder, layers, renderer, head, front_camera(head, (0, 0, 0.1), frame_mm=31.0), 1)
+    layers = make_layers(renderer.device, SIZE, 1, triangles=True, compute=True)
+    (layer,), _ = shown(layers, renderer, head, front_camera(head, (0, 0, 0.1), frame_mm=31.0), 1)
     assert (layer > 0).all()
 
 
@@ -129,12 +126,12 @@ def test_tiles_hold_only_the_last_view(
 ) -> None:
     """A ball that leaves tiles and comes back leaves nothing behind, nor do layers that are drawn no more."""
     monkeypatch.setattr(visibility_buffer, "_COARSEST_MM", 0.0 if apart else 0.1)
-    finder = Nearest(renderer.device, triangles=triangles, compute=True)
-    used = finder.make_layers(SIZE, 2)
+    options = {"triangles": triangles, "compute": True}
+    used = make_layers(renderer.device, SIZE, 2, **options)
     for aside, samples in ((40, 2), (-40, 2), (-40, 2), (5, 1), (40, 2), (500, 2)):
         camera = front_camera(BALL, (aside, 0, 0), frame_mm=80.0)
-        fresh = finder.make_layers(SIZE, 2)
-        left, right = (shown(finder, layers, renderer, BALL, camera, samples)[0] for layers in (used, fresh))
+        fresh = make_layers(renderer.device, SIZE, 2, **options)
+        left, right = (shown(layers, renderer, BALL, camera, samples)[0] for layers in (used, fresh))
         assert (right[0] > 0).any() == (aside < 500) and (right[1] > 0).any() == (aside < 500 and samples > 1)
         assert np.array_equal(left, right)
 
@@ -147,9 +144,9 @@ def test_steps_of_depth() -> None:
     seen, little = 3.0 * eye, 1e-3
     at_far, before = np.array([[1, 2, far - 5, 1], [1, 2, far - 5 - little, 1]])
     step = (seen[2] @ before) / (seen[3] @ before) - (seen[2] @ at_far) / (seen[3] @ at_far)
-    assert nearest._depth_range_mm(seen) == pytest.approx(little / step, rel=1e-4)
+    assert visibility_buffer._depth_range_mm(seen) == pytest.approx(little / step, rel=1e-4)
     parallel = parallel_view(np.array([0.0, 0.6, -0.8]), BALL.mesh, 64)
-    assert nearest._depth_range_mm(parallel.clip) == pytest.approx(parallel.far - parallel.near)
+    assert visibility_buffer._depth_range_mm(parallel.clip) == pytest.approx(parallel.far - parallel.near)
 
 
 @pytest.mark.parametrize(("eye", "ahead"), [((1, 0, 0), (0, 0, -50)), ((30, 120, 1), (0, -50, 0))])
@@ -160,8 +157,8 @@ def test_corners_on_the_plane_of_the_eye(renderer: Renderer, eye: Any, ahead: An
     camera = Camera(position=eye, target=target, up=(0.1, 1, 0.2), frame_mm=60.0)
     covered = []
     for compute in (True, False):
-        finder = Nearest(renderer.device, triangles=False, compute=compute)
-        (layer,), _ = shown(finder, finder.make_layers(SIZE, 1), renderer, ball, camera, 1)
+        layers = make_layers(renderer.device, SIZE, 1, triangles=False, compute=compute)
+        (layer,), _ = shown(layers, renderer, ball, camera, 1)
         covered.append(layer > 0)
     assert 0.1 < covered[1].mean() < 0.95
     assert (covered[0] != covered[1]).mean() < 1e-3

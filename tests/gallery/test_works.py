@@ -7,7 +7,7 @@ import re
 import pytest
 
 from dermis import cite
-from dermis.gallery.works import reference
+from dermis.gallery.page import reference
 
 
 @pytest.mark.parametrize("key", sorted(cite.keys()))

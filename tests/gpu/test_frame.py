@@ -12,7 +12,7 @@ import pytest
 
 from dermis.errors import DermisError
 from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture
-from dermis.gpu.bind_groups import BindGroups, key_of
+from dermis.gpu.by_resources import ByResources, key_of
 from dermis.gpu.device import gpu_failures
 from dermis.gpu.frame import Timed
 from dermis.gpu.probe import half_store_rounding
@@ -190,7 +190,7 @@ class Resource:
 
 def test_resources_that_go_one_after_another_are_followed_no_more() -> None:
     """Else what takes their place in memory would be taken for them, with groups that bind what is gone."""
-    groups, first, second = BindGroups(), Resource(), Resource()
+    groups, first, second = ByResources[str](), Resource(), Resource()
     groups.keep(key_of([first, second]), [first, second], "group")
     del first
     assert len(groups) == 0 and groups.followed == 1

@@ -1,13 +1,15 @@
-"""Pipelines that are compiled on other threads."""
+"""Pipelines: compiled on other threads, and those used last are kept."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 import wgpu
 
-from dermis.gpu import ComputeProgram, Device
+from dermis.gpu import ComputeProgram, Device, compiled, program
 
 SHADER = Path(__file__).parent / "scale.wgsl"
 
@@ -23,3 +25,44 @@ def test_what_does_not_compile_is_told_to_who_needs_it(device: Device) -> None:
     for _ in range(2):
         with pytest.raises(wgpu.GPUError, match="NO_SUCH_SWITCH"):
             _ = program.pipeline
+
+
+class Made:
+    """Stands in for a kind of program, and notes what is compiled."""
+
+    def __init__(self) -> None:
+        self.constants: list[dict[str, float]] = []
+
+    def compile(self, device: Device, path: Path, folders: Any, constants: dict[str, float]) -> object:
+        self.constants.append(constants)
+        return object()
+
+    def found(self, device: Device, models: Sequence[int]) -> list[Any]:
+        """Programs of these models, one after the other."""
+        return [compiled(self.compile, device, SHADER, (), (("MODEL", model),)) for model in models]
+
+
+@pytest.fixture
+def made(device: Device, monkeypatch: pytest.MonkeyPatch) -> Made:
+    monkeypatch.setattr(device, "programs", {})
+    monkeypatch.setattr(program, "_MOST_VARIANTS", 3)
+    return Made()
+
+
+def test_going_back_and_forth_compiles_nothing(device: Device, made: Made) -> None:
+    first = made.found(device, (1, 2, 3))
+    assert made.found(device, (1, 2, 3, 1)) == [*first, first[0]]
+    assert made.constants == [{"MODEL": 1}, {"MODEL": 2}, {"MODEL": 3}]
+
+
+def test_the_one_used_longest_ago_goes(device: Device, made: Made) -> None:
+    made.found(device, (1, 2, 3, 1, 4, 1, 3, 2))
+    assert [one["MODEL"] for one in made.constants] == [1, 2, 3, 4, 2]
+
+
+def test_shaders_get_the_constants_that_they_have(device: Device, made: Made, tmp_path: Path) -> None:
+    path = tmp_path / "own.wgsl"
+    path.write_text("override STRIP: u32 = 1;\noverride WIDE: u32 = 0;\n", encoding="utf-8")
+    suited = (("STRIP", 16), ("WIDE", 2), ("OTHER", 3))
+    compiled(made.compile, device, path, (), (("WIDE", 1),), suited)
+    assert made.constants == [{"STRIP": 16, "WIDE": 1}]

@@ -8,7 +8,7 @@ import pytest
 
 from dermis.errors import DermisError
 from dermis.gpu import ComputeProgram, Device
-from dermis.gpu.wgsl_source import compose
+from dermis.gpu.wgsl_source import Member, ShaderFolder, compose
 
 
 def write(folder: Path, **files: str) -> Path:
@@ -49,6 +49,48 @@ def test_only_whole_lines_include(tmp_path: Path) -> None:
     text = '// as in: //#include "gone.wgsl"'
     write(tmp_path, main=text)
     assert compose(tmp_path / "main.wgsl", ()).text == text
+
+
+def test_a_list_is_included_and_repeated_as_it_grows(tmp_path: Path) -> None:
+    write(
+        tmp_path,
+        main="//#include <pets>\n    //#each pets: {name} {NAME} {number} {legs}",
+        cat="// cat",
+        emu="// emu",
+    )
+    pets = [Member("tom-cat", tmp_path / "cat.wgsl", (("legs", "4"),))]
+    folder = ShaderFolder(tmp_path, {"pets": lambda: pets})
+    assert compose(tmp_path / "main.wgsl", (folder,)).text.splitlines() == [
+        "// cat",
+        "    tom_cat TOM_CAT 0u 4",
+    ]
+    pets.append(Member("emu", tmp_path / "emu.wgsl", (("legs", "2"),)))
+    source = compose(tmp_path / "main.wgsl", (folder,))
+    assert source.text.splitlines()[1:] == ["// emu", "    tom_cat TOM_CAT 0u 4", "    emu EMU 1u 2"]
+    assert source.origin[-2:] == (("main.wgsl", 2), ("main.wgsl", 2))
+
+
+def test_numbers_of_python_are_filled_in(tmp_path: Path) -> None:
+    write(tmp_path, main="//#fill const A: f32 = {a}; // {b} of them")
+    folder = ShaderFolder(tmp_path, numbers=lambda: {"a": 0.25, "b": 3})
+    assert compose(tmp_path / "main.wgsl", (folder,)).text == "const A: f32 = 0.25; // 3 of them"
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("//#include <gone>", "the list <gone>"),
+        ("//#each gone: {name}", "the list <gone>"),
+        ("//#fill {gone}", "a word of a, but {gone} came"),
+        ("//#each pets: {gone}", "a word of name, NAME, number, but {gone} came"),
+    ],
+)
+def test_what_nobody_gives_is_named(tmp_path: Path, text: str, error: str) -> None:
+    write(tmp_path, main=text)
+    pets = [Member("cat", tmp_path / "cat.wgsl")]
+    folder = ShaderFolder(tmp_path, {"pets": lambda: pets}, lambda: {"a": 1})
+    with pytest.raises(DermisError, match=f"main.wgsl: expected .*{error}"):
+        compose(tmp_path / "main.wgsl", (folder,))
 
 
 @pytest.mark.parametrize("broken", ["let a: u32 = 1.5;", "let a = unknown;", "let = ;"])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from dermis.atlas.build import build_atlas
-from dermis.cli.render_scene import assemble
+from dermis.cli.scene_options import SceneOptions, assemble
 from dermis.errors import DermisError
 from dermis.human.bust.regions import REGIONS, region_of
 from dermis.human.regions import apply
@@ -221,13 +221,13 @@ def test_tables_that_cannot_be_are_refused(
 
 def test_the_command_refuses_before_it_loads() -> None:
     with pytest.raises(DermisError, match=r"nowhere.toml: expected default, or regions in TOML"):
-        assemble("nobody.obj", {"regions": "nowhere.toml"})
+        assemble("nobody.obj", SceneOptions(head={"regions": "nowhere.toml"}))
     with pytest.raises(DermisError, match="--rho-s: expected one or the other"):
-        assemble("nobody.obj", {"regions": "default", "rho_s": 0.2})
+        assemble("nobody.obj", SceneOptions(head={"regions": "default"}, skin={"rho_s": 0.2}))
 
 
 def test_the_command_gives_the_scan_its_regions(sample_folder: Path) -> None:
-    scene, _ = assemble(SCAN, {"regions": "default"})
+    scene, _ = assemble(SCAN, SceneOptions(head={"regions": "default"}))
     low, high = load_table("default").values.min(axis=0), load_table("default").values.max(axis=0)
     roughness, specular = scene.head.maps.roughness, scene.head.maps.specular
     assert roughness is not None and specular is not None

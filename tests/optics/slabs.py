@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dermis.optics.media import Floats, Layer, Medium
-from dermis.optics.presets import media
+from dermis.optics.media import Floats, Layer, Medium, media
 
 TWO_LAYER = Medium(
     "two_layer",

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dermis.errors import DermisError
+from dermis.optics.media import read_toml
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM
-from dermis.optics.presets import read_toml
 from dermis.optics.profiles import find_table, load_profile, preset_names, write_profile
 from dermis.optics.tissue import load_tissue, names
 

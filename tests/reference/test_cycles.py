@@ -10,9 +10,8 @@ import pytest
 from lit_balls import BALL, LIGHTS, ball_scene
 
 from dermis.errors import DermisError
-from dermis.optics.presets import media
-from dermis.reference.cycles import Method, cycles_passes, cycles_render
-from dermis.reference.cycles_process import PYTHON_VARIABLE
+from dermis.optics.media import media
+from dermis.reference.cycles import PYTHON_VARIABLE, Method, cycles_passes, cycles_render
 from dermis.reference.cycles_scene import describe
 from dermis.reference.half_space import diffuse_albedo
 from dermis.reference.path_traced import Lambertian, path_trace

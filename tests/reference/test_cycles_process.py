@@ -11,10 +11,9 @@ from lit_balls import LIGHTS, ball_scene
 
 from dermis.errors import DermisError
 from dermis.images.io import write_image
-from dermis.optics.presets import media
-from dermis.reference import cycles_process
-from dermis.reference.cycles import CyclesRendered, cycles_render
-from dermis.reference.cycles_process import read_passes
+from dermis.optics.media import media
+from dermis.reference import cycles
+from dermis.reference.cycles import CyclesRendered, cycles_render, read_passes
 from dermis.scene.settings import Settings
 
 SKIN1 = media()["skin1"].with_eta(1.0)
@@ -70,7 +69,7 @@ def test_crash_tells_the_signal(python: Path) -> None:
 
 
 def test_endless_run_is_ended(python: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cycles_process, "_START_S", 0.2)
+    monkeypatch.setattr(cycles, "_START_S", 0.2)
     with pytest.raises(DermisError, match=r"it was ended after 0 s\. Take fewer samples or a smaller image"):
         render(python, "exec sleep 60")
 

@@ -14,8 +14,7 @@ from dermis.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import plane, uv_sphere
-from dermis.optics.media import Layer, Medium
-from dermis.optics.presets import media
+from dermis.optics.media import Layer, Medium, media
 from dermis.reference.half_space import directional_albedo, reflected_radiance
 from dermis.reference.path_traced import Lambertian, path_trace
 from dermis.reference.slab_mc import ScatteringLayer, trace_slab

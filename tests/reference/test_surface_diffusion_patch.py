@@ -47,7 +47,7 @@ def test_edges_are_short_and_the_surface_is_the_same(patch: Patch) -> None:
 
 
 def test_the_whole_is_closed_and_has_its_area() -> None:
-    assert (uses(WHOLE.triangles) == 2).all() and WHOLE.judged.all()
+    assert (uses(WHOLE.triangles) == 2).all() and WHOLE.holds(WHOLE.positions).all()
     area = triangle_areas(WHOLE.positions[WHOLE.triangles])
     per_parent = np.bincount(WHOLE.parent, area)
     assert np.allclose(per_parent, triangle_areas(COARSE[0][COARSE[1]]), rtol=1e-12)
@@ -60,7 +60,7 @@ def test_a_patch_has_one_border_outside_its_margin() -> None:
     distance = np.linalg.norm(SMALL.positions - PLACE, axis=1)
     assert distance[border].min() >= 3.0 + margin_for(VARIANCES) - edge_for(VARIANCES)
     assert distance.max() < 3.0 + margin_for(VARIANCES) + 2 * edge_for(VARIANCES)
-    assert 0 < SMALL.judged.sum() < len(SMALL.positions)
+    assert 0 < SMALL.holds(SMALL.positions).sum() < len(SMALL.positions)
 
 
 def test_places_are_found_again() -> None:
@@ -107,7 +107,7 @@ def test_without_a_margin_the_border_is_felt() -> None:
     values = 1 + np.cos(bare.positions[:, :1])
     levels = diffuse_on_surface(bare.positions, bare.triangles, values, VARIANCES)
     wide = diffuse_on_surface(SMALL.positions, SMALL.triangles, 1 + np.cos(SMALL.positions[:, :1]), VARIANCES)
-    assert abs(levels[1, :, 0].max() - wide[1, SMALL.judged, 0].max()) > 0.01
+    assert abs(levels[1, :, 0].max() - wide[1, SMALL.holds(SMALL.positions), 0].max()) > 0.01
 
 
 def test_edges_in_need_alone_are_halved() -> None:

@@ -56,10 +56,10 @@ def shared_driver(make_driver: Callable[[], InputDriver]) -> InputDriver:
 @pytest.fixture
 def driver(shared_driver: InputDriver, caplog: pytest.LogCaptureFixture) -> Iterator[InputDriver]:
     """The module's viewer, back at its first state; errors that rendercanvas only logs fail the test."""
-    history = shared_driver.viewer.desk.history
+    history = shared_driver.viewer.session.history
     while history.can_undo:
         history.undo()
     shared_driver.viewer.panel.visible = True
-    shared_driver.viewer.desk.split.release()
+    shared_driver.viewer.session.split.release()
     yield shared_driver
     assert [record.message for record in caplog.records if record.levelname == "ERROR"] == []

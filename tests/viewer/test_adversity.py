@@ -1,4 +1,4 @@
-"""Windows that change size all the time or have none, devices that go, and driver quicker than frames."""
+"""Windows that keep changing size or have none, lost devices, and input faster than frames."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def move(driver: InputDriver, x: float, y: float = ON_HEAD[1], kind: str = "poin
 
 
 def lose_device(driver: InputDriver) -> Any:
-    studio = driver.viewer.desk.studio
+    studio = driver.viewer.session.studio
     studio.renderer.device.handle.destroy()
     return studio
 
@@ -54,8 +54,8 @@ def test_a_storm_of_sizes_ends_in_the_same_picture_and_memory(driver: InputDrive
         driver.frame(chance.uniform(0.0, 0.4))
     resized(driver, *SIZE)
     move(driver, ON_HEAD[0], kind="pointer_up")
-    while driver.viewer.desk.history.can_undo:
-        driver.viewer.desk.history.undo()
+    while driver.viewer.session.history.can_undo:
+        driver.viewer.session.history.undo()
     driver.settled()
     resized(driver, 300, 200)
     driver.settled()
@@ -67,12 +67,12 @@ def test_a_storm_of_sizes_ends_in_the_same_picture_and_memory(driver: InputDrive
 
 @pytest.mark.parametrize("how", ["picture", "split", ATLAS, "normals"])
 def test_a_minimised_window_goes_on_where_it_was(driver: InputDriver, how: str) -> None:
-    desk = driver.viewer.desk
+    session = driver.viewer.session
     if how == "split":
-        desk.split.freeze(desk.state)
-        desk.change(desk.state.with_skin(mix=0.0))
+        session.split.freeze(session.state)
+        session.change(session.state.with_skin(mix=0.0))
     else:
-        desk.change(desk.state.in_view(how))
+        session.change(session.state.in_view(how))
     before = driver.settled()
     move(driver, ON_HEAD[0], kind="pointer_down")
     for size in ((0, 0), (0, 300), (1, 1), (290, 2)):
@@ -87,13 +87,13 @@ def test_a_minimised_window_goes_on_where_it_was(driver: InputDriver, how: str) 
 @pytest.mark.parametrize("how", ["split", ATLAS, "minimised"])
 def test_a_device_lost_in_a_drag_comes_back(make_driver: Callable[[], InputDriver], how: str) -> None:
     driver = make_driver()
-    desk = driver.viewer.desk
+    session = driver.viewer.session
     if how == "split":
-        desk.split.freeze(desk.state)
-        desk.split.share = 0.2  # away from the hand
-        desk.change(desk.state.with_skin(mix=0.0))
+        session.split.freeze(session.state)
+        session.split.share = 0.2  # away from the hand
+        session.change(session.state.with_skin(mix=0.0))
     elif how == ATLAS:
-        desk.change(desk.state.in_view(ATLAS))
+        session.change(session.state.in_view(ATLAS))
     driver.settled()
     move(driver, ON_HEAD[0], kind="pointer_down")
     move(driver, ON_HEAD[0] - 20.0)
@@ -108,10 +108,11 @@ def test_a_device_lost_in_a_drag_comes_back(make_driver: Callable[[], InputDrive
     move(driver, ON_HEAD[0] - 60.0)
     move(driver, ON_HEAD[0] - 60.0, kind="pointer_up")
     after = driver.settled()
-    assert desk.studio is not lost and driver.viewer.failure is None
+    assert session.studio is not lost and driver.viewer.failure is None
     same = make_driver()
-    same.viewer.desk.split.before, same.viewer.desk.split.share = desk.split.before, desk.split.share
-    same.viewer.desk.change(desk.state)
+    copy = same.viewer.session
+    copy.split.before, copy.split.share = session.split.before, session.split.share
+    copy.change(session.state)
     same.event("pointer_move", x=ON_HEAD[0] - 60.0, y=ON_HEAD[1], button=0, buttons=())
     found = same.settled()
     np.testing.assert_array_equal(found[PICTURE], after[PICTURE])
@@ -126,11 +127,11 @@ def test_devices_that_go_one_after_the_other_leave_nothing_behind(
     held = held_bytes()
     for k in range(3):
         lose_device(driver)
-        driver.viewer.desk.change(driver.viewer.desk.state.with_skin(mix=0.1 * k))
+        driver.viewer.session.change(driver.viewer.session.state.with_skin(mix=0.1 * k))
         driver.frame()
         driver.settled()
-    while driver.viewer.desk.history.can_undo:
-        driver.viewer.desk.history.undo()
+    while driver.viewer.session.history.can_undo:
+        driver.viewer.session.history.undo()
     assert np.array_equal(driver.settled()[PICTURE], before[PICTURE])
     gc.collect()
     assert held_bytes() <= FEW_BYTES * held
@@ -154,34 +155,34 @@ def test_a_device_that_never_works_again_closes_the_window(
     assert driver.canvas.get_closed() and isinstance(driver.viewer.failure, wgpu.GPUError)
 
 
-def test_what_driver_do_during_a_frame_is_in_the_next_one(
+def test_input_during_a_frame_is_in_the_next_one(
     driver: InputDriver, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """All of it at once: nothing queues, and it is one step of the history."""
     driver.settled()
-    desk = driver.viewer.desk
-    start, image, frames = desk.state, desk.studio.image, []
+    session = driver.viewer.session
+    start, image, frames = session.state, session.studio.image, []
 
     def long_frame(*given: Any) -> Any:
         if not frames:
             for k in range(300):
                 move(driver, ON_HEAD[0] - 0.3 * k)
-        frames.append(desk.state)
+        frames.append(session.state)
         return image(*given)
 
-    monkeypatch.setattr(desk.studio, "image", long_frame)
+    monkeypatch.setattr(session.studio, "image", long_frame)
     move(driver, ON_HEAD[0], kind="pointer_down")
     driver.frame()
-    assert desk.state is start
+    assert session.state is start
     driver.frame()
-    last = desk.state
+    last = session.state
     move(driver, ON_HEAD[0] - 0.3 * 299, kind="pointer_up")
     driver.settled()
-    assert desk.state is last and len(frames) < 30
-    desk.history.undo()
-    assert desk.state is start and not desk.history.can_undo
+    assert session.state is last and len(frames) < 30
+    session.history.undo()
+    assert session.state is start and not session.history.can_undo
     slowly(driver)
-    assert desk.state.scene.camera.position == pytest.approx(last.scene.camera.position, abs=1e-6)
+    assert session.state.scene.camera.position == pytest.approx(last.scene.camera.position, abs=1e-6)
 
 
 def slowly(driver: InputDriver) -> None:

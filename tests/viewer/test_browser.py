@@ -93,7 +93,7 @@ def places(make_driver: Callable[[], InputDriver]) -> dict[str, tuple[float, flo
     """Where the panel's controls are in a window of the page's size, with the list of views open."""
     driver = make_driver()
     driver.press("show")
-    return driver.viewer.desk.places
+    return driver.viewer.session.positions
 
 
 def test_the_panel_alters_the_picture(page: Any, places: dict[str, tuple[float, float]]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dermis.scene.settings import Settings
-from dermis.viewer.pace import EFFORTS, Pace
+from dermis.viewer.pace import QUALITY_LEVELS, Pace
 
 WANTED = Settings(atlas=2048, samples=4, shadow_size=2048)
 
@@ -30,19 +30,19 @@ def test_a_gpu_begins_with_everything() -> None:
 
 def test_slow_frames_lower_the_effort_and_fast_ones_raise_it_again() -> None:
     pace = noted(Pace(software=True), *[400.0] * 20)
-    assert pace.effort is EFFORTS[-1]
-    assert noted(pace, *[10.0] * 20).effort is EFFORTS[2]
+    assert pace.quality is QUALITY_LEVELS[-1]
+    assert noted(pace, *[10.0] * 20).quality is QUALITY_LEVELS[2]
 
 
 def test_one_slow_frame_alone_changes_nothing() -> None:
     pace = noted(Pace(software=True), 400.0, 90.0, 400.0, 90.0)
-    assert pace.effort is EFFORTS[2]
+    assert pace.quality is QUALITY_LEVELS[2]
 
 
 def test_frames_within_the_budget_stay_as_they_are() -> None:
     pace = noted(Pace(software=True), *[400.0] * 2)
-    level = pace.effort
-    assert noted(pace, *[95.0] * 20).effort is level
+    level = pace.quality
+    assert noted(pace, *[95.0] * 20).quality is level
 
 
 def test_less_than_asked_for_is_not_raised() -> None:

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from offscreen_input import InputDriver
 
-from dermis.viewer.panel.sections.profile import CHANNELS
-from dermis.viewer.panel.sections.timing import stage_series
+from dermis.viewer.panel.plots import CHANNELS, stage_series
 
 PANEL = np.s_[:, :190]
 
@@ -24,21 +23,21 @@ def test_stages_without_a_time_in_a_frame_have_none_there() -> None:
 
 
 def test_the_studio_keeps_the_times_of_the_last_frames(driver: InputDriver) -> None:
-    times, desk = driver.viewer.desk.studio.times, driver.viewer.desk
+    times, session = driver.viewer.session.studio.times, driver.viewer.session
     for k in range(130):
         times.append({"shade": float(k)})
     assert len(times) == 120
-    desk.change(desk.state.with_settings(exposure=1.5))
+    session.change(session.state.with_settings(exposure=1.5))
     driver.frame()
-    assert len(times) == 120 and desk.studio.rendered is not None
-    assert times[-1] == (desk.studio.rendered.gpu_ms or {})
+    assert len(times) == 120 and session.studio.rendered is not None
+    assert times[-1] == (session.studio.rendered.gpu_ms or {})
 
 
 def test_the_profile_is_drawn_in_three_colours_and_follows_it(driver: InputDriver) -> None:
     wide = driver.settled()
     for colour in CHANNELS:
         assert count_of(wide, colour) > 15
-    driver.viewer.desk.change(driver.viewer.desk.state.with_skin(profile="dark"))
+    driver.viewer.session.change(driver.viewer.session.state.with_skin(profile="dark"))
     assert np.abs(driver.settled()[PANEL].astype(int) - wide[PANEL]).max() > 50
 
 

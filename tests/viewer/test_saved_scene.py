@@ -16,8 +16,8 @@ from dermis.human.bust.regions import REGIONS
 from dermis.images.io import read_image
 from dermis.scene import Environment
 from dermis.scene.skin import TissueLayer
-from dermis.viewer.orbit import orbit
-from dermis.viewer.regions import regional
+from dermis.viewer.navigation import orbit
+from dermis.viewer.session import apply_regions
 from dermis.viewer.state import ViewerState, load_state, save_state
 from dermis.viewer.studio import Studio
 
@@ -38,7 +38,7 @@ def with_regions(state: ViewerState, folder: Path) -> ViewerState:
     Image.fromarray(labels).save(folder / "labels.png")
     rows = [f'"{name}" = {{ m = 0.3, rho_s = {0.1 + 0.05 * k:.2f} }}' for k, name in enumerate(REGIONS)]
     (folder / "regions.toml").write_text("\n".join(['labels = "labels.png"', *rows, ""]))
-    return regional(state.with_skin(roughness=0.5), str(folder / "regions.toml")).with_skin(oiliness=0.7)
+    return apply_regions(state.with_skin(roughness=0.5), str(folder / "regions.toml")).with_skin(oiliness=0.7)
 
 
 def with_surface(state: ViewerState, folder: Path) -> ViewerState:

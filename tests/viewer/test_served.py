@@ -220,10 +220,10 @@ def test_a_lost_device_is_told_in_the_page_and_the_head_turns_on(viewer: Any) ->
         page = Page(socket)
         page.show()
         before = page.still()
-        viewer.desk.studio.renderer.device.handle.destroy()
+        viewer.session.studio.renderer.device.handle.destroy()
         page.drag(300, 330)
         after = page.still()
-        assert "lost and opened again" in viewer.desk.messages.said and viewer.failure is None
+        assert "lost and opened again" in viewer.session.message and viewer.failure is None
         assert difference(before, after) > 0.5
         lines = np.s_[255:, 205:]  # where messages are
         assert np.abs(after[lines] - before[lines]).max() > 100

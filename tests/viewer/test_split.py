@@ -29,12 +29,12 @@ def frozen(driver: InputDriver) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     driver.press("Before and after")
     driver.press("freeze")
     driver.press("Before and after")
-    assert driver.viewer.desk.split.before is driver.viewer.desk.state
-    driver.viewer.desk.split.release()
-    driver.viewer.desk.change(driver.viewer.desk.state.with_skin(mix=0.0, roughness=0.7))
+    assert driver.viewer.session.split.before is driver.viewer.session.state
+    driver.viewer.session.split.release()
+    driver.viewer.session.change(driver.viewer.session.state.with_skin(mix=0.0, roughness=0.7))
     after = driver.settled()
-    driver.viewer.desk.split.freeze(driver.viewer.desk.history.states[-2])
-    driver.viewer.desk.split.share = 0.5
+    driver.viewer.session.split.freeze(driver.viewer.session.history.states[-2])
+    driver.viewer.session.split.share = 0.5
     return before, after
 
 
@@ -42,34 +42,34 @@ def test_left_is_what_was_frozen_right_is_live_and_the_divider_is_dragged(driver
     before, after = frozen(driver)
     assert np.abs(before[ROWS, LEFT:].astype(int) - after[ROWS, LEFT:]).mean() > 0.5
     assert_halves(driver.settled(), before, after, 300)
-    camera = driver.viewer.desk.state.scene.camera
+    camera = driver.viewer.session.state.scene.camera
     driver.drag((302.0, 150.0), (252.0, 300.0))
     assert_halves(driver.settled(), before, after, 252)
-    assert driver.viewer.desk.state.scene.camera == camera
-    driver.viewer.desk.split.release()
+    assert driver.viewer.session.state.scene.camera == camera
+    driver.viewer.session.split.release()
     assert np.array_equal(driver.settled()[ROWS, LEFT:], after[ROWS, LEFT:])
 
 
 def test_the_camera_turns_both_sides(driver: InputDriver) -> None:
     frozen(driver)
-    split, desk = driver.viewer.desk.split, driver.viewer.desk
+    split, session = driver.viewer.session.split, driver.viewer.session
     still = driver.settled()
     driver.drag((350.0, 240.0), (310.0, 240.0))
     turned = driver.settled()
     for old, new in zip(sides(still, 300), sides(turned, 300), strict=True):
         assert np.abs(old.astype(int) - new).mean() > 0.5
-    live, was = desk.state, split.before
+    live, was = session.state, split.before
     assert was is not None
     split.release()
     after = driver.settled()
-    desk.change(was.with_camera(live.scene.camera))
+    session.change(was.with_camera(live.scene.camera))
     assert_halves(turned, driver.settled(), after, 300)
 
 
 def test_a_divider_at_the_edge_shows_one_side(driver: InputDriver) -> None:
     before, after = frozen(driver)
     for share, whole in ((0.0, after), (1.0, before)):
-        driver.viewer.desk.split.share = share
+        driver.viewer.session.split.share = share
         driver.event("pointer_move", x=5.0, y=5.0, button=0, buttons=())
         found = driver.settled()[ROWS, LEFT + 2 : RIGHT - 2]
         assert np.array_equal(found, whole[ROWS, LEFT + 2 : RIGHT - 2])

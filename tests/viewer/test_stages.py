@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from offscreen_input import ADAPTER
 
-from dermis.gpu.repeated import Recording
+from dermis.gpu.recording import Recording
 from dermis.scene.environment import Environment
-from dermis.viewer.orbit import orbit
-from dermis.viewer.pace import EFFORTS
+from dermis.viewer.navigation import orbit
+from dermis.viewer.pace import QUALITY_LEVELS
 from dermis.viewer.state import ViewerState
 from dermis.viewer.studio import Studio
 
 SIZE = (96, 96)
-SPREAD = {"diffuse", "transmission", "combine"}
+SPREAD = {"diffuse", "translucency", "combine"}
 PICTURE = {"shade", "post"}
 
 
@@ -55,7 +55,10 @@ CHANGES: dict[str, tuple[Callable[[ViewerState], ViewerState], set[str]]] = {
         lambda state: state.with_light(0, irradiance=(1.0, 2.0, 3.0)),
         {"irradiance"} | SPREAD | PICTURE,
     ),
-    "roughness": (lambda state: state.with_skin(roughness=0.6), {"irradiance"} | SPREAD | PICTURE),
+    "roughness": (
+        lambda state: state.with_skin(roughness=0.6),
+        {"surface", "irradiance"} | SPREAD | PICTURE,
+    ),
     "mix": (lambda state: state.with_skin(mix=1.0), {"irradiance"} | SPREAD | PICTURE),
     "profile": (lambda state: state.with_skin(profile="dark"), SPREAD | PICTURE),
     "fewer Gaussians": (  # which have another space for their levels
@@ -63,13 +66,16 @@ CHANGES: dict[str, tuple[Callable[[ViewerState], ViewerState], set[str]]] = {
         {"irradiance"} | SPREAD | PICTURE,
     ),
     "pigments": (skin_of(0.05), SPREAD | PICTURE),
-    "stretch": (lambda state: state.with_settings(stretch="none"), {"irradiance"} | SPREAD | PICTURE),
+    "stretch": (
+        lambda state: state.with_settings(stretch="none"),
+        {"surface", "irradiance"} | SPREAD | PICTURE,
+    ),
     "part": (lambda state: state.in_view("specular"), PICTURE),
     "background": (lambda state: state.with_settings(background=(0.1, 0.2, 0.3)), PICTURE),
     "exposure": (lambda state: state.with_settings(exposure=2.0), {"post"}),
     "tone": (lambda state: state.with_settings(tone="filmic"), {"post"}),
     "bloom": (lambda state: state.with_settings(bloom=0.2), {"bloom", "post"}),
-    "nothing": (lambda state: replace(state), {"post"}),
+    "nothing": (lambda state: replace(state), set()),
 }
 
 
@@ -173,8 +179,8 @@ def test_shadows_of_another_size_have_light_of_their_own(
     studio: Studio, state: ViewerState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where frames in motion differ from still ones in nothing else."""
-    coarse = replace(EFFORTS[2], shadow_size=64)
-    monkeypatch.setattr("dermis.viewer.pace.EFFORTS", (EFFORTS[0], coarse, coarse, coarse))
+    coarse = replace(QUALITY_LEVELS[2], shadow_size=64)
+    monkeypatch.setattr("dermis.viewer.pace.QUALITY_LEVELS", (QUALITY_LEVELS[0], coarse, coarse, coarse))
     for moving in (True, False):
         stages(studio, turned(state, 0.1), moving)
     for angle, moving in ((0.2, True), (0.2, False), (0.3, True)):
@@ -202,8 +208,8 @@ def test_a_slider_leaves_the_frozen_side(studio: Studio, state: ViewerState) -> 
 def test_states_in_motion_and_still_are_recorded_once(
     studio: Studio, state: ViewerState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    small = replace(EFFORTS[2], atlas=64)
-    monkeypatch.setattr("dermis.viewer.pace.EFFORTS", (EFFORTS[0], small, small, small))
+    small = replace(QUALITY_LEVELS[2], atlas=64)
+    monkeypatch.setattr("dermis.viewer.pace.QUALITY_LEVELS", (QUALITY_LEVELS[0], small, small, small))
     live = state.with_skin(mix=0.9)
     for moving in (True, False):
         both(studio, live, state, moving)

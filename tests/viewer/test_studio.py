@@ -15,8 +15,8 @@ from dermis.frame.renderer import Renderer
 from dermis.images.io import read_image
 from dermis.scene import Settings
 from dermis.viewer.chart import ATLAS
-from dermis.viewer.orbit import orbit
-from dermis.viewer.pace import EFFORTS
+from dermis.viewer.navigation import orbit
+from dermis.viewer.pace import QUALITY_LEVELS
 from dermis.viewer.state import ViewerState
 from dermis.viewer.studio import Studio
 from dermis.viewer.views import VIEWS
@@ -78,9 +78,7 @@ CHANGES: dict[str, Callable[[ViewerState], ViewerState]] = {
 def test_what_is_kept_never_shows(name: str, studio: Studio, fresh: Renderer, state: ViewerState) -> None:
     image(studio, state)
     changed = CHANGES[name](state)
-    expected = fresh.draw(
-        changed.scene, changed.settings.model_copy(update={"size": SIZE}), keep_shadows=False
-    )
+    expected = fresh.draw(changed.scene, changed.settings.model_copy(update={"size": SIZE}), anew=True)
     off = np.abs(image(studio, changed) - expected.srgb8().astype(int))
     assert off.max() <= (1 if name == "pigments" else 0)  # whose fit begins elsewhere
 
@@ -104,9 +102,9 @@ def test_pigments_fit_again_and_load_nothing(studio: Studio, state: ViewerState)
     skin = state.with_skin(profile="light")
     before = prepared(studio, skin.with_pigments(melanin=0.02))
     after = prepared(studio, skin.with_pigments(melanin=0.021))
-    assert not np.array_equal(before.level_weight, after.level_weight)
+    assert not np.array_equal(before.blurs[0].weight, after.blurs[0].weight)
     assert_same_textures(before, after)
-    assert before.layouts[0].thin.pairs is after.layouts[0].thin.pairs
+    assert before.layouts[0].translucency.pairs is after.layouts[0].translucency.pairs
 
 
 def prepared(studio: Studio, state: ViewerState) -> Any:
@@ -124,8 +122,8 @@ def assert_same_textures(a: Any, b: Any) -> None:
 def test_going_back_and_forth_between_two_sizes_lights_each_once(
     studio: Studio, state: ViewerState, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    small = replace(EFFORTS[2], atlas=64)
-    monkeypatch.setattr("dermis.viewer.pace.EFFORTS", (EFFORTS[0], small, small, small))
+    small = replace(QUALITY_LEVELS[2], atlas=64)
+    monkeypatch.setattr("dermis.viewer.pace.QUALITY_LEVELS", (QUALITY_LEVELS[0], small, small, small))
     moving, still = [(turned(state, 0.1 * k), bool(k % 2)) for k in (1, 2)]
     for one, moves in (moving, still):
         image(studio, one, moves)

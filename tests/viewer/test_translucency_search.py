@@ -92,14 +92,14 @@ def test_pigments_move_on_while_the_search_goes_on(studio: Studio, held: Held, s
 def test_a_moving_picture_shows_what_was_found(studio: Studio, held: Held, state: ViewerState) -> None:
     dark = skin(state, DARK)
     image(studio, dark, True)
-    assert studio.renderer.thin_parts.provisional
+    assert studio.renderer.memo.provisional
     held.may_go_on.set()
     for k in range(1000):
-        if not studio.renderer.thin_parts.provisional:
+        if not studio.renderer.memo.provisional:
             break
         time.sleep(0.01)
         image(studio, dark.with_settings(exposure=1.0 + 1e-4 * k), True)
-    assert not studio.renderer.thin_parts.provisional
+    assert not studio.renderer.memo.provisional
     assert len(held.widths) == 1
 
 
@@ -124,20 +124,20 @@ def test_the_viewer_stays_alive_until_it_is_found(
 ) -> None:
     held.may_go_on.set()
     driver = make_driver()
-    desk = driver.viewer.desk
-    desk.change(skin(state, PALE))
+    session = driver.viewer.session
+    session.change(skin(state, PALE))
     driver.settled()
     held.may_go_on.clear()
-    desk.change(skin(state, DARK))
+    session.change(skin(state, DARK))
     for _ in range(20):  # of 50 ms: long after what counts as motion
         driver.frame()
-        assert desk.studio.is_searching and not driver.viewer.is_still
-    camera = desk.state.scene.camera
+        assert session.studio.is_searching and not driver.viewer.is_still
+    camera = session.state.scene.camera
     driver.drag((300.0, 240.0), (230.0, 240.0))
-    assert desk.state.scene.camera != camera and desk.studio.is_searching
+    assert session.state.scene.camera != camera and session.studio.is_searching
     held.may_go_on.set()
     driver.settled()
-    assert desk.studio.is_current and not desk.studio.is_searching
+    assert session.studio.is_current and not session.studio.is_searching
 
 
 def test_a_search_that_fails_is_begun_again(

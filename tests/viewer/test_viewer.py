@@ -39,34 +39,34 @@ def test_a_drag_turns_the_head_and_is_one_step_back(driver: InputDriver) -> None
     driver.drag(ON_HEAD, TO_THE_LEFT)
     after = driver.settled()
     assert difference(before, after) > 1.0
-    driver.viewer.desk.history.undo()
+    driver.viewer.session.history.undo()
     driver.event("pointer_move", x=5.0, y=5.0, button=0, buttons=())
     assert difference(before, driver.settled()) == 0.0
-    assert not driver.viewer.desk.history.can_undo
+    assert not driver.viewer.session.history.can_undo
 
 
 def test_shift_carries_the_light_and_leaves_the_camera(driver: InputDriver) -> None:
-    before, state = driver.settled(), driver.viewer.desk.state
+    before, state = driver.settled(), driver.viewer.session.state
     driver.drag(ON_HEAD, TO_THE_LEFT, modifiers=("Shift",))
-    after = driver.viewer.desk.state
+    after = driver.viewer.session.state
     assert after.scene.camera == state.scene.camera
     assert after.scene.lights[0] != state.scene.lights[0] and after.scene.lights[1] == state.scene.lights[1]
     assert difference(before, driver.settled()) > 0.5
 
 
 def test_the_wheel_comes_nearer_and_a_double_click_turns_around_the_place(driver: InputDriver) -> None:
-    camera = driver.viewer.desk.state.scene.camera
+    camera = driver.viewer.session.state.scene.camera
     driver.event("wheel", x=300.0, y=240.0, dx=0.0, dy=-200.0)
     driver.settled()
-    near = driver.viewer.desk.state.scene.camera
+    near = driver.viewer.session.state.scene.camera
     assert near.frame_mm < 0.9 * camera.frame_mm
     driver.event("double_click", x=230.0, y=200.0)
     driver.settled()
-    assert driver.viewer.desk.state.scene.camera.target != near.target
+    assert driver.viewer.session.state.scene.camera.target != near.target
 
 
 def test_two_fingers_that_part_come_nearer(driver: InputDriver) -> None:
-    camera = driver.viewer.desk.state.scene.camera
+    camera = driver.viewer.session.state.scene.camera
     driver.event("pointer_down", x=300.0, y=240.0, button=1, buttons=(1,))
     driver.frame()
     for gap in (20.0, 40.0, 80.0):
@@ -75,21 +75,21 @@ def test_two_fingers_that_part_come_nearer(driver: InputDriver) -> None:
         driver.frame()
     driver.event("pointer_up", x=300.0, y=240.0, button=1, buttons=())
     driver.frame()
-    assert driver.viewer.desk.state.scene.camera.frame_mm == pytest.approx(camera.frame_mm / 4.0)
+    assert driver.viewer.session.state.scene.camera.frame_mm == pytest.approx(camera.frame_mm / 4.0)
 
 
 def test_keys_are_presets_undo_and_the_panel(driver: InputDriver) -> None:
-    desk = driver.viewer.desk
-    start, plain = desk.state, driver.settled()
+    session = driver.viewer.session
+    start, plain = session.state, driver.settled()
     driver.event("key_down", key="3")
     driver.frame()
-    assert desk.state.scene.camera == preset("profile", desk.state.scene.head)
+    assert session.state.scene.camera == preset("profile", session.state.scene.head)
     driver.event("key_down", key="z", modifiers=("Control",))
     driver.frame()
-    assert desk.state is start
+    assert session.state is start
     driver.event("key_down", key="y", modifiers=("Control",))
     driver.frame()
-    assert desk.state is not start
+    assert session.state is not start
     driver.event("key_down", key="z", modifiers=("Control",))
     driver.event("key_down", key="Tab")
     bare = driver.settled()
@@ -101,69 +101,69 @@ def test_keys_are_presets_undo_and_the_panel(driver: InputDriver) -> None:
 
 def test_a_slider_changes_the_picture_and_is_one_step(driver: InputDriver) -> None:
     before = driver.settled()
-    x, y = driver.place("roughness")
+    x, y = driver.position("roughness")
     driver.drag((x, y), (x + 40.0, y))
-    assert driver.viewer.desk.state.scene.skin.roughness > 0.3
+    assert driver.viewer.session.state.scene.skin.roughness > 0.3
     assert difference(before, driver.settled()) > 0.05
-    driver.viewer.desk.history.undo()
-    assert not driver.viewer.desk.history.can_undo
+    driver.viewer.session.history.undo()
+    assert not driver.viewer.session.history.can_undo
 
 
 def test_a_choice_changes_the_picture(driver: InputDriver) -> None:
     before = driver.settled()
     driver.choose("show", "normals")
-    assert driver.viewer.desk.state.view == "normals"
+    assert driver.viewer.session.state.view == "normals"
     assert difference(before, driver.settled()) > 10.0
 
 
 def test_a_drag_that_begins_on_the_panel_stays_there(driver: InputDriver) -> None:
-    camera = driver.viewer.desk.state.scene.camera
-    x, y = driver.place("mix")
+    camera = driver.viewer.session.state.scene.camera
+    x, y = driver.position("mix")
     driver.drag((x, y), (380.0, 150.0))
-    assert driver.viewer.desk.state.scene.camera == camera
+    assert driver.viewer.session.state.scene.camera == camera
 
 
 def test_a_touch_on_the_head_right_after_one_on_the_panel_turns_it(driver: InputDriver) -> None:
     """No frame is drawn between the two in which the panel could notice that the pointer went away."""
-    camera = driver.viewer.desk.state.scene.camera
+    camera = driver.viewer.session.state.scene.camera
     driver.click((150.0, 243.0))  # a label
     driver.event("pointer_down", x=300.0, y=240.0, button=1, buttons=(1,))
     driver.event("pointer_move", x=260.0, y=240.0, button=1, buttons=(1,))
     driver.event("pointer_up", x=260.0, y=240.0, button=1, buttons=())
     driver.frame()
-    assert driver.viewer.desk.state.scene.camera != camera
+    assert driver.viewer.session.state.scene.camera != camera
 
 
 def test_melanin_darkens_the_skin(driver: InputDriver) -> None:
-    desk = driver.viewer.desk
-    desk.change(desk.state.with_skin(profile="light", albedo="profile"))
+    session = driver.viewer.session
+    session.change(session.state.with_skin(profile="light", albedo="profile"))
     light = driver.settled()
-    desk.change(desk.state.with_pigments(melanin=0.4))
+    session.change(session.state.with_pigments(melanin=0.4))
     dark = driver.settled()
     assert dark[200:280, 210:240].mean() < 0.7 * light[200:280, 210:240].mean()
 
 
 def test_an_impossible_state_is_told_and_the_last_picture_stays(driver: InputDriver) -> None:
-    desk = driver.viewer.desk
+    session = driver.viewer.session
     before = driver.settled()
-    desk.change(desk.state.with_skin(profile="nothing.csv"))
+    session.change(session.state.with_skin(profile="nothing.csv"))
     after = driver.frame()
-    assert "nothing.csv" in desk.messages.said
+    assert "nothing.csv" in session.message
     assert difference(before, after, rows=140) == 0.0
     assert driver.settled() is not None  # it is not tried again and again
-    desk.history.undo()
+    session.history.undo()
     assert difference(before, driver.settled()) == 0.0
 
 
 def test_buttons_save_load_and_take_pictures(driver: InputDriver, tmp_path: Path) -> None:
-    desk = driver.viewer.desk
-    desk.save(tmp_path / "scene.toml")
-    saved = desk.state
-    desk.change(desk.state.with_skin(mix=0.9))
-    desk.load(tmp_path / "scene.toml")
-    assert desk.state.scene.skin == saved.scene.skin and desk.state.scene.head is saved.scene.head
-    desk.screenshot(tmp_path / "a.png", (32, 32))
-    assert (tmp_path / "a.png").stat().st_size > 100 and "a.png" in desk.messages.said
+    session = driver.viewer.session
+    session.save(tmp_path / "scene.toml")
+    saved = session.state
+    session.change(session.state.with_skin(mix=0.9))
+    session.load(tmp_path / "scene.toml")
+    assert session.state.scene.skin == saved.scene.skin and session.state.scene.head is saved.scene.head
+    session.screenshot(tmp_path / "a.png", (32, 32))
+    assert (tmp_path / "a.png").stat().st_size > 100 and "a.png" in session.message
 
 
 def test_the_window_may_change_its_size_or_have_none(driver: InputDriver) -> None:
@@ -179,20 +179,20 @@ def test_the_window_may_change_its_size_or_have_none(driver: InputDriver) -> Non
 def test_a_lost_device_is_opened_again(make_driver: Callable[[], InputDriver]) -> None:
     driver = make_driver()
     before = driver.settled()
-    lost = driver.viewer.desk.studio
+    lost = driver.viewer.session.studio
     lost.renderer.device.handle.destroy()
-    driver.viewer.desk.change(driver.viewer.desk.state.with_skin(mix=0.4))
+    driver.viewer.session.change(driver.viewer.session.state.with_skin(mix=0.4))
     driver.frame()
-    assert driver.viewer.desk.studio is not lost and "lost" in driver.viewer.desk.messages.said
-    driver.viewer.desk.history.undo()
+    assert driver.viewer.session.studio is not lost and "lost" in driver.viewer.session.message
+    driver.viewer.session.history.undo()
     assert difference(before, driver.settled(), rows=380) == 0.0
     assert np.abs(driver.frame()[30:440, :190].astype(int) - before[30:440, :190]).max() == 0  # not "redo"
 
 
 def test_changes_leave_no_memory_behind(driver: InputDriver) -> None:
     """Of the process, where what each frame left behind would add up."""
-    desk = driver.viewer.desk
-    start = desk.state
+    session = driver.viewer.session
+    start = session.state
     for k in range(30):
         _change(driver, k)
     gc.collect()
@@ -201,13 +201,13 @@ def test_changes_leave_no_memory_behind(driver: InputDriver) -> None:
         _change(driver, k)
     gc.collect()
     assert _resident_mb() - before < 8.0
-    desk.change(start)
+    session.change(start)
 
 
 def _change(driver: InputDriver, k: int) -> None:
-    desk = driver.viewer.desk
-    desk.change(
-        desk.state.with_skin(mix=0.2 + 0.004 * (k % 100)).with_light(0, position=(k % 50, 500.0, 900.0))
+    session = driver.viewer.session
+    session.change(
+        session.state.with_skin(mix=0.2 + 0.004 * (k % 100)).with_light(0, position=(k % 50, 500.0, 900.0))
     )
     driver.frame()
 

@@ -11,7 +11,7 @@ from PIL import Image
 from dermis.errors import DermisError
 from dermis.human.bust.regions import REGIONS
 from dermis.scene.skin import Skin
-from dermis.viewer.regions import NO_REGIONS, regional
+from dermis.viewer.session import NO_REGIONS, apply_regions
 from dermis.viewer.state import ViewerState
 
 
@@ -32,23 +32,23 @@ def _small(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_table_gives_maps_and_their_mean_and_none_takes_them_away(state: ViewerState, table: str) -> None:
-    found = regional(state, table)
+    found = apply_regions(state, table)
     maps = found.scene.head.maps
     assert maps.specular is not None and np.ptp(maps.specular) > 0.05
     assert 0.1 < found.scene.skin.rho_s < 0.25 and found.head["regions"] == table
-    bare = regional(found, NO_REGIONS)
+    bare = apply_regions(found, NO_REGIONS)
     assert bare.scene.head.maps.specular is None and "regions" not in bare.head
     assert bare.scene.skin.rho_s == Skin().rho_s
 
 
 def test_heads_that_are_there_are_not_made_again(state: ViewerState, table: str) -> None:
-    found = regional(state, table)
-    assert regional(found, NO_REGIONS, [state, found]).scene.head is state.scene.head
-    assert regional(state, table, [state, found]).scene.head is found.scene.head
+    found = apply_regions(state, table)
+    assert apply_regions(found, NO_REGIONS, [state, found]).scene.head is state.scene.head
+    assert apply_regions(state, table, [state, found]).scene.head is found.scene.head
 
 
 def test_heads_without_known_regions_are_refused(state: ViewerState) -> None:
     with pytest.raises(DermisError):
-        regional(state, "default")
+        apply_regions(state, "default")
     with pytest.raises(DermisError, match="made in memory"):
-        regional(ViewerState(state.scene), "default")
+        apply_regions(ViewerState(state.scene), "default")

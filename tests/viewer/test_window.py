@@ -1,4 +1,4 @@
-"""The window on a desk of its own: it shows the head, turns it, and follows its size."""
+"""The desktop window: it shows the head, turns it, and follows its size."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""How fast the frame is on this machine, stage by stage, beside what its memory would allow."""
+"""How fast the frame is on this machine, stage by stage, compared with what its memory allows."""

@@ -1,12 +1,29 @@
-"""Which frames are measured: a usual one, and others that differ from it in one thing each."""
+"""The frames that are measured, a usual one and others that each differ in one thing, and their scenes."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 
-PUBLISHED = "published"
+import numpy as np
+
+from dermis.mesh.head import Head
+from dermis.optics.gaussians import GaussianSum
+from dermis.optics.profiles import load_profile
+from dermis.scene.camera import portrait
+from dermis.scene.environment import Environment
+from dermis.scene.lights import PointLight, studio
+from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
+from dermis.scene.skin import Skin
+
+GPU_GEMS_3 = "gpu-gems-3"
 FRAGMENTS = "published-fragments"
-"""The passes of 2007 in the graphics pipeline; `PUBLISHED` are the same in compute."""
+"""The passes of 2007 in the graphics pipeline; `GPU_GEMS_3` has the same in compute."""
+_SWAY_MM = 2.0
+_LEAST_WEIGHT = 1e-3
+_TURN_DEGREES = 25.0  # between one round of the studio's lights and the next
 
 
 @dataclass(frozen=True)
@@ -15,13 +32,13 @@ class Case:
 
     image : (width, height) [pixel]
     atlas : side of the irradiance map [texel]
-    gaussians : terms of the profile
+    gaussians : of the profile
     lights : spots with shadows
-    environment : name of the light around, "" for none beside the lights
-    subdivide : levels of subdivision of the head: four times the triangles each
+    environment : name of a panorama, "" for none
+    subdivide : levels of subdivision of the head, each with four times the triangles
     samples : of a pixel
     technique : of `Settings`, or `FRAGMENTS`
-    varies : what tells it from the usual frame, "" for that itself
+    varies : how it differs from the usual frame, "" for that itself
     """
 
     image: tuple[int, int] = (1920, 1080)
@@ -37,7 +54,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Preset:
-    """A usual frame, and the values that each of its numbers takes by itself."""
+    """A usual frame, and the values that each of its fields takes in turn."""
 
     usual: Case
     image: tuple[tuple[int, int], ...]
@@ -46,7 +63,7 @@ class Preset:
     lights: tuple[int, ...]
     subdivide: tuple[int, ...]
     environment: tuple[str, ...] = ("uniform",)
-    technique: tuple[str, ...] = (PUBLISHED, FRAGMENTS)
+    technique: tuple[str, ...] = (GPU_GEMS_3, FRAGMENTS)
 
     def cases(self) -> list[Case]:
         """The usual frame, then the others."""
@@ -84,3 +101,67 @@ PRESETS: dict[str, Preset] = {
         subdivide=(0, 1),
     ),
 }
+
+
+def settings_of(case: Case) -> Settings:
+    """How the case is rendered."""
+    return Settings(
+        size=case.image,
+        atlas=case.atlas,
+        samples=case.samples,
+        technique=case.technique,
+    )
+
+
+def scenes_of(case: Case, head: Head, folder: Path, count: int) -> list[Scene]:
+    """The case at `count` moments: camera and lights are never in the same place twice.
+
+    folder : for the profile's file
+    """
+    skin, camera = Skin(profile=str(_profile_file(case.gaussians, folder))), portrait(head)
+    lights = _lights(case.lights)
+    around = Environment(name=case.environment) if case.environment else None
+    scenes = []
+    for k in range(count):
+        sway = _SWAY_MM * math.sin(1.0 + k)
+        moved = [light.model_copy(update={"position": _aside(light.position, sway)}) for light in lights]
+        eye = camera.model_copy(update={"position": _aside(camera.position, sway)})
+        scenes.append(Scene(head, lights=tuple(moved), environment=around, camera=eye, skin=skin))
+    return scenes
+
+
+def _aside(place: tuple[float, float, float], sway: float) -> tuple[float, float, float]:
+    return place[0] + sway, place[1], place[2]
+
+
+def _lights(count: int) -> list[PointLight]:
+    """The studio's spots, then the same ones turned about the head."""
+    rig = [light for light in studio() if isinstance(light, PointLight)]
+    return [_turned(rig[k % len(rig)], _TURN_DEGREES * (k // len(rig))) for k in range(count)]
+
+
+def _turned(light: PointLight, degrees: float) -> PointLight:
+    x, y, z = light.position
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    return light.model_copy(update={"position": (c * x + s * z, y, c * z - s * x)})
+
+
+def _profile_file(count: int, folder: Path) -> Path:
+    path = folder / f"{count}.csv"
+    profile = with_terms(load_profile("gpu-gems-3"), count)
+    rows = np.column_stack([profile.variance_mm2, profile.weight])
+    lines = [",".join(repr(float(number)) for number in row) for row in rows]
+    path.write_text("\n".join(["variance_mm2,red,green,blue", *lines]) + "\n", encoding="utf-8")
+    return path
+
+
+def with_terms(profile: GaussianSum, count: int) -> GaussianSum:
+    """A stand-in with `count` Gaussians, the same albedo and the same widest Gaussian."""
+    if count == len(profile.variance_mm2):
+        return profile
+    known = np.log(profile.variance_mm2)
+    wanted = np.linspace(known[0], known[-1], count) if count > 1 else known[-1:]
+    channels = [np.interp(wanted, known, channel) + _LEAST_WEIGHT for channel in profile.weight.T]
+    weight = np.stack(channels, axis=1)
+    weight *= profile.albedo / weight.sum(axis=0)
+    return GaussianSum(f"{count} Gaussians", np.exp(wanted), weight)

@@ -1,4 +1,4 @@
-"""How time grows with each of the frame's sizes, and the usual frame's stages, as SVG."""
+"""Plots of a benchmark as SVG: time over each of the frame's sizes, and the usual frame by stage."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _AXES: dict[str, tuple[str, Callable[[Row], float]]] = {
 
 
 def plain(number: float) -> str:
-    """Three digits, without powers of ten."""
+    """Three significant digits without an exponent."""
     return f"{number:.0f}" if number >= 1000 else f"{number:.3g}"
 
 
 def scaling(made: Benchmark) -> str:
-    """Device time over each size that was varied, beside what the floor model says, as SVG text."""
+    """Device time and floor over each size that was varied, as SVG text."""
     varied = [name for name in _AXES if any(row.case.varies == name for row in made.rows)]
     if not varied:
         return ""
@@ -77,7 +77,7 @@ def _figure(width: float, height: float, columns: int) -> tuple[Any, list[Any]]:
 
 
 def _marks(axis: Any, places: list[float] | None) -> None:
-    """Plain numbers, at the places measured or where they fall."""
+    """Plain numbers at the measured places, or at round ones."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
     axis.set_major_locator(FixedLocator(places) if places else LogLocator(subs=(1.0, 2.0, 5.0)))

@@ -1,15 +1,16 @@
-"""A benchmark as JSON, as lines of text, and as one HTML file that needs nothing else."""
+"""A benchmark as JSON, as lines of text, and as a self-contained HTML file."""
 
 from __future__ import annotations
 
 import html
 from collections.abc import Sequence
+from dataclasses import asdict
 from importlib import resources
 from pathlib import Path
 from string import Template
 from typing import Any
 
-from dermis.benchmark.cases import FRAGMENTS, PUBLISHED, Case
+from dermis.benchmark.cases import FRAGMENTS, GPU_GEMS_3, Case
 from dermis.benchmark.measure import Row
 from dermis.benchmark.plots import plain
 from dermis.benchmark.run import Benchmark
@@ -26,7 +27,7 @@ def as_json(made: Benchmark) -> dict[str, Any]:
         "date": made.date,
         "seconds": made.seconds,
         "copy_gb_s": made.copied / 1e9,
-        "published_ratio": made.ratio(PUBLISHED),
+        "published_ratio": made.ratio(GPU_GEMS_3),
         "published_fragments_ratio": made.ratio(FRAGMENTS),
         "rows": [_row(row) for row in made.rows],
         "left_out": [{**_case(one.case), "reason": one.reason} for one in made.left_out],
@@ -34,45 +35,24 @@ def as_json(made: Benchmark) -> dict[str, Any]:
 
 
 def _case(case: Case) -> dict[str, Any]:
-    return {
-        "image": list(case.image),
-        "atlas": case.atlas,
-        "gaussians": case.gaussians,
-        "lights": case.lights,
-        "environment": case.environment,
-        "subdivide": case.subdivide,
-        "samples": case.samples,
-        "technique": case.technique,
-        "varies": case.varies,
-    }
+    return asdict(case) | {"image": list(case.image)}
 
 
 def _row(row: Row) -> dict[str, Any]:
-    return {
-        **_case(row.case),
-        "adapter": row.adapter,
-        "triangles": row.triangles,
-        "frame_ms": row.frame_ms,
-        "gpu_ms": row.gpu_ms,
-        "floor_ms": row.floor_ms,
-        "floor_ratio": row.floor_ratio,
-        "python_ms": row.python_ms,
-        "image_ms": row.image_ms,
-        "memory_mb": row.memory_mb,
-    }
+    told = {**_case(row.case), **asdict(row), "floor_ratio": row.floor_ratio}
+    del told["case"]
+    return told
 
 
-_OTHERS = {PUBLISHED: "2007, compute [ms]", FRAGMENTS: "2007, fragments [ms]"}
+_OTHERS = {GPU_GEMS_3: "2007, compute [ms]", FRAGMENTS: "2007, fragments [ms]"}
 _CASE = ("image", "atlas", "Gaussians", "lights", "around", "triangles", "technique")
 _TIMES = ("frame [ms]", "device [ms]", "floor [ms]", "ratio", "Python [ms]", "image out [ms]")
 COLUMNS = (*_CASE, *_TIMES, "memory [MB]")
 
 
 def cells(row: Row) -> tuple[str, ...]:
-    """A row's figures as they are printed, in the order of COLUMNS."""
-    case = row.case
-    times = (row.frame_ms, row.gpu_ms["total"], row.floor_ms["total"], row.floor_ratio)
-    rest = (row.python_ms, row.image_ms)
+    """A row's figures as text, in the order of COLUMNS."""
+    case, device = row.case, (row.gpu_ms["total"], row.floor_ms["total"], row.floor_ratio)
     return (
         f"{case.image[0]}x{case.image[1]}",
         str(case.atlas),
@@ -81,35 +61,32 @@ def cells(row: Row) -> tuple[str, ...]:
         case.environment or "-",
         str(row.triangles),
         case.technique,
-        *map(plain, (*times, *rest)),
+        *map(plain, (row.frame_ms, *device, row.python_ms, row.image_ms)),
         f"{row.memory_mb:.0f}",
     )
 
 
 def stage_table(made: Benchmark) -> list[tuple[str, ...]]:
-    """The usual frame by stage, titles first: device time, floor, their ratio, and what 2007 took."""
+    """The usual frame by stage, titles first: device time, floor, their ratio, and the passes of 2007."""
     if made.usual is None:
         return []
-    usual, others = made.usual, [row for name in _OTHERS if (row := made.row_of(name))]
-    shown = [name for name in _OTHERS if made.row_of(name)]
-    table = [("stage", "device [ms]", "floor [ms]", "ratio", *(_OTHERS[name] for name in shown))]
+    usual = made.usual
+    others = {title: row.gpu_ms for name, title in _OTHERS.items() if (row := made.row_of(name))}
+    table = [("stage", "device [ms]", "floor [ms]", "ratio", *others)]
     for stage, ms in usual.gpu_ms.items():
         floor = usual.floor_ms.get(stage)
         known = (plain(floor), f"{ms / floor:.1f}") if floor else ("-", "-")
-        table.append((stage, plain(ms), *known, *(_ms(row, stage) for row in others)))
+        theirs = (plain(times[stage]) if stage in times else "-" for times in others.values())
+        table.append((stage, plain(ms), *known, *theirs))
     return table
 
 
-def _ms(row: Row, stage: str) -> str:
-    return plain(row.gpu_ms[stage]) if stage in row.gpu_ms else "-"
-
-
 def published_text(made: Benchmark) -> str:
-    """How much longer the passes of 2007 take, as far as that was measured."""
-    names = {PUBLISHED: "as compute", FRAGMENTS: "as fragments"}
+    """How much longer the passes of 2007 take, if that was measured."""
+    names = {GPU_GEMS_3: "as compute", FRAGMENTS: "as fragments"}
     found = {said: made.ratio(name) for name, said in names.items()}
     told = [f"{ratio:.2f} times as long {said}" for said, ratio in found.items() if ratio is not None]
-    return f"Drawn by the passes of 2007, it takes {' and '.join(told)}." if told else ""
+    return f"With the passes of 2007 it takes {' and '.join(told)}." if told else ""
 
 
 def left_out_lines(made: Benchmark) -> list[str]:
@@ -125,7 +102,7 @@ def _told(case: Case) -> str:
 
 
 def summary(made: Benchmark) -> str:
-    """Where and with what, in one line."""
+    """The machine, the head, the date and the versions, in one line."""
     versions = ", ".join(f"{name} {number}" for name, number in made.versions.items())
     return (
         f"{made.adapter} ({made.driver}), {made.head}, {made.date}; {versions}; "
@@ -134,9 +111,9 @@ def summary(made: Benchmark) -> str:
 
 
 def write_report(path: Path, made: Benchmark) -> None:
-    """Write tables and plots, whole or not at all.
+    """Write tables and plots; the file is complete or not there.
 
-    Raises DermisError when that is not possible.
+    Raises DermisError when it cannot be written.
     """
     from dermis.benchmark import plots
 
@@ -155,10 +132,9 @@ def write_report(path: Path, made: Benchmark) -> None:
 
 
 def _table(lines: Sequence[tuple[str, ...]]) -> str:
-    """The first line has the titles."""
-    body = [_line(cells, "th" if number == 0 else "td") for number, cells in enumerate(lines)]
-    return f"<table>{''.join(body)}</table>"
-
-
-def _line(cells: tuple[str, ...], tag: str) -> str:
-    return f"<tr>{''.join(f'<{tag}>{html.escape(cell)}</{tag}>' for cell in cells)}</tr>"
+    """An HTML table whose first line has the titles."""
+    rows = []
+    for number, line in enumerate(lines):
+        tag = "td" if number else "th"
+        rows.append("".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in line))
+    return "<table>" + "".join(f"<tr>{row}</tr>" for row in rows) + "</table>"

@@ -1,4 +1,4 @@
-"""A whole benchmark: all cases of a preset on one adapter, in one run."""
+"""A whole benchmark: all cases of a preset on one adapter."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from dermis.benchmark.cases import Case
-from dermis.benchmark.copy_rate import copy_rate
+from dermis.benchmark.floor import copy_rate
 from dermis.benchmark.measure import ON_CPU, Effort, Row, measure
 from dermis.errors import DermisError
 from dermis.frame.renderer import Renderer
@@ -34,8 +34,8 @@ class LeftOut:
 class Benchmark:
     """What was measured and where.
 
-    copied : bytes a second that a copy moves
-    seconds : the whole run took [s]
+    copied : bytes per second that a copy moves
+    seconds : duration of the whole run [s]
     left_out : what could not be measured
     """
 
@@ -51,7 +51,7 @@ class Benchmark:
 
     @property
     def usual(self) -> Row | None:
-        """The frame that all others differ from in one thing; None when it could not be measured."""
+        """The frame from which all others differ in one thing; None when it could not be measured."""
         return next((row for row in self.rows if not row.case.varies), None)
 
     def row_of(self, technique: str) -> Row | None:
@@ -70,7 +70,7 @@ def run(
 ) -> Benchmark:
     """Measure the cases one after another.
 
-    progress : told how many of how many are done
+    progress : called with the number of cases done, and of all
 
     Raises DermisError when none of them could be measured.
     """
@@ -97,12 +97,12 @@ def run(
 def _all_of(
     cases: list[Case], head: str, renderer: Renderer, rate: float, progress: Progress
 ) -> tuple[list[Row], list[LeftOut]]:
-    """Those that could be measured, and the others."""
+    """The cases that could be measured, and the others."""
     effort = ON_CPU if renderer.device.adapter.kind == "CPU" else Effort()
     subdivided = lru_cache(1)(lambda levels: load_head(head, subdivide=levels))
     rows: list[Row] = []
     left_out: list[LeftOut] = []
-    subdivided(cases[0].subdivide)  # a head that is none concerns all of them
+    subdivided(cases[0].subdivide)  # a missing head is an error of all cases
     with tempfile.TemporaryDirectory() as folder:
         for done, case in enumerate(cases):
             progress(done, len(cases))
@@ -110,5 +110,5 @@ def _all_of(
                 rows.append(measure(renderer, case, subdivided(case.subdivide), Path(folder), rate, effort))
             except DermisError as fault:
                 left_out.append(LeftOut(case, str(fault)))
-                renderer.forget()  # what was made of it before it failed
+                renderer.forget()  # frees what was made before it failed
     return rows, left_out

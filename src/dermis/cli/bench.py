@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING, Literal
 
 from dermis.cli.console import print_json, print_lines, progress
-from dermis.cli.options import Json
+from dermis.cli.options import Adapter, Json, Output
 
 if TYPE_CHECKING:
     from dermis.benchmark.run import Benchmark
@@ -19,8 +16,8 @@ def bench(
     *,
     preset: Literal["film", "interactive", "cpu"] | None = None,
     head: str = "auto",
-    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
-    adapter: str = "auto",
+    output: Output = None,
+    adapter: Adapter = "auto",
     as_json: Json = False,
 ) -> int:
     """Measure the frame, stage by stage, at several sizes, beside what the memory's speed would allow.
@@ -48,10 +45,6 @@ def bench(
         auto (the scan lee_perry_smith when it is here, else bust), or what `dermis render` takes.
     output:
         HTML report with plots.
-    adapter:
-        auto (the best), cpu (software), or a part of an adapter's name.
-    as_json:
-        Print one JSON object.
     """
     from dermis.benchmark.cases import PRESETS
     from dermis.benchmark.report import as_json as to_json

@@ -4,23 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from dermis.cli.console import print_lines
-from dermis.specular.names import SpecularName
+from dermis.cli.options import NOTHING, options_of, refuse_options
+from dermis.scene.settings import Settings
+from dermis.scene.skin import Skin
 
-_SKIN, _SETTINGS = ("profile", "specular"), ("technique", "seams", "transmission")
+if TYPE_CHECKING:
+    SettingsOptions = dict[str, Any]
+    SkinOptions = dict[str, Any]
+else:
+    SettingsOptions = options_of(Settings, only=("technique", "seams", "transmission", "tone", "bloom"))
+    SkinOptions = options_of(Skin, only=("profile", "specular", "fresnel", "energy", "direction"))
 
 
 def cite(
     *keys: str,
     scene: Path | None = None,
-    technique: Literal["texture-space", "none", "one-blur", "published", "screen-space", "pre-integrated"]
-    | None = None,
-    seams: Literal["stitch", "none", "clear-colour", "stretch-map", "alpha", "multi-uv"] | None = None,
-    transmission: Literal["thin", "none"] | None = None,
-    profile: str | None = None,
-    specular: SpecularName | None = None,
+    settings: SettingsOptions = NOTHING,
+    skin: SkinOptions = NOTHING,
     against: Literal["surface-integral", "heat", "path-traced", "cycles"] | None = None,
 ) -> int:
     """Print BibTeX entries: of the given keys, or of the works behind a picture or a comparison.
@@ -43,66 +46,43 @@ def cite(
         Author-year keys as they stand in the documentation.
     scene:
         A scene file: what its skin, lights and settings use; without it a picture with all defaults.
-    technique:
-        How light scatters below the surface, as render takes it [texture-space].
-    seams:
-        What is done at the map's seams, as render takes it [stitch].
-    transmission:
-        Whether light comes through thin parts, as render takes it [thin].
-    profile:
-        The diffusion profile, as render takes it [gpu-gems-3].
-    specular:
-        The model of the surface reflection, as render takes it [kelemen].
     against:
         A truth of compare, instead of a picture: it, the measure of difference and the techniques.
     """
     from dermis.cite import bibtex
 
-    given = {name: value for name, value in locals().items() if value is not None}
-    print_lines(bibtex(_wanted(given)))
+    options = {**({"scene": scene} if scene else {}), **settings, **skin}
+    if keys:
+        refuse_options([*options, *(["against"] if against else [])], None, "beside keys", "Leave one out")
+        wanted: tuple[str, ...] = keys
+    elif against:
+        refuse_options(options.keys() - {"technique"}, None, "beside --against", "Leave one out")
+        wanted = _of_comparison(against, settings.get("technique"))
+    else:
+        wanted = _of_picture(scene, settings, skin)
+    print_lines(bibtex(wanted))
     return 0
 
 
-def _wanted(given: Mapping[str, Any]) -> tuple[str, ...]:
-    """Keys of the works that the options ask for."""
-    options = {name: value for name, value in given.items() if name not in ("keys", "bibtex")}
-    if given["keys"]:
-        _refuse_beside("keys", options)
-        return tuple(given["keys"])
-    if "against" in options:
-        _refuse_beside("--against", {k: v for k, v in options.items() if k not in ("against", "technique")})
-        return _of_comparison(options["against"], options.get("technique"))
-    return _of_picture(options)
-
-
 def _of_comparison(against: str, technique: str | None) -> tuple[str, ...]:
-    from dermis.cli.compare_techniques import TECHNIQUES
     from dermis.comparison.sources import comparison_sources
+    from dermis.scene.techniques import TECHNIQUES
 
-    return comparison_sources(against, [technique] if technique else TECHNIQUES.split(","))
+    return comparison_sources(against, [technique] if technique else TECHNIQUES)
 
 
-def _of_picture(options: Mapping[str, Any]) -> tuple[str, ...]:
-    from dermis.scene import Settings, Skin, load_scene
-    from dermis.scene.lights import studio
+def _of_picture(file: Path | None, settings: Mapping[str, Any], skin: Mapping[str, Any]) -> tuple[str, ...]:
+    from dermis.scene import load_scene, studio
     from dermis.scene.sources import sources_of
 
-    skin, settings = ({k: options[k] for k in names if k in options} for names in (_SKIN, _SETTINGS))
-    if "scene" not in options:
+    if file is None:
         return sources_of(Skin(**skin), Settings(**settings), studio())
-    scene, written = load_scene(options["scene"])
+    scene, written = load_scene(file)
     maps = scene.head.maps
     return sources_of(
-        Skin(**(scene.skin.model_dump() | skin)),
-        Settings(**(written.model_dump() | settings)),
+        Skin(**(scene.skin.model_dump() | dict(skin))),
+        Settings(**(written.model_dump() | dict(settings))),
         scene.lights,
         scene.environment,
         relief=maps.normal is not None or maps.height is not None,
     )
-
-
-def _refuse_beside(what: str, options: Mapping[str, Any]) -> None:
-    from dermis.errors import refuse
-
-    for name in options:
-        refuse(f"--{name}", f"no such option beside {what}", "it came", "Leave one out")

@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-from cyclopts import Parameter
-
-from dermis.cli.options import Json, Whole
+from dermis.cli.console import print_json, print_lines, working_on
+from dermis.cli.options import NOTHING, Adapter, Json, Output, Whole, check, given, option_name, options_of
 from dermis.errors import refuse
+from dermis.scene.settings import Settings
+from dermis.scene.skin import Skin
+from dermis.scene.techniques import TECHNIQUES
 
 _BY_PATHS = ("path-traced", "cycles")
-_OF_HEADS = ("against", "techniques", "light", "region", "medium", "direction", "size", "atlas", "samples")
+_SIZES = {"size": (256, 256), "atlas": 1024}
+
+if TYPE_CHECKING:
+    from dermis.comparison.compare import Comparison
+
+    SizeOptions = dict[str, Any]
+    SkinOptions = dict[str, Any]
+else:
+    SizeOptions = options_of(Settings, only=_SIZES, defaults=_SIZES)
+    SkinOptions = options_of(Skin, only=("direction", "roughness"))
 
 
 def compare(
@@ -24,13 +36,11 @@ def compare(
     light: str | None = None,
     region: str | None = None,
     medium: str | None = None,
-    direction: Literal["lambertian", "half-space"] | None = None,
-    size: str | None = None,
-    atlas: Whole = None,
+    sizes: SizeOptions = NOTHING,
+    skin: SkinOptions = NOTHING,
     samples: Whole = None,
-    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
-    roughness: float | None = None,
-    adapter: str = "auto",
+    output: Output = None,
+    adapter: Adapter = "auto",
     as_json: Json = False,
 ) -> int:
     """Compare techniques of scattering with the truth on a head, or the models of the surface.
@@ -43,7 +53,7 @@ def compare(
 
         dermis compare bust --against path-traced --light back --samples 256 --json
 
-        dermis compare bust --against heat --region ear --techniques published,texture-space
+        dermis compare bust --against heat --region ear --techniques gpu-gems-3,texture-space
 
         dermis compare specular -o plots
 
@@ -56,52 +66,104 @@ def compare(
         surface near the middle of the picture), path-traced (light through the medium; needs Mitsuba) or
         cycles (Blender's random walk; DERMIS_BLENDER_PYTHON names a Python that has bpy) [surface-integral].
     techniques:
-        Names with commas: none, one-blur, published, texture-space, screen-space, pre-integrated [all].
+        Names with commas, as `dermis render --technique` takes them [all].
     light:
         front, back (through the ear) or laser (a stripe over cheek and ear) [front].
     region:
         portrait, three-quarter, ear, cheek or nose [where the light shows most].
     medium:
         skin1, skin2 or another medium with a name, index-matched [skin1].
-    direction:
-        How skin returns light: lambertian alike by all directions, or as a half-space [lambertian].
-    size:
-        WIDTHxHEIGHT in pixels [256x256].
-    atlas:
-        Side of the irradiance map in texels [1024].
     samples:
         Paths through each pixel, for path-traced and cycles [64].
     output:
         HTML report; for specular a folder of plots.
-    roughness:
-        Beckmann roughness m, for specular only [0.3].
-    adapter:
-        auto (the best), cpu (software), or a part of an adapter's name.
-    as_json:
-        Print one JSON object.
     """
-    given = {name: value for name, value in locals().items() if value is not None}
-    _check_used(what, given)
+    words = given(against=against, techniques=techniques, light=light, region=region)
+    chosen = words | given(medium=medium, samples=samples) | sizes | skin
+    _check_used(what, chosen)
     if what == "specular":
         from dermis.cli.compare_specular import compare_specular
 
-        compare_specular(output, given.get("roughness", 0.3), adapter, as_json)
-        return 0
-    from dermis.cli.compare_techniques import choose, compare_techniques
-
-    compare_techniques(what, choose(given), output, as_json)
+        check(Skin, skin)
+        compare_specular(output, Skin(**skin).roughness, adapter, as_json)
+    else:
+        _compare_techniques(what, _choose(chosen, sizes) | {"adapter": adapter}, output, as_json)
     return 0
 
 
-def _check_used(what: str, given: Mapping[str, Any]) -> None:
+def _check_used(what: str, chosen: Mapping[str, Any]) -> None:
     """Refuse options that would change nothing."""
     if what == "specular":
-        idle = dict.fromkeys(_OF_HEADS, "surface models are compared without a head")
+        idle = dict.fromkeys(chosen.keys() - {"roughness"}, "surface models are compared without a head")
     else:
         idle = {"roughness": "techniques are compared without surface reflection"}
-        if given.get("against") not in _BY_PATHS:
+        if chosen.get("against") not in _BY_PATHS:
             idle["samples"] = f"only {' and '.join(_BY_PATHS)} trace paths"
             idle["direction"] = f"only {' and '.join(_BY_PATHS)} know directions"
     for name, why in idle.items():
-        if name in given:
-            refuse(f"--{name}", "no such option here", f"it came, and {why}", "Leave it out")
+        if name in chosen:
+            refuse(option_name(name), "no such option here", f"it came, and {why}", "Leave it out")
+
+
+def _choose(chosen: Mapping[str, Any], sizes: Mapping[str, Any]) -> dict[str, Any]:
+    """What `dermis.comparison.compare` is asked for."""
+    from dermis.comparison.scenes import usual_region
+
+    names = [name.strip() for name in chosen.get("techniques", ",".join(TECHNIQUES)).split(",")]
+    for name in names:
+        check(Settings, {**_SIZES, **sizes, "technique": name}, {"technique": "techniques"})
+    light = chosen.get("light", "front")
+    return {
+        "against": chosen.get("against", "surface-integral"),
+        "techniques": names,
+        "light": light,
+        "region": chosen.get("region", usual_region(light)),
+        "medium": chosen.get("medium", "skin1"),
+        "direction": chosen.get("direction", "lambertian"),
+        "settings": Settings(**{**_SIZES, **sizes}),
+        "samples": chosen.get("samples", 64),
+    }
+
+
+def _compare_techniques(head: str, chosen: dict[str, Any], output: Path | None, as_json: bool) -> None:
+    """Render a head with each technique, judge it by a truth, print and write what came of it."""
+    from dermis.comparison import compare as comparison
+    from dermis.comparison.report import write_report
+    from dermis.outputs import check_output
+    from dermis.scene.heads import load_head
+
+    comparison.check_choices(*(chosen[option] for option in ("against", "light", "region", "medium")))
+    if output is not None:
+        check_output(output, (".html",), "Choose such a name")
+    with working_on("comparing"):
+        made = comparison.compare(load_head(head), **chosen)
+    if output is not None:
+        write_report(output, made)
+    if as_json:
+        print_json(_report(made))
+    else:
+        print_lines(*_lines(made))
+
+
+def _report(made: Comparison) -> dict[str, Any]:
+    return {
+        "title": made.title,
+        "adapter": made.adapter,
+        "truth": {"seconds": made.truth.seconds, "notes": list(made.truth.notes)},
+        "rows": [asdict(row) for row in made.rows],
+    }
+
+
+def _lines(made: Comparison) -> Sequence[str]:
+    from dermis.comparison.report import cells
+
+    lines = [
+        f"{made.title}; times on {made.adapter}",
+        f"against {made.against}, {made.truth.seconds:.0f} s: {'; '.join(made.truth.notes)}",
+        "",
+        f"{'technique':18}{'relative RMSE':>20}{'FLIP':>8}{'energy ratio':>20}{'ms':>9}",
+    ]
+    for row in made.rows:
+        name, error, flip, energy, ms = cells(row)
+        lines.append(f"{name:18}{error:>20}{flip:>8}{energy:>20}{ms:>9}")
+    return lines

@@ -1,25 +1,29 @@
-"""`dermis compare specular`: the models of the surface against each other, in numbers."""
+"""`dermis compare specular`: the models of the surface against each other, in numbers and figures."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from dermis.cli.console import print_json, print_lines, working_on
+from dermis.outputs import refuse_output, replacing
+from dermis.specular.albedo import directional_albedo
+from dermis.specular.cosines import cosines
+from dermis.specular.models import MODELS
 
 _DEGREES = (0, 30, 60, 75, 85)
+_INCIDENT = {15: "#2a62b0", 45: "#2e8b57", 75: "#c0392b"}
+_DRAWN = [name for name in MODELS if name != "kelemen-direct"]  # the same curve as kelemen
+_FARTHEST = 1.8  # root of the intensity over kelemen's peak; on rough skin some models pass it
+_UP = np.array([0.0, 0.0, 1.0])
 
 
 def compare_specular(output: Path | None, roughness: float, adapter: str, as_json: bool) -> None:
     """Print what surface models reflect and cost, and draw their lobes into a folder if there is one."""
-    from dermis.cli.options import check
-    from dermis.scene.skin import Skin
-
-    check(Skin, {"roughness": roughness})
     if output is not None:
-        from dermis.cli.specular_plot import draw
-
-        draw(output, roughness)
+        _draw(output, roughness)
     with working_on("measuring"):
         report = _specular(adapter)
     if as_json:
@@ -35,7 +39,6 @@ def _specular(adapter: str) -> dict[str, Any]:
     from dermis.gpu.device import gpu_failures
     from dermis.specular.comparison import albedo_rows, reciprocity_error
     from dermis.specular.fresnel import FRESNEL, hemispherical_reflectance
-    from dermis.specular.models import MODELS
 
     device = open_device(adapter)
     with gpu_failures(device):
@@ -58,11 +61,7 @@ def _specular(adapter: str) -> dict[str, Any]:
 
 
 def _lines(report: dict[str, Any], m: float) -> list[str]:
-    import numpy as np
-
-    from dermis.specular.albedo import directional_albedo
     from dermis.specular.comparison import peak
-    from dermis.specular.models import MODELS
 
     cosine = np.cos(np.radians(_DEGREES))
     angles = "".join(f"{f'{angle}°':>8}" for angle in _DEGREES)
@@ -85,3 +84,76 @@ def _lines(report: dict[str, Any], m: float) -> list[str]:
         f"A smooth surface of index 1.4 reflects {smooth['exact']:.1%} of light from everywhere "
         f"({smooth['schlick']:.1%} by Schlick's curve); the talk says up to 6 %.",
     ]
+
+
+def _draw(folder: Path, m: float) -> None:
+    """Write lobes.png and albedo.png of all models into a folder, made when it is not there."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        refuse_output(folder, fault)
+    _save(_lobes(m), folder / "lobes.png")
+    _save(_albedos(m), folder / "albedo.png")
+
+
+def _lobes(m: float) -> Any:
+    """Intensity under three lights in the plane of incidence: a polar panel for each model."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12.0, 4.8), dpi=130, layout="constrained")
+    figure.suptitle(f"Intensity over kelemen's peak under the same light, on a root scale; m = {m:g}")
+    panels = figure.subplots(2, 4, subplot_kw={"projection": "polar"}).ravel()
+    whole = _intensity("kelemen", m).max(axis=1, keepdims=True)
+    roots = [np.sqrt(_intensity(name, m) / whole) for name in _DRAWN]
+    farthest = max(_FARTHEST, 1.05 * float(np.max(roots)))
+    for axes, name, curves in zip(panels, _DRAWN, roots, strict=True):
+        for (degrees, ink), curve in zip(_INCIDENT.items(), curves, strict=True):
+            axes.plot(_view_angles(), curve, color=ink, label=f"light from {degrees}°")
+        axes.set(thetamin=-90, thetamax=90, theta_zero_location="N", theta_direction=-1, rmax=farthest)
+        axes.set(
+            rticks=np.sqrt([0.25, 1.0, 2.25]),
+            yticklabels=["", "1", ""],
+            xticks=np.radians(range(-90, 91, 30)),
+        )
+        axes.tick_params(labelsize=7)
+        axes.set_title(name, fontsize=10)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    return figure
+
+
+def _intensity(name: str, m: float) -> Any:
+    """(3, n) BRDF times both cosines, for each incident angle and view [1/sr]."""
+    angle = _view_angles()
+    view = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=-1)
+    rows = []
+    for degrees in _INCIDENT:
+        theta = np.radians(degrees)
+        light = np.broadcast_to([-np.sin(theta), 0.0, np.cos(theta)], view.shape)
+        rows.append(MODELS[name].lobe(cosines(_UP, light, view), m) * np.cos(theta) * np.cos(angle))
+    return np.stack(rows)
+
+
+def _view_angles() -> Any:
+    return np.radians(np.linspace(-89.9, 89.9, 1200))
+
+
+def _albedos(m: float) -> Any:
+    """Directional albedo by angle, all models in one panel."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.2, 4.6), dpi=130, layout="constrained")
+    axes = figure.subplots()
+    degrees = np.linspace(0.0, 89.0, 180)
+    for name in _DRAWN:
+        rho = directional_albedo(np.cos(np.radians(degrees)), m, MODELS[name].lobe)
+        axes.plot(degrees, rho, linewidth=1.4, label=name)
+    axes.set(xlabel="angle from the normal [°]", ylabel="share reflected, ρ_s = 1", xlim=(0, 90))
+    axes.set(yscale="log", title=f"Directional albedo, m = {m:g}")
+    axes.grid(which="major", alpha=0.25, linewidth=0.6)
+    axes.legend(frameon=False, fontsize=8)
+    return figure
+
+
+def _save(figure: Any, path: Path) -> None:
+    with replacing(path) as trial:
+        figure.savefig(trial)

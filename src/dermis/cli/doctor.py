@@ -7,29 +7,22 @@ from importlib.metadata import version
 from typing import Any
 
 from dermis.cli.console import print_json, print_lines
-from dermis.cli.options import Json
+from dermis.cli.options import Adapter, Json
 from dermis.errors import DermisError
 
 _LIBRARIES = ("dermis", "wgpu", "numpy", "scipy", "trimesh", "pydantic", "imageio", "OpenEXR", "pillow")
 
 
-def doctor(*, adapter: str = "auto", as_json: Json = False) -> int:
+def doctor(*, adapter: Adapter = "auto", as_json: Json = False) -> int:
     """Show the adapters, the one that is used and why, versions and sample data, and render a test frame.
 
     Exits with 0 when everything works and with 2 when not.
 
-    Examples:
+    For example:
 
         dermis doctor
 
         dermis doctor --adapter cpu --json
-
-    Parameters
-    ----------
-    adapter:
-        auto (the best), cpu (software), or a part of an adapter's name.
-    as_json:
-        Print one JSON object.
     """
     report = examine(adapter)
     if as_json:

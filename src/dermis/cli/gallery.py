@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from dermis.cli.console import note, print_json, print_lines, progress
-from dermis.cli.options import Json, Whole
+from dermis.cli.options import Adapter, Json, Whole
 
 if TYPE_CHECKING:
     from dermis.gallery.run import Picture
@@ -22,7 +22,7 @@ def gallery(
     head: str | None = None,
     size: Whole = None,
     output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("gallery"),
-    adapter: str = "auto",
+    adapter: Adapter = "auto",
     as_json: Json = False,
 ) -> int:
     """Draw the comparisons of the talk, and a page that explains them.
@@ -47,10 +47,6 @@ def gallery(
         Side of a panel in pixels, 32 to 2048 [448].
     output:
         Folder for pictures and page; made if it is not there.
-    adapter:
-        auto, cpu, or a part of an adapter's name.
-    as_json:
-        Print one JSON object.
     """
     from dermis.errors import refuse
     from dermis.gallery.page import write_page

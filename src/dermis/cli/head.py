@@ -9,10 +9,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from dermis.cli.console import print_json, print_lines, progress
-from dermis.cli.options import Json, Whole
-
-_SHAPE = ("width", "nose", "ears", "jaw", "fullness", "asymmetry")
-_LOOK = ("melanin", "eumelanin", "blood", "oxygen", "freckles", "moles", "oil", "age", "stubble")
+from dermis.cli.options import Json, Whole, given
 
 
 def head(
@@ -91,10 +88,7 @@ def head(
         Side of the maps in texels, a power of two from 256 to 4096 [2048].
     layout:
         few charts, or many: a layout with as many seams as can be, to test them.
-    as_json:
-        Print one JSON object.
     """
-    given = {name: value for name, value in locals().items() if value is not None}
     started = time.perf_counter()
     from dermis.human.bust.parameters import BustParameters
     from dermis.human.bust_file import BustRecipe, write_bust
@@ -102,10 +96,12 @@ def head(
     from dermis.outputs import check_output
 
     check_output(output, (".glb",), "Name it something.glb")
-    chosen = {"seed": seed} if seed is not None else {}
-    shape = BustParameters(**chosen, **{name: given[name] for name in _SHAPE if name in given})
-    look = SkinLook(**chosen, **{name: given[name] for name in _LOOK if name in given})
-    recipe = BustRecipe(shape, look, layout=layout, **({"size": size} if size is not None else {}))
+    chosen = given(seed=seed)
+    proportions = given(width=width, nose=nose, ears=ears, jaw=jaw, fullness=fullness, asymmetry=asymmetry)
+    pigments = given(melanin=melanin, eumelanin=eumelanin, blood=blood, oxygen=oxygen)
+    marks = given(freckles=freckles, moles=moles, oil=oil, age=age, stubble=stubble)
+    shape, look = BustParameters(**chosen, **proportions), SkinLook(**chosen, **pigments, **marks)
+    recipe = BustRecipe(shape, look, layout=layout, **given(size=size))
     with progress("making the head") as report:
         write_bust(output, recipe, report)
     seconds = time.perf_counter() - started

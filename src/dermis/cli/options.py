@@ -1,10 +1,12 @@
-"""Options that are more than a word or a number, and checks that name an option as it was typed."""
+"""Options made of the scene's own models, options that commands share, and words as values."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from pathlib import Path
+from types import NoneType
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict, get_args
 
 from cyclopts import Parameter, Token
 
@@ -18,43 +20,139 @@ def _whole(_: type, tokens: Sequence[Token]) -> int:
     return int(tokens[0].value)
 
 
-Json = Annotated[bool, Parameter(name="--json", negative="")]
+def _size(_: type, tokens: Sequence[Token]) -> tuple[int, int]:
+    return parse_size(tokens[0].value, str(tokens[0].keyword))
+
+
+def _colour(_: type, tokens: Sequence[Token]) -> tuple[float, float, float]:
+    return parse_colour(tokens[0].value, str(tokens[0].keyword))
+
+
+Json = Annotated[
+    bool, Parameter(name="--json", negative="", show_default=False, help="Print one JSON object.")
+]
+Adapter = Annotated[str, Parameter(help="auto (the best), cpu (software), or a part of an adapter's name.")]
+Output = Annotated[Path | None, Parameter(name=("--output", "-o"))]
+NOTHING: dict[str, Any] = {}
+"""Options of a model when none is given."""
 # cyclopts itself would round 64.5.
 Whole = Annotated[int | None, Parameter(converter=_whole)]
 
 
-def check(kind: type[Plain], given: Mapping[str, Any], names: Mapping[str, str] | None = None) -> None:
-    """Refuse values that no field of `kind` can have, under the names of their options.
+def options_of(
+    model: type[Plain],
+    *,
+    only: Collection[str] = (),
+    without: Collection[str] = (),
+    names: Mapping[str, str] | None = None,
+    defaults: Mapping[str, Any] | None = None,
+) -> Any:
+    """The type of a command's parameter that takes a dictionary: the fields of a model that were given.
 
-    given : values by field
-    names : options by field, where they differ
+    Each field is an option, with the model's own type, choices, bounds and help; fields that are models
+    themselves are none.
+
+    only, without : fields that are options here, all when left out; fields that are none
+    names : options by field, where they are not called like it
+    defaults : what the help shows in place of the model's own
+    """
+    options: dict[str, Any] = {}
+    for field in only or model.model_fields:
+        kind, how = _kind(model, field)
+        if kind is not None and field not in without:
+            name, text = option_name(field, names), _help(model, field, defaults or {})
+            options[field] = Annotated[kind, Parameter(name=name, help=text, **how)]
+    made: Any = TypedDict  # mypy wants its names spelled out
+    return Annotated[made(model.__name__, options, total=False), Parameter(name="*")]
+
+
+def given(**options: Any) -> dict[str, Any]:
+    """Those that are not None."""
+    return {name: value for name, value in options.items() if value is not None}
+
+
+def option_name(field: str, names: Mapping[str, str] | None = None) -> str:
+    """What is typed for a field: --rho-s for rho_s."""
+    return "--" + (names or {}).get(field, field).replace("_", "-")
+
+
+def is_option(model: type[Plain], field: str) -> bool:
+    """Whether a field can be an option: it holds words or numbers, not other models."""
+    return _kind(model, field)[0] is not None
+
+
+def _kind(model: type[Plain], field: str) -> tuple[Any, dict[str, Any]]:
+    """What cyclopts takes a field's words for, and how it makes the value of them; None for no option."""
+    from dermis.scene.plain import choices_of
+
+    if choices := choices_of(model, field):
+        return Literal[choices], {}
+    kind = model.model_fields[field].annotation
+    kind = next((one for one in get_args(kind) if get_args(kind)[-1] is NoneType), kind)
+    parts = tuple(get_args(part)[0] if get_args(part) else part for part in get_args(kind))
+    known: dict[Any, tuple[Any, dict[str, Any]]] = {
+        int: (int, {"converter": _whole}),
+        (int, int): (
+            tuple[int, int],
+            {"n_tokens": 1, "negative": "", "converter": _size, "metavar": "WIDTHxHEIGHT"},
+        ),
+        (float, float, float): (
+            tuple[float, float, float],
+            {"n_tokens": 1, "negative": "", "converter": _colour, "metavar": "R,G,B"},
+        ),
+        (str, ...): (list[str], {"negative": ""}),
+    }
+    return (kind, {}) if kind in (bool, float, str) else known.get(parts or kind, (None, {}))
+
+
+def _help(model: type[Plain], field: str, defaults: Mapping[str, Any]) -> str:
+    """A field's help with its bounds, where they say something, and its default."""
+    from dermis.scene.plain import choices_of, help_of, shown, values_of
+
+    text = help_of(model, field)
+    if (values := values_of(model, field)) and not choices_of(model, field):  # cyclopts adds choices itself
+        text += f" [range: {values}]"
+    default = shown(defaults.get(field, model.model_fields[field].get_default()))
+    return f"{text} [default: {default}]" if default else text
+
+
+def check(model: type[Plain], values: Mapping[str, Any], names: Mapping[str, str] | None = None) -> None:
+    """Refuse values that no field of a model can have, under the names of their options.
+
+    values : by field
+    names : options by field, where they are not called like it
     """
     from dermis.scene.plain import ImpossibleError
 
     try:
-        kind(**given)
+        model(**values)
     except ImpossibleError as error:
         place, finding = next(iter(error.findings.items()))
-        field = place.partition(".")[0]
-        option = (names or {}).get(field, field).replace("_", "-") or "size"
-        raise DermisError(f"--{option}: {finding}. Correct it.") from None
+        field = place.partition(".")[0] or next(name for name in model.model_fields if name in values)
+        raise DermisError(f"{option_name(field, names)}: {finding}. Correct it.") from None
 
 
-def parse_size(text: str) -> tuple[int, int]:
+def refuse_options(fields: Iterable[str], names: Mapping[str, str] | None, place: str, remedy: str) -> None:
+    """Refuse options that would change nothing."""
+    for field in fields:
+        refuse(option_name(field, names), f"no such option {place}", "it came", remedy)
+
+
+def parse_size(text: str, option: str = "--size") -> tuple[int, int]:
     """Width and height [pixel] of "1024x1024"."""
     match = re.fullmatch(r"(\d{1,9})x(\d{1,9})", text)
     if not match:
         came, remedy = f"{text!r} came", "Write two whole numbers with an x"
-        refuse("--size", "WIDTHxHEIGHT, such as 1024x1024", came, remedy)
+        refuse(option, "WIDTHxHEIGHT, such as 1024x1024", came, remedy)
     return int(match[1]), int(match[2])
 
 
-def parse_colour(text: str) -> tuple[float, float, float]:
+def parse_colour(text: str, option: str) -> tuple[float, float, float]:
     """Linear Rec. 709 of "red,green,blue"."""
     try:
         red, green, blue = (float(part) for part in text.split(","))
     except ValueError:
-        refuse("--background", "red,green,blue, such as 0,0,0", f"{text!r} came", "Write three numbers")
+        refuse(option, "red,green,blue, such as 0,0,0", f"{text!r} came", "Write three numbers")
     return red, green, blue
 
 

@@ -9,17 +9,23 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from dermis.cli.console import note, print_json, print_lines, progress
-from dermis.cli.options import Json, Whole, parse_lengths
+from dermis.cli.options import NOTHING, Json, Output, Whole, option_name, options_of, parse_lengths
 from dermis.errors import refuse
+from dermis.scene.skin import Pigments
+
+_NAMES = {"structure": "skin"}
 
 if TYPE_CHECKING:
     from dermis.optics.radial import RadialProfile
     from dermis.optics.tissue import Tissue
 
+    PigmentOptions = dict[str, Any]
+else:
+    PigmentOptions = options_of(Pigments, names=_NAMES)
+
 Model = Literal["dipole", "better-dipole", "multipole", "layered", "layered-point", "montecarlo"]
 Flag = Annotated[bool, Parameter(negative="")]
 
-_PIGMENTS = ("melanin", "eumelanin", "blood", "oxygen", "epidermis_mm", "epidermal_blood", "oiliness")
 _TERMS, _PHOTONS = 6, 1_000_000
 
 
@@ -33,20 +39,14 @@ def profile(
     photons: Whole = None,
     seed: Whole = None,
     anisotropy: float = 0.0,
-    skin: Literal["dj2006", "donner2008", "biospec"] | None = None,
-    melanin: float | None = None,
-    eumelanin: float | None = None,
-    blood: float | None = None,
-    oxygen: float | None = None,
-    epidermis_mm: float | None = None,
-    epidermal_blood: float | None = None,
+    pigments: PigmentOptions = NOTHING,
     oiliness: float | None = None,
     fit: Whole = None,
     fit_kind: Literal["gaussian", "burley", "separable"] = "gaussian",
     variances: Literal["shared", "per-channel"] = "shared",
     keep_energy: Flag = False,
     through: str | None = None,
-    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    output: Output = None,
     plot: Path | None = None,
     check: Flag = False,
     as_json: Json = False,
@@ -82,21 +82,6 @@ def profile(
         Of the photons' random numbers [0].
     anisotropy:
         Mean cosine g of the photons' scattering; the reduced scattering stays what it is.
-    skin:
-        Layers of a skin of pigments: two (dj2006, the default), two and a thin sheet of melanin (donner2008),
-        four (biospec).
-    melanin:
-        Share of melanosomes in the epidermis, 0 to 1.
-    eumelanin:
-        Share of them that is eumelanin, the rest is pheomelanin.
-    blood:
-        Share of blood in the dermis.
-    oxygen:
-        Share of the haemoglobin that carries oxygen.
-    epidermis_mm:
-        Thickness of the epidermis [mm].
-    epidermal_blood:
-        Share of blood in the epidermis, of donner2008.
     oiliness:
         Strength of the surface reflection; nothing below depends on it.
     fit:
@@ -115,26 +100,22 @@ def profile(
         Picture to write (.png, .svg or .pdf): r R(r) of each channel with its fit.
     check:
         Add Monte Carlo points with error bars to the plot.
-    as_json:
-        Print one JSON object.
     """
-    given = {key: value for key, value in locals().items() if key in _PIGMENTS and value is not None}
     from dermis.cli.profile_report import Report, Request
     from dermis.optics.profiles import find_table
     from dermis.optics.radial import profile_of_table
 
+    given = pigments | ({"oiliness": oiliness} if oiliness is not None else {})
     _check_outputs(output, plot, check)
     request = Request(_TERMS if fit is None else fit, fit_kind, variances == "shared", keep_energy)
     thicknesses = () if through is None else parse_lengths("--through", through)
     light = _light(photons, seed, anisotropy, check or model == "montecarlo")
     table = find_table(name)
     if table is not None:
-        _refuse_tissue_options(
-            name, given | {"model": model, "skin": skin, "eta": eta, "check": check or None}
-        )
+        _refuse_tissue_options(name, given | {"model": model, "eta": eta, "check": check or None})
         tissue, radial, counted = None, replace(profile_of_table(table), name=name), None
     else:
-        tissue = _tissue(name, skin, given, eta)
+        tissue = _tissue(name, given, eta)
         radial = _profile(tissue, model or "layered", clamp, light)
         counted = _profile(tissue, "montecarlo", clamp, light) if check and model != "montecarlo" else None
     found = Report.of(radial, tissue, request, None if fit is not None else table, thicknesses)
@@ -175,14 +156,15 @@ def _refuse_tissue_options(name: str, given: dict[str, Any]) -> None:
     for option, value in given.items():
         if value is not None:
             expected, came = "a medium or a skin of pigments", f"{name} is a table of Gaussians"
-            refuse(f"--{option.replace('_', '-')}", expected, came, "Leave it out")
+            refuse(option_name(option, _NAMES), expected, came, "Leave it out")
 
 
-def _tissue(name: str, skin: Any, pigments: dict[str, Any], eta: float | None) -> Tissue:
+def _tissue(name: str, given: dict[str, Any], eta: float | None) -> Tissue:
     from dermis.optics.tissue import load_tissue
 
-    tissue = load_tissue(name, skin, pigments)
-    if skin is not None and tissue.parameters is None:
+    structure = given.get("structure")
+    tissue = load_tissue(name, structure, {key: value for key, value in given.items() if key != "structure"})
+    if structure is not None and tissue.parameters is None:
         refuse("--skin", "a skin made of pigments", f"{name} is a medium", "Leave it out")
     return tissue if eta is None else replace(tissue, medium=tissue.medium.with_eta(eta))
 
@@ -190,7 +172,7 @@ def _tissue(name: str, skin: Any, pigments: dict[str, Any], eta: float | None) -
 def _profile(tissue: Tissue, model: Model, clamp: Any, light: dict[str, Any]) -> RadialProfile:
     if model != "montecarlo":
         return tissue.profile(model, clamp)
-    from dermis.reference.counted import counted_profile
+    from dermis.reference.slab_mc import counted_profile
 
     with progress("tracing photons") as report:
         return counted_profile(tissue.medium, tissue.rgb, report=report, **light)

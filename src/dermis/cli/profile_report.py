@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from dermis.optics.diffusion.transmission import through_gaussians
+from dermis.optics.diffusion.models import through_gaussians
 from dermis.optics.fits.gaussian import GaussianFit, fit_gaussians
 
 if TYPE_CHECKING:

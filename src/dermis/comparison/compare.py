@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.comparison.scenes import LIGHTS, REGIONS, comparison_scene
-from dermis.comparison.truths import TRUTHS, Subject, Truth, check_seen, matched
+from dermis.comparison.scenes import LIGHTS, REGIONS, medium_scene
+from dermis.comparison.truths import TRUTHS, Subject, Truth, check_seen
 from dermis.errors import refuse
 from dermis.frame.renderer import Renderer
 from dermis.frame.surface_points import surface_points
 from dermis.images.colour import encode_srgb
 from dermis.mesh.head import Head
-from dermis.optics.diffusion.models import diffusion_profile
-from dermis.optics.fits.gaussian import fit_gaussians
-from dermis.optics.presets import media
-from dermis.optics.profiles import TERMS, write_profile
+from dermis.optics.media import media
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 
@@ -34,10 +29,10 @@ _SHOWN_PERCENTILE = 99.0
 class Row:
     """A technique's figures, with standard errors where the truth is noisy.
 
-    relrmse, relrmse_se : root of the squared error over that of the squared truth [-]
-    flip : mean perceived difference [0..1]; None without the package that measures it
-    energy_ratio, energy_ratio_se : light of the image over that of the truth [-]
-    ms : device time of the frame
+    relrmse, relrmse_se : root mean square error over the root mean square of the truth [-]
+    flip : mean perceived difference [0..1]; None without the package flip-evaluator
+    energy_ratio, energy_ratio_se : light in the image over that in the truth [-]
+    ms : device time of a frame
     """
 
     technique: str
@@ -52,7 +47,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What was compared, and all that came of it.
+    """What was compared, and the results.
 
     images : linear radiance (h, w, 3) by technique
     """
@@ -66,7 +61,7 @@ class Comparison:
 
     @property
     def exposure(self) -> float:
-        """Factor that shows the truth's bright parts as nearly white."""
+        """Factor that makes the truth's bright parts nearly white."""
         bright = np.percentile(self.truth.image[self.truth.mask], _SHOWN_PERCENTILE)
         return 0.8 / max(float(bright), 1e-9)
 
@@ -93,12 +88,12 @@ def compare(
 
     against : of TRUTHS
     light, region : of `scenes.LIGHTS` and `scenes.REGIONS`
-    medium : of the named media, taken without a refracting surface
-    direction : of the techniques' skin; the surface integral and heat know lambertian skin only
+    medium : a named medium, taken as index-matched
+    direction : of the techniques' skin; the surface integral and heat are always lambertian
     samples : paths through each pixel
-    report : told what is being done
+    report : called with what is being done
 
-    Raises DermisError for names that are none, pictures without the head, and what the truth cannot do.
+    Raises DermisError for unknown names, pictures without the head, and what the truth cannot do.
     """
     check_choices(against, light, region, medium)
     settings = settings or Settings(size=(256, 256), atlas=1024)
@@ -107,35 +102,31 @@ def compare(
         report(f"truth: {against}")
         truth = TRUTHS[against](subject, samples)
         check_seen(truth.mask)
-        shown = replace(subject, scene=replace(subject.scene, skin=_turned(subject.scene.skin, direction)))
+        skin = Skin(**(subject.scene.skin.model_dump() | {"direction": direction}))
+        judged = replace(subject, scene=replace(subject.scene, skin=skin))
         images, ms = {}, {}
         for technique in techniques:
             report(technique)
-            images[technique], ms[technique] = _render(shown, technique, truth)
+            images[technique], ms[technique] = _render(judged, technique, truth)
         name = subject.renderer.device.adapter.name
     title = f"{head.name}, {medium}, light: {light}, region: {region}, {settings.size[0]}x{settings.size[1]}"
     title += f", {direction} skin" if direction != "lambertian" else ""
     made = Comparison(title, name, truth, against, (), images)
-    rows = tuple(_row(made, technique, ms[technique]) for technique in techniques)
-    return Comparison(title, made.adapter, truth, against, rows, images)
+    return replace(made, rows=tuple(_row(made, technique, ms[technique]) for technique in techniques))
 
 
 @contextmanager
 def subject_of(
     head: Head, light: str, region: str, medium: str, settings: Settings, adapter: str
 ) -> Iterator[Subject]:
-    """What a comparison judges; its profile is a file that lasts as long as the context. See `compare`."""
-    body = matched(media()[medium])
-    profile = fit_gaussians(diffusion_profile(body).rings(), TERMS, name=medium).profile
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "profile.toml"
-        write_profile(file, profile, {})
-        scene = comparison_scene(head, light, region, str(file))
+    """What a comparison judges, valid within the context; arguments as of `compare`."""
+    body = media()[medium].with_eta(1.0)
+    with medium_scene(head, light, region, body) as (scene, profile):
         yield Subject(Renderer(adapter), scene, profile, body, settings)
 
 
 def check_choices(against: str, light: str, region: str, medium: str) -> None:
-    """Raises DermisError for names that are none; cheap, so call it before long work."""
+    """Raises DermisError for unknown names; cheap, so call it before long work."""
     choices: dict[str, tuple[str, Collection[str]]] = {
         "against": (against, TRUTHS),
         "light": (light, LIGHTS),
@@ -145,10 +136,6 @@ def check_choices(against: str, light: str, region: str, medium: str) -> None:
     for option, (chosen, known) in choices.items():
         if chosen not in known:
             refuse(f"--{option}", f"one of {', '.join(known)}", f"{chosen!r} came", "Choose one of them")
-
-
-def _turned(skin: Skin, direction: str) -> Skin:
-    return Skin(**(skin.model_dump() | {"direction": direction}))
 
 
 def _render(subject: Subject, technique: str, truth: Truth) -> tuple[Floats, float]:
@@ -177,15 +164,3 @@ def _flip(image: Floats, truth: Floats, mask: NDArray[np.bool_]) -> float | None
     from dermis.reference.metrics import flip
 
     return flip(image, truth, mask).mean if find_spec("flip_evaluator") else None
-
-
-def by_channel(made: Comparison, technique: str) -> dict[str, Any]:
-    """Relative error and energy in red, green and blue, for a report."""
-    from dermis.reference.metrics import energy_ratio, relative_rmse
-
-    truth, image = made.truth, made.images[technique]
-    parts = [(image[..., c], truth.image[..., c], truth.mask, truth.variance[..., c]) for c in range(3)]
-    return {
-        "relrmse": [relative_rmse(*part).value for part in parts],
-        "energy_ratio": [energy_ratio(*part).value for part in parts],
-    }

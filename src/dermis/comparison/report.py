@@ -1,4 +1,4 @@
-"""A comparison as one HTML file that needs nothing else."""
+"""A comparison as a self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from dermis.comparison.compare import Comparison, Row
 from dermis.comparison.sources import comparison_sources
 from dermis.images.codecs import encode_png8
 from dermis.outputs import replacing
-from dermis.reference.difference_images import signed_difference
+from dermis.reference.metrics import MID_GREY, signed_difference
 
 Floats = NDArray[np.float64]
 _COLUMNS = ("technique", "relative RMSE", "FLIP", "energy ratio", "ms a frame")
 
 
 def write_report(path: Path, made: Comparison) -> None:
-    """Write pictures, differences and figures, whole or not at all.
+    """Write pictures, differences and figures; the file is complete or not there.
 
-    Raises DermisError when that is not possible.
+    Raises DermisError when it cannot be written.
     """
     text = Template((resources.files("dermis.comparison") / "report.html").read_text(encoding="utf-8"))
     truth = _figure("the truth", made.shown(made.truth.image))
@@ -44,7 +44,7 @@ def write_report(path: Path, made: Comparison) -> None:
 
 
 def cells(row: Row) -> tuple[str, ...]:
-    """A row's figures as they are printed, with standard errors where there are any."""
+    """A row's figures as text, with standard errors where there are any."""
     flip = "-" if row.flip is None else f"{row.flip:.3f}"
     return (
         row.technique,
@@ -70,10 +70,9 @@ def _figures(made: Comparison, row: Row) -> str:
     difference = signed_difference(
         np.maximum(made.exposure * image, 0.0), np.maximum(made.exposure * truth.image, 0.0)
     )
-    difference = np.where(truth.mask[..., None], difference, 0.5)
-    return (
-        _figure(row.technique, made.shown(image)) + "\n" + _figure(f"{row.technique}: difference", difference)
-    )
+    difference = np.where(truth.mask[..., None], difference, MID_GREY)
+    pictures = {row.technique: made.shown(image), f"{row.technique}: difference": difference}
+    return "\n".join(_figure(caption, picture) for caption, picture in pictures.items())
 
 
 def _figure(caption: str, picture: Floats) -> str:

@@ -1,21 +1,29 @@
-"""The scenes that techniques are judged on: light from the front, through the ear, and a laser's stripe."""
+"""The scenes on which techniques are judged: lit from the front, through the ear, and by a laser's stripe."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
+from dermis.optics.diffusion.models import diffusion_profile
+from dermis.optics.fits.gaussian import fit_gaussians
+from dermis.optics.gaussians import GaussianSum
+from dermis.optics.media import Medium
+from dermis.optics.profiles import TERMS, write_profile
 from dermis.scene.camera import Camera, portrait, three_quarter
 from dermis.scene.lights import Light, SpotLight, StripeLight
 from dermis.scene.model import Scene
 from dermis.scene.skin import Skin
 
 _WHITE = (3.14, 3.14, 3.14)
-_NOSE = (14.0, -28.0, 90.0)  # between tip, wing and lip, from the centre [mm]
-_EARS_MM = 60.0  # above and below the centre; farther below, shoulders stand out more
+_NOSE = (14.0, -28.0, 90.0)  # between tip, wing and lip, from the head's centre [mm]
+_EARS_MM = 60.0  # above and below the centre; farther below, shoulders are wider
 
 
 def _front(head: Head) -> tuple[Light, ...]:
@@ -30,7 +38,7 @@ def _back(head: Head) -> tuple[Light, ...]:
 
 
 def _laser(head: Head) -> tuple[Light, ...]:
-    """A sheet of light up and down over the cheek and the ear's front edge."""
+    """A vertical sheet of light over the cheek and the ear's front edge."""
     ear = _ear(head)
     place = (ear[0] - 12.0, ear[1], ear[2])
     return (StripeLight(direction=(-0.55, 0.0, -1.0), position=place, irradiance=(30.0, 30.0, 30.0)),)
@@ -40,7 +48,7 @@ LIGHTS: dict[str, Callable[[Head], tuple[Light, ...]]] = {"front": _front, "back
 
 
 def _ear(head: Head) -> tuple[float, float, float]:
-    """The outermost place of the head's left half at the height of its ears."""
+    """The outermost point of the head's left half at the height of its ears."""
     places = head.mesh.positions - head.centre_mm
     off = np.abs(places[:, 1])
     beside = places[off <= max(_EARS_MM, float(off.min()))]
@@ -59,7 +67,6 @@ def _at_cheek(head: Head) -> Camera:
 
 
 def _at_nose(head: Head) -> Camera:
-    """Close to the nose, from the front."""
     return Camera(position=(_NOSE[0], _NOSE[1], 900.0), target=_NOSE, frame_mm=90.0)
 
 
@@ -73,7 +80,7 @@ REGIONS: dict[str, Callable[[Head], Camera]] = {
 
 
 def comparison_scene(head: Head, light: str, region: str, profile: str) -> Scene:
-    """A head without maps, of white surface-free skin with a profile's own colour.
+    """A head without maps or surface reflection, its skin in the profile's own colour.
 
     light, region : of LIGHTS and REGIONS
     profile : name or file
@@ -83,6 +90,16 @@ def comparison_scene(head: Head, light: str, region: str, profile: str) -> Scene
     return Scene(bare, lights=LIGHTS[light](head), camera=REGIONS[region](head), skin=skin)
 
 
+@contextmanager
+def medium_scene(head: Head, light: str, region: str, body: Medium) -> Iterator[tuple[Scene, GaussianSum]]:
+    """`comparison_scene` with a medium's profile, kept as a file within the context, and the profile."""
+    profile = fit_gaussians(diffusion_profile(body).rings(), TERMS, name=body.name).profile
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "profile.toml"
+        write_profile(file, profile, {})
+        yield comparison_scene(head, light, region, str(file)), profile
+
+
 def usual_region(light: str) -> str:
-    """Where a light shows most."""
+    """Where a light's effect shows most."""
     return {"back": "ear", "laser": "three-quarter"}.get(light, "portrait")

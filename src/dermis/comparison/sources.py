@@ -1,4 +1,4 @@
-"""The works behind a comparison: truths, and how far an image is from them."""
+"""The works behind a comparison: the truths, the measures and the techniques."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _DIFFERENCE = "Andersson2020"
 
 
 def comparison_sources(against: str, techniques: Iterable[str]) -> tuple[str, ...]:
-    """Keys of the bibliography, each once.
+    """Keys of the bibliography, without duplicates.
 
     against : of `truths.TRUTHS`
     """

@@ -1,4 +1,4 @@
-"""Images to judge techniques by, each with assumptions of its own."""
+"""Images to judge techniques by, each with its own assumptions."""
 
 from __future__ import annotations
 
@@ -19,19 +19,22 @@ from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
 if TYPE_CHECKING:
+    from dermis.reference.cycles import CyclesRendered
     from dermis.reference.irradiance_samples import IrradianceSamples
+    from dermis.reference.path_traced import PathTraced
 
 Floats = NDArray[np.float64]
 
 _SPACING_MM, _FINEST_MM = 3.0, 0.2  # twice as coarse, a laser's stripe loses 1.5 % of its light
 _HEAT_RADIUS_MM = 10.0
-_LEAST_VARIANCE_MM2 = 0.25  # narrower Gaussians see no difference between straight lines and the surface
+_LEAST_VARIANCE_MM2 = 0.25  # for narrower Gaussians the surface is as good as flat
+_COVERED = 0.999  # share of a pixel
 SUBPIXELS = 16
 
 
 @dataclass(frozen=True)
 class Subject:
-    """What is judged: a scene, what its skin is made of, and how large its image is."""
+    """What is judged: a scene, its skin's profile and medium, and the settings of its image."""
 
     renderer: Renderer
     scene: Scene
@@ -46,10 +49,10 @@ class Truth:
 
     image, variance : (h, w, 3) radiance and the variance of its noise
     mask : (h, w) pixels to judge
-    subpixels : samples of each pixel that an image should have to be compared with it
+    subpixels : samples of each pixel that a technique's image needs for a fair comparison
     seconds : that it took
     notes : for the reader
-    through : whether light also takes the way through thin parts
+    through : whether it includes light through thin parts
     """
 
     image: Floats
@@ -62,9 +65,9 @@ class Truth:
 
 
 def surface_integral(subject: Subject, samples: int) -> Truth:
-    """The same profile by distance in space, integrated over the surface: what is left is the map's error.
+    """The same profile by straight-line distance, integrated over the surface: it shows the error of the map.
 
-    samples : of no account
+    samples : ignored
     """
     started = time.perf_counter()
     seen = surface_points(subject.renderer, subject.scene, subject.settings)
@@ -74,9 +77,9 @@ def surface_integral(subject: Subject, samples: int) -> Truth:
 
 
 def heat(subject: Subject, samples: int) -> Truth:
-    """The same Gaussians as heat that spreads along the surface, around what the camera aims at.
+    """The same Gaussians diffused along the surface like heat, around the camera's target.
 
-    samples : of no account
+    samples : ignored
     """
     return heat_around(subject, subject.scene.camera.target, _HEAT_RADIUS_MM, irradiance_samples(subject))
 
@@ -88,13 +91,13 @@ def heat_around(
     lit: IrradianceSamples,
     least_mm2: float = _LEAST_VARIANCE_MM2,
 ) -> Truth:
-    """The same Gaussians as heat that spreads along the surface, around what is seen nearest to a place.
+    """The same Gaussians diffused along the surface like heat, around the visible point nearest to a place.
 
     place : from the head's centre [mm]
     lit : of the whole head, see `irradiance_samples`
-    least_mm2 : variance under which Gaussians are integrated by straight-line distance
+    least_mm2 : variance below which Gaussians are integrated by straight-line distance
     """
-    from dermis.reference.map_error import patch_of
+    from dermis.reference.refine import patch_of
     from dermis.reference.surface_diffusion import diffuse_on_surface
 
     started = time.perf_counter()
@@ -121,7 +124,7 @@ def heat_around(
 
 
 def irradiance_samples(subject: Subject) -> IrradianceSamples:
-    """The light that enters all of the skin, as finely as the truths take it."""
+    """The light that enters all of the skin, sampled as finely as the truths need it."""
     from dermis.reference.irradiance_samples import Places, sample_irradiance
 
     def light(places: Places) -> Floats:
@@ -131,30 +134,25 @@ def irradiance_samples(subject: Subject) -> IrradianceSamples:
 
 
 def path_traced(subject: Subject, samples: int) -> Truth:
-    """Light through the medium itself: the profile's and the diffuse surface's error included.
+    """Light through the medium itself, free of the errors of the profile and of diffuse surfaces.
 
     samples : paths through each pixel
     """
     from dermis.reference.path_traced import path_trace
 
-    traced = path_trace(subject.scene, subject.medium, samples, subject.settings)
-    covered = traced.mask > 0.999
-    notes = (f"{traced.samples} paths a pixel", *traced.notes)
-    image, variance = traced.image.astype(np.float64), traced.variance.astype(np.float64)
-    return Truth(image, variance, covered, SUBPIXELS, traced.seconds, notes)
+    made = path_trace(subject.scene, subject.medium, samples, subject.settings)
+    return _rendered(made, made.mask, f"{made.samples} paths a pixel", *made.notes)
 
 
 def cycles(subject: Subject, samples: int) -> Truth:
-    """What Blender's Cycles makes of the medium by random walks: a peer, not the truth.
+    """Blender's Cycles with random walks through the medium: a peer, not the truth.
 
     samples : paths through each pixel
     """
     from dermis.reference.cycles import cycles_render
 
     made = cycles_render(subject.scene, subject.medium, samples, subject.settings)
-    image, variance = made.image.astype(np.float64), made.variance.astype(np.float64)
-    note = f"{made.samples} paths a pixel, random walk"
-    return Truth(image, variance, made.coverage > 0.999, SUBPIXELS, made.seconds, (note,))
+    return _rendered(made, made.coverage, f"{made.samples} paths a pixel, random walk")
 
 
 TRUTHS: dict[str, Callable[[Subject, int], Truth]] = {
@@ -165,12 +163,17 @@ TRUTHS: dict[str, Callable[[Subject, int], Truth]] = {
 }
 
 
+def _rendered(made: PathTraced | CyclesRendered, coverage: NDArray[np.float32], *notes: str) -> Truth:
+    image, variance = made.image.astype(np.float64), made.variance.astype(np.float64)
+    return Truth(image, variance, coverage > _COVERED, SUBPIXELS, made.seconds, notes)
+
+
 def _entered(subject: Subject, triangle: NDArray[np.int64], barycentric: Floats) -> Floats:
     return irradiance_at(subject.renderer, subject.scene, subject.settings, triangle, barycentric)
 
 
 def _straight(points: Floats, lit: IrradianceSamples, weight: Floats, variance_mm2: Floats) -> Floats:
-    """(n, 3) what leaves at points under some Gaussians of the straight-line distance."""
+    """(n, 3) radiant exitance at points by Gaussians of the straight-line distance."""
     from dermis.reference.surface_integral import GaussianSum as Profile
     from dermis.reference.surface_integral import integrate
 
@@ -180,7 +183,7 @@ def _straight(points: Floats, lit: IrradianceSamples, weight: Floats, variance_m
 
 
 def positions(subject: Subject, seen: SurfacePoints) -> Floats:
-    """(n, 3) where the pixels' middles meet the head [mm]."""
+    """(n, 3) where rays through the pixels' centres meet the head [mm]."""
     mesh = subject.scene.head.mesh
     corners = mesh.positions[mesh.triangles[seen.triangle]].astype(np.float64)
     return np.asarray(np.einsum("nk,nkc->nc", seen.barycentric, corners))
@@ -197,8 +200,3 @@ def check_seen(mask: NDArray[np.bool_]) -> None:
     if not mask.any():
         expected = "a pixel that shows nothing but the head"
         refuse("the picture", expected, "there is none", "Choose a larger size or another region")
-
-
-def matched(medium: Medium) -> Medium:
-    """The medium without a surface that refracts, as all truths take it."""
-    return replace(medium, eta=1.0)

@@ -13,14 +13,14 @@ from dermis.disk import cached_arrays
 from dermis.frame.coarser import Sheet, halved
 from dermis.frame.levels import MOST_HALVINGS
 from dermis.frame.seams import FEATHER_MM, REMEDIES, Remedy
-from dermis.gpu import Device
+from dermis.gpu import Device, scratch
 from dermis.gpu.textures import texture_from
 
 _HALVING = "halved 1"  # raise when `halved` gives other results
 _LEAST_SHARE = 1e-3  # of the blur at the edge itself: 0 would mean no surface
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AtlasTextures:
     """What the shaders read of an atlas, by the names they use.
 
@@ -38,6 +38,10 @@ class AtlasTextures:
     gathered: Any = None
     coarser: tuple[AtlasTextures, ...] = ()
     usual_per_mm: float = 0.0
+
+    def sheets(self, edge: str) -> tuple[AtlasTextures, ...]:
+        """The atlas at its resolution and at those that blurs with this edge may use."""
+        return (self, *(self.coarser if edge == "repeated" else ()))
 
 
 def upload_atlas(
@@ -73,7 +77,8 @@ def _uploaded(device: Device, sheet: Sheet, resources: dict[str, Any], **more: A
         return AtlasTextures(resources, sheared, **more)
     beyond = np.concatenate([sheet.source.view(np.uint32), sheet.gutter.astype(np.uint32)], axis=1)
     light = np.zeros((len(beyond), 4), np.float32)
-    lists = (device.buffer(words, "STORAGE") for words in (beyond, light))
+    lists = [device.buffer(words, "STORAGE") for words in (beyond, light)]
+    scratch(device, lists[1])
     return AtlasTextures(resources, sheared, *lists, **more)
 
 

@@ -18,37 +18,28 @@ _TRIANGLES_PER_ROW = 2048  # the shaders take it from the texture's width
 _VERTICES_PER_ROW = 512
 
 
-@dataclass(frozen=True)
-class HeadTextures:
+@dataclass(frozen=True, eq=False)
+class HeadResources:
     """What the shaders read of a head, by the names they use.
 
     resources : name in geometry.wgsl and skin.wgsl -> texture or sampler
-    relief_band : mip of the height map from which on the normal map knows the relief, -1 without one
     triangles : count
-    unscattered : share of the skin's triangles that the atlas cannot hold
     """
 
     resources: dict[str, Any]
-    relief_band: float
     triangles: int
-    unscattered: float
 
 
 def upload_geometry(device: Device, mesh: Mesh, atlas: Atlas) -> dict[str, Any]:
     """Textures and buffers by their names in geometry.wgsl."""
     triangles, vertices = _triangle_table(mesh, atlas), _vertex_table(mesh)
-    read = mesh_constants(device)  # what is not read still needs to be there
+    read = device.adapter.kind != "CPU"  # see geometry.wgsl; what is not read still needs to be there
     return {
         "triangle_table": texture_from(device, triangles, "rgba32uint"),
         "vertex_table": texture_from(device, vertices, "rgba32float"),
         "triangle_buffer": device.buffer(triangles if read else triangles[:1, :3], "STORAGE"),
         "vertex_buffer": device.buffer(vertices if read else vertices[:1, :4], "STORAGE"),
     }
-
-
-def mesh_constants(device: Device) -> tuple[tuple[str, int], ...]:
-    """Values of geometry.wgsl's `override`s: GPUs read buffers faster, software adapters textures."""
-    return () if device.adapter.kind == "CPU" else (("MESH_IN_BUFFERS", 1),)
 
 
 def _triangle_table(mesh: Mesh, atlas: Atlas) -> NDArray[np.uint32]:

@@ -12,35 +12,27 @@ from dermis.gpu import Device, make_texture
 
 FLOATS = "rgba32float"
 """Format of light that is neither blurred nor rounded to halves."""
+HALVES = "rgba16float"
 MOST_HALVINGS = 3
 _BRIGHT = 16.0  # what the lights are brought to, a 4000th of what halves hold
 _MOST_SCALED = 2.0**100  # it and its inverse are floats; light that would need more is none
 SHARP = 0.45  # least standard deviation [mm] of what is halved, over the square of the result's texels [mm]
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
 class Levels:
-    """Light and its blurred levels, layer 0 not blurred, and the space between two passes.
+    """Space for light and its blurred levels, layer 0 not blurred, and for what lies between two passes.
+
+    A level of less resolution is in its layer's mip of that number.
 
     texel : format of the textures
-    halvings : how often the resolution of each layer is halved; its light is in that mip level
-    scale : what light is multiplied with
-    stretch : space for a stretch map that is blurred along with the light
     """
 
     stack: Any
     scratch: Any
     size: int
     texel: str
-    halvings: tuple[int, ...]
-    scale: float = 1.0
-    stretch: tuple[Any, ...] = ()
     _views: dict[tuple[int, int], Any] = field(default_factory=dict)
-
-    @property
-    def views(self) -> list[Any]:
-        """What each layer shows, the light that enters first."""
-        return [self.layer(k, h) for k, h in enumerate(self.halvings)]
 
     def layer(self, k: int, halvings: int = 0) -> Any:
         """A view of one layer."""
@@ -58,12 +50,38 @@ class Levels:
         return self._views[k, mip]
 
 
-def make_levels(device: Device, size: int, count: int, texel: str) -> Levels:
-    """Space for the light that enters and `count` blurred levels of the format `texel`."""
-    mips = 1 + sum(size % 2**times == 0 for times in range(1, MOST_HALVINGS + 1))
+@dataclass(frozen=True)
+class Blur:
+    """How light spreads over an atlas.
+
+    variance_mm2, weight : (k,) increasing, and (k, 3) of the Gaussians
+    halvings : how often the resolution of each layer is halved, that of the unblurred one first
+    scale : what light is multiplied with in the layers
+    edge : what lies beyond a chart's edge and its gutter: "repeated", "cleared" or "skipped"
+    clear : the light that empty texels show when the edge is "cleared"
+    """
+
+    variance_mm2: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    halvings: tuple[int, ...]
+    scale: float = 1.0
+    edge: str = "repeated"
+    clear: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+def usual_texel(device: Device) -> str:
+    """Format of levels: halves on GPUs, which read them faster; floats where software converts halves."""
+    return FLOATS if device.adapter.kind == "CPU" else HALVES
+
+
+def make_levels(device: Device, size: int, count: int, texel: str, halved: bool = True) -> Levels:
+    """Space for the light that enters and `count` blurred levels of the format `texel`.
+
+    halved : whether there may be levels of less resolution
+    """
+    mips = 1 + sum(size % 2**times == 0 for times in range(1, MOST_HALVINGS + 1)) if halved else 1
     stack = make_texture(device, (size, size), texel, layers=max(2, count + 1), mips=mips)
-    scratch = make_texture(device, (size, size), texel, mips=mips)
-    return Levels(stack, scratch, size, texel, (0,) * (count + 1))
+    return Levels(stack, make_texture(device, (size, size), texel, mips=mips), size, texel)
 
 
 def scale_of(texel: str, brightest: float) -> float:

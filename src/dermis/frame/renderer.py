@@ -6,29 +6,32 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
-from typing import Any, Literal, overload
+from typing import Any, Literal, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.frame import Stages, draw_frame
+from dermis.frame.frame import draw_frame
 from dermis.frame.inputs import Inputs
+from dermis.frame.passes import pack, warm_up
 from dermis.frame.passes.pack import Leaving
 from dermis.frame.passes.post import Picture
 from dermis.frame.preparation import Preparation
 from dermis.frame.rendered import Rendered
-from dermis.gpu import Frame, open_device
+from dermis.gpu import Frame, Graph, open_device
 from dermis.gpu.device import gpu_failures
 from dermis.gpu.frame import Timed
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
+from dermis.scene.techniques import TECHNIQUES
 
+T = TypeVar("T")
 _WARMING_FRAMES = 100
 _IN_FLIGHT = 3  # frames submitted and not done: Python and the device work side by side, pictures stay fresh
 
 
 class Renderer:
-    """Renders scenes on one device; what does not change between two frames is not made again.
+    """Renders scenes on one device; what does not change between two frames is not computed again.
 
     adapter : "auto", "cpu" or part of an adapter's name
     depth : how many sizes of things are kept, for who goes back and forth between some
@@ -38,43 +41,46 @@ class Renderer:
         started = time.perf_counter()
         self.device = open_device(adapter)
         with gpu_failures(self.device):
-            self.stages = Stages(self.device)
-        self._preparation = Preparation(self.device, self.stages, depth)
-        self.prepare, self.forget = self._preparation.inputs, self._preparation.forget_all
-        self.profile_of, self.thin_parts = self._preparation.profile_of, self._preparation.thin_parts
+            warm_up(self.device)
+        self.graph = Graph(self.device)
+        self._preparation = Preparation(self.device, depth)
+        self.memo, self.prepare = self._preparation.memo, self._preparation.inputs
+        self.profile_of = self._preparation.profile_of
         self._frames = 0
         self._in_flight: deque[int] = deque()
         self._opening_ms = 1e3 * (time.perf_counter() - started)
+
+    def forget(self) -> None:
+        """Make and compute everything again."""
+        self.memo.forget()
+        self.graph.forget()
 
     def draw(
         self,
         scene: Scene,
         settings: Settings | None = None,
         *,
-        keep_shadows: bool = True,
-        keep_stages: bool = False,
+        anew: bool = False,
         timed: Timed = True,
-        place: str = "",
+        view: str = "",
     ) -> Rendered:
         """Render one frame and leave the image on the device.
 
-        keep_shadows : False draws the shadow maps again even when no light moved
-        keep_stages : True runs only stages whose results are not there already: for still and slow scenes
+        anew : True computes everything, also what is there already
         timed : True times each stage in a pass of its own, which takes longer than the frame otherwise does;
             "whole" times only the frame, with its stages in one pass; False returns as soon as the frame is
             submitted, so that the device never waits for Python; only when it is three frames behind is it
             waited for
-        place : name of a scene among several drawn in turn: each keeps light and shadows of its own
+        view : name of a scene among several drawn in turn: each keeps light and shadows of its own
 
         Raises DermisError for sizes over the device's limits and when the device fails.
         """
         settings = settings or Settings()
         with gpu_failures(self.device):
             started = time.perf_counter()
-            inputs = self.prepare(scene, settings, place)
+            inputs = self.prepare(scene, settings, view)
             ready = time.perf_counter()
-            frame = Frame(self.device, timed=timed)
-            self._submit(frame, inputs, keep_shadows, keep_stages)
+            frame, _ = self._submit(inputs, timed, anew)
             if timed:
                 frame.wait()
             else:
@@ -83,57 +89,45 @@ class Renderer:
             times = frame.stage_ms() if timed else None
         setup_ms = 1e3 * (ready - started) + self._opening_ms
         self._opening_ms = 0.0
-        number, frame_ms = self._frames, 1e3 * (done - ready)
+        number, frame_ms, made = self._frames, 1e3 * (done - ready), inputs.resources
         return Rendered(
             self.device,
-            inputs.picture,
+            made.picture,
             times,
             frame_ms,
             setup_ms,
-            inputs.gaussians,
-            inputs.head.unscattered,
-            inputs.suns,
+            made.gaussians,
+            made.unscattered,
+            made.suns,
             self._leave,
             is_current=lambda: number == self._frames,
         )
 
-    def draw_warm(
-        self, scene: Scene, settings: Settings | None = None, *, keep_shadows: bool = False
-    ) -> Rendered:
+    def draw_warm(self, scene: Scene, settings: Settings | None = None) -> Rendered:
         """A frame timed on a device at work: a GPU that was idle runs at a fraction of its clock rate."""
-        rendered = self.draw(scene, settings, keep_shadows=keep_shadows)
+        rendered = self.draw(scene, settings, anew=True)
         if self.device.adapter.kind == "CPU":
             return rendered
         for _ in range(_WARMING_FRAMES):
-            self.draw(scene, settings, keep_shadows=keep_shadows, timed=False)
+            self.draw(scene, settings, anew=True, timed=False)
         self.device.wait()
-        return self.draw(scene, settings, keep_shadows=keep_shadows)
+        return self.draw(scene, settings, anew=True)
 
     def _submit(
-        self,
-        frame: Frame,
-        inputs: Inputs,
-        keep_shadows: bool,
-        keep_stages: bool,
-        leave: Callable[[Frame, Picture], Leaving] | None = None,
-    ) -> Leaving | None:
-        """Record and submit; after a failure nobody knows what the shadow maps and the atlas hold.
+        self, inputs: Inputs, timed: Timed, anew: bool, leave: Callable[[Graph, Picture], T] | None = None
+    ) -> tuple[Frame, T | None]:
+        """Declare a frame and run what has to be run of it.
 
         leave : sends the picture on its way to NumPy at once
         """
-        if not keep_shadows:
-            inputs.shadow_maps.drawn = b""
-        self.stages.shown.begin(keep_stages)
-        try:
-            draw_frame(frame, self.stages, inputs)
-            leaving = leave(frame, inputs.picture) if leave else None
-            frame.submit()
-        except Exception:
-            inputs.shadow_maps.drawn = b""
-            self.stages.shown.forget_all()
-            raise
+        if anew:
+            self.graph.forget()
+        self.graph.begin()
+        draw_frame(self.graph, inputs, TECHNIQUES[inputs.settings.technique])
+        leaving = leave(self.graph, inputs.resources.picture) if leave else None
+        frame = self.graph.submit(timed)
         self._frames += 1
-        return leaving
+        return frame, leaving
 
     def _keep_pace(self, frame: Frame) -> None:
         """Wait for the frame before those that may be in flight."""
@@ -142,9 +136,9 @@ class Renderer:
             self.device.wait(self._in_flight.popleft())
 
     def _leave(self, picture: Picture) -> Leaving:
-        frame = Frame(self.device, timed=False)
-        leaving = self.stages.pack.draw(frame, picture)
-        frame.submit()
+        self.graph.begin()
+        leaving = pack.draw(self.graph, picture)
+        self.graph.submit()
         return leaving
 
     def render(self, scene: Scene, **settings: Any) -> NDArray[np.float32]:
@@ -186,8 +180,8 @@ class Renderer:
     def _send(self, scene: Scene, settings: Settings, linear: bool) -> Leaving:
         """Submit a frame and send its picture on its way."""
         with gpu_failures(self.device):
-            inputs, frame = self.prepare(scene, settings), Frame(self.device, timed=False)
-            leaving = self._submit(frame, inputs, True, False, partial(self.stages.pack.draw, linear=linear))
+            inputs = self.prepare(scene, settings)
+            _, leaving = self._submit(inputs, False, False, partial(pack.draw, linear=linear))
         assert leaving is not None
         return leaving
 

@@ -2,209 +2,222 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Future
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.cached import cached_atlas
-from dermis.frame import inputs as made
-from dermis.frame import surface
-from dermis.frame.atlas_layout import Layout
+from dermis.frame import surface, surroundings
+from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.atlas_textures import AtlasTextures, upload_atlas
-from dermis.frame.engine_techniques import pre_integrated, screen_spread
-from dermis.frame.frame import Stages
-from dermis.frame.geometry import HeadTextures, upload_geometry
-from dermis.frame.inputs import Split, Standing
-from dermis.frame.kept import Kept
-from dermis.frame.levels import Levels
-from dermis.frame.maps import relief_band, upload_maps
-from dermis.frame.passes.shade import technique_constants
-from dermis.frame.passes.shadows import ShadowMaps
-from dermis.frame.passes.translucency import Thin
-from dermis.frame.passes.visibility_buffer import Layers
-from dermis.frame.projection import ShadowView
-from dermis.frame.seams import laid_out, remedy_of, stretch_of
-from dermis.frame.surroundings import (
-    Surroundings,
-    environment_record,
-    is_occluded,
-    no_occlusion,
-    occlusion_map,
-)
-from dermis.frame.translucency import ThinParts, lets_through, shared_width, thin_of
-from dermis.gpu import Device
+from dermis.frame.geometry import HeadResources, upload_geometry
+from dermis.frame.inputs import Resources, Split, view_record
+from dermis.frame.levels import FLOATS, Blur, Levels, make_levels
+from dermis.frame.limits import check_limits
+from dermis.frame.maps import upload_maps
+from dermis.frame.passes import bloom, post, shade, shadows, surface_texels, visibility_buffer
+from dermis.frame.seams import LaidOut, Remedy, laid_out, remedy_of
+from dermis.frame.surroundings import Surroundings
+from dermis.frame.techniques.technique import AtlasTechnique, Technique
+from dermis.frame.translucency import translucency_of
+from dermis.gpu import Device, Memo
 from dermis.gpu.textures import texture_from
 from dermis.mesh.head import Head
 from dermis.optics.gaussians import GaussianSum
-from dermis.scene.model import Scene
+from dermis.scene.environment import Environment
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.specular.albedo import albedo_table
 
 
-class StandingMaker:
-    """Makes it of things that are kept by the role that they play."""
+@dataclass(frozen=True)
+class Asked:
+    """What resources are made for.
 
-    def __init__(self, device: Device, stages: Stages, kept: Kept, profile_of: surface.ProfileOf) -> None:
-        self.device, self._stages, self._profile_of = device, stages, profile_of
-        self._keep, self._forget_all = kept.keep, kept.forget_all
-        self.thin_parts = ThinParts(device, kept)
+    lights, shadow_layers : how many parts of lights there are, and how many of them cast shadows
+    view : name of a scene among several that are drawn in turn
+    """
 
-    def make(
-        self,
-        scene: Scene,
-        settings: Settings,
-        place: str,
-        profile: GaussianSum,
-        split: Split,
-        surroundings: Surroundings,
-        views: list[ShadowView | None],
-        lights: Any,
-    ) -> Standing:
-        """What stands, under the lights of its first frame.
+    head: Head
+    skin: Skin
+    profile: GaussianSum
+    settings: Settings
+    environment: Environment | None
+    surroundings: Surroundings
+    technique: Technique
+    lights: int
+    shadow_layers: int
+    view: str
 
-        scene : with its environment's peaks among its lights
-        place : scenes that are drawn in turn have light and shadows of their own, by its name
-        """
-        self.thin_parts.begin()
-        self._place, self._shadow = place, settings.shadow_size  # light that has spread is kept for each size
-        count, size, stages = len(split.blurred_mm2), settings.size, self._stages
-        layers = sum(view is not None for view in views)
-        shadow_maps = self._shadow_maps(scene.head, layers, settings.shadow_size if layers else 1)
-        shared = {
-            "lights": lights,
-            "shadow_maps": shadow_maps.texture,
-            "shadow_bounds": shadow_maps.bounds,
-            "nearest_sampler": self.device.sampler(),
-            "panorama": surroundings.panorama,
-            "albedo_table": self._albedo(scene.skin),
-        }
-        layouts = self._layouts(scene, settings, split, len(views), shared)
-        pre = pre_integrated(self._keep, self.device, settings, profile)
-        remedy = remedy_of(settings)
-        return Standing(
-            head=layouts[0].head,
-            layouts=layouts,
-            shadow_maps=shadow_maps,
-            scatters=count > 0,
-            levels=self._levels(settings.technique, settings.atlas if count else 1, count),
-            blurred_mm2=split.blurred_mm2,
-            level_weight=split.weight,
-            edge=remedy.edge,
-            clear=np.pi * np.array(settings.seam_colour) * remedy.coloured,
-            scattered=pre.table if pre else self._scattered(layouts, settings.atlas),
-            seen=self._seen(size, settings.samples),
-            view=made.view_record(stages.shade.program, scene.head, settings, split, pre),
-            constants=surface.constants(scene.skin) + technique_constants(settings),
-            suns=len(surroundings.suns),
-            gaussians=len(profile.variance_mm2),
-            picture=self._keep("picture", size, lambda: stages.post.make_picture(size)),
-            spread=screen_spread(self._keep, lambda: stages.screen_space, settings, profile),
-            glow=self._keep("glow", size, lambda: stages.bloom.make_glow(size)) if settings.bloom else None,
-            settings=settings,
-        )
+    @property
+    def white(self) -> bool:
+        """Whether the colour map alone gives the colour."""
+        return self.skin.albedo == "map"
 
-    def _layouts(
-        self, scene: Scene, settings: Settings, split: Split, lights: int, shared: dict[str, Any]
-    ) -> list[Layout]:
-        """The atlases that light is spread on: one, or two that hide each other's seams."""
-        layouts, maps = [], self._begin_maps(scene, settings)
-        count = len(split.blurred_mm2)
-        names, side = laid_out(settings, count, is_occluded(scene, settings))
-        for index, name in enumerate(names):
-            atlas, textures = self._atlas(scene.head, name, side, settings, index)
-            thin = self._thin(scene, settings, split, atlas, index)
-            head = self._head(scene, atlas, maps, index)
-            skin = surface.skin_record(self._stages.shade.program, scene, head, self._profile_of)
-            skin["light_count"] = lights
-            lit = {**head.resources, "skin": skin, **shared}
-            around = self._environment(scene, settings, split.total, head, lit, atlas, textures, index)
-            space = self._space(f"scattered {index}", settings.atlas if count else 1)
-            layouts.append(Layout(head, textures, lit | around, space, thin))
-        return layouts
+    @property
+    def light_of(self) -> str:
+        """Whose light it is: each view and each size of shadow maps keeps its own."""
+        return f"{self.view} {self.settings.shadow_size}"
 
-    def _thin(self, scene: Scene, settings: Settings, split: Split, atlas: Atlas, index: int) -> Thin | None:
-        """The translucent pairs of a layout, weighted for the skin, and space for their light."""
-        if not (len(split.blurred_mm2) and lets_through(settings)):
-            return None
-        head, widest = scene.head, float(np.sqrt(split.blurred_mm2[-1]))
-        widest = shared_width(widest) if scene.skin.has_own_tissue else widest
-        pairs = self.thin_parts.pairs(index, head, atlas, widest, changing=scene.skin.has_own_tissue)
-        profile, stage = (split.blurred_mm2, split.weight), self._stages.translucency_weights
-        key = (pairs, *(numbers.tobytes() for numbers in profile))
-        return self._keep(f"thin {index}", key, lambda: thin_of(self.device, stage, pairs, *profile))
+    @cached_property
+    def split(self) -> Split:
+        """The profile as the technique uses it."""
+        return self.technique.split(self.profile, self.white)
 
-    def _levels(self, technique: str, side: int, count: int) -> Levels:
-        stage = self._stages.spreading(technique)
-        key = stage.name, side, count, self._shadow
-        return self._keep("levels" + self._place, key, lambda: stage.make_levels(side, count))
+    @cached_property
+    def occluded(self) -> bool:
+        """Whether the head hides some of its environment from itself."""
+        return surroundings.is_occluded(self.environment, self.settings)
 
-    def _scattered(self, layouts: list[Layout], side: int) -> Any:
-        return self._space("scattered", side) if len(layouts) > 1 else layouts[0].scattered
+    @cached_property
+    def remedy(self) -> Remedy:
+        """What is done at the seams."""
+        return remedy_of(self.settings.seams, self.technique.stitches)
 
-    def _seen(self, size: tuple[int, int], samples: int) -> Layers:
-        return self._keep("seen", (size, samples), lambda: self._stages.visibility.make_seen(size, samples))
+    @property
+    def count(self) -> int:
+        """Gaussians that light is blurred by over the atlas."""
+        return len(self.split.blurred_mm2)
 
-    def _environment(
-        self,
-        scene: Scene,
-        settings: Settings,
-        total: Any,
-        head: HeadTextures,
-        lit: Any,
-        atlas: Atlas,
-        textures: AtlasTextures,
-        index: int,
-    ) -> dict[str, Any]:
-        """The environment's record, and how much of it each place sees."""
-        occluded = is_occluded(scene, settings)
+    @cached_property
+    def atlases(self) -> LaidOut:
+        """Names and size of the atlases."""
+        return laid_out(self.remedy, self.settings, self.count, self.occluded)
 
-        def make() -> Any:
-            if not occluded:
-                return no_occlusion(self.device)
-            return occlusion_map(self.device, scene.head, head, lit, atlas, textures)
 
-        key = (atlas,) if occluded else ()
-        record = environment_record(self._stages.shade.program, scene, total, occluded)
-        return {"environment": record, "occlusion_map": self._keep(f"occlusion {index}", key, make)}
+def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
+    """The resources of frames that differ by their cameras and lights alone.
 
-    def _albedo(self, skin: Skin) -> Any:
-        key = surface.model_of(skin), skin.fresnel
-        return self._keep("albedo", key, lambda: texture_from(self.device, albedo_table(*key), "rg32float"))
+    Raises DermisError for sizes over the device's limits.
+    """
+    settings, keep, technique = asked.settings, memo.keep, asked.technique
+    check_limits(device, technique, settings, asked.atlases, asked.count)
+    reading = device, asked.head, asked.white, settings.gamma == "right"
+    maps = memo.soon(device.executor, upload_maps, *reading)  # which take long to read
+    size = settings.shadow_size if asked.shadow_layers else 1
+    shadow_maps = keep(_shadow_maps, device, asked.head, asked.shadow_layers, size, of=asked.view)
+    shared = _shared(memo, device, asked, shadow_maps)
+    named = list(enumerate(asked.atlases.layouts))
+    atlases = [_atlas(memo, device, asked, name, index) for index, name in named]
+    uploaded: dict[str, Any] = memo.wait(maps)
+    shared |= uploaded
+    layouts = [_layout(memo, device, asked, *atlases[index], shared, index) for index, _ in named]
+    own = technique.make(memo, device, settings, asked.profile)
+    program = shade.shade_program(device)
+    view = view_record(program, asked.head, settings, asked.split)
+    technique.describe(view, program, own)
+    first, _ = atlases[0]
+    side, several = settings.atlas, len(layouts) > 1
+    return Resources(
+        head=HeadResources(layouts[0].lit, len(asked.head.mesh.triangles)),
+        layouts=tuple(layouts),
+        shadow_maps=shadow_maps,
+        scatters=asked.count > 0,
+        levels=_levels(memo, device, asked),
+        blurs=tuple(_blur(asked, textures) for _, textures in atlases) if asked.count else (),
+        scattered=_sum(memo, device, asked, side, "both") if several else layouts[0].scattered,
+        own=own,
+        visibility=keep(_visibility, device, settings.size, settings.samples),
+        view=view,
+        constants=surface.constants(asked.skin) + technique.shade_constants,
+        suns=len(asked.surroundings.suns),
+        gaussians=len(asked.profile.variance_mm2),
+        picture=keep(post.make_picture, device, settings.size),
+        glow=keep(bloom.make_glow, device, settings.size) if settings.bloom else None,
+        unscattered=keep(first.unscattered, asked.head.mesh),
+    )
 
-    def _shadow_maps(self, head: Head, layers: int, size: int) -> ShadowMaps:
-        key = (head, layers, size)  # heads of one size have the same matrices
-        return self._keep("shadows" + self._place, key, lambda: self._stages.shadows.make_maps(layers, size))
 
-    def _space(self, role: str, side: int) -> Any:
-        stage = self._stages.combine
-        return self._keep(role + self._place, (side, self._shadow, stage), lambda: stage.make_sum(side))
+def _shared(memo: Memo, device: Device, asked: Asked, shadow_maps: shadows.ShadowMaps) -> dict[str, Any]:
+    """What all layouts are lit with, lights aside."""
+    skin, program = asked.skin, shade.shade_program(device)
+    around, total = asked.environment, asked.split.total
+    return {
+        "skin": surface.skin_record(program, skin, asked.head.maps, asked.profile, asked.lights),
+        "environment": surroundings.environment_record(program, around, skin, total, asked.occluded),
+        "shadow_maps": shadow_maps.texture,
+        "shadow_bounds": shadow_maps.bounds,
+        "nearest_sampler": device.sampler(),
+        "panorama": asked.surroundings.panorama,
+        "albedo_table": memo.keep(_albedo, device, surface.model_of(skin), skin.fresnel),
+    }
 
-    def _atlas(
-        self, head: Head, layout: str, size: int, settings: Settings, index: int
-    ) -> tuple[Atlas, AtlasTextures]:
-        remedy, stretch = remedy_of(settings), stretch_of(settings)
-        atlas = self._keep(
-            f"atlas {index}", (head, layout, size), lambda: cached_atlas(head.mesh, size, layout)
-        )
-        key = atlas, stretch, remedy
-        return atlas, self._keep(f"atlas textures {index}", key, lambda: upload_atlas(self.device, *key))
 
-    def _begin_maps(self, scene: Scene, settings: Settings) -> Future[dict[str, Any]]:
-        """The head's maps, which take long to read: on another thread, while the rest is made."""
-        key = scene.head, scene.skin.albedo == "map", settings.gamma == "right"
-        return self._keep("maps", key, lambda: self.device.executor.submit(upload_maps, self.device, *key))
+def _atlas(memo: Memo, device: Device, asked: Asked, name: str, index: int) -> tuple[Atlas, AtlasTextures]:
+    technique, settings = asked.technique, asked.settings
+    atlas = memo.keep(_cached_atlas, asked.head, asked.atlases.side, name, of=str(index))
+    stretch = technique.stretch(settings) if isinstance(technique, AtlasTechnique) else settings.stretch
+    return atlas, memo.keep(upload_atlas, device, atlas, stretch, asked.remedy, of=str(index))
 
-    def _head(self, scene: Scene, atlas: Atlas, maps: Future[dict[str, Any]], index: int) -> HeadTextures:
-        head, mesh = scene.head, scene.head.mesh
-        key = head, atlas
-        geometry = self._keep(f"geometry {index}", key, lambda: upload_geometry(self.device, mesh, atlas))
-        unscattered = self._keep(f"unscattered {index}", key, lambda: atlas.unscattered(mesh))
-        try:
-            resources = geometry | maps.result()
-        except Exception:
-            self._forget_all()  # maps that failed must not be found again
-            raise
-        return HeadTextures(resources, relief_band(head.maps), len(mesh.triangles), unscattered)
+
+def _layout(
+    memo: Memo,
+    device: Device,
+    asked: Asked,
+    atlas: Atlas,
+    textures: AtlasTextures,
+    shared: dict[str, Any],
+    index: int,
+) -> AtlasLayout:
+    """An atlas that light is spread on, without lights."""
+    keep, number, head = memo.keep, str(index), asked.head
+    lit = keep(upload_geometry, device, head.mesh, atlas, of=number) | shared
+    if asked.occluded:
+        bound = lit, textures.resources["atlas"]
+        lit["occlusion_map"] = keep(surroundings.occlusion_map, device, head, atlas, using=bound, of=number)
+    else:
+        lit["occlusion_map"] = surroundings.no_occlusion(device)
+    translucency = None
+    if asked.count and asked.settings.transmission == "thin" and asked.technique.transmits:
+        blurred = asked.split.blurred_mm2, asked.split.weight, asked.skin.has_own_tissue
+        translucency = translucency_of(memo, device, head, atlas, *blurred, of=number)
+    side = asked.settings.atlas if asked.count else 1
+    surfaces = keep(surface_texels.make_surfaces, device, side, of=number)
+    return AtlasLayout(textures, lit, surfaces, _sum(memo, device, asked, side, number), translucency)
+
+
+def _sum(memo: Memo, device: Device, asked: Asked, side: int, role: str) -> Any:
+    of = f"{role} {asked.view}"
+    return memo.keep(_make_sum, device, asked.technique, side, asked.light_of, of=of)
+
+
+def _levels(memo: Memo, device: Device, asked: Asked) -> Levels:
+    side = asked.settings.atlas if asked.count else 1
+    return memo.keep(_make_levels, device, asked.technique, side, asked.count, asked.light_of, of=asked.view)
+
+
+def _blur(asked: Asked, atlas: AtlasTextures) -> Blur:
+    assert isinstance(asked.technique, AtlasTechnique)
+    red, green, blue = (np.pi * c * asked.remedy.coloured for c in asked.settings.seam_colour)
+    halvings = asked.technique.halvings(asked.split, atlas, asked.remedy.edge)
+    spread = asked.split.blurred_mm2, asked.split.weight
+    return Blur(*spread, halvings, edge=asked.remedy.edge, clear=(red, green, blue))
+
+
+def _cached_atlas(head: Head, side: int, name: str) -> Atlas:
+    return cached_atlas(head.mesh, side, name)
+
+
+def _shadow_maps(device: Device, _: Head, layers: int, size: int) -> shadows.ShadowMaps:
+    return shadows.make_shadow_maps(device, layers, size)
+
+
+def _visibility(device: Device, size: tuple[int, int], samples: int) -> visibility_buffer.Layers:
+    return visibility_buffer.make_layers(device, size, samples, triangles=True)
+
+
+def _albedo(device: Device, model: str, fresnel: str) -> Any:
+    return texture_from(device, albedo_table(model, fresnel), "rg32float")
+
+
+def _make_levels(device: Device, technique: Technique, side: int, count: int, _: str) -> Levels:
+    if isinstance(technique, AtlasTechnique):
+        return technique.make_levels(device, side, count)
+    return make_levels(device, side, count, FLOATS)
+
+
+def _make_sum(device: Device, technique: Technique, side: int, _: str) -> Any:
+    return technique.make_sum(device, side)

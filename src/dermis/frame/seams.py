@@ -35,14 +35,14 @@ REMEDIES = {
     "alpha": Remedy(edge="skipped"),
     "multi-uv": Remedy(("mesh", "unwrapped"), edge="skipped"),
 }
-_BASELINES = ("one-blur", "published")  # never knew what lies across a seam
 
 
-def remedy_of(settings: Settings) -> Remedy:
-    """What is done at the seams; the baselines take their own remedy where ours is asked for."""
-    if settings.technique in _BASELINES and settings.seams == "stitch":
-        return REMEDIES["clear-colour"]
-    return REMEDIES[settings.seams]
+def remedy_of(seams: str, stitches: bool) -> Remedy:
+    """What is done at the seams.
+
+    stitches : whether the technique can stitch; else it takes a remedy of its time where that is asked for
+    """
+    return REMEDIES["clear-colour" if seams == "stitch" and not stitches else seams]
 
 
 class LaidOut(NamedTuple):
@@ -52,18 +52,13 @@ class LaidOut(NamedTuple):
     side: int
 
 
-def laid_out(settings: Settings, levels: int, occluded: bool) -> LaidOut:
+def laid_out(remedy: Remedy, settings: Settings, levels: int, occluded: bool) -> LaidOut:
     """The atlases that a frame needs: the least where no light spreads over them and nothing else lies there.
 
     levels : Gaussians that light is blurred by over the atlas
     occluded : whether an environment's occlusion lies on it
     """
-    layouts = remedy_of(settings).layouts
+    layouts = remedy.layouts
     if levels:
         return LaidOut(layouts, settings.atlas)
     return LaidOut(layouts[:1], settings.atlas) if occluded else LaidOut(("mesh",), SMALLEST)
-
-
-def stretch_of(settings: Settings) -> str:
-    """How blurs follow the map's stretch: a single blur does not."""
-    return "none" if settings.technique == "one-blur" else settings.stretch

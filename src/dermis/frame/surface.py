@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from dermis.frame.geometry import HeadTextures
-from dermis.frame.maps import DEFAULT_COLOUR
-from dermis.frame.passes.variants import Constants
+from dermis.frame.maps import DEFAULT_COLOUR, relief_band
 from dermis.gpu import ComputeProgram
+from dermis.gpu.wgsl_source import Member
+from dermis.mesh.maps import Maps
 from dermis.optics.directions import directions
 from dermis.optics.gaussians import GaussianSum
-from dermis.scene.model import Scene
 from dermis.scene.skin import Skin
+from dermis.specular.albedo import ROOT_OF_FIRST_ROW
 from dermis.specular.energy import ENERGY
-from dermis.specular.fresnel import FRESNEL, SKIN_ETA, SKIN_F0
+from dermis.specular.fresnel import SKIN_ETA, SKIN_F0
 from dermis.specular.models import MODELS
-
-ProfileOf = Callable[[Skin], GaussianSum]
 
 
 def model_of(skin: Skin) -> str:
@@ -27,19 +24,31 @@ def model_of(skin: Skin) -> str:
     return next(iter(MODELS)) if skin.specular == "none" else skin.specular
 
 
-def constants(skin: Skin) -> Constants:
+def lobe_shaders() -> list[Member]:
+    """The models as lobe.wgsl includes them; their place is their number."""
+    return [Member(name, model.shader) for name, model in MODELS.items()]
+
+
+def surface_numbers() -> dict[str, float]:
+    """What lobe.wgsl and the models' shaders fill in."""
+    of_models = {name: number for model in MODELS.values() for name, number in model.numbers.items()}
+    return {"root_of_first_row": ROOT_OF_FIRST_ROW, **of_models}
+
+
+def constants(skin: Skin) -> tuple[tuple[str, int], ...]:
     """Values of lobe.wgsl's `override`s where they are not the default 0."""
-    numbers = {"MODEL": list(MODELS).index(model_of(skin)), "FRESNEL": list(FRESNEL).index(skin.fresnel)}
+    numbers = {"MODEL": MODELS.names.index(model_of(skin)), "EXACT_FRESNEL": int(skin.fresnel == "exact")}
     return tuple((name, number) for name, number in numbers.items() if number)
 
 
-def skin_record(program: ComputeProgram, scene: Scene, head: HeadTextures, profile_of: ProfileOf) -> Any:
+def skin_record(
+    program: ComputeProgram, skin: Skin, maps: Maps, profile: GaussianSum, light_count: int
+) -> Any:
     """The skin's parameters; a roughness map replaces the constant.
 
-    profile_of : the Gaussians of a skin, asked for where directions matter
+    profile : of the skin
     """
-    skin, energy = scene.skin, ENERGY[scene.skin.energy]
-    mapped = scene.head.maps.roughness is not None
+    energy, mapped = ENERGY[skin.energy], maps.roughness is not None
     return program.record(
         "Skin",
         roughness=skin.smoothing * (1.0 if mapped else skin.roughness),
@@ -50,16 +59,15 @@ def skin_record(program: ComputeProgram, scene: Scene, head: HeadTextures, profi
         returned=float(energy.returned),
         tint=float(skin.specular_colour == "wrong"),
         mix=skin.mix,
-        relief_band=head.relief_band,
-        light_count=len(scene.lights),
-        **(_by_direction(scene, profile_of) if skin.direction == "half-space" else {}),
+        relief_band=relief_band(maps),
+        light_count=light_count,
+        **(_by_direction(skin, maps, profile) if skin.direction == "half-space" else {}),
     )
 
 
-def _by_direction(scene: Scene, profile_of: ProfileOf) -> dict[str, Any]:
+def _by_direction(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any]:
     """What light does by its directions, for half-spaces of the skin's mean colour."""
-    skin = scene.skin
-    colour = profile_of(skin).albedo if skin.albedo == "profile" else scene.head.maps.mean_colour
+    colour = profile.albedo if skin.albedo == "profile" else maps.mean_colour
     colour = np.full(3, DEFAULT_COLOUR) if colour is None else colour
     law = directions(colour, 1.0 if skin.specular == "none" else SKIN_ETA)
     return {

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.atlas_layout import Layout
+from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.atlas_textures import AtlasTextures, packed_texels
+from dermis.frame.passes import irradiance, shadows, surface_texels, visibility_buffer
+from dermis.frame.passes.surface_texels import make_surfaces
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Frame, download, make_texture
 from dermis.gpu.textures import texture_from
@@ -40,9 +42,11 @@ def surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> Surf
     single = settings.model_copy(update={"samples": 1, "technique": "none"})
     inputs = renderer.prepare(scene, single)
     frame = Frame(renderer.device)
-    renderer.stages.visibility.draw(frame, inputs.seen, inputs.camera, inputs.head)
+    made = inputs.resources
+    visibility_buffer.draw(frame, made.visibility, inputs.camera, made.head)
     frame.submit()
-    seen = download(renderer.device, inputs.seen.texture).astype(np.int64)
+    renderer.graph.forget()  # which does not know of this frame
+    seen = download(renderer.device, made.visibility.texture).astype(np.int64)
     mask = seen > 0
     triangle = seen[mask] - 1
     return SurfacePoints(mask, triangle, _barycentric(scene, inputs.view, triangle, mask))
@@ -84,10 +88,11 @@ def irradiance_at(
     listed = AtlasTextures({"atlas": texture_from(device, records, "rg32uint")}, sheared=False)
     lit = make_texture(device, (side, side), "rgba32float")
     frame = Frame(device)
-    renderer.stages.shadows.draw(
-        frame, inputs.shadow_maps, inputs.shadow_views, inputs.head, inputs.shadow_key
-    )
-    layout = Layout(first.head, listed, first.lit, lit)
-    renderer.stages.irradiance.draw(frame, layout, inputs.light_constants, lit, side)
+    made = inputs.resources
+    shadows.draw(frame, made.shadow_maps, inputs.shadow_views, made.head)
+    layout = AtlasLayout(listed, first.lit, make_surfaces(device, side), lit)
+    surface_texels.draw(frame, layout)
+    irradiance.draw(frame, layout, inputs.light_constants, lit, side)
     frame.submit()
+    renderer.graph.forget()  # which does not know of this frame
     return download(device, lit).reshape(-1, 4)[: len(triangle), :3].astype(np.float64)

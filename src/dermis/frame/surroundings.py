@@ -12,24 +12,23 @@ from dermis.atlas.atlas import Atlas
 from dermis.atlas.cached import cached_occlusion
 from dermis.environment.panorama import Sun
 from dermis.environment.prefilter import equivalent_mirrors, prefilter
-from dermis.frame.atlas_textures import AtlasTextures
-from dermis.frame.geometry import HeadTextures
-from dermis.frame.kept import Keep
 from dermis.frame.lights import sun_lights
-from dermis.frame.passes.occlusion import FORM, Occlusion, whole_map
+from dermis.frame.passes.occlusion import FORM, bake_occlusion, whole_map
 from dermis.frame.surface import model_of
-from dermis.gpu import ComputeProgram, Device, make_texture, upload
+from dermis.gpu import ComputeProgram, Device, Memo, make_texture, upload
 from dermis.gpu.program import Resources
 from dermis.gpu.textures import texture_from
 from dermis.mesh.head import Head
+from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
+from dermis.scene.skin import Skin
 
 _BRIGHTEST = 65504.0  # of 16-bit floats
 _FINEST_OCCLUSION = 1024  # texels a side: it is smooth, and a texel of it is under a millimetre
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Surroundings:
     """A panorama on the device.
 
@@ -66,13 +65,12 @@ def _bordered(layer: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.concatenate([rows[:, -1:], rows, rows[:, :1]], axis=1)
 
 
-def with_suns(keep: Keep, scene: Scene, surroundings: Surroundings) -> Scene:
+def with_suns(memo: Memo, scene: Scene, surroundings: Surroundings) -> Scene:
     """The scene with its environment's peaks among its lights."""
     environment = scene.environment
     if environment is None or not surroundings.suns:
         return scene
-    key = surroundings, environment
-    suns = keep("suns", key, lambda: sun_lights(surroundings.suns, environment))
+    suns = memo.keep(sun_lights, surroundings.suns, environment)
     return replace(scene, lights=(*scene.lights, *suns))
 
 
@@ -85,12 +83,13 @@ def brightest(scene: Scene, surroundings: Surroundings) -> float:
     return around + sum(max(light.irradiance) for light in scene.lights)
 
 
-def environment_record(program: ComputeProgram, scene: Scene, total: Any, occluded: bool) -> Any:
+def environment_record(
+    program: ComputeProgram, environment: Environment | None, skin: Skin, total: Any, occluded: bool
+) -> Any:
     """The shader's record of the environment.
 
     total : (3,) the profile's albedo as the frame uses it
     """
-    environment = scene.environment
     if environment is None:
         return program.record("Environment")
     angle = np.radians(environment.rotation_degrees)
@@ -101,21 +100,20 @@ def environment_record(program: ComputeProgram, scene: Scene, total: Any, occlud
         albedo=np.minimum(total, 1.0),
         occluded=int(occluded),
         visible=int(environment.visible),
-        mirrors=np.pad(equivalent_mirrors(model_of(scene.skin)).reshape(-1, 3), ((0, 0), (0, 1))),
+        mirrors=np.pad(equivalent_mirrors(model_of(skin)).reshape(-1, 3), ((0, 0), (0, 1))),
     )
 
 
-def occlusion_map(
-    device: Device, head: Head, geometry: HeadTextures, lit: Resources, atlas: Atlas, textures: AtlasTextures
-) -> Any:
+def occlusion_map(device: Device, head: Head, atlas: Atlas, lit: Resources, texels: Any) -> Any:
     """The open share of the sky of the atlas' texels and of the vertices, baked or read from disk.
 
-    lit : what the lighting passes read
+    lit : what the lighting passes read, lights aside
+    texels : the atlas' texture of texels
     """
     side = min(atlas.size, _FINEST_OCCLUSION)
 
     def bake() -> NDArray[np.uint16]:
-        baked = Occlusion(device).bake(head.mesh, geometry, lit, textures.resources["atlas"], side)
+        baked = bake_occlusion(device, head.mesh, lit, texels, side)
         levels: NDArray[np.uint16] = np.rint(65535.0 * whole_map(baked, side)).astype(np.uint16)
         return levels
 
@@ -123,11 +121,11 @@ def occlusion_map(
     return texture_from(device, levels / np.float32(65535.0), "r32float")
 
 
-def is_occluded(scene: Scene, settings: Settings) -> bool:
+def is_occluded(environment: Environment | None, settings: Settings) -> bool:
     """Whether the head hides some of its environment from itself."""
-    return scene.environment is not None and settings.occlusion == "baked"
+    return environment is not None and settings.occlusion == "baked"
 
 
 def no_occlusion(device: Device) -> Any:
     """Stands for the map where nothing is occluded."""
-    return make_texture(device, (1, 1), "r32float", use="map")
+    return device.shared("no occlusion", lambda: make_texture(device, (1, 1), "r32float", use="map"))

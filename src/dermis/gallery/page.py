@@ -1,4 +1,4 @@
-"""The gallery as one HTML file that needs nothing else, no network either."""
+"""The gallery as a self-contained HTML file that needs no network."""
 
 from __future__ import annotations
 
@@ -6,21 +6,37 @@ import base64
 import csv
 import html
 import re
-from collections.abc import Sequence
+import unicodedata
+from collections.abc import Iterator, Sequence
 from importlib import resources
 from pathlib import Path
 from string import Template
 
+from dermis import cite
 from dermis.gallery.run import Picture
-from dermis.gallery.works import reference
 from dermis.outputs import replacing
+
+_FIELD = re.compile(r"(\w+)\s*=\s*\{")
+_ACCENT = re.compile(r"\\(['\"`^~])\s*(\w)")
+_ABOVE = {"'": "\u0301", '"': "\u0308", "`": "\u0300", "^": "\u0302", "~": "\u0303"}
+_SIGNS = {
+    r"$\mu$": "µ",
+    r"\&": "&",
+    r"\AA": "Å",
+    "; others": " and others",
+    "---": "—",
+    "--": "–",
+    "``": "“",
+    "''": "”",
+}
 
 
 def write_page(path: Path, pictures: Sequence[Picture], head: str, adapter: str) -> None:
-    """Write the page, whole or not at all.
+    """Write the page; the file is complete or not there.
 
     head, adapter : what the pictures show, and what drew them
-    Raises DermisError when that is not possible.
+
+    Raises DermisError when it cannot be written.
     """
     page = Template(_resource("page.html")).substitute(
         style=_resource("page.css"),
@@ -51,7 +67,7 @@ def _section(picture: Picture) -> str:
 
 
 def _equation(text: str) -> str:
-    """HTML of an equation in one line: what follows _ stands low, what follows ^ high."""
+    """HTML of an equation in one line: _ begins a subscript, ^ a superscript."""
     low = re.sub(r"_(\w+)", r"<sub>\1</sub>", html.escape(text))
     return re.sub(r"\^\(([^)]*)\)|\^(\w+)", lambda found: f"<sup>{found[1] or found[2]}</sup>", low)
 
@@ -60,14 +76,12 @@ def _panels(picture: Picture) -> str:
     if picture.fault:
         return f'<p class="fault">Not made: {html.escape(picture.fault)}</p>'
     slider, panels = picture.script.slider, dict(picture.panels)
-    laid_over = ""
-    if slider:
-        laid_over = _slider(slider, [panels.pop(name) for name in slider])
-    columns = picture.script.columns or min(len(panels), 4) or 1
+    laid_over = _slider(slider, [panels.pop(name) for name in slider]) if slider else ""
+    if not panels:
+        return laid_over
+    columns = picture.script.columns or min(len(panels), 4)
     figures = "".join(_figure(caption, file) for caption, file in panels.items())
-    return laid_over + (
-        f'<div class="panels" style="--columns: {columns}">{figures}</div>' if figures else ""
-    )
+    return f'{laid_over}<div class="panels" style="--columns: {columns}">{figures}</div>'
 
 
 def _slider(captions: tuple[str, str], files: Sequence[bytes]) -> str:
@@ -108,7 +122,7 @@ def _rounded(value: float) -> str:
 
 
 def _deck(pictures: Sequence[Picture]) -> str:
-    """Each row of the talk with the pictures that show it and the command that makes them."""
+    """Rows of the talk with the pictures that show them and the commands that make these."""
     rows = csv.DictReader(line for line in _resource("deck.csv").splitlines() if not line.startswith("#"))
     return "".join(_deck_row(row, pictures) for row in rows)
 
@@ -130,3 +144,35 @@ def _works(pictures: Sequence[Picture]) -> str:
 
 def _resource(name: str) -> str:
     return (resources.files("dermis.gallery") / name).read_text(encoding="utf-8")
+
+
+def reference(key: str) -> str:
+    """A work in one line: authors, title, year.
+
+    Raises DermisError for a key that is not in the bibliography.
+    """
+    fields = dict(_fields(cite.bibtex([key])))
+    if "author" in fields:
+        fields["author"] = "; ".join(re.split(r"\s+and\s+", fields["author"]))
+    known = [_plain(fields[name]).rstrip(".") for name in ("author", "title", "year") if name in fields]
+    return ". ".join(known)
+
+
+def _fields(entry: str) -> Iterator[tuple[str, str]]:
+    """Names and values, which may span lines and contain braces."""
+    at = 0
+    while found := _FIELD.search(entry, at):
+        at, depth = found.end(), 1
+        while depth:
+            depth += {"{": 1, "}": -1}.get(entry[at], 0)
+            at += 1
+        yield found[1].lower(), entry[found.end() : at - 1]
+
+
+def _plain(value: str) -> str:
+    """A value without TeX markup."""
+    text = value.replace("{", "").replace("}", "")
+    for sign, meant in _SIGNS.items():
+        text = text.replace(sign, meant)
+    text = _ACCENT.sub(lambda accent: unicodedata.normalize("NFC", accent[2] + _ABOVE[accent[1]]), text)
+    return " ".join(text.split())

@@ -1,4 +1,4 @@
-"""Panels side by side, each over its caption, as one picture."""
+"""Panels side by side, with captions below, as one picture."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ def as_bytes(image: Image) -> Bytes:
 
 
 def still(panel: Panel) -> Image:
-    """A panel, of a film its first picture."""
+    """A panel, or the first frame of a film."""
     return panel[0] if isinstance(panel, list) else panel
 
 
 def sheet(panels: Panels, columns: int = 0) -> Bytes:
-    """(h, w, 3) sRGB bytes of all panels in rows, captions below; of a film its first picture.
+    """(h, w, 3) sRGB bytes of all panels in rows with captions below; films show their first frame.
 
-    columns : panels in a row; 0 for all of them in one
+    columns : panels in a row; 0 puts all of them in one
     """
     cells = [_cell(as_bytes(still(panel)), name) for name, panel in panels.items()]
     step = columns or len(cells)
@@ -58,7 +58,7 @@ def main(draw: Callable[[Studio], Panels]) -> None:
 def plotted(plot: Callable[[Any], Any], side: int = 448) -> Bytes:
     """sRGB bytes of a square figure.
 
-    plot : draws into its matplotlib axes
+    plot : draws into matplotlib axes
     side : of the picture [pixel]
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg

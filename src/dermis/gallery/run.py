@@ -1,4 +1,4 @@
-"""Draws the pictures of a gallery one after the other, and keeps them as small files."""
+"""Draws the pictures of a gallery one after another, as WebP files."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _QUALITY, _FILM_MS = 86, 80
 
 @dataclass(frozen=True)
 class Picture:
-    """What came of a script.
+    """The result of a script.
 
     panels : WebP files by caption
     size : width and height of the first one [pixel]
-    seconds : for all of it
-    frame_ms : median of its frames [ms]; nothing if it drew none
+    seconds : that the script took
+    frame_ms : median of its frames [ms]; None if it drew none
     fault : why there is no picture
     """
 
@@ -40,7 +40,7 @@ class Picture:
 
 
 def draw_pictures(scripts: Sequence[Script], studio: Studio) -> Iterator[Picture]:
-    """Each script's picture; one that lacks something says what, and the others go on."""
+    """Each script's picture; a script that fails for lack of something gives a picture that says so."""
     for script in scripts:
         started, studio.frames_ms = time.perf_counter(), []
         try:
@@ -55,7 +55,7 @@ def draw_pictures(scripts: Sequence[Script], studio: Studio) -> Iterator[Picture
 
 
 def encode_webp(panel: Panel, quality: int = _QUALITY) -> bytes:
-    """A panel as a WebP file; a film moves."""
+    """A panel as a WebP file, animated if it is a film."""
     from PIL import Image as Pillow
 
     images = panel if isinstance(panel, list) else [panel]
@@ -67,7 +67,7 @@ def encode_webp(panel: Panel, quality: int = _QUALITY) -> bytes:
 
 
 def write_panels(folder: Path, picture: Picture) -> None:
-    """A picture's panels as files of their own.
+    """Write a picture's panels as separate files.
 
     Raises DermisError when that is not possible.
     """

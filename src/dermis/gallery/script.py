@@ -1,4 +1,4 @@
-"""A script of the gallery, described by its own docstring."""
+"""A gallery script, described by its own docstring."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dermis.gallery.studio import Studio
 
 Image = NDArray[np.uint8] | NDArray[np.float32]
 Panel = Image | list[Image]
-"""A picture, or a film: pictures over time."""
+"""A picture, or a film as a list of frames."""
 Panels = Mapping[str, Panel]
 
 _FACT = re.compile(r"^(Deck|Equation|Sources|Slider|Columns): *(.+)$", re.MULTILINE)
@@ -29,10 +29,10 @@ class Script:
 
     title, caption : the first line, and what to see
     deck : rows of the talk that it shows, such as "S11"
-    equation : the equation behind it, or nothing
+    equation : the equation behind it, or ""
     sources : author-year keys
-    slider : two panels to be laid over each other
-    columns : panels in a row
+    slider : two panels to be compared with a slider
+    columns : panels in a row; 0 for the page's choice
     """
 
     path: Path
@@ -52,7 +52,7 @@ class Script:
     def draw(self, studio: Studio) -> Panels:
         """Run the script: panels by their captions.
 
-        Raises DermisError for what the script needs and does not find.
+        Raises DermisError when the script lacks something that it needs.
         """
         from matplotlib import style
 
@@ -62,7 +62,7 @@ class Script:
 
 
 def read_script(path: Path) -> Script:
-    """The description in a script's docstring; nothing of the script is run."""
+    """The description in a script's docstring; the script is not run."""
     text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
     facts: dict[str, str] = dict(_FACT.findall(text))
     title, _, caption = _FACT.sub("", text).partition("\n")
@@ -80,9 +80,9 @@ def read_script(path: Path) -> Script:
 
 
 def find_scripts(only: Sequence[str] = ()) -> list[Script]:
-    """The scripts in their order; `only` names some by their number, their name or a part of it.
+    """The scripts in order; `only` selects some by number, by name or by part of a name.
 
-    Raises DermisError for a name that no script has.
+    Raises DermisError for a name that matches no script.
     """
     scripts = [read_script(path) for path in sorted(scripts_folder().glob("[0-9]*.py"))]
     for wanted in only:
@@ -93,14 +93,14 @@ def find_scripts(only: Sequence[str] = ()) -> list[Script]:
 
 
 def _named(script: Script, wanted: str) -> bool:
-    """Whether a number, or a part of a name, means the script."""
+    """Whether a number or part of a name matches the script."""
     if wanted.isdecimal():
         return int(wanted) == int(script.name.partition("_")[0])
     return wanted != "" and wanted in script.name
 
 
 def scripts_folder() -> Path:
-    """Where the scripts lie: beside the package's sources, or within the installed package."""
+    """Where the scripts are: beside the package's sources, or inside the installed package."""
     installed = Path(__file__).parent / "scripts"
     return installed if installed.is_dir() else Path(__file__).parents[3] / "gallery"
 

@@ -1,8 +1,8 @@
-"""What a script of the gallery draws with: one renderer and one head for all of them."""
+"""What gallery scripts draw with: one renderer and one head for all of them."""
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -22,9 +22,9 @@ _SCAN = "lee_perry_smith"
 class Studio:
     """A renderer, and the head that pictures show.
 
-    name : head to show; the scan where its files are at hand, else the bust
+    name : head to show; by default the scan if it is downloaded, else the bust
     side : of a panel [pixel]
-    settings : those of `Settings`, over what a script asks for
+    settings : fields of `Settings` that override a script's
     """
 
     def __init__(
@@ -34,16 +34,15 @@ class Studio:
         self.side = side
         self._adapter, self._settings = adapter, settings
         self.frames_ms: list[float] = []
-        self._open = cache(lambda: Renderer(self._adapter))
         self._load = cache(load_head)
 
-    @property
+    @cached_property
     def renderer(self) -> Renderer:
-        """The renderer, opened when it is first asked for."""
-        return self._open()
+        """The renderer, opened on first use."""
+        return Renderer(self._adapter)
 
     def head(self, name: str | None = None) -> Head:
-        """The head to show, or another one; the scan's outline is rounded once."""
+        """The head to show, or another one; all but the bust are subdivided once."""
         name = name or self.name
         return self._load(name, subdivide=0 if name == "bust" else 1)
 
@@ -51,18 +50,18 @@ class Studio:
         """(h, w, 3) sRGB bytes.
 
         scale : of the panel's side
-        settings : those of `Settings`
+        settings : fields of `Settings`
         """
         return self._draw(scene, scale, settings).srgb8()
 
     def linear(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.float32]:
-        """(h, w, 3) linear Rec. 709, as `render` before the encoding."""
+        """(h, w, 3) linear Rec. 709: `render` before encoding."""
         return self._draw(scene, scale, settings).linear()
 
     def view(self, scene: Scene, view: str, scale: float = 1.0, **settings: Any) -> NDArray[np.uint8]:
-        """(h, w, 3) sRGB bytes of an intermediate, where the picture shows it.
+        """(h, w, 3) sRGB bytes of an intermediate result as the viewer shows it.
 
-        view : one of those that the viewer offers, such as "blur 3"
+        view : as named by the viewer, such as "blur 3"
         """
         from dermis.gpu import download
         from dermis.viewer.state import PARTS
@@ -75,14 +74,15 @@ class Studio:
         return np.asarray(download(self.renderer.device, texture), np.uint8)[..., :3]
 
     def light_map(self, scene: Scene, level: int, **settings: Any) -> NDArray[np.float32]:
-        """(n, n, 3) light on the atlas, irradiance over pi: level 0 as it enters, then ever more blurred."""
+        """(n, n, 3) light on the atlas, irradiance over pi: level 0 as it enters, higher levels blurred."""
         from dermis.gpu import download
 
         chosen = self.settings(**settings)
         self._draw(scene, 1.0, settings)
-        levels = self.renderer.prepare(scene, chosen).levels
-        light = download(self.renderer.device, levels.stack, mip=levels.halvings[level], layer=level)
-        return np.asarray(light, np.float32)[..., :3] / np.float32(levels.scale)
+        inputs = self.renderer.prepare(scene, chosen)
+        stack, blur = inputs.resources.levels.stack, inputs.blurs[0]
+        light = download(self.renderer.device, stack, mip=blur.halvings[level], layer=level)
+        return np.asarray(light, np.float32)[..., :3] / np.float32(blur.scale)
 
     def settings(self, scale: float = 1.0, **settings: Any) -> Settings:
         """A panel's settings."""

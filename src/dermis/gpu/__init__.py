@@ -1,21 +1,31 @@
 """A small toolkit over wgpu: it knows adapters, shaders, textures and passes, and nothing of skin."""
 
+from dermis.gpu.access import scratch
 from dermis.gpu.adapters import Adapter, list_adapters
 from dermis.gpu.device import Device, open_device
 from dermis.gpu.frame import Frame
-from dermis.gpu.program import ComputeProgram, FragmentProgram, RasterProgram
+from dermis.gpu.graph import Graph
+from dermis.gpu.memo import Memo
+from dermis.gpu.program import ComputeProgram, Constants, FragmentProgram, RasterProgram, compiled
+from dermis.gpu.recorder import Recorder
 from dermis.gpu.textures import download, make_texture, upload
 
 __all__ = [
     "Adapter",
     "ComputeProgram",
+    "Constants",
     "Device",
     "FragmentProgram",
     "Frame",
+    "Graph",
+    "Memo",
     "RasterProgram",
+    "Recorder",
+    "compiled",
     "download",
     "list_adapters",
     "make_texture",
     "open_device",
+    "scratch",
     "upload",
 ]

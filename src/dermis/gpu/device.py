@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import weakref
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 from typing import Any
@@ -80,6 +80,8 @@ class Device:
         not begun when the device is dropped is left
     ffi, lib, checked : the native library, for the calls of every frame, without what wgpu's Python adds;
         calls of `checked` raise what the library finds wrong, in passes when their encoder is submitted
+    slots : what textures, buffers and views hold, see access.py
+    programs : compiled shaders, see program.py
     spare_records : memory in which no frame gathers its numbers at the moment; new memory takes longer
     """
 
@@ -108,9 +110,24 @@ class Device:
         self._timestamps: tuple[Any, Any] | None = None
         self._uniform_chunks: list[Any] = []
         self.spare_records: list[bytearray] = []
+        self.slots: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
+        self.programs: dict[Any, Any] = {}
+        self._shared: dict[str, Any] = {}
+        self._frames = 0
         self._staging: dict[int, list[Any]] = {}
         self.fetching: set[Any] = set()
         self._samplers: dict[tuple[tuple[str, str], ...], Any] = {}
+
+    def shared(self, name: str, make: Callable[[], Any]) -> Any:
+        """Something small that lives as long as the device, made when it is first asked for by its name."""
+        if name not in self._shared:
+            self._shared[name] = make()
+        return self._shared[name]
+
+    def next_frame(self) -> int:
+        """Number of a frame that begins."""
+        self._frames += 1
+        return self._frames
 
     def write(self, buffer: Any, data: bytearray, size: int) -> None:
         """Put the first `size` bytes of the data into a buffer before the next submit."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from typing import Any, Literal
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, TypeVar
 
 from dermis.gpu.compute_pass import ComputePass, Step
 from dermis.gpu.device import Device
@@ -13,6 +13,7 @@ from dermis.gpu.readback import Fetched
 from dermis.gpu.timing import Timestamps, WallClock
 from dermis.gpu.uniforms import Uniforms
 
+T = TypeVar("T")
 Timed = bool | Literal["whole"]
 """Whether stages are timed, each in a pass of its own, or the frame as it is when nobody asks, as a whole."""
 
@@ -43,18 +44,36 @@ class Frame:
         self._divided = self._wall is not None or (stamped and not whole)  # into a pass for each stage
 
     def compute(
-        self, stage: str, program: ComputeProgram, resources: Resources, size: tuple[int, int], tile: int = 8
+        self,
+        stage: str,
+        program: ComputeProgram,
+        resources: Resources,
+        size: tuple[int, int],
+        tile: int = 8,
+        completes: str = "",
     ) -> None:
         """Run `program` once for each of size[0] x size[1] invocations, in tiles of `tile` squared."""
         self.dispatch(stage, program, resources, (*program.groups_for(size, tile), 1))
 
     def dispatch(
-        self, stage: str, program: ComputeProgram, resources: Resources, groups: tuple[int, int, int]
+        self,
+        stage: str,
+        program: ComputeProgram,
+        resources: Resources,
+        groups: tuple[int, int, int],
+        completes: str = "",
     ) -> None:
-        """Run `program` for a number of workgroups along each axis."""
-        self.repeat([step_of(stage, program, *program.bind_group(resources, self._uniforms), groups)])
+        """Run `program` for a number of workgroups along each axis.
 
-    def repeat(self, steps: Sequence[Step]) -> None:
+        completes : of account where passes are declared, see `Graph.dispatch`
+        """
+        self.run([step_of(stage, program, *program.bind_group(resources, self._uniforms), groups)])
+
+    def repeat(self, record: Callable[..., T], *args: Any) -> T:
+        """Run the passes of `record(frame, *args)`."""
+        return record(self, *args)
+
+    def run(self, steps: Sequence[Step]) -> None:
         """Run dispatches whose bind groups are known."""
         if self._divided:
             for step in steps:
@@ -77,10 +96,13 @@ class Frame:
             (width, height, layers),
         )
 
-    def fetch(self, buffer: Any) -> Fetched:
-        """The bytes of a buffer as the passes so far leave them, on their way from the device."""
+    def fetch(self, buffer: Any, fetched: Fetched | None = None) -> Fetched:
+        """The bytes of a buffer as the passes so far leave them, on their way from the device.
+
+        fetched : where they go, if that is made already
+        """
         self._end_pass()
-        fetched = Fetched(self.device, buffer.size)
+        fetched = fetched or Fetched(self.device, buffer.size)
         self._encoder.copy_buffer_to_buffer(buffer, 0, fetched.buffer, 0, buffer.size)
         self._fetched.append(fetched)
         return fetched

@@ -1,6 +1,11 @@
-"""What the process holds on its devices."""
+"""What the process holds on its devices, and what it must not ask of them."""
 
 from __future__ import annotations
+
+import os
+
+from dermis.errors import refuse
+from dermis.gpu.device import Device
 
 
 def held_bytes() -> int:
@@ -9,3 +14,19 @@ def held_bytes() -> int:
 
     found = wgpu.diagnostics.object_counts.get_dict()
     return int(found["total"].get("resource_mem", 0))
+
+
+def check_memory(device: Device, needed: float, option: str, sizes: str) -> None:
+    """Refuse what does not fit into main memory, from which a software adapter takes textures.
+
+    needed : bytes; the system ends who takes too much
+    option, sizes : what to say of them
+
+    Raises DermisError.
+    """
+    if device.adapter.kind != "CPU" or not hasattr(os, "sysconf"):
+        return
+    here = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    if needed > here:
+        came = f"{sizes} need {needed / 1e9:.0f} GB"
+        refuse(option, f"a frame within {here / 1e9:.0f} GB", came, "Choose smaller ones")

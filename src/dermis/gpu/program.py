@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import cached_property
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from dermis.errors import DermisError
-from dermis.gpu.bind_groups import BindGroups, key_of
+from dermis.gpu.access import Access, new_number, slot_of
+from dermis.gpu.by_resources import ByResources, key_of
 from dermis.gpu.device import Device
-from dermis.gpu.shader_types import Binding, bindings, struct_dtype
+from dermis.gpu.shader_types import Binding, bindings, members_read, struct_dtype
 from dermis.gpu.uniforms import Uniforms
-from dermis.gpu.wgsl_source import Source, compose
+from dermis.gpu.wgsl_source import Folder, Source, compose
 
 Resources = Mapping[str, Any]
+P = TypeVar("P")
 _TOOLKIT_SHADERS = Path(__file__).parent / "wgsl"
 _UNIFORM = {"type": "uniform"}
+_MOST_VARIANTS = 12  # of a shader: on a software adapter each takes some 7 MB
+Constants = tuple[tuple[str, float], ...]
+"""Names and values of pipeline constants, a shader's `override`s; those left out keep their default."""
 
 
 def _reader(names: Sequence[str]) -> Callable[[Resources], Sequence[Any]]:
@@ -52,16 +57,24 @@ def _entry(binding: Binding, value: Any, given: Any) -> Any:
 class Program:
     """What compute and raster programs share: the composed text, its bindings and their layouts."""
 
-    def __init__(self, device: Device, path: Path, folders: Sequence[Path] = ()) -> None:
-        self.device = device
-        self.name = path.stem
+    def __init__(
+        self,
+        device: Device,
+        path: Path,
+        folders: Sequence[Folder] = (),
+        constants: Mapping[str, float] | None = None,
+    ) -> None:
+        self.device, self.name = device, path.stem
+        self.constants = dict(constants or {})
         self.source: Source = compose(path, (*folders, _TOOLKIT_SHADERS))
         self.bindings: tuple[Binding, ...] = bindings(self.source.text)
         self._module = self._compile(path)
         self._uniforms = [b for b in self.bindings if _is_uniform(b)]
         self._others = [b for b in self.bindings if not _is_uniform(b)]
         self._read = _reader([b.name for b in self._others])
-        self.kept_groups = BindGroups()
+        self._read_of = {one.name: members_read(self.source.text, one.name) for one in self._uniforms}
+        self.kept_groups: ByResources[Any] = ByResources()
+        self._accesses: ByResources[Access] = ByResources()
         self._group_layout = device.handle.create_bind_group_layout(entries=self._layout_entries())
         self._layout = device.handle.create_pipeline_layout(bind_group_layouts=[self._group_layout])
 
@@ -80,16 +93,45 @@ class Program:
         """
         try:
             placed = [uniforms.place(resources[one.name]) for one in self._uniforms]
-            bound = [*self._read(resources), *(buffer for buffer, _ in placed)]
         except KeyError as missing:
-            message = f"{self.name}.wgsl declares {missing.args[0]!r}, and nothing is bound to it"
-            raise KeyError(message) from None
+            raise self._unbound(missing) from None
+        bound = [*self._bound(resources), *(buffer for buffer, _ in placed)]
         key = key_of(bound)
         group = self.kept_groups.find(key)
         if group is None:
             group = self._make_group(bound, resources)
             self.kept_groups.keep(key, bound, group)
         return group, [offset for _, offset in placed]
+
+    def access(self, resources: Resources) -> Access:
+        """What a pass of this program with these resources reads and writes, records aside."""
+        bound = self._bound(resources)
+        key = key_of(bound)
+        found = self._accesses.find(key)
+        if found is None:
+            named = list(zip(self._others, bound, strict=True))
+            reads = tuple(slot_of(self.device, value) for one, value in named if one.holds and one.reads)
+            writes = tuple(slot_of(self.device, value) for one, value in named if one.writes)
+            found = Access(new_number(), reads, writes)
+            self._accesses.keep(key, bound, found)
+        return found
+
+    def numbers(self, resources: Resources) -> tuple[bytes, ...]:
+        """What the shader reads of the records."""
+        try:
+            return tuple([read(resources[name]) for name, read in self._read_of.items()])
+        except KeyError as missing:
+            raise self._unbound(missing) from None
+
+    def _bound(self, resources: Resources) -> Sequence[Any]:
+        """What is bound besides records, in the shader's order."""
+        try:
+            return self._read(resources)
+        except KeyError as missing:
+            raise self._unbound(missing) from None
+
+    def _unbound(self, missing: KeyError) -> KeyError:
+        return KeyError(f"{self.name}.wgsl declares {missing.args[0]!r}, and nothing is bound to it")
 
     def _make_group(self, bound: Sequence[Any], resources: Resources) -> Any:
         """The group of what the others are, and then the uniforms' buffers."""
@@ -129,11 +171,11 @@ class ComputeProgram(Program):
         self,
         device: Device,
         path: Path,
-        folders: Sequence[Path] = (),
+        folders: Sequence[Folder] = (),
         constants: Mapping[str, float] | None = None,
     ) -> None:
-        super().__init__(device, path, folders)
-        stage = {"module": self._module, "entry_point": "main", "constants": dict(constants or {})}
+        super().__init__(device, path, folders, constants)
+        stage = {"module": self._module, "entry_point": "main", "constants": self.constants}
         self._compiled = device.executor.submit(
             device.handle.create_compute_pipeline, layout=self._layout, compute=stage
         )
@@ -164,16 +206,17 @@ class RasterProgram(Program):
         self,
         device: Device,
         path: Path,
-        folders: Sequence[Path] = (),
+        folders: Sequence[Folder] = (),
+        constants: Mapping[str, float] | None = None,
         *,
         target: str | None,
         depth_compare: str,
     ) -> None:
-        super().__init__(device, path, folders)
+        super().__init__(device, path, folders, constants)
         fragment = {"module": self._module, "entry_point": "fragment", "targets": [{"format": target}]}
         self.pipeline = device.handle.create_render_pipeline(
             layout=self._layout,
-            vertex={"module": self._module, "entry_point": "vertex"},
+            vertex={"module": self._module, "entry_point": "vertex", "constants": self.constants},
             fragment=fragment if target else None,
             primitive={"topology": "triangle-list", "cull_mode": "none"},
             depth_stencil={
@@ -199,13 +242,13 @@ class FragmentProgram(Program):
         self,
         device: Device,
         path: Path,
-        folders: Sequence[Path] = (),
+        folders: Sequence[Folder] = (),
         constants: Mapping[str, float] | None = None,
         *,
         targets: Sequence[str],
     ) -> None:
-        super().__init__(device, path, folders)
-        stage = {"module": self._module, "entry_point": "fragment", "constants": dict(constants or {})}
+        super().__init__(device, path, folders, constants)
+        stage = {"module": self._module, "entry_point": "fragment", "constants": self.constants}
         self.pipeline = device.handle.create_render_pipeline(
             layout=self._layout,
             vertex={"module": self._module, "entry_point": "vertex"},
@@ -217,3 +260,24 @@ class FragmentProgram(Program):
         import wgpu
 
         return int(wgpu.ShaderStage.FRAGMENT)
+
+
+def compiled(device: Device, shader: Hashable, constants: Constants, make: Callable[[], P]) -> P:
+    """What `make` compiles of a shader with these pipeline constants, unless it is one of those used last.
+
+    shader : what tells it from others
+    """
+    variants: dict[Constants, P] = device.programs.setdefault(shader, {})
+    found = variants.pop(constants, None)
+    if found is None:
+        found = make()
+    variants[constants] = found  # the last one
+    if len(variants) > _MOST_VARIANTS:
+        del variants[next(iter(variants))]
+    return found
+
+
+def declared(path: Path, folders: Sequence[Folder], constants: Constants) -> dict[str, float]:
+    """Those of some pipeline constants that the shader has."""
+    text = compose(path, (*folders, _TOOLKIT_SHADERS)).text
+    return {name: value for name, value in constants if f"override {name}:" in text}

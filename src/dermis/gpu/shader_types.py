@@ -7,6 +7,7 @@ so the two cannot drift apart. Alignment rules: WGSL specification, section "Mem
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -45,6 +46,21 @@ class Binding:
     name: str
     entry: dict[str, Any]
 
+    @property
+    def holds(self) -> bool:
+        """Whether it has a content: samplers have none."""
+        return "sampler" not in self.entry
+
+    @property
+    def writes(self) -> bool:
+        """Whether the shader may change what is bound."""
+        return "storage_texture" in self.entry or self.entry.get("buffer") == {"type": "storage"}
+
+    @property
+    def reads(self) -> bool:
+        """Whether the shader may depend on what is bound; what it only stores to it does not know."""
+        return bool(self.entry.get("storage_texture", {}).get("access") != "write-only")
+
 
 @cache
 def struct_dtype(text: str, name: str) -> np.dtype[np.void]:
@@ -54,6 +70,29 @@ def struct_dtype(text: str, name: str) -> np.dtype[np.void]:
     """
     dtype, _ = _struct(dict(_STRUCT.findall(_COMMENT.sub("", text))), name)
     return dtype
+
+
+def members_read(text: str, name: str) -> Callable[[np.ndarray[Any, Any]], bytes]:
+    """Takes out of a record bound by that name the bytes of the members that the shader's text names.
+
+    All of it where the text hands the record on as a whole.
+    """
+    code = _COMMENT.sub("", text)
+    code = re.sub(rf"var<uniform>\s*{name}\b", "", code)
+    used = re.findall(rf"(?<![.\w]){name}\b(?:\.(\w+))?", code)
+    if "" in used:
+        return lambda record: record.tobytes()
+    members, places = sorted(set(used)), list[slice]()
+
+    def read(record: np.ndarray[Any, Any]) -> bytes:
+        if not places:  # the same for all records of that name
+            fields = dict(record.dtype.fields or {})
+            ends = ((fields[member][1], fields[member][0].itemsize) for member in members)
+            places.extend(slice(start, start + size) for start, size in ends)
+        raw = record.tobytes()
+        return b"".join([raw[place] for place in places])
+
+    return read
 
 
 def _struct(bodies: dict[str, str], name: str) -> tuple[np.dtype[np.void], int]:

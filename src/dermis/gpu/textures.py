@@ -28,6 +28,8 @@ _FORMATS: dict[str, tuple[type[np.generic], int]] = {
     "depth32float": (np.float32, 1),
 }
 
+FORMAT_BYTES = {name: np.dtype(kind).itemsize * channels for name, (kind, channels) in _FORMATS.items()}
+"""Bytes of a texel of each format."""
 
 _LARGE = 1 << 24  # bytes
 
@@ -82,8 +84,7 @@ def upload(device: Device, texture: Any, array: NDArray[Any], *, mip: int = 0, l
 
 def texel_bytes(texture: Any) -> int:
     """Bytes of one texel of a texture."""
-    kind, channels = _FORMATS[texture.format]
-    return np.dtype(kind).itemsize * channels
+    return FORMAT_BYTES[texture.format]
 
 
 def texture_from(device: Device, array: NDArray[Any], texel: str) -> Any:

@@ -1,16 +1,64 @@
-"""WGSL files with `//#include "name.wgsl"`, and compile errors that name file and line."""
+"""WGSL files with directives, and compile errors that name file and line.
+
+A whole line may be
+
+- `//#include "name.wgsl"`: another file, inserted once;
+- `//#include <list>`: the file of each member of a list;
+- `//#each list: text`: the text once for each member, with its words for {name}, {NAME}, {number} and others;
+- `//#fill text`: the text with a number of Python's in place of each {word}.
+"""
 
 from __future__ import annotations
 
+import os
 import re
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 from dermis.errors import DermisError
 
-_INCLUDE = re.compile(r'^//#include "([\w./]+)"\s*$')
+_DIRECTIVE = re.compile(
+    r'^(?P<indent>\s*)//#(?:include "(?P<file>[\w./]+)"|include <(?P<files>\w+)>'
+    r"|each (?P<list>\w+): (?P<text>.*)|fill (?P<filled>.*))\s*$"
+)
+_WORD = re.compile(r"\{(\w+)\}")
 _ERROR_LINE = re.compile(r"(?:wgsl|shader[^:\n]*|source):(\d+):(\d+)")
+
+Words = tuple[tuple[str, str], ...]
+
+
+class Member(NamedTuple):
+    """One of a list of shaders that can grow.
+
+    name : as people write it; in shaders with underscores, {name}, or in capitals, {NAME}
+    words : what stands for other {words} in lines that are repeated
+    """
+
+    name: str
+    file: Path
+    words: Words = ()
+
+
+@dataclass(frozen=True, eq=False)
+class ShaderFolder(os.PathLike[str]):
+    """A folder of shaders with what its files repeat and fill in.
+
+    lists : members of each list, asked for whenever a shader is composed
+    numbers : constants that Python has too, asked for likewise
+    """
+
+    path: Path
+    lists: Mapping[str, Callable[[], Sequence[Member]]] = field(default_factory=dict)
+    numbers: Callable[[], Mapping[str, float]] = dict
+
+    def __fspath__(self) -> str:
+        return str(self.path)
+
+
+Folder = os.PathLike[str]
 
 
 @dataclass(frozen=True)
@@ -33,31 +81,88 @@ class Source:
         return _ERROR_LINE.sub(named, message)
 
 
+def compose(path: Path, folders: Sequence[Folder]) -> Source:
+    """The shader at `path` with its directives carried out.
+
+    folders : where files are looked up that are not beside the one that asks for them
+
+    Raises DermisError for a file, a list or a {word} that is not there.
+    """
+    shared = [folder for folder in folders if isinstance(folder, ShaderFolder)]
+    lists = {name: tuple(members()) for folder in shared for name, members in folder.lists.items()}
+    numbers = {name: repr(value) for folder in shared for name, value in folder.numbers().items()}
+    found = tuple(Path(folder) for folder in folders), tuple(lists.items()), tuple(numbers.items())
+    return _compose(path, *found)
+
+
 @cache
-def compose(path: Path, folders: tuple[Path, ...]) -> Source:
-    """The shader at `path` with its includes, each inserted once, looked up in `folders`."""
-    lines: list[str] = []
-    origin: list[tuple[str, int]] = []
-    _insert(path, folders, set(), lines, origin)
-    return Source("\n".join(lines), tuple(origin))
+def _compose(
+    path: Path, folders: tuple[Path, ...], lists: tuple[tuple[str, tuple[Member, ...]], ...], numbers: Words
+) -> Source:
+    composed = _Composed(folders, dict(lists), dict(numbers))
+    composed.insert(path)
+    text, origin = zip(*composed.lines, strict=True) if composed.lines else ((), ())
+    return Source("\n".join(text), origin)
 
 
-def _insert(
-    path: Path, folders: tuple[Path, ...], seen: set[Path], lines: list[str], origin: list[tuple[str, int]]
-) -> None:
-    if path in seen:
-        return
-    seen.add(path)
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
-        if include := _INCLUDE.match(line):
-            _insert(_find(include[1], path, folders), folders, seen, lines, origin)
-        else:
-            lines.append(line)
-            origin.append((path.name, number))
+class _Composed:
+    """lines : each with the file and line that it came from"""
+
+    def __init__(
+        self, folders: Sequence[Path], lists: Mapping[str, Sequence[Member]], numbers: Mapping[str, str]
+    ) -> None:
+        self._folders, self._lists, self._numbers = folders, lists, numbers
+        self._seen: set[Path] = set()
+        self.lines: list[tuple[str, tuple[str, int]]] = []
+
+    def insert(self, path: Path) -> None:
+        if path in self._seen:
+            return
+        self._seen.add(path)
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+            directive = _DIRECTIVE.match(line)
+            if directive is None:
+                self.lines.append((line, (path.name, number)))
+            elif name := directive["file"]:
+                self.insert(self._find(name, path))
+            elif name := directive["files"]:
+                for member in self._members(name, path):
+                    self.insert(member.file)
+            else:
+                self.lines += [(text, (path.name, number)) for text in self._filled(directive, path)]
+
+    def _filled(self, directive: re.Match[str], asker: Path) -> list[str]:
+        """The lines that one directive stands for."""
+        if text := directive["filled"]:
+            return [directive["indent"] + _fill(text, self._numbers, asker)]
+        members = enumerate(self._members(directive["list"], asker))
+        each = [_naming(member, number) for number, member in members]
+        return [directive["indent"] + _fill(directive["text"], words, asker) for words in each]
+
+    def _find(self, name: str, asker: Path) -> Path:
+        for folder in (asker.parent, *self._folders):
+            if (folder / name).is_file():
+                return folder / name
+        came = f'expected to find the include "{name}", but no shader folder has it.'
+        raise DermisError(f"{asker.name}: {came}")
+
+    def _members(self, name: str, asker: Path) -> Sequence[Member]:
+        if name not in self._lists:
+            raise DermisError(
+                f"{asker.name}: expected to find the list <{name}>, but no shader folder has it."
+            )
+        return self._lists[name]
 
 
-def _find(name: str, asker: Path, folders: tuple[Path, ...]) -> Path:
-    for folder in (asker.parent, *folders):
-        if (folder / name).is_file():
-            return folder / name
-    raise DermisError(f'{asker.name}: expected to find the include "{name}", but no shader folder has it.')
+def _naming(member: Member, number: int) -> dict[str, str]:
+    name = member.name.replace("-", "_")
+    return {"name": name, "NAME": name.upper(), "number": f"{number}u", **dict(member.words)}
+
+
+def _fill(text: str, words: Mapping[str, str], asker: Path) -> str:
+    def meant(match: re.Match[str]) -> str:
+        if match[1] not in words:
+            raise DermisError(f"{asker.name}: expected a word of {', '.join(words)}, but {match[0]} came.")
+        return words[match[1]]
+
+    return _WORD.sub(meant, text)

@@ -1,4 +1,4 @@
-"""What a mesh must be before it can be skin, each refusal with its remedy."""
+"""Checks of a mesh that is to be rendered as skin, each refusal with its remedy."""
 
 from __future__ import annotations
 
@@ -18,15 +18,14 @@ LIKELY_HEAD_MM = (150.0, 500.0)
 UNITS_MM = (1.0, 10.0, 25.4, 100.0, 1000.0)
 FLAT = 1e-6
 """Area over squared longest side below which a triangle has none in single precision [-]."""
-
-Reals = NDArray[np.floating]
-Indices = NDArray[np.integer]
+_DAMAGED = "The file is damaged: export it again"
+_UNIT = "Set the millimetres per unit of the file with --unit-mm"
 
 
 def check_mesh(mesh: Mesh, culprit: object) -> None:
     """Refuse a mesh that cannot be rendered as skin.
 
-    culprit : named in the message, mostly the file
+    culprit : named in the message, usually the file
 
     Raises `DermisError` for numbers that are not finite, indices out of range, uv outside the map,
     triangles without area, edges of more than two triangles, and a mesh without skin.
@@ -38,7 +37,9 @@ def check_mesh(mesh: Mesh, culprit: object) -> None:
     _check_skin(mesh, culprit)
 
 
-def check_arrays(positions: Reals, uv: Reals, triangles: Indices, culprit: object) -> None:
+def check_arrays(
+    positions: NDArray[np.floating], uv: NDArray[np.floating], triangles: NDArray[np.integer], culprit: object
+) -> None:
     """Refuse arrays that no `Mesh` can be built from.
 
     positions : (v, 3) [mm]
@@ -48,40 +49,28 @@ def check_arrays(positions: Reals, uv: Reals, triangles: Indices, culprit: objec
     if len(triangles) == 0:
         refuse(culprit, "a mesh of triangles", "it has none", "Export the head as a polygon mesh")
     if triangles.min() < 0 or triangles.max() >= len(positions):
-        refuse(
-            culprit,
-            f"triangle indices from 0 to {len(positions) - 1}",
-            f"they run from {triangles.min()} to {triangles.max()}",
-            "The file is damaged: export it again",
-        )
+        came = f"they run from {triangles.min()} to {triangles.max()}"
+        refuse(culprit, f"triangle indices from 0 to {len(positions) - 1}", came, _DAMAGED)
     for name, values in (("positions", positions), ("uv", uv)):
         lost = np.flatnonzero(~np.isfinite(values).all(axis=1))
         if len(lost):
-            refuse(
-                culprit,
-                f"finite {name}",
-                f"{len(lost)} vertices are NaN or infinite, first {lost[0]}",
-                "The file is damaged: export it again",
-            )
+            came = f"{len(lost)} vertices are NaN or infinite, first {lost[0]}"
+            refuse(culprit, f"finite {name}", came, _DAMAGED)
     farthest = float(np.abs(positions).max())
     if farthest > FARTHEST_MM:
-        refuse(
-            culprit,
+        expected, came = (
             f"positions within {FARTHEST_MM:g} mm of the origin",
             f"one is {farthest:.3g} mm away",
-            "Set the millimetres per unit of the file with --unit-mm, or move the head to the origin",
         )
+        refuse(culprit, expected, came, f"{_UNIT}, or move the head to the origin")
 
 
 def _check_uv_range(mesh: Mesh, culprit: object) -> None:
     low, high = mesh.uv.min(axis=0), mesh.uv.max(axis=0)
     if min(low) < -UV_TOLERANCE or max(high) > 1 + UV_TOLERANCE:
-        refuse(
-            culprit,
-            "uv in [0, 1]: one tile, no UDIM tiles, no repeats",
-            f"u runs from {low[0]:.4g} to {high[0]:.4g} and v from {low[1]:.4g} to {high[1]:.4g}",
-            "Move every uv island into the one tile (in Blender: UV Editor, UV > Pack Islands)",
-        )
+        came = f"u runs from {low[0]:.4g} to {high[0]:.4g} and v from {low[1]:.4g} to {high[1]:.4g}"
+        remedy = "Move every uv island into the one tile (in Blender: UV Editor, UV > Pack Islands)"
+        refuse(culprit, "uv in [0, 1]: one tile, no UDIM tiles, no repeats", came, remedy)
 
 
 def _check_areas(mesh: Mesh, culprit: object) -> None:
@@ -89,58 +78,40 @@ def _check_areas(mesh: Mesh, culprit: object) -> None:
     longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
     flat = np.flatnonzero(triangle_areas(corners) <= FLAT * longest**2)
     if len(flat):
-        refuse(
-            culprit,
-            "triangles with an area",
-            f"{len(flat)} have none (zero area): {_first(flat)}",
-            "In Blender: Edit Mode, Mesh > Clean Up > Degenerate Dissolve",
-        )
+        came = f"{len(flat)} have none (zero area): the first are {', '.join(map(str, flat[:5]))}"
+        remedy = "In Blender: Edit Mode, Mesh > Clean Up > Degenerate Dissolve"
+        refuse(culprit, "triangles with an area", came, remedy)
 
 
 def _check_manifold(mesh: Mesh, culprit: object) -> None:
     ends, _, counts = edges(mesh.point[mesh.triangles])
     crowded = np.flatnonzero(counts > 2)
     if len(crowded):
-        first = crowded[0]
-        place = mesh.positions[np.flatnonzero(mesh.point == ends[first, 0])[0]]
-        where = ", ".join(f"{x:.4g}" for x in place)
-        refuse(
-            culprit,
-            "a surface of one sheet, two triangles to an edge",
-            f"{len(crowded)} edges are non-manifold, the first has {counts[first]} triangles at ({where}) mm",
-            "In Blender: Select > All by Trait > Non Manifold, delete inner or double faces, "
-            "then Mesh > Merge > By Distance",
-        )
+        place = mesh.positions[np.flatnonzero(mesh.point == ends[crowded[0], 0])[0]]
+        where = f"{counts[crowded[0]]} triangles at ({', '.join(f'{x:.4g}' for x in place)}) mm"
+        came = f"{len(crowded)} edges are non-manifold, the first has {where}"
+        remedy = "In Blender: Select > All by Trait > Non Manifold, delete inner or double faces, "
+        remedy += "then Mesh > Merge > By Distance"
+        refuse(culprit, "a surface of one sheet, two triangles to an edge", came, remedy)
 
 
 def _check_skin(mesh: Mesh, culprit: object) -> None:
     if mesh.material.min() < 0 or mesh.material.max() >= len(mesh.materials):
-        refuse(
-            culprit,
-            f"material indices below {len(mesh.materials)}",
-            f"they run from {mesh.material.min()} to {mesh.material.max()}",
-            "Build the mesh again",
-        )
+        came = f"they run from {mesh.material.min()} to {mesh.material.max()}"
+        refuse(culprit, f"material indices below {len(mesh.materials)}", came, "Build the mesh again")
     used = np.bincount(mesh.material, minlength=len(mesh.materials))
-    skins = [
-        (name.name, count) for name, count in zip(mesh.materials, used, strict=True) if name.kind == "skin"
-    ]
+    skins = [(one.name, n) for one, n in zip(mesh.materials, used, strict=True) if one.kind == "skin"]
     empty = [name for name, count in skins if count == 0]
     if not skins or empty:
         groups = ", ".join(material.name for material in mesh.materials)
-        came = (
-            f"skin group {empty[0]!r} has no triangles" if empty else f"none of its groups is skin ({groups})"
-        )
-        refuse(
-            culprit,
-            "a group of triangles that is skin",
-            came,
-            "Assign the skin's faces to a material called skin, or name fewer groups opaque",
-        )
+        bare = f"none of its groups is skin ({groups})"
+        came = f"skin group {empty[0]!r} has no triangles" if empty else bare
+        remedy = "Assign the skin's faces to a material called skin, or name fewer groups opaque"
+        refuse(culprit, "a group of triangles that is skin", came, remedy)
 
 
 def check_head_height(mesh: Mesh, culprit: object, unit_mm: float | None) -> None:
-    """Refuse a head that is not 100 to 1000 mm high: mostly the unit is forgotten.
+    """Refuse a head that is not 100 to 1000 mm high: usually the unit was forgotten.
 
     culprit : the file, named in the message
     unit_mm : the unit the file was read with [mm]; None for that of its format
@@ -150,17 +121,8 @@ def check_head_height(mesh: Mesh, culprit: object, unit_mm: float | None) -> Non
         return
     unit_mm = default_unit_mm(str(culprit)) if unit_mm is None else unit_mm
     fitting = [u for u in UNITS_MM if LIKELY_HEAD_MM[0] <= height / unit_mm * u <= LIKELY_HEAD_MM[1]]
-    remedy = "Set the millimetres per unit of the file with --unit-mm"
+    remedy = _UNIT
     if fitting:
         remedy += f": {fitting[0]:g} would make it {height / unit_mm * fitting[0]:.4g} mm high"
-    refuse(
-        culprit,
-        f"a head {HEAD_MM[0]:g} to {HEAD_MM[1]:g} mm high",
-        f"it is {height:.4g} mm high at {unit_mm:g} mm per unit (a forgotten unit?)",
-        remedy,
-    )
-
-
-def _first(indices: Indices, limit: int = 5) -> str:
-    """The first few indices in words."""
-    return "the first are " + ", ".join(str(i) for i in indices[:limit])
+    came = f"it is {height:.4g} mm high at {unit_mm:g} mm per unit (a forgotten unit?)"
+    refuse(culprit, f"a head {HEAD_MM[0]:g} to {HEAD_MM[1]:g} mm high", came, remedy)

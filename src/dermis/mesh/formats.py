@@ -1,7 +1,7 @@
 """Mesh files as they lie on disk: groups of triangles in file units, with uv untouched.
 
 trimesh parses; what it would lose or change is marked in the file's text first: it flips v of glTF, drops
-uv of primitives without material and of integer uv, and names groups after itself.
+uv of primitives without material and integer uv, and renames groups.
 """
 
 from __future__ import annotations
@@ -71,9 +71,8 @@ def read_gltf(path: Path) -> list[Part]:
     text += b" " * (-len(text) % 4)
     if binary:
         rest = data[20 + chunk :]
-        text = (
-            data[:8] + struct.pack("<II", 20 + len(text) + len(rest), len(text)) + data[16:20] + text + rest
-        )
+        lengths = struct.pack("<II", 20 + len(text) + len(rest), len(text))
+        text = data[:8] + lengths + data[16:20] + text + rest
     return list(_parts(text, path.suffix[1:].lower(), groups, resolver=FilePathResolver(str(path))))
 
 
@@ -87,12 +86,11 @@ def _mark_gltf(tree: dict[str, Any], path: Path) -> list[Group]:
             given = primitive["attributes"]
             kept = {"POSITION": "POSITION", "NORMAL": "_NORMAL", "TEXCOORD_0": "_UV"}
             primitive["attributes"] = {mark: given[name] for name, mark in kept.items() if name in given}
-            wanted.update(
-                primitive["attributes"].values(), [primitive[k] for k in ("indices",) if k in primitive]
-            )
+            wanted.update(primitive["attributes"].values())
+            wanted.update([primitive["indices"]] if "indices" in primitive else [])
             groups.append(_gltf_group(tree, mesh, primitive))
             primitive["material"] = len(groups) - 1
-    # pictures are none of our business here, and unused accessors may ask for any amount of memory
+    # pictures are read elsewhere, and unused accessors may ask for any amount of memory
     for key in ("textures", "images", "samplers", "cameras", "animations", "skins"):
         tree.pop(key, None)
     tree["materials"] = [{"name": str(k)} for k in range(len(groups))]
@@ -100,12 +98,8 @@ def _mark_gltf(tree: dict[str, Any], path: Path) -> list[Group]:
         if index not in wanted:
             tree["accessors"][index] = {"componentType": 5126, "count": 0, "type": "SCALAR"}
         elif "sparse" in accessor or "bufferView" not in accessor:
-            refuse(
-                path,
-                "plain glTF accessors",
-                f"accessor {index} is sparse or empty",
-                "Export without morph targets",
-            )
+            came = f"accessor {index} is sparse or empty"
+            refuse(path, "plain glTF accessors", came, "Export without morph targets")
     return groups
 
 
@@ -114,12 +108,8 @@ def _refuse_extensions(tree: dict[str, Any], path: Path) -> None:
     harmless = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_")
     foreign = [name for name in tree.get("extensionsRequired", []) if not str(name).startswith(harmless)]
     if foreign:
-        refuse(
-            path,
-            "plain glTF geometry",
-            f"the file requires {', '.join(map(str, foreign))}",
-            "Export without compression and quantisation",
-        )
+        came = f"the file requires {', '.join(map(str, foreign))}"
+        refuse(path, "plain glTF geometry", came, "Export without compression and quantisation")
 
 
 def _gltf_group(tree: dict[str, Any], mesh: dict[str, Any], primitive: dict[str, Any]) -> Group:
@@ -134,9 +124,8 @@ def read_obj(path: Path) -> list[Part]:
     text = path.read_bytes().decode("utf-8", errors="replace").replace("\r\n", "\n").replace("\\\n", " ")
     text = re.sub(r"^((?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", r"\1", text, flags=re.MULTILINE)
     if re.search(r"^f[^\n]*[ /]-\d", text, re.MULTILINE):
-        refuse(
-            path, "faces by absolute index", "it has relative (negative) ones", "Export it again, in Blender"
-        )
+        came = "it has relative (negative) ones"
+        refuse(path, "faces by absolute index", came, "Export it again, in Blender")
     libraries = re.findall(r"^[ \t]*mtllib[ \t]+(.*?)[ \t]*$", text, re.MULTILINE)
     colours: dict[str, Colour] = {}
     for library in libraries:

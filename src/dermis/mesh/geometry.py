@@ -14,7 +14,7 @@ MIN_UV_CROSS = 1e-12
 
 
 def weld(rows: ArrayLike) -> Ints:
-    """Index of the unique row for each row, rows being equal when all their float32 numbers are.
+    """Index of the unique row for each row; rows are equal when all their float32 numbers are.
 
     rows : (v, k) positions [mm], or positions and uv side by side
     """

@@ -27,7 +27,7 @@ _WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 
 
 def embedded_maps(path: Path) -> dict[str, Any]:
-    """Options of `load_maps` that a .glb or .gltf file itself answers, {} for one without pictures.
+    """Options of `load_maps` that a .glb or .gltf file gives itself, {} for one without pictures.
 
     The skin's material gives its base colour and, when the package wrote the file, the height, specular,
     roughness and region maps of its extras; any other file gives its normal map.
@@ -140,10 +140,8 @@ def encode_glb(
     }
     triangles = np.ascontiguousarray(mesh.triangles, "<u4")
     indices = binary.array(triangles, "SCALAR", _UNSIGNED, _INDICES)
-    images = [
-        {"bufferView": binary.view(data), "mimeType": "image/png", "name": name}
-        for name, data in pictures.items()
-    ]
+    kind = {"mimeType": "image/png"}
+    images = [{"bufferView": binary.view(data), **kind, "name": name} for name, data in pictures.items()]
     places = {name: index for index, name in enumerate(pictures)}
     primitive = {"attributes": attributes, "indices": indices, "material": 0}
     tree = {

@@ -7,6 +7,7 @@ import json
 import math
 from collections.abc import Callable
 from dataclasses import asdict, fields
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -55,11 +56,9 @@ def load_mesh(
     unit = default_unit_mm(source) if unit_mm is None else float(unit_mm)
     _check_options(source, unit, v_origin, up)
 
-    def load() -> Mesh:
-        return _loaded(source, unit, v_origin, up, opaque)
-
+    load = partial(_loaded, source, unit, v_origin, up, opaque)
     data = source.read_bytes() if source.suffix.lower() == ".glb" and source.is_file() else b""
-    if not data or b'"uri"' in data:  # what it is made of lies elsewhere
+    if not data or b'"uri"' in data:  # parts of it lie in other files
         return load()
     named = source.stem  # as a group without a name is
     return cached_mesh(data, repr((named, unit, v_origin, up, opaque)), load)
@@ -94,12 +93,8 @@ def _read(source: Path) -> list[Part]:
     """The file's parts; whatever its reader raises on a damaged file becomes a refusal."""
     reader = READERS.get(source.suffix.lower())
     if reader is None:
-        refuse(
-            source,
-            f"a mesh file ({', '.join(READERS)})",
-            f"the suffix is {source.suffix!r}",
-            "Export it as one of these",
-        )
+        came = f"the suffix is {source.suffix!r}"
+        refuse(source, f"a mesh file ({', '.join(READERS)})", came, "Export it as one of these")
     if not source.is_file():
         refuse(source, "a mesh file", "there is no such file", "Check the path")
     try:
@@ -108,13 +103,9 @@ def _read(source: Path) -> list[Part]:
         raise
     # a damaged file makes the reader fail anywhere, with any exception
     except Exception as error:
-        detail = f"{type(error).__name__}: {error}".splitlines()[0][:200]
-        refuse(
-            source,
-            f"a sound {source.suffix} mesh",
-            f"it cannot be read ({detail})",
-            "The file is damaged or cut short: export it again",
-        )
+        came = f"it cannot be read ({f'{type(error).__name__}: {error}'.splitlines()[0][:200]})"
+        remedy = "The file is damaged or cut short: export it again"
+        refuse(source, f"a sound {source.suffix} mesh", came, remedy)
     full = [part for part in parts if len(part.triangles)]
     if not full:
         refuse(source, "a mesh of triangles", "it has none", "Export the head as a polygon mesh")
@@ -143,19 +134,11 @@ def _joined(parts: list[Part], source: Path) -> tuple[Array, Array, Array, NDArr
 def _part_uv(part: Part, source: Path) -> Array:
     name = part.group.names[0] if part.group.names else "the mesh"
     if part.uv is None or part.uv.shape != (len(part.positions), 2):
-        refuse(
-            source,
-            "uv at every vertex",
-            f"{name!r} has none",
-            "Unwrap it (in Blender: Edit Mode, U > Unwrap) and export with uv",
-        )
+        remedy = "Unwrap it (in Blender: Edit Mode, U > Unwrap) and export with uv"
+        refuse(source, "uv at every vertex", f"{name!r} has none", remedy)
     if not np.abs(part.uv).max() <= FARTHEST_UV:
-        refuse(
-            source,
-            "finite uv",
-            f"{name!r} has some that are NaN, infinite or beyond {FARTHEST_UV:g}",
-            "The file is damaged: export it again",
-        )
+        came = f"{name!r} has some that are NaN, infinite or beyond {FARTHEST_UV:g}"
+        refuse(source, "finite uv", came, "The file is damaged: export it again")
     return part.uv
 
 
@@ -181,12 +164,8 @@ def _materials(
     unknown = unwanted - {name.casefold() for group in groups for name in group.names}
     if unknown:
         known = ", ".join(dict.fromkeys(name for group in groups for name in group.names))
-        refuse(
-            source,
-            f"opaque to name groups of the file ({known})",
-            f"{sorted(unknown)[0]!r} is none",
-            "Check the spelling",
-        )
+        expected = f"opaque to name groups of the file ({known})"
+        refuse(source, expected, f"{sorted(unknown)[0]!r} is none", "Check the spelling")
     named = any(_has(group, "skin") for group in groups)
     index: dict[Material, int] = {}
     per_part = []
@@ -203,9 +182,9 @@ def _has(group: Group, word: str) -> bool:
 
 
 def cached_mesh(data: bytes, options: str, load: Callable[[], Mesh]) -> Mesh:
-    """The mesh that `load` makes of a file, kept on disk in the same way.
+    """The mesh that `load` makes of a file, kept on disk by its content.
 
-    data : the file, with all that the mesh is made of
+    data : the file, with everything that the mesh is made of
     options : how it is read
     """
     arrays = [field.name for field in fields(Mesh) if field.name != "materials"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,8 +20,7 @@ Floats = NDArray[np.float32]
 PathLike = str | Path | Picture
 
 MIN_SIZE, MAX_SIZE = 16, 16384
-# A normal this far off its surface (87 degrees) has its slope capped; nothing real leans further.
-_MIN_NORMAL_Z = 0.05
+_MIN_NORMAL_Z = 0.05  # slopes steeper than 87 degrees are capped; nothing real leans further
 _LARGE = 1 << 14  # bytes of a file whose map is kept on disk: it is read back faster than decoded
 _MEAN_TEXELS, _MOST_APART = 64, 16  # a mean is taken of at least as many a side, at most so far apart
 _FORM = 1  # raise when maps of the same files become others
@@ -48,7 +47,7 @@ class Maps:
 
     @cached_property
     def mean_colour(self) -> NDArray[np.float64] | None:
-        """(3,) of the colour map, without black texels, which nobody painted [-]."""
+        """(3,) of the colour map, without the black texels of empty space [-]."""
         if self.colour is None:
             return None
         apart = int(np.clip(min(self.colour.shape[:2]) // _MEAN_TEXELS, 1, _MOST_APART))
@@ -79,19 +78,21 @@ def load_maps(
     normal_y : "up" when green points to row 0 (OpenGL, Blender), "down" when away from it (DirectX)
     DermisError : a file is not what its role asks for; the message names it
     """
+    relief_mm = np.float32(255 * (height_mm or 0.0))
+    if height is not None and not (np.isfinite(relief_mm) and relief_mm > 0):
+        came = "none was given" if height_mm is None else f"it is {height_mm}"
+        remedy = "Skin maps have about 0.02 to 0.03; the map's author knows"
+        refuse(height, "a height map with height_mm, the mm per grey level, above 0", came, remedy)
+    if normal is not None and normal_y not in ("up", "down"):
+        refuse("normal_y", '"up" or "down"', f"it is {normal_y!r}", "Try the other if bumps look like dents")
     return Maps(
-        colour=None if colour is None else load_colour(colour),
-        normal=None if normal is None else load_normal(normal, normal_y),
-        height=None if height is None else load_height(height, height_mm),
-        specular=None if specular is None else load_grey(specular, "a specular map"),
-        roughness=None if roughness is None else load_grey(roughness, "a roughness map"),
+        colour=_kept(colour, "colour", _colour),
+        normal=_kept(normal, f"normal {normal_y}", partial(_slopes, normal_y=normal_y)),
+        height=_kept(height, f"height {relief_mm!r}", lambda path: _height(path) * relief_mm),
+        specular=_kept(specular, "grey", partial(_plain_grey, role="a specular map")),
+        roughness=_kept(roughness, "grey", partial(_plain_grey, role="a roughness map")),
         region=None if region is None else load_labels(region),
     )
-
-
-def load_colour(path: PathLike) -> Floats:
-    """(H, W, 3) linear Rec. 709 [-] of a colour map."""
-    return _kept(path, "colour", lambda: _colour(path))
 
 
 def _colour(path: PathLike) -> Floats:
@@ -104,33 +105,22 @@ def _colour(path: PathLike) -> Floats:
     return decode_srgb_levels(image)
 
 
-def load_height(path: PathLike, height_mm: float | None) -> Floats:
-    """(H, W) height [mm] of a grey map; see `load_maps`. 8-bit steps are smoothed away, finer ones stay."""
-    if height_mm is None or not (np.isfinite(height_mm) and height_mm > 0):
-        came = "none was given" if height_mm is None else f"it is {height_mm}"
-        remedy = "Skin maps have about 0.02 to 0.03; the map's author knows"
-        refuse(path, "a height map with height_mm, the mm per grey level, above 0", came, remedy)
-    relief_mm = np.float32(255 * height_mm)
-    return _kept(path, f"height {relief_mm!r}", lambda: _height(path) * relief_mm)
-
-
 def _height(path: PathLike) -> Floats:
+    """(H, W) in units of the full scale; 8-bit steps are smoothed away, finer ones stay."""
     image = _read(path, "a height map")
     grey = _grey(path, "a height map", image)
     return without_steps(grey) if image.dtype == np.uint8 else grey
 
 
-def load_grey(path: PathLike, role: str) -> Floats:
-    """(H, W) plain grey values 0..1 [-], not through the sRGB curve.
-
-    role : what the map should be, for the message
-    """
-    return _kept(path, "grey", lambda: _within_unit(path, role, _grey(path, role, _read(path, role))))
+def _plain_grey(path: PathLike, role: str) -> Floats:
+    """(H, W) values 0..1 [-], not through the sRGB curve."""
+    return _within_unit(path, role, _grey(path, role, _read(path, role)))
 
 
 def load_labels(path: PathLike) -> NDArray[np.uint8]:
     """(H, W) labels of a grey picture of 8 bits."""
-    return _kept(path, "labels", lambda: _labels(path))
+    labels: NDArray[np.uint8] = _kept(path, "labels", _labels)
+    return labels
 
 
 def _labels(path: PathLike) -> NDArray[np.uint8]:
@@ -140,20 +130,8 @@ def _labels(path: PathLike) -> NDArray[np.uint8]:
     return image[..., 0]
 
 
-def load_normal(path: PathLike, normal_y: Literal["up", "down"] = "up") -> Floats:
-    """(H, W, 2) slopes [-] of a tangent-space normal map; see `Maps.normal`.
-
-    normal_y : which way green points: "up" to row 0 or "down" away from it
-
-    A float map may hold -1..1 instead of 0..1. Texels with no outward normal, as in the empty space
-    between uv islands, are flat.
-    """
-    if normal_y not in ("up", "down"):
-        refuse("normal_y", '"up" or "down"', f"it is {normal_y!r}", "Try the other if bumps look like dents")
-    return _kept(path, f"normal {normal_y}", lambda: _slopes(path, normal_y))
-
-
 def _slopes(path: PathLike, normal_y: str) -> Floats:
+    """(H, W, 2) slopes of a normal map of 0..1 or -1..1; texels without an outward normal are flat."""
     image = _read(path, "a normal map")
     if image.shape[2] < 3:
         refuse(path, "a normal map with red, green and blue", "it is grey", "If it is a height map, say so")
@@ -180,17 +158,19 @@ def _check_normals(path: PathLike, normals: Floats) -> None:
         refuse(path, "a tangent-space normal map, which looks light blue", came, "Check which map this is")
 
 
-def _kept(path: PathLike, how: str, load: Callable[[], NDArray[Any]]) -> NDArray[Any]:
-    """What `load` makes of a picture file, kept on disk when the file is large.
+def _kept(path: PathLike | None, how: str, load: Callable[[PathLike], NDArray[Any]]) -> Any:
+    """The map that `load` makes of a picture file, kept on disk when the file is large; None for no file.
 
     how : all that the map depends on besides the file
     """
+    if path is None:
+        return None
     data = read_bytes(path)
     if len(data) < _LARGE:
-        return load()
+        return load(path)
     from dermis.disk import cached_array
 
-    return cached_array(np.frombuffer(data, np.uint8), f"map {_FORM} {how}", load)
+    return cached_array(np.frombuffer(data, np.uint8), f"map {_FORM} {how}", lambda: load(path))
 
 
 def _read(path: PathLike, role: str) -> NDArray[Any]:

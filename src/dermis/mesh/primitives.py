@@ -42,12 +42,8 @@ def plane(size_mm: float, segments: int = 1, uv_scale: float = 1.0) -> Mesh:
     uv_scale : uv covers [0, uv_scale] along both sides, at most 1
     """
     if not (size_mm > 0 and segments >= 1 and 0 < uv_scale <= 1):
-        refuse(
-            "plane",
-            "a size above 0, a segment and a uv_scale in (0, 1]",
-            f"{size_mm} mm, {segments} and {uv_scale} came",
-            "Mend the arguments",
-        )
+        came = f"{size_mm} mm, {segments} and {uv_scale} came"
+        refuse("plane", "a size above 0, a segment and a uv_scale in (0, 1]", came, "Correct the arguments")
     along = np.linspace(0, 1, segments + 1)
     v, u = (axis.ravel() for axis in np.meshgrid(along, along, indexing="ij"))
     positions = size_mm * np.column_stack((u - 0.5, 0.5 - v, np.zeros_like(u)))
@@ -66,12 +62,8 @@ def uv_sphere(radius_mm: float, segments: int = 64, rings: int = 32) -> Mesh:
     segments, rings : cells around and from pole to pole, at least 3 and 2
     """
     if not (radius_mm > 0 and segments >= 3 and rings >= 2):
-        refuse(
-            "uv_sphere",
-            "a radius above 0, 3 segments and 2 rings",
-            f"{radius_mm} mm, {segments} and {rings} came",
-            "Mend the arguments",
-        )
+        came = f"{radius_mm} mm, {segments} and {rings} came"
+        refuse("uv_sphere", "a radius above 0, 3 segments and 2 rings", came, "Correct the arguments")
     row, column = (axis.ravel() for axis in np.mgrid[: rings + 1, : segments + 1])
     # the last column is the first: exactly the same numbers, so that it welds
     phi, theta = 2 * np.pi * (column % segments) / segments, np.pi * row / rings
@@ -97,7 +89,7 @@ def wedge(side_mm: float, thin_mm: float, thick_mm: float, cells: int = 4) -> Me
     """
     if not (side_mm > 0 and min(thin_mm, thick_mm) > 0 and cells >= 1):
         came = f"{side_mm}, {thin_mm} and {thick_mm} mm and {cells} came"
-        refuse("wedge", "sides above 0 and a cell", came, "Mend the arguments")
+        refuse("wedge", "sides above 0 and a cell", came, "Correct the arguments")
     v, u = (axis.ravel() for axis in np.mgrid[: cells + 1, : cells + 1] / cells)
     row, column = (axis.ravel() for axis in np.mgrid[:cells, :cells])
     a = row * (cells + 1) + column
@@ -107,12 +99,8 @@ def wedge(side_mm: float, thin_mm: float, thick_mm: float, cells: int = 4) -> Me
         c = np.array(corners, float)
         c[:, 2] = (c[:, 2] - 0.5) * np.where(c[:, 0] > 0, thick_mm, thin_mm)
         c[:, :2] = (c[:, :2] - 0.5) * side_mm
-        places = (
-            np.outer((1 - u) * (1 - v), c[0])
-            + np.outer(u * (1 - v), c[1])
-            + np.outer(u * v, c[2])
-            + np.outer((1 - u) * v, c[3])
-        )
+        upper = np.outer((1 - u) * (1 - v), c[0]) + np.outer(u * (1 - v), c[1])
+        places = upper + np.outer(u * v, c[2]) + np.outer((1 - u) * v, c[3])
         normal = np.cross(c[3] - c[0], c[1] - c[0])
         positions.append(places)
         normals.append(np.tile(normal / np.linalg.norm(normal), (len(places), 1)))

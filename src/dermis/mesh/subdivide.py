@@ -28,11 +28,8 @@ def subdivide(mesh: Mesh, levels: int) -> Mesh:
         refuse("subdivide", f"0 to {MAX_LEVELS} levels", f"{levels} came", "Each level takes 4x the memory")
     if levels == 0:
         return mesh
-    uv, point, triangles = (
-        mesh.uv.astype(np.float64),
-        mesh.point.astype(np.int64),
-        mesh.triangles.astype(np.int64),
-    )
+    uv = mesh.uv.astype(np.float64)
+    point, triangles = mesh.point.astype(np.int64), mesh.triangles.astype(np.int64)
     places = np.zeros((int(point.max()) + 1, 3))
     places[point] = mesh.positions
     for _ in range(levels):

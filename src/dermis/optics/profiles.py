@@ -14,8 +14,7 @@ import numpy as np
 from dermis.errors import refuse
 from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.media import Floats
-from dermis.optics.presets import read_text, read_toml
+from dermis.optics.media import Floats, read_text, read_toml
 from dermis.optics.tissue import Tissue, load_tissue, names
 from dermis.outputs import replacing
 

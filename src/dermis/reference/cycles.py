@@ -1,27 +1,40 @@
-"""The same head by Cycles, as what a user of Blender would pick instead: random walk or Burley's profile."""
+"""The same head by Cycles, as a Blender user would render it: by random walk or with Burley's profile.
+
+Blender's Python runs `cycles_script.py` as a process of its own on a folder with the described scene.
+"""
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.errors import DermisError, refuse
+from dermis.images.io import read_image
 from dermis.optics.media import Medium
-from dermis.reference.cycles_process import CyclesPass, blender_python, read_passes, run_cycles, write_scene
 from dermis.reference.cycles_scene import FALLOFFS, describe
-from dermis.reference.mitsuba_skin import Lambertian
+from dermis.reference.mitsuba_scene import Lambertian
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
+PYTHON_VARIABLE = "DERMIS_BLENDER_PYTHON"
 Floats = NDArray[np.float32]
 Method = Literal["random-walk", "burley"]
 _PASSES = 4
+_REMEDY = (
+    f"Set {PYTHON_VARIABLE} to a Python with bpy, kept apart since bpy wants numpy below 2: "
+    'python3.11 -m venv blender && blender/bin/pip install bpy "numpy<2"'
+)
+_START_S, _PATH_S = 300.0, 5e-4
+"""Time limits for the start and for each path: a hundred times what two cores took."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,10 +42,10 @@ class CyclesRendered:
     """An image by Cycles, black where there is no head.
 
     image : (h, w, 3) radiance, linear Rec. 709
-    variance : (h, w, 3) of each value of the image, from passes with seeds of their own
+    variance : (h, w, 3) of each value of the image, from passes with different seeds
     coverage : (h, w) share of the pixel that the head fills
     samples : paths through each pixel
-    seconds : that Cycles took for them, scene and acceleration structure included
+    seconds : that Cycles took, building the scene and the acceleration structure included
     """
 
     image: Floats
@@ -40,6 +53,26 @@ class CyclesRendered:
     coverage: Floats
     samples: int
     seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class CyclesPass:
+    """One rendering by Cycles, black where there is no head.
+
+    image : (h, w, 3) radiance, linear Rec. 709
+    coverage : (h, w) share of the pixel that the head fills
+    samples : paths through each pixel
+    seconds : by the clock; for the first pass with building the scene and the acceleration structure
+    core_seconds : summed over all cores
+    version : Blender's
+    """
+
+    image: Floats
+    coverage: Floats
+    samples: int
+    seconds: float
+    core_seconds: float
+    version: str
 
 
 def cycles_render(
@@ -51,9 +84,9 @@ def cycles_render(
     method: Method = "random-walk",
     python: str | Path | None = None,
 ) -> CyclesRendered:
-    """The scene by Cycles on the CPU: the mean of passes; arguments and refusals as of `cycles_passes`.
+    """The scene by Cycles on the CPU, as the mean of 4 passes; arguments and errors as of `cycles_passes`.
 
-    samples : at least so many paths through each pixel, in 4 passes
+    samples : at least this many paths through each pixel
     """
     _check_samples(samples)
     each = -(-int(samples) // _PASSES)
@@ -79,19 +112,18 @@ def cycles_passes(
     seed: int = 0,
     python: str | Path | None = None,
 ) -> list[CyclesPass]:
-    """The scene by Cycles on the CPU, once for each count of samples, in one process.
+    """The scene by Cycles on the CPU, once for each number of samples, in one process.
 
     There is no clamping, denoising or surface reflection.
 
-    medium : of one layer; its eta plays no part, for Cycles' walks end at an index-matched surface. Its
-        colour in Cycles is what it reflects of diffuse light, its radius 4 pi mean free paths. Or a
-        `Lambertian`
-    samples : paths through each pixel, of each pass
+    medium : of one layer; its eta is ignored, because Cycles' walks end at an index-matched surface. Its
+        colour in Cycles is its diffuse reflectance, its radius 4 pi mean free paths. Or a `Lambertian`
+    samples : paths through each pixel, for each pass
     settings : only the size counts
-    seed : of the first pass; each further one has the next
-    python : of an environment with `bpy`; DERMIS_BLENDER_PYTHON when left out
+    seed : of the first pass; each further pass takes the next
+    python : of an environment with `bpy`; by default the one that DERMIS_BLENDER_PYTHON names
 
-    Raises DermisError when there is no such Python, when Cycles fails, and for layers.
+    Raises DermisError when there is no such Python, when Cycles fails, and for more than one layer.
     """
     for count in samples:
         _check_samples(count)
@@ -103,11 +135,91 @@ def cycles_passes(
     interpreter = blender_python(python)
     with tempfile.TemporaryDirectory(prefix="dermis-cycles-") as name:
         folder = Path(name)
-        write_scene(folder, described, arrays)
-        run_cycles(interpreter, folder, paths=size[0] * size[1] * sum(samples))
+        _write_scene(folder, described, arrays)
+        _run_cycles(interpreter, folder, paths=size[0] * size[1] * sum(samples))
         return read_passes(folder, samples, size)
 
 
 def _check_samples(samples: int) -> None:
     if not (isinstance(samples, int | np.integer) and samples >= 1):
         refuse("samples", "a whole number from 1", f"{samples} came", "Correct it")
+
+
+def blender_python(python: str | Path | None = None) -> Path:
+    """The Python that has bpy: the one given, or the one that DERMIS_BLENDER_PYTHON names.
+
+    Raises DermisError when there is no such file.
+    """
+    named = python or os.environ.get(PYTHON_VARIABLE) or ""
+    if not named:
+        _refuse_python("none is named")
+    if not Path(named).is_file():
+        _refuse_python(f"there is no file {named}")
+    return Path(named)
+
+
+def _write_scene(folder: Path, described: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
+    (folder / "scene.json").write_text(json.dumps(described), encoding="utf-8")
+    np.savez(folder / "arrays.npz", **arrays)  # type: ignore[arg-type]  # its last parameter is no array
+
+
+def _run_cycles(python: Path, folder: Path, paths: int) -> None:
+    """Render the scene in a folder.
+
+    paths : to be traced, which sets the time limit
+    """
+    script = Path(__file__).with_name("cycles_script.py")
+    # Isolated: our packages need another numpy, and the `cycles` beside the script is not Blender's.
+    command = [str(python), "-I", str(script), str(folder)]
+    longest = _START_S + _PATH_S * paths
+    try:
+        ran = subprocess.run(command, capture_output=True, check=False, timeout=longest)
+    except OSError as fault:
+        _refuse_python(f"{python} cannot be run ({fault.strerror})")
+    except subprocess.TimeoutExpired:
+        came = f"it was ended after {longest:.0f} s"
+        refuse("Cycles", "to render the scene", came, "Take fewer samples or a smaller image")
+    if ran.returncode != 0:
+        _refuse_end(python, ran)
+
+
+def read_passes(folder: Path, samples: Sequence[int], size: tuple[int, int]) -> list[CyclesPass]:
+    """The passes that Cycles left in a folder.
+
+    samples : of each pass
+    size : width and height [pixel]
+
+    Raises DermisError when they are not what was asked for.
+    """
+    try:
+        done = json.loads((folder / "done.json").read_text(encoding="utf-8"))
+        files = [folder / f"pass_{k}.exr" for k in range(len(samples))]
+        pixels = [read_image(file).astype(np.float32, copy=False) for file in files]
+        if any(one.shape != (size[1], size[0], 4) or not np.isfinite(one).all() for one in pixels):
+            raise ValueError("a pass of another size, or with values that are not finite")
+        found = zip(pixels, samples, done["times"], strict=True)
+        return [
+            CyclesPass(
+                one[..., :3], one[..., 3], int(count), float(clock), float(cores), str(done["version"])
+            )
+            for one, count, (clock, cores) in found
+        ]
+    except (OSError, ValueError, KeyError, TypeError, DermisError) as fault:
+        _refuse_render(f"it left something else ({str(fault) or type(fault).__name__})")
+
+
+def _refuse_end(python: Path, ran: subprocess.CompletedProcess[bytes]) -> NoReturn:
+    said = (ran.stderr.strip() or ran.stdout.strip()).decode("utf-8", "replace").splitlines()
+    last = said[-1] if said else "it said nothing"
+    if "No module named" in last:
+        _refuse_python(f"{python} says: {last}")
+    ended = f"signal {-ran.returncode} ended it" if ran.returncode < 0 else "it failed"
+    _refuse_render(f"{ended} ({last})")
+
+
+def _refuse_render(came: str) -> NoReturn:
+    refuse("Cycles", "to render the scene", came, "Try bpy 5.0, which this was made with")
+
+
+def _refuse_python(came: str) -> NoReturn:
+    refuse("Cycles", "a Python that has Blender's module bpy", came, _REMEDY)

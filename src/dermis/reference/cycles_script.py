@@ -1,8 +1,8 @@
 """Renders a described scene with Cycles. Blender's Python runs it by its path: cycles_script.py FOLDER.
 
-FOLDER holds scene.json and arrays.npz as `dermis.reference.cycles_process` writes them. The script adds
-pass_K.exr (radiance and coverage) and, last of all, done.json (Blender's version, times of the passes). It
-imports nothing of dermis: Blender's Python is another one.
+FOLDER holds scene.json and arrays.npz as `dermis.reference.cycles` writes them. The script adds pass_K.exr
+(radiance and coverage) and finally done.json (Blender's version, times of the passes). It imports nothing of
+dermis, which Blender's Python does not have.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a half-space that scatters isotropically under an index-matched surface reflects, in closed form."""
+"""Reflection of an index-matched half-space that scatters isotropically, in closed form."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ _ROUNDS = 500
 
 
 def h_function(cosine: ArrayLike, albedo: float) -> Floats:
-    """Chandrasekhar's H at cosines from the normal, of their shape [-].
+    """Chandrasekhar's H at cosines to the normal, of their shape [-].
 
-    albedo : share of the extinction that is scattering, below 1 [-]
+    albedo : of single scattering, below 1 [-]
 
-    Source: [Chandrasekhar1960] section 38; fixed points of its form without cancellation, on Gaussian nodes.
+    Source: [Chandrasekhar1960] section 38; its form without cancellation, iterated on Gaussian nodes.
     """
     if not 0.0 <= albedo < 1.0:
         refuse("half-space", "an albedo from 0 to below 1", f"{albedo:g} came", "Correct it")
@@ -31,12 +31,12 @@ def h_function(cosine: ArrayLike, albedo: float) -> Floats:
 
 
 def directional_albedo(cosine: ArrayLike, albedo: float) -> Floats:
-    """Share of light from a direction that comes back, by the cosine of that direction [-]."""
+    """Share of the light from a direction that is reflected, by the cosine of that direction [-]."""
     return np.asarray(1.0 - np.sqrt(1.0 - albedo) * h_function(cosine, albedo))
 
 
 def diffuse_albedo(albedo: float) -> float:
-    """Share of light from all directions alike that comes back [-]."""
+    """Share of uniform light from all directions that is reflected [-]."""
     mu, weight = _nodes()
     return float((2.0 * weight * mu * directional_albedo(mu, albedo)).sum())
 
@@ -44,7 +44,7 @@ def diffuse_albedo(albedo: float) -> float:
 def reflected_radiance(cosine_in: ArrayLike, cosine_out: ArrayLike, albedo: float) -> Floats:
     """Radiance over the irradiance of parallel light, by the cosines of light and view [1/sr].
 
-    Source: [Chandrasekhar1960] section 33: S over 4 pi times both cosines.
+    Source: [Chandrasekhar1960] section 33: S / (4 pi cos_in cos_out).
     """
     mu, view = np.asarray(cosine_in, np.float64), np.asarray(cosine_out, np.float64)
     H = h_function(mu, albedo) * h_function(view, albedo)

@@ -1,4 +1,4 @@
-"""How far a picture is from the truth: relative error without the truth's own noise, energy, and FLIP."""
+"""How far a picture is from the truth: relative error free of the truth's noise, energy, FLIP, and where."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.errors import refuse
+from dermis.images.colour import encode_srgb
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 PIXELS_PER_DEGREE = 67.0
 """FLIP's own default: a 4K screen 0.7 m wide, seen from 0.7 m."""
+MID_GREY = 0.5
+"""sRGB of no difference, near the middle of the scale of lightness (L* 53)."""
 
 
 class Estimate(NamedTuple):
@@ -31,7 +34,7 @@ class Flip:
 
     mean : over the mask
     error : (h, w) 0 outside the mask
-    pixels_per_degree : how large the picture is to the eye
+    pixels_per_degree : resolution of the picture as seen
     """
 
     mean: float
@@ -46,25 +49,25 @@ def relative_rmse(
     variance: ArrayLike | None = None,
     image_variance: ArrayLike | None = None,
 ) -> Estimate:
-    """Root of (sum of squared differences over sum of the truth's squares), without the truth's noise [-].
+    """Root of (sum of squared differences over sum of the truth's squares), free of the truth's noise [-].
 
     image, truth : (h, w) or (h, w, c) linear; the channels count together
     mask : (h, w) pixels that count
-    variance : as `truth`, of each value of it, an unbiased estimate: that of samples over their number
-    image_variance : the same of the image, whose noise is then left out too
+    variance : of each value of `truth`, an unbiased estimate: that of its samples over their number
+    image_variance : the same of the image, whose noise is then removed too
 
     With truth T = t + n, noise n of mean 0 and variance s², and difference D = I - T, the mean of D² is that
-    of (I - t)² plus s², and of T² that of t² plus s²; so E = sum(D² - s²) / sum(T² - s²) has both free of it.
+    of (I - t)² plus s², and of T² that of t² plus s²; so E = sum(D² - s²) / sum(T² - s²) is free of noise.
     A pixel moves E by U = D² - s² - E (T² - s²), whose random part is -2 n (I - t + E t) + (1 - E)(n² - s²).
-    For normal n its variance is 4 s² (I - t + E t)² + 2 (1 - E)² s⁴, whose unbiased estimate is
-    4 s² (D + E T)² - 2 (1 - E)² s⁴. Skewed noise is taken off as well, but makes this error too small: by
-    7 to 16 % for means of 64 exponential samples. Pixels are independent; channels may share their paths, so
-    their deviations are added, at most sqrt(c) too much. The error of the root is the larger of the ways to
-    sqrt(E + error of E) and to sqrt(E - error of E) or 0.
+    For normal n its variance is 4 s² (I - t + E t)² + 2 (1 - E)² s⁴, with the unbiased estimate
+    4 s² (D + E T)² - 2 (1 - E)² s⁴. Skewed noise is removed as well, but makes this standard error too small,
+    by 7 to 16 % for means of 64 exponential samples. Pixels are independent; channels may share paths, so
+    their deviations are added, which is at most sqrt(c) too much. The root's standard error is the larger
+    distance to sqrt(E ± error of E), or to 0.
 
     An image's own noise of variance v adds v to D², and 4 v D² - 4 v s² - 2 v² to the estimate of U's
-    variance, of which the first term alone is counted: few passes tell v² badly, and the error is too large,
-    not too small.
+    variance. Only the first term is counted, because few passes estimate v² badly: the standard error is too
+    large rather than too small.
     """
     I, T, s2 = _pixels(image, truth, mask, variance)
     v = np.zeros_like(I) if image_variance is None else _pixels(image, truth, mask, image_variance)[2]
@@ -84,8 +87,8 @@ def energy_ratio(
 ) -> Estimate:
     """Sum of the image over sum of the truth [-]; arguments as of `relative_rmse`.
 
-    The ratio's relative error is that of the truth's sum, whose variance is the sum of the variances; of
-    channels, which may share their paths, the deviations are added.
+    The ratio's relative error is that of the truth's sum, whose variance is the sum of the variances;
+    channels may share paths, so their deviations are added.
     """
     I, T, s2 = _pixels(image, truth, mask, variance)
     total = float(T.sum())
@@ -96,7 +99,7 @@ def energy_ratio(
 
 
 def _added(variance: Floats) -> float:
-    """Deviation of a sum of independent pixels (n, c), at most, however the channels hang together."""
+    """Upper bound of the deviation of a sum of independent pixels (n, c), whatever ties the channels."""
     return float(np.sqrt(np.maximum(variance.sum(axis=0), 0)).sum())
 
 
@@ -133,11 +136,12 @@ def flip(
 ) -> Flip:
     """FLIP of two pictures (h, w, 3).
 
-    image, truth : sRGB in 0..1, as they are shown: after exposure and tone curve; linear Rec. 709 of 0 or
-        more when `high_dynamic_range`, which looks at all exposures that the truth asks for
-    mask : (h, w) pixels that count; elsewhere the image is taken to be the truth
-    pixels_per_degree : how large the picture is to the eye
-    DermisError : the package flip-evaluator is not installed
+    image, truth : sRGB in 0..1 as shown, after exposure and tone curve; with `high_dynamic_range` linear
+        Rec. 709 of 0 or more, judged at all exposures that suit the truth
+    mask : (h, w) pixels that count; elsewhere the image is taken to equal the truth
+    pixels_per_degree : resolution of the picture as seen
+
+    Raises DermisError when the package flip-evaluator is not installed.
 
     Source: [Andersson2020], and [Andersson2021] for high dynamic range.
     """
@@ -171,3 +175,21 @@ def _flip_evaluator() -> Any:
     except ImportError:
         remedy = "Install it with `pip install flip-evaluator`"
         refuse("FLIP", "the package flip-evaluator", "it is not installed", remedy)
+
+
+def signed_difference(image: ArrayLike, truth: ArrayLike, gain: float = 4.0) -> Floats:
+    """sRGB picture (h, w, 3) of image minus truth: mid-grey is none, redder is too red, lighter too light.
+
+    image, truth : (h, w, 3) linear Rec. 709 of 0 or more; 1 is white
+    gain : of the difference of sRGB values, whose steps look about even
+    """
+    I, T = np.asarray(image, np.float64), np.asarray(truth, np.float64)
+    if I.shape != T.shape or I.ndim != 3 or I.shape[2] != 3:
+        came = f"{I.shape} and {T.shape} came"
+        refuse("difference", "two pictures of one shape (h, w, 3)", came, "Align them")
+    if not (np.isfinite(I).all() and np.isfinite(T).all()):
+        refuse("difference", "finite values", "others came", "Mask them out")
+    if not gain > 0:
+        refuse("gain", "a number above 0", f"{gain} came", "4 shows what the eye can just see")
+    difference = encode_srgb(np.maximum(I, 0)) - encode_srgb(np.maximum(T, 0))
+    return np.clip(MID_GREY + gain * difference, 0.0, 1.0)

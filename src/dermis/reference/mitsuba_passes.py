@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dermis.disk import find, store
 from dermis.environment.panorama import load_panorama
 from dermis.optics.media import Medium
-from dermis.reference.mitsuba_skin import Lambertian
+from dermis.reference.mitsuba_scene import Lambertian
 from dermis.scene.model import Scene
 
 Floats = NDArray[np.float64]
@@ -59,7 +59,7 @@ class Passes:
 
 
 def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], form: str) -> str:
-    """A name for all that the image depends on.
+    """A hash of all that the image depends on.
 
     form : versions, and how it is traced
     """

@@ -1,29 +1,52 @@
-"""A scene of ours as a scene of Mitsuba's: the same head, lights, camera and pixels."""
+"""A scene as Mitsuba has it: the same head, lights, camera and pixels, with a medium inside the skin."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from importlib import import_module
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from dermis.errors import refuse
-from dermis.optics.media import Medium
-from dermis.reference.mitsuba_lights import emitter, surroundings
-from dermis.reference.mitsuba_skin import Lambertian, head_shapes, mask_shapes
+from dermis.mesh.head import Head
+from dermis.optics.media import Layer, Medium
+from dermis.reference.described import rgb, surroundings
+from dermis.reference.lights import emitter
+from dermis.reference.mitsuba_solid import Solid, inwards, skin_solid
 from dermis.scene.camera import Camera
 from dermis.scene.model import Scene
 
 ROULETTE_DEPTH = 100
-"""Scatterings before a path may be ended by chance. Ended sooner, the few that live on carry much: on skin2
-red has then nearly twice the variance in the same time, and with few samples its mean is 1 % low."""
+"""Scatterings before Russian roulette. Earlier, it leaves few paths that carry much: red on skin2 then has
+nearly twice the variance in the same time, and with few samples its mean is 1 % low."""
 _DIRECT_DEPTH = 2
+_GAP = 0.97
+"""Distance between the two surfaces that stand for a face, over the step by which Mitsuba moves a ray past a
+surface so as not to hit it again. That step skips 0.01 mm of medium on a head, which makes skin with a mean
+free path of 1 mm up to 1 % darker. With two surfaces a ray inwards passes the upper one and steps over the
+lower one, a ray outwards passes the lower one and steps over the upper one: only the gap is skipped."""
+_NOTABLE_FOLD = 1e-3
+
+
+@dataclass(frozen=True)
+class Lambertian:
+    """Skin without depth, lit by the lights alone and not by itself: what a render without scattering shows.
+
+    albedo : linear Rec. 709 [-]
+    """
+
+    albedo: tuple[float, float, float]
 
 
 def load_mitsuba() -> Any:
-    """The module `mitsuba`, without a variant set; DermisError when it is not installed."""
+    """The module `mitsuba` with no variant set.
+
+    Raises DermisError when it is not installed.
+    """
     try:
         return import_module("mitsuba")
     except ImportError as fault:
@@ -33,7 +56,7 @@ def load_mitsuba() -> Any:
 
 @contextmanager
 def variant_of(mi: Any, name: str) -> Iterator[None]:
-    """A variant of Mitsuba, until the caller's own is set again; there may have been none."""
+    """Set a variant of Mitsuba; afterwards the caller's own is set again, if there was one."""
     before = mi.variant()
     mi.set_variant(name)
     try:
@@ -43,23 +66,29 @@ def variant_of(mi: Any, name: str) -> Iterator[None]:
             mi.set_variant(before)
 
 
+def check_traceable(medium: Medium | Lambertian) -> None:
+    """Raises DermisError for a refracting surface, through which no ray to a point light finds its way."""
+    if isinstance(medium, Medium) and medium.eta != 1.0:
+        came = f"its index is {medium.eta:g}"
+        refuse(medium.name, "an index-matched medium, for path tracing", came, "Trace medium.with_eta(1.0)")
+    if isinstance(medium, Medium) and medium.channels != 3:
+        came = f"it has {medium.channels}"
+        refuse(medium.name, "three channels, for path tracing", came, "Give red, green and blue")
+
+
 def radiance_scene(mi: Any, scene: Scene, medium: Medium | Lambertian, size: tuple[int, int]) -> Any:
-    """Mitsuba's scene, and notes on how the head became bodies of media."""
-    head = head_shapes(mi, scene.head, medium)
+    """Mitsuba's scene whose image is the radiance, and notes on what was done to the head."""
+    shapes, notes = _head_shapes(mi, scene.head, medium)
     direct = {"max_depth": _DIRECT_DEPTH} if isinstance(medium, Lambertian) else {}
-    # Spectral MIS: extinction differs between the channels, and sampling one of them makes the others noisy.
+    # Spectral MIS: extinction differs between channels, and sampling one of them makes the others noisy.
     integrator = {"type": "volpathmis", "rr_depth": ROULETTE_DEPTH, "hide_emitters": True, **direct}
     lights = {f"light_{k}": emitter(mi, light, k) for k, light in enumerate(scene.lights, start=1)}
     if scene.environment is not None:
         lights["environment"] = surroundings(mi, scene.environment)
-    everything = {
-        "type": "scene",
-        "integrator": integrator,
-        "sensor": _sensor(mi, scene.camera, size),
-        **head.shapes,
-        **lights,
-    }
-    return mi.load_dict(everything), head.notes
+    sensor = _sensor(mi, scene.camera, size)
+    return mi.load_dict(
+        {"type": "scene", "integrator": integrator, "sensor": sensor, **shapes, **lights}
+    ), notes
 
 
 def mask_scene(mi: Any, scene: Scene, size: tuple[int, int]) -> Any:
@@ -69,7 +98,7 @@ def mask_scene(mi: Any, scene: Scene, size: tuple[int, int]) -> Any:
             "type": "scene",
             "integrator": {"type": "path", "max_depth": 1},
             "sensor": _sensor(mi, scene.camera, size, sampler="multijitter"),
-            **mask_shapes(mi, scene.head),
+            **_mask_shapes(mi, scene.head),
         }
     )
 
@@ -89,3 +118,103 @@ def _sensor(mi: Any, camera: Camera, size: tuple[int, int], sampler: str = "inde
         "film": {"type": "hdrfilm", "rfilter": {"type": "box"}, **film},
         "sampler": {"type": sampler},
     }
+
+
+def _head_shapes(mi: Any, head: Head, medium: Medium | Lambertian) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Skin and opaque materials of a head, about its centre, by name, and notes on them."""
+    opaque = {}
+    for k in _materials(head, "opaque"):
+        colour = rgb(head.mesh.materials[k].colour)
+        opaque[f"material_{k}"] = _sheet(mi, head, k, bsdf=_diffuse(mi, colour))
+    if isinstance(medium, Lambertian):
+        diffuse = _diffuse(mi, rgb(medium.albedo))
+        skin = {f"skin_{k}": _sheet(mi, head, k, bsdf=diffuse) for k in _materials(head, "skin")}
+        return {**skin, **opaque}, ()
+    bodies, notes = _bodies(mi, head, medium)
+    return {**bodies, **opaque}, notes
+
+
+def _mask_shapes(mi: Any, head: Head) -> dict[str, Any]:
+    """The head with skin that shines with radiance 1 and everything else black."""
+    shapes = {}
+    for k, material in enumerate(head.mesh.materials):
+        given = {"bsdf": _diffuse(mi, 0.0)}
+        if material.kind == "skin":
+            given["emitter"] = mi.load_dict({"type": "area", "radiance": 1.0})
+        if (head.mesh.material == k).any():
+            shapes[f"part_{k}"] = _sheet(mi, head, k, **given)
+    return shapes
+
+
+def _materials(head: Head, kind: str) -> list[int]:
+    kinds = [material.kind for material in head.mesh.materials]
+    return [k for k in np.unique(head.mesh.material).tolist() if kinds[k] == kind]
+
+
+def _diffuse(mi: Any, reflectance: Any) -> Any:
+    return mi.load_dict({"type": "diffuse", "reflectance": reflectance})
+
+
+def _sheet(mi: Any, head: Head, index: int, **given: Any) -> Any:
+    """The triangles of a material with the head's own normals."""
+    mesh = head.mesh
+    used, corners = np.unique(mesh.triangles[mesh.material == index], return_inverse=True)
+    places = mesh.positions[used] - np.array(head.centre_mm)
+    return _mesh(mi, places, corners.reshape(-1, 3), mesh.normals[used], **given)
+
+
+def _bodies(mi: Any, head: Head, medium: Medium) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Surfaces around the skin and around what lies below each interface between its layers."""
+    skin = skin_solid(head.mesh, head.name)
+    skin = replace(skin, positions=(skin.positions - np.array(head.centre_mm)).astype(np.float32))
+    notes = [f"{skin.caps} openings shut, {skin.cap_area:.0f} mm2"] if skin.caps else []
+    gap = _GAP * (1.0 + np.abs(skin.positions).max(axis=1)) * mi.math.RayEpsilon
+    media: list[Any] = [None, *(mi.load_dict(_homogeneous(layer)) for layer in medium.layers), None]
+    shapes = {}
+    depth = -gap
+    for k, (above, below) in enumerate(pairwise(media)):
+        if np.isinf(depth).any():
+            break
+        for side, where in (("upper", depth), ("lower", depth + gap)):
+            surface, folded = inwards(skin, where, head.name)
+            shapes[f"face_{k}_{side}"] = _shell(mi, surface, {"exterior": above, "interior": below})
+        if folded > _NOTABLE_FOLD:
+            notes.append(f"{folded:.1%} of the face under layer {k} is folded")
+        if k < len(medium.layers):
+            depth = depth + gap + medium.layers[k].thickness_mm
+    return shapes, tuple(notes)
+
+
+def _homogeneous(layer: Layer) -> dict[str, Any]:
+    extinction = layer.sigma_t_prime
+    # Textures hold at most 1, so the largest extinction goes into the scale.
+    return {
+        "type": "homogeneous",
+        "albedo": rgb(layer.alpha_prime),
+        "sigma_t": rgb(extinction / extinction.max()),
+        "scale": float(extinction.max()),
+        "phase": {"type": "isotropic"},
+    }
+
+
+def _shell(mi: Any, solid: Solid, media: dict[str, Any]) -> Any:
+    filled = {side: medium for side, medium in media.items() if medium is not None}
+    return _mesh(mi, solid.positions, solid.triangles, None, bsdf=mi.load_dict({"type": "null"}), **filled)
+
+
+def _mesh(mi: Any, places: Any, triangles: Any, normals: Any, **given: Any) -> Any:
+    properties = mi.Properties()
+    for name, value in given.items():
+        properties[name] = value
+    mesh = mi.Mesh("", len(places), len(triangles), has_vertex_normals=normals is not None, props=properties)
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = _flat(places, np.float32)
+    parameters["faces"] = _flat(triangles, np.uint32)
+    if normals is not None:
+        parameters["vertex_normals"] = _flat(normals, np.float32)
+    parameters.update()
+    return mesh
+
+
+def _flat(values: Sequence[Any], kind: Any) -> Any:
+    return np.ascontiguousarray(values, dtype=kind).ravel()

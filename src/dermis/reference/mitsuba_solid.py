@@ -1,4 +1,4 @@
-"""Closed surfaces around what scatters: a head's skin with its openings shut, and the layers' lower faces."""
+"""Closed surfaces around a scattering medium: a head's skin with its openings shut, moved inwards."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _MOST_FOLDED = 0.02
 
 @dataclass(frozen=True)
 class Solid:
-    """A surface without an edge; what lies behind its triangles is inside.
+    """A closed surface.
 
     positions : (p, 3) [mm]
     triangles : (f, 3)
-    caps : openings that were shut, and `cap_area` what that added to the surface [mm2]
+    caps, cap_area : number of openings that were shut, and the area that this added [mm2]
     """
 
     positions: Floats
@@ -34,11 +34,11 @@ class Solid:
 
 
 def skin_solid(mesh: Mesh, culprit: str) -> Solid:
-    """The skin of a mesh, welded, each opening shut by triangles about its middle.
+    """The welded skin of a mesh, each opening shut by a fan of triangles around its middle.
 
     culprit : the head's name, for messages
 
-    Raises DermisError when that encloses nothing: a single sheet, or a surface turned inside out.
+    Raises DermisError when it encloses no volume: a single sheet, or a surface turned inside out.
     """
     skin = np.array([material.kind == "skin" for material in mesh.materials])[mesh.material]
     if not skin.any():
@@ -56,12 +56,12 @@ def skin_solid(mesh: Mesh, culprit: str) -> Solid:
 
 
 def inwards(solid: Solid, depth_mm: Doubles, culprit: str) -> tuple[Solid, float]:
-    """The surface moved inwards, each point so that its faces move by its depth; the share that got folded.
+    """The surface moved inwards so that the faces around each point move by its depth, and the folded share.
 
-    depth_mm : (p,) for each point, negative for outwards
+    depth_mm : (p,) negative for outwards
 
-    Raises DermisError when more than a fiftieth is folded, or nothing is left inside. It does not find thin
-    parts whose two sides pass through one another: none may be thinner than twice the depth.
+    Raises DermisError when more than 2 % of the surface folds over, or no volume is left. It does not notice
+    thin parts whose two sides pass through one another: none may be thinner than twice the depth.
     """
     moved = (solid.positions - depth_mm[:, None] * _mitres(solid)).astype(np.float32)
     before, after = (_cross(places[solid.triangles]) for places in (solid.positions, moved))
@@ -77,7 +77,7 @@ def inwards(solid: Solid, depth_mm: Doubles, culprit: str) -> tuple[Solid, float
 
 
 def _mitres(solid: Solid) -> Doubles:
-    """(p, 3) steps outwards that move the faces around a point by 1, at most 2 long."""
+    """(p, 3) steps outwards that move the faces around a point by 1; at most 2 long."""
     points = np.arange(len(solid.positions), dtype=np.int32)
     normals = vertex_normals(solid.positions, points, solid.triangles).astype(np.float64)
     face = _cross(solid.positions[solid.triangles])
@@ -105,7 +105,7 @@ def _shut(positions: Floats, triangles: Index) -> Solid:
 
 
 def _open_sides(triangles: Index, count: int) -> NDArray[np.int64]:
-    """(n, 2) directed sides that no other triangle runs along the other way, as often as they are alone."""
+    """(n, 2) directed sides that no triangle traverses the other way, as often as they lack one."""
     sides = np.vstack((triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]])).astype(np.int64)
     low, high = sides.min(axis=1), sides.max(axis=1)
     edge, of_side = np.unique(low * count + high, return_inverse=True)
@@ -116,7 +116,7 @@ def _open_sides(triangles: Index, count: int) -> NDArray[np.int64]:
 
 
 def _connected(sides: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(n,) which of the sides hang together, as a number for each."""
+    """(n,) the connected component of each side, as a number."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

@@ -1,8 +1,8 @@
-"""Gathering of light from an octree of triangles, compiled. Import it inside a function: it loads numba.
+"""Gathering light from an octree of triangles, compiled by numba: import this inside functions.
 
-Whatever is settled at once, a node of the tree or a (part of a) triangle, is replaced by three points with
-the same flux and nearly the same centre and second moments. Its error is at most its `spread` times the
-profile's curvature, the remainders of the light and of the three points, plus its `offset` times the slope.
+A node, a triangle or a part of one that is far enough is replaced by three points with the same flux and
+nearly the same centre and second moments. The error is at most its `spread` times the profile's curvature,
+plus its `offset` times the slope.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from dermis.reference.radial_table import Table
 Floats = NDArray[np.float64]
 
 _DEEPEST = 20
-"""Cuts of a triangle in four, one in another; 20 make a side a million times shorter."""
+"""Nested cuts of a triangle in four; 20 make a side a million times shorter."""
 
 
 class Pending(NamedTuple):
-    """Parts of a triangle that wait: corners (p, 3, 3) [mm], light at them (p, 3, 3), area (p,) [mm²]."""
+    """A stack of parts of a triangle: corners (p, 3, 3) [mm], light at them (p, 3, 3), area (p,) [mm²]."""
 
     corners: Floats
     light: Floats
@@ -33,9 +33,9 @@ class Pending(NamedTuple):
 
 @compiled
 def gather(points: Floats, tree: Tree, table: Table, bound: float, exitance: Floats) -> int:
-    """Add the light that leaves at each point (n, 3) to exitance (n, 3); returns how much was looked at.
+    """Add the light that leaves at each point (n, 3) to exitance (n, 3); returns how many parts were visited.
 
-    bound : of the sum of all errors, of the profile's energy times the irradiance around [-]
+    bound : of the sum of all errors, over the profile's energy times the irradiance nearby [-]
     """
     size = 3 * _DEEPEST + 4
     pending = Pending(np.empty((size, 3, 3)), np.empty((size, 3, 3)), np.empty(size))
@@ -44,7 +44,7 @@ def gather(points: Floats, tree: Tree, table: Table, bound: float, exitance: Flo
         node = 0
         while node < len(tree.first):
             visits += 1
-            if _node_is_settled(points[i], node, tree, table, bound):
+            if _node_is_far(points[i], node, tree, table, bound):
                 _add_node(points[i], node, tree, table, exitance[i])
                 node = tree.skip[node]
                 continue
@@ -56,7 +56,7 @@ def gather(points: Floats, tree: Tree, table: Table, bound: float, exitance: Flo
 
 
 @compiled
-def _node_is_settled(point: Floats, node: int, tree: Tree, table: Table, bound: float) -> bool:
+def _node_is_far(point: Floats, node: int, tree: Tree, table: Table, bound: float) -> bool:
     distance = _distance(point, tree.centre[node, 0], tree.centre[node, 1], tree.centre[node, 2])
     near, far = _rows(distance, tree.radius[node], table)
     remainder = table.curvature[near] * tree.spread[node] + table.slope[near] * tree.offset[node]
@@ -75,13 +75,13 @@ def _add_node(point: Floats, node: int, tree: Tree, table: Table, exitance: Floa
 def _add_triangle(
     point: Floats, t: int, tree: Tree, table: Table, bound: float, pending: Pending, exitance: Floats
 ) -> int:
-    """Add a triangle's light, cut in four until its parts are settled; returns how many there were."""
+    """Add a triangle's light, cut in four until its parts are far enough; returns how many were visited."""
     pending.corners[0], pending.light[0], pending.area[0] = tree.corners[t], tree.light[t], tree.area[t]
     count, visits = 1, 0
     while count > 0:
         count -= 1
         visits += 1
-        if _part_is_settled(point, pending.corners[count], table, bound) or count + 4 > len(pending.area):
+        if _part_is_far(point, pending.corners[count], table, bound) or count + 4 > len(pending.area):
             _add_part(point, count, pending, table, exitance)
         else:
             _cut(count, pending)
@@ -90,7 +90,7 @@ def _add_triangle(
 
 
 @compiled
-def _part_is_settled(point: Floats, corners: Floats, table: Table, bound: float) -> bool:
+def _part_is_far(point: Floats, corners: Floats, table: Table, bound: float) -> bool:
     x = (corners[0, 0] + corners[1, 0] + corners[2, 0]) / 3.0
     y = (corners[0, 1] + corners[1, 1] + corners[2, 1]) / 3.0
     z = (corners[0, 2] + corners[1, 2] + corners[2, 2]) / 3.0
@@ -100,14 +100,14 @@ def _part_is_settled(point: Floats, corners: Floats, table: Table, bound: float)
         total += square
         largest = max(largest, square)
     near, far = _rows(_distance(point, x, y, z), math.sqrt(largest), table)
-    # mean square distance from the middle, at most: of light that is linear, and of the middles of the sides
+    # At most the mean square distance from the middle, of linear light and of the midpoints of the sides.
     spread = (total + 2.0 * largest) / 20.0 + largest / 4.0
     return bool(table.curvature[near] * spread <= bound * table.share[far])
 
 
 @compiled
 def _add_part(point: Floats, i: int, pending: Pending, table: Table, exitance: Floats) -> None:
-    """Add the middles of the sides: right for light times profile up to second order."""
+    """Add the midpoints of the sides: right for light times profile up to second order."""
     corners, light, scale = pending.corners[i], pending.light[i], pending.area[i] / 6.0
     for a in range(3):
         b = (a + 1) % 3
@@ -120,7 +120,7 @@ def _add_part(point: Floats, i: int, pending: Pending, table: Table, exitance: F
 
 @compiled
 def _cut(i: int, pending: Pending) -> None:
-    """Put the four quarters of part i into places i to i + 3."""
+    """Replace part i by its four quarters, i to i + 3."""
     pending.area[i : i + 4] = 0.25 * pending.area[i]
     for values in (pending.corners, pending.light):
         for axis in range(3):
@@ -139,7 +139,7 @@ def _distance(point: Floats, x: float, y: float, z: float) -> float:
 
 @compiled
 def _rows(distance: float, radius: float, table: Table) -> tuple[int, int]:
-    """Rows of the table at or before the nearest and at or after the furthest place within a radius."""
+    """Rows of the table at or before the nearest and at or after the furthest point within a radius."""
     last = len(table.share) - 1
     near = int(math.sqrt(max(distance - radius, 0.0)) * table.per_root)
     far = int(math.sqrt(distance + radius) * table.per_root) + 1
@@ -148,7 +148,7 @@ def _rows(distance: float, radius: float, table: Table) -> tuple[int, int]:
 
 @compiled
 def _add(distance: float, red: float, green: float, blue: float, table: Table, exitance: Floats) -> None:
-    """Add flux times the profile, read between rows of the table."""
+    """Add flux times the profile, interpolated in the table."""
     at = math.sqrt(distance) * table.per_root
     row = int(at)
     if row < len(table.R) - 1:

@@ -1,4 +1,4 @@
-"""The truth for a scene: volumetric path tracing by Mitsuba, with the variance of each pixel."""
+"""The truth of a scene: volumetric path tracing by Mitsuba, with the variance of each pixel."""
 
 from __future__ import annotations
 
@@ -15,12 +15,13 @@ from dermis.optics.media import Medium
 from dermis.reference.mitsuba_passes import Passes, kept_passes, scene_key, store_passes
 from dermis.reference.mitsuba_scene import (
     ROULETTE_DEPTH,
+    Lambertian,
+    check_traceable,
     load_mitsuba,
     mask_scene,
     radiance_scene,
     variant_of,
 )
-from dermis.reference.mitsuba_skin import Lambertian, check_traceable
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
@@ -43,7 +44,7 @@ class PathTraced:
 
     image : (h, w, 3) radiance, linear Rec. 709
     variance : (h, w, 3) of each value of the image, as a mean
-    mask : (h, w) share of the pixel that skin fills, with what is in front of it left out
+    mask : (h, w) share of the pixel that visible skin fills
     samples : paths through each pixel
     seconds : that they took
     notes : what had to be done to the head
@@ -67,23 +68,23 @@ def path_trace(
     keep: bool = True,
     report: Report | None = None,
 ) -> PathTraced:
-    """The scene with its skin filled by a medium; its maps, profile and surface reflection play no part.
+    """The scene with its skin filled by a medium; its maps, profile and surface reflection are ignored.
 
-    medium : index-matched (eta 1), isotropic and of three channels; layers become bodies inside one another,
-        each face the skin moved inwards by its depth. Or a `Lambertian`, for the dry, directly lit skin
-    samples : at least so many paths through each pixel, in whole passes of 4. Passes are kept on disk by the
-        scene's content, so that a second call with more samples adds to the first
+    medium : index-matched (eta 1), isotropic, with three channels; layers become nested bodies, each face the
+        skin moved inwards by its depth. Or a `Lambertian`, for directly lit skin without scattering
+    samples : at least this many paths through each pixel, in passes of 4. Passes are kept on disk by the
+        scene's content, so a later call with more samples adds to them
     settings : only the size counts
-    variant : of Mitsuba; "llvm_ad_rgb" takes half the time of many samples but wants a recent LLVM (14 and 15
-        end the process), "cuda_ad_rgb" wants an NVIDIA GPU
-    keep : False neither looks for passes on disk nor keeps any, so that all of the time is spent now
-    report : called with how many passes are done, and of how many
+    variant : of Mitsuba; "llvm_ad_rgb" takes half the time for many samples but needs a recent LLVM (14 and
+        15 end the process), "cuda_ad_rgb" needs an NVIDIA GPU
+    keep : whether to use and keep passes on disk; without it `seconds` is that of this call
+    report : called with the number of passes done, and of all
 
     Raises DermisError when Mitsuba is missing, and for what it cannot trace: a surface without volume, media
     under a refracting surface, lights without shadows.
 
-    Light passes the surface straight on, so that lights of no size connect to what lies below it; profiles to
-    be compared are those for eta 1. Lights are not seen, nor do they shadow one another.
+    Light passes the surface unbent, so point lights connect to what lies below it; compare with profiles for
+    eta 1. Lights are invisible and do not shadow one another.
 
     Sources: [Jakob2022], [Miller2019].
     """
@@ -122,7 +123,7 @@ def _mask(mi: Any, scene: Scene, size: tuple[int, int]) -> Floats:
 def _add_passes(
     mi: Any, built: Any, passes: Passes, wanted: int, key: str | None, report: Report | None
 ) -> None:
-    """Passes up to the number that is wanted; with a key the ones done are stored, whatever happens."""
+    """Add passes up to the number wanted; with a key those done are stored, whatever happens."""
     stored = time.perf_counter()
     try:
         while passes.count < wanted:

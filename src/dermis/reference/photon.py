@@ -1,7 +1,6 @@
-"""The walk of photons through a stack of layers, compiled. Import it inside a function: it loads numba.
+"""Random walks of photons through a stack of layers, compiled by numba: import this inside functions.
 
-Layers are numbered from 1, topmost first; 0 and the number after the last are the air. Face k lies under
-layer k.
+Layers are numbered from 1, topmost first; 0 and the number after the last are air. Face k lies under layer k.
 """
 
 from __future__ import annotations
@@ -19,11 +18,11 @@ Counts = NDArray[np.int64]
 Words = NDArray[np.uint64]
 
 MAX_EVENTS = 100_000
-"""Scatterings and faces after which a photon is given up: without absorption some would walk for ever."""
+"""Scatterings and faces after which a photon is given up: without absorption some would walk forever."""
 
 
 class Stack(NamedTuple):
-    """Layers and the air on both sides: arrays (layers + 2,), and the depths of the faces (layers + 1,)."""
+    """Layers with air on both sides (layers + 2,), and the depths of the faces (layers + 1,)."""
 
     eta: Floats
     sigma_t: Floats
@@ -33,12 +32,12 @@ class Stack(NamedTuple):
 
 
 class Tally(NamedTuple):
-    """How many photons ended where; rings are counted from the axis, the last is all beyond the last edge.
+    """How many photons ended where. Rings count from the axis; the last is everything beyond the last edge.
 
-    reflected, transmitted : (rings + 1,) left the stack after they had scattered
-    unscattered : (2,) left upward and downward without having scattered
+    reflected, transmitted : (rings + 1,) left the stack after scattering
+    unscattered : (2,) left upwards and downwards without scattering
     absorbed : (layers,)
-    unfinished : (1,) still walked after `MAX_EVENTS`
+    unfinished : (1,) still walking after `MAX_EVENTS`
     """
 
     reflected: Counts
@@ -68,15 +67,15 @@ def next_word(rng: Words) -> np.uint64:
 
 @compiled
 def uniform(rng: Words) -> float:
-    """A number between 0 and 1, never either of them, so that its logarithm is finite and not 0."""
+    """A number strictly between 0 and 1, so that its logarithm is finite and not 0."""
     return ((next_word(rng) >> np.uint64(12)) + 0.5) * 2.0**-52
 
 
 @compiled
 def refract(cosine: float, eta: float) -> tuple[float, float]:
-    """Reflectance of unpolarised light, and the cosine beyond the face, which is 0 when all is reflected [-].
+    """Reflectance of unpolarised light, and the cosine beyond the face, 0 for total reflection [-].
 
-    eta : index of the near side over that of the far side
+    eta : index of refraction on the near side over that on the far side
 
     Source: [Born1999] section 1.5.
     """
@@ -93,7 +92,7 @@ def refract(cosine: float, eta: float) -> tuple[float, float]:
 
 @compiled
 def deflect(x: float, y: float, z: float, g: float, rng: Words) -> tuple[float, float, float]:
-    """The unit direction (x, y, z) after it has scattered by Henyey and Greenstein.
+    """The unit direction (x, y, z) after scattering by Henyey and Greenstein's phase function.
 
     g : mean cosine of the deflection [-]
 
@@ -120,7 +119,7 @@ def deflect(x: float, y: float, z: float, g: float, rng: Words) -> tuple[float, 
 
 @compiled
 def _ring(x: float, y: float, edges2: Floats) -> int:
-    """The ring between squared edges (n + 1,) that holds a point; n beyond the last edge."""
+    """The ring between squared edges (n + 1,) that contains a point; n beyond the last edge."""
     return int(np.searchsorted(edges2, x * x + y * y, side="right")) - 1
 
 
@@ -136,7 +135,7 @@ def _leave(x: float, y: float, upward: bool, scatterings: int, edges2: Floats, t
 
 @compiled
 def _walk(stack: Stack, edges2: Floats, rng: Words, tally: Tally) -> None:
-    """One photon that has entered straight down on the axis, until it leaves or is absorbed."""
+    """One photon that has entered straight down on the axis, followed until it leaves or is absorbed."""
     x = y = z = ux = uy = 0.0
     uz = 1.0
     layer, bottom = 1, len(stack.eta) - 2
@@ -174,13 +173,13 @@ def _walk(stack: Stack, edges2: Floats, rng: Words, tally: Tally) -> None:
 
 @compiled
 def walk_batch(photons: int, stack: Stack, edges2: Floats, rng: Words, tally: Tally) -> None:
-    """Add to the tally what becomes of so many photons.
+    """Add the fates of this many photons to the tally.
 
-    Source: [Wang1995], except that absorption takes all of a photon or nothing of it.
+    Source: [Wang1995], except that absorption takes a photon whole or not at all.
     """
-    # Weights that shrink at each scattering, with roulette below 1e-4 as in the source, had 0.8 to 2.3 times
-    # the variance of R(r) in the same time, measured on seven media; with roulette below 0.3 they had 0.6
-    # (for albedo 0.5) to 0.97 times. That gain is small in skin, and whole photons are counts: they conserve
-    # light exactly, add up the same in any order, and have binomial errors.
+    # Weights that shrink at each scattering, with roulette below 1e-4 as in the source, gave 0.8 to 2.3 times
+    # the variance of R(r) in equal time on seven media; with roulette below 0.3 they gave 0.6 (albedo 0.5) to
+    # 0.97 times. That gain is small for skin, and whole photons are counts: they conserve energy exactly, add
+    # up alike in any order, and have binomial errors.
     for _ in range(photons):
         _walk(stack, edges2, rng, tally)

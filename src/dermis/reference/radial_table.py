@@ -1,4 +1,4 @@
-"""Diffusion profiles in the form in which they are integrated: a fine table and bounds of its derivatives."""
+"""Diffusion profiles as they are integrated: a fine table with bounds of its derivatives."""
 
 from __future__ import annotations
 
@@ -13,16 +13,15 @@ from dermis.errors import refuse
 Floats = NDArray[np.float64]
 
 ROWS = 8192
-"""Rows of the table, even steps of the root of the radius: linear steps between them err by 5e-6."""
+"""Of the table, in even steps of the square root of the radius: linear interpolation errs by 5e-6."""
 
-_TAIL = 1e-12  # of a Gaussian's peak, where it is taken to end
-# Share of the permitted error that a slowly falling tail gets, so that what is far away is never opened.
-_FAR_SHARE = 0.2
+_TAIL = 1e-12  # of a Gaussian's peak, where it ends
+_FAR_SHARE = 0.2  # of the permitted error, spread over a slowly falling tail so that far nodes stay closed
 
 
 @dataclass(frozen=True)
 class GaussianSum:
-    """Profile R(r) = sum of weight exp(-r² / 2v) / (2 pi v).
+    """Profile R(r) = sum of weight exp(-r² / 2v) / (2 pi v). The truth's own, apart from the models'.
 
     weight : (k, 3) energy of each Gaussian, by channel [-]
     variance_mm2 : (k,) v [mm²]
@@ -41,7 +40,7 @@ class GaussianSum:
 
     @property
     def end_mm(self) -> float:
-        """Radius beyond which nothing is left [mm]."""
+        """Radius beyond which the profile is 0 [mm]."""
         return float(np.sqrt(-2 * np.log(_TAIL) * np.max(self.variance_mm2)))
 
     def derivatives(self, radius_mm: Floats) -> tuple[Floats, Floats, Floats]:
@@ -54,7 +53,7 @@ class GaussianSum:
 
 @dataclass(frozen=True)
 class RadialTable:
-    """Profile R(r) by a table: constant below the first radius, monotone cubics between, 0 beyond the last.
+    """Profile R(r) from a table: constant below the first radius, monotone cubics, 0 beyond the last.
 
     radius_mm : (n,) increasing, 0 or more [mm]
     reflectance : (n, 3) R [mm^-2]
@@ -74,7 +73,7 @@ class RadialTable:
 
     @property
     def end_mm(self) -> float:
-        """Radius beyond which nothing is left [mm]."""
+        """Radius beyond which the profile is 0 [mm]."""
         return float(self.radius_mm[-1])
 
     def derivatives(self, radius_mm: Floats) -> tuple[Floats, Floats, Floats]:
@@ -82,7 +81,7 @@ class RadialTable:
         from scipy.interpolate import PchipInterpolator
 
         r, R = np.asarray(self.radius_mm, np.float64), np.asarray(self.reflectance, np.float64)
-        if r[0] > 0:  # a level start, without which the slope would jump on the axis
+        if r[0] > 0:  # constant up to the first radius, or the slope would jump on the axis
             r, R = np.concatenate([[0.0], r]), np.vstack([R[:1], R])
         curve = PchipInterpolator(r, R, axis=0)
         value, slope, bend = (np.asarray(curve(radius_mm, order)) for order in range(3))
@@ -93,12 +92,12 @@ Profile = GaussianSum | RadialTable
 
 
 class Table(NamedTuple):
-    """What is looked up by the root of the radius, `per_root` rows for 1 mm^(1/2).
+    """A profile by the square root of the radius, `per_root` rows for 1 mm^(1/2).
 
     R : (rows, 3) profile [mm^-2], 0 in the last row
     slope : (rows,) bound of |dR/dr| from this radius on, over the profile's energy [mm^-3]
     curvature : (rows,) bound of half the largest second derivative, likewise [mm^-4]
-    share : (rows,) falls; its integral over a plane is 1: where error is permitted [mm^-2]
+    share : (rows,) density of the permitted error: falls, with integral 1 over a plane [mm^-2]
     """
 
     per_root: float
@@ -111,9 +110,9 @@ class Table(NamedTuple):
 def tabulate(profile: Profile) -> Table:
     """The table of a profile.
 
-    A patch of second moment m about its centre, taken as a point there, errs by up to m times the
-    curvature. The fewest patches for a given sum of such errors have m in proportion to 1 / sqrt(curvature)
-    (Lagrange), so that is how the permitted error is shared out.
+    A patch of second moment m about its centre, replaced by a point there, errs by up to m times the
+    curvature. The fewest patches for a given sum of such errors have m proportional to 1 / sqrt(curvature)
+    (Lagrange), so the permitted error is shared out that way.
     """
     end = profile.end_mm
     root = np.linspace(0.0, np.sqrt(end), ROWS)
@@ -133,7 +132,7 @@ def tabulate(profile: Profile) -> Table:
 
 
 def _bound(values: Floats, energy: Floats, lit: NDArray[np.bool_]) -> Floats:
-    """(rows,) the largest of all channels from each radius on; 0 in the last row, where the profile ends."""
+    """(rows,) the largest value of any channel from each radius on; 0 in the last row."""
     largest = np.max(values[:, lit] / energy[lit], axis=1)
     bound: Floats = np.maximum.accumulate(largest[::-1])[::-1].copy()
     bound[-1] = 0.0

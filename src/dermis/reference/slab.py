@@ -1,4 +1,4 @@
-"""Scattering layers for one wavelength, and the shares of light that came back, through and to nothing."""
+"""Scattering layers at one wavelength, and the shares of light they reflect, transmit and absorb."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from dermis.optics.media import SKIN_ETA, Floats
 
 
 def check_mean_cosine(g: float) -> None:
-    """Refuse what no phase function has."""
+    """Raises DermisError for a mean cosine that no phase function has."""
     if not -1.0 < g < 1.0:
         refuse("scattering", "a mean cosine between -1 and 1", f"{g:g} came", "Correct it")
 
 
 @dataclass(frozen=True)
 class ScatteringLayer:
-    """One homogeneous layer for one wavelength; it scatters by Henyey and Greenstein.
+    """One homogeneous layer at one wavelength, with the phase function of Henyey and Greenstein.
 
-    sigma_a, sigma_s : absorption and (not reduced) scattering, 0 or more [1/mm]
-    thickness_mm : infinity for a half-space [mm]
+    sigma_a, sigma_s : coefficients of absorption and (not reduced) scattering, 0 or more [1/mm]
+    thickness_mm : infinite for a half-space [mm]
     g : mean cosine of the deflection [-]
-    eta : index of refraction against the air [-]
+    eta : index of refraction relative to air [-]
     """
 
     sigma_a: float
@@ -41,7 +41,7 @@ class ScatteringLayer:
             refuse(culprit, "a thickness above 0 mm", f"{self.thickness_mm:g} came", "Correct it")
         if np.isinf(self.thickness_mm) and self.sigma_t == 0.0:
             came = "it neither absorbs nor scatters"
-            refuse(culprit, "that an infinite layer stops light", came, "Give it a thickness")
+            refuse(culprit, "an infinite layer to stop light", came, "Give it a thickness")
         check_mean_cosine(self.g)
         if not 1.0 <= self.eta <= 2.5:
             refuse(culprit, "an index of refraction from 1 to 2.5", f"{self.eta:g} came", "Correct it")
@@ -53,26 +53,26 @@ class ScatteringLayer:
 
     @property
     def albedo(self) -> float:
-        """Share of the extinction that is scattering; 0 where nothing is met [-]."""
+        """Share of the extinction that is scattering; 0 without extinction [-]."""
         return self.sigma_s / self.sigma_t if self.sigma_t > 0.0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class SlabResult:
-    """Where the power of the beam went, in shares of what fell on the stack [-]; `_se` are standard errors.
+    """Where the beam's power went, in shares of the incident power [-]; `_se` are standard errors.
 
     The specular, total, unscattered, absorbed and unfinished shares sum to 1. The errors are binomial, and 0
-    where no photon came.
+    where no photon arrived.
 
-    photons : how many were traced; each of them had entered
+    photons : traced, all of which had entered the stack
     edges_mm : (n + 1,) of the rings, from 0 [mm]
-    specular : mirrored by the top face
-    reflectance, transmittance : (n,) R(r) and T(r) of light that has scattered, mean of each ring [1/mm2]
-    total_reflectance, total_transmittance : all light that has scattered, at any radius
+    specular : reflected by the top face
+    reflectance, transmittance : (n,) R(r) and T(r) of scattered light, averaged over each ring [1/mm2]
+    total_reflectance, total_transmittance : scattered light at any radius
     overflow_reflectance, overflow_transmittance : the part of it beyond the last edge
-    unscattered_reflectance, unscattered_transmittance : left on the axis after mirrors only
+    unscattered_reflectance, unscattered_transmittance : left on the axis without having scattered
     absorbed : (layers,)
-    unfinished : given up after very many scatterings; above 0 only where next to nothing absorbs
+    unfinished : given up after very many scatterings; above 0 only where almost nothing absorbs
     """
 
     photons: int
@@ -96,7 +96,7 @@ class SlabResult:
 
     @property
     def per_entering(self) -> SlabResult:
-        """The same in shares of the light that entered, which is how diffusion profiles are meant."""
+        """The same in shares of the light that entered, as diffusion profiles are defined."""
         names = [field.name for field in fields(self)][3:]
         entered = 1.0 - self.specular
         return replace(self, specular=0.0, **{name: getattr(self, name) / entered for name in names})

@@ -1,10 +1,9 @@
-"""Monte Carlo transport of a thin beam's light through a stack of scattering layers: no diffusion assumed."""
+"""Monte Carlo: a pencil beam through a stack of scattering layers, with no diffusion approximation."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from threading import Event
 from typing import TYPE_CHECKING
 
@@ -12,26 +11,29 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.errors import refuse
+from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.media import Floats, Layer, Medium
+from dermis.optics.radial import RadialProfile, light_beyond, ring_edges
 from dermis.reference.slab import ScatteringLayer, SlabResult, check_mean_cosine
 
 if TYPE_CHECKING:
     from dermis.reference.photon import Counts, Stack, Tally
 
-__all__ = ["ScatteringLayer", "SlabResult", "default_edges", "trace_medium", "trace_slab"]
+__all__ = ["ScatteringLayer", "SlabResult", "counted_profile", "default_edges", "trace_medium", "trace_slab"]
 
 Report = Callable[[int, int], None]
 
 BATCHES = 64
-"""Each has random numbers of its own, so that the result does not depend on how many run at once."""
+"""Each has its own random numbers, so the result does not depend on how many run at once."""
 
 MAX_PHOTONS = 10**10
 
-_AT_ONCE = 20_000  # photons between two looks at whether someone pressed Ctrl-C
+_AT_ONCE = 20_000  # photons between two checks for Ctrl-C
+_NOTABLE_LOSS = 1e-3
 
 
 def default_edges() -> Floats:
-    """Edges of a disc of 0.001 mm and of 92 rings, each 12 % wider than the last, out to 40 mm [mm]."""
+    """Edges of a disc of 0.001 mm and 92 rings around it, each 12 % wider than the last, to 40 mm [mm]."""
     return np.concatenate([[0.0], np.geomspace(1e-3, 40.0, 93)])
 
 
@@ -42,13 +44,13 @@ def trace_slab(
     edges_mm: Floats | None = None,
     report: Report | None = None,
 ) -> SlabResult:
-    """Light of a thin beam that falls straight on a stack of layers with air above and below.
+    """What becomes of a thin beam that falls at right angles on a stack of layers in air.
 
-    layers : topmost first; faces between unequal indices of refraction mirror and refract
-    photons : how many to trace; the standard errors fall with the square root of it
-    seed : the same one gives the same result on any number of processors
-    edges_mm : of the rings, from 0; as of `default_edges` when left out [mm]
-    report : called with how many parts are done, and of how many
+    layers : topmost first; interfaces between unequal indices of refraction reflect and refract
+    photons : how many to trace; standard errors fall with its square root
+    seed : the same seed gives the same result on any number of processors
+    edges_mm : of the rings, from 0; `default_edges` when left out [mm]
+    report : called with the number of batches done, and of all
 
     Source: [Wang1995].
     """
@@ -66,26 +68,75 @@ def trace_medium(
     edges_mm: Floats | None = None,
     report: Report | None = None,
 ) -> list[SlabResult]:
-    """`trace_slab` for each channel of a medium; the channels' random numbers are independent.
+    """`trace_slab` for each channel of a medium, with independent random numbers.
 
-    g : mean cosine that all layers are given; scattering is the reduced one over 1 - g [-]
+    g : mean cosine of the deflection in all layers; scattering is the reduced coefficient over 1 - g [-]
     """
     check_mean_cosine(g)
-    results = []
+    results: list[SlabResult] = []
+
+    def part(done: int, of: int) -> None:
+        if report is not None:
+            report(len(results) * of + done, medium.channels * of)
+
     for i in range(medium.channels):
         layers = [_layer(layer, i, g, medium.eta) for layer in medium.layers]
-        part = None if report is None else partial(_report_channel, report, i, medium.channels)
         results.append(trace_slab(layers, photons, seed + i, edges_mm, part))
     return results
+
+
+def counted_profile(
+    medium: Medium,
+    rgb: Floats | None = None,
+    photons: int = 1_000_000,
+    seed: int = 0,
+    g: float = 0.0,
+    report: Callable[[int, int], None] | None = None,
+) -> RadialProfile:
+    """R(r) of a medium by Monte Carlo, averaged over rings, with standard errors.
+
+    rgb : (3, c) weights from wavelengths to linear Rec. 709; the result is then per incident power
+    photons : per channel or wavelength
+    g : mean cosine of the deflection; the reduced scattering coefficient is kept [-]
+
+    Source: [Wang1995].
+    """
+    edges = ring_edges()
+    runs = trace_medium(medium, photons, seed, g, edges, report)
+    entered = 1.0 - normal_reflectance(medium.eta)
+    weights = np.eye(medium.channels) / entered if rgb is None else np.asarray(rgb)
+    R, error, totals, total_error = (
+        np.stack([getattr(run, name) for run in runs])
+        for name in ("reflectance", "reflectance_se", "total_reflectance", "total_reflectance_se")
+    )
+    reflectance = (weights @ R).T
+    ring_energy = reflectance * np.pi * np.diff(edges**2)[:, None]
+    return RadialProfile(
+        name=medium.name,
+        model="montecarlo",
+        radius_mm=np.concatenate([[2.0 / 3.0 * edges[1]], np.sqrt(edges[1:-1] * edges[2:])]),
+        reflectance=reflectance,
+        total=weights @ totals,
+        edges_mm=edges,
+        ring_energy=ring_energy,
+        standard_error=np.sqrt(weights**2 @ error**2).T,
+        total_error=np.sqrt(weights**2 @ total_error**2),
+        incident=rgb is not None,
+        warnings=(*light_beyond(weights @ totals, ring_energy), *_losses(runs)),
+        sources=(*medium.sources, "Wang1995"),
+    )
+
+
+def _losses(runs: Sequence[SlabResult]) -> list[str]:
+    lost = max(run.per_entering.unfinished for run in runs)
+    if lost < _NOTABLE_LOSS:
+        return []
+    return [f"{lost:.1%} of the light was given up after very many scatterings: the total lacks it"]
 
 
 def _layer(layer: Layer, channel: int, g: float, eta: float) -> ScatteringLayer:
     sigma_s = float(layer.sigma_s_prime[channel]) / (1.0 - g)
     return ScatteringLayer(float(layer.sigma_a[channel]), sigma_s, layer.thickness_mm, g, eta)
-
-
-def _report_channel(report: Report, channel: int, channels: int, done: int, of: int) -> None:
-    report(channel * of + done, channels * of)
 
 
 def _check(layers: Sequence[ScatteringLayer], photons: int, seed: int) -> None:
@@ -142,7 +193,7 @@ def _trace(stack: Stack, photons: int, seed: int, edges: Floats, report: Report 
 
     sizes = [photons * (i + 1) // BATCHES - photons * i // BATCHES for i in range(BATCHES)]
     tallies = []
-    # The compiled walk releases the interpreter, so that threads share the work.
+    # The compiled walk releases the GIL, so threads share the work.
     with ThreadPoolExecutor(config.NUMBA_NUM_THREADS) as pool:
         try:
             for tally in pool.map(trace, sizes, np.random.SeedSequence(seed).spawn(BATCHES)):
@@ -150,7 +201,7 @@ def _trace(stack: Stack, photons: int, seed: int, edges: Floats, report: Report 
                 if report is not None:
                     report(len(tallies), BATCHES)
         finally:
-            stop.set()  # or the pool would wait for batches that nobody wants any more
+            stop.set()  # otherwise the pool would wait for batches that are no longer wanted
     return Tally(*(np.sum(parts, axis=0) for parts in zip(*tallies, strict=True)))
 
 

@@ -1,7 +1,7 @@
-"""Light that spreads along a surface as heat does: what a blur on any uv map should give.
+"""Light diffused along a surface like heat: what a blur should give on any uv map.
 
-A Gaussian of variance v on a surface is heat diffused for the time v/2. It is solved here on the triangles
-themselves, so no uv map, seam or stretch has a part in it. Open borders let nothing through (Neumann).
+A Gaussian of variance v on a surface is heat diffused for the time v/2. It is solved on the triangles
+themselves, so no uv map, seam or stretch plays a part. Open borders are insulated (Neumann).
 """
 
 from __future__ import annotations
@@ -13,27 +13,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.errors import refuse
-from dermis.mesh.geometry import edges, sum_at
+from dermis.mesh.geometry import sum_at
 from dermis.mesh.mesh import Mesh
-from dermis.reference.surface_diffusion_operators import (
-    Floats,
-    Index,
-    delaunay,
-    intrinsic,
-    mass_and_stiffness,
-)
+from dermis.reference.surface_diffusion_operators import delaunay, intrinsic, mass_and_stiffness
+from dermis.reference.triangles import Floats, Index, sides
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
 STEPS = 12
-"""Steps of time a level: the peak of a spread point is then within 0.2 % of that of infinitely many."""
+"""Time steps for each level: the peak of a diffused point is then within 0.2 % of the limit."""
 EDGES_PER_SIGMA = 2.0
 MARGIN_SIGMAS = 4.0
-"""Beyond it lie 0.03 % of a Gaussian: what happens there cannot be told apart."""
+"""Beyond them lie 0.03 % of a Gaussian, too little to matter."""
 
 _GAMMA = 2 - np.sqrt(2)
-"""Share of the step that the trapezium covers; with this one both stages solve the same matrix."""
+"""Share of the step that the trapezoidal stage covers; with this one both stages solve the same matrix."""
 
 
 def diffuse_on_surface(
@@ -43,19 +38,19 @@ def diffuse_on_surface(
     variances_mm2: Sequence[float] | Floats,
     steps: int = STEPS,
 ) -> Floats:
-    """`values` blurred by a Gaussian of each variance along the surface, (k, n, c), in the unit of `values`.
+    """`values` blurred along the surface by a Gaussian of each variance, (k, n, c), in the unit of `values`.
 
-    Each level is made from the one before. Time advances by TR-BDF2, which is of second order and, unlike
-    Crank and Nicolson's rule, does not ring on points of light.
+    Each level starts from the one before. TR-BDF2 advances time: it is of second order and, unlike Crank and
+    Nicolson's rule, does not ring on points of light.
 
-    positions : (n, 3), one for each place: weld what uv seams have split, see `welded` [mm]
+    positions : (n, 3) without duplicates: weld what uv seams have split, see `welded` [mm]
     triangles : (f, 3)
     values : (n, c) at the vertices, linear in between
     variances_mm2 : (k,) rising, above 0 [mm2]
-    steps : of time for each level
+    steps : time steps for each level
 
-    Raises DermisError when the edges are too long for what a level adds: they may have half the standard
-    deviation. `refine_patch` makes them shorter.
+    Raises DermisError when edges are longer than half the standard deviation that a level adds.
+    `refine_patch` makes them shorter.
 
     Source: [Bank1985] for TR-BDF2, [BobenkoSpringborn2007] for the Laplacian.
     """
@@ -71,14 +66,14 @@ def diffuse_on_surface(
 
 
 def welded(mesh: Mesh) -> tuple[Floats, Index]:
-    """Positions (p, 3) [mm], one for each place, and the triangles (f, 3) among them in their order."""
+    """Positions (p, 3) [mm] without duplicates, and the triangles (f, 3) among them in their order."""
     positions = np.zeros((int(mesh.point.max()) + 1, 3))
     positions[mesh.point] = mesh.positions
     return positions, mesh.point[mesh.triangles].astype(np.int64)
 
 
 def vertex_areas(positions: ArrayLike, triangles: ArrayLike) -> Floats:
-    """The surface that each vertex stands for (n,) [mm2]; diffusion keeps the sum of values times areas."""
+    """The area that each vertex stands for (n,) [mm2]; diffusion keeps the sum of values times areas."""
     places, corners = _surface(positions, triangles)
     surface = delaunay(intrinsic(places, corners))
     thirds = np.repeat(surface.areas() / 3, 3)
@@ -88,12 +83,11 @@ def vertex_areas(positions: ArrayLike, triangles: ArrayLike) -> Floats:
 def longest_edge_mm(positions: ArrayLike, triangles: ArrayLike) -> float:
     """Length of the longest edge [mm]."""
     places, corners = _surface(positions, triangles)
-    ends, _, _ = edges(corners)
-    return float(np.linalg.norm(places[ends[:, 0]] - places[ends[:, 1]], axis=1).max())
+    return float(sides(places, corners)[2].max())
 
 
 def resolved(variances_mm2: Sequence[float] | Floats, edge_mm: float) -> NDArray[np.bool_]:
-    """Levels (k,) that edges of this length allow: what each adds to the last allowed one spans two edges.
+    """Which levels (k,) edges of this length allow: those that add a sigma of two edges to the last allowed.
 
     variances_mm2 : (k,) rising, above 0 [mm2]
     edge_mm : the longest edge, see `longest_edge_mm`
@@ -106,13 +100,13 @@ def resolved(variances_mm2: Sequence[float] | Floats, edge_mm: float) -> NDArray
 
 
 def edge_for(variances_mm2: Sequence[float] | Floats) -> float:
-    """Longest edge that allows all levels [mm]: half the standard deviation of the least that one adds."""
+    """Longest edge that allows all levels [mm]: half the smallest standard deviation that one adds."""
     least = float(np.diff(_rising(variances_mm2), prepend=0.0).min())
     return float(np.sqrt(least)) / EDGES_PER_SIGMA
 
 
 def margin_for(variances_mm2: Sequence[float] | Floats) -> float:
-    """How far a patch must go on around what is judged [mm]: four standard deviations of the widest level."""
+    """How far a patch must extend beyond its radius [mm]: four standard deviations of the widest level."""
     return MARGIN_SIGMAS * float(np.sqrt(_rising(variances_mm2)[-1]))
 
 
@@ -130,7 +124,7 @@ def _diffused(mass: csc_array, stiffness: csc_array, values: Floats, variance: f
 
 
 def _factorised(matrix: csc_array) -> Callable[[Floats], Floats]:
-    """Solver of a symmetric, positive definite matrix: no pivots, and an order that suits surfaces."""
+    """Solver for a symmetric, positive definite matrix: no pivoting, and an ordering that suits surfaces."""
     from scipy.sparse.linalg import splu
 
     options = {"SymmetricMode": True}

@@ -1,4 +1,4 @@
-"""Mass and stiffness of heat on triangles, from their edge lengths alone."""
+"""Mass and stiffness matrices of heat on triangles, from their edge lengths alone."""
 
 from __future__ import annotations
 
@@ -8,24 +8,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.mesh.geometry import edges, sum_at
+from dermis.mesh.geometry import sum_at
+from dermis.reference.triangles import Floats, Index, sides
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
-Floats = NDArray[np.float64]
-Index = NDArray[np.int64]
-
 _SLACK = 1e-5
-"""Least slack of the triangle inequality, of the mean edge: flatter triangles have no useful angles."""
+"""Least slack of the triangle inequality, over the mean edge: flatter triangles have no useful angles."""
 _COCIRCULAR = 1e-6
-"""Edges whose cotangents sum to less than -this are flipped: four points on a circle give 0 and rounding."""
+"""Edges whose cotangents sum to less than minus this are flipped: points on a circle give 0 and rounding."""
 _MAX_SWEEPS = 1000
 
 
 @dataclass(frozen=True)
 class Triangulation:
-    """Triangles known by their edge lengths: where they lie in space does not matter.
+    """Triangles known by their edge lengths; their places in space do not matter.
 
     corners : (f, 3) vertices; side k runs from corner k to corner k + 1
     side : (f, 3) edge of each side
@@ -44,7 +42,7 @@ class Triangulation:
         return areas
 
     def cotangents(self) -> Floats:
-        """Cotangent of the angle that faces each side (f, 3)."""
+        """Cotangent of the angle opposite each side (f, 3)."""
         square = self.length[self.side] ** 2
         facing = square.sum(axis=1, keepdims=True) - 2 * square
         cotangents: Floats = facing / (4 * self.areas()[:, None])
@@ -52,34 +50,31 @@ class Triangulation:
 
 
 def intrinsic(positions: Floats, triangles: Index) -> Triangulation:
-    """The triangles by their lengths; all edges grow by the same tiny amount if some triangle is degenerate.
+    """The triangles by their edge lengths; all edges grow by the same tiny amount if one is degenerate.
 
     positions : (n, 3) [mm]
     triangles : (f, 3)
 
     Source: [SharpCrane2020], intrinsic mollification.
     """
-    ends, of_side, _ = edges(triangles)
-    length = np.linalg.norm(positions[ends[:, 0]] - positions[ends[:, 1]], axis=1)
-    side = of_side.reshape(3, -1).T
-    sides = length[side]
-    slack = sides.sum(axis=1) - 2 * sides.max(axis=1)
+    _, side, length = sides(positions, triangles)
+    slack = length[side].sum(axis=1) - 2 * length[side].max(axis=1)
     missing = max(0.0, _SLACK * float(length.mean()) - float(slack.min()))
     return Triangulation(triangles, side, length + missing)
 
 
 def delaunay(given: Triangulation) -> Triangulation:
-    """The same surface, edges flipped within it until the angles that face each sum to at most pi.
+    """The same surface with edges flipped until the two angles opposite each sum to at most pi.
 
-    Then heat flows from hot to cold along every edge, whatever obtuse angles the mesh has. Open borders, and
-    edges where more than two triangles meet or two are oriented against each other, stay.
+    Heat then flows from hot to cold along every edge, whatever obtuse angles the mesh has. Borders, and edges
+    where more than two triangles meet or two have opposite orientations, stay.
 
     Source: [BobenkoSpringborn2007]; [Fisher2007] for flips by lengths.
     """
     corners, side, length = given.corners.copy(), given.side.copy(), given.length.copy()
     now = Triangulation(corners, side, length)
     flippable = _between_two(corners, side, len(length))
-    # each flip lowers the energy of every function on the surface, so in the end none is left to make
+    # Each flip lowers the Dirichlet energy of every function on the surface, so this ends.
     for _ in range(_MAX_SWEEPS):
         weight = sum_at(side.ravel(), now.cotangents().reshape(-1, 1), len(length))[:, 0]
         bad = flippable & (weight < -_COCIRCULAR)
@@ -90,7 +85,7 @@ def delaunay(given: Triangulation) -> Triangulation:
 
 
 def _between_two(corners: Index, side: Index, count: int) -> NDArray[np.bool_]:
-    """Edges (e,) that two triangles of the same orientation share: each runs along it the other way."""
+    """Edges (e,) shared by two triangles of the same orientation, which run along it in opposite ways."""
     forward = (corners < np.roll(corners, -1, axis=1)).ravel()
     uses = np.bincount(side.ravel(), minlength=count)
     along = np.bincount(side.ravel()[forward], minlength=count)
@@ -99,9 +94,9 @@ def _between_two(corners: Index, side: Index, count: int) -> NDArray[np.bool_]:
 
 
 def _apart(side: Index, bad: NDArray[np.bool_], weight: Floats) -> Index:
-    """Bad edges no two of which share a triangle, as places (2, m) of their sides in `side.ravel()`.
+    """Bad edges no two of which share a triangle, as indices (2, m) of their sides in `side.ravel()`.
 
-    Each triangle votes for its worst edge; edges with both votes are taken, and the worst of all has them.
+    Each triangle votes for its worst edge. Edges with both votes are taken; the worst of all is among them.
     """
     worst_first = np.flatnonzero(bad)[np.argsort(weight[bad], kind="stable")]
     rank = np.full(len(bad), len(bad), dtype=np.int64)
@@ -117,7 +112,7 @@ def _apart(side: Index, bad: NDArray[np.bool_], weight: Floats) -> Index:
 
 
 def _flip(now: Triangulation, pairs: Index) -> None:
-    """Turn each edge ab between triangles abc and bad into cd, in place."""
+    """Flip each edge ab between triangles abc and bad to cd, in place."""
     (left, i), (right, j) = (np.divmod(place, 3) for place in pairs)
     a, b, c = (now.corners[left, (i + k) % 3] for k in range(3))
     d = now.corners[right, (j + 2) % 3]
@@ -131,7 +126,7 @@ def _flip(now: Triangulation, pairs: Index) -> None:
 
 
 def _apex(base: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats]:
-    """Where the apex lies along the base, from the end where side `first` is, and its height [mm]."""
+    """Where the apex lies along the base, measured from the end at side `first`, and its height [mm]."""
     along = (base**2 + first**2 - second**2) / (2 * base)
     return along, np.sqrt(np.maximum(first**2 - along**2, 0))
 
@@ -140,10 +135,10 @@ def mass_and_stiffness(surface: Triangulation, count: int) -> tuple[csc_array, c
     """Mass M [mm2] and stiffness K [-] of linear elements, (n, n): M du/dt = -K u is du/dt = Laplacian of u.
 
     M is the mean of the lumped and the consistent mass. Their errors in the speed of heat are opposite and,
-    on regular triangles, cancel to the fourth order in the edge's length. The rows of M sum to the vertices'
-    areas, those of K to 0. A vertex without triangles keeps its value.
+    on regular triangles, cancel to fourth order in the edge length. The rows of M sum to the vertices' areas,
+    those of K to 0. A vertex without triangles keeps its value.
 
-    count : n, vertices
+    count : n, the number of vertices
 
     Source: [PinkallPolthier1993] for the cotangents.
     """

@@ -1,4 +1,4 @@
-"""Light that leaves a surface by a diffusion profile, summed over the surface: the truth of a profile."""
+"""The light that a diffusion profile brings to points, integrated over the surface: a profile's truth."""
 
 from __future__ import annotations
 
@@ -16,27 +16,26 @@ __all__ = ["GaussianSum", "IrradianceSamples", "Places", "RadialTable", "integra
 
 Floats = NDArray[np.float64]
 
-_AT_ONCE = 1024  # points between two looks at whether someone pressed Ctrl-C
-
-# What sums of remainders go with an error of 0.001, by quadrature of waves, spheres, bumps and the scan. The
-# remainders that three points leave are of third order in the size of a patch, their bound of second.
+_AT_ONCE = 1024  # points between two checks for Ctrl-C
 _ERROR_OF_BOUND = 1e-3
-# Where the channels' lights differ, three points leave remainders of second order, which cancel less well.
+"""Error at a bound of 1, by quadrature of waves, spheres, bumps and the scan. The remainders that three
+points leave are of third order in the size of a patch, their bound of second."""
 _STRICT_BOUND = 50.0
+"""Where channels are lit differently, the remainders are of second order and cancel less well."""
 
 
 def integrate(points: ArrayLike, samples: IrradianceSamples, profile: Profile, error: float = 1e-3) -> Floats:
     """Radiant exitance (n, 3), in the samples' unit: the integral of R(|x - y|) E(y) dA over the surface.
 
     points : (n, 3) x, on the surface [mm]
-    samples : E, linear on small triangles; finer than the light's own detail is their maker's business
-    profile : R, by straight-line distance, also through thin parts
-    error : root mean square error of the integral to expect, of its mean; 1e-5 to 0.05 [-]
+    samples : E, linear on small triangles; whether they are fine enough for the light is up to the caller
+    profile : R, by straight-line distance, through thin parts too
+    error : expected root mean square error of the integral, relative to its mean; 1e-5 to 0.05 [-]
 
-    A node of the octree, a triangle or a part of one is taken as three points if Taylor's remainder stays
-    under its share of a bound, and is opened or cut otherwise: so the steep middle of the profile is
-    integrated as finely as it needs. The bound holds if no two errors cancel; nearly all do, so the one that
-    goes with `error` comes from measurement.
+    A node of the octree, a triangle or a part of one is replaced by three points if Taylor's remainder stays
+    under its share of a bound, and is opened or cut otherwise, so the profile's steep middle is integrated as
+    finely as it needs. The bound would be exact if no errors cancelled; nearly all do, so the bound that goes
+    with `error` comes from measurement.
 
     Source: [JensenBuhler2002], with the remainder in place of the solid angle.
     """
@@ -61,7 +60,7 @@ def _gathered(places: Floats, samples: IrradianceSamples, profile: Profile, erro
     def fill(part: slice) -> None:
         gather(places[part], tree, table, bound, exitance[part])
 
-    # The compiled loop releases the interpreter, so that threads share the work.
+    # The compiled loop releases the GIL, so threads share the work.
     pool = ThreadPoolExecutor(config.NUMBA_NUM_THREADS)
     try:
         for _ in pool.map(fill, parts):
@@ -72,5 +71,5 @@ def _gathered(places: Floats, samples: IrradianceSamples, profile: Profile, erro
 
 
 def _weighed(tree: Tree, strictness: float) -> Tree:
-    """The tree with what does not cancel counted that many times."""
+    """The tree with the errors that do not cancel multiplied by `strictness`."""
     return tree._replace(spread=tree.spread + strictness * tree.mismatch, offset=strictness * tree.offset)

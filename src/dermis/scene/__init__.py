@@ -1,40 +1,48 @@
 """What is to be seen, as plain data without a GPU."""
 
-from dermis.scene.camera import Camera, portrait, profile, three_quarter
-from dermis.scene.environment import Environment
-from dermis.scene.files import load_camera, load_lights, load_scene
-from dermis.scene.lights import (
-    DirectionalLight,
-    Light,
-    PointLight,
-    RectangleLight,
-    SphereLight,
-    SpotLight,
-    StripeLight,
-    studio,
-)
-from dermis.scene.model import Scene
-from dermis.scene.settings import Settings
-from dermis.scene.skin import Skin
+from __future__ import annotations
 
-__all__ = [
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from dermis.scene.camera import Camera, portrait, profile, three_quarter
+    from dermis.scene.environment import Environment
+    from dermis.scene.files import load_camera, load_lights, load_scene
+    from dermis.scene.lights import *  # noqa: F403 each kind
+    from dermis.scene.model import Scene
+    from dermis.scene.settings import Settings
+    from dermis.scene.skin import Skin
+
+_HOMES = {
+    "camera": ("Camera", "portrait", "profile", "three_quarter"),
+    "environment": ("Environment",),
+    "files": ("load_camera", "load_lights", "load_scene"),
+    "model": ("Scene",),
+    "settings": ("Settings",),
+    "skin": ("Skin",),
+}
+
+__all__ = [  # besides those of dermis.scene.lights
     "Camera",
-    "DirectionalLight",
     "Environment",
-    "Light",
-    "PointLight",
-    "RectangleLight",
     "Scene",
     "Settings",
     "Skin",
-    "SphereLight",
-    "SpotLight",
-    "StripeLight",
     "load_camera",
     "load_lights",
     "load_scene",
     "portrait",
     "profile",
-    "studio",
     "three_quarter",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Names on first use: a command's help needs some of the models, not the heads."""
+    home = next((home for home, names in _HOMES.items() if name in names), "lights")
+    module = import_module(f"{__name__}.{home}")
+    if name not in __all__ and name not in module.__all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value = getattr(module, name)
+    return value

@@ -16,17 +16,16 @@ _DISTANCE_MM = 1100.0  # a portrait lens' distance: closer makes noses large
 
 
 class Camera(Plain):
-    """Where the picture is taken from.
-
-    position, target : eye, and the point in the middle of the image [mm]
-    up : the direction that is upwards in the image
-    frame_mm : height of what the image shows at the target's distance [mm]
-    """
+    """Where the picture is taken from."""
 
     position: Vector
+    """Place of the eye [mm]."""
     target: Vector = (0.0, 0.0, 0.0)
+    """The point in the middle of the picture [mm]."""
     up: Direction = (0.0, 1.0, 0.0)
+    """The direction that is upwards in the picture."""
     frame_mm: Annotated[float, Field(ge=0.01, le=1e5)] = 340.0
+    """Height of what the picture shows at the target's distance [mm]."""
 
     @model_validator(mode="after")
     def _looks_somewhere(self) -> Camera:

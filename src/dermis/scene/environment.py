@@ -6,20 +6,18 @@ from typing import Annotated
 
 from pydantic import Field
 
-from dermis.scene.plain import Plain
+from dermis.scene.plain import Plain, slider
 
 
 class Environment(Plain):
-    """A panorama around the head; its middle lies behind the head, where a camera before the face looks.
-
-    name : a sample ("royal_esplanade", "lebombo"), a latitude-longitude picture (.hdr, .exr), or "uniform"
-        for radiance 1 from everywhere
-    rotation_degrees : turn about the upward axis, counter-clockwise seen from above
-    exposure : factor of its radiance [-]
-    visible : whether it is seen behind the head, out of focus and without its sun-like peaks
-    """
+    """A panorama around the head; its middle lies behind the head, where a camera before the face looks."""
 
     name: str
-    rotation_degrees: Annotated[float, Field(ge=-3600, le=3600)] = 0.0
-    exposure: Annotated[float, Field(ge=0, le=1e6)] = 1.0
+    """Light from all around: a sample (royal_esplanade, lebombo), a latitude-longitude picture (.hdr, .exr),
+    or "uniform" for radiance 1 from everywhere."""
+    rotation_degrees: Annotated[float, Field(ge=-3600, le=3600, json_schema_extra=slider(-180, 180))] = 0.0
+    """Turn of the environment about the upward axis, counter-clockwise as seen from above [degrees]."""
+    exposure: Annotated[float, Field(ge=0, le=1e6, json_schema_extra=slider(0.02, 10, log=True))] = 1.0
+    """Factor of the environment's radiance."""
     visible: bool = False
+    """Show the environment behind the head, out of focus and without its sun-like peaks."""

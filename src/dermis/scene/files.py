@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
-
-from pydantic import Field
+from typing import Any, TypeVar
 
 from dermis.errors import refuse
 from dermis.human.regions.apply import with_regions
@@ -15,60 +14,19 @@ from dermis.human.regions.table import load_table
 from dermis.mesh.head import Head
 from dermis.scene.camera import PRESETS, Camera, preset
 from dermis.scene.environment import Environment
+from dermis.scene.head_table import HeadTable
 from dermis.scene.heads import load_head
-from dermis.scene.lights import (
-    DirectionalLight,
-    Light,
-    PointLight,
-    RectangleLight,
-    SphereLight,
-    SpotLight,
-    StripeLight,
-)
+from dermis.scene.lights import LIGHTS, Light, preset_lights
 from dermis.scene.model import Scene
 from dermis.scene.plain import ImpossibleError, Plain
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 
 P = TypeVar("P", bound=Plain)
-_KINDS: dict[str, type[Light]] = {
-    "point": PointLight,
-    "spot": SpotLight,
-    "rectangle": RectangleLight,
-    "sphere": SphereLight,
-    "directional": DirectionalLight,
-    "stripe": StripeLight,
-}
 NO_LIGHTS = "none"
 """Name of the rig without lights, for an environment alone."""
 _PARTS = {"head", "skin", "lights", "environment", "camera", "render"}
 _MAPS = ("colour", "normal", "height", "specular", "roughness")
-_Length = Annotated[float | None, Field(gt=0, allow_inf_nan=False)]
-
-
-class _HeadTable(Plain):
-    """The [head] of a scene: what `load_head` takes, and a table of regions of the face."""
-
-    name: str
-    colour: str | None = None
-    normal: str | None = None
-    height: str | None = None
-    height_mm: _Length = None
-    specular: str | None = None
-    roughness: str | None = None
-    unit_mm: _Length = None
-    v_origin: Literal["auto", "top", "bottom"] = "auto"
-    up: Literal["y", "z"] = "y"
-    normal_y: Literal["up", "down"] = "up"
-    opaque: tuple[str, ...] = ()
-    subdivide: Annotated[int, Field(ge=0, le=3)] = 0
-    regions: str | None = None
-
-
-def preset_lights(name: str) -> tuple[Light, ...]:
-    """The lights of a preset of the package."""
-    text = (resources.files("dermis.scene") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
-    return _lights(f"preset {name}", tomllib.loads(text).get("lights"))
 
 
 def load_lights(name: str) -> tuple[Light, ...]:
@@ -104,46 +62,55 @@ def load_scene(path: Path, known: Head | None = None) -> tuple[Scene, Settings]:
         refuse(path, f"only the parts {', '.join(sorted(_PARTS))}", f"{part!r} came", "Correct its name")
     skin = _made(Skin, path, "skin", table.get("skin", {}))
     settings = _made(Settings, path, "render", table.get("render", {}))
-    described = _made(_HeadTable, path, "head", table.get("head"))
+    described = _made(HeadTable, path, "head", table.get("head"))
     _check_said_once(path, described, skin)
-    head, skin = (known, skin) if known else _head(path, described, skin)
+    head, skin = (known, skin) if known else head_and_skin(described, skin, path.parent)
     environment = _environment(path, table["environment"]) if "environment" in table else None
     lights, camera = table.get("lights"), table.get("camera", "portrait")
     if lights is None:
         lights = "studio" if environment is None else NO_LIGHTS
     return Scene(
         head,
-        lights=load_lights(_beside(path, lights)) if isinstance(lights, str) else _lights(path, lights),
+        lights=load_lights(_beside(path.parent, lights))
+        if isinstance(lights, str)
+        else _lights(path, lights),
         environment=environment,
-        camera=load_camera(_beside(path, camera), head)
+        camera=load_camera(_beside(path.parent, camera), head)
         if isinstance(camera, str)
         else _made(Camera, path, "camera", camera),
-        skin=skin.model_copy(update={"profile": _beside(path, skin.profile)}),
+        skin=skin.model_copy(update={"profile": _beside(path.parent, skin.profile)}),
     ), settings
 
 
 def head_table(path: Path) -> dict[str, Any]:
     """The [head] of a scene's file with names that hold from any folder."""
-    table = dict(_read(path, "a scene in TOML").get("head", {}))
-    for role in ("name", "regions", *_MAPS):
-        if isinstance(table.get(role), str) and (path.parent / table[role]).is_file():
-            table[role] = str((path.parent / table[role]).resolve())
-    return table
+    return with_whole_names(_read(path, "a scene in TOML").get("head", {}), path.parent)
 
 
-def _head(path: Path, table: _HeadTable, skin: Skin) -> tuple[Head, Skin]:
-    """The head, and the skin with the mean strength that a table of regions gives it."""
-    regions = None if table.regions is None else load_table(_beside(path, table.regions))
+def with_whole_names(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """A [head] whose files, in a folder, have names that hold from any other."""
+    named = {role: folder / table[role] for role in ("name", "regions", *_MAPS) if role in table}
+    return {**table} | {role: str(file.resolve()) for role, file in named.items() if file.is_file()}
+
+
+def head_and_skin(table: HeadTable, skin: Skin, folder: Path) -> tuple[Head, Skin]:
+    """The head of a [head] table, and the skin with the mean strength that a table of regions gives it.
+
+    folder : where the files lie that the table names
+
+    Raises DermisError for files that cannot be used.
+    """
+    regions = None if table.regions is None else load_table(_beside(folder, table.regions))
     options = table.model_dump(exclude={"name", "regions"}, exclude_none=True)
-    options |= {role: path.parent / options[role] for role in _MAPS if role in options}
-    head = load_head(_beside(path, table.name), **options)
+    options |= {role: folder / options[role] for role in _MAPS if role in options}
+    head = load_head(_beside(folder, table.name), **options)
     if regions is None:
         return head, skin
     head, rho_s = with_regions(head, regions)
     return head, skin.model_copy(update={"rho_s": rho_s})
 
 
-def _check_said_once(path: Path, table: _HeadTable, skin: Skin) -> None:
+def _check_said_once(path: Path, table: HeadTable, skin: Skin) -> None:
     for name in ("rho_s", "roughness"):
         if table.regions is not None and name in skin.model_fields_set:
             came = "it came beside the head's regions, which say it for each region"
@@ -152,12 +119,12 @@ def _check_said_once(path: Path, table: _HeadTable, skin: Skin) -> None:
 
 def _environment(path: Path, table: Any) -> Environment:
     environment = _made(Environment, path, "environment", table)
-    return environment.model_copy(update={"name": _beside(path, environment.name)})
+    return environment.model_copy(update={"name": _beside(path.parent, environment.name)})
 
 
-def _beside(path: Path, name: str) -> str:
-    """The file of that name in the scene's folder if there is one, else the name, of a preset mostly."""
-    file = path.parent / name
+def _beside(folder: Path, name: str) -> str:
+    """The file of that name in a scene's folder if there is one, else the name, of a preset mostly."""
+    file = folder / name
     return str(file) if file.is_file() else name
 
 
@@ -176,9 +143,9 @@ def _lights(culprit: object, tables: Any) -> tuple[Light, ...]:
 
 def _light(culprit: object, which: str, table: Any) -> Light:
     kind = table.get("kind", "point") if isinstance(table, dict) else "point"
-    if not isinstance(kind, str) or kind not in _KINDS:
-        refuse(f"{culprit}: {which}", f"a kind of {', '.join(_KINDS)}", f"{kind!r} came", "Correct it")
-    return _made(_KINDS[kind], culprit, which, table)
+    if not isinstance(kind, str) or kind not in LIGHTS:
+        refuse(f"{culprit}: {which}", f"a kind of {', '.join(LIGHTS)}", f"{kind!r} came", "Correct it")
+    return _made(LIGHTS[kind], culprit, which, table)
 
 
 def _made(kind: type[P], culprit: object, part: str, table: Any) -> P:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from dermis.errors import refuse
 from dermis.human.bust import BUSTS
@@ -17,6 +17,7 @@ from dermis.mesh.load import load_mesh
 from dermis.mesh.maps import load_maps
 from dermis.mesh.samples import SAMPLES, fetch
 from dermis.mesh.subdivide import subdivide as subdivided
+from dermis.scene.head_table import NormalY, Up, VOrigin
 
 MapFile = str | os.PathLike[str] | None
 
@@ -31,9 +32,9 @@ def load_head(
     specular: MapFile = None,
     roughness: MapFile = None,
     unit_mm: float | None = None,
-    v_origin: Literal["auto", "top", "bottom"] = "auto",
-    up: Literal["y", "z"] = "y",
-    normal_y: Literal["up", "down"] = "up",
+    v_origin: VOrigin = "auto",
+    up: Up = "y",
+    normal_y: NormalY = "up",
     opaque: Sequence[str] = (),
     subdivide: int = 0,
 ) -> Head:

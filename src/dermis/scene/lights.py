@@ -2,29 +2,48 @@
 
 from __future__ import annotations
 
+import tomllib
+from importlib import resources
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from dermis.scene.plain import Colour, Direction, Plain, Vector
+from dermis.registry import Registry
+from dermis.scene.plain import Colour, Direction, Plain, Vector, slider
 
-_Degrees = Annotated[float, Field(gt=0, lt=89)]
-_Length = Annotated[float, Field(ge=0.1, le=1e5)]
+__all__ = [
+    "LIGHTS",
+    "DirectionalLight",
+    "Light",
+    "PointLight",
+    "RectangleLight",
+    "SphereLight",
+    "SpotLight",
+    "StripeLight",
+    "preset_lights",
+    "studio",
+]
+
+_Degrees = Annotated[float, Field(gt=0, lt=89, json_schema_extra=slider(0.5, 88, log=True))]
+_Length = Annotated[float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 3000, log=True))]
 
 
 class _Source(Plain):
-    """What every light has.
-
-    irradiance : on a surface at the target that faces the light, linear Rec. 709; pi makes white skin 1
-    shadows : whether it casts shadows
-    softness_mm : width over which a shadow's edge fades, at most 12 texels of the shadow map; for lights of
-        some size the least width [mm]
-    """
+    """What every light has."""
 
     irradiance: Colour = (3.14, 3.14, 3.14)
+    """Irradiance of a surface at the target that faces the light, linear Rec. 709; pi makes white skin 1."""
     shadows: bool = True
-    softness_mm: Annotated[float, Field(gt=0, le=1000)] = 1.5
+    """Whether it casts shadows."""
+    softness_mm: Annotated[float, Field(gt=0, le=1000, json_schema_extra=slider(0.1, 100, log=True))] = 1.5
+    """Width over which a shadow's edge fades, at most 12 texels of the shadow map; for lights of some size it
+    is the least width [mm]."""
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """Keys of the bibliography: what its kind is drawn by."""
+        return ()
 
 
 class PointLight(_Source):
@@ -32,7 +51,9 @@ class PointLight(_Source):
 
     kind: Literal["point"] = "point"
     position: Vector
+    """Where it stands [mm]."""
     target: Vector = (0.0, 0.0, 0.0)
+    """Where it is directed, and where its irradiance is given [mm]."""
 
     @model_validator(mode="after")
     def _apart(self) -> PointLight:
@@ -42,14 +63,13 @@ class PointLight(_Source):
 
 
 class SpotLight(PointLight):
-    """A point light within a cone around the line to the target.
-
-    inner_degrees, outer_degrees : half angles where the cone begins and ends to fade
-    """
+    """A point light within a cone around the line to the target."""
 
     kind: Literal["spot"] = "spot"  # type: ignore[assignment]
     inner_degrees: _Degrees = 25.0
+    """Half angle at which the cone begins to fade."""
     outer_degrees: _Degrees = 35.0
+    """Half angle at which the cone ends."""
 
     @model_validator(mode="after")
     def _fades(self) -> SpotLight:
@@ -59,24 +79,29 @@ class SpotLight(PointLight):
 
 
 class RectangleLight(PointLight):
-    """A window or softbox: an even rectangle that faces the target, one pair of sides level.
-
-    width_mm, height_mm : its sides [mm]
-    """
+    """A window or softbox: an even rectangle that faces the target, one pair of sides level."""
 
     kind: Literal["rectangle"] = "rectangle"  # type: ignore[assignment]
     width_mm: _Length = 600.0
+    """Length of the level sides [mm]."""
     height_mm: _Length = 600.0
+    """Length of the other sides [mm]."""
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        return "Baum1989", "Roberts2018"
 
 
 class SphereLight(PointLight):
-    """An evenly bright sphere, as a lamp with a globe.
-
-    radius_mm : [mm]
-    """
+    """An evenly bright sphere, as a lamp with a globe."""
 
     kind: Literal["sphere"] = "sphere"  # type: ignore[assignment]
-    radius_mm: _Length = 100.0
+    radius_mm: Annotated[float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 500, log=True))] = 100.0
+    """Radius of the sphere [mm]."""
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        return "ShirleyChiu1997", "Roberts2018"
 
     @model_validator(mode="after")
     def _outside(self) -> SphereLight:
@@ -86,31 +111,31 @@ class SphereLight(PointLight):
 
 
 class DirectionalLight(_Source):
-    """Parallel light, as from the sun.
-
-    direction : the way the light travels
-    angle_degrees : what its source spans, 0.53 for the sun: shadows harden towards what casts them
-    """
+    """Parallel light, as from the sun."""
 
     kind: Literal["directional"] = "directional"
     direction: Direction
+    """The way in which the light travels."""
     angle_degrees: Annotated[float, Field(ge=0, le=20)] = 0.0
+    """Angle that its source spans, 0.53 for the sun: shadows harden towards what casts them."""
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        return ("Roberts2018",) if self.angle_degrees > 0 else ()
 
 
 class StripeLight(DirectionalLight):
-    """A sheet of parallel light, as from a laser through a cylindrical lens.
-
-    position : a point in the sheet's middle
-    up : the way along which the stripe is long
-    width_mm : across, from edge to edge at 1/e^2 of the middle, of a Gaussian [mm]
-    length_mm : [mm]
-    """
+    """A sheet of parallel light, as from a laser through a cylindrical lens."""
 
     kind: Literal["stripe"] = "stripe"  # type: ignore[assignment]
     position: Vector = (0.0, 0.0, 0.0)
+    """A point in the middle of the sheet [mm]."""
     up: Direction = (0.0, 1.0, 0.0)
+    """The way along which the stripe is long."""
     width_mm: _Length = 1.5
+    """Width of a Gaussian across, between the edges at 1/e^2 of its middle [mm]."""
     length_mm: _Length = 300.0
+    """Length of the stripe [mm]."""
 
     @model_validator(mode="after")
     def _across(self) -> StripeLight:
@@ -121,11 +146,30 @@ class StripeLight(DirectionalLight):
         return self
 
 
-Light = PointLight | SpotLight | RectangleLight | SphereLight | DirectionalLight | StripeLight
+Light = PointLight | DirectionalLight
+"""Every kind is one or the other, with more to it."""
+
+LIGHTS: Registry[type[Light]] = Registry(
+    "light",
+    {
+        "point": PointLight,
+        "spot": SpotLight,
+        "rectangle": RectangleLight,
+        "sphere": SphereLight,
+        "directional": DirectionalLight,
+        "stripe": StripeLight,
+    },
+)
+"""The kinds by their word in scene files. How each is drawn stands in `dermis.frame.lights`, what Mitsuba and
+Cycles take in its place in `dermis.reference.lights`."""
+
+
+def preset_lights(name: str) -> tuple[Light, ...]:
+    """The lights of a preset of the package."""
+    text = (resources.files("dermis.scene") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+    return tuple(LIGHTS[table["kind"]](**table) for table in tomllib.loads(text)["lights"])
 
 
 def studio() -> tuple[Light, ...]:
     """Three shadowed spots: a warm key from the upper left, a weak fill, a cool rim from behind."""
-    from dermis.scene.files import preset_lights
-
     return preset_lights("studio")

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any
+from types import UnionType
+from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails, PydanticUndefined
 
 from dermis.errors import DermisError
+from dermis.registry import Named
 
 FARTHEST_MM = 1e6
 _LONGEST = 80  # letters of what came
+_VAST = 1e5  # bounds beyond it only keep numbers finite
 
 
 def _direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -41,9 +45,12 @@ class ImpossibleError(DermisError):
 
 
 class Plain(BaseModel):
-    """Immutable settings: unknown names and impossible values are refused."""
+    """Immutable settings: unknown names and impossible values are refused.
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    The docstring under a field is its help, in the command line, the viewer and the documentation.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True, defer_build=True)
 
     def __init__(self, **data: Any) -> None:
         try:
@@ -52,6 +59,85 @@ class Plain(BaseModel):
             model = type(self)
             findings = {_place(one): _finding(one, list(model.model_fields)) for one in error.errors()}
             raise ImpossibleError(model.__name__, findings) from None
+
+
+class Range(NamedTuple):
+    """Where a number lies as a rule: the ends of its slider."""
+
+    low: float
+    high: float
+    logarithmic: bool = False
+
+
+def slider(low: float, high: float, *, log: bool = False) -> dict[str, Any]:
+    """For a field's `json_schema_extra`: a slider's range, where the bounds are wider than what is useful."""
+    return {"slider": Range(low, high, log)}
+
+
+def help_of(model: type[BaseModel], field: str) -> str:
+    """What a field means, on one line, with what each of the names of a registry stands for."""
+    info = model.model_fields[field]
+    text = re.sub(r"\s+", " ", info.description or "")
+    summaries = [one for named in _named(info) for one in named.registry.summaries()]
+    return f"{text} {'; '.join(summaries)}." if summaries else text
+
+
+def choices_of(model: type[BaseModel], field: str) -> tuple[str, ...]:
+    """The words that a field may be; none where it is no choice of words."""
+    info = model.model_fields[field]
+    for named in _named(info):
+        return named.names
+    words = [word for one in _kinds(info) if get_origin(one) is Literal for word in get_args(one)]
+    return tuple(words)
+
+
+def range_of(model: type[BaseModel], field: str) -> Range | None:
+    """The ends of a number's slider, or of each number in a tuple; None where the model names no two ends."""
+    return _range(model.model_fields[field])
+
+
+def values_of(model: type[BaseModel], field: str) -> str:
+    """The words that a field may be, or the bounds of a number where they say something."""
+    low, high = _bounds(model.model_fields[field])
+    if low is not None and high is not None and high < _VAST:
+        return f"{low:g} to {high:g}"
+    return ", ".join(choices_of(model, field))
+
+
+def shown(value: Any) -> str:
+    """A default as it is typed; nothing where a setting is off or left out."""
+    if isinstance(value, tuple):
+        return ("x" if all(isinstance(one, int) for one in value) else ",").join(map(shown, value))
+    if value is None or isinstance(value, bool) or value is PydanticUndefined:
+        return ""
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _named(info: FieldInfo) -> list[Named]:
+    return [one for one in info.metadata if isinstance(one, Named)]
+
+
+def _kinds(info: FieldInfo) -> tuple[Any, ...]:
+    """The types that a field's value may have."""
+    kind = info.annotation
+    return get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
+
+
+def _range(info: FieldInfo) -> Range | None:
+    extra = info.json_schema_extra
+    if isinstance(extra, dict) and "slider" in extra:
+        return Range(*extra["slider"])  # type: ignore[misc]
+    for kind in _kinds(info):
+        if get_origin(kind) is tuple:
+            return _range(FieldInfo.from_annotation(get_args(kind)[0]))
+    low, high = _bounds(info)
+    return None if low is None or high is None else Range(low, high)
+
+
+def _bounds(info: FieldInfo) -> tuple[float | None, float | None]:
+    low = [getattr(one, name) for one in info.metadata for name in ("ge", "gt") if hasattr(one, name)]
+    high = [getattr(one, name) for one in info.metadata for name in ("le", "lt") if hasattr(one, name)]
+    return next(iter(low), None), next(iter(high), None)
 
 
 def _place(one: ErrorDetails) -> str:

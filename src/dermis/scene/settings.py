@@ -6,7 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from dermis.scene.plain import Colour, Plain
+from dermis.registry import Named
+from dermis.scene.plain import Colour, Plain, slider
+from dermis.scene.techniques import TECHNIQUES
 
 _Side = Annotated[int, Field(ge=1, le=16384)]
 _MOST_SAMPLES = 64
@@ -14,48 +16,42 @@ MOST_WORK = 2**27
 
 
 class Settings(Plain):
-    """Sizes, quality, and what leaves linear light.
-
-    size : width and height of the image [pixel]
-    atlas : side of the irradiance map [texel]
-    samples : samples of each pixel
-    technique : "texture-space" scatters light over the atlas; "none" is the dry, unscattered skin; baselines
-        are "one-blur" (a single blur of the light map), "published" (the passes of 2007 as they were) and
-        what engines do: "screen-space" scatters over the picture, "pre-integrated" by tables over curvature
-    stretch : "full" corrects blurs for the map's stretch and shear, "axes" takes u and v for at right angles,
-        "none" blurs alike everywhere, for comparison
-    seams : "stitch" lets light cross the map's seams; "none" and the talk's remedies "clear-colour",
-        "stretch-map", "alpha" and "multi-uv" are for comparison
-    seam_colour : light beside the charts for "clear-colour", as irradiance over pi
-    transmission : "thin" lets light through thin parts: ears, nostrils; "none" takes all for thick
-    shadow_size : side of each shadow map [texel]
-    occlusion : "baked" dims an environment's light where the head is in its way
-    exposure : factor from radiance to the image [-]
-    bloom : share of the light that the lens scatters around [0..1]
-    tone : curve before the encoding of bytes: "none", "filmic", or the Khronos group's "neutral"
-    gamma : "wrong" takes the colour map for linear and leaves the encoding out, for comparison
-    background : linear Rec. 709
-    parts : which light is shown: "all", only the "diffuse" from below, or the "specular" off the surface
-    """
+    """Sizes, quality, and what leaves linear light."""
 
     size: tuple[_Side, _Side] = (1024, 1024)
+    """Width and height of the picture [pixel]."""
     atlas: Annotated[int, Field(ge=64)] = 2048
+    """Side of the atlas, the map in which light scatters [texel]."""
     samples: Annotated[int, Field(ge=1, le=_MOST_SAMPLES)] = 4
-    technique: Literal["texture-space", "none", "one-blur", "published", "screen-space", "pre-integrated"] = (
-        "texture-space"
-    )
+    """Samples of each pixel, for smooth edges."""
+    technique: Annotated[str, Named(TECHNIQUES)] = "texture-space"
+    """How light scatters below the surface."""
     stretch: Literal["full", "axes", "none"] = "full"
+    """Correction of blurs for the uv layout: "full" for its stretch and shear, "axes" as if u and v were at
+    right angles, "none" to blur alike everywhere."""
     seams: Literal["stitch", "none", "clear-colour", "stretch-map", "alpha", "multi-uv"] = "stitch"
+    """What is done at the seams of the uv layout: "stitch" lets light cross them; the others are the talk's
+    remedies, for comparison. Techniques that cannot stitch take "clear-colour" instead."""
     seam_colour: Colour = (0.5, 0.35, 0.3)
+    """Light between the charts for "clear-colour" seams, as irradiance over pi."""
     transmission: Literal["thin", "none"] = "thin"
+    """Light through the head: "thin" for thin parts such as ears and nostrils, "none" for no part."""
     shadow_size: Annotated[int, Field(ge=64, le=8192)] = 2048
+    """Side of each shadow map [texel]."""
     occlusion: Literal["baked", "none"] = "baked"
-    exposure: Annotated[float, Field(ge=1e-6, le=1e6)] = 1.0
-    bloom: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Ambient occlusion: "baked" dims the environment's light where the head is in its way."""
+    exposure: Annotated[float, Field(ge=1e-6, le=1e6, json_schema_extra=slider(0.05, 20, log=True))] = 1.0
+    """Factor from radiance to the picture."""
+    bloom: Annotated[float, Field(ge=0, le=1, json_schema_extra=slider(0, 0.5))] = 0.0
+    """Share of the light that the lens scatters around."""
     tone: Literal["none", "filmic", "neutral"] = "none"
+    """Tone curve before the encoding as bytes; "neutral" is the Khronos group's."""
     gamma: Literal["right", "wrong"] = "right"
+    """Colour space: "wrong" takes the colour map to be linear and leaves the encoding out, for comparison."""
     background: Colour = (0.0, 0.0, 0.0)
+    """Colour behind the head, linear Rec. 709."""
     parts: Literal["all", "diffuse", "specular"] = "all"
+    """Which light is shown: "all", only the "diffuse" from below the surface, or the "specular" off it."""
 
     @model_validator(mode="after")
     def _fits_in_memory(self) -> Settings:

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from dermis.scene.plain import Plain
-from dermis.specular.names import EnergyName, FresnelName, SpecularName
+from dermis.scene.plain import Plain, slider
+from dermis.specular.models import EnergyName, FresnelName, SpecularName
 
 StructureName = Literal["dj2006", "donner2008", "biospec"]
 MOST_LAYERS = 8
@@ -17,27 +17,26 @@ _OILY_STRENGTH, _OILY_SMOOTHING = 3.0, 0.6
 _Share = Annotated[float | None, Field(ge=0, le=1)]
 _Absorption = Annotated[float, Field(ge=0, le=1e4)]
 _Scattering = Annotated[float, Field(gt=0, le=1e4)]
+_COEFFICIENT = Field(json_schema_extra=slider(1e-4, 50, log=True))
 
 
 class Pigments(Plain):
-    """What replaces the pigments of a skin made of them; None leaves the skin's own.
-
-    structure : its layers: "dj2006" two, "donner2008" two and a sheet of melanin, "biospec" four
-    melanin : share of the epidermis' volume that is melanosomes [-]
-    eumelanin : share of the melanosomes that hold eumelanin [-]
-    blood : share of the dermis' volume that is blood [-]
-    oxygen : share of the haemoglobin that carries oxygen [-]
-    epidermis_mm : thickness of the epidermis [mm]
-    epidermal_blood : share of the epidermis' volume that is blood, of "donner2008" only [-]
-    """
+    """What replaces the pigments of a skin made of them; None leaves the skin's own."""
 
     structure: StructureName | None = None
-    melanin: _Share = None
+    """Layers of the skin: "dj2006" has two, "donner2008" a sheet of melanin too, "biospec" four."""
+    melanin: Annotated[_Share, Field(json_schema_extra=slider(0.0005, 0.6, log=True))] = None
+    """Share of the epidermis' volume that is melanosomes."""
     eumelanin: _Share = None
-    blood: _Share = None
+    """Share of the melanosomes that hold eumelanin."""
+    blood: Annotated[_Share, Field(json_schema_extra=slider(0.0005, 0.2, log=True))] = None
+    """Share of the dermis' volume that is blood."""
     oxygen: _Share = None
-    epidermis_mm: Annotated[float | None, Field(gt=0, le=2)] = None
-    epidermal_blood: _Share = None
+    """Share of the haemoglobin that carries oxygen."""
+    epidermis_mm: Annotated[float | None, Field(gt=0, le=2, json_schema_extra=slider(0.02, 0.5))] = None
+    """Thickness of the epidermis [mm]."""
+    epidermal_blood: Annotated[_Share, Field(json_schema_extra=slider(0, 0.1))] = None
+    """Share of the epidermis' volume that is blood, for "donner2008" only."""
 
     def given(self) -> dict[str, float]:
         """Shares and thicknesses that replace something."""
@@ -45,58 +44,57 @@ class Pigments(Plain):
 
 
 class TissueLayer(Plain):
-    """One layer of a medium, its coefficients for red, green and blue.
-
-    name : what it is
-    thickness_mm : None for a layer without end, which only the last can be [mm]
-    absorption_per_mm : [1/mm]
-    scattering_per_mm : reduced scattering [1/mm]
-    """
+    """One layer of a medium, its coefficients for red, green and blue."""
 
     name: str = "layer"
-    thickness_mm: Annotated[float | None, Field(gt=0, le=1000)] = None
-    absorption_per_mm: tuple[_Absorption, _Absorption, _Absorption]
-    scattering_per_mm: tuple[_Scattering, _Scattering, _Scattering]
+    """What the layer is called."""
+    thickness_mm: Annotated[
+        float | None, Field(gt=0, le=1000, json_schema_extra=slider(0.01, 5, log=True))
+    ] = None
+    """Thickness; none for the last layer, if it has no end [mm]."""
+    absorption_per_mm: Annotated[tuple[_Absorption, _Absorption, _Absorption], _COEFFICIENT]
+    """Absorption coefficient [1/mm]."""
+    scattering_per_mm: Annotated[tuple[_Scattering, _Scattering, _Scattering], _COEFFICIENT]
+    """Reduced scattering coefficient [1/mm]."""
 
 
 class Skin(Plain):
-    """Parameters of the two layers: the rough white surface, and what scatters below.
-
-    profile : preset name or file of the diffusion profile
-    albedo : "map" renormalises the profile to white and takes the colour from the map; "profile" keeps
-        the profile's own colour and uses no map
-    mix : share of the colour map applied before scattering, the rest after it [0..1]
-    roughness : Beckmann roughness m [-]
-    rho_s : strength of the surface lobe [-]
-    oiliness : one dial over both, 0 as given to 1 for shiny skin, with 3 times the strength and 0.6 times the
-        roughness; an artist's mapping, not a measured one
-    specular : model of the lobe; "none" leaves it out
-    fresnel : Schlick's curve with F0 = 0.028, or the exact one of index 1.4
-    specular_colour : "white"; "wrong" tints reflections by the colour map, for comparison
-    energy : what the surface reflects does not enter: "full"; "published" as the deck has it, with an albedo
-        pi times too large; "none"
-    direction : "lambertian" skin returns light alike from and to all directions; "half-space" as one of the
-        skin's mean colour does: more of what comes aslant, and what scattered only once leaves mostly aslant.
-        Without a surface lobe it is index-matched, else of index 1.4
-    pigments : what differs from those of the profile's skin: "spectral", "light", "medium", "dark", a file's
-    layers : what the profile's medium consists of instead, topmost first: of "dj3", "skin1", a file's ...
+    """What the skin is: the rough white surface, and what scatters below it.
 
     Source: [dEonLuebke2007] sections 14.3-14.5; values of [Dudash2007].
     """
 
     profile: str = "gpu-gems-3"
+    """Diffusion profile: "gpu-gems-3", a medium or skin (dj3, skin1, light ...), a .toml file such as
+    `dermis profile -o` writes, or a CSV file with variance_mm2,red,green,blue."""
     albedo: Literal["map", "profile"] = "map"
+    """Where skin gets its colour: "map" makes the profile white and takes the colour map; "profile" keeps the
+    profile's own colour and uses no map."""
     mix: Annotated[float, Field(ge=0, le=1)] = 0.5
+    """Share of the colour map applied before scattering, the rest after it."""
     roughness: Annotated[float, Field(ge=0.05, le=1)] = 0.3
+    """Beckmann roughness m of the surface; a roughness map replaces it."""
     rho_s: Annotated[float, Field(ge=0, le=1)] = 0.18
+    """Strength of the surface reflection."""
     oiliness: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """One dial over strength and roughness: 1 is shiny skin, 3 times as strong and 0.6 times as rough; an
+    artist's mapping, not a measured one."""
     specular: SpecularName = "kelemen"
+    """Model of the surface reflection; "none" leaves it out."""
     fresnel: FresnelName = "schlick"
+    """Schlick's curve with F0 = 0.028, or the exact one of index 1.4."""
     specular_colour: Literal["white", "wrong"] = "white"
+    """Colour of reflections; "wrong" tints them by the colour map, for comparison."""
     energy: EnergyName = "full"
+    """Light that the surface reflects does not enter: "full" subtracts it all, "published" as the deck does,
+    pi times too much, "none" nothing."""
     direction: Literal["lambertian", "half-space"] = "lambertian"
+    """How skin returns light: "lambertian" alike from and to all directions; "half-space" as a half-space
+    of the skin's mean colour: more of what arrives at a slant, and light scattered once leaves at a slant."""
     pigments: Pigments | None = None
+    """What replaces pigments of the profile's skin, of "spectral", "light", "medium", "dark" or a file."""
     layers: Annotated[tuple[TissueLayer, ...], Field(max_length=MOST_LAYERS)] = ()
+    """What replaces the layers of the profile's medium ("dj3", "skin1", a file's), topmost first."""
 
     @property
     def has_own_tissue(self) -> bool:

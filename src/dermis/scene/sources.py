@@ -5,22 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from dermis.scene.environment import Environment
-from dermis.scene.lights import DirectionalLight, Light, RectangleLight, SphereLight
+from dermis.scene.lights import Light
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
+from dermis.scene.techniques import TECHNIQUES
 
 _FRAME = ("dEonLuebke2007", "Burns2013")
-_TECHNIQUES = {
-    "texture-space": ("dEonLuebke2007", "Geusebroek2003"),
-    "none": (),
-    "one-blur": ("Borshukov2003", "Green2004"),
-    "published": ("dEonLuebke2007",),
-    "screen-space": ("Jimenez2015",),
-    "pre-integrated": ("Penner2011",),
-}
-_CUT = ("one-blur", "published")  # which stitch nothing
-_WITH_SEAMS = ("texture-space", *_CUT)
-_WITH_TRANSMISSION = ("texture-space", "published")
 _FRESNEL = {"schlick": ("Schlick1994", "Dudash2007"), "exact": ("CookTorrance1982",)}
 _HALF_SPACE = ("Chandrasekhar1960", "Jensen2001")
 _TONES = {"none": (), "filmic": ("Hable2010",), "neutral": ("Khronos2024",)}
@@ -58,10 +48,10 @@ def sources_of(
 
 def scattering_sources(settings: Settings) -> tuple[str, ...]:
     """Of the technique, of what it does at the seams, and of light through thin parts."""
-    technique = settings.technique
-    remedied = settings.seams != "stitch" or technique in _CUT
-    keys = _TECHNIQUES[technique] + ("Dudash2007",) * (remedied and technique in _WITH_SEAMS)
-    if settings.transmission == "thin" and technique in _WITH_TRANSMISSION:
+    technique = TECHNIQUES[settings.technique]
+    remedied = settings.seams != "stitch" or not technique.stitches
+    keys: tuple[str, ...] = technique.sources + ("Dudash2007",) * (remedied and technique.on_atlas)
+    if settings.transmission == "thin" and technique.transmits:
         keys += ("JensenBuhler2002",)
     return keys
 
@@ -86,9 +76,5 @@ def _surface(skin: Skin) -> tuple[str, ...]:
 
 
 def _light(lights: Sequence[Light]) -> tuple[str, ...]:
-    rectangles = any(isinstance(light, RectangleLight) for light in lights)
-    spheres = any(isinstance(light, SphereLight) for light in lights)
-    suns = any(isinstance(light, DirectionalLight) and light.angle_degrees > 0 for light in lights)
     keys: tuple[str, ...] = _SHADOWS * any(light.shadows for light in lights)
-    keys += ("Baum1989",) * rectangles + ("ShirleyChiu1997",) * spheres
-    return keys + ("Roberts2018",) * (rectangles or spheres or suns)
+    return keys + tuple(key for light in lights for key in light.sources)

@@ -13,8 +13,9 @@ from dermis.specular.kelemen import kelemen
 from dermis.specular.models import MODELS, Lobe
 
 Floats = NDArray[np.float64]
+ROOT_OF_FIRST_ROW = 0.2
 TABLE_COSINES: Floats = np.linspace(0.0, 1.0, 64) ** 2
-TABLE_ROUGHNESSES: Floats = np.linspace(0.2, 1.0, 32) ** 2
+TABLE_ROUGHNESSES: Floats = np.linspace(ROOT_OF_FIRST_ROW, 1.0, 32) ** 2
 """Columns and rows of the shader's table: evenly spaced roots, for albedos bend at grazing angles."""
 
 _TABLE_NODES = (24, 12)

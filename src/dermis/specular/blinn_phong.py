@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from dermis.specular.cosines import Cosines, Floats
 from dermis.specular.fresnel import Fresnel, schlick
+from dermis.specular.models import Model
 
 
 def exponent(m: ArrayLike) -> Floats:
@@ -46,3 +47,17 @@ def blinn_phong_plain(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick)
 
 def _power(angles: Cosines, s: Floats) -> Floats:
     return np.asarray(np.clip(angles.n_h, 0.0, 1.0) ** s)
+
+
+BLINN_PHONG = Model(
+    blinn_phong,
+    "a power of n.h with its energy put right",
+    reciprocal=True,
+    sources=("Blinn1977", "Walter2007"),
+)
+BLINN_PHONG_PLAIN = Model(
+    blinn_phong_plain,
+    "a power of n.h as first used; not reciprocal, for its highlight has no cosine of the light",
+    reciprocal=False,
+    sources=("Blinn1977",),
+)

@@ -40,7 +40,7 @@ def dielectric(cos_theta: ArrayLike, eta: float = SKIN_ETA) -> Floats:
 
 
 FRESNEL: dict[str, Fresnel] = {"schlick": schlick, "exact": dielectric}
-"""Both ways, by the names that scenes use; an entry's place is its number in the shaders."""
+"""Both ways, by the names that scenes use."""
 
 
 def hemispherical_reflectance(fresnel: Fresnel = dielectric, nodes: int = 64) -> float:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.specular.beckmann import beckmann
 from dermis.specular.cosines import Cosines, Floats
 from dermis.specular.fresnel import Fresnel, schlick
+from dermis.specular.models import Model
 
 
 def kelemen(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
@@ -24,3 +27,12 @@ def kelemen(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats
     h2 = np.maximum(4.0 * angles.v_h**2, 1e-12)
     lobe = beckmann(angles.n_h, m) * fresnel(angles.v_h) / (np.pi * h2)
     return np.asarray(np.where(angles.above, lobe, 0.0))
+
+
+KELEMEN = Model(
+    kelemen,
+    "Beckmann's slopes over the unnormalised half vector, shaded by table",
+    reciprocal=True,
+    sources=("Kelemen2001", "Beckmann1963"),
+)
+KELEMEN_DIRECT = replace(KELEMEN, note="the first, shaded without its table")

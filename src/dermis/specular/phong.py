@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from dermis.specular.blinn_phong import exponent
 from dermis.specular.cosines import Cosines, Floats
 from dermis.specular.fresnel import Fresnel, schlick
+from dermis.specular.models import Model
 
 
 def phong(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
@@ -39,3 +40,18 @@ def _power(angles: Cosines, s: Floats) -> Floats:
     """(r.v)^s with r the mirrored light."""
     r_v = 2.0 * angles.n_l * angles.n_v - (2.0 * angles.v_h**2 - 1.0)
     return np.asarray(np.clip(r_v, 0.0, 1.0) ** s)
+
+
+PHONG = Model(
+    phong,
+    "a power of the mirror direction with its energy put right",
+    reciprocal=True,
+    sources=("Phong1975", "LafortuneWillems1994"),
+)
+PHONG_PLAIN = Model(
+    phong_plain,
+    "a power of the mirror direction as first published; not reciprocal, for its highlight has no cosine "
+    "of the light and its reflectance is that of the angle of incidence",
+    reciprocal=False,
+    sources=("Phong1975",),
+)

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from dermis.specular.beckmann import beckmann
 from dermis.specular.cosines import Cosines, Floats
 from dermis.specular.fresnel import Fresnel, schlick
+from dermis.specular.models import Model
 
 _GRAZING = 1e-6
 
@@ -56,3 +57,17 @@ def _lobe(angles: Cosines, m: ArrayLike, fresnel: Fresnel, masking: Floats) -> F
     n_l, n_v = _raised(angles)
     slopes = beckmann(angles.n_h, m) / np.pi
     return np.where(angles.above, slopes * fresnel(angles.v_h) * masking / (4.0 * n_l * n_v), 0.0)
+
+
+TORRANCE_SPARROW = Model(
+    torrance_sparrow,
+    "Beckmann's slopes masked by V-cavities",
+    reciprocal=True,
+    sources=("TorranceSparrow1967", "CookTorrance1982", "Beckmann1963"),
+)
+TORRANCE_SPARROW_SMITH = Model(
+    torrance_sparrow_smith,
+    "Beckmann's slopes masked after Smith",
+    reciprocal=True,
+    sources=("TorranceSparrow1967", "Smith1967", "Walter2007"),
+)

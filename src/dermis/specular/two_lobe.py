@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from dermis.specular.cosines import Cosines, Floats
 from dermis.specular.fresnel import Fresnel, schlick
 from dermis.specular.kelemen import kelemen
+from dermis.specular.models import Model
 
 NARROW, WIDE = 0.75**2, 1.3**2
 """Factors of m: an engine's 0.75 and 1.3 belong to its roughness, whose square is m [EpicGames2025]."""
@@ -26,3 +27,12 @@ def two_lobe(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Float
     narrow, wide = (np.clip(factor * np.asarray(m), LEAST_M, MOST_M) for factor in (NARROW, WIDE))
     core, veil = kelemen(angles, narrow, fresnel), kelemen(angles, wide, fresnel)
     return np.asarray(SHARE_OF_NARROW * core + (1.0 - SHARE_OF_NARROW) * veil)
+
+
+TWO_LOBE = Model(
+    two_lobe,
+    "a narrow and a wide Kelemen lobe",
+    reciprocal=True,
+    sources=("Kelemen2001", "EpicGames2025"),
+    numbers={"narrow": NARROW, "wide": WIDE, "share_of_narrow": SHARE_OF_NARROW},
+)

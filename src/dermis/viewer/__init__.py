@@ -1,1 +1,1 @@
-"""The viewer: a head to turn in one's hands, in a window, in a browser, in a notebook."""
+"""The interactive viewer: in a desktop window, a browser or a notebook."""

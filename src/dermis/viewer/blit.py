@@ -1,11 +1,10 @@
-"""The rendered image into the window's texture, without a detour through main memory."""
+"""Copies rendered images into the window's texture, on the device."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from dermis.gpu import Device
 from dermis.gpu.program import Program
@@ -14,9 +13,8 @@ Box = tuple[int, int, int, int]
 """Left, top, width and height [pixel]."""
 
 
-@dataclass(frozen=True)
-class Patch:
-    """An image, scaled to a box of the target, of which a part is shown.
+class Patch(NamedTuple):
+    """An image scaled to a box of the target, and the part of that box that is drawn.
 
     image : texture of sRGB bytes
     """
@@ -27,7 +25,7 @@ class Patch:
 
 
 class Blit(Program):
-    """Draws images of bytes into targets of one format."""
+    """Draws byte images into targets of one format."""
 
     def __init__(self, device: Device, target: str) -> None:
         super().__init__(device, Path(__file__).parent / "blit.wgsl")
@@ -45,25 +43,23 @@ class Blit(Program):
         )
 
     def draw(self, patches: Sequence[Patch], view: Any) -> None:
-        """Patches on black.
+        """Draw patches on black.
 
-        view : of the target's texture
+        view : of the target texture
         """
         encoder = self.device.handle.create_command_encoder()
-        whole = {"view": view, "load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 1)}
-        one = encoder.begin_render_pass(label="blit", color_attachments=[whole])
-        one.set_pipeline(self._pipeline)
+        target = {"view": view, "load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 1)}
+        render_pass = encoder.begin_render_pass(label="blit", color_attachments=[target])
+        render_pass.set_pipeline(self._pipeline)
         for patch in patches:
-            one.set_viewport(*patch.box, 0.0, 1.0)
-            one.set_scissor_rect(*patch.shown)
-            one.set_bind_group(0, self._group(patch.image))
-            one.draw(3)
-        one.end()
+            render_pass.set_viewport(*patch.box, 0.0, 1.0)
+            render_pass.set_scissor_rect(*patch.shown)
+            entry = {"binding": 0, "resource": patch.image.create_view()}
+            group = self.device.handle.create_bind_group(layout=self._group_layout, entries=[entry])
+            render_pass.set_bind_group(0, group)
+            render_pass.draw(3)
+        render_pass.end()
         self.device.handle.queue.submit([encoder.finish()])
-
-    def _group(self, image: Any) -> Any:
-        entry = {"binding": 0, "resource": image.create_view()}
-        return self.device.handle.create_bind_group(layout=self._group_layout, entries=[entry])
 
     def _visibility(self) -> int:
         import wgpu

@@ -1,4 +1,4 @@
-// The rendered image, scaled into the window's own texture.
+// Scales the rendered image into the window's texture.
 //#include "bilinear.wgsl"
 
 override DECODED: bool = false; // for a target that encodes sRGB itself

@@ -1,4 +1,4 @@
-// A part of a layer of the atlas as a flat picture, its texels as squares.
+// Draws part of an atlas layer as a flat picture, its texels as squares.
 //#include "layer_colours.wgsl"
 
 const MOST_SAMPLES: u32 = 8u; // along each side of a pixel that covers many texels

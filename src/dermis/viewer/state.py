@@ -1,4 +1,4 @@
-"""What the viewer shows, as plain data: every change makes a new state."""
+"""What the viewer shows, as immutable data: every change makes a new state, which the undo history keeps."""
 
 from __future__ import annotations
 
@@ -24,17 +24,18 @@ from dermis.viewer.chart import Chart
 P = TypeVar("P", bound=Plain)
 PICTURE = "picture"
 PARTS = {"diffuse": "diffuse", "specular": "specular"}
-"""Views that are the picture with some of its light, as `Settings.parts` names it."""
+"""Views that are the picture with part of its light, by the value of `Settings.parts`."""
+_MOST_STEPS = 200  # of the undo history
 
 
 @dataclass(frozen=True, eq=False)
 class ViewerState:
-    """A scene, how it is rendered, and what of it is looked at.
+    """A scene, how it is rendered, and which view of it is shown.
 
-    settings : `size` is of no account, the window has its own
-    head : the [head] table that the head came from
-    view : one of `views.VIEWS`: the picture, or something on the way to it
-    rig : the lights' preset, empty when they are no preset's
+    settings : `size` is ignored: the window has its own
+    head : the [head] table that the head was loaded from
+    view : one of `views.VIEWS`: the picture or an intermediate result
+    rig : the lights' preset, empty for custom lights
     chart : the part of the atlas that the view "atlas" shows
     """
 
@@ -46,53 +47,56 @@ class ViewerState:
     chart: Chart = field(default_factory=Chart)
 
     def with_skin(self, **fields: Any) -> ViewerState:
-        """With other values of the skin; impossible ones raise DermisError."""
+        """Change fields of the skin.
+
+        Raises DermisError for impossible values.
+        """
         return self._with_scene(skin=changed(self.scene.skin, **fields))
 
     def with_pigments(self, **fields: Any) -> ViewerState:
-        """With other pigments of the skin."""
+        """Change pigments of the skin."""
         pigments = self.scene.skin.pigments or Pigments()
         return self.with_skin(pigments=changed(pigments, **fields).model_dump())
 
     def with_settings(self, **fields: Any) -> ViewerState:
-        """With other settings."""
+        """Change settings."""
         return replace(self, settings=changed(self.settings, **fields))
 
     def with_camera(self, camera: Camera) -> ViewerState:
-        """From another place."""
+        """Replace the camera."""
         return self._with_scene(camera=camera)
 
     def with_lights(self, lights: Sequence[Light], rig: str = "") -> ViewerState:
-        """In the light of others."""
+        """Replace the lights."""
         return replace(self._with_scene(lights=tuple(lights)), rig=rig)
 
     def with_rig(self, name: str) -> ViewerState:
-        """In the light of a preset."""
+        """Replace the lights by a preset."""
         return self.with_lights(load_lights(name), name)
 
     def with_light(self, index: int, **fields: Any) -> ViewerState:
-        """With other values of one light."""
+        """Change fields of one light."""
         lights = list(self.scene.lights)
         lights[index] = changed(lights[index], **fields)
         return self.with_lights(lights)
 
     def with_environment(self, environment: Environment | None) -> ViewerState:
-        """With other light from all around, or none."""
+        """Replace the environment."""
         return self._with_scene(environment=environment)
 
     def in_view(self, name: str) -> ViewerState:
-        """Looking at something else."""
+        """Switch to another view."""
         return replace(self, view=name)
 
     def with_chart(self, chart: Chart) -> ViewerState:
-        """Looking at another part of the atlas."""
+        """Show another part of the atlas."""
         return replace(self, chart=chart)
 
     def with_head(self, head: Head, table: Mapping[str, Any], rho_s: float) -> ViewerState:
-        """With another head, or other maps of it.
+        """Replace the head or its maps.
 
-        table : the [head] table that it came from
-        rho_s : its skin's mean strength of reflection [-]
+        table : the [head] table that it was loaded from
+        rho_s : mean strength of the surface reflection [-]
         """
         skin = changed(self.scene.skin, rho_s=rho_s)
         return replace(self._with_scene(head=head, skin=skin), head=table)
@@ -102,7 +106,7 @@ class ViewerState:
 
 
 def same(a: ViewerState, b: ViewerState) -> bool:
-    """Whether two states are alike; heads are compared by identity, without touching their arrays."""
+    """Whether two states are equal; heads are compared by identity, not by their arrays."""
 
     def rest(state: ViewerState) -> tuple[Any, ...]:
         scene = state.scene
@@ -113,14 +117,14 @@ def same(a: ViewerState, b: ViewerState) -> bool:
 
 
 def changed(values: P, **fields: Any) -> P:
-    """A copy with other values, checked."""
+    """A copy with other values, validated."""
     return type(values)(**(values.model_dump() | fields))
 
 
 def save_state(path: Path, state: ViewerState) -> None:
-    """Write the scene that `dermis render` and `dermis view` take; views of what is no light are left out.
+    """Write the scene file that `dermis render` and `dermis view` take; views of intermediates are not saved.
 
-    Raises DermisError when that is not possible.
+    Raises DermisError for a head made in memory and for a path that cannot be written.
     """
     if not state.head:
         refuse(path, "a head from a file or a sample", "it was made in memory", "Write it to a file first")
@@ -129,20 +133,20 @@ def save_state(path: Path, state: ViewerState) -> None:
 
 
 def named_state(name: str) -> ViewerState:
-    """The built-in bust, a sample or a mesh file in the studio's light, or the scene of a TOML file.
+    """The built-in bust, a sample or a mesh file in studio light, or the scene of a TOML file.
 
-    Raises DermisError for what is none of these.
+    Raises DermisError for anything else.
     """
     if Path(name).suffix.lower() == ".toml":
         return load_state(Path(name))
-    place = str(Path(name).resolve()) if Path(name).is_file() else name
-    return ViewerState(Scene(load_head(name)), head={"name": place})
+    path = str(Path(name).resolve()) if Path(name).is_file() else name
+    return ViewerState(Scene(load_head(name)), head={"name": path})
 
 
 def load_state(path: Path, before: ViewerState | None = None) -> ViewerState:
-    """The state that a scene's file describes; a head that is the same as before is not loaded again.
+    """The state that a scene file describes; the head is not loaded again if `before` has the same one.
 
-    Raises DermisError for a file that is no scene.
+    Raises DermisError for a file that is not a scene.
     """
     table = head_table(path)
     known = before.scene.head if before and before.head == table and "regions" not in table else None
@@ -151,6 +155,66 @@ def load_state(path: Path, before: ViewerState | None = None) -> ViewerState:
 
 
 def opened(scene: Scene, settings: Settings, head: Mapping[str, Any], rig: str) -> ViewerState:
-    """A scene as the viewer shows it first: the part of the light that its settings choose is a view."""
+    """The first state of a scene: `Settings.parts` becomes the view."""
     view = settings.parts if settings.parts in PARTS else PICTURE
     return ViewerState(scene, changed(settings, parts="all"), head, view, rig)
+
+
+class History:
+    """Undo history of states.
+
+    A gesture (a drag, a slider held down) changes the state many times and is undone in one step.
+    """
+
+    def __init__(self, state: ViewerState) -> None:
+        self._past = [state]
+        self._undone: list[ViewerState] = []
+        self._gesture = ""
+
+    @property
+    def state(self) -> ViewerState:
+        """The current state."""
+        return self._past[-1]
+
+    @property
+    def states(self) -> list[ViewerState]:
+        """All states, those that were undone included."""
+        return [*self._past, *self._undone]
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is an earlier state."""
+        return len(self._past) > 1
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether the last step was an undo."""
+        return bool(self._undone)
+
+    def change(self, state: ViewerState, gesture: str = "") -> None:
+        """Add a state; during one gesture it replaces the last one."""
+        if same(state, self.state):
+            return
+        if gesture and gesture == self._gesture:
+            self._past[-1] = state
+        else:
+            self._past.append(state)
+            del self._past[: -_MOST_STEPS - 1]
+        self._gesture = gesture
+        self._undone.clear()
+
+    def end_gesture(self) -> None:
+        """Make the next change a step of its own."""
+        self._gesture = ""
+
+    def undo(self) -> None:
+        """Go back one step."""
+        self.end_gesture()
+        if self.can_undo:
+            self._undone.append(self._past.pop())
+
+    def redo(self) -> None:
+        """Repeat the step undone last."""
+        self.end_gesture()
+        if self._undone:
+            self._past.append(self._undone.pop())

@@ -52,7 +52,7 @@ class Studio:
         self.rendered: Rendered | None = None
         self.settings: Settings | None = None
         self._views = Views(self.renderer)
-        self._thin_parts = self.renderer.thin_parts
+        self._thin_parts = self.renderer.memo
         self._provisional = False  # whether something stood in for what is still looked for
         self._shown: tuple[ViewerState, Camera, Settings] | None = None
         self.last_image: Any = None
@@ -155,7 +155,7 @@ class Studio:
         if state.view == ATLAS and self._shows_light_of(state, place):
             return self._views.draw_chart(state.scene, settings, state.chart, place)
         self._lit = None
-        self.rendered = self.renderer.draw(state.scene, settings, keep_stages=True, place=place)
+        self.rendered = self.renderer.draw(state.scene, settings, view=place)
         self._lit = None if self._thin_parts.provisional else (state, place)
         if state.view in (PICTURE, *PARTS):
             return self.rendered.picture.bytes

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
+from dermis.frame.atlas_layout import PairBuffers
 from dermis.frame.inputs import Inputs
-from dermis.frame.passes.translucency_weights import Pairs
-from dermis.frame.passes.variants import Variants
+from dermis.frame.passes import program
 from dermis.frame.renderer import Renderer
 from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture
 from dermis.gpu.device import gpu_failures
@@ -31,6 +31,7 @@ LAYERS = (*LEVELS, "stretch", "thickness")
 VIEWS = ("picture", *PARTS, *LAYERS, "shadow", "normals", ATLAS)
 """All that can be looked at."""
 
+_INTERMEDIATE = Path(__file__).parent / "intermediate.wgsl"
 _NUMBERS = {"stretch": 1, "thickness": 2, "shadow": 3, "normals": 4}  # as in intermediate.wgsl; levels are 0
 _ATLAS_NEEDED = "Choose a narrower blur, or the technique texture-space"
 
@@ -40,11 +41,10 @@ class Views:
 
     def __init__(self, renderer: Renderer) -> None:
         self._renderer, device = renderer, renderer.device
-        self._variants = Variants(device, Path(__file__).parent / "intermediate.wgsl")
         self._flat = ComputeProgram(device, Path(__file__).parent / "chart.wgsl")
         self._nothing = texture_from(device, np.zeros((1, 1, 4), np.float32), "rgba32float")
         self._image: Any = None
-        self._thick: weakref.WeakKeyDictionary[Pairs, Any] = weakref.WeakKeyDictionary()
+        self._thick: weakref.WeakKeyDictionary[PairBuffers, Any] = weakref.WeakKeyDictionary()
         self._density: weakref.WeakKeyDictionary[Any, float] = weakref.WeakKeyDictionary()
 
     def draw(self, scene: Scene, settings: Settings, view: str, place: str = "") -> Any:
@@ -53,20 +53,21 @@ class Views:
         Raises DermisError for what the technique does not make.
         """
         inputs = self._renderer.prepare(scene, settings, place)
-        constants = tuple(switch for switch in inputs.light_constants if switch[0] == "SHAPES")
-        program = self._variants.program(constants)
+        around = ("ENVIRONMENT", "HALF_SPACE")  # which the shader has not
+        constants = tuple(switch for switch in inputs.light_constants if switch[0] not in around)
+        shader = program(self._renderer.device, _INTERMEDIATE, constants)
         layer, scale = self._layer(inputs, view, settings)
         looked = ("eye", "forward", "right", "up", "samples", "jitter")
-        record = program.record("Look", **{name: inputs.view[name] for name in looked})
+        record = shader.record("Look", **{name: inputs.view[name] for name in looked})
         record["what"], record["scale"] = _NUMBERS.get(view, 0), scale
         bound = {
             **inputs.lit,
             "look": record,
-            "seen": inputs.seen.texture,
+            "seen": inputs.resources.visibility.texture,
             "layer": layer,
             "bytes": self._space(settings.size),
         }
-        return self._computed(program, bound, settings.size)
+        return self._computed(shader, bound, settings.size)
 
     def draw_chart(self, scene: Scene, settings: Settings, chart: Chart, place: str = "") -> Any:
         """A texture of bytes that shows a part of the atlas of the frame drawn last at a place.
@@ -80,29 +81,29 @@ class Views:
         bound = {"sheet": sheet, "layer": layer, "bytes": self._space(settings.size)}
         return self._computed(self._flat, bound, settings.size)
 
-    def _computed(self, program: ComputeProgram, bound: dict[str, Any], size: tuple[int, int]) -> Any:
+    def _computed(self, shader: ComputeProgram, bound: dict[str, Any], size: tuple[int, int]) -> Any:
         with gpu_failures(self._renderer.device):
             frame = Frame(self._renderer.device)
-            frame.compute("view", program, bound, size)
+            frame.compute("view", shader, bound, size)
             frame.submit()
         return self._image
 
     def _layer(self, inputs: Inputs, view: str, settings: Settings) -> tuple[Any, float]:
         """The map of the atlas that a view reads, and how its numbers are scaled."""
         if view in LEVELS:
-            found = inputs.levels.views if inputs.scatters else []
-            if LEVELS[view] >= len(found):
-                refuse(
-                    f"view {view}", "a level of light on the atlas", f"there are {len(found)}", _ATLAS_NEEDED
-                )
-            return found[LEVELS[view]], settings.exposure / inputs.scale
+            layer, blurs = LEVELS[view], inputs.blurs[:1] if inputs.resources.scatters else ()
+            count = len(blurs[0].halvings) if blurs else 0
+            if layer >= count:
+                refuse(f"view {view}", "a level of light on the atlas", f"there are {count}", _ATLAS_NEEDED)
+            halvings, scale = blurs[0].halvings[layer], blurs[0].scale
+            return inputs.resources.levels.layer(layer, halvings), settings.exposure / scale
         if view == "stretch":
             stretch = inputs.layouts[0].atlas.resources["stretch_map"]
             return stretch, self._mean_density(stretch)
         return self._thickness(inputs) if view == "thickness" else self._nothing, 1.0
 
     def _thickness(self, inputs: Inputs) -> Any:
-        thin = inputs.layouts[0].thin
+        thin = inputs.layouts[0].translucency
         if thin is None:
             refuse("view thickness", "light through thin parts", "there is none", "Set transmission to thin")
         if thin.pairs not in self._thick:
@@ -124,7 +125,7 @@ class Views:
         return self._image
 
 
-def thickness_mm(device: Device, pairs: Pairs) -> NDArray[np.float32]:
+def thickness_mm(device: Device, pairs: PairBuffers) -> NDArray[np.float32]:
     """(n, n) least depth of the flesh behind each cell of the atlas, at most the search radius [mm]."""
     receivers, words = (
         np.frombuffer(device.handle.queue.read_buffer(buffer), np.uint32).reshape(-1, 3)

@@ -1,11 +1,11 @@
-"""The three windows of the one viewer."""
+"""Where a viewer is shown: a desktop window, a web page, a notebook cell."""
 
 from __future__ import annotations
 
 import importlib
 import warnings
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NoReturn
 
 from dermis.errors import refuse
 from dermis.viewer.state import ViewerState, named_state
@@ -14,35 +14,25 @@ from dermis.viewer.viewer import Viewer
 Size = tuple[int, int]
 _TITLE = "dermis"
 _MOST_FPS = 60
-_VIEWER = 'Install it: pip install "dermis[viewer]"'
-_NOTEBOOK = 'Install it: pip install "dermis[notebook]"'
 
 
 def show_window(state: ViewerState, adapter: str, size: Size) -> None:
-    """Open a window on the desk and return when it is closed.
+    """Open a desktop window and return when it is closed.
 
     Raises DermisError without a display, a device or the extra `viewer`.
     """
-    backend = _backend("glfw", ("glfw",), _VIEWER)
-    _find_display(backend.glfw)
+    backend = _backend("glfw", ("glfw",), "viewer")
+    with warnings.catch_warnings(record=True) as caught:  # without a display glfw warns, and exits later
+        warnings.simplefilter("always")
+        if not backend.glfw.init():
+            _refuse_display("; ".join(str(one.message) for one in caught))
     try:
         canvas = backend.RenderCanvas(size=size, title=_TITLE, max_fps=_MOST_FPS)
-    except Exception as error:  # whatever glfw makes of a missing display
-        came = f"none opens ({error})"
-        refuse("window", "a display to open it on", came, "Set DISPLAY, or use --browser")
+    except Exception as error:  # glfw has no class of its own for a missing display
+        _refuse_display(error)
     viewer = Viewer(state, canvas, adapter)
     backend.loop.run()
     _raise_failure(viewer)
-
-
-def _find_display(glfw: Any) -> None:
-    """Refuse without a display: glfw only warns of it, and ends the process once a window is asked for."""
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
-        opens = glfw.init()
-    if not opens:
-        came = f"none opens ({'; '.join(str(one.message) for one in told)})"
-        refuse("window", "a display to open it on", came, "Set DISPLAY, or use --browser")
 
 
 def serve(
@@ -57,17 +47,16 @@ def serve(
 ) -> None:
     """Serve web pages until interrupted.
 
-    size : of the canvas until a page has told its own
-    port : 0 for any that is free
-    announce : told the page's address, and whether others than this machine can reach it
-    secret : whether the page's address has a token even where only this machine can reach it
+    size : of the canvas until a page reports its own
+    port : 0 for any free one
+    announce : called with the page's URL and whether other machines can reach it
+    secret : whether the URL has a token even when only this machine can reach it
 
-    Raises DermisError when nothing can listen there, without a device or the extra `viewer`.
+    Raises DermisError when the address cannot be used, without a device or the extra `viewer`.
     """
-    _backend("http", ("uvicorn", "websockets"), _VIEWER)
+    _backend("http", ("uvicorn", "websockets"), "viewer")
     from dermis.viewer.browser.canvas import PageCanvas
-    from dermis.viewer.browser.guard import is_local
-    from dermis.viewer.browser.server import bind, server
+    from dermis.viewer.browser.server import bind, is_local, server
 
     listener, address = bind(host, port, secret=secret)
     with listener:
@@ -75,7 +64,7 @@ def serve(
         viewer.canvas._size_info.set_physical_size(*size, 1.0)
         announce(address.url, not is_local(host))
         pages = server(address)
-        # Ctrl+C comes to rendercanvas, which closes the canvas and would leave the server running.
+        # rendercanvas handles Ctrl+C by closing the canvas; without this the server would keep running.
         viewer.canvas.add_event_handler(lambda event: setattr(pages, "should_exit", True), "close")
         pages.run(sockets=[listener])
     _raise_failure(viewer)
@@ -84,27 +73,48 @@ def serve(
 def notebook_viewer(
     shown: ViewerState | str = "bust", adapter: str = "auto", size: Size = (720, 540)
 ) -> Viewer:
-    """A viewer that a notebook's cell displays.
+    """A viewer for a notebook cell to display.
 
-    shown : a state, or what `dermis view` takes: the built-in bust, a sample, a mesh file, a scene in TOML
+    shown : a state, or what `dermis view` takes: the built-in bust, a sample, a mesh file, a TOML scene
 
-    Raises DermisError for what is none of these, and without the packages that a notebook takes.
+    Raises DermisError for anything else, and without the extra `notebook`.
     """
-    _backend("anywidget", ("anywidget",), _NOTEBOOK)
-    from dermis.viewer.notebook import CellCanvas
-
+    canvas = _notebook_canvas(_backend("anywidget", ("anywidget",), "notebook"))
     state = shown if isinstance(shown, ViewerState) else named_state(shown)
-    return Viewer(state, CellCanvas(size=size, max_fps=_MOST_FPS), adapter)
+    return Viewer(state, canvas(size=size, max_fps=_MOST_FPS), adapter)
 
 
-def _backend(name: str, needed: tuple[str, ...], remedy: str) -> Any:
-    """rendercanvas' module of that name, when the packages that it needs are there."""
+def _notebook_canvas(backend: Any) -> Any:
+    """rendercanvas' notebook widget with two corrections."""
+
+    class NotebookCanvas(backend.AnywidgetRenderCanvas):  # type: ignore[misc]
+        def _rfb_handle_msg(self, widget: Any, content: dict[str, Any], buffers: list[Any]) -> None:
+            kind = content.get("type")
+            super()._rfb_handle_msg(widget, content, buffers)
+            if kind == "resize":
+                self.request_draw()  # otherwise a resized cell would not redraw until something moves
+
+        def _rc_close(self) -> None:
+            if not self.get_closed():  # the base class would call itself without end
+                self._is_closed = True
+                super()._rc_close()
+
+    return NotebookCanvas
+
+
+def _backend(name: str, needed: tuple[str, ...], extra: str) -> Any:
+    """A module of rendercanvas, provided that the packages it needs are installed."""
     for package in (*needed, "imgui_bundle", "rendercanvas"):
         try:
             importlib.import_module(package)
         except ImportError:
+            remedy = f'Install it: pip install "dermis[{extra}]"'
             refuse("viewer", f"the package {package.replace('_', '-')}", "it is not installed", remedy)
     return importlib.import_module(f"rendercanvas.{name}")
+
+
+def _refuse_display(reason: object) -> NoReturn:
+    refuse("window", "a display to open it on", f"none opens ({reason})", "Set DISPLAY, or use --browser")
 
 
 def _raise_failure(viewer: Viewer) -> None:

@@ -13,7 +13,7 @@ from dermis.errors import DermisError
 from dermis.optics.diffusion import dipole
 from dermis.optics.diffusion.boundary import mismatch
 from dermis.optics.diffusion.models import diffusion_profile
-from dermis.optics.presets import media
+from dermis.optics.media import media
 from dermis.optics.radial import enclosed
 
 MARBLE_GREEN = media()["marble"].channel(1).with_eta(1.5)

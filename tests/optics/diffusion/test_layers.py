@@ -13,8 +13,7 @@ from tolerances import CLOSED_FORM, LAYERED_TOTAL
 from dermis.optics.diffusion import dipole, hankel, layered_diffusion, multipole
 from dermis.optics.diffusion.boundary import mismatch
 from dermis.optics.diffusion.models import diffusion_profile
-from dermis.optics.media import Layer, Medium
-from dermis.optics.presets import media
+from dermis.optics.media import Layer, Medium, media
 from dermis.optics.radial import enclosed, resample
 
 A = mismatch(1.4, "exact")

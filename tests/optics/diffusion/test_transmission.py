@@ -9,9 +9,9 @@ import pytest
 from slabs import slab, table
 
 from dermis.errors import DermisError
-from dermis.optics.diffusion.transmission import cut, through_gaussians, through_slab
+from dermis.optics.diffusion.models import cut, through_gaussians, through_slab
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.presets import media
+from dermis.optics.media import media
 from dermis.optics.profiles import load_profile
 
 THICK_MM = np.array([0.25, 0.5, 1.0, 2.0, 4.0, 8.0])

@@ -1,13 +1,86 @@
-"""The frame's stages: each a Python file that records it and a WGSL file of the same name."""
+"""The passes of a frame: each a Python file that declares them and a WGSL file of the same name."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from pathlib import Path
 
-STAGES = Path(__file__).parent
-SHARED_SHADERS = Path(__file__).parent.parent / "wgsl"
+from dermis.frame.lights import light_numbers
+from dermis.frame.lights.kind import light_shaders
+from dermis.frame.surface import lobe_shaders, surface_numbers
+from dermis.gpu import ComputeProgram, Constants, Device, compiled
+from dermis.gpu.program import declared
+from dermis.gpu.wgsl_source import Folder, ShaderFolder
+from dermis.scene.lights import LIGHTS
+from dermis.specular.models import MODELS
+
+PASSES = Path(__file__).parent
+TECHNIQUES = PASSES.parent / "techniques"
+SHARED_SHADERS = ShaderFolder(
+    PASSES.parent / "wgsl",
+    lists={"lights": light_shaders, "lobes": lobe_shaders},
+    numbers=lambda: {**light_numbers(), **surface_numbers()},
+)
 TILE = 16
 """Side of workgroups that do little: smaller ones are done before the H200 has started the next."""
-_LEVELS = STAGES / "levels"
-SOURCE_SHADERS = {"rgba32float": _LEVELS / "loaded", "rgba16float": _LEVELS / "filtered"}
-"""Shaders that read blurred light, by its format."""
-STORE_SHADERS = {"rgba32float": _LEVELS / "floats", "rgba16float": _LEVELS / "halves"}
-"""Shaders that store it."""
+_LEVELS = PASSES / "levels"
+_SOURCES = {"rgba32float": _LEVELS / "loaded", "rgba16float": _LEVELS / "filtered"}
+_STORES = {"rgba32float": _LEVELS / "floats", "rgba16float": _LEVELS / "halves"}
+_STRIP = 16  # pixels of an invocation on software adapters, see shade.wgsl
+
+
+def shader_folders(source: str = "", store: str = "") -> tuple[Folder, ...]:
+    """Where includes are looked up.
+
+    source, store : formats of the blurred light that the shader reads and stores, if it does
+    """
+    levels = [_SOURCES[source]] if source else []
+    levels += [_STORES[store]] if store else []
+    return (*levels, SHARED_SHADERS, TECHNIQUES)
+
+
+def program(
+    device: Device, path: str | Path, constants: Constants = (), source: str = "", store: str = ""
+) -> ComputeProgram:
+    """The shader of that name among the passes, or at that path, with pipeline constants.
+
+    What suits the device is added to them; see `shader_folders` for the formats.
+    """
+
+    def make() -> ComputeProgram:
+        file, folders = PASSES / path, shader_folders(source, store)
+        return ComputeProgram(device, file, folders, suited(device, file, folders, constants))
+
+    return compiled(device, (path, source, store, registered()), constants, make)
+
+
+def suited(
+    device: Device, path: Path, folders: Sequence[Folder], constants: Constants = ()
+) -> dict[str, float]:
+    """Pipeline constants, with those that the shader has of what suits the device."""
+    return declared(path, folders, device_constants(device)) | dict(constants)
+
+
+def registered() -> int:
+    """Another number whenever a light or a lobe has been added to the shaders, or taken away."""
+    return LIGHTS.changes + MODELS.changes
+
+
+def device_constants(device: Device) -> Constants:
+    """Pipeline constants that suit the device, for shaders that have them.
+
+    GPUs read buffers faster. Software adapters read textures faster, pass over lights in the dark one by one,
+    and shade columns of pixels; see geometry.wgsl, lighting.wgsl and shade.wgsl.
+    """
+    if device.adapter.kind == "CPU":
+        return (("PASSES_DARK", 1), ("STRIP", _STRIP))
+    return (("MESH_IN_BUFFERS", 1),)
+
+
+def warm_up(device: Device) -> None:
+    """Begin to compile what most frames need, while others load what it is to work on."""
+    for name in ("shade.wgsl", "surface_texels.wgsl", "shadow_bounds.wgsl", "post.wgsl", "pack.wgsl"):
+        program(device, name)
+    texel = "rgba32float" if device.adapter.kind == "CPU" else "rgba16float"
+    for name in ("stitch_gather.wgsl", "diffuse_halve.wgsl"):
+        program(device, name, source=texel, store=texel)

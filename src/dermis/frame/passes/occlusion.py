@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.geometry import HeadTextures
-from dermis.frame.passes import SHARED_SHADERS, STAGES
-from dermis.frame.passes.visibility_buffer import Nearest
+from dermis.frame.geometry import HeadResources
+from dermis.frame.passes import program
+from dermis.frame.passes.visibility_buffer import draw_layers, make_layers
 from dermis.frame.projection import ShadowView, parallel_view, shadow_layers
 from dermis.gpu import ComputeProgram, Device, Frame
 from dermis.gpu.program import Resources
@@ -21,59 +21,50 @@ MAP_SIZE = 512
 FORM = f"1 {DIRECTIONS} {MAP_SIZE}"
 """Differs when baking gives other results."""
 _BATCH = 32  # depth maps at a time
-_DIRECTIONAL = 2  # lights.wgsl
 
 
-class Occlusion:
-    """Sees the mesh from all around and counts where each place is in sight.
+def bake_occlusion(
+    device: Device,
+    mesh: Mesh,
+    lit: Resources,
+    atlas: Any,
+    side: int,
+    directions: int = DIRECTIONS,
+    map_size: int = MAP_SIZE,
+) -> NDArray[np.float32]:
+    """(rows, side) open share of the sky, weighted by the cosine, 0 to 1; NaN where there is no surface.
 
-    The shader is compiled when it is first wanted: most frames have no environment.
+    The mesh is seen from all around, and each place counts where it is in sight.
+
+    lit : what the lighting passes read
+    atlas : texture of texels, of which side x side are baked, then the vertices, row by row
     """
+    shader, towards = program(device, "occlusion.wgsl"), fibonacci_sphere(directions)
+    rows = side - (-len(mesh.positions) // side)
+    sums = device.buffer(np.zeros((rows, side, 2), np.float32), "STORAGE")
+    layers = make_layers(device, (map_size, map_size), _BATCH, triangles=False)
+    head, frame = HeadResources(dict(lit), len(mesh.triangles)), Frame(device)
+    for first in range(0, len(towards), _BATCH):
+        views = [parallel_view(-d, mesh, map_size) for d in towards[first : first + _BATCH]]
+        draw_layers(frame, "occlusion", layers, shadow_layers(views), head)
+        sky = shader.record("Sky", directions=len(views), side=side, vertices=len(mesh.positions))
+        own = {"lights": _lights(shader, views), "shadow_maps": layers.texture, "sky": sky}
+        bound = {**lit, **own, "atlas": atlas, "open": sums}
+        frame.compute("occlusion", shader, bound, (side, rows))
+    frame.submit()
+    raw = np.frombuffer(device.handle.queue.read_buffer(sums), np.float32).reshape(rows, side, 2)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(raw[..., 0] / raw[..., 1])
 
-    def __init__(self, device: Device, directions: int = DIRECTIONS, map_size: int = MAP_SIZE) -> None:
-        self._device, self._map_size = device, map_size
-        self._towards = fibonacci_sphere(directions)
-        self._nearest = Nearest(device, triangles=False)
-        self._program = ComputeProgram(device, STAGES / "occlusion.wgsl", (SHARED_SHADERS,))
 
-    def bake(
-        self, mesh: Mesh, head: HeadTextures, lit: Resources, atlas: Any, side: int
-    ) -> NDArray[np.float32]:
-        """(rows, side) open share of the sky, weighted by the cosine, 0 to 1; NaN where there is no surface.
-
-        lit : what the lighting passes read
-        atlas : texture of texels, of which side x side are baked, then the vertices, row by row
-        """
-        rows = side - (-len(mesh.positions) // side)
-        sums = self._device.buffer(np.zeros((rows, side, 2), np.float32), "STORAGE")
-        layers = self._nearest.make_layers((self._map_size, self._map_size), _BATCH)
-        frame = Frame(self._device)
-        for first in range(0, len(self._towards), _BATCH):
-            views = [parallel_view(-d, mesh, self._map_size) for d in self._towards[first : first + _BATCH]]
-            self._nearest.draw(frame, "occlusion", layers, shadow_layers(views), head)
-            sky = self._program.record("Sky", directions=len(views), side=side, vertices=len(mesh.positions))
-            bound = {
-                **lit,
-                "lights": self._lights(views),
-                "shadow_maps": layers.texture,
-                "sky": sky,
-                "atlas": atlas,
-                "open": sums,
-            }
-            frame.compute("occlusion", self._program, bound, (side, rows))
-        frame.submit()
-        raw = np.frombuffer(self._device.handle.queue.read_buffer(sums), np.float32).reshape(rows, side, 2)
-        with np.errstate(invalid="ignore"):
-            return np.asarray(raw[..., 0] / raw[..., 1])
-
-    def _lights(self, views: list[ShadowView]) -> Any:
-        record = self._program.record("Lights")
-        for layer, view in enumerate(views):
-            light = record["light"][layer]
-            light["kind"], light["layer"], light["half_width"] = _DIRECTIONAL, layer, 1
-            light["direction"] = np.cross(view.up, view.right)
-            light["to_map"], light["texel"] = view.clip.T, view.texel
-        return record
+def _lights(shader: ComputeProgram, views: list[ShadowView]) -> Any:
+    record = shader.record("Lights")
+    for layer, view in enumerate(views):
+        light = record["light"][layer]
+        light["parallel"], light["layer"], light["half_width"] = 1, layer, 1
+        light["direction"] = np.cross(view.up, view.right)
+        light["to_map"], light["texel"] = view.clip.T, view.texel
+    return record
 
 
 def fibonacci_sphere(count: int) -> Floats:

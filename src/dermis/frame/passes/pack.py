@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
-from dermis.frame.passes import STAGES
+from dermis.frame.passes import program
 from dermis.frame.passes.post import Picture
-from dermis.gpu import ComputeProgram, Device, Frame
+from dermis.gpu import Device, Graph
 from dermis.gpu.readback import Fetched
 
 _ROW = 1024  # as in the shaders
@@ -40,46 +39,35 @@ class Leaving:
         return numbers.reshape(height, width, _CHANNELS)
 
 
-class Pack:
-    """Takes a picture off the device."""
+def draw(graph: Graph, picture: Picture, *, linear: bool = False) -> Leaving:
+    """The picture as the passes so far leave it, on its way to NumPy.
 
-    def __init__(self, device: Device) -> None:
-        self._device = device
-        self._bytes = ComputeProgram(device, STAGES / "pack.wgsl")
-        self._space: Any = None
+    linear : floats rather than bytes
 
-    @cached_property
-    def _linear(self) -> ComputeProgram:
-        """For sequences of linear pictures."""
-        return ComputeProgram(self._device, STAGES / "pack_linear.wgsl")
+    Raises DermisError for more than the device has in one buffer.
+    """
+    device, pixels = graph.device, picture.size[0] * picture.size[1]
+    if linear:
+        shader, count, words = program(device, "pack_linear.wgsl"), pixels, _CHANNELS * pixels
+        bound = {"exposed": picture.exposed}
+    else:
+        count = -(-pixels // _PIXELS)
+        shader, words, bound = program(device, "pack.wgsl"), _WORDS * count, {"bytes": picture.bytes}
+    _check(device, 4 * words, pixels)
+    packed = _packed(device, picture, words)
+    graph.compute("pack", shader, bound | {"packed": packed}, (_ROW, -(-count // _ROW)))
+    return Leaving(graph.fetch(packed), picture.size, np.float32 if linear else np.uint8)
 
-    def draw(self, frame: Frame, picture: Picture, *, linear: bool = False) -> Leaving:
-        """The picture as the passes so far leave it.
 
-        linear : floats rather than bytes
+def _check(device: Device, size: int, pixels: int) -> None:
+    most = device.max_storage_bytes
+    if size > most:
+        limit = f"at most {most * pixels // size} pixels at once from {device.adapter.name}"
+        refuse("size", limit, f"there are {pixels}", "Choose a smaller one")
 
-        Raises DermisError for more than the device has in one buffer.
-        """
-        pixels = picture.size[0] * picture.size[1]
-        if linear:
-            program, count, words = self._linear, pixels, _CHANNELS * pixels
-            bound = {"exposed": picture.exposed}
-        else:
-            count = -(-pixels // _PIXELS)
-            program, words, bound = self._bytes, _WORDS * count, {"bytes": picture.bytes}
-        self._check(4 * words, pixels)
-        packed = self._packed(words)
-        frame.compute("pack", program, bound | {"packed": packed}, (_ROW, -(-count // _ROW)))
-        return Leaving(frame.fetch(packed), picture.size, np.float32 if linear else np.uint8)
 
-    def _check(self, size: int, pixels: int) -> None:
-        most = self._device.max_storage_bytes
-        if size > most:
-            limit = f"at most {most * pixels // size} pixels at once from {self._device.adapter.name}"
-            refuse("size", limit, f"there are {pixels}", "Choose a smaller one")
-
-    def _packed(self, words: int) -> Any:
-        """Space for words of 4 bytes; pictures that follow each other share it."""
-        if self._space is None or self._space.size != 4 * words:
-            self._space = self._device.buffer(np.zeros(words, np.uint32), "STORAGE")
-        return self._space
+def _packed(device: Device, picture: Picture, words: int) -> Any:
+    """Space for words of 4 bytes, which lives as long as the picture."""
+    if words not in picture.packed:
+        picture.packed[words] = device.buffer(np.zeros(words, np.uint32), "STORAGE")
+    return picture.packed[words]

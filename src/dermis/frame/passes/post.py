@@ -2,50 +2,44 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
-from dermis.frame.passes import SHARED_SHADERS, STAGES
-from dermis.gpu import ComputeProgram, Device, Frame, make_texture
+from dermis.frame.passes import program
+from dermis.gpu import Device, Recorder, make_texture
 from dermis.scene.settings import Settings
 
 _TONES = ("none", "filmic", "neutral")  # numbered as in tone.wgsl
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Picture:
-    """Radiance as shaded; exposed and linear; exposed, sRGB, in bytes."""
+    """Radiance as shaded; exposed and linear; exposed, sRGB, in bytes.
+
+    packed : buffers in which it leaves the device, by their words
+    """
 
     radiance: Any
     exposed: Any
     bytes: Any
     size: tuple[int, int]
+    packed: dict[int, Any] = field(default_factory=dict)
 
 
-class Post:
-    """Exposes, applies the tone curve and encodes."""
+def make_picture(device: Device, size: tuple[int, int]) -> Picture:
+    """Space for an image of size (width, height)."""
+    radiance, exposed = (make_texture(device, size, "rgba32float") for _ in range(2))
+    return Picture(radiance, exposed, make_texture(device, size, "rgba8uint"), size)
 
-    def __init__(self, device: Device) -> None:
-        self._device = device
-        self._program = ComputeProgram(device, STAGES / "post.wgsl", (SHARED_SHADERS,))
 
-    def make_picture(self, size: tuple[int, int]) -> Picture:
-        """Space for an image of size (width, height)."""
-        radiance, exposed = (make_texture(self._device, size, "rgba32float") for _ in range(2))
-        return Picture(radiance, exposed, make_texture(self._device, size, "rgba8uint"), size)
-
-    def draw(self, frame: Frame, radiance: Any, picture: Picture, settings: Settings) -> None:
-        """Fill the picture's linear and byte images."""
-        record = self._program.record(
-            "Post",
-            exposure=settings.exposure,
-            tone=_TONES.index(settings.tone),
-            encoded=int(settings.gamma == "right"),
-        )
-        bound = {
-            "settings": record,
-            "image": radiance,
-            "exposed": picture.exposed,
-            "bytes": picture.bytes,
-        }
-        frame.compute("post", self._program, bound, picture.size)
+def draw(graph: Recorder, radiance: Any, picture: Picture, settings: Settings) -> None:
+    """Expose, apply the tone curve and encode: fill the picture's linear and byte images."""
+    shader = program(graph.device, "post.wgsl")
+    record = shader.record(
+        "Post",
+        exposure=settings.exposure,
+        tone=_TONES.index(settings.tone),
+        encoded=int(settings.gamma == "right"),
+    )
+    bound = {"settings": record, "image": radiance, "exposed": picture.exposed, "bytes": picture.bytes}
+    graph.compute("post", shader, bound, picture.size)

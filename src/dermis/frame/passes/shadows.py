@@ -1,29 +1,29 @@
-"""Shadow maps: one layer for each light that casts shadows, redrawn only when the light or the mesh moved."""
+"""Shadow maps: one layer for each light that casts shadows [Williams1978]."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
-from dermis.frame.geometry import HeadTextures
-from dermis.frame.limits import check_shadows
-from dermis.frame.passes import STAGES
-from dermis.frame.passes.visibility_buffer import Layers, Nearest
+from dermis.frame.geometry import HeadResources
+from dermis.frame.passes import program
+from dermis.frame.passes.visibility_buffer import Drawer, Layers, draw_layers, make_layers
 from dermis.frame.projection import Views
-from dermis.gpu import ComputeProgram, Device, Frame, make_texture
+from dermis.gpu import Device, make_texture
+from dermis.gpu.memory import check_memory
+
+_DEPTH_BYTES = 4
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
 class ShadowMaps:
-    """A depth layer for each light [Williams1978].
+    """A depth layer for each light.
 
     bounds : texture of the nearest depths in ever larger squares of each layer, for lights of some size
-    drawn : key of what they show
     """
 
     layers: Layers
     bounds: Any
-    drawn: bytes = b""
 
     @property
     def texture(self) -> Any:
@@ -31,48 +31,31 @@ class ShadowMaps:
         return self.layers.texture
 
 
-class Shadows:
-    """Draws the depth that each light sees."""
+def make_shadow_maps(device: Device, layers: int, size: int) -> ShadowMaps:
+    """Empty maps, `size` texels a side.
 
-    def __init__(self, device: Device) -> None:
-        self._device = device
-        self._nearest = Nearest(device, triangles=False)
-        self._bound = ComputeProgram(device, STAGES / "shadow_bounds.wgsl")
+    Raises DermisError when they do not fit into memory.
+    """
+    needed = _DEPTH_BYTES * layers * size**2
+    check_memory(device, needed, "shadow_size", f"{layers} maps of {size} texels")
+    side = _squares(size)
+    bounds = make_texture(device, (side + side // 2, side), "r32float", layers=max(2, layers))
+    return ShadowMaps(make_layers(device, (size, size), layers, triangles=False), bounds)
 
-    def make_maps(self, layers: int, size: int) -> ShadowMaps:
-        """Empty maps, `size` texels a side.
 
-        Raises DermisError when they do not fit into memory.
-        """
-        check_shadows(self._device, layers, size)
-        side = _squares(size)
-        bounds = make_texture(self._device, (side + side // 2, side), "r32float", layers=max(2, layers))
-        return ShadowMaps(self._nearest.make_layers((size, size), layers), bounds)
+def draw(graph: Drawer, maps: ShadowMaps, views: Views, head: HeadResources, bounded: bool = True) -> None:
+    """Draw the depth that each light sees.
 
-    def draw(
-        self,
-        frame: Frame,
-        maps: ShadowMaps,
-        views: Views,
-        head: HeadTextures,
-        key: bytes,
-        bounded: bool = True,
-    ) -> None:
-        """Draw every layer, unless the maps already show just that.
-
-        bounded : whether some light has a size, so that the bounds are read
-        """
-        key += b"bounded" * bounded
-        if len(views.clips) and maps.drawn != key:
-            self._nearest.draw(frame, "shadows", maps.layers, views, head)
-            if bounded:
-                self._draw_bounds(frame, maps, len(views.clips))
-            maps.drawn = key
-
-    def _draw_bounds(self, frame: Frame, maps: ShadowMaps, count: int) -> None:
-        resources = {"maps": maps.texture, "maps_sampler": self._device.sampler(), "bounds": maps.bounds}
+    bounded : whether some light has a size, so that the bounds are read
+    """
+    if not len(views.clips):
+        return
+    draw_layers(graph, "shadows", maps.layers, views, head)
+    if bounded:
+        bound = {"maps": maps.texture, "maps_sampler": graph.device.sampler(), "bounds": maps.bounds}
         groups = _squares(maps.layers.size[0]) // 16
-        frame.dispatch("shadows", self._bound, resources, (groups, groups, count))
+        shader = program(graph.device, "shadow_bounds.wgsl")
+        graph.dispatch("shadows", shader, bound, (groups, groups, len(views.clips)))
 
 
 def _squares(size: int) -> int:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
-from dermis.frame.levels import Levels
-from dermis.frame.passes import SHARED_SHADERS, STAGES
-from dermis.frame.passes.translucency_weights import Pairs
-from dermis.frame.passes.variants import Constants
-from dermis.gpu import ComputeProgram, Device, Frame
+from dermis.frame.atlas_layout import Translucency
+from dermis.frame.levels import Blur, Levels
+from dermis.frame.passes import program
+from dermis.gpu import Constants, Recorder
 
 _TEAMS: Constants = (("SIZE", 128), ("TEAM", 16), ("ROUND", 4))
 _ALONE: Constants = (("SIZE", 128), ("TEAM", 1), ("ROUND", 1))  # software adapters pay for barriers
@@ -17,65 +15,36 @@ _GATHERING = 64  # invocations of a workgroup, as in translucency_gather.wgsl
 _ROW = 1024  # workgroups, of which no more than 65535 fit in a row
 
 
-@dataclass(frozen=True)
-class Thin:
-    """Thin parts of an atlas.
+def draw(graph: Recorder, levels: Levels, blur: Blur, thin: Translucency, constants: Constants = ()) -> Any:
+    """The light that comes through, from the blurred layers, summed from all places opposite.
 
-    pairs : translucent pairs
-    weights : what `TranslucencyWeights.weigh` made of them
-    layer : blurred level, counted from 0, whose light passes
-    gathered : buffer for the light of the sources
+    constants : of translucency.wgsl, where others than those that suit the device are wanted
+
+    Source: [JensenBuhler2002; dEonLuebke2007].
     """
-
-    pairs: Pairs
-    weights: Any
-    layer: int
-    gathered: Any
-
-    @property
-    def light(self) -> Any:
-        """Texture of the coarse atlas for what comes through."""
-        return self.pairs.light
-
-
-class Transmission:
-    """Sums the light from the sources of each receiver [JensenBuhler2002; dEonLuebke2007].
-
-    constants : of translucency.wgsl, what suits the device if left out
-    """
-
-    def __init__(self, device: Device, constants: Constants = ()) -> None:
-        chosen = dict((_ALONE if device.adapter.kind == "CPU" else _TEAMS) + constants)
-        self._receivers = int(chosen["SIZE"]) // int(chosen["TEAM"])  # of a workgroup
-        self._gather = ComputeProgram(device, STAGES / "translucency_gather.wgsl", (SHARED_SHADERS,))
-        self._sum = ComputeProgram(device, STAGES / "translucency.wgsl", (SHARED_SHADERS,), chosen)
-
-    def draw(self, frame: Frame, levels: Levels, thin: Thin) -> Any:
-        """The light that comes through, from the blurred layers, which start after the unblurred one."""
-        pairs = thin.pairs
-        layer = 1 + thin.layer
-        record = self._gather.record(
-            "Entering",
-            layer=layer,
-            sources=pairs.source_count,
-            mip=levels.halvings[layer],
-            scale=1.0 / levels.scale,
-        )
-        entering = {
-            "entering": record,
-            "levels": levels.stack,
-            "sources": pairs.sources,
-            "gathered": thin.gathered,
-        }
-        leaving = {
-            "receivers": pairs.receivers,
-            "weights": thin.weights,
-            "gathered": thin.gathered,
-            "transmitted": pairs.light,
-        }
-        frame.dispatch("transmission", self._gather, entering, _rows(pairs.source_count, _GATHERING))
-        frame.dispatch("transmission", self._sum, leaving, _rows(pairs.receiver_count, self._receivers))
-        return pairs.light
+    device, pairs, layer = graph.device, thin.pairs, 1 + thin.layer
+    gather = program(device, "translucency_gather.wgsl")
+    record = gather.record(
+        "Entering",
+        layer=layer,
+        sources=pairs.source_count,
+        mip=blur.halvings[layer],
+        scale=1.0 / blur.scale,
+    )
+    sources = {"entering": record, "levels": levels.stack, "sources": pairs.sources}
+    entering = {**sources, "gathered": thin.gathered}
+    leaving = {
+        "receivers": pairs.receivers,
+        "weights": thin.weights,
+        "gathered": thin.gathered,
+        "transmitted": pairs.light,
+    }
+    chosen = dict((_ALONE if device.adapter.kind == "CPU" else _TEAMS) + constants)
+    add_up = program(device, "translucency.wgsl", tuple(chosen.items()))
+    graph.dispatch("translucency", gather, entering, _rows(pairs.source_count, _GATHERING))
+    receivers = int(chosen["SIZE"]) // int(chosen["TEAM"])  # of a workgroup
+    graph.dispatch("translucency", add_up, leaving, _rows(pairs.receiver_count, receivers))
+    return pairs.light
 
 
 def _rows(count: int, each: int) -> tuple[int, int, int]:

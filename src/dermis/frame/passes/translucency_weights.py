@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,8 +9,9 @@ from numpy.typing import NDArray
 
 from dermis.atlas.translucency.pairs import TranslucentPairs
 from dermis.disk import cached_array
-from dermis.frame.passes import STAGES
-from dermis.gpu import ComputeProgram, Device, Frame, make_texture, upload
+from dermis.frame.atlas_layout import PairBuffers
+from dermis.frame.passes import program
+from dermis.gpu import ComputeProgram, Device, Frame, make_texture, scratch, upload
 from dermis.optics.gaussians import MOST_GAUSSIANS
 
 Floats = NDArray[np.float64]
@@ -23,32 +22,7 @@ GRAIN = (
 _SMOOTH = 0.45  # of the spacing; light of this standard deviation has no detail that the sources miss
 
 
-@dataclass(frozen=True)
-class Pairs:
-    """Pairs of places on a device, and how they lie.
-
-    side : of the coarse atlas
-    receivers : buffer of cells that take light, as translucency.wgsl reads them
-    pairs, sources : buffers of words, as translucency_weights.wgsl reads them
-    count, source_count, receiver_count : of pairs, sources and receivers
-    light : texture of the coarse atlas for what comes through, none yet, and 1 where there is surface
-    key : what stands for all of it, so that what a profile makes of it can be kept on disk; empty for no key
-    """
-
-    side: int
-    radius_mm: float
-    spacing_mm: float
-    receivers: Any
-    pairs: Any
-    sources: Any
-    count: int
-    source_count: int
-    receiver_count: int
-    light: Any
-    key: str = ""
-
-
-def upload_pairs(device: Device, table: TranslucentPairs, key: str = "") -> Pairs:
+def upload_pairs(device: Device, table: TranslucentPairs, key: str = "") -> PairBuffers:
     """The pairs as the shaders read them.
 
     key : what stands for the table, if what passes is to be kept on disk
@@ -61,7 +35,7 @@ def upload_pairs(device: Device, table: TranslucentPairs, key: str = "") -> Pair
     sources[:number, 0] = np.ascontiguousarray(table.texel).view(np.uint32)[:, 0]
     sources[:number, 1] = table.area_mm2.view(np.uint32)
     receivers = _receivers(table)
-    return Pairs(
+    return PairBuffers(
         side=len(table.receiver),
         radius_mm=float(table.radius_mm),
         spacing_mm=float(table.spacing_mm),
@@ -95,56 +69,48 @@ def _unlit(device: Device, surface: NDArray[np.bool_]) -> Any:
     light[..., 3] = surface
     texture = make_texture(device, surface.shape, "rgba32float")
     upload(device, texture, light)
-    return texture
+    return scratch(device, texture)
 
 
-def source_level(pairs: Pairs, variance_mm2: Floats) -> int:
+def source_level(pairs: PairBuffers, variance_mm2: Floats) -> int:
     """The blurred level that is smooth enough for the sources to tell all of it."""
     smooth = np.flatnonzero(variance_mm2 >= (_SMOOTH * pairs.spacing_mm) ** 2)
     return int(smooth[0]) if len(smooth) else len(variance_mm2) - 1
 
 
-class TranslucencyWeights:
-    """Weighs pairs for a profile. The shader is compiled when it is first wanted."""
+def weigh(device: Device, pairs: PairBuffers, variance_mm2: Floats, weight: Floats) -> Any:
+    """A buffer of the source of each pair and the share of its light, red, green and blue, that passes.
 
-    def __init__(self, device: Device) -> None:
-        self._device = device
+    variance_mm2, weight : (k,) and (k, 3) of the blurred levels
+    """
+    shader = program(device, "translucency_weights.wgsl")
+    gaussian = np.zeros((MOST_GAUSSIANS, 4), np.float32)
+    gaussian[: len(weight), :3], gaussian[: len(weight), 3] = weight, variance_mm2
+    record = shader.record(
+        "Weighing",
+        radius_mm=pairs.radius_mm,
+        before_mm2=variance_mm2[source_level(pairs, variance_mm2)],
+        cell_mm2=pairs.spacing_mm**2,
+        grain=GRAIN,
+        count=len(weight),
+        gaussian=gaussian,
+    )
+    adapter = device.adapter
+    if not pairs.key or adapter.kind != "CPU":  # GPUs weigh faster than disks are read
+        return _weighed(device, shader, pairs, record)
+    told = adapter.name, adapter.driver, shader.source.text, record.tobytes().hex()
 
-    @cached_property
-    def _program(self) -> ComputeProgram:
-        return ComputeProgram(self._device, STAGES / "translucency_weights.wgsl")
+    def make() -> NDArray[np.uint8]:
+        weights = _weighed(device, shader, pairs, record)
+        return np.frombuffer(device.handle.queue.read_buffer(weights), np.uint8)
 
-    def weigh(self, pairs: Pairs, variance_mm2: Floats, weight: Floats) -> Any:
-        """A buffer of the source of each pair and the share of its light, red, green and blue, that passes.
+    return device.buffer(cached_array((), f"passing {pairs.key} {told}", make), "STORAGE")
 
-        variance_mm2, weight : (k,) and (k, 3) of the blurred levels
-        """
-        gaussian = np.zeros((MOST_GAUSSIANS, 4), np.float32)
-        gaussian[: len(weight), :3], gaussian[: len(weight), 3] = weight, variance_mm2
-        record = self._program.record(
-            "Weighing",
-            radius_mm=pairs.radius_mm,
-            before_mm2=variance_mm2[source_level(pairs, variance_mm2)],
-            cell_mm2=pairs.spacing_mm**2,
-            grain=GRAIN,
-            count=len(weight),
-            gaussian=gaussian,
-        )
-        adapter = self._device.adapter
-        if not pairs.key or adapter.kind != "CPU":  # GPUs weigh faster than disks are read
-            return self._weighed(pairs, record)
-        told = adapter.name, adapter.driver, self._program.source.text, record.tobytes().hex()
 
-        def weigh() -> NDArray[np.uint8]:
-            weights = self._weighed(pairs, record)
-            return np.frombuffer(self._device.handle.queue.read_buffer(weights), np.uint8)
-
-        return self._device.buffer(cached_array((), f"passing {pairs.key} {told}", weigh), "STORAGE")
-
-    def _weighed(self, pairs: Pairs, record: Any) -> Any:
-        weights = self._device.handle.create_buffer(size=8 * pairs.count, usage=pairs.pairs.usage)
-        bound = {"weighing": record, "pairs": pairs.pairs, "sources": pairs.sources, "weights": weights}
-        frame = Frame(self._device)
-        frame.compute("translucency weights", self._program, bound, (ROW, -(-pairs.count // ROW)))
-        frame.submit()
-        return weights
+def _weighed(device: Device, shader: ComputeProgram, pairs: PairBuffers, record: Any) -> Any:
+    weights = device.handle.create_buffer(size=8 * pairs.count, usage=pairs.pairs.usage)
+    bound = {"weighing": record, "pairs": pairs.pairs, "sources": pairs.sources, "weights": weights}
+    frame = Frame(device)
+    frame.compute("translucency weights", shader, bound, (ROW, -(-pairs.count // ROW)))
+    frame.submit()
+    return weights

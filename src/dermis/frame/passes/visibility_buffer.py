@@ -1,4 +1,4 @@
-"""The nearest surface in each pixel of one or more views: its depth or its triangle.
+"""The nearest surface in each pixel of one or more views: its depth or its triangle, a visibility buffer.
 
 Two ways to one result. On the GPUs measured, a compute pass takes a fraction of the rasteriser's time;
 software adapters rasterise faster than they compute.
@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from dermis.frame.geometry import HeadTextures
-from dermis.frame.passes import SHARED_SHADERS, STAGES
-from dermis.frame.passes.variants import Constants, Variants
+from dermis.frame.geometry import HeadResources
+from dermis.frame.passes import PASSES, program, shader_folders, suited
 from dermis.frame.projection import Matrix, Views
-from dermis.gpu import ComputeProgram, Device, Frame, RasterProgram, make_texture
+from dermis.gpu import Constants, Device, Frame, Graph, RasterProgram, Recorder, compiled, make_texture
+from dermis.gpu.program import Program
 
+Drawer = Frame | Graph
 _GROUPS = 2048  # workgroups that keep a GPU busy; where there are more triangles, each takes more of them
 _TAKEN = (8, 128)  # triangles of a workgroup of visibility_buffer.wgsl: fewest and most
 _RUN = 16  # of them that follow each other, where they are many and so small
@@ -27,13 +28,13 @@ _DEPTH, _FOUND, _BOTH = 0, 1, 2  # what visibility_buffer.wgsl records
 _COARSEST_MM = 0.1  # steps of depth at which a sample's depth and triangle share a word
 
 
-@dataclass
+@dataclass(eq=False)
 class Layers:
     """A texture array with a layer for each view, and what it takes to fill it.
 
     Even one view gets two layers: OpenGL takes a texture of one layer for no array.
 
-    texture : depth (1 near, 0 nothing) as float, or triangle + 1 as uint
+    texture : depth (1 near, 0 nothing) as float, or triangle + 1 as uint where `triangles`
     depth : the rasteriser's depth attachments, one a layer, or one for all when triangles are wanted
     targets : the rasteriser's colour targets, one a layer
     nearness, found, tiles : the compute pass' buffers; triangles found get theirs when a frame needs it
@@ -42,6 +43,7 @@ class Layers:
     texture: Any
     size: tuple[int, int]
     count: int
+    triangles: bool
     depth: list[Any]
     targets: list[Any]
     nearness: Any = None
@@ -49,118 +51,116 @@ class Layers:
     tiles: Any = None
 
 
-class Nearest:
-    """Fills layers with depths or with triangles.
+def make_layers(
+    device: Device, size: tuple[int, int], count: int, *, triangles: bool, compute: bool | None = None
+) -> Layers:
+    """Space for `count` views of size (width, height); those too large for a buffer are rasterised.
 
     triangles : whether the layers hold triangles rather than depths
     compute : which way to take; None chooses by the adapter
     """
+    compute = device.adapter.kind != "CPU" if compute is None else compute
+    fits = 4 * size[0] * size[1] * count <= device.max_storage_bytes
+    make = _compute_layers if compute and fits else _raster_layers
+    return make(device, size, max(1, count), triangles)
 
-    def __init__(self, device: Device, *, triangles: bool, compute: bool | None = None) -> None:
-        self._device = device
-        self._triangles = triangles
-        self._compute = device.adapter.kind != "CPU" if compute is None else compute
-        shared = (SHARED_SHADERS,)
-        self._finders = Variants(device, STAGES / "visibility_buffer.wgsl")
-        if self._compute:
-            resolve = "resolve_triangles.wgsl" if triangles else "resolve_depth.wgsl"
-            self._resolve = ComputeProgram(device, STAGES / resolve, shared)
-        target = "r32uint" if triangles else None
-        self._raster = RasterProgram(
-            device, STAGES / "visibility_buffer_raster.wgsl", shared, target=target, depth_compare="greater"
-        )
 
-    def make_layers(self, size: tuple[int, int], count: int) -> Layers:
-        """Space for `count` views of size (width, height); those too large for a buffer are rasterised."""
-        fits = 4 * size[0] * size[1] * count <= self._device.max_storage_bytes
-        make = self._compute_layers if self._compute and fits else self._raster_layers
-        return make(size, max(1, count))
+def draw_layers(graph: Drawer, stage: str, layers: Layers, views: Views, head: HeadResources) -> None:
+    """Fill a layer for each place of each view; depth 1 is near and 0 far."""
+    if layers.nearness is not None:
+        _draw_compute(graph, stage, layers, views, head)
+    else:
+        _draw_raster(graph, stage, layers, views.matrices(layers.size), head)
 
-    def draw(self, frame: Frame, stage: str, layers: Layers, views: Views, head: HeadTextures) -> None:
-        """Fill a layer for each place of each view; depth 1 is near and 0 far."""
-        if layers.nearness is not None:
-            self._draw_compute(frame, stage, layers, views, head)
-        else:
-            self._draw_raster(frame, stage, layers, views.matrices(layers.size), head)
 
-    def _compute_layers(self, size: tuple[int, int], count: int) -> Layers:
-        texel = "r32uint" if self._triangles else "r32float"
-        texture = make_texture(self._device, size, texel, layers=max(2, count))
-        across, down = _tiles(size)
-        nearness, found, tiles = map(self._words, (size[0] * size[1] * count, 1, across * down * count))
-        return Layers(texture, size, count, [], [], nearness, found, tiles)
+def draw(graph: Drawer, visibility: Layers, views: Views, head: HeadResources) -> None:
+    """Find the triangle that each sample of the image sees [Burns2013]; shading happens later, in compute."""
+    draw_layers(graph, "visibility", visibility, views, head)
 
-    def _words(self, count: int) -> Any:
-        return self._device.buffer(np.zeros(count, np.uint32), "STORAGE")
 
-    def _raster_layers(self, size: tuple[int, int], count: int) -> Layers:
-        def layered(texel: str, number: int) -> tuple[Any, list[Any]]:
-            texture = make_texture(self._device, size, texel, layers=max(2, number), use="raster")
-            options = {"dimension": "2d", "array_layer_count": 1}
-            return texture, [texture.create_view(base_array_layer=k, **options) for k in range(number)]
+def _compute_layers(device: Device, size: tuple[int, int], count: int, triangles: bool) -> Layers:
+    texture = make_texture(device, size, "r32uint" if triangles else "r32float", layers=max(2, count))
+    across, down = _tiles(size)
+    counts = size[0] * size[1] * count, 1, across * down * count
+    nearness, found, tiles = (_words(device, number) for number in counts)
+    return Layers(texture, size, count, triangles, [], [], nearness, found, tiles)
 
-        if not self._triangles:
-            texture, depth = layered("depth32float", count)
-            return Layers(texture, size, count, depth, [None] * count)
-        _, depth = layered("depth32float", 1)
-        texture, targets = layered("r32uint", count)
-        return Layers(texture, size, count, depth * count, targets)
 
-    def _draw_compute(
-        self, frame: Frame, stage: str, layers: Layers, views: Views, head: HeadTextures
-    ) -> None:
-        triangles, (clips, places) = head.triangles, views
-        record, recorded = self._views(self._resolve, layers, clips, head), self._recorded(triangles, clips)
-        record["sample"][: len(places), :2] = places
-        across, down = places.T.tolist()
-        record["reach"] = min(across), min(down), max(across), max(down)
-        record["index_bits"] = triangles.bit_length() if recorded == (_BOTH,) else 0
-        if _FOUND in recorded and layers.found.size < layers.nearness.size:
-            layers.found = self._words(layers.nearness.size // 4)
-        resources = {
-            **head.resources,
-            "views": record,
-            "nearness": layers.nearness,
-            "found": layers.found,
-            "tiles": layers.tiles,
-            "layers": layers.texture,
-        }
-        shared, count = _shared_out(triangles, len(clips), len(places))
-        groups = (min(count, _GROUPS_PER_ROW), -(-count // _GROUPS_PER_ROW), len(clips))
-        for what in recorded:
-            finder = self._finders.program((("RECORDED", what), ("SAMPLES", len(places)), *shared))
-            frame.dispatch(stage, finder, resources, groups)
-        frame.dispatch(stage, self._resolve, resources, (*_tiles(layers.size), layers.count))
+def _words(device: Device, count: int) -> Any:
+    return device.buffer(np.zeros(count, np.uint32), "STORAGE")
 
-    def _recorded(self, triangles: int, clips: Matrix) -> tuple[int, ...]:
-        """What is recorded, time after time: depth and triangle in one word where that is fine enough."""
-        if not self._triangles:
-            return (_DEPTH,)
-        steps = 2.0 ** (32 - triangles.bit_length())
-        fine = max(map(_depth_range_mm, clips)) <= _COARSEST_MM * steps
-        return (_BOTH,) if fine else (_DEPTH, _FOUND)
 
-    def _draw_raster(
-        self, frame: Frame, stage: str, layers: Layers, clips: Matrix, head: HeadTextures
-    ) -> None:
-        resources = {**head.resources, "views": self._views(self._raster, layers, clips, head)}
-        for layer, (depth, target) in enumerate(zip(layers.depth, layers.targets, strict=True)):
-            frame.draw(
-                stage,
-                self._raster,
-                resources,
-                3 * head.triangles,
-                layer=layer,
-                depth=depth,
-                far=0.0,
-                target=target,
-            )
+def _raster_layers(device: Device, size: tuple[int, int], count: int, triangles: bool) -> Layers:
+    def layered(texel: str, number: int) -> tuple[Any, list[Any]]:
+        texture = make_texture(device, size, texel, layers=max(2, number), use="raster")
+        options = {"dimension": "2d", "array_layer_count": 1}
+        return texture, [texture.create_view(base_array_layer=k, **options) for k in range(number)]
 
-    def _views(self, program: Any, layers: Layers, clips: Matrix, head: HeadTextures) -> Any:
-        record = program.record("Views", triangles=head.triangles)
-        record["width"], record["height"] = layers.size
-        record["clip"][: len(clips)] = clips.swapaxes(1, 2)
-        return record
+    if not triangles:
+        texture, depth = layered("depth32float", count)
+        return Layers(texture, size, count, triangles, depth, [None] * count)
+    _, depth = layered("depth32float", 1)
+    texture, targets = layered("r32uint", count)
+    return Layers(texture, size, count, triangles, depth * count, targets)
+
+
+def _draw_compute(graph: Recorder, stage: str, layers: Layers, views: Views, head: HeadResources) -> None:
+    device, triangles, (clips, places) = graph.device, head.triangles, views
+    resolve = program(device, "resolve_triangles.wgsl" if layers.triangles else "resolve_depth.wgsl")
+    record, recorded = _views(resolve, layers, clips, head), _recorded(layers, triangles, clips)
+    record["sample"][: len(places), :2] = places
+    across, down = places.T.tolist()
+    record["reach"] = min(across), min(down), max(across), max(down)
+    record["index_bits"] = triangles.bit_length() if recorded == (_BOTH,) else 0
+    if _FOUND in recorded and layers.found.size < layers.nearness.size:
+        layers.found = _words(device, layers.nearness.size // 4)
+    resources = {
+        **head.resources,
+        "views": record,
+        "nearness": layers.nearness,
+        "found": layers.found,
+        "tiles": layers.tiles,
+        "layers": layers.texture,
+    }
+    shared, count = _shared_out(triangles, len(clips), len(places))
+    groups = (min(count, _GROUPS_PER_ROW), -(-count // _GROUPS_PER_ROW), len(clips))
+    for what in recorded:
+        constants = (("RECORDED", what), ("SAMPLES", len(places)), *shared)
+        graph.dispatch(stage, program(device, "visibility_buffer.wgsl", constants), resources, groups)
+    graph.dispatch(stage, resolve, resources, (*_tiles(layers.size), layers.count))
+
+
+def _recorded(layers: Layers, triangles: int, clips: Matrix) -> tuple[int, ...]:
+    """What is recorded, time after time: depth and triangle in one word where that is fine enough."""
+    if not layers.triangles:
+        return (_DEPTH,)
+    steps = 2.0 ** (32 - triangles.bit_length())
+    fine = max(map(_depth_range_mm, clips)) <= _COARSEST_MM * steps
+    return (_BOTH,) if fine else (_DEPTH, _FOUND)
+
+
+def _draw_raster(graph: Drawer, stage: str, layers: Layers, clips: Matrix, head: HeadResources) -> None:
+    shader = _raster_program(graph.device, layers.triangles)
+    resources = {**head.resources, "views": _views(shader, layers, clips, head)}
+    for layer, (depth, target) in enumerate(zip(layers.depth, layers.targets, strict=True)):
+        vertices, attached = 3 * head.triangles, {"depth": depth, "far": 0.0, "target": target}
+        graph.draw(stage, shader, resources, vertices, layer=layer, **attached)
+
+
+def _raster_program(device: Device, triangles: bool) -> RasterProgram:
+    def make() -> RasterProgram:
+        path, folders = PASSES / "visibility_buffer_raster.wgsl", shader_folders()
+        chosen, target = suited(device, path, folders), "r32uint" if triangles else None
+        return RasterProgram(device, path, folders, chosen, target=target, depth_compare="greater")
+
+    return compiled(device, ("visibility buffer", triangles), (), make)
+
+
+def _views(shader: Program, layers: Layers, clips: Matrix, head: HeadResources) -> Any:
+    record = shader.record("Views", triangles=head.triangles)
+    record["width"], record["height"] = layers.size
+    record["clip"][: len(clips)] = clips.swapaxes(1, 2)
+    return record
 
 
 def _depth_range_mm(clip: Matrix) -> float:

@@ -36,8 +36,8 @@ fn next_that_may_shine(first: u32, p: vec3f, n: vec3f) -> u32 {
     var i = first;
     loop {
         let light = lights.light[i];
-        let towards = select(light.position - p, -light.direction, light.kind == DIRECTIONAL);
-        if (light.kind >= STRIPE || dot(towards, n) > 0.0 || i + 1u >= skin.light_count) {
+        let towards = select(light.position - p, -light.direction, is_parallel(light));
+        if (light.narrow == 0u || dot(towards, n) > 0.0 || i + 1u >= skin.light_count) {
             break;
         }
         i++;

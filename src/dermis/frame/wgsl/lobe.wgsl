@@ -1,18 +1,12 @@
 // The rough white surface over the skin: the model in use, and how light shares itself out between it and the skin.
 //#include "surface.wgsl"
-//#include "lobes/angles.wgsl"
-//#include "lobes/fresnel.wgsl"
-//#include "lobes/kelemen.wgsl"
-//#include "lobes/torrance_sparrow.wgsl"
-//#include "lobes/blinn_phong.wgsl"
-//#include "lobes/phong.wgsl"
-//#include "lobes/two_lobe.wgsl"
+//#include <lobes>
 
-// A pipeline is made for one model, so that the others cost nothing; numbered as in specular/models.py.
+// A pipeline is made for one model, so that the others cost nothing.
 override MODEL: u32 = 0u;
 
-// Roots of cosine and roughness are evenly spaced in the table of albedos; as in specular/albedo.py.
-const ROOT_OF_FIRST_ROW: f32 = 0.2;
+// Roots of cosine and roughness are evenly spaced in the table of albedos.
+//#fill const ROOT_OF_FIRST_ROW: f32 = {root_of_first_row};
 
 // BRDF for rho_s = 1, without the cosine [1/sr], for light above the surface.
 fn lobe(n: vec3f, l: vec3f, v: vec3f, m: f32) -> f32 {
@@ -20,31 +14,8 @@ fn lobe(n: vec3f, l: vec3f, v: vec3f, m: f32) -> f32 {
     if (a.n_h <= 0.0) {
         return 0.0;
     }
-    if (MODEL == 1u) {
-        return torrance_sparrow(a, m);
-    }
-    if (MODEL == 2u) {
-        return torrance_sparrow_smith(a, m);
-    }
-    if (MODEL == 3u) {
-        return blinn_phong(a, m);
-    }
-    if (MODEL == 4u) {
-        return blinn_phong_plain(a, m);
-    }
-    if (MODEL == 5u) {
-        return phong(a, m);
-    }
-    if (MODEL == 6u) {
-        return phong_plain(a, m);
-    }
-    if (MODEL == 7u) {
-        return two_lobe(a, m);
-    }
-    if (MODEL == 8u) {
-        return kelemen_direct(a, m);
-    }
-    return kelemen(a, m);
+    //#each lobes: if (MODEL == {number}) { return {name}(a, m); }
+    return 0.0;
 }
 
 // Share of light from (or to) a direction that the surface reflects, for rho_s = 1, and its mean over directions.

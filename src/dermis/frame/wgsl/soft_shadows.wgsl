@@ -77,7 +77,7 @@ fn place_on(index: u32, round: bool) -> vec2f {
 }
 
 fn four_places(light: Light, first: u32) -> Four {
-    let round = light.kind != RECTANGLE;
+    let round = light.round != 0u;
     let a = place_on(first, round);
     let b = place_on(first + 1u, round);
     let c = place_on(first + 2u, round);

@@ -6,23 +6,11 @@ import numpy as np
 
 from dermis.human.bust.anatomy import nominal
 from dermis.human.bust.fields import Doubles, ellipsoid, rise, smooth_union
+from dermis.tables import numbers, read_rows
 
 EYE = nominal("eye")
 LID_RADIUS = 13.3
-# Artist's values: x from the inner to the outer corner, height of the line of the lids and of the fold.
-LINES = np.array(
-    [
-        [13.0, -3.4, 0.0],
-        [16.2, -3.6, 1.0],
-        [20.0, -4.9, 3.2],
-        [25.0, -6.8, 5.4],
-        [31.0, -7.8, 6.6],
-        [37.0, -7.0, 6.2],
-        [42.0, -4.8, 4.0],
-        [45.0, -2.8, 1.5],
-        [50.0, 0.5, -3.0],
-    ]
-)
+LINES = numbers(read_rows(__package__, "lids"), "x line fold")
 
 
 def add_lids(distance: Doubles, p: Doubles) -> Doubles:

@@ -7,21 +7,9 @@ from numpy.typing import NDArray
 
 from dermis.human.bust.fields import Doubles, rise
 from dermis.human.bust.parameters import BustParameters
+from dermis.tables import numbers, read_rows
 
-# Artist's values: x, the upper border, the line of the mouth and the lower border, all heights in mm.
-BORDERS = np.array(
-    [
-        [0, -60.4, -67.9, -77.8],
-        [2.5, -59.8, -67.8, -77.8],
-        [5.5, -59.0, -67.4, -77.5],
-        [10, -60.0, -67.0, -76.6],
-        [15, -62.2, -67.1, -74.7],
-        [20, -64.6, -67.3, -71.8],
-        [24, -66.5, -67.2, -68.9],
-        [26, -67.1, -67.1, -67.6],
-        [32, -67.0, -67.0, -67.0],
-    ]
-)
+BORDERS = numbers(read_rows(__package__, "lips"), "x upper line lower")
 CORNER_X = 26.0
 
 

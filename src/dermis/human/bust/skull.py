@@ -6,29 +6,9 @@ import numpy as np
 
 from dermis.human.bust.fields import Doubles, rise, smooth_intersection, smooth_union
 from dermis.human.bust.parameters import BustParameters
+from dermis.tables import numbers, read_rows
 
-# Artist's values, made to agree with the measures of `anatomy`. Rows: height y, half-width, depth of the
-# midline without nose and lips, depth at which the section is widest, roundness of its corners, and extent
-# behind there.
-SECTIONS = np.array(
-    [
-        [60, 62, 84.0, -8, 2.3, 66],
-        [38, 65, 91.5, -5, 2.35, 66],
-        [20, 66.5, 93.5, 0, 2.35, 66],
-        [6, 67, 88.5, 2, 2.35, 64],
-        [-10, 67.5, 87.5, 3, 2.3, 62],
-        [-25, 66.5, 89.5, 4, 2.22, 56],
-        [-46, 63.5, 94.5, 6, 2.1, 44],
-        [-60, 60.5, 96.5, 7, 2.03, 34],
-        [-68, 58.5, 96.3, 7, 2.0, 29],
-        [-77, 56, 94.2, 7, 1.98, 25],
-        [-85, 53.5, 91.0, 8, 1.97, 22],
-        [-97, 49.5, 91.2, 8, 1.96, 20],
-        [-105, 46, 90.5, 8, 1.96, 18],
-        [-114, 41, 87.0, 8, 1.96, 16],
-        [-130, 37, 81.0, 8, 2.0, 14],
-    ]
-)
+SECTIONS = numbers(read_rows(__package__, "sections"), "y half_width front widest roundness back")
 _MENTON_Y, _JAW_SLOPE = -115.5, 0.36
 
 

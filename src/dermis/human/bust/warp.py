@@ -8,23 +8,9 @@ import numpy as np
 
 from dermis.human.bust.fields import Doubles, bump
 from dermis.human.bust.parameters import BustParameters
+from dermis.tables import numbers, read_rows
 
-# Artist's values: centre x, y, z and radii along x, y, z of a place that may shift, and the usual shift
-# along x, y, z, all in mm. Places off the midline shift on each side by themselves.
-SHIFTS = np.array(
-    [
-        [0, -36, 108, 22, 24, 40, 0.7, 0.0, 0.0],
-        [0, -68, 95, 34, 20, 40, 0.6, 0.3, 0.0],
-        [0, -100, 90, 40, 26, 50, 0.9, 0.0, 0.0],
-        [31, 0, 76, 20, 16, 40, 0.3, 0.6, 0.3],
-        [30, 22, 84, 22, 12, 40, 0.0, 0.7, 0.3],
-        [26, -68, 87, 16, 14, 30, 0.3, 0.6, 0.0],
-        [44, -30, 65, 26, 30, 40, 0.4, 0.0, 0.6],
-        [50, -80, 20, 34, 34, 50, 0.9, 0.6, 0.0],
-        [80, -12, -20, 26, 50, 40, 0.6, 1.2, 0.8],
-        [60, 60, -40, 60, 50, 60, 0.8, 0.0, 0.8],
-    ]
-)
+SHIFTS = numbers(read_rows(__package__, "shifts"), "x y z rx ry rz dx dy dz")
 _STEPS = 6  # each brings the way back at least four times closer
 
 

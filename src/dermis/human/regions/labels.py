@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from functools import lru_cache
 from importlib import resources
-from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +20,7 @@ from dermis.human.bust.shape import landmarks, symmetric
 from dermis.human.regions.table import RegionTable
 from dermis.mesh.head import Head
 from dermis.mesh.maps import load_labels
+from dermis.tables import parse_rows
 
 Place = tuple[float, float, float]
 Places = Mapping[str, Place]
@@ -94,9 +93,10 @@ def _on_skin(points: Doubles) -> Doubles:
 
 
 def _read(text: str, name: str) -> Places:
-    rows = csv.DictReader(StringIO("\n".join(row for row in text.splitlines() if not row.startswith("#"))))
     try:
-        return {row["landmark"]: (float(row["x"]), float(row["y"]), float(row["z"])) for row in rows}
+        return {
+            row["landmark"]: (float(row["x"]), float(row["y"]), float(row["z"])) for row in parse_rows(text)
+        }
     except (KeyError, TypeError, ValueError) as error:
         refuse(name, "rows of landmark,x,y,z", f"one cannot be read ({error})", "Correct it there")
 

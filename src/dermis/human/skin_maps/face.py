@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-from importlib import resources
 from itertools import groupby
 from typing import NamedTuple
 
@@ -15,6 +13,7 @@ from dermis.human.bust.fields import Doubles, gradient, spline
 from dermis.human.bust.parameters import BustParameters
 from dermis.human.bust.shape import symmetric
 from dermis.human.bust.warp import make_warp
+from dermis.tables import numbers, read_rows
 
 _STEP_MM = 0.25
 DEGREES = 2
@@ -60,19 +59,10 @@ def make_face(parameters: BustParameters) -> Face:
     )  # fmt: skip
 
 
-def read_rows(table: str) -> list[dict[str, str]]:
-    """Rows of one of this package's tables."""
-    text = resources.files(__package__).joinpath(f"{table}.csv").read_text("utf-8")
-    return list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
-
-
 def _zones(parameters: BustParameters) -> tuple[Doubles, Doubles, Doubles]:
     """Centres, radii and amounts of the zones, grown with their parts."""
-    rows = read_rows("zones")
-    centres, radii, amounts = (
-        np.array([[float(row[name]) for name in names] for row in rows])
-        for names in (["x", "y", "z"], ["rx", "ry", "rz"], _AMOUNTS.split())
-    )
+    rows = read_rows(__package__, "zones")
+    centres, radii, amounts = (numbers(rows, names) for names in ("x y z", "rx ry rz", _AMOUNTS))
     growth = {
         "face": (np.zeros(3), np.ones(3)),
         "nose": (nose.BASE, nose.growth(parameters)),
@@ -94,7 +84,7 @@ def _curves(knots: Doubles) -> Doubles:
 def _hairline() -> Doubles:
     from scipy.interpolate import PchipInterpolator
 
-    angle, height = np.array([[float(row["angle"]), float(row["height"])] for row in read_rows("hairline")]).T
+    angle, height = numbers(read_rows(__package__, "hairline"), "angle height").T
     return np.asarray(PchipInterpolator(angle, height)(np.arange(0, 181, DEGREES)))
 
 
@@ -119,9 +109,9 @@ class Folds(NamedTuple):
 def make_folds(parameters: BustParameters, age: float) -> Folds:
     """The folds of a face of this age, 0 to 1, on its skin."""
     curves, sizes = [], []
-    for _, group in groupby(read_rows("folds"), key=lambda row: row["fold"]):
+    for _, group in groupby(read_rows(__package__, "folds"), key=lambda row: row["fold"]):
         rows = list(group)
-        curves.append(spline([[float(row[axis]) for axis in "xyz"] for row in rows], _PIECES))
+        curves.append(spline(numbers(rows, "x y z"), _PIECES))
         width, young, old = (float(rows[0][name]) for name in ("width", "young", "old"))
         sizes.append((width, young + age * (old - young)))
     lengths = [len(curve) for curve in curves]

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from functools import cache
-from importlib import resources
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.errors import refuse
 from dermis.optics.media import Floats
+from dermis.tables import numbers, read_rows
 
 SHORTEST_NM, LONGEST_NM = 380.0, 780.0
 
@@ -75,7 +75,5 @@ def _primaries_xyz() -> Floats:
 
 @cache
 def _read(table: str) -> dict[str, Floats]:
-    text = resources.files("dermis.optics").joinpath(f"data/spectra/{table}.csv").read_text("utf-8")
-    header, *rows = (line for line in text.splitlines() if not line.startswith("#"))
-    columns = np.array([row.split(",") for row in rows], dtype=np.float64).T
-    return dict(zip(header.split(","), columns, strict=True))
+    rows = read_rows("dermis.optics", f"data/spectra/{table}")
+    return {name: numbers(rows, name)[:, 0] for name in rows[0]}

@@ -1,1 +1,1 @@
-"""The viewer in a web page: rendercanvas' HTTP canvas behind a guard."""
+"""The viewer as a web page: rendercanvas' HTTP canvas and a guarded server."""

@@ -1,4 +1,4 @@
-"""rendercanvas' HTTP canvas with encoders beside its loop, and a first frame for every page that comes."""
+"""rendercanvas' HTTP canvas, with image encoding in threads and a first frame for every new page."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from rendercanvas.http import HttpRenderCanvas
 
 _QUALITY = 88
 _LOSSLESS_AFTER_S = 0.3
-_ENCODERS = 2  # frames that become bytes at once, while the next one is drawn
+_ENCODERS = 2  # frames encoded at the same time, while the next one is drawn
 
 
 class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
-    """A canvas that pages show; a page too slow for all frames gets the newest when it is ready."""
+    """A canvas shown in web pages; a slow page skips frames and gets the newest when it is ready."""
 
     def __init__(self, **given: Any) -> None:
         self._encoders = ThreadPoolExecutor(_ENCODERS, "encoder")
-        self._encoding = 0  # frames on their way to the pages, but for lossless ones
-        self._drawn = self._kept = 0  # frames by their number: the one drawn and the one kept last
-        self._lossless = 0  # of the lossless frame that nothing has outdated
+        self._encoding = 0  # lossy frames being encoded
+        self._drawn = self._sent = 0  # numbers of the last frame drawn and of the last one sent
+        self._lossless = 0  # number of the current lossless frame, 0 when a newer frame has replaced it
         super().__init__(**given)
 
     def _on_event(self, event: dict[str, Any], id: int) -> None:
@@ -35,23 +35,22 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         super()._on_event(event, id)
         acted = kind == "_clients_change" or (kind[:1] != "_" and id == self._active_client)
         if acted and self._frame_info_per_client:
-            # At the next tick, not at the one after the tick that hears it; and a page that was loaded again
-            # or resized would wait for some motion.
+            # rendercanvas would draw one tick later, and for a reloaded or resized page only on motion.
             self.request_draw()
         elif kind == "_framefeedback" and not self._draw_requested:
-            self._send_last_frame_to_ready_clients()  # which may have come while this page was not ready
+            self._send_last_frame_to_ready_clients()  # encoded while this page was not ready
 
     def _maybe_draw(self) -> None:
-        """Draw when the page is ready for one more frame than those on their way to it."""
+        """Draw unless too many frames are on their way to the page."""
         known = self._frame_info_per_client.get(self._active_client)
         if known and known["sent"] - known["confirmed"] + self._encoding >= self._max_buffered_frames:
-            self._pending_maybe_draw = False  # it comes again with what is encoded or confirmed next
+            self._pending_maybe_draw = False  # tried again after the next frame is encoded or confirmed
             self._send_last_frame_to_ready_clients()
         else:
             super()._maybe_draw()
 
     def _encode_frame(self, array: NDArray[np.uint8], is_lossless_redraw: bool = False) -> None:
-        """Have bytes made of a frame: JPEG while things move, then PNG."""
+        """Encode a frame in a thread: JPEG while things move, then PNG."""
         self._cancel_lossless_draw()
         self._drawn += 1
         if is_lossless_redraw:
@@ -61,23 +60,23 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
             self._schedule_lossless_draw(array, _LOSSLESS_AFTER_S)
         work = partial(encoded, array, lossless=is_lossless_redraw)
         made = asyncio.get_running_loop().run_in_executor(self._encoders, work)
-        made.add_done_callback(partial(self._keep, self._drawn, is_lossless_redraw))
+        made.add_done_callback(partial(self._send, self._drawn, is_lossless_redraw))
 
     def _cancel_lossless_draw(self) -> None:
-        """Before another frame, which outdates a lossless one that is being encoded as well."""
+        """Also discard a lossless frame that is still being encoded."""
         self._lossless = 0
         super()._cancel_lossless_draw()
 
-    def _keep(self, number: int, lossless: bool, made: asyncio.Future[bytes]) -> None:
-        """Keep a frame for the pages, unless a newer one is there already."""
+    def _send(self, number: int, lossless: bool, made: asyncio.Future[bytes]) -> None:
+        """Send an encoded frame to the pages, unless a newer one was sent already."""
         self._encoding -= not lossless
         if self._is_closed:
             return
         self._schedule_maybe_draw()
         data = made.result()
-        if number < self._kept or (lossless and number != self._lossless):
+        if number < self._sent or (lossless and number != self._lossless):
             return
-        self._kept = number
+        self._sent = number
         message = {
             "type": "framebufferdata",
             "nbuffers": 1,
@@ -91,11 +90,11 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
 
 
 def encoded(array: NDArray[np.uint8], *, lossless: bool) -> bytes:
-    """An (h, w, 4) image as PNG or JPEG, without its alpha."""
+    """An (h, w, 4) image as PNG or JPEG, without alpha."""
     from PIL import Image
 
     height, width = array.shape[:2]
-    # Four bytes a pixel are Pillow's own, so that nothing is copied for JPEG.
+    # RGBX is Pillow's own layout, so JPEG needs no copy.
     image = Image.frombuffer("RGBX", (width, height), np.ascontiguousarray(array), "raw", "RGBX", 0, 1)
     buffer = io.BytesIO()
     if lossless:

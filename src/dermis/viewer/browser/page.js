@@ -1,17 +1,17 @@
-// What rendercanvas' page lacks: it connects again by itself, also behind https, two fingers zoom and pan, and a
-// page that becomes active tells its size.
+// What rendercanvas' page lacks: it reconnects, works behind https, sends pinch gestures, and reports its size when
+// it becomes active.
 
 const RETRY_MS = 1000
 const TAPS_MS = 350
 const TAPS_PX = 24
-const WATCHING = 'watching: the page that came first has the head'
-const LOST = 'the connection is lost, trying again …'
+const WATCHING = 'watching: another page has control'
+const LOST = 'connection lost, reconnecting …'
 const OUR_KEYS = ['Tab', 'F1']
 const OUR_KEYS_WITH_CONTROL = ['z', 'y', 's']
 
 const notice = document.getElementById('notice')
 
-// The socket opened last, which may still be on its way: two at once would leave this page watching itself.
+// The socket opened last, perhaps still connecting: with two of them this page would be watching itself.
 let latest = null
 window.WebSocket = class extends window.WebSocket {
   constructor (address, ...rest) {
@@ -22,7 +22,7 @@ window.WebSocket = class extends window.WebSocket {
   }
 }
 
-// A page that came over https, by way of a proxy, may open encrypted sockets only.
+// A page served over https, through a proxy, may only open encrypted sockets.
 function safe (address) {
   return window.location.protocol === 'https:' ? address.replace(/^ws:/, 'wss:') : address
 }
@@ -41,7 +41,7 @@ function hear (event) {
   }
 }
 
-// What this page said while it watched was not heard, and another server does not know it.
+// The server ignores a page that watches, and a restarted server has forgotten its size.
 function tellSize () {
   const exactly = new ResizeObserver(([entry], observer) => {
     observer.disconnect()
@@ -55,7 +55,7 @@ function tellSize () {
   exactly.observe(document.querySelector('#canvas img'))
 }
 
-// Keys and the wheel work without a first click; on a touch screen that would open the keyboard.
+// Make keys and the wheel work without a first click; on a touch screen this would open the keyboard.
 function takeKeys () {
   const field = document.querySelector('#rendercanvas-focus-element-container input')
   if (field && window.matchMedia('(hover: hover)').matches) { field.focus({ preventScroll: true }) }
@@ -67,7 +67,7 @@ function tell (event) {
   }
 }
 
-// Else Tab would leave the picture, and the browser would save the page.
+// Otherwise Tab would leave the picture, and Ctrl+S would save the page.
 window.addEventListener('keydown', (event) => {
   const held = event.ctrlKey || event.metaKey
   const keys = held ? OUR_KEYS_WITH_CONTROL : OUR_KEYS
@@ -76,8 +76,8 @@ window.addEventListener('keydown', (event) => {
 
 const fingers = new Map()
 let pinching = false
-let began = null // where a finger came last
-let tapped = null // where and when one left last
+let began = null // where the last finger touched
+let tapped = null // where and when the last tap ended
 
 function follow (event) {
   if (event.pointerType !== 'touch') { return }
@@ -87,7 +87,7 @@ function follow (event) {
   }
   if (fingers.size < 2 && !pinching) { return }
   pinching = true
-  event.stopImmediatePropagation() // one finger alone is rendercanvas' own
+  event.stopImmediatePropagation() // rendercanvas handles a single finger
   event.preventDefault()
   tellFingers()
 }
@@ -98,7 +98,7 @@ function tellFingers () {
   tell({ type: 'pointer_move', x, y, button: 1, buttons: [1], modifiers: [], ntouches: fingers.size, touches })
 }
 
-// Two taps at a place are a double click, which no browser makes of them here.
+// Turn two taps at one point into a double click, which browsers do not do here.
 function tap ({ clientX: x, clientY: y }) {
   const at = performance.now()
   if (Math.hypot(x - began.x, y - began.y) > TAPS_PX) { // it was a drag

@@ -1,27 +1,37 @@
-"""Serves the canvas to web pages."""
+"""Serves the canvas to web pages, behind a guard that checks who may connect and what a page may send."""
 
 from __future__ import annotations
 
+import hmac
+import ipaddress
+import json
 import secrets
 import socket
-from dataclasses import dataclass
+from collections.abc import Awaitable, Callable, MutableMapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from dermis.errors import refuse
-from dermis.viewer.browser.guard import Guard, is_local
+
+Message = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[Message]]
+Send = Callable[[Message], Awaitable[None]]
+App = Callable[[Message, Receive, Send], Awaitable[None]]
 
 _TOKEN_BYTES = 18
 _MOST_MESSAGE_BYTES = 1 << 16
-_GRACE_S = 1
+_SHUTDOWN_S = 1
 _EVERYWHERE = "0.0.0.0", "::"
+_SERVER_EVENTS = ("close", "_clients_change")  # rendercanvas obeys them, whoever sends them
+_LARGEST_SIDE = 4096
+_MOST_LETTERS = 4096
+_NOT_FOUND = {"type": "http.response.start", "status": 404, "headers": [(b"content-type", b"text/plain")]}
 
 
-@dataclass(frozen=True)
-class Address:
-    """Where the page is.
+class Address(NamedTuple):
+    """Where the page is served.
 
-    token : part of its address that others cannot guess, empty where only this machine can ask
+    token : secret part of the URL, empty when only this machine can connect
     """
 
     host: str
@@ -30,26 +40,26 @@ class Address:
 
     @property
     def url(self) -> str:
-        """Of the page; a server that listens everywhere goes by the machine's name."""
+        """The page's URL; a server that listens on all interfaces uses the machine's name."""
         name = socket.gethostname() if self.host in _EVERYWHERE else self.host
         host = f"[{name}]" if ":" in name else name
         return f"http://{host}:{self.port}/" + (f"{self.token}/" if self.token else "")
 
 
 def bind(host: str, port: int, *, secret: bool = False) -> tuple[socket.socket, Address]:
-    """A socket that listens, and the address that leads to it; every host but this machine gets a token.
+    """A listening socket and its address, with a token unless the host is local.
 
-    port : 0 for any that is free
-    secret : whether this machine gets one as well
+    port : 0 for any free one
+    secret : whether a local host gets a token too
 
-    Raises DermisError when nothing can listen there.
+    Raises DermisError when the address cannot be used.
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listener = socket.socket(family, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((host, port))
-        listener.listen()  # so that a page that comes at once waits for the server
+        listener.listen()  # a page that connects at once waits for the server
     except OSError as error:
         listener.close()
         refuse(f"{host}:{port}", "an address to listen at", f"{error.strerror}", "Choose another --port")
@@ -58,7 +68,7 @@ def bind(host: str, port: int, *, secret: bool = False) -> tuple[socket.socket, 
 
 
 def server(address: Address) -> Any:
-    """A uvicorn server of rendercanvas' application with our own page, behind a guard."""
+    """A uvicorn server of rendercanvas' application with our own page, behind the guard."""
     import uvicorn
     from rendercanvas.http import asgi, resources
 
@@ -69,8 +79,94 @@ def server(address: Address) -> Any:
         Guard(asgi, address.token),
         log_level="warning",
         ws_max_size=_MOST_MESSAGE_BYTES,
-        ws_per_message_deflate=False,  # pictures are compressed already
-        timeout_graceful_shutdown=_GRACE_S,
+        ws_per_message_deflate=False,  # images are already compressed
+        timeout_graceful_shutdown=_SHUTDOWN_S,
         server_header=False,
     )
     return uvicorn.Server(config)
+
+
+class Guard:
+    """ASGI middleware: lets only requests through that have the token and come from the server's own page.
+
+    app : rendercanvas' application
+    token : the first part of the path, empty for none
+    """
+
+    def __init__(self, app: App, token: str) -> None:
+        self._app, self._token = app, token
+
+    async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
+        """The ASGI entry point."""
+        if scope["type"] != "lifespan" and not self._may_pass(scope):
+            await _refuse(scope, receive, send)
+        else:
+            checked = _checked(receive) if scope["type"] == "websocket" else receive
+            await self._app(scope, checked, send)
+
+    def _may_pass(self, scope: Message) -> bool:
+        headers = {name: value.decode("latin-1") for name, value in scope["headers"]}
+        host = headers.get(b"host", "")
+        if not self._token and not is_local(_name_of(host)):
+            return False  # DNS rebinding: another site's name that resolves to this machine
+        origin = headers.get(b"origin")
+        if not self._token and origin is not None and origin.partition("://")[2] != host:
+            return False  # with a token the origin may differ, as behind a proxy
+        given = str(scope["path"]).split("/")[1:2]
+        return not self._token or hmac.compare_digest("".join(given).encode(), self._token.encode())
+
+
+def is_local(host: str) -> bool:
+    """Whether a host name or address can be reached from this machine only."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _name_of(host: str) -> str:
+    """The host of "name:port", "[address]:port" or the name alone."""
+    if host.startswith("["):
+        return host[1:].partition("]")[0]
+    return host.partition(":")[0]
+
+
+def _checked(receive: Receive) -> Receive:
+    """The page's messages without those it may not send."""
+
+    async def next_message() -> Message:
+        while True:
+            message = await receive()
+            if message["type"] != "websocket.receive" or acceptable(message.get("text")):
+                return message
+
+    return next_message
+
+
+def acceptable(text: Any) -> bool:
+    """Whether the text is an event that a page may send, with a window of reasonable size."""
+    if not isinstance(text, str) or len(text) > _MOST_LETTERS:
+        return False
+    try:
+        event = json.loads(text)
+    except ValueError:
+        return False
+    if not isinstance(event, dict) or not isinstance(event.get("type"), str):
+        return False
+    if event["type"] == "resize":
+        sides = [event.get("pwidth"), event.get("pheight")]
+        return all(isinstance(side, int) and 0 <= side <= _LARGEST_SIDE for side in sides)
+    if event["type"] == "_framefeedback":
+        return isinstance(event.get("index"), int)
+    return event["type"] not in _SERVER_EVENTS
+
+
+async def _refuse(scope: Message, receive: Receive, send: Send) -> None:
+    if scope["type"] == "websocket":
+        await receive()
+        await send({"type": "websocket.close", "code": 1008})
+        return
+    await send(_NOT_FOUND)
+    await send({"type": "http.response.body", "body": b"Not Found"})

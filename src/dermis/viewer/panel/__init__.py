@@ -1,1 +1,1 @@
-"""The panel over the picture, in Dear ImGui: one module for each of its sections."""
+"""The panel: Dear ImGui controls beside the picture. Its modules need the package imgui-bundle."""

@@ -1,150 +1,167 @@
-"""Sliders, choices and colours for the fields of plain settings."""
+"""Controls of the panel, and the one that a field of a model gets: its range and help come from the model."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import Any, get_args
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
 
 from imgui_bundle import imgui
 
 from dermis.errors import DermisError
-from dermis.scene.plain import Plain
-from dermis.viewer.desk import Desk
-from dermis.viewer.panel.meanings import explain
+from dermis.scene.plain import Colour, Plain, Range, choices_of, help_of, range_of
+from dermis.viewer.session import Session
 from dermis.viewer.state import ViewerState
 
 Apply = Callable[..., ViewerState]
-_LOG = imgui.SliderFlags_.logarithmic
+Put = Callable[[Any], ViewerState]
+_LOG = int(imgui.SliderFlags_.logarithmic)
+_HDR = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.hdr)
+_FORMS = {"_per_mm": "%.3g", "_mm": "%.4g mm", "_degrees": "%.4g°"}  # by the unit that a name ends in
 _ALL_NAMES = int(imgui.ComboFlags_.height_largest)
+_TOOLTIP_WIDTH = 260.0
 
 
-def slider(
-    desk: Desk,
-    label: str,
-    value: float,
-    apply: Callable[[float], ViewerState],
-    low: float,
-    high: float,
-    *,
-    log: bool = False,
-    form: str = "%.3f",
+@dataclass(frozen=True)
+class Style:
+    """How a field is shown where the panel departs from the model.
+
+    label : instead of the field's name
+    span : range of the slider, instead of the model's
+    unit : of the numbers shown, in units of the field
+    form : printf format of the numbers shown
+    options : the whole numbers to choose from
+    """
+
+    label: str = ""
+    span: Range | None = None
+    unit: float = 1.0
+    form: str = ""
+    options: tuple[int, ...] = ()
+
+
+_PLAIN = Style()
+_COLOUR: Any = Colour
+
+
+def draw_fields(
+    session: Session,
+    values: Plain,
+    apply: Apply,
+    styles: Mapping[str, Style],
+    names: Iterable[str] | None = None,
+    suffix: str = "",
 ) -> None:
-    """A number on a scale; the whole drag is one step of the history."""
-    flags = int(_LOG) if log else 0
-    moved, found = imgui.slider_float(label, value, low, high, form, flags)
-    note_place(desk, label)
+    """A control for each field of a model; fields whose type has none are skipped.
+
+    apply : makes a state from a field's new value, given by name
+    names : of the fields, all of them by default
+    suffix : "##id" to tell controls with the same label apart
+    """
+    for name in type(values).model_fields if names is None else names:
+        _draw_field(session, values, name, apply, styles.get(name, _PLAIN), suffix)
+
+
+def _draw_field(session: Session, values: Plain, name: str, apply: Apply, style: Style, suffix: str) -> None:
+    kind, value = type(values), getattr(values, name)
+    label = (style.label or _label_of(name)) + suffix
+    span = style.span or range_of(kind, name) or Range(0.0, 1.0)
+
+    def put(found: Any) -> ViewerState:
+        return apply(**{name: found})
+
+    if isinstance(value, bool):
+        _hold(session, label, imgui.checkbox(label, value), put)
+    elif style.options:
+        combo(session, label, str(value), map(str, style.options), lambda text: put(int(text)))
+    elif isinstance(value, (int, float)):
+        unit, exact = style.unit, round if isinstance(value, int) else float
+        form = style.form or next((_FORMS[end] for end in _FORMS if name.endswith(end)), "%.3f")
+        shown = Range(span.low / unit, span.high / unit, span.logarithmic)
+        slider(session, label, value / unit, lambda found: put(exact(unit * found)), shown, form)
+    elif kind.model_fields[name].annotation == _COLOUR:
+        result = imgui.color_edit3(label, list(value), _HDR)
+        _hold(session, label, result, lambda found: put(tuple(max(0.0, c) for c in found)))
+    elif isinstance(value, tuple) and span.logarithmic:
+        result = imgui.slider_float3(label, list(value), span.low, span.high, "%.3g", _LOG)
+        _hold(session, label, result, lambda found: put(tuple(_clamped(one, span) for one in found)))
+    elif len(words := choices_of(kind, name)) > 1:
+        combo(session, label, str(value), words, put)
+    else:
+        return
+    _explain(help_of(kind, name))
+
+
+def _label_of(name: str) -> str:
+    """The field's name without its unit."""
+    for unit in _FORMS:
+        name = name.removesuffix(unit)
+    return name.replace("_", " ")
+
+
+def _explain(text: str) -> None:
+    """A tooltip for the control drawn last."""
+    if not text or not imgui.is_item_hovered() or imgui.is_any_mouse_down():
+        return
+    imgui.begin_tooltip()
+    imgui.push_text_wrap_pos(_TOOLTIP_WIDTH)
+    imgui.text_unformatted(text)
+    imgui.pop_text_wrap_pos()
+    imgui.end_tooltip()
+
+
+def slider(session: Session, label: str, value: float, put: Put, span: Range, form: str) -> None:
+    """A number on a scale."""
+    flags = _LOG if span.logarithmic else 0
+    result = imgui.slider_float(label, value, span.low, span.high, form, flags)
+    _hold(session, label, result, lambda found: put(_clamped(found, span)))
+
+
+def _clamped(value: float, span: Range) -> float:
+    """Within the range, which typing and single precision can leave."""
+    return min(span.high, max(span.low, value))
+
+
+def _hold(session: Session, label: str, result: tuple[bool, Any], put: Put) -> None:
+    """Apply the new value of a control; all values while it is held are one step of the undo history."""
+    record_position(session, label)
+    moved, found = result
     if moved:
-        attempt(desk, lambda: desk.change(apply(min(high, max(low, found))), f"slide {label}"))
+        attempt(session, lambda: session.change(put(found), f"hold {label}"))
     if imgui.is_item_deactivated():
-        desk.history.end_gesture()
+        session.history.end_gesture()
 
 
-def choice(
-    desk: Desk, label: str, current: str, names: Iterable[str], apply: Callable[[str], ViewerState]
-) -> None:
+def combo(session: Session, label: str, current: str, names: Iterable[str], put: Put) -> None:
     """One of some names."""
-    is_open = imgui.begin_combo(label, current, _ALL_NAMES)
-    if not is_open:
-        note_place(desk, label)
+    if not imgui.begin_combo(label, current, _ALL_NAMES):
+        record_position(session, label)
         return
     for name in names:
         clicked, _ = imgui.selectable(name, name == current)
-        note_place(desk, f"{label}/{name}")
+        record_position(session, f"{label}/{name}")
         if clicked and name != current:
-            attempt(desk, lambda chosen=name: desk.change(apply(chosen)))  # type: ignore[misc]
+            attempt(session, lambda chosen=name: session.change(put(chosen)))  # type: ignore[misc]
     imgui.end_combo()
 
 
-def field_choice(desk: Desk, label: str, values: Plain, field: str, apply: Apply) -> None:
-    """One of the words that a field may be."""
-    names = words_of(type(values), field)
-    choice(desk, label, str(getattr(values, field)), names, lambda name: apply(**{field: name}))
-    explain(type(values), field)
-
-
-def words_of(kind: type[Plain], field: str) -> tuple[str, ...]:
-    """The words of a field that is a literal."""
-    return tuple(get_args(kind.model_fields[field].annotation))
-
-
-def field_slider(
-    desk: Desk, label: str, values: Plain, field: str, apply: Apply, low: float, high: float, **options: Any
-) -> None:
-    """A number of some settings on a scale."""
-    value = float(getattr(values, field))
-    slider(desk, label, value, lambda found: apply(**{field: found}), low, high, **options)
-    explain(type(values), field)
-
-
-def triple(
-    desk: Desk,
-    label: str,
-    value: tuple[float, float, float],
-    apply: Callable[[tuple[float, ...]], ViewerState],
-    low: float,
-    high: float,
-) -> None:
-    """Red, green and blue on logarithmic scales; the whole drag is one step of the history."""
-    moved, found = imgui.slider_float3(label, list(value), low, high, "%.3g", int(_LOG))
-    note_place(desk, label)
-    if moved:
-        kept = tuple(min(high, max(low, one)) for one in found)
-        attempt(desk, lambda: desk.change(apply(kept), f"slide {label}"))
-    if imgui.is_item_deactivated():
-        desk.history.end_gesture()
-
-
-def whole(
-    desk: Desk, label: str, value: int, options: Iterable[int], apply: Callable[[int], ViewerState]
-) -> None:
-    """One of some whole numbers."""
-    choice(desk, label, str(value), map(str, options), lambda text: apply(int(text)))
-
-
-def tick(desk: Desk, label: str, value: bool, apply: Callable[[bool], ViewerState]) -> None:
-    """Yes or no."""
-    moved, found = imgui.checkbox(label, value)
-    note_place(desk, label)
-    if moved:
-        attempt(desk, lambda: desk.change(apply(found)))
-
-
-def colour(
-    desk: Desk, label: str, value: tuple[float, float, float], apply: Callable[[Any], ViewerState]
-) -> None:
-    """Linear Rec. 709; beyond 1 for lights."""
-    flags = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.hdr)
-    moved, found = imgui.color_edit3(label, list(value), flags)
-    note_place(desk, label)
-    if moved:
-        attempt(desk, lambda: desk.change(apply(tuple(max(0.0, c) for c in found)), f"colour {label}"))
-    if imgui.is_item_deactivated():
-        desk.history.end_gesture()
-
-
-def button(desk: Desk, label: str) -> bool:
+def button(session: Session, label: str) -> bool:
     """Whether it was pressed."""
     pressed = imgui.button(label)
-    note_place(desk, label)
+    record_position(session, label)
     return bool(pressed)
 
 
-def remark(text: str) -> None:
-    """A grey line that breaks where the panel ends."""
-    imgui.push_style_color(int(imgui.Col_.text), imgui.get_style_color_vec4(int(imgui.Col_.text_disabled)))
-    imgui.text_wrapped(text)
-    imgui.pop_style_color()
-
-
-def note_place(desk: Desk, label: str) -> None:
-    """Remember where the item drawn last is: its left part, which is never its label."""
+def record_position(session: Session, label: str) -> None:
+    """Record where the item drawn last is: a point in its left part, which is never its label."""
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
-    desk.places[label] = float(low.x) + min(20.0, 0.5 * float(high.x - low.x)), 0.5 * float(low.y + high.y)
+    x = float(low.x) + min(20.0, 0.5 * float(high.x - low.x))
+    session.positions[label] = x, 0.5 * float(low.y + high.y)
 
 
-def attempt(desk: Desk, act: Callable[[], None]) -> None:
-    """Do it, or write over the picture why it cannot be done."""
+def attempt(session: Session, act: Callable[[], None]) -> None:
+    """Run an action; an error becomes the message over the picture."""
     try:
         act()
     except DermisError as error:
-        desk.messages.said = str(error)
+        session.message = str(error)

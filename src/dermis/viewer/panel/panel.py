@@ -1,4 +1,4 @@
-"""The panel: a column of sections on the left, and a line of text under the picture."""
+"""The panel: a column of sections on the left of the window, drawn with Dear ImGui."""
 
 from __future__ import annotations
 
@@ -6,210 +6,228 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from dermis.errors import refuse
+import imgui_bundle
+from imgui_bundle import imgui, implot
+from wgpu.utils.imgui import ImguiRenderer, ImguiWgpuBackend
+
 from dermis.gpu import Device
-from dermis.viewer.desk import Desk
+from dermis.viewer.panel.fields import attempt, button, record_position
+from dermis.viewer.panel.overlay import HELP_KEYS, draw_divider, draw_help, draw_messages
+from dermis.viewer.panel.sections import SECTIONS
+from dermis.viewer.session import Session
 
 _WIDTH, _FONT_SIZE = 290.0, 15.0
 _MOST_OF_WINDOW, _LEAST_SCALE = 0.5, 0.8  # of text in a narrow panel
-_GREYS = (
-    ("window_bg", 0.08, 1.0),
-    ("frame_bg", 0.18, 1.0),
-    ("frame_bg_hovered", 0.26, 1.0),
-    ("frame_bg_active", 0.32, 1.0),
-    ("slider_grab", 0.42, 1.0),  # dark enough for the number over it
-    ("slider_grab_active", 0.55, 1.0),
-    ("check_mark", 0.8, 1.0),
-    ("checkbox_selected_bg", 0.26, 1.0),
-    ("button", 0.26, 1.0),
-    ("button_hovered", 0.36, 1.0),
-    ("button_active", 0.46, 1.0),
-    ("header", 0.22, 1.0),
-    ("header_hovered", 0.32, 1.0),
-    ("header_active", 0.4, 1.0),
-    ("text_selected_bg", 0.4, 1.0),
-    ("nav_cursor", 0.6, 1.0),
+_MARGIN, _FAINT = 8.0, 0.6  # of the button that brings the panel back
+_WHEEL = 0.01
+_POINTER = ("pointer_down", "pointer_move", "pointer_up", "double_click", "wheel")
+_GREYS = (  # without hues, which would affect how the skin beside them is judged
+    ("window_bg", 0.08),
+    ("frame_bg", 0.18),
+    ("frame_bg_hovered", 0.26),
+    ("frame_bg_active", 0.32),
+    ("slider_grab", 0.42),  # dark enough for the number over it
+    ("slider_grab_active", 0.55),
+    ("check_mark", 0.8),
+    ("checkbox_selected_bg", 0.26),
+    ("button", 0.26),
+    ("button_hovered", 0.36),
+    ("button_active", 0.46),
+    ("header", 0.22),
+    ("header_hovered", 0.32),
+    ("header_active", 0.4),
+    ("text_selected_bg", 0.4),
+    ("nav_cursor", 0.6),
 )
-_INSTALL = 'Install it: pip install "dermis[viewer]"'
 
 
 class Panel:
-    """Draws the sections with Dear ImGui, and tells which events are theirs.
+    """Draws the sections, and decides which events are for the panel."""
 
-    Raises DermisError without the package imgui-bundle.
-    """
-
-    def __init__(self, desk: Desk) -> None:
-        try:
-            from imgui_bundle import imgui, implot
-        except ImportError:
-            refuse("panel", "the package imgui-bundle", "it is not installed", _INSTALL)
-        self._desk, self._imgui, self._implot = desk, imgui, implot
-        self.visible, self.helps = True, False
-        self._is_new, self._has_popup = True, False
-        self._handle = (0.0, 0.0)
-        self._scrolls = False
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self.visible, self.shows_help = True, False
+        self._is_new = self._has_popup = self._scrolls = False
+        self._button_end = (0.0, 0.0)
         self._context: Any = None
-        self._backend: Any = None
 
     def open(self, device: Device, target: str) -> None:
-        """Make what a device needs to draw into textures of a format."""
-        from wgpu.utils.imgui import ImguiWgpuBackend
-
-        # A context knows its font's texture, which another device's would not be.
-        self._context = self._imgui.create_context()
-        self._plots = self._implot.create_context()
+        """Create the resources for drawing into textures of a format."""
+        # A context holds its font's texture, which belongs to one device.
+        self._context = imgui.create_context()
+        self._plots = implot.create_context()
         self._enter()
-        _set_style(self._imgui)
+        _set_style()
         self._is_new = True
         self._device = device
         self._backend = ImguiWgpuBackend(device.handle, target)
 
     def width(self, size: tuple[float, float]) -> float:
-        """Columns of a window of that size that it takes from the picture, logical."""
+        """Of the panel in a window of that size, logical; 0 when it is hidden."""
         return round(min(_WIDTH, _MOST_OF_WINDOW * size[0])) if self.visible else 0.0
 
     def feed(self, event: Mapping[str, Any], size: tuple[float, float]) -> bool:
-        """Take an event in; returns whether it was meant for the panel and for nothing behind it."""
-        from dermis.viewer.panel.input import feed
-
+        """Process an event; returns whether it was for the panel, not for the picture."""
         self._enter()
-        if event["event_type"] == "key_down" and not self._types and self._obeys(event):
+        io, kind = imgui.get_io(), event["event_type"]
+        if kind == "key_down" and not io.want_text_input and self._shortcut(event):
             return True
-        if event["event_type"] == "pointer_down" and event["x"] >= self.width(size):
-            self.helps = False
-        return feed(self._imgui.get_io(), event, lambda x, y: self._covers(x, y, size))
-
-    def _obeys(self, event: Mapping[str, Any]) -> bool:
-        """Whether a key is about the panel itself."""
-        from dermis.viewer.panel.fields import attempt
-        from dermis.viewer.panel.help import KEYS
-
-        key, desk = str(event["key"]), self._desk
-        if {"Control", "Meta"} & set(event.get("modifiers", ())):
-            if key.lower() != "s":
-                return False
-            attempt(desk, lambda: desk.save(Path(desk.names.scene)))
-        elif key == "Tab":
-            self.visible = not self.visible
-        elif key in KEYS or (key == "Escape" and self.helps):
-            self.helps = not self.helps
-        else:
+        if kind == "pointer_down" and event["x"] >= self.width(size):
+            self.shows_help = False
+        if kind in _POINTER:
+            _feed_pointer(io, event)
+            return self._covers(event["x"], event["y"], size)
+        if kind == "pointer_leave":
+            io.add_mouse_pos_event(-1e6, -1e6)
             return False
-        return True
-
-    @property
-    def is_active(self) -> bool:
-        """Whether something of it is held or typed into."""
-        self._enter()
-        return bool(self._imgui.is_any_item_active())
+        if kind == "char":
+            io.add_input_characters_utf8(event.get("data") or event.get("char_str") or "")
+        else:
+            _feed_key(io, str(event["key"]), kind == "key_down")
+        return bool(io.want_text_input)
 
     def draw(self, target: Any, size: tuple[float, float], pixel_ratio: float) -> None:
         """Draw over what the target shows.
 
         size : of the window, logical
         """
-        imgui = self._imgui
-        from dermis.viewer.panel.over import draw_divider, draw_lines
-
         self._enter()
         io = imgui.get_io()
         io.display_size = imgui.ImVec2(*size)
         io.display_framebuffer_scale = imgui.ImVec2(pixel_ratio, pixel_ratio)
-        for _ in range(2 if self._is_new else 1):  # a window's first frame only measures it
+        for _ in range(2 if self._is_new else 1):  # the first frame of a window only measures it
             self._is_new = False
             imgui.new_frame()
             try:
                 self._draw_windows(size)
-                draw_divider(self._desk.split, self.width(size), size)
-                draw_lines(self._lines(), self.width(size), size)
             finally:
                 imgui.render()
         encoder = self._device.handle.create_command_encoder()
-        kept = {"view": target, "load_op": "load", "store_op": "store"}
-        one = encoder.begin_render_pass(label="panel", color_attachments=[kept])
-        self._backend.render(imgui.get_draw_data(), one)
-        one.end()
+        attachment = {"view": target, "load_op": "load", "store_op": "store"}
+        render_pass = encoder.begin_render_pass(label="panel", color_attachments=[attachment])
+        self._backend.render(imgui.get_draw_data(), render_pass)
+        render_pass.end()
         self._device.handle.queue.submit([encoder.finish()])
 
-    @property
-    def _types(self) -> bool:
-        return bool(self._imgui.get_io().want_text_input)
+    def _shortcut(self, event: Mapping[str, Any]) -> bool:
+        """Whether a key was a shortcut of the panel."""
+        key, session = str(event["key"]), self._session
+        if {"Control", "Meta"} & set(event.get("modifiers", ())):
+            if key.lower() != "s":
+                return False
+            attempt(session, lambda: session.save(Path(session.scene_file)))
+        elif key == "Tab":
+            self.visible = not self.visible
+        elif key in HELP_KEYS or (key == "Escape" and self.shows_help):
+            self.shows_help = not self.shows_help
+        else:
+            return False
+        return True
 
     def _enter(self) -> None:
-        self._imgui.set_current_context(self._context)
-        self._implot.set_current_context(self._plots)
-
-    def _lines(self) -> list[str]:
-        messages = self._desk.messages
-        return [line for line in (messages.said, messages.status) if line]
+        imgui.set_current_context(self._context)
+        implot.set_current_context(self._plots)
 
     def _covers(self, x: float, y: float, size: tuple[float, float]) -> bool:
-        """Whether a pointer there is the panel's; Dear ImGui itself knows it only a frame later."""
-        on_handle = not self.visible and x < self._handle[0] and y < self._handle[1]
-        return x < self.width(size) or on_handle or self._has_popup or self.is_active
+        """Whether a pointer there is over the panel; Dear ImGui would know it only a frame later."""
+        on_button = not self.visible and x < self._button_end[0] and y < self._button_end[1]
+        return x < self.width(size) or on_button or self._has_popup or bool(imgui.is_any_item_active())
 
     def _draw_windows(self, size: tuple[float, float]) -> None:
-        """The panel or what brings it back, and help."""
-        from dermis.viewer.panel.help import draw_help
-        from dermis.viewer.panel.toolbar import draw_handle
-
+        """The panel, or the button that brings it back, and the overlay."""
         if self.visible:
-            self._draw_sections(size)
+            self._draw_panel(size)
         else:
-            self._has_popup = False
-            self.visible, self._handle = draw_handle(self._desk)
-        if self.helps:
-            draw_help(self.width(size), size)
+            self._draw_button()
+        left, session = self.width(size), self._session
+        if self.shows_help:
+            draw_help(left, size)
+        draw_divider(session.split, left, size)
+        draw_messages([line for line in (session.message, session.status) if line], left, size)
 
-    def _draw_sections(self, size: tuple[float, float]) -> None:
-        from dermis.viewer.panel.fields import note_place
-        from dermis.viewer.panel.sections import SECTIONS
-        from dermis.viewer.panel.toolbar import draw_toolbar
+    def _draw_button(self) -> None:
+        """A button in the corner of the picture."""
+        self._has_popup = False
+        imgui.set_next_window_pos(imgui.ImVec2(0.0, 0.0))
+        flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_background
+        imgui.push_style_var(int(imgui.StyleVar_.alpha), _FAINT)
+        imgui.begin("corner", None, int(flags | imgui.WindowFlags_.always_auto_resize))
+        self.visible = button(self._session, "panel")
+        end = imgui.get_item_rect_max()
+        self._button_end = float(end.x) + _MARGIN, float(end.y) + _MARGIN
+        imgui.end()
+        imgui.pop_style_var()
 
-        imgui = self._imgui
-        width = self.width(size)
+    def _draw_panel(self, size: tuple[float, float]) -> None:
+        session, width = self._session, self.width(size)
         imgui.get_style().font_scale_main = max(_LEAST_SCALE, min(1.0, width / _WIDTH))
         imgui.set_next_window_pos(imgui.ImVec2(0.0, 0.0))
         imgui.set_next_window_size(imgui.ImVec2(width, size[1]))
-        still = imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_collapse
-        imgui.begin("dermis", None, int(still | imgui.WindowFlags_.no_title_bar))
-        pressed = draw_toolbar(self._desk)
-        self.helps, self.visible = self.helps ^ (pressed == "help"), pressed != "hide"
+        fixed = imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_collapse
+        imgui.begin("dermis", None, int(fixed | imgui.WindowFlags_.no_title_bar))
+        self._draw_toolbar()
         imgui.push_item_width(0.58 * width)
         for section in SECTIONS:
-            flags = int(imgui.TreeNodeFlags_.default_open) if section.OPEN else 0
-            is_open = imgui.collapsing_header(section.TITLE, flags)
-            note_place(self._desk, section.TITLE)
+            flags = int(imgui.TreeNodeFlags_.default_open) if section.is_open else 0
+            is_open = imgui.collapsing_header(section.title, flags)
+            record_position(session, section.title)
             if is_open:
-                imgui.push_id(section.TITLE)  # several sections may use a label
-                section.draw(self._desk)
+                imgui.push_id(section.title)  # sections may share labels
+                section.draw(session)
                 imgui.pop_id()
         imgui.pop_item_width()
-        self._follow_finger()
+        self._scroll_by_touch()
         self._has_popup = bool(imgui.is_popup_open("", int(imgui.PopupFlags_.any_popup)))
         imgui.end()
 
-    def _follow_finger(self) -> None:
-        """Scroll along with a drag that began beside all controls, for fingers have no wheel."""
-        imgui = self._imgui
+    def _draw_toolbar(self) -> None:
+        h = self._session.history
+        for label, possible, step in (("undo", h.can_undo, h.undo), ("redo", h.can_redo, h.redo)):
+            imgui.begin_disabled(not possible)
+            if button(self._session, label):
+                step()
+            imgui.end_disabled()
+            imgui.same_line()
+        self.shows_help ^= button(self._session, "help")
+        imgui.same_line()
+        self.visible = not button(self._session, "hide")
+
+    def _scroll_by_touch(self) -> None:
+        """Scroll with a drag that began beside all controls: fingers have no wheel."""
         if imgui.is_mouse_clicked(0):
             self._scrolls = imgui.is_window_hovered() and not imgui.is_any_item_hovered()
         if self._scrolls and imgui.is_mouse_down(0):
             imgui.set_scroll_y(imgui.get_scroll_y() - imgui.get_io().mouse_delta.y)
 
 
-def _set_style(imgui: Any) -> None:
-    """A legible font on a dark ground."""
-    import imgui_bundle
+def _feed_pointer(io: Any, event: Mapping[str, Any]) -> None:
+    kind = event["event_type"]
+    io.add_mouse_pos_event(event["x"], event["y"])
+    if kind in ("pointer_down", "pointer_up"):
+        io.add_mouse_button_event(max(0, event["button"] - 1), kind == "pointer_down")
+    elif kind == "wheel":
+        io.add_mouse_wheel_event(-_WHEEL * event["dx"], -_WHEEL * event["dy"])
 
+
+def _feed_key(io: Any, name: str, down: bool) -> None:
+    key = ImguiRenderer.KEY_MAP.get(name)
+    if key is None and len(name) == 1 and name.isascii() and name.isalnum():
+        key = getattr(imgui.Key, f"_{name}" if name.isdigit() else name.lower(), None)
+    if key is not None:
+        io.add_key_event(key, down)
+    if name in ImguiRenderer.KEY_MAP_MOD:
+        io.add_key_event(ImguiRenderer.KEY_MAP_MOD[name], down)
+
+
+def _set_style() -> None:
+    """A legible font on a dark ground."""
     io, style = imgui.get_io(), imgui.get_style()
     font = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "Roboto" / "Roboto-Regular.ttf"
     if font.is_file():
         io.fonts.add_font_from_file_ttf(str(font), _FONT_SIZE)
     imgui.style_colors_dark()
-    io.fonts.flags |= int(imgui.ImFontAtlasFlags_.no_baked_lines)  # which the backend may leave out
+    io.fonts.flags |= int(imgui.ImFontAtlasFlags_.no_baked_lines)  # some backends cannot draw them
     style.window_rounding, style.frame_rounding, style.window_border_size = 0.0, 3.0, 0.0
-    for name, grey, alpha in _GREYS:  # colours beside skin would change how it is judged
-        if hasattr(imgui.Col_, name):  # some are new
-            style.set_color_(int(getattr(imgui.Col_, name)), imgui.ImVec4(grey, grey, grey, alpha))
+    for name, grey in _GREYS:
+        if hasattr(imgui.Col_, name):  # some need a newer version
+            style.set_color_(int(getattr(imgui.Col_, name)), imgui.ImVec4(grey, grey, grey, 1.0))

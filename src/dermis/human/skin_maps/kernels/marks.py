@@ -82,14 +82,7 @@ def _pore(x: float, y: float, z: float, normal: Doubles, place: Doubles, texel: 
 
 @compiled
 def _freckle(
-    x: float,
-    y: float,
-    z: float,
-    normal: Doubles,
-    place: Doubles,
-    freckles: float,
-    texel: float,
-    seed: int,
+    x: float, y: float, z: float, normal: Doubles, place: Doubles, freckles: float, texel: float, seed: int
 ) -> float:
     """Ragged spots of two sizes, most where the sun shines."""
     kept = freckles * (0.12 + 0.88 * min(max(place[FRECKLES], 0.0), 1.0))

@@ -7,13 +7,7 @@ import math
 from dermis.human.bust.fields import Doubles
 from dermis.human.skin_maps.face import Folds
 from dermis.human.skin_maps.kernels.marks import HAIR, MOLE, PORE
-from dermis.human.skin_maps.kernels.noise import (
-    blobs,
-    fractal_noise,
-    gradient_noise,
-    smooth_step,
-    visible,
-)
+from dermis.human.skin_maps.kernels.noise import blobs, fractal_noise, gradient_noise, smooth_step, visible
 from dermis.human.skin_maps.kernels.places import AROUND, FURROWS, LEVEL, LIP, MOUTH, X, Y, Z
 from dermis.human.skin_maps.look import Patch
 from dermis.machine_code import compiled

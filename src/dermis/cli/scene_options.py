@@ -1,0 +1,128 @@
+"""The options of a scene, as `dermis render` and `dermis view` take them, and the scene they make."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from dermis.cli.options import check, option_name, options_of, refuse_options
+from dermis.errors import refuse
+from dermis.scene.environment import Environment
+from dermis.scene.head_table import HeadTable
+from dermis.scene.settings import Settings
+from dermis.scene.skin import Skin
+
+if TYPE_CHECKING:
+    from dermis.scene import Light, Scene
+
+    HeadOptions = dict[str, Any]
+    SkinOptions = dict[str, Any]
+    SettingsOptions = dict[str, Any]
+    EnvironmentOptions = dict[str, Any]
+
+HEAD = {"specular": "specular_map", "roughness": "roughness_map"}
+AROUND = {field: f"env_{field}" for field in Environment.model_fields}
+AROUND |= {"name": "env", "rotation_degrees": "env_rotation"}
+
+if not TYPE_CHECKING:
+    HeadOptions = options_of(HeadTable, without=("name",), names=HEAD)
+    SkinOptions, SettingsOptions = options_of(Skin), options_of(Settings)
+    EnvironmentOptions = options_of(Environment, names=AROUND)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class SceneOptions:
+    """What was typed, by the fields of the models."""
+
+    settings: SettingsOptions = field(default_factory=dict)
+    skin: SkinOptions = field(default_factory=dict)
+    lights: Annotated[
+        str | None,
+        Parameter(
+            help="A rig (studio, window, top, rim, rembrandt, laser, none) or a TOML file with [[lights]]; "
+            "studio unless --env is given."
+        ),
+    ] = None
+    around: EnvironmentOptions = field(default_factory=dict)
+    camera: Annotated[
+        str | None,
+        Parameter(help="portrait, three-quarter, profile, ear, cheek, or a TOML file with [camera]."),
+    ] = None
+    head: HeadOptions = field(default_factory=dict)
+
+
+DEFAULTS = SceneOptions()
+
+
+def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
+    """The scene and its settings: those of a head or of a scene's file, with the options given on top."""
+    from dermis.scene import Scene, load_camera
+
+    _check(name, given)
+    scene, settings = _begin(name, given)
+    environment = _environment(scene.environment, given.around)
+    return Scene(
+        scene.head,
+        lights=_lights(scene, given.lights, environment, replaced="name" in given.around),
+        camera=scene.camera if given.camera is None else load_camera(given.camera, scene.head),
+        skin=Skin(**(scene.skin.model_dump() | given.skin)),
+        environment=environment,
+    ), Settings(**(settings.model_dump() | given.settings))
+
+
+def _check(name: str, given: SceneOptions) -> None:
+    """Refuse what cannot be before the head is loaded, which takes longer."""
+    from dermis.environment.panorama import panorama_file
+    from dermis.optics.profiles import load_profile
+
+    check(HeadTable, {"name": name} | given.head, HEAD)
+    check(Skin, given.skin)
+    check(Settings, given.settings)
+    check(Environment, {"name": "uniform"} | given.around, AROUND)
+    if "profile" in given.skin:
+        load_profile(given.skin["profile"])
+    if "name" in given.around:
+        panorama_file(given.around["name"])
+
+
+def _begin(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
+    """The file's scene, or a head's with defaults."""
+    from dermis.scene import Scene, load_scene
+    from dermis.scene.files import head_and_skin
+
+    if Path(name).suffix.lower() == ".toml":
+        refuse_options(given.head, HEAD, "with a scene file", "Write it into the file's [head]")
+        return load_scene(Path(name))
+    for field_ in ("rho_s", "roughness"):
+        if "regions" in given.head and field_ in given.skin:
+            came = "it came with --regions, which says it for each region"
+            refuse(option_name(field_), "one or the other", came, "Leave one out, or use --oiliness")
+    head, skin = head_and_skin(HeadTable(name=name, **given.head), Skin(), Path())
+    return Scene(head, skin=skin), Settings()
+
+
+def _environment(before: Environment | None, around: dict[str, Any]) -> Environment | None:
+    if around and before is None and "name" not in around:
+        option = option_name(next(iter(around)), AROUND)
+        refuse(option, "an environment with it", "there is none", "Add --env, or [environment] to the scene")
+    if not around:
+        return before
+    return Environment(**((before.model_dump() if before else {}) | around))
+
+
+def _lights(
+    scene: Scene, name: str | None, environment: Environment | None, *, replaced: bool
+) -> tuple[Light, ...]:
+    """The rig given; with an environment given and no rig none; else the scene's."""
+    from dermis.scene import load_lights
+
+    if name is None:
+        return () if replaced else tuple(scene.lights)
+    lights = load_lights(name)
+    if not lights and environment is None:
+        refuse("--lights", "some light", f"{name!r} has none", "Add --env, or choose another rig")
+    return lights

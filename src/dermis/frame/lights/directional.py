@@ -1,0 +1,23 @@
+"""Parallel light, and light of a sun."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from dermis.frame.lights.kind import Kind
+from dermis.frame.projection import Triple
+from dermis.scene.lights import DirectionalLight
+
+
+class _Directional(Kind[DirectionalLight]):
+    always = True
+
+    def has_size(self, light: DirectionalLight) -> bool:
+        return light.angle_degrees > 0
+
+    def members(self, light: DirectionalLight, centre: Triple, distance: float) -> dict[str, Any]:
+        return {"extent": math.tan(0.5 * math.radians(light.angle_degrees))}
+
+
+KIND = _Directional()

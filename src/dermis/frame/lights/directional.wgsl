@@ -1,0 +1,5 @@
+// Parallel light, the same everywhere.
+
+fn directional_incident(light: Light, p: vec3f, part: u32) -> Incident {
+    return Incident(-light.direction, light.irradiance);
+}

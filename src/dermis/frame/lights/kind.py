@@ -1,0 +1,91 @@
+"""What sets the kinds of light apart for the frame: one object each, its shader beside it."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from dermis.frame.projection import Triple, between, frame_of
+from dermis.gpu.wgsl_source import Member
+from dermis.mesh.head import Head
+from dermis.registry import Registry
+from dermis.scene.lights import LIGHTS, Light, PointLight
+
+L = TypeVar("L", bound=Light)
+_UP = np.array([0.0, 1.0, 0.0])
+
+
+class Kind(Generic[L]):
+    """Light from one place or, where it is parallel, in one direction.
+
+    Its shader lies beside its module under the same name and has
+    `fn NAME_incident(light: Light, p: vec3f, part: u32) -> Incident`,
+    NAME as in scene files, with underscores for hyphens.
+
+    always : whether all shaders have it; others are compiled for the scenes that call for them
+    narrow : whether all of it comes from its position or along its direction
+    round : whether it is a disc as seen from the head, not a rectangle
+    """
+
+    always = False
+    narrow = True
+    round = True
+
+    @property
+    def shader(self) -> Path:
+        """The file of its shader."""
+        return Path(inspect.getfile(type(self))).with_suffix(".wgsl")
+
+    def has_size(self, light: L) -> bool:
+        """Whether what it shadows softens with the distance from what casts the shadow."""
+        return not self.narrow
+
+    def parts(self, light: L) -> list[Light]:
+        """Lights that together are this one and see the head each for itself."""
+        return [light]
+
+    def check(self, light: L, head: Head, culprit: str) -> None:
+        """Raise DermisError where the light cannot stand."""
+
+    def members(self, light: L, centre: Triple, distance: float) -> dict[str, Any]:
+        """Of the shader's `Light`, what other kinds have not.
+
+        centre : of the head [mm]
+        distance : from the light to its target, 1 for parallel light [mm]
+        """
+        return {}
+
+
+KINDS: Registry[Kind[Any]] = Registry("light", {name: f"{__package__}.{name}:KIND" for name in LIGHTS})
+"""By the names of scene files."""
+
+
+def facing(light: PointLight, radiance: float, half_width: float, half_height: float) -> dict[str, Any]:
+    """Members of a light of some size that faces its target; it carries its radiance.
+
+    radiance : for an irradiance of 1 at the target [1/sr]
+    half_width, half_height : [mm]
+    """
+    right, up, _ = frame_of(np.array(between(light.position, light.target)), _UP)
+    return {
+        "half_u": half_width * right,
+        "half_v": half_height * up,
+        "extent": (half_width, half_height),
+        "irradiance": radiance * np.array(light.irradiance),
+    }
+
+
+def override_of(name: str) -> str:
+    """The shaders' `override` for a kind, by its name in scene files."""
+    return f"{name.replace('-', '_').upper()}_LIGHT"
+
+
+def light_shaders() -> list[Member]:
+    """The kinds as lights.wgsl includes them."""
+    return [
+        Member(name, kind.shader, (("override", override_of(name)), ("always", str(kind.always).lower())))
+        for name, kind in KINDS.items()
+    ]

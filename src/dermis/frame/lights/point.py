@@ -1,0 +1,13 @@
+"""Light from a point."""
+
+from __future__ import annotations
+
+from dermis.frame.lights.kind import Kind
+from dermis.scene.lights import PointLight
+
+
+class _Point(Kind[PointLight]):
+    always = True
+
+
+KIND = _Point()

@@ -1,0 +1,10 @@
+// An even rectangle, as points in the middles of its parts that shine as Lambert's law has it.
+
+fn rectangle_incident(light: Light, p: vec3f, part: u32) -> Incident {
+    let place = place_of(part, light.side);
+    let d = light.position + place.x * light.half_u + place.y * light.half_v - p;
+    let d2 = max(dot(d, d), 1.0);
+    let l = d * inverseSqrt(d2);
+    let area = 4.0 * length(light.half_u) * length(light.half_v) / f32(parts_of(light));
+    return Incident(l, light.irradiance * max(0.0, -dot(l, light.direction)) * area / d2);
+}

@@ -1,0 +1,32 @@
+"""An evenly bright sphere."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from dermis.errors import refuse
+from dermis.frame.lights.kind import Kind, facing
+from dermis.frame.projection import Triple, place_of
+from dermis.mesh.head import Head
+from dermis.scene.lights import SphereLight
+
+
+class _Sphere(Kind[SphereLight]):
+    narrow = False
+
+    def check(self, light: SphereLight, head: Head, culprit: str) -> None:
+        middle = place_of(light.position, head.centre_mm)
+        near = float(np.linalg.norm(head.mesh.positions - np.array(middle), axis=1).min())
+        if near <= light.radius_mm:
+            came = f"the head is {near:.0f} mm from its middle"
+            refuse(culprit, f"a head outside the sphere of {light.radius_mm:g} mm", came, "Move it away")
+
+    def members(self, light: SphereLight, centre: Triple, distance: float) -> dict[str, Any]:
+        radiance = 1.0 / (math.pi * (light.radius_mm / distance) ** 2)
+        return facing(light, radiance, light.radius_mm, light.radius_mm)
+
+
+KIND = _Sphere()

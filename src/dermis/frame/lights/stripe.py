@@ -1,0 +1,21 @@
+"""A sheet of parallel light."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dermis.frame.lights.kind import Kind
+from dermis.frame.projection import Triple, frame_of, place_of
+from dermis.scene.lights import StripeLight
+
+
+class _Stripe(Kind[StripeLight]):
+    def members(self, light: StripeLight, centre: Triple, distance: float) -> dict[str, Any]:
+        right, up, _ = frame_of(np.array(light.direction), np.array(light.up))
+        across, along = 2.0 * right / light.width_mm, 2.0 * up / light.length_mm
+        return {"position": place_of(light.position, centre), "half_u": across, "half_v": along}
+
+
+KIND = _Stripe()

@@ -1,0 +1,32 @@
+"""A single blur of the light map, as before 2007."""
+
+from __future__ import annotations
+
+from dermis.frame.techniques.texture_space import TextureSpace
+from dermis.optics.fits.gaussian import single_gaussian
+from dermis.optics.gaussians import GaussianSum
+from dermis.scene.settings import Settings
+
+
+class OneBlur(TextureSpace):
+    """One Gaussian for all of the profile, alike everywhere on the map."""
+
+    name = "one-blur"
+    sources = ("Borshukov2003", "Green2004")
+    stitches = False
+    transmits = False
+
+    def gaussians(self, profile: GaussianSum) -> GaussianSum:
+        """The one Gaussian."""
+        return single_gaussian(profile)
+
+    def relights(self, profile: GaussianSum) -> bool:
+        """It never did."""
+        return False
+
+    def stretch(self, settings: Settings) -> str:
+        """It took the map for even."""
+        return "none"
+
+
+TECHNIQUE = OneBlur()

@@ -1,0 +1,127 @@
+"""Light that spreads below the skin over the picture itself, by a separable kernel [Jimenez2015]."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.frame.inputs import Inputs
+from dermis.frame.passes import TECHNIQUES, program
+from dermis.frame.techniques.technique import Technique
+from dermis.gpu import Device, Graph, Memo, Recorder, make_texture
+from dermis.gpu.textures import texture_from
+from dermis.optics.fits.separable import SeparableKernel, preintegrate
+from dermis.optics.gaussians import GaussianSum
+from dermis.scene.settings import Settings
+
+_TAIL = 5e-4  # of the light that goes to one side: the kernel is followed until no channel has more beyond
+_FINEST_MM, _WIDEST_MM = 0.01, 400.0  # where that distance is looked for
+_ENTRIES = 256
+
+
+@dataclass(frozen=True, eq=False)
+class Apart:
+    """What shade keeps apart, and space for what comes of it.
+
+    layers : light below the skin with its depth [mm]; the share of it that leaves towards the eye
+    below, leaving : views of the two
+    between : light spread along rows only
+    result : the whole picture
+    """
+
+    layers: Any
+    below: Any
+    leaving: Any
+    between: Any
+    result: Any
+
+
+@dataclass(frozen=True, eq=False)
+class Kernel:
+    """Share of the light that goes up to a distance to one side, as a texture over its root.
+
+    reach_mm : distance of the last entry
+    """
+
+    texture: Any
+    reach_mm: float
+
+
+class ScreenSpace(Technique):
+    """Spreads the light of all skin in sight and joins it with what lies over it [Jimenez2015]."""
+
+    name = "screen-space"
+    sources = ("Jimenez2015",)
+    shade_constants = (("SPLIT", 1),)
+    pixel_bytes = 64
+
+    def make(
+        self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum
+    ) -> tuple[Apart, Kernel]:
+        """Space for a picture, and the profile's kernel."""
+        apart = memo.keep(make_apart, device, settings.size)
+        return apart, memo.keep(make_kernel, device, profile)
+
+    def apart(self, own: tuple[Apart, Kernel]) -> Any:
+        """Layers for the light below the skin and how it leaves."""
+        return own[0].layers
+
+    def finish(self, graph: Graph, inputs: Inputs, radiance: Any) -> Any:
+        """The picture with the light below the skin spread over it."""
+        apart, kernel = inputs.resources.own
+        return draw(graph, apart, kernel, inputs.half, radiance)
+
+
+TECHNIQUE = ScreenSpace()
+
+
+def make_apart(device: Device, size: tuple[int, int]) -> Apart:
+    """Space for a picture of size (width, height)."""
+    layers = make_texture(device, size, "rgba32float", layers=2)
+    below, leaving = (
+        layers.create_view(dimension="2d", base_array_layer=k, array_layer_count=1) for k in range(2)
+    )
+    between, result = (make_texture(device, size, "rgba32float") for _ in range(2))
+    return Apart(layers, below, leaving, between, result)
+
+
+def make_kernel(device: Device, profile: GaussianSum) -> Kernel:
+    """The profile's kernel as the shader reads it."""
+    shares, reach_mm = kernel_table(preintegrate(profile))
+    return Kernel(texture_from(device, shares, "rgba32float"), reach_mm)
+
+
+def draw(graph: Recorder, apart: Apart, kernel: Kernel, half: tuple[float, float], over: Any) -> Any:
+    """The picture, a texture of `apart`.
+
+    half : tangents of the half angles of view
+    over : what shade has seen apart from the light below the skin
+    """
+    device, size = graph.device, over.size[:2]
+    along = [program(device, TECHNIQUES / "screen_space.wgsl", (("AXIS", axis),)) for axis in (0, 1)]
+    record = along[0].record("Spread", half=half, reach=kernel.reach_mm)
+    passes = ((apart.below, apart.between), (apart.between, apart.below))
+    for shader, (source, blurred) in zip(along, passes, strict=True):
+        bound = {"spread": record, "source": source, "kernel": kernel.texture, "blurred": blurred}
+        graph.compute("screen space", shader, bound, size)
+    bound = {"over": over, "below": apart.below, "leaving": apart.leaving, "image": apart.result}
+    graph.compute("screen space", program(device, TECHNIQUES / "resurface.wgsl"), bound, size)
+    return apart.result
+
+
+def kernel_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
+    """(1, n, 4) shares by the root of the distance over the reach, and the reach [mm]."""
+    reach = _reach(kernel)
+    shares = kernel.one_side(reach * np.linspace(0.0, 1.0, _ENTRIES) ** 2)
+    shares *= 0.5 / shares[-1]  # what would go farther stays within reach
+    return np.concatenate([shares, np.zeros((_ENTRIES, 1))], axis=1)[None], reach
+
+
+def _reach(kernel: SeparableKernel) -> float:
+    """Distance beyond which no channel has more than `_TAIL` of the light [mm]."""
+    distance = np.geomspace(_FINEST_MM, _WIDEST_MM, 4096)
+    beyond = (0.5 - kernel.one_side(distance)).max(axis=1) > _TAIL
+    return float(distance[min(int(beyond.sum()), len(distance) - 1)])

@@ -1,0 +1,153 @@
+"""What every technique of scattering is asked for."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.frame.atlas_textures import AtlasTextures
+from dermis.frame.inputs import Inputs, Split
+from dermis.frame.levels import FLOATS, MOST_HALVINGS, Blur, Levels, halvings_of, make_levels, usual_texel
+from dermis.frame.passes import blend, combine, irradiance, surface_texels, translucency
+from dermis.gpu import Constants, Device, Graph, Memo
+from dermis.gpu.textures import FORMAT_BYTES
+from dermis.optics.gaussians import GaussianSum
+from dermis.scene.settings import Settings
+
+# A Gaussian narrower than this is finer than texels and pores: it is lit again, not blurred.
+_RELIT_MM2 = 0.1**2
+
+
+class Technique:
+    """A way for light to spread below the skin; this one lets it leave where it entered.
+
+    name : as settings, files and the command line have it
+    sources : keys of the bibliography
+    stitches : whether it can carry light across the map's seams
+    shade_constants : pipeline constants of the shading pass
+    pixel_bytes : of memory for each pixel, besides the picture
+    """
+
+    name: ClassVar[str] = "none"
+    sources: ClassVar[tuple[str, ...]] = ()
+    on_atlas: ClassVar[bool] = False
+    stitches: ClassVar[bool] = True
+    transmits: ClassVar[bool] = False
+    shade_constants: ClassVar[Constants] = ()
+    pixel_bytes: ClassVar[int] = 0
+
+    def split(self, profile: GaussianSum, white: bool) -> Split:
+        """The profile as the technique uses it.
+
+        white : renormalise each channel's weights to 1, so that the colour map alone gives the colour
+        """
+        total = _weights(profile, white).sum(axis=0)
+        return Split(total, total, np.empty(0), np.empty((0, 3)))
+
+    def make_sum(self, device: Device, side: int) -> Any:
+        """Space for the light that leaves below the surface."""
+        return combine.make_sum(device, side)
+
+    def texel_bytes(self, levels: int) -> float:
+        """Memory for each texel of the atlas on a software adapter, with the space between passes."""
+        return 0.0
+
+    def make(self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum) -> Any:
+        """What it needs of its own: tables and textures, kept by the memo."""
+        return None
+
+    def describe(self, view: Any, shade: Any, own: Any) -> None:
+        """Put what the shading pass must know into its record.
+
+        shade : the pass' program
+        """
+
+    def scatter(self, graph: Graph, inputs: Inputs) -> Any:
+        """Declare the passes before the shading; returns the texture that it reads as `scattered`."""
+        return inputs.resources.scattered
+
+    def apart(self, own: Any) -> Any:
+        """Texture for light that the shading keeps apart, None when it keeps none."""
+        return None
+
+    def finish(self, graph: Graph, inputs: Inputs, radiance: Any) -> Any:
+        """Declare the passes after the shading; returns the texture that holds the picture."""
+        return radiance
+
+
+class AtlasTechnique(Technique):
+    """Light that spreads over the atlas: lit there, blurred by each of the profile's Gaussians, added up."""
+
+    on_atlas = True
+
+    def gaussians(self, profile: GaussianSum) -> GaussianSum:
+        """The sum of Gaussians that is blurred with."""
+        return profile
+
+    def relights(self, profile: GaussianSum) -> bool:
+        """Whether the narrowest Gaussian is lit again in the picture instead of blurred."""
+        return bool(profile.variance_mm2[0] <= _RELIT_MM2)
+
+    def split(self, profile: GaussianSum, white: bool) -> Split:
+        """What is lit again, and the Gaussians that blur."""
+        profile = self.gaussians(profile)
+        weight = _weights(profile, white)
+        total = weight.sum(axis=0)
+        if self.relights(profile):
+            return Split(weight[0], total, profile.variance_mm2[1:], weight[1:])
+        return Split(np.zeros(3), total, profile.variance_mm2, weight)
+
+    def stretch(self, settings: Settings) -> str:
+        """How blurs follow the map's stretch, one of `Settings.stretch`."""
+        return settings.stretch
+
+    def texel(self, device: Device) -> str:
+        """Format of the levels of light."""
+        return usual_texel(device)
+
+    def make_levels(self, device: Device, side: int, count: int) -> Levels:
+        """Space for light and its blurred levels."""
+        return make_levels(device, side, count, self.texel(device))
+
+    def texel_bytes(self, levels: int) -> float:
+        """Memory for each texel of the atlas on a software adapter, with the space between passes."""
+        mips = sum(0.25**halving for halving in range(MOST_HALVINGS + 1))
+        return FORMAT_BYTES[FLOATS] * (levels + 2) * mips
+
+    def halvings(self, split: Split, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
+        """How often the resolution of each level is halved, that of the unblurred one first."""
+        most = len(atlas.sheets(edge)) - 1
+        return halvings_of(split.blurred_mm2, atlas.usual_per_mm, most)
+
+    def scatter(self, graph: Graph, inputs: Inputs) -> Any:
+        """Light each layout, let the light spread, blend two layouts; see `spread`."""
+        resources = inputs.resources
+        if not resources.scatters:
+            return resources.scattered
+        levels, layouts = resources.levels, inputs.layouts
+        for layout, blur in zip(layouts, inputs.blurs, strict=True):
+            into = levels.layer(0), levels.size, levels.texel, blur.scale
+            surface_texels.draw(graph, layout)
+            irradiance.draw(graph, layout, inputs.light_constants, *into)
+            graph.repeat(self.spread, levels, layout.atlas, blur, layout.translucency, layout.scattered)
+        if len(layouts) > 1:
+            blend.draw(graph, layouts[0], layouts[1], resources.scattered)
+        return resources.scattered
+
+    def spread(
+        self, graph: Any, levels: Levels, atlas: AtlasTextures, blur: Blur, thin: Any, into: Any
+    ) -> None:
+        """Blur the light of layer 0, let it through thin parts, and add up what leaves."""
+        self.fill(graph, levels, atlas, blur)
+        through = translucency.draw(graph, levels, blur, thin) if thin else None
+        combine.draw(graph, levels, blur, into, through)
+
+    def fill(self, graph: Any, levels: Levels, atlas: AtlasTextures, blur: Blur) -> None:
+        """Fill layer k with the light of layer 0 spread by the k-th Gaussian."""
+        raise NotImplementedError
+
+
+def _weights(profile: GaussianSum, white: bool) -> NDArray[np.float64]:
+    return profile.weight / profile.albedo if white else profile.weight

@@ -1,0 +1,104 @@
+"""What passes read and write, told by the shaders' own declarations, and what each resource holds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import count
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from dermis.gpu.device import Device
+
+_number = count(1)
+
+
+@dataclass(eq=False, slots=True)
+class Slot:
+    """What a texture, a buffer or a view of one layer holds.
+
+    Contents have numbers: the same number for what the same pass made of the same things, 0 for what nobody
+    has told. `value` is what the passes declared so far will leave, `held` what is there.
+
+    parent : of a view, the texture's slot
+    parts : of a texture, the slots of its views
+    frame : the one in which `value`, `writer` and `writers` hold
+    writer : the pass that writes it last
+    writers : all that do, and those that write what contains it or is contained
+    scratch : whether only passes read it, so that it may hold anything in between
+    """
+
+    parent: Slot | None = None
+    parts: list[Slot] = field(default_factory=list)
+    held: int = 0
+    value: int = 0
+    frame: int = 0
+    writer: int = 0
+    writers: list[int] = field(default_factory=list)
+    scratch: bool = False
+
+    def sources(self, frame: int) -> Iterator[Slot]:
+        """The slots from which it gets what it holds in the frame: itself, its views, or its texture."""
+        if self.frame == frame:
+            yield self
+        elif self.parent is not None and self.parent.frame == frame:
+            yield self.parent
+        for part in self.parts:
+            if part.frame == frame:
+                yield part
+
+    def write(self, frame: int, index: int, value: int) -> None:
+        """Let the pass of that index leave a value."""
+        if self.frame != frame:
+            self.writers = []
+        self.frame, self.value, self.writer = frame, value, index
+        self.writers.append(index)
+        for part in self.parts:
+            if part.frame == frame:
+                part.writers.append(index)
+                part.frame = 0  # what is read of it now is the texture's
+        if self.parent is not None and self.parent.frame == frame:
+            self.parent.writers.append(index)
+
+    def hold(self, value: int) -> None:
+        """Note what is there now; what overlaps it is no longer what it was."""
+        self.held = value
+        for part in self.parts:
+            part.held = 0
+        if self.parent is not None:
+            self.parent.held = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Access:
+    """What a program does with the resources bound to it.
+
+    number : of this program with these resources, never given twice
+    reads, writes : slots; what is both stands in both
+    """
+
+    number: int
+    reads: tuple[Slot, ...]
+    writes: tuple[Slot, ...]
+
+
+def new_number() -> int:
+    """A number that nothing has had before."""
+    return next(_number)
+
+
+def scratch(device: Device, resource: Any) -> Any:
+    """The texture or buffer, which passes share: none runs only for what it leaves there."""
+    slot_of(device, resource).scratch = True
+    return resource
+
+
+def slot_of(device: Device, resource: Any) -> Slot:
+    """The slot of a texture, a buffer or a view."""
+    found: Slot | None = device.slots.get(resource)
+    if found is None:
+        texture = getattr(resource, "texture", None)
+        found = device.slots[resource] = Slot(slot_of(device, texture) if texture is not None else None)
+        if found.parent is not None:
+            found.parent.parts.append(found)
+    return found

@@ -1,0 +1,66 @@
+"""What is made for a set of resources and goes with the first of them."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Sequence
+from typing import Any, Generic, TypeVar
+
+Key = tuple[int, ...]
+T = TypeVar("T")
+
+
+class ByResources(Generic[T]):
+    """Bind groups, and the like, by the identity of all that they bind.
+
+    A group lets go of its resources' memory only when it goes itself, so it is forgotten as soon as one of
+    them is no longer held elsewhere.
+    """
+
+    def __init__(self) -> None:
+        self._kept: dict[Key, T] = {}
+        self._users: dict[int, tuple[weakref.ref[Any], set[Key]]] = {}
+
+    def __len__(self) -> int:
+        return len(self._kept)
+
+    @property
+    def followed(self) -> int:
+        """How many resources there are things for."""
+        return len(self._users)
+
+    def find(self, key: Key) -> T | None:
+        """What was made for a key from `key_of`, None when there is none (any more)."""
+        return self._kept.get(key)
+
+    def keep(self, key: Key, resources: Sequence[Any], made: T) -> None:
+        """Keep it for as long as all the resources that gave the key live."""
+        self._kept[key] = made
+        for resource in resources:
+            self._user(resource).add(key)
+
+    def _user(self, resource: Any) -> set[Key]:
+        """The keys that a resource is in; new resources are followed to their end."""
+        name = id(resource)
+        if name not in self._users:
+            this = weakref.ref(self)
+
+            def gone(_: Any) -> None:
+                kept = this()
+                if kept is not None:
+                    kept._forget(name)
+
+            self._users[name] = weakref.ref(resource, gone), set()
+        return self._users[name][1]
+
+    def _forget(self, name: int) -> None:
+        _, keys = self._users.pop(name)
+        for key in keys:
+            self._kept.pop(key, None)
+            for other in set(key) & self._users.keys():
+                self._users[other][1].discard(key)
+
+
+def key_of(resources: Sequence[Any]) -> Key:
+    """Tells a set of resources from others."""
+    return tuple(map(id, resources))

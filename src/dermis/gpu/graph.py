@@ -1,0 +1,238 @@
+"""A frame as a graph: passes are declared in order, and only those run whose results are not there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from dermis.gpu.access import Slot, slot_of
+from dermis.gpu.device import Device
+from dermis.gpu.frame import Frame, Timed
+from dermis.gpu.listing import Lister, Listing
+from dermis.gpu.program import ComputeProgram, FragmentProgram, Program, RasterProgram, Resources
+from dermis.gpu.readback import Fetched
+from dermis.gpu.recording import Recordings
+
+T = TypeVar("T")
+Groups = tuple[int, int, int]
+
+
+@dataclass(slots=True)
+class Pass:
+    """One pass of a frame, or a recorded run of them.
+
+    run : does it
+    writes : what it leaves in which slots
+    needs : passes before it, and the slots in which they leave what it reads
+    """
+
+    stages: tuple[str, ...]
+    run: Callable[[Frame], None]
+    writes: list[tuple[Slot, int]]
+    needs: list[tuple[int, Slot]] = field(default_factory=list)
+
+
+class Graph:
+    """Takes the passes of one frame after the other, with the methods of `Frame`, and knows what they leave.
+
+    What a pass reads and writes stands in its shader; what it leaves is told apart by its program, its
+    resources, what they hold, the workgroups, and the numbers in its records that the shader reads. A pass
+    whose result is still where it leaves it does not run, nor does one whose result nobody needs.
+
+    ran : stages of the passes that the last frame ran, in order
+    listing : when it is set, the passes of the next frame are written down there
+    """
+
+    def __init__(self, device: Device) -> None:
+        self.device = device
+        self.recordings = Recordings()
+        self.ran: list[str] = []
+        self.listing: Listing | None = None
+        self._epoch = 0
+        self._frame = 0
+        self._passes: list[Pass] = []
+        self._fetches: list[tuple[Any, Fetched]] = []
+
+    def forget(self) -> None:
+        """Nobody knows what any resource holds: the next frame runs every pass."""
+        self._epoch += 1
+
+    def begin(self) -> None:
+        """Begin a frame."""
+        self._frame = self.device.next_frame()
+        self._passes.clear()
+        self._fetches.clear()
+
+    def compute(
+        self,
+        stage: str,
+        program: ComputeProgram,
+        resources: Resources,
+        size: tuple[int, int],
+        tile: int = 8,
+        completes: str = "",
+    ) -> None:
+        """Declare a pass of size[0] x size[1] invocations, in tiles of `tile` squared."""
+        self.dispatch(stage, program, resources, (*program.groups_for(size, tile), 1), completes)
+
+    def dispatch(
+        self, stage: str, program: ComputeProgram, resources: Resources, groups: Groups, completes: str = ""
+    ) -> None:
+        """Declare a pass of a number of workgroups along each axis.
+
+        completes : name of a resource that the pass fills up with what follows from its own content, which is
+            therefore no other afterwards
+        """
+        access = program.access(resources)
+        filled = slot_of(self.device, resources[completes]) if completes else None
+        writes = [slot for slot in access.writes if slot is not filled]
+        key = (access.number, groups, program.numbers(resources))
+        self._list(stage, program, resources, groups)
+        self._add(
+            (stage,),
+            key,
+            access.reads,
+            writes,
+            lambda frame: frame.dispatch(stage, program, resources, groups),
+        )
+
+    def draw(
+        self,
+        stage: str,
+        program: RasterProgram,
+        resources: Resources,
+        vertices: int,
+        *,
+        layer: int = 0,
+        depth: Any,
+        far: float,
+        target: Any = None,
+    ) -> None:
+        """Declare a pass that rasterises triangles into cleared targets, as `Frame.draw` does."""
+        access, options = program.access(resources), {"layer": layer, "depth": depth, "far": far}
+        writes = [slot_of(self.device, one) for one in (depth, target) if one is not None]
+        key = (access.number, vertices, layer, far, program.numbers(resources))
+
+        def run(frame: Frame) -> None:
+            frame.draw(stage, program, resources, vertices, target=target, **options)
+
+        self._list(stage, program, resources, (vertices,))
+        self._add((stage,), key, access.reads, writes, run)
+
+    def fill(
+        self, stage: str, program: FragmentProgram, resources: Resources, targets: Sequence[Any]
+    ) -> None:
+        """Declare a pass for each texel of its targets, as `Frame.fill` does."""
+        access = program.access(resources)
+        writes = [slot_of(self.device, one) for one in targets]
+        key = (access.number, program.numbers(resources))
+        self._list(stage, program, resources, (3,))
+        self._add(
+            (stage,),
+            key,
+            access.reads,
+            writes,
+            lambda frame: frame.fill(stage, program, resources, targets),
+        )
+
+    def repeat(self, record: Callable[..., T], *args: Any) -> T:
+        """Declare the passes that `record(graph, *args)` declares, recorded once for the same arguments.
+
+        Compute passes only. The recording runs as a whole or not at all, and takes Python next to no time.
+        """
+        recording, result = self.recordings.find(self.device, record, args)
+        steps = recording.steps
+        if self.listing is not None:
+            record(Lister(self.device, self.listing, len(self._passes)), *args)
+        key = (recording.number,)
+        self._add(recording.stages, key, recording.reads, recording.writes, lambda frame: frame.run(steps))
+        return result
+
+    def fetch(self, buffer: Any) -> Fetched:
+        """The bytes of a buffer as all the frame's passes leave it, on their way from the device."""
+        fetched = Fetched(self.device, buffer.size)
+        self._fetches.append((buffer, fetched))
+        return fetched
+
+    def submit(self, timed: Timed = False) -> Frame:
+        """Run what has to be run; returns the frame, which knows how long it took."""
+        frame = Frame(self.device, timed=timed)
+        try:
+            runs = self._due()
+            due = [one for one, now in zip(self._passes, runs, strict=True) if now]
+            if self.listing is not None:
+                self.listing.finish(runs)
+                self.listing = None
+            for one in due:
+                one.run(frame)
+            for buffer, fetched in self._fetches:
+                frame.fetch(buffer, fetched)
+            frame.submit()
+        except Exception:
+            self.forget()
+            raise
+        finally:
+            self._passes, self._fetches = [], []  # which keep resources alive
+        for one in due:
+            for slot, value in one.writes:
+                slot.hold(value)
+        self.ran = [stage for one in due for stage in one.stages]
+        return frame
+
+    def _list(self, stage: str, program: Program, resources: Resources, groups: Sequence[int]) -> None:
+        if self.listing is not None:
+            self.listing.add(stage, program, resources, groups, len(self._passes))
+
+    def _add(
+        self,
+        stages: tuple[str, ...],
+        key: tuple[Any, ...],
+        reads: Sequence[Slot],
+        writes: Sequence[Slot],
+        run: Any,
+    ) -> None:
+        now, index = self._frame, len(self._passes)
+        needs, found = list[tuple[int, Slot]](), list[int]()
+        for slot in reads:
+            known = False
+            for source in slot.sources(now):
+                found.append(source.value)
+                needs.append((source.writer, source))
+                known = True
+            if not known and slot not in writes:
+                found.append(slot.held or (slot.parent.held if slot.parent else 0))
+        made = hash((self._epoch, key, *found))
+        left = [(slot, hash((made, number)) or 1) for number, slot in enumerate(writes)]
+        for slot, value in left:
+            slot.write(now, index, value)
+        self._passes.append(Pass(stages, run, left, needs))
+
+    def _due(self) -> list[bool]:
+        """Which passes have to run for every resource to hold what all of them together leave."""
+        lost: set[int] = set()  # slots that hold what is wanted, and will not any more
+        while True:
+            due = self._due_without(lost)
+            spoilt = {
+                id(slot)
+                for index, one in enumerate(self._passes)
+                if due[index]
+                for slot, _ in one.writes
+                if not due[slot.writers[-1]]
+            }
+            if spoilt <= lost:
+                return due
+            lost |= spoilt
+
+    def _due_without(self, lost: set[int]) -> list[bool]:
+        due, wanted = [False] * len(self._passes), set[tuple[int, int]]()
+        for index in range(len(self._passes) - 1, -1, -1):
+            one = self._passes[index]
+            for slot, value in one.writes:
+                last = slot.writers[-1] == index
+                there = last and slot.held == value and id(slot) not in lost
+                if not there and ((last and not slot.scratch) or (index, id(slot)) in wanted):
+                    due[index] = True
+            if due[index]:
+                wanted.update((before, id(slot)) for before, slot in one.needs)
+        return due

@@ -1,0 +1,139 @@
+"""A frame written down: its passes, what they bind, and which of them ran."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, TypeVar
+
+from dermis.gpu.device import Device
+from dermis.gpu.program import ComputeProgram, Program, Resources
+
+T = TypeVar("T")
+
+
+@dataclass
+class Listed:
+    """One pass.
+
+    shader : name of its file
+    constants : pipeline constants
+    bindings : by the shader's names: number of a resource, "sampler", or bytes of a record as "record 128"
+    groups : workgroups, or vertices of a raster pass
+    recorded : whether it is part of a recording, whose records stay as they are
+    ran : whether it ran in that frame
+    """
+
+    stage: str
+    shader: str
+    constants: dict[str, float]
+    bindings: dict[str, int | str]
+    groups: tuple[int, ...]
+    recorded: bool = False
+    ran: bool = False
+
+
+@dataclass
+class Listing:
+    """Passes in order, and the resources that they bind.
+
+    resources : what each is: "rgba32float 512 x 512 x 7", "buffer 4096"
+    """
+
+    passes: list[Listed] = field(default_factory=list)
+    resources: list[str] = field(default_factory=list)
+    _numbers: dict[int, int] = field(default_factory=dict)
+    _indices: list[int] = field(default_factory=list)
+
+    def add(
+        self,
+        stage: str,
+        program: Program,
+        resources: Resources,
+        groups: Sequence[int],
+        index: int,
+        recorded: bool = False,
+    ) -> None:
+        """Write a pass down.
+
+        index : of the graph's pass that it is, or is part of
+        """
+        bindings = {one.name: self._bound(resources[one.name]) for one in program.bindings}
+        listed = Listed(stage, program.name, dict(program.constants), bindings, tuple(groups), recorded)
+        self.passes.append(listed)
+        self._indices.append(index)
+
+    def finish(self, ran: Sequence[bool]) -> None:
+        """Note which of the graph's passes ran."""
+        for one, index in zip(self.passes, self._indices, strict=True):
+            one.ran = ran[index]
+
+    def as_dict(self) -> dict[str, Any]:
+        """All of it as what JSON can hold."""
+        return {"resources": self.resources, "passes": [asdict(one) for one in self.passes]}
+
+    def lines(self) -> Iterator[str]:
+        """A line for each pass."""
+        for one in self.passes:
+            bound = " ".join(f"{name}={value}" for name, value in one.bindings.items())
+            mark = "ran " if one.ran else "kept"
+            yield f"{mark} {one.stage}: {one.shader} {'x'.join(map(str, one.groups))} {bound}"
+
+    def _bound(self, value: Any) -> int | str:
+        if hasattr(value, "dtype"):
+            return f"record {value.nbytes}"
+        described = _described(value)
+        if described == "sampler":
+            return described
+        if id(value) not in self._numbers:
+            self._numbers[id(value)] = len(self.resources)
+            self.resources.append(described)
+        return self._numbers[id(value)]
+
+
+class Lister:
+    """Takes the passes of a recording and writes them down.
+
+    index : of the recording among the graph's passes
+    """
+
+    def __init__(self, device: Device, listing: Listing, index: int) -> None:
+        self.device, self._listing, self._index = device, listing, index
+
+    def compute(
+        self,
+        stage: str,
+        program: ComputeProgram,
+        resources: Resources,
+        size: tuple[int, int],
+        tile: int = 8,
+        completes: str = "",
+    ) -> None:
+        """Write a pass of size[0] x size[1] invocations down."""
+        self.dispatch(stage, program, resources, (*program.groups_for(size, tile), 1))
+
+    def dispatch(
+        self,
+        stage: str,
+        program: ComputeProgram,
+        resources: Resources,
+        groups: tuple[int, int, int],
+        completes: str = "",
+    ) -> None:
+        """Write a pass of a number of workgroups down."""
+        self._listing.add(stage, program, resources, groups, self._index, recorded=True)
+
+    def repeat(self, record: Callable[..., T], *args: Any) -> T:
+        """Write the passes of `record` down."""
+        return record(self, *args)
+
+
+def _described(value: Any) -> str:
+    texture = getattr(value, "texture", None)
+    if texture is not None:
+        return f"view of {_described(texture)}"
+    if hasattr(value, "format"):
+        width, height, layers = value.size
+        return f"{value.format} {width} x {height} x {layers}"
+    size = getattr(value, "size", None)
+    return "sampler" if size is None else f"buffer {size}"

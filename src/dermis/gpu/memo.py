@@ -1,0 +1,183 @@
+"""What is made on the host and kept: maps uploaded, tables fitted, space for results."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+T = TypeVar("T")
+Role = tuple[Callable[..., Any], str]
+
+
+@dataclass(eq=False, slots=True)
+class Made:
+    """What a function returned for some arguments.
+
+    parts : what was kept while it was made, which is in use as long as this is
+    provisional : whether something in it stands in for what is still being made
+    """
+
+    args: tuple[Any, ...]
+    value: Any = None
+    parts: list[tuple[Role, Made]] = field(default_factory=list)
+    provisional: bool = False
+
+
+@dataclass(eq=False)
+class _Search:
+    """The last result of a function that takes long, and what it is looking for now."""
+
+    value: Any = None
+    found: bool = False
+    running: Future[Any] | None = None
+
+
+class Memo:
+    """Results of functions by their arguments, each made again only when an argument is another.
+
+    depth : how many results of a function are kept, for who goes back and forth between some; a function that
+        nobody asks is forgotten after the square of that many rounds, as there may be several in turn as well
+    patient : whether `meanwhile` waits
+    """
+
+    def __init__(self, depth: int = 1) -> None:
+        self.patient = True
+        self._depth = depth
+        self._kept: dict[Role, list[Made]] = {}
+        self._asked: deque[set[Role]] = deque([set()], maxlen=depth * depth)
+        self._making: list[Made] = []
+        self._awaited: Future[Any] | None = None
+
+    def keep(self, make: Callable[..., T], *args: Any, using: tuple[Any, ...] = (), of: str = "") -> T:
+        """What `make(*args, *using)` returned, made unless these are among the arguments used last.
+
+        using : what it also takes, and what makes no other result where the arguments are the same
+        of : whose it is, where several are in use in turn
+        """
+        role = make, of
+        kept = self._kept.setdefault(role, [])
+        found = next((one for one in kept if same(one.args, args)), None)
+        if found is None or found.provisional:
+            kept[:] = [one for one in kept if one is not found][
+                : self._depth - 1
+            ]  # whose space may be needed
+            found = self._made(make, args, using)
+        self._touch(role, found)
+        if self._making:
+            self._making[-1].parts.append((role, found))
+        value: T = found.value
+        return value
+
+    def meanwhile(
+        self, executor: Executor, make: Callable[..., T], *args: Any, alike: tuple[Any, ...], of: str = ""
+    ) -> T:
+        """What `make(*args)` returns, made by another thread; unless the memo is patient, the last result
+        stands in until it is there.
+
+        alike : arguments that what stands in must share
+        """
+        search = self.keep(_search, make, *alike, of=of)
+        running = search.running
+        if not search.found or running is None or self.patient or running.done():
+            running = search.running = self.soon(executor, make, *args, of=of)
+            if not search.found or self.patient or running.done():
+                search.value, search.found = self.wait(running), True
+                found: T = search.value
+                return found
+        self._awaited = running
+        self._asked[-1].add((_begin, of))  # or it would go before it is found
+        for one in self._making:
+            one.provisional = True
+        standing_in: T = search.value
+        return standing_in
+
+    def soon(self, executor: Executor, make: Callable[..., T], *args: Any, of: str = "") -> Future[T]:
+        """What `make(*args)` returns, begun on another thread unless it is kept; for `wait`."""
+        return self.keep(_begin, executor, make, args, of=of)
+
+    def wait(self, begun: Future[T]) -> T:
+        """What was begun, as soon as it is there."""
+        try:
+            return begun.result()
+        except Exception:
+            self.forget()  # what failed must not be found again
+            raise
+
+    @property
+    def provisional(self) -> bool:
+        """Whether something stood in for what is still being made in this round."""
+        return self._awaited is not None
+
+    @property
+    def searching(self) -> bool:
+        """Whether that is still being made."""
+        return self._awaited is not None and not self._awaited.done()
+
+    def begin(self) -> None:
+        """Begin a round."""
+        self._awaited = None
+
+    def end(self) -> None:
+        """End a round: let go of what nobody has asked for in the last rounds."""
+        used = set().union(*self._asked)
+        self._kept = {role: kept for role, kept in self._kept.items() if role in used}
+        self._asked.append(set())
+
+    def forget(self) -> None:
+        """Make everything again."""
+        self._kept.clear()
+
+    def _made(self, make: Callable[..., Any], args: tuple[Any, ...], using: tuple[Any, ...]) -> Made:
+        made = Made(args)
+        self._making.append(made)
+        try:
+            made.value = make(*args, *using)
+        finally:
+            self._making.pop()
+        if made.provisional and self._making:
+            self._making[-1].provisional = True
+        return made
+
+    def _touch(self, role: Role, made: Made) -> None:
+        """It and its parts are what was used last."""
+        self._asked[-1].add(role)
+        others = (one for one in self._kept.get(role, ()) if one is not made)
+        self._kept[role] = [made, *others][: self._depth]
+        for part in made.parts:
+            self._touch(*part)
+
+
+def _search(*_: Any) -> _Search:
+    return _Search()
+
+
+def _begin(executor: Executor, make: Callable[..., T], args: tuple[Any, ...]) -> Future[T]:
+    return executor.submit(make, *args)
+
+
+def same(a: Any, b: Any) -> bool:
+    """Equality of values by what they say, arrays and dataclasses included; of other things by identity."""
+    if a is b:
+        return True
+    if type(a) is not type(b):
+        return False
+    if isinstance(a, tuple | list):
+        return len(a) == len(b) and all(map(same, a, b))
+    if isinstance(a, np.ndarray):
+        return bool(a.shape == b.shape and a.dtype == b.dtype and a.tobytes() == b.tobytes())
+    if not is_value(a):
+        return False
+    if is_dataclass(a):
+        return all(same(getattr(a, one.name), getattr(b, one.name)) for one in fields(a))
+    return bool(a == b)
+
+
+def is_value(thing: Any) -> bool:
+    """Whether it stands for what it says, and not for itself as textures do."""
+    equality: Any = type(thing).__eq__
+    return equality is not object.__eq__

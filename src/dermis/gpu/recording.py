@@ -1,0 +1,180 @@
+"""Runs of dispatches that are the same in every frame: recorded once, then repeated."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from functools import partial
+from typing import Any, TypeVar
+
+import numpy as np
+
+from dermis.gpu.access import Slot, new_number, slot_of
+from dermis.gpu.compute_pass import Step
+from dermis.gpu.device import Device
+from dermis.gpu.frame import step_of
+from dermis.gpu.memo import is_value, same
+from dermis.gpu.program import ComputeProgram, Resources
+from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
+
+T = TypeVar("T")
+_MOST = 4  # recordings of a function: two states, each in motion and still
+
+
+class Recording:
+    """Takes dispatches as a graph does, and keeps them with the numbers they read.
+
+    It keeps no texture alive: what it would bind goes when its last owner does. The recording is void then,
+    and its numbers go too.
+
+    number : of this recording, never given twice
+    reads, writes : slots that it finds written, and those that it leaves written
+    """
+
+    def __init__(self, device: Device) -> None:
+        self.device, self.number = device, new_number()
+        self.steps: list[Step] = []
+        self._chunks: list[Any] = []
+        self._uniforms: Uniforms | None = Uniforms(device, partial(_chunk, device, self._chunks))
+        self._pipelines: list[Any] = []
+        self._bound: list[weakref.ref[Any]] = []
+        self._reads: dict[Slot, None] = {}
+        self._writes: dict[Slot, None] = {}
+
+    @property
+    def reads(self) -> Sequence[Slot]:
+        """In the order in which they come."""
+        return tuple(self._reads)
+
+    @property
+    def writes(self) -> Sequence[Slot]:
+        """In the order in which they come."""
+        return tuple(self._writes)
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """Each once."""
+        return tuple(dict.fromkeys(step.stage for step in self.steps))
+
+    @property
+    def is_void(self) -> bool:
+        """Whether something that it binds is gone."""
+        return len(self.steps) != len(self._pipelines)
+
+    def compute(
+        self,
+        stage: str,
+        program: ComputeProgram,
+        resources: Resources,
+        size: tuple[int, int],
+        tile: int = 8,
+        completes: str = "",
+    ) -> None:
+        """Keep a pass of size[0] x size[1] invocations, in tiles of `tile` squared."""
+        self.dispatch(stage, program, resources, (*program.groups_for(size, tile), 1), completes)
+
+    def dispatch(
+        self,
+        stage: str,
+        program: ComputeProgram,
+        resources: Resources,
+        groups: tuple[int, int, int],
+        completes: str = "",
+    ) -> None:
+        """Keep a pass, as `Graph.dispatch` declares one."""
+        chunks, steps = self._chunks, self.steps  # and not the recording, which would keep itself alive
+
+        def void(_: Any) -> None:
+            chunks.clear()
+            steps.clear()
+
+        assert self._uniforms is not None, "a recording is made once"
+        group, offsets = program.bind_group(resources, self._uniforms)
+        self._bound.append(weakref.ref(group, void))
+        self._pipelines.append(program.pipeline)
+        # as the native library takes them, so that no frame needs to convert them
+        kept = program.device.ffi.new("uint32_t[]", offsets)
+        steps.append(step_of(stage, program, group, kept, groups))
+        self._note(program, resources, completes)
+
+    def repeat(self, record: Callable[..., T], *args: Any) -> T:
+        """Keep the passes of `record(recording, *args)` too."""
+        return record(self, *args)
+
+    def _note(self, program: ComputeProgram, resources: Resources, completes: str) -> None:
+        access = program.access(resources)
+        for slot in access.reads:
+            if slot not in self._writes and slot not in access.writes:
+                self._reads[slot] = None
+        filled = slot_of(self.device, resources[completes]) if completes else None
+        self._writes |= dict.fromkeys(slot for slot in access.writes if slot is not filled)
+
+    def finish(self) -> None:
+        """Put the numbers in their place."""
+        assert self._uniforms is not None
+        self._uniforms.upload()
+        self._uniforms.finish()
+        self._uniforms = None  # it holds on to the buffers
+
+
+def _chunk(device: Device, chunks: list[Any], index: int) -> Any:
+    if index == len(chunks):
+        chunks.append(device.uniform_buffer(CHUNK_BYTES))
+    return chunks[index]
+
+
+class Recordings:
+    """For each function the recordings used last, for who goes back and forth between some."""
+
+    def __init__(self) -> None:
+        self._known: dict[Callable[..., Any], list[tuple[Any, Recording, Any]]] = {}
+
+    def find(self, device: Device, record: Callable[..., T], args: tuple[Any, ...]) -> tuple[Recording, T]:
+        """What `record` did for these arguments and what it returned; it is called when that is not known."""
+        known = self._known.setdefault(record, [])
+        found = next((one for one in known if _alike(one[0], args) and not one[1].is_void), None)
+        if found is None:
+            recording = Recording(device)
+            result = record(recording, *args)
+            recording.finish()
+            assert not recording.is_void, "what was just bound is gone"
+            found = _held_weakly(args), recording, result
+        self._known[record] = [found, *(one for one in known if one is not found)][:_MOST]
+        return found[1], found[2]
+
+
+@dataclass(frozen=True)
+class _Values:
+    """The fields of a dataclass, held weakly."""
+
+    kind: type
+    fields: tuple[Any, ...]
+
+
+def _held_weakly(value: Any) -> Any:
+    """A value, with references in the place of what it would keep alive."""
+    if isinstance(value, tuple):
+        return tuple(map(_held_weakly, value))
+    if isinstance(value, np.ndarray):
+        return value.copy()
+    if not is_value(value):
+        return weakref.ref(value) if value is not None else None
+    return _Values(type(value), _fields(value)) if is_dataclass(value) else value
+
+
+def _fields(value: Any) -> tuple[Any, ...]:
+    return tuple(_held_weakly(getattr(value, one.name)) for one in fields(value))
+
+
+def _alike(held: Any, value: Any) -> bool:
+    if isinstance(held, weakref.ref):
+        return held() is value
+    if isinstance(held, tuple):
+        return isinstance(value, tuple) and len(held) == len(value) and all(map(_alike, held, value))
+    if isinstance(held, _Values):
+        if type(value) is not held.kind:
+            return False
+        parts = (getattr(value, one.name) for one in fields(held.kind))
+        return all(map(_alike, held.fields, parts))
+    return same(held, value)

@@ -1,0 +1,47 @@
+"""The [head] of a scene as plain data."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from dermis.scene.plain import Plain
+
+_Length = Annotated[float | None, Field(gt=0, allow_inf_nan=False)]
+VOrigin = Literal["auto", "top", "bottom"]
+Up = Literal["y", "z"]
+NormalY = Literal["up", "down"]
+
+
+class HeadTable(Plain):
+    """The [head] of a scene: what `load_head` takes, and a table of regions of the face."""
+
+    name: str
+    """The built-in "bust", a sample (lee_perry_smith) or a mesh (.glb .gltf .obj .ply)."""
+    colour: str | None = None
+    """Colour map (sRGB)."""
+    normal: str | None = None
+    """Tangent-space normal map."""
+    height: str | None = None
+    """Height map; it needs height_mm."""
+    height_mm: _Length = None
+    """Relief of one grey level of an 8-bit height map [mm]."""
+    specular: str | None = None
+    """Map of the surface reflection's strength, scaled to a mean of rho_s."""
+    roughness: str | None = None
+    """Map of the roughness m, 0 to 1."""
+    unit_mm: _Length = None
+    """Length of the file's unit [mm]; 1000 for glTF and 1 for others when left out."""
+    v_origin: VOrigin = "auto"
+    """Which row of the maps v = 0 is; "auto" keeps to the format's rule."""
+    up: Up = "y"
+    """The file's upward axis."""
+    normal_y: NormalY = "up"
+    """Way in which green points in the normal map: "up" (OpenGL) or "down" (DirectX)."""
+    opaque: tuple[str, ...] = ()
+    """Groups of the file that are not skin, whatever they are called."""
+    subdivide: Annotated[int, Field(ge=0, le=3)] = 0
+    """Levels of Loop subdivision."""
+    regions: str | None = None
+    """Roughness and strength by region of the face: "default" (an artist's values), or a TOML file."""

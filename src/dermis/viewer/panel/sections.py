@@ -1,0 +1,118 @@
+"""The sections of the panel, from top to bottom.
+
+To add a section, write a function that draws it and add it to `SECTIONS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from imgui_bundle import imgui
+
+from dermis.scene.plain import choices_of
+from dermis.viewer.chart import ATLAS
+from dermis.viewer.controls import CAMERAS
+from dermis.viewer.panel.fields import Style, attempt, button, combo, draw_fields
+from dermis.viewer.panel.light import draw_lights
+from dermis.viewer.panel.plots import draw_timing
+from dermis.viewer.panel.skin import draw_profile, draw_surface
+from dermis.viewer.session import Session
+from dermis.viewer.views import LAYERS, VIEWS
+
+_BUTTONS_PER_ROW = 3
+_SIDES = (256, 512, 1024, 2048, 4096)
+_SETTINGS = {
+    "atlas": Style(options=_SIDES),
+    "shadow_size": Style("shadow map", options=_SIDES),
+    "samples": Style(options=(1, 2, 4, 8, 16)),
+}
+_PICTURE = ("exposure", "tone", "gamma", "bloom", "background")
+_NOWHERE = ("size", "parts")  # the window's, and a view
+
+
+class Section(NamedTuple):
+    """A part of the panel that can be opened and closed."""
+
+    title: str
+    draw: Callable[[Session], None]
+    is_open: bool = False
+
+
+def draw_view(session: Session) -> None:
+    """The view and the camera presets."""
+    state = session.state
+    combo(session, "show", state.view, VIEWS, state.in_view)
+    if state.view == ATLAS:
+        layers = {name: replace(state.chart, layer=name) for name in LAYERS}
+        combo(session, "layer", state.chart.layer, layers, lambda name: state.with_chart(layers[name]))
+        imgui.text_disabled("wheel: zoom; double click: show all")
+    for index, name in enumerate(CAMERAS):
+        if index % _BUTTONS_PER_ROW:
+            imgui.same_line()
+        if button(session, f"{name}##camera"):
+            session.controls.look(name)
+
+
+def draw_comparison(session: Session) -> None:
+    """Freeze the state for the left side of the divider, swap the sides, release it."""
+    split, state = session.split, session.state
+    if button(session, "freeze"):
+        split.freeze(state)
+    if split.before is None:
+        return
+    imgui.same_line()
+    if button(session, "swap"):
+        session.change(split.before.with_camera(state.scene.camera))
+        split.freeze(state)
+    imgui.same_line()
+    if button(session, "release"):
+        split.release()
+
+
+def draw_technique(session: Session) -> None:
+    """All settings that no other section has, choices first: a new one appears here."""
+    settings = session.state.settings
+    kind, left_out = type(settings), {*_PICTURE, *_NOWHERE}
+    if settings.seams != "clear-colour":
+        left_out.add("seam_colour")
+    names = sorted(
+        (name for name in kind.model_fields if name not in left_out),
+        key=lambda name: not choices_of(kind, name),
+    )
+    draw_fields(session, settings, session.state.with_settings, _SETTINGS, names)
+
+
+def draw_picture(session: Session) -> None:
+    """How linear light becomes the picture."""
+    draw_fields(session, session.state.settings, session.state.with_settings, _SETTINGS, _PICTURE)
+
+
+def draw_files(session: Session) -> None:
+    """The scene file, and screenshots of any size."""
+    _, session.scene_file = imgui.input_text("scene", session.scene_file)
+    if button(session, "save"):
+        attempt(session, lambda: session.save(Path(session.scene_file)))
+    imgui.same_line()
+    if button(session, "load"):
+        attempt(session, lambda: session.load(Path(session.scene_file)))
+    _, session.picture_file = imgui.input_text("picture", session.picture_file)
+    _, sides = imgui.input_int2("size", list(session.picture_size))
+    session.picture_size = max(1, sides[0]), max(1, sides[1])
+    if button(session, "screenshot"):
+        attempt(session, lambda: session.screenshot(Path(session.picture_file), session.picture_size))
+
+
+SECTIONS = (
+    Section("View", draw_view, is_open=True),
+    Section("Before and after", draw_comparison),
+    Section("Profile", draw_profile, is_open=True),
+    Section("Surface", draw_surface, is_open=True),
+    Section("Light", draw_lights),
+    Section("Technique", draw_technique),
+    Section("Picture", draw_picture),
+    Section("Timing", draw_timing),
+    Section("Scene", draw_files, is_open=True),
+)

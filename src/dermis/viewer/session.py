@@ -1,0 +1,100 @@
+"""A viewing session: everything of the viewer except its window, shared by input and panel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from dermis.errors import refuse
+from dermis.human.regions.apply import with_regions
+from dermis.scene.heads import load_head
+from dermis.scene.skin import Skin
+from dermis.viewer.controls import Controls, Split
+from dermis.viewer.state import PARTS, PICTURE, History, ViewerState, load_state, save_state
+from dermis.viewer.studio import Studio
+
+NO_REGIONS = "none"
+
+
+class Session:
+    """The undo history, the input controls that change it, and the studio that draws its state.
+
+    split : the before/after comparison
+    status, message : text over the picture: the adapter's state, and the result of the last action
+    scene_file, picture_file, picture_size : what the panel's buttons write [pixel]
+    positions : of the panel's controls in the window, by label
+    """
+
+    def __init__(self, state: ViewerState, studio: Studio) -> None:
+        self.history = History(state)
+        self.controls = Controls(self.history)
+        self.studio = studio
+        self.split = Split()
+        self.status = self.message = ""
+        self.scene_file, self.picture_file, self.picture_size = "scene.toml", "dermis.png", (1920, 1080)
+        self.positions: dict[str, tuple[float, float]] = {}
+
+    @property
+    def state(self) -> ViewerState:
+        """The current state."""
+        return self.history.state
+
+    def change(self, state: ViewerState, gesture: str = "") -> None:
+        """Go to a new state; changes with the same gesture are undone together."""
+        self.history.change(state, gesture)
+        self.message = ""
+
+    def save(self, path: Path) -> None:
+        """Write the scene file.
+
+        Raises DermisError when that is not possible.
+        """
+        save_state(path, self.state)
+        self.message = f"saved {path}"
+
+    def load(self, path: Path) -> None:
+        """Open a scene file.
+
+        Raises DermisError for a file that is not a scene.
+        """
+        self.change(load_state(path, self.state))
+        self.message = f"loaded {path}"
+
+    def screenshot(self, path: Path, size: tuple[int, int]) -> None:
+        """Write the picture at any size: .png with the tone curve or .exr, linear.
+
+        Raises DermisError when that is not possible.
+        """
+        kind, view = path.suffix.lower(), self.state.view
+        if kind not in (".png", ".exr"):
+            refuse(f"picture {path}", "a name that ends in .png or .exr", f"{path.name!r} came", "Change it")
+        if kind == ".exr" and view not in (PICTURE, *PARTS):
+            refuse(f"view {view} as .exr", "a view of linear light", "its numbers are colours", "Take .png")
+        self.studio.screenshot(path, self.state, size)
+        self.message = f"wrote {path}, {size[0]} x {size[1]}"
+
+
+def apply_regions(state: ViewerState, name: str, known: Iterable[ViewerState] = ()) -> ViewerState:
+    """The state with the maps of a table of face regions, or without them.
+
+    name : of the table, or "none"
+    known : states whose heads are reused when they already have these maps
+
+    Raises DermisError for heads whose regions are not known and for heads made in memory.
+    """
+    if not state.head:
+        refuse(
+            "regions", "a head from a file or a sample", "it was made in memory", "Write it to a file first"
+        )
+    bare = {key: value for key, value in state.head.items() if key != "regions"}
+    wanted = bare if name == NO_REGIONS else bare | {"regions": name}
+    for other in known:
+        if dict(other.head) == wanted:
+            return state.with_head(other.scene.head, wanted, other.scene.skin.rho_s)
+    head, rho_s = state.scene.head, Skin().rho_s
+    if "regions" in state.head:
+        options = dict(bare)
+        head = load_head(options.pop("name"), **options)
+    if name != NO_REGIONS:
+        head, rho_s = with_regions(head, name)
+    return state.with_head(head, wanted, rho_s)

@@ -1,0 +1,21 @@
+"""A surface lobe from outside the package: the same in all directions."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dermis.specular.cosines import Cosines, Floats
+from dermis.specular.fresnel import Fresnel, schlick
+from dermis.specular.models import Model
+
+ALBEDO = 0.5
+
+
+def chalk(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
+    """BRDF albedo / pi [1/sr]."""
+    value = np.broadcast_to(ALBEDO / np.pi, np.broadcast_shapes(angles.n_l.shape, np.shape(m)))
+    return np.where(angles.above, value, 0.0)
+
+
+CHALK = Model(chalk, "the same in all directions", True, ("Phong1975",), {"chalk_albedo": ALBEDO})

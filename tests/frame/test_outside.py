@@ -1,0 +1,129 @@
+"""A light and a lobe that another package brings: files, frames, sources and help take them as their own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from outside.chalk import ALBEDO, CHALK
+from outside.glow import GLOW, GlowLight
+from setups import frontal, head_of, place, scene_of, settings_of
+from tolerances import FURNACE, TWIN
+
+from dermis.errors import DermisError
+from dermis.frame.lights.kind import KINDS
+from dermis.frame.renderer import Renderer
+from dermis.mesh.primitives import plane
+from dermis.reference.lights import lamp
+from dermis.scene.files import load_lights
+from dermis.scene.lights import LIGHTS
+from dermis.scene.plain import choices_of
+from dermis.scene.settings import Settings
+from dermis.scene.skin import Skin
+from dermis.scene.sources import sources_of
+from dermis.specular.albedo import directional_albedo
+from dermis.specular.models import MODELS
+
+Floats = NDArray[np.float64]
+FLOOR = head_of(plane(200.0, 4))
+HEIGHT, SIZE, FRAME_MM = 150.0, 48, 80.0
+COLOUR = 0.8  # of skin without a map
+FILE = """
+[[lights]]
+kind = "after-glow"
+position = {position}
+target = {target}
+irradiance = [3, 2, 1]
+power = 6
+"""
+
+
+@pytest.fixture
+def glow() -> Iterator[None]:
+    with LIGHTS.including("after-glow", GlowLight), KINDS.including("after-glow", GLOW):
+        yield
+
+
+@pytest.fixture
+def chalk() -> Iterator[None]:
+    with MODELS.including("blue-chalk", CHALK):
+        yield
+
+
+def picture(renderer: Renderer, *lights: object, parts: str = "all", **skin: object) -> Floats:
+    """(n, n, 3) radiance of the floor, which does not scatter."""
+    settings = settings_of(size=(SIZE, SIZE), technique="none", parts=parts)
+    scene = scene_of(FLOOR, *lights, **skin)  # type: ignore[arg-type]
+    return renderer.draw(scene, settings).linear().astype(float)
+
+
+def radius_mm() -> Floats:
+    """(n, n) distance of each pixel's place on the floor from its middle."""
+    along = ((np.arange(SIZE) + 0.5) / SIZE - 0.5) * FRAME_MM
+    return np.asarray(np.hypot(*np.meshgrid(along, along)))
+
+
+def from_file(folder: Path) -> GlowLight:
+    path = folder / "glow.toml"
+    above, middle = (list(place(FLOOR, (0, 0, height))) for height in (HEIGHT, 0))
+    path.write_text(FILE.format(position=above, target=middle), encoding="utf-8")
+    (light,) = load_lights(str(path))
+    assert isinstance(light, GlowLight)
+    return light
+
+
+@pytest.mark.usefixtures("glow")
+@pytest.mark.parametrize("shadows", [False, True])
+def test_a_light(renderer: Renderer, tmp_path: Path, shadows: bool) -> None:
+    """Against E cos^(power + 3), with E over the middle of a floor that hides nothing."""
+    light = from_file(tmp_path).model_copy(update={"shadows": shadows})
+    made = picture(renderer, light, specular="none")
+    cosine = HEIGHT / np.hypot(HEIGHT, radius_mm())
+    exact = COLOUR / np.pi * np.array([3.0, 2.0, 1.0]) * cosine[..., None] ** (6 + 3)
+    assert np.abs(made - exact).max() < 5 * TWIN * exact.max()
+    assert exact.min() < 0.8 * exact.max()
+
+
+@pytest.mark.usefixtures("glow")
+def test_a_light_beside_others(renderer: Renderer, tmp_path: Path) -> None:
+    light, other = from_file(tmp_path), frontal(1.0)
+    apart = picture(renderer, light, specular="none") + picture(renderer, other, specular="none")
+    assert np.abs(picture(renderer, other, light, specular="none") - apart).max() < TWIN * apart.max()
+
+
+@pytest.mark.usefixtures("glow")
+def test_what_else_knows_the_light(tmp_path: Path) -> None:
+    light = from_file(tmp_path)
+    assert "Phong1975" in sources_of(Skin(specular="none"), Settings(), [light])
+    with pytest.raises(DermisError, match=r"light of Cycles: expected one of point, .*'after-glow' came"):
+        lamp(light, 1)
+
+
+def test_its_name_is_unknown_without_it(tmp_path: Path) -> None:
+    with pytest.raises(DermisError, match=r"a kind of point, .*'after-glow' came"):
+        from_file(tmp_path)
+    with pytest.raises(DermisError, match=r"one of kelemen, .*none, but 'blue-chalk' came"):
+        Skin(specular="blue-chalk")
+
+
+@pytest.mark.usefixtures("chalk")
+def test_a_lobe(renderer: Renderer) -> None:
+    """It reflects half of rho_s at every angle; the rest of the light enters, and leaves as it came."""
+    irradiance, rho_s = 3.0, 0.4
+    skin = {"specular": "blue-chalk", "rho_s": rho_s}
+    light = frontal(irradiance)
+    reflected = picture(renderer, light, parts="specular", **skin)
+    assert np.abs(reflected - rho_s * ALBEDO / np.pi * irradiance).max() < TWIN
+    entered = (1 - rho_s * ALBEDO) * COLOUR / np.pi * irradiance
+    below = picture(renderer, light, parts="diffuse", **skin)
+    assert np.abs(below - entered).max() < FURNACE * entered
+
+
+@pytest.mark.usefixtures("chalk")
+def test_what_else_knows_the_lobe() -> None:
+    assert choices_of(Skin, "specular")[-2:] == ("blue-chalk", "none")
+    assert "Phong1975" in sources_of(Skin(specular="blue-chalk"), Settings())
+    assert directional_albedo([0.2, 0.9], 0.3, MODELS["blue-chalk"].lobe) == pytest.approx(ALBEDO, rel=1e-4)

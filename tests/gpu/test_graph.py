@@ -1,0 +1,175 @@
+"""A graph runs what has to be run, and leaves what all of its passes would leave."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dermis.gpu import ComputeProgram, Device, Frame, Graph, download, make_texture, scratch
+from dermis.gpu.shader_types import bindings, members_read, struct_dtype
+from dermis.gpu.textures import texture_from
+
+SIZE = (9, 5)
+
+
+@pytest.fixture(scope="module")
+def scale(device: Device) -> ComputeProgram:
+    return ComputeProgram(device, Path(__file__).parent / "scale.wgsl")
+
+
+class Chain:
+    """Textures, and passes that scale one into another."""
+
+    def __init__(self, device: Device, scale: ComputeProgram, count: int) -> None:
+        self.graph, self.scale = Graph(device), scale
+        first = texture_from(device, np.ones(SIZE[::-1], np.float32), "r32float")
+        self.textures = [first, *(make_texture(device, SIZE, "r32float") for _ in range(count))]
+
+    def frame(self, *passes: tuple[int, int, float]) -> list[str]:
+        """Which of the passes (from, into, factor) ran, as "0-1"."""
+        self.graph.begin()
+        for source, into, factor in passes:
+            record = self.scale.record("Factor", value=factor)
+            bound = {"factor": record, "image": self.textures[source], "scaled": self.textures[into]}
+            self.graph.compute(f"{source}-{into}", self.scale, bound, SIZE)
+        self.graph.submit()
+        return self.graph.ran
+
+    def value(self, index: int) -> float:
+        return float(download(self.graph.device, self.textures[index])[0, 0])
+
+
+def test_what_is_there_does_not_run_again(device: Device, scale: ComputeProgram) -> None:
+    chain = Chain(device, scale, 3)
+    assert chain.frame((0, 1, 2.0), (1, 2, 3.0), (2, 3, 5.0)) == ["0-1", "1-2", "2-3"]
+    assert chain.frame((0, 1, 2.0), (1, 2, 3.0), (2, 3, 5.0)) == []
+    assert chain.frame((0, 1, 2.0), (1, 2, 3.0), (2, 3, 7.0)) == ["2-3"]
+    assert chain.frame((0, 1, 4.0), (1, 2, 3.0), (2, 3, 7.0)) == ["0-1", "1-2", "2-3"]
+    assert chain.value(3) == 4.0 * 3.0 * 7.0
+
+
+def test_who_forgets_runs_everything(device: Device, scale: ComputeProgram) -> None:
+    chain = Chain(device, scale, 2)
+    passes = (0, 1, 2.0), (1, 2, 3.0)
+    for _ in range(2):
+        chain.graph.forget()
+        assert chain.frame(*passes) == ["0-1", "1-2"]
+    assert chain.frame(*passes) == []
+
+
+def test_what_another_frame_left_there_is_replaced(device: Device, scale: ComputeProgram) -> None:
+    """Also where its own result is there still: back and forth between two ends of one beginning."""
+    chain = Chain(device, scale, 3)
+    one, other = ((0, 1, 2.0), (1, 2, 3.0)), ((0, 1, 5.0), (1, 3, 3.0))
+    assert [chain.frame(*one), chain.frame(*other)] == [["0-1", "1-2"], ["0-1", "1-3"]]
+    assert chain.frame(*one) == ["0-1"]
+    assert (chain.value(1), chain.value(2), chain.value(3)) == (2.0, 6.0, 15.0)
+
+
+def test_scratch_may_hold_anything(device: Device, scale: ComputeProgram) -> None:
+    """No pass runs only for what it leaves there, but for one that reads it."""
+    chain = Chain(device, scale, 3)
+    scratch(device, chain.textures[1])
+    one, other = ((0, 1, 2.0), (1, 2, 3.0)), ((0, 1, 5.0), (1, 3, 3.0))
+    chain.frame(*one), chain.frame(*other)
+    assert chain.frame(*one) == []
+    assert chain.frame((0, 1, 2.0), (1, 2, 4.0)) == ["0-1", "1-2"]
+    assert (chain.value(2), chain.value(3)) == (8.0, 15.0)
+
+
+def test_what_is_written_twice_in_a_frame_is_read_as_it_was_then(
+    device: Device, scale: ComputeProgram
+) -> None:
+    chain = Chain(device, scale, 3)
+    passes = (0, 1, 2.0), (1, 2, 1.0), (0, 1, 3.0), (1, 3, 1.0)
+    assert chain.frame(*passes) == ["0-1", "1-2", "0-1", "1-3"]
+    assert chain.frame(*passes) == []
+    assert chain.frame((0, 1, 2.0), (1, 2, 5.0), (0, 1, 3.0), (1, 3, 1.0)) == ["0-1", "1-2", "0-1"]
+    assert (chain.value(1), chain.value(2), chain.value(3)) == (3.0, 10.0, 3.0)
+
+
+def test_what_nobody_needs_does_not_run(device: Device, scale: ComputeProgram) -> None:
+    chain = Chain(device, scale, 1)
+    assert chain.frame((0, 1, 2.0), (0, 1, 3.0)) == ["0-1"]
+    assert chain.value(1) == 3.0
+
+
+def test_layers_are_kept_apart_and_their_texture_is_all_of_them(device: Device) -> None:
+    whole = make_texture(device, SIZE, "r32float", layers=2)
+    options = {"dimension": "2d", "array_layer_count": 1}
+    layers = [whole.create_view(base_array_layer=k, **options) for k in range(2)]
+    program = ComputeProgram(device, Path(__file__).parent / "scale.wgsl")
+    graph, image = Graph(device), texture_from(device, np.ones(SIZE[::-1], np.float32), "r32float")
+
+    def frame(*factors: float) -> list[str]:
+        graph.begin()
+        for k, factor in enumerate(factors):
+            bound = {"factor": program.record("Factor", value=factor), "image": image, "scaled": layers[k]}
+            graph.compute(f"layer {k}", program, bound, SIZE)
+        graph.submit()
+        return graph.ran
+
+    assert frame(2.0, 3.0) == ["layer 0", "layer 1"]
+    assert [frame(2.0, 3.0), frame(2.0, 4.0)] == [[], ["layer 1"]]
+    assert [float(download(device, whole, layer=k)[0, 0]) for k in range(2)] == [2.0, 4.0]
+
+
+def test_a_frame_that_failed_is_run_again(
+    device: Device, scale: ComputeProgram, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chain, passes = Chain(device, scale, 2), ((0, 1, 2.0), (1, 2, 3.0))
+    chain.frame(*passes)
+
+    def fail(*_: Any) -> None:
+        raise ValueError
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Frame, "submit", fail)
+        with pytest.raises(ValueError):
+            chain.frame((0, 1, 2.0), (1, 2, 7.0))
+    assert chain.frame(*passes) == ["0-1", "1-2"]
+
+
+def test_bytes_that_are_fetched_are_those_after_all_passes(device: Device) -> None:
+    graph, buffer = Graph(device), device.buffer(np.arange(4, dtype=np.uint32), "STORAGE")
+    graph.begin()
+    fetched = graph.fetch(buffer)
+    graph.submit()
+    assert fetched.array().view(np.uint32).tolist() == [0, 1, 2, 3]
+
+
+def test_accesses_are_what_shaders_declare() -> None:
+    declared = {
+        "var x: texture_2d<f32>;": (True, True, False),
+        "var x: texture_storage_2d<r32float, write>;": (True, False, True),
+        "var<storage> x: array<u32>;": (True, True, False),
+        "var<storage, read_write> x: array<u32>;": (True, True, True),
+    }
+    for declaration, expected in declared.items():
+        (one,) = bindings(f"@group(0) @binding(0) {declaration}")
+        assert (one.holds, one.reads, one.writes) == expected, declaration
+    (sampler,) = bindings("@group(0) @binding(0) var x: sampler;")
+    assert not sampler.holds and not sampler.writes
+
+
+STRUCT = "struct S { a: f32, b: vec3f, c: f32 }\n@group(0) @binding(0) var<uniform> one: S;\n"
+
+
+@pytest.mark.parametrize(
+    ("code", "read"),
+    [
+        ("fn f() -> f32 { return one.a; }", {"a"}),
+        ("fn f() -> f32 { return one.b.x + none.c + other.one.c; } // one.a", {"b"}),
+        ("fn f() -> f32 { return g(one); }", {"a", "b", "c"}),
+    ],
+)
+def test_only_members_that_are_read_count(code: str, read: set[str]) -> None:
+    reader, dtype = members_read(STRUCT + code, "one"), struct_dtype(STRUCT, "S")
+    plain = np.zeros((), dtype)
+    for member in ("a", "b", "c"):
+        changed = np.zeros((), dtype)
+        changed[member] = 1.0
+        assert (reader(changed) != reader(plain)) == (member in read)

@@ -1,0 +1,255 @@
+"""What is kept from frame to frame, and what stands in for what takes long."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from threading import Event
+from time import sleep
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dermis.gpu import Memo
+from dermis.gpu.memo import same
+
+
+class Log:
+    """Makes things and notes for which arguments."""
+
+    def __init__(self) -> None:
+        self.made = ""
+
+    def make(self, key: str) -> str:
+        self.made += key
+        return key.upper()
+
+    def asked(self, memo: Memo, keys: str) -> str:
+        """The keys for which something is made when all of these are asked for."""
+        self.made = ""
+        assert "".join(memo.keep(self.make, key) for key in keys) == keys.upper()
+        return self.made
+
+
+@pytest.mark.parametrize(
+    ("depth", "keys", "expected"),
+    [(1, "aabba", "aba"), (2, "abab", "ab"), (2, "abcab", "abcab"), (2, "abacab", "abcb")],
+)
+def test_the_things_used_last_are_kept(depth: int, keys: str, expected: str) -> None:
+    assert Log().asked(Memo(depth), keys) == expected
+
+
+def test_room_is_made_before_a_thing_is() -> None:
+    """So that memory never holds one more than is kept."""
+    memo, log, left = Memo(2), Log(), list[Any]()
+
+    def make(key: str) -> str:
+        left[:] = [made.value for made in memo._kept[make, ""]]
+        return log.make(key)
+
+    for key, others in (("a", []), ("b", ["A"]), ("c", ["B"]), ("b", ["B"])):
+        memo.keep(make, key)
+        assert left == others
+    assert log.made == "abc"
+
+
+@pytest.mark.parametrize(("depth", "rounds"), [(1, 1), (2, 4)])
+def test_what_nobody_asks_for_goes_after_some_rounds(depth: int, rounds: int) -> None:
+    memo, log = Memo(depth), Log()
+    for more, expected in ((0, ""), (rounds, "a")):
+        log.asked(memo, "a")
+        for _ in range(more + 1):
+            memo.begin()
+            memo.end()
+        assert log.asked(memo, "a") == expected
+
+
+def test_parts_of_what_is_asked_for_stay() -> None:
+    """They are asked for only while it is made."""
+    memo, log = Memo(), Log()
+
+    def whole() -> str:
+        return memo.keep(log.make, "a")
+
+    for _ in range(5):
+        memo.begin()
+        assert memo.keep(whole) == "A"
+        memo.end()
+    assert log.asked(memo, "a") == ""
+
+
+def test_parts_of_what_is_asked_for_are_those_used_last() -> None:
+    """Else who goes back to a whole has its parts made again for the next one that is like it."""
+    memo, log = Memo(2), Log()
+
+    def whole(key: str) -> str:
+        return memo.keep(log.make, key)
+
+    for key in "abac":
+        assert memo.keep(whole, key) == key.upper()
+    assert log.asked(memo, "acb") == "b"
+
+
+def test_forgetting_makes_everything_again() -> None:
+    memo, log = Memo(3), Log()
+    log.asked(memo, "abc")
+    memo.forget()
+    assert log.asked(memo, "abc") == "abc"
+
+
+def test_owners_keep_their_own() -> None:
+    memo, log = Memo(), Log()
+    for owner, key in (("left", "a"), ("right", "b"), ("left", "a"), ("right", "b")):
+        assert memo.keep(log.make, key, of=owner) == key.upper()
+    assert log.made == "ab"
+
+
+def test_what_makes_no_other_result_is_not_compared() -> None:
+    memo = Memo()
+    assert [memo.keep(max, 1, using=(more,)) for more in (5, 7)] == [5, 5]
+
+
+@dataclass(frozen=True)
+class Value:
+    number: int
+    array: Any
+
+
+@dataclass(eq=False)
+class Thing:
+    """Stands for itself, as textures do."""
+
+    number: int = 0
+
+
+def test_arguments_are_the_same_by_what_they_say() -> None:
+    thing = Thing()
+    ones = np.ones(3)
+    alike: list[tuple[Any, Any]] = [
+        (1, 1),
+        ("a", "a"),
+        ((1, (2, thing)), (1, (2, thing))),
+        (ones, ones.copy()),
+        (Value(1, ones), Value(1, ones.copy())),
+        ([Value(1, ones), None], [Value(1, ones.copy()), None]),
+    ]
+    others: list[tuple[Any, Any]] = [
+        (1, 2),
+        (1, 1.0),
+        (Thing(), Thing()),
+        ((1, 2), (1, 2, 3)),
+        (ones, ones.astype(np.float32)),
+        (ones, ones[:, None]),
+        (ones, 2 * ones),
+        (Value(1, ones), Value(1, 2 * ones)),
+        ([Value(1, ones)], [Value(1, 2 * ones)]),
+        ([1, 2], (1, 2)),
+    ]
+    assert [same(a, b) for a, b in alike] == [True] * len(alike)
+    assert [same(a, b) for a, b in others] == [False] * len(others)
+
+
+@pytest.fixture
+def executor() -> Iterator[ThreadPoolExecutor]:
+    with ThreadPoolExecutor(2) as made:
+        yield made
+
+
+class Slow:
+    """Something that takes long: as long as it is told to."""
+
+    def __init__(self) -> None:
+        self.go = Event()
+        self.made: list[str] = []
+
+    def make(self, head: str, width: int) -> str:
+        if width > 1:
+            assert self.go.wait(20.0)
+        self.made.append(f"{head}{width}")
+        return self.made[-1]
+
+
+def found(memo: Memo, executor: ThreadPoolExecutor, slow: Slow, head: str, width: int) -> str:
+    """What a round gets."""
+    memo.begin()
+    made = memo.meanwhile(executor, slow.make, head, width, alike=(head,))
+    memo.end()
+    return made
+
+
+def wait(memo: Memo) -> None:
+    """Until what the last round would have had is there."""
+    for _ in range(2000):
+        if not memo.searching:
+            return
+        sleep(0.01)
+    raise TimeoutError
+
+
+def test_the_last_result_stands_in_meanwhile(executor: ThreadPoolExecutor) -> None:
+    memo, slow = Memo(), Slow()
+    memo.patient = False
+    assert found(memo, executor, slow, "a", 1) == "a1" and not memo.provisional
+    assert [found(memo, executor, slow, "a", 2) for _ in range(2)] == ["a1", "a1"]
+    assert memo.provisional and memo.searching
+    slow.go.set()
+    wait(memo)
+    assert memo.provisional  # as the last round had it
+    assert found(memo, executor, slow, "a", 2) == "a2"
+    assert not memo.provisional and not memo.searching
+    assert slow.made == ["a1", "a2"]
+
+
+def test_who_is_patient_waits(executor: ThreadPoolExecutor) -> None:
+    memo, slow = Memo(), Slow()
+    slow.go.set()
+    assert [found(memo, executor, slow, "a", width) for width in (1, 2, 3)] == ["a1", "a2", "a3"]
+    assert not memo.provisional
+
+
+def test_what_stands_in_shares_what_it_must(executor: ThreadPoolExecutor) -> None:
+    """Another head's is waited for."""
+    memo, slow = Memo(), Slow()
+    memo.patient = False
+    assert [found(memo, executor, slow, head, 1) for head in "ab"] == ["a1", "b1"]
+    assert not memo.provisional
+
+
+def test_what_is_made_of_a_stand_in_is_made_again(executor: ThreadPoolExecutor) -> None:
+    memo, slow, log = Memo(), Slow(), Log()
+    memo.patient = False
+
+    def whole(width: int) -> str:
+        log.made += str(width)
+        return "whole " + memo.meanwhile(executor, slow.make, "a", width, alike=("a",))
+
+    def asked(width: int) -> str:
+        memo.begin()
+        made = memo.keep(whole, width)
+        memo.end()
+        return made
+
+    assert [asked(width) for width in (1, 1, 2, 2)] == ["whole a1"] * 4
+    assert log.made == "122" and memo.provisional
+    slow.go.set()
+    wait(memo)
+    assert [asked(2), asked(2)] == ["whole a2"] * 2
+    assert log.made == "1222" and not memo.provisional
+
+
+def test_what_failed_is_not_found_again(executor: ThreadPoolExecutor) -> None:
+    memo, tries = Memo(), list[int]()
+
+    def fail() -> int:
+        tries.append(1)
+        if len(tries) < 3:
+            raise MemoryError("no more of it")
+        return 7
+
+    for _ in range(2):
+        with pytest.raises(MemoryError, match="no more of it"):
+            memo.wait(memo.soon(executor, fail))
+    assert [memo.wait(memo.soon(executor, fail)) for _ in range(2)] == [7, 7]
+    assert len(tries) == 3

@@ -1,0 +1,141 @@
+"""Passes recorded once do in each frame what they did in the first, as long as what they bind lives."""
+
+from __future__ import annotations
+
+import weakref
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dermis.gpu import ComputeProgram, Device, Frame, Graph, Recorder, download, make_texture, upload
+
+SIZE = (19, 5)
+
+
+@pytest.fixture(scope="module")
+def scale(device: Device) -> ComputeProgram:
+    return ComputeProgram(device, Path(__file__).parent / "scale.wgsl")
+
+
+class Chain:
+    """Two passes in a row, counting how often they are recorded."""
+
+    def __init__(self, device: Device, scale: ComputeProgram) -> None:
+        self.graph = Graph(device)
+        self.textures = [make_texture(device, SIZE, "r32float") for _ in range(3)]
+        self.scale, self.recorded = scale, 0
+
+    def record(self, recorder: Recorder, first: Any, between: Any, last: Any, factor: float) -> float:
+        self.recorded += 1
+        for stage, image, scaled in (("a", first, between), ("b", between, last)):
+            record = self.scale.record("Factor", value=factor)
+            recorder.compute(stage, self.scale, {"factor": record, "image": image, "scaled": scaled}, SIZE)
+        return 10.0 * self.recorded
+
+    def repeated(self, factor: float) -> float:
+        """What the recording returned, of a frame of its passes alone."""
+        self.graph.begin()
+        returned = self.graph.repeat(self.record, *self.textures, factor)
+        self.graph.submit()
+        return returned
+
+    def drawn(self, value: float, factor: float = 3.0) -> Any:
+        """What the passes make of an image of one value."""
+        upload(self.graph.device, self.textures[0], np.full(SIZE[::-1], value, np.float32))
+        self.graph.forget()  # it does not know of uploads
+        self.repeated(factor)
+        return download(self.graph.device, self.textures[2])
+
+
+def test_later_frames_do_the_same_with_other_light(device: Device, scale: ComputeProgram) -> None:
+    chain = Chain(device, scale)
+    for value in (1.0, 2.0, 5.0):
+        assert np.array_equal(chain.drawn(value), np.full(SIZE[::-1], 9 * value))
+    assert chain.recorded == 1
+
+
+def test_other_arguments_are_recorded_anew(device: Device, scale: ComputeProgram) -> None:
+    chain = Chain(device, scale)
+    assert [chain.drawn(1.0, factor)[0, 0] for factor in (3.0, 3.0, 2.0)] == [9.0, 9.0, 4.0]
+    assert chain.recorded == 2
+
+
+def test_going_back_and_forth_records_each_once(device: Device, scale: ComputeProgram) -> None:
+    chain = Chain(device, scale)
+    for _ in range(3):
+        for factor in (2.0, 3.0, 4.0):
+            assert chain.drawn(1.0, factor)[0, 0] == factor**2
+    assert chain.recorded == 3
+
+
+def test_those_used_long_ago_are_recorded_anew(device: Device, scale: ComputeProgram) -> None:
+    chain = Chain(device, scale)
+    for factor in (0.0, 1.0, 0.0, 2.0, 3.0, 4.0, 0.0, 1.0):  # 1 has gone when 4 came
+        chain.drawn(1.0, factor)
+    assert chain.recorded == 6
+
+
+def test_what_the_recording_returned_comes_again(device: Device, scale: ComputeProgram) -> None:
+    chain = Chain(device, scale)
+    assert [chain.repeated(factor) for factor in (2.0, 3.0, 2.0)] == [10.0, 20.0, 10.0]
+
+
+def test_numbers_of_other_frames_do_not_come_in_between(device: Device, scale: ComputeProgram) -> None:
+    chain, other = Chain(device, scale), Chain(device, scale)
+    chain.drawn(1.0)
+    frame = Frame(device)
+    other.record(frame, *other.textures, 7.0)
+    frame.submit()
+    assert chain.drawn(1.0)[0, 0] == 9.0
+
+
+def test_a_recording_keeps_nothing_alive(device: Device, scale: ComputeProgram) -> None:
+    chain = Chain(device, scale)
+    chain.drawn(1.0)
+    gone = weakref.ref(chain.textures[1])
+    chain.textures[1] = make_texture(device, SIZE, "r32float")
+    assert gone() is None
+    assert chain.drawn(2.0)[0, 0] == 18.0  # void, so it was recorded anew
+    assert chain.recorded == 2
+
+
+def test_a_recording_whose_arguments_live_may_be_void_too(device: Device, scale: ComputeProgram) -> None:
+    """What it binds beside its arguments is gone: it would read nothing that anybody knows."""
+    chain, graph, held = Chain(device, scale), Graph(device), [make_texture(device, SIZE, "r32float")]
+
+    def record(recorder: Recorder, first: Any, last: Any) -> None:
+        chain.record(recorder, first, held[0], last, 3.0)
+
+    for value in (1.0, 2.0):
+        upload(device, chain.textures[0], np.full(SIZE[::-1], value, np.float32))
+        graph.forget()
+        graph.begin()
+        graph.repeat(record, chain.textures[0], chain.textures[2])
+        graph.submit()
+        assert download(device, chain.textures[2])[0, 0] == 9.0 * value
+        held[:] = [make_texture(device, SIZE, "r32float")]
+    assert chain.recorded == 2
+
+
+def test_only_compute_passes_can_be_recorded(device: Device) -> None:
+    def record(recorder: Any) -> None:
+        recorder.fill("filled", None, {}, [])
+
+    graph = Graph(device)
+    graph.begin()
+    with pytest.raises(AttributeError, match="fill"):
+        graph.repeat(record)
+
+
+def test_stages_of_repeated_passes_are_timed(device: Device, scale: ComputeProgram) -> None:
+    chain = Chain(device, scale)
+    for _ in range(2):
+        chain.graph.forget()
+        chain.graph.begin()
+        chain.graph.repeat(chain.record, *chain.textures, 3.0)
+        frame = chain.graph.submit(timed=True)
+        frame.wait()
+        times = frame.stage_ms()
+        assert times is None or set(times) == {"a", "b", "total"}

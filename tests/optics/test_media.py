@@ -1,0 +1,134 @@
+"""Media: named ones, files, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dermis.errors import DermisError
+from dermis.optics.diffusion.models import diffusion_profile
+from dermis.optics.media import Layer, Medium, media, medium_from_toml, read_toml
+
+ONE = np.array([1.0])
+
+
+def parsed(tmp_path: Path, text: str) -> Medium:
+    path = tmp_path / "own.toml"
+    path.write_text(text)
+    return medium_from_toml(path, read_toml(path))
+
+
+def test_published_media() -> None:
+    known = media()
+    assert {"dj3", "skin1", "skin2", "marble", "wholemilk", "spectralon", "ketchup"} <= set(known)
+    assert known["marble"].layers[0].sigma_s_prime.tolist() == [2.19, 2.62, 3.00]
+    assert known["skin1"].layers[0].sigma_a.tolist() == [0.032, 0.17, 0.48]
+    assert [layer.thickness_mm for layer in known["dj3"].layers] == [0.25, 0.20, np.inf]
+    # The unit under which the deck's "0.02083 mm between events" is a tenth of a millimetre and more.
+    assert 1.0 / known["dj3"].layers[0].sigma_s_prime[0] == pytest.approx(10 * 0.02083, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", sorted(media()))
+def test_every_medium_has_a_profile(name: str) -> None:
+    profile = diffusion_profile(media()[name])
+    assert ((profile.total > 0.0) & (profile.total <= 1.0 + 1e-9)).all()
+    assert profile.sources
+
+
+def test_quantities_of_a_layer() -> None:
+    """Of marble, as the notebook of [dEonLuebke2007] has them."""
+    layer = media()["marble"].channel(1).layers[0]
+    assert layer.mean_free_path_mm[0] == pytest.approx(0.38108304, abs=1e-8)
+    assert layer.D[0] == pytest.approx(layer.mean_free_path_mm[0] / 3.0)
+    assert layer.alpha_prime[0] == pytest.approx(0.99843756, abs=1e-8)
+
+
+def test_medium_of_a_file(tmp_path: Path) -> None:
+    text = """
+        eta = 1.3
+        [[layers]]
+        name = "top"
+        thickness_mm = 0.3
+        absorption_per_mm = [0.1, 0.2, 0.3]
+        scattering_per_mm = [4, 5.5, 6]
+        [[layers]]
+        absorption_per_mm = [0.01, 0.02, 0.03]
+        scattering_per_mm = [1, 1, 1]
+    """
+    medium = parsed(tmp_path, text)
+    assert (medium.name, medium.eta, len(medium.layers)) == ("own", 1.3, 2)
+    assert medium.layers[0].sigma_s_prime.tolist() == [4.0, 5.5, 6.0]
+    assert medium.layers[1].name == "layer" and medium.semi_infinite
+
+
+LAYER = "[[layers]]\nabsorption_per_mm = [1,1,1]\nscattering_per_mm = [1,1,1]\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("eta = 1.4", r"\[\[layers\]\]"),
+        ("layers = 3", r"\[\[layers\]\]"),
+        ("layers = []", "at least one layer"),
+        ("eta = 'x'\n" + LAYER, "eta as a number"),
+        ("eta = 0.7\n" + LAYER, "from 1 to 2.5"),
+        ("eta = nan\n" + LAYER, "from 1 to 2.5"),
+        ("colour = 1\n" + LAYER, "colour came"),
+        (LAYER + "thickness = 1", "thickness came"),
+        (LAYER + "thickness_mm = -1", "above 0 mm"),
+        (LAYER + "thickness_mm = nan", "above 0 mm"),
+        (LAYER + LAYER, "infinite in the last layer only"),
+        (LAYER.replace("[1,1,1]", "[1,1]", 1), "absorption_per_mm = .*three numbers"),
+        (LAYER.replace("[1,1,1]", "['a',1,1]", 1), "three numbers"),
+        (LAYER.replace("[1,1,1]", "[-1,1,1]", 1), "absorption of 0 or more"),
+        (LAYER.replace("[1,1,1]", "[nan,1,1]", 1), "absorption of 0 or more"),
+        (LAYER.replace("scattering_per_mm = [1", "scattering_per_mm = [0"), "scattering above 0"),
+        ("[[layers", "cannot be read"),
+    ],
+)
+def test_files_that_are_refused(tmp_path: Path, text: str, complaint: str) -> None:
+    with pytest.raises(DermisError, match=complaint):
+        parsed(tmp_path, text)
+
+
+def test_missing_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(DermisError, match="No such file"):
+        read_toml(tmp_path / "none.toml")
+
+
+def test_layers_must_agree() -> None:
+    with pytest.raises(DermisError, match="as many channels"):
+        Medium("odd", (Layer(ONE, ONE, 1.0), Layer(np.ones(2), np.ones(2))))
+
+
+def test_warnings_name_the_reason() -> None:
+    assert any("absorbs" in text for text in diffusion_profile(media()["skin1"]).warnings)
+    assert not diffusion_profile(media()["marble"]).warnings
+    wide = Medium("thin air", (Layer(0.001 * ONE, 0.05 * ONE),))
+    assert any("beyond the widest radius" in text for text in diffusion_profile(wide).warnings)
+    printed = diffusion_profile(_thin(), "multipole", clamp="none")
+    assert any("negative" in text for text in printed.warnings)
+
+
+def test_absorption_is_told_where_the_beam_meets_it() -> None:
+    """Under a thin clear layer, and not below the first mean free path."""
+    clear, dark = Layer(0.01 * ONE, 2.0 * ONE, 0.05), Layer(2.0 * ONE, 2.0 * ONE)
+    for top, told in ((0.05, True), (2.0, False)):
+        medium = Medium("skin", (Layer(clear.sigma_a, clear.sigma_s_prime, top), dark))
+        assert any("absorbs" in text for text in diffusion_profile(medium).warnings) is told
+
+
+def test_light_below_zero_and_finer_than_its_numbers_is_told() -> None:
+    corneum = Layer(0.02 * ONE, 5.0 * ONE, 0.01)
+    medium = Medium("skin", (corneum, Layer(0.5 * ONE, 2.5 * ONE)))
+    assert any("negative at some radii" in text for text in diffusion_profile(medium, "multipole").warnings)
+    assert not diffusion_profile(Medium("skin", medium.layers[1:]), "multipole").warnings[1:]
+    foil = Medium("foil", (Layer(0.02 * ONE, 5.0 * ONE, 1e-6), medium.layers[1]))
+    assert any("more light than the total" in text for text in diffusion_profile(foil, "multipole").warnings)
+
+
+def _thin() -> Medium:
+    thin = Layer(0.02 * ONE, 0.98 * ONE, 0.1)
+    return Medium("cut", (thin, Layer(0.02 * ONE, 0.98 * ONE)))

@@ -1,0 +1,56 @@
+"""Registries: imported on first use, open to other packages, and strict about names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any
+
+import pytest
+
+from dermis.errors import DermisError
+from dermis.registry import Named, Registry
+from dermis.scene.plain import ImpossibleError, Plain, choices_of, help_of
+from dermis.scene.settings import Settings
+from dermis.scene.techniques import TECHNIQUES
+
+ANIMALS: Registry[Any] = Registry("animal", {"cat": 1, "root": "math:sqrt"})
+
+
+class Owner(Plain):
+    """Someone with an animal."""
+
+    animal: Annotated[str, Named(ANIMALS)] = "cat"
+    """What it owns."""
+
+
+@pytest.fixture
+def wet() -> Iterator[None]:
+    """A technique that another package registers."""
+    TECHNIQUES.register("wet", "math:pi", "shines all over")
+    yield
+    del TECHNIQUES._entries["wet"], TECHNIQUES._summaries["wet"]
+
+
+def test_entries_are_imported_on_first_use() -> None:
+    assert ANIMALS.names == ("cat", "root") and len(ANIMALS) == 2 and "dog" not in ANIMALS
+    assert ANIMALS["cat"] == 1 and ANIMALS["root"](9.0) == 3.0
+
+
+def test_unknown_names_are_refused() -> None:
+    with pytest.raises(DermisError, match="animal: expected one of cat, root, but 'dog' came"):
+        ANIMALS["dog"]
+    with pytest.raises(ImpossibleError, match="animal: expected one of cat, root, but 'dog' came"):
+        Owner(animal="dog")
+    with pytest.raises(ImpossibleError, match="5 came"):
+        Owner(animal=5)
+
+
+def test_a_name_is_registered_once() -> None:
+    with pytest.raises(DermisError, match="animal cat: expected a name of its own"):
+        ANIMALS.register("cat", 2)
+
+
+def test_names_from_other_packages_are_accepted(wet: None) -> None:
+    assert Settings(technique="wet").technique == "wet"
+    assert choices_of(Settings, "technique")[-1] == "wet"
+    assert help_of(Settings, "technique").endswith("wet: shines all over.")
