@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -33,13 +34,16 @@ class Made:
     def __init__(self) -> None:
         self.constants: list[dict[str, float]] = []
 
-    def compile(self, device: Device, path: Path, folders: Any, constants: dict[str, float]) -> object:
+    def compile(self, constants: dict[str, float]) -> object:
         self.constants.append(constants)
         return object()
 
     def found(self, device: Device, models: Sequence[int]) -> list[Any]:
         """Programs of these models, one after the other."""
-        return [compiled(self.compile, device, SHADER, (), (("MODEL", model),)) for model in models]
+        return [
+            compiled(device, "shader", (("MODEL", model),), partial(self.compile, {"MODEL": model}))
+            for model in models
+        ]
 
 
 @pytest.fixture
@@ -60,9 +64,8 @@ def test_the_one_used_longest_ago_goes(device: Device, made: Made) -> None:
     assert [one["MODEL"] for one in made.constants] == [1, 2, 3, 4, 2]
 
 
-def test_shaders_get_the_constants_that_they_have(device: Device, made: Made, tmp_path: Path) -> None:
+def test_shaders_get_the_constants_that_they_have(tmp_path: Path) -> None:
     path = tmp_path / "own.wgsl"
     path.write_text("override STRIP: u32 = 1;\noverride WIDE: u32 = 0;\n", encoding="utf-8")
-    suited = (("STRIP", 16), ("WIDE", 2), ("OTHER", 3))
-    compiled(made.compile, device, path, (), (("WIDE", 1),), suited)
-    assert made.constants == [{"STRIP": 16, "WIDE": 1}]
+    given = (("STRIP", 16), ("WIDE", 2), ("OTHER", 3))
+    assert program.declared(path, (), given) == {"STRIP": 16, "WIDE": 2}

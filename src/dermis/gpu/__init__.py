@@ -6,7 +6,8 @@ from dermis.gpu.device import Device, open_device
 from dermis.gpu.frame import Frame
 from dermis.gpu.graph import Graph
 from dermis.gpu.memo import Memo
-from dermis.gpu.program import ComputeProgram, Constants, FragmentProgram, RasterProgram, compiled
+from dermis.gpu.program import ComputeProgram, Constants, compiled
+from dermis.gpu.raster_program import FragmentProgram, RasterProgram
 from dermis.gpu.recorder import Recorder
 from dermis.gpu.textures import download, make_texture, upload
 

@@ -8,7 +8,8 @@ from typing import Any, Literal, TypeVar
 
 from dermis.gpu.compute_pass import ComputePass, Step
 from dermis.gpu.device import Device
-from dermis.gpu.program import ComputeProgram, FragmentProgram, RasterProgram, Resources
+from dermis.gpu.program import ComputeProgram, Resources
+from dermis.gpu.raster_program import FragmentProgram, RasterProgram
 from dermis.gpu.readback import Fetched
 from dermis.gpu.timing import Timestamps, WallClock
 from dermis.gpu.uniforms import Uniforms

@@ -10,7 +10,8 @@ from dermis.gpu.access import Slot, slot_of
 from dermis.gpu.device import Device
 from dermis.gpu.frame import Frame, Timed
 from dermis.gpu.listing import Lister, Listing
-from dermis.gpu.program import ComputeProgram, FragmentProgram, Program, RasterProgram, Resources
+from dermis.gpu.program import ComputeProgram, Program, Resources
+from dermis.gpu.raster_program import FragmentProgram, RasterProgram
 from dermis.gpu.readback import Fetched
 from dermis.gpu.recording import Recordings
 

@@ -48,7 +48,7 @@ def read_image(path: str | Path | Picture) -> Pixels:
     """The picture (H, W, C) as it is stored, row 0 at the top; C is 1 (grey), 3 (RGB) or 4 (RGBA).
 
     path : PNG, JPEG or TIFF, which give uint8 or uint16 (a float TIFF float32), or EXR or HDR, which
-        give linear float32; told apart by content, not by suffix
+        give linear float32; recognised by content, not by suffix
     DermisError : the file is missing, is no picture, is cut off, or holds pixels of another kind
 
     Grey with alpha becomes RGBA. Colour profiles and camera orientation are ignored, as for any texture.

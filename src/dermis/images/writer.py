@@ -21,7 +21,7 @@ _WAITING_PER_THREAD = 4
 
 
 class ImageWriter:
-    """Encodes and writes pictures on threads while the caller goes on; leaving the context waits for all.
+    """Encodes and writes pictures on other threads; leaving the context waits for all of them.
 
     threads : one for each core when left out
 

@@ -18,7 +18,7 @@ class Head:
     """A mesh in mm with its maps.
 
     name : sample or file
-    attribution : whom to name when a picture of it is shown, empty when nobody asks for it
+    attribution : whom to credit when a picture of it is shown, empty when that is not required
     """
 
     name: str

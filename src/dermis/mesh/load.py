@@ -1,4 +1,4 @@
-"""From a mesh file of any unit, axis and uv origin to the one `Mesh` of the package."""
+"""Loading of mesh files of any unit, up axis and uv origin, kept on disk by their content."""
 
 from __future__ import annotations
 

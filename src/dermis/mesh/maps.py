@@ -1,4 +1,4 @@
-"""The pictures that lie on a mesh, in the units that the renderer works with."""
+"""Maps of a mesh from picture files, in the units that the renderer works with."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ MIN_SIZE, MAX_SIZE = 16, 16384
 _MIN_NORMAL_Z = 0.05  # slopes steeper than 87 degrees are capped; nothing real leans further
 _LARGE = 1 << 14  # bytes of a file whose map is kept on disk: it is read back faster than decoded
 _MEAN_TEXELS, _MOST_APART = 64, 16  # a mean is taken of at least as many a side, at most so far apart
-_FORM = 1  # raise when maps of the same files become others
+_FORM = 1  # raise when the same files give other maps
 
 
 @dataclass(frozen=True)
 class Maps:
-    """What varies over the skin; None is "no map". Row 0 is the top; sizes may differ from map to map.
+    """Maps of the skin, None where there is none. Row 0 is the top; sizes may differ from map to map.
 
     colour : (H, W, 3) linear Rec. 709 [-]
     normal : (H, W, 2) slopes dh/du and dh/d(up) of the bumps, up being towards row 0 [-]
     height : (H, W) outwards, from an arbitrary zero [mm]
-    specular : (H, W) plain grey 0..1, to be scaled to a mean by whoever knows which texels are skin [-]
+    specular : (H, W) plain grey 0..1; the renderer scales it to a mean over the skin [-]
     roughness : (H, W) plain grey 0..1 [-]
     region : (H, W) uint8 part of the face, by its place in the list of the head that has it
     """
@@ -66,7 +66,7 @@ def load_maps(
     region: PathLike | None = None,
     normal_y: Literal["up", "down"] = "up",
 ) -> Maps:
-    """The maps of these picture files.
+    """The maps in these picture files.
 
     colour : RGB in sRGB, or linear when the file holds floats; alpha is left out
     normal : tangent-space normals, red towards +u, green as `normal_y` says

@@ -1,4 +1,4 @@
-"""Heads and environments to begin with: known by hash, fetched once, credited to their authors."""
+"""Sample heads and environments: known by hash, fetched once, credited to their authors."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class SampleFile:
 
 @dataclass(frozen=True)
 class Sample:
-    """What is known about a sample before any of it is fetched.
+    """What is known about a sample before it is fetched.
 
     kind : "head" is a mesh with maps, "environment" a latitude-longitude picture
     folder : where its files lie below DERMIS_DATA or below the cache
@@ -108,7 +108,7 @@ def _folder(sample: Sample) -> Path:
 
 
 def _is_right(path: Path, file: SampleFile) -> bool:
-    """Whether the file is there with the hash that is known."""
+    """Whether the file is there with the known hash."""
     try:
         status = path.stat()
         return _sha256(path, status.st_size, status.st_mtime_ns) == file.sha256

@@ -42,7 +42,7 @@ def __getattr__(name: str) -> Any:
     """Names on first use: a command's help needs some of the models, not the heads."""
     home = next((home for home, names in _HOMES.items() if name in names), "lights")
     module = import_module(f"{__name__}.{home}")
-    if name not in __all__ and name not in module.__all__:
+    if name.startswith("_") or not hasattr(module, name):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value = getattr(module, name)
     return value

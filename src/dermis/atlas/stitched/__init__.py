@@ -1,1 +1,1 @@
-"""The stitched layout of the atlas: charts apart, with room beyond their edges for what lies across seams."""
+"""The stitched layout of the atlas: charts apart, with gutters that show the surface across their seams."""
