@@ -7,7 +7,7 @@ from typing import Any
 
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.inputs import Inputs, camera_views, pinhole, seen_by
-from dermis.frame.levels import scale_of
+from dermis.frame.levels import Blur, scale_of
 from dermis.frame.lights import light_constants, light_records, light_views
 from dermis.frame.passes.shade import shade_program
 from dermis.frame.projection import ShadowView, shadow_layers
@@ -66,7 +66,7 @@ class Preparation:
             resources=resources,
             settings=settings,
             layouts=tuple(under(layout, record) for layout in resources.layouts),
-            blurs=tuple(replace(blur, scale=scale) for blur in resources.blurs),
+            blurs=keep(_scaled, resources.blurs, scale),
             shadow_views=layers,
             light_constants=shone_on,
             camera=camera_views(seen_from, head.mesh, settings.samples),
@@ -82,6 +82,10 @@ def under(layout: AtlasLayout, lights: Any) -> AtlasLayout:
     lights : the shader's array
     """
     return replace(layout, lit=layout.lit | {"lights": lights})
+
+
+def _scaled(blurs: tuple[Blur, ...], scale: float) -> tuple[Blur, ...]:
+    return tuple(replace(blur, scale=scale) for blur in blurs)
 
 
 def _views(_: Head, __: Lights, size: int, scene: Scene) -> Views:

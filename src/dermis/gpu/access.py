@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import count
 from typing import TYPE_CHECKING, Any
@@ -26,6 +25,7 @@ class Slot:
     writer : the pass that writes it last
     writers : all that do, and those that write what contains it or is contained
     scratch : whether only passes read it, so that it may hold anything in between
+    active : whether any pass has ever written it
     """
 
     parent: Slot | None = None
@@ -36,16 +36,22 @@ class Slot:
     writer: int = 0
     writers: list[int] = field(default_factory=list)
     scratch: bool = False
+    active: bool = False
 
-    def sources(self, frame: int) -> Iterator[Slot]:
+    @property
+    def changes(self) -> bool:
+        """Whether what is read of it may be another's from frame to frame."""
+        around = (self, *self.parts) if self.parent is None else (self, self.parent, *self.parts)
+        return any(slot.active for slot in around)
+
+    def sources(self, frame: int) -> list[Slot]:
         """The slots from which it gets what it holds in the frame: itself, its views, or its texture."""
+        found = [part for part in self.parts if part.frame == frame] if self.parts else []
         if self.frame == frame:
-            yield self
+            found.append(self)
         elif self.parent is not None and self.parent.frame == frame:
-            yield self.parent
-        for part in self.parts:
-            if part.frame == frame:
-                yield part
+            found.append(self.parent)
+        return found
 
     def write(self, frame: int, index: int, value: int) -> None:
         """Let the pass of that index leave a value."""
@@ -69,17 +75,30 @@ class Slot:
             self.parent.held = 0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(eq=False, slots=True)
 class Access:
     """What a program does with the resources bound to it.
 
     number : of this program with these resources, never given twice
     reads, writes : slots; what is both stands in both
+    groups : bind groups with the buffers of a device's frames, by these
     """
 
     number: int
     reads: tuple[Slot, ...]
     writes: tuple[Slot, ...]
+    groups: dict[tuple[int, ...], Any] = field(default_factory=dict)
+    _changing: list[Slot] = field(default_factory=list)
+    _of: int = -1
+
+    def changing(self, active: int) -> list[Slot]:
+        """Of what it reads that which passes write.
+
+        active : how many slots passes have written; while there are no more, the answer is the same
+        """
+        if self._of != active:
+            self._changing, self._of = [slot for slot in self.reads if slot.changes], active
+        return self._changing
 
 
 def new_number() -> int:

@@ -81,6 +81,7 @@ class Device:
     ffi, lib, checked : the native library, for the calls of every frame, without what wgpu's Python adds;
         calls of `checked` raise what the library finds wrong, in passes when their encoder is submitted
     slots : what textures, buffers and views hold, see access.py
+    active_slots : how many of them passes have written
     programs : compiled shaders, see program.py
     spare_records : memory in which no frame gathers its numbers at the moment; new memory takes longer
     """
@@ -111,6 +112,7 @@ class Device:
         self._uniform_chunks: list[Any] = []
         self.spare_records: list[bytearray] = []
         self.slots: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
+        self.active_slots = 0
         self.programs: dict[Any, Any] = {}
         self._shared: dict[str, Any] = {}
         self._frames = 0

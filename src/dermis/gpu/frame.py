@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, TypeVar
 
+from dermis.gpu.access import Access
 from dermis.gpu.compute_pass import ComputePass, Step
 from dermis.gpu.device import Device
 from dermis.gpu.program import ComputeProgram, Resources
@@ -63,12 +64,15 @@ class Frame:
         resources: Resources,
         groups: tuple[int, int, int],
         completes: str = "",
+        access: Access | None = None,
     ) -> None:
         """Run `program` for a number of workgroups along each axis.
 
         completes : of account where passes are declared, see `Graph.dispatch`
+        access : of these resources, for who has it
         """
-        self.run([step_of(stage, program, *program.bind_group(resources, self._uniforms), groups)])
+        bound = program.bind_group(resources, self._uniforms, access)
+        self.run([step_of(stage, program, *bound, groups)])
 
     def repeat(self, record: Callable[..., T], *args: Any) -> T:
         """Run the passes of `record(frame, *args)`."""

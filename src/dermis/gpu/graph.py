@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from dermis.gpu.access import Slot, slot_of
+from dermis.gpu.access import Access, Slot, slot_of
 from dermis.gpu.device import Device
 from dermis.gpu.frame import Frame, Timed
 from dermis.gpu.listing import Lister, Listing
@@ -93,9 +93,9 @@ class Graph:
         self._add(
             (stage,),
             key,
-            access.reads,
+            access,
             writes,
-            lambda frame: frame.dispatch(stage, program, resources, groups),
+            lambda frame: frame.dispatch(stage, program, resources, groups, access=access),
         )
 
     def draw(
@@ -119,7 +119,7 @@ class Graph:
             frame.draw(stage, program, resources, vertices, target=target, **options)
 
         self._list(stage, program, resources, (vertices,))
-        self._add((stage,), key, access.reads, writes, run)
+        self._add((stage,), key, access, writes, run)
 
     def fill(
         self, stage: str, program: FragmentProgram, resources: Resources, targets: Sequence[Any]
@@ -132,7 +132,7 @@ class Graph:
         self._add(
             (stage,),
             key,
-            access.reads,
+            access,
             writes,
             lambda frame: frame.fill(stage, program, resources, targets),
         )
@@ -146,8 +146,8 @@ class Graph:
         steps = recording.steps
         if self.listing is not None:
             record(Lister(self.device, self.listing, len(self._passes)), *args)
-        key = (recording.number,)
-        self._add(recording.stages, key, recording.reads, recording.writes, lambda frame: frame.run(steps))
+        access = recording.access
+        self._add(recording.stages, (access.number,), access, access.writes, lambda frame: frame.run(steps))
         return result
 
     def fetch(self, buffer: Any) -> Fetched:
@@ -189,23 +189,25 @@ class Graph:
         self,
         stages: tuple[str, ...],
         key: tuple[Any, ...],
-        reads: Sequence[Slot],
+        access: Access,
         writes: Sequence[Slot],
         run: Any,
     ) -> None:
         now, index = self._frame, len(self._passes)
         needs, found = list[tuple[int, Slot]](), list[int]()
-        for slot in reads:
-            known = False
-            for source in slot.sources(now):
+        for slot in access.changing(self.device.active_slots):
+            sources = slot.sources(now)
+            for source in sources:
                 found.append(source.value)
                 needs.append((source.writer, source))
-                known = True
-            if not known and slot not in writes:
+            if not sources and slot not in writes:
                 found.append(slot.held or (slot.parent.held if slot.parent else 0))
         made = hash((self._epoch, key, *found))
         left = [(slot, hash((made, number)) or 1) for number, slot in enumerate(writes)]
         for slot, value in left:
+            if not slot.active:
+                slot.active = True
+                self.device.active_slots += 1
             slot.write(now, index, value)
         self._passes.append(Pass(stages, run, left, needs))
 

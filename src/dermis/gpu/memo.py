@@ -51,6 +51,9 @@ class Memo:
         self._kept: dict[Role, list[Made]] = {}
         self._asked: deque[set[Role]] = deque([set()], maxlen=depth * depth)
         self._making: list[Made] = []
+        self._hits: list[tuple[Role, Made]] = []  # of this round and the last, parts not among them
+        self._last_hits: list[tuple[Role, Made]] = []
+        self._last_asked: set[Role] = set()
         self._awaited: Future[Any] | None = None
 
     def keep(self, make: Callable[..., T], *args: Any, using: tuple[Any, ...] = (), of: str = "") -> T:
@@ -63,12 +66,16 @@ class Memo:
         kept = self._kept.setdefault(role, [])
         found = next((one for one in kept if same(one.args, args)), None)
         if found is None or found.provisional:
+            self._settle()
             others = [one for one in kept if one is not found]
             kept[:] = others[: self._depth - 1]  # before making, which may need the space
             found = self._made(make, args, using)
-        self._touch(role, found)
+            self._touch(role, found)
         if self._making:
             self._making[-1].parts.append((role, found))
+            self._touch(role, found)
+        else:
+            self._hits.append((role, found))
         value: T = found.value
         return value
 
@@ -123,13 +130,20 @@ class Memo:
 
     def end(self) -> None:
         """End a round: let go of what nobody has asked for in the last rounds."""
+        if self._hits == self._last_hits and not self._asked[-1]:
+            self._asked[-1] = self._last_asked  # as in the last round, which takes no time
+        else:
+            self._settle()
+        self._last_hits, self._last_asked, self._hits = self._hits, self._asked[-1], []
         used = set().union(*self._asked)
-        self._kept = {role: kept for role, kept in self._kept.items() if role in used}
+        if len(used) < len(self._kept):
+            self._kept = {role: kept for role, kept in self._kept.items() if role in used}
         self._asked.append(set())
 
     def forget(self) -> None:
         """Make everything again."""
         self._kept.clear()
+        self._last_hits = []
 
     def _made(self, make: Callable[..., Any], args: tuple[Any, ...], using: tuple[Any, ...]) -> Made:
         made = Made(args)
@@ -141,6 +155,11 @@ class Memo:
         if made.provisional and self._making:
             self._making[-1].provisional = True
         return made
+
+    def _settle(self) -> None:
+        """Let what this round has found count as used."""
+        for role, made in self._hits:
+            self._touch(role, made)
 
     def _touch(self, role: Role, made: Made) -> None:
         """It and its parts are what was used last."""

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, TypeVar
 
 import numpy as np
 
-from dermis.gpu.access import Slot, new_number, slot_of
+from dermis.gpu.access import Access, Slot, new_number, slot_of
 from dermis.gpu.compute_pass import Step
 from dermis.gpu.device import Device
 from dermis.gpu.frame import step_of
@@ -27,13 +27,10 @@ class Recording:
 
     It keeps no texture alive: what it would bind goes when its last owner does. The recording is void then,
     and its numbers go too.
-
-    number : of this recording, never given twice
-    reads, writes : slots that it finds written, and those that it leaves written
     """
 
     def __init__(self, device: Device) -> None:
-        self.device, self.number = device, new_number()
+        self.device = device
         self.steps: list[Step] = []
         self._chunks: list[Any] = []
         self._uniforms: Uniforms | None = Uniforms(device, partial(_chunk, device, self._chunks))
@@ -42,17 +39,12 @@ class Recording:
         self._reads: dict[Slot, None] = {}
         self._writes: dict[Slot, None] = {}
 
-    @property
-    def reads(self) -> Sequence[Slot]:
-        """In the order in which they come."""
-        return tuple(self._reads)
+    @cached_property
+    def access(self) -> Access:
+        """What it finds written, and what it leaves written; of a recording that is finished."""
+        return Access(new_number(), tuple(self._reads), tuple(self._writes))
 
-    @property
-    def writes(self) -> Sequence[Slot]:
-        """In the order in which they come."""
-        return tuple(self._writes)
-
-    @property
+    @cached_property
     def stages(self) -> tuple[str, ...]:
         """Each once."""
         return tuple(dict.fromkeys(step.stage for step in self.steps))
@@ -160,7 +152,14 @@ def _held_weakly(value: Any) -> Any:
         return value.copy()
     if not is_value(value):
         return weakref.ref(value) if value is not None else None
-    return _Values(type(value), _fields(value)) if is_dataclass(value) else value
+    if not is_dataclass(value):
+        return value
+    held = _fields(value)
+    return _Values(type(value), held) if any(map(_is_weak, held)) else value
+
+
+def _is_weak(held: Any) -> bool:
+    return isinstance(held, weakref.ref | _Values) or (isinstance(held, tuple) and any(map(_is_weak, held)))
 
 
 def _fields(value: Any) -> tuple[Any, ...]:
