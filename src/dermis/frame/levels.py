@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.gpu import Device, make_texture
+from dermis.gpu import Device, make_texture, scratch
 
 FLOATS = "rgba32float"
 """Format of light that is neither blurred nor rounded to halves."""
@@ -81,7 +81,8 @@ def make_levels(device: Device, size: int, count: int, texel: str, halved: bool 
     """
     mips = 1 + sum(size % 2**times == 0 for times in range(1, MOST_HALVINGS + 1)) if halved else 1
     stack = make_texture(device, (size, size), texel, layers=max(2, count + 1), mips=mips)
-    return Levels(stack, make_texture(device, (size, size), texel, mips=mips), size, texel)
+    between = scratch(device, make_texture(device, (size, size), texel, mips=mips))
+    return Levels(stack, between, size, texel)
 
 
 def scale_of(texel: str, brightest: float) -> float:

@@ -120,4 +120,5 @@ def slot_of(device: Device, resource: Any) -> Slot:
         found = device.slots[resource] = Slot(slot_of(device, texture) if texture is not None else None)
         if found.parent is not None:
             found.parent.parts.append(found)
+            found.scratch = found.parent.scratch
     return found

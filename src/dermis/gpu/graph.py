@@ -86,17 +86,17 @@ class Graph:
             therefore no other afterwards
         """
         access = program.access(resources)
-        filled = slot_of(self.device, resources[completes]) if completes else None
-        writes = [slot for slot in access.writes if slot is not filled]
-        key = (access.number, groups, program.numbers(resources))
-        self._list(stage, program, resources, groups)
-        self._add(
-            (stage,),
-            key,
-            access,
-            writes,
-            lambda frame: frame.dispatch(stage, program, resources, groups, access=access),
-        )
+        writes: Sequence[Slot] = access.writes
+        if completes:
+            filled = slot_of(self.device, resources[completes])
+            writes = [slot for slot in writes if slot is not filled]
+        if self.listing is not None:
+            self.listing.add(stage, program, resources, groups, len(self._passes))
+
+        def run(frame: Frame) -> None:
+            frame.dispatch(stage, program, resources, groups, access=access)
+
+        self._add((stage,), (access.number, groups, program.numbers(resources)), access, writes, run)
 
     def draw(
         self,
@@ -203,7 +203,7 @@ class Graph:
             if not sources and slot not in writes:
                 found.append(slot.held or (slot.parent.held if slot.parent else 0))
         made = hash((self._epoch, key, *found))
-        left = [(slot, hash((made, number)) or 1) for number, slot in enumerate(writes)]
+        left = [(slot, made + number) for number, slot in enumerate(writes, start=1)]
         for slot, value in left:
             if not slot.active:
                 slot.active = True

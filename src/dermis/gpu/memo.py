@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field, fields, is_dataclass
+from functools import cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -19,12 +20,14 @@ class Made:
     """What a function returned for some arguments.
 
     parts : what was kept while it was made, which is in use as long as this is
+    roles : its own and those of all its parts
     provisional : whether something in it stands in for what is still being made
     """
 
     args: tuple[Any, ...]
     value: Any = None
     parts: list[tuple[Role, Made]] = field(default_factory=list)
+    roles: set[Role] = field(default_factory=set)
     provisional: bool = False
 
 
@@ -51,9 +54,7 @@ class Memo:
         self._kept: dict[Role, list[Made]] = {}
         self._asked: deque[set[Role]] = deque([set()], maxlen=depth * depth)
         self._making: list[Made] = []
-        self._hits: list[tuple[Role, Made]] = []  # of this round and the last, parts not among them
-        self._last_hits: list[tuple[Role, Made]] = []
-        self._last_asked: set[Role] = set()
+        self._found: list[tuple[Role, Made]] = []  # in this round, parts not among them
         self._awaited: Future[Any] | None = None
 
     def keep(self, make: Callable[..., T], *args: Any, using: tuple[Any, ...] = (), of: str = "") -> T:
@@ -64,18 +65,24 @@ class Memo:
         """
         role = make, of
         kept = self._kept.setdefault(role, [])
-        found = next((one for one in kept if same(one.args, args)), None)
+        found = None
+        for one in kept:
+            if same(one.args, args):
+                found = one
+                break
         if found is None or found.provisional:
-            self._settle()
+            self._settle(role)
             others = [one for one in kept if one is not found]
             kept[:] = others[: self._depth - 1]  # before making, which may need the space
             found = self._made(make, args, using)
+            found.roles.add(role)
             self._touch(role, found)
         if self._making:
             self._making[-1].parts.append((role, found))
+            self._making[-1].roles |= found.roles
             self._touch(role, found)
         else:
-            self._hits.append((role, found))
+            self._found.append((role, found))
         value: T = found.value
         return value
 
@@ -130,11 +137,10 @@ class Memo:
 
     def end(self) -> None:
         """End a round: let go of what nobody has asked for in the last rounds."""
-        if self._hits == self._last_hits and not self._asked[-1]:
-            self._asked[-1] = self._last_asked  # as in the last round, which takes no time
-        else:
+        if self._depth > 1:
             self._settle()
-        self._last_hits, self._last_asked, self._hits = self._hits, self._asked[-1], []
+        self._asked[-1].update(*(made.roles for _, made in self._found))
+        self._found.clear()
         used = set().union(*self._asked)
         if len(used) < len(self._kept):
             self._kept = {role: kept for role, kept in self._kept.items() if role in used}
@@ -143,7 +149,7 @@ class Memo:
     def forget(self) -> None:
         """Make everything again."""
         self._kept.clear()
-        self._last_hits = []
+        self._found.clear()
 
     def _made(self, make: Callable[..., Any], args: tuple[Any, ...], using: tuple[Any, ...]) -> Made:
         made = Made(args)
@@ -156,16 +162,18 @@ class Memo:
             self._making[-1].provisional = True
         return made
 
-    def _settle(self) -> None:
-        """Let what this round has found count as used."""
-        for role, made in self._hits:
-            self._touch(role, made)
+    def _settle(self, among: Role | None = None) -> None:
+        """Let what this round has found be what was used last, where others are to go."""
+        for role, made in self._found:
+            if among is None or among in made.roles:
+                self._touch(role, made)
 
     def _touch(self, role: Role, made: Made) -> None:
         """It and its parts are what was used last."""
         self._asked[-1].add(role)
-        others = (one for one in self._kept.get(role, ()) if one is not made)
-        self._kept[role] = [made, *others][: self._depth]
+        kept = self._kept.setdefault(role, [])
+        if not kept or kept[0] is not made:
+            kept[:] = [made, *(one for one in kept if one is not made)][: self._depth]
         for part in made.parts:
             self._touch(*part)
 
@@ -185,14 +193,29 @@ def same(a: Any, b: Any) -> bool:
     if type(a) is not type(b):
         return False
     if isinstance(a, tuple | list):
-        return len(a) == len(b) and all(map(same, a, b))
+        if len(a) != len(b):
+            return False
+        for x, y in zip(a, b, strict=True):  # noqa: SIM110 most are the very same: no call for these
+            if x is not y and not same(x, y):
+                return False
+        return True
     if isinstance(a, np.ndarray):
         return bool(a.shape == b.shape and a.dtype == b.dtype and a.tobytes() == b.tobytes())
     if not is_value(a):
         return False
+    kind: Any = type(a)
     if is_dataclass(a):
-        return all(same(getattr(a, one.name), getattr(b, one.name)) for one in fields(a))
+        for name in _field_names(kind):
+            x, y = getattr(a, name), getattr(b, name)
+            if x is not y and not same(x, y):
+                return False
+        return True
     return bool(a == b)
+
+
+@cache
+def _field_names(kind: Any) -> tuple[str, ...]:
+    return tuple(one.name for one in fields(kind))
 
 
 def is_value(thing: Any) -> bool:

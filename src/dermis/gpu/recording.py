@@ -41,8 +41,9 @@ class Recording:
 
     @cached_property
     def access(self) -> Access:
-        """What it finds written, and what it leaves written; of a recording that is finished."""
-        return Access(new_number(), tuple(self._reads), tuple(self._writes))
+        """What it finds written and what it leaves written, scratch aside; once it is finished."""
+        left = tuple(slot for slot in self._writes if not slot.scratch)
+        return Access(new_number(), tuple(self._reads), left)
 
     @cached_property
     def stages(self) -> tuple[str, ...]:
