@@ -1,4 +1,4 @@
-"""A light and a lobe that another package brings: files, frames, sources and help take them as their own."""
+"""A light, a lobe and a technique of another package, taken by files, frames and help as their own."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from outside.chalk import ALBEDO, CHALK
+from outside.dim import LEFT, TECHNIQUE
 from outside.glow import GLOW, GlowLight
 from setups import frontal, head_of, place, scene_of, settings_of
 from tolerances import FURNACE, TWIN
@@ -24,6 +25,7 @@ from dermis.scene.plain import choices_of
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.sources import sources_of
+from dermis.scene.techniques import TECHNIQUES
 from dermis.specular.albedo import directional_albedo
 from dermis.specular.models import MODELS
 
@@ -127,3 +129,22 @@ def test_what_else_knows_the_lobe() -> None:
     assert choices_of(Skin, "specular")[-2:] == ("blue-chalk", "none")
     assert "Phong1975" in sources_of(Skin(specular="blue-chalk"), Settings())
     assert directional_albedo([0.2, 0.9], 0.3, MODELS["blue-chalk"].lobe) == pytest.approx(ALBEDO, rel=1e-4)
+
+
+def test_a_technique_from_outside(renderer: Renderer) -> None:
+    """It is drawn, cited and offered like the package's own, and not kept from them."""
+
+    def below(technique: str) -> Floats:
+        scene = scene_of(FLOOR, frontal(), specular="none")
+        settings = settings_of(size=(SIZE, SIZE), technique=technique, transmission="none")
+        return renderer.draw(scene, settings).linear().astype(float)
+
+    with TECHNIQUES.including("dim", TECHNIQUE):
+        assert "dim" in choices_of(Settings, "technique")
+        assert "Borshukov2003" in sources_of(Skin(), Settings(technique="dim"))
+        dimmed = below("dim")
+        assert "dim" in renderer.graph.ran
+        middle = (slice(8, -8),) * 2  # away from the map's edges
+        assert dimmed[middle] == pytest.approx(LEFT * below("none")[middle], rel=TWIN)
+    with pytest.raises(DermisError, match="technique"):
+        Settings(technique="dim")

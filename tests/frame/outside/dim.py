@@ -1,0 +1,44 @@
+"""A technique of another package: light leaves where it entered, and half of it is lost."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from dermis.frame.atlas_textures import AtlasTextures
+from dermis.frame.inputs import Split
+from dermis.frame.levels import Blur, Levels
+from dermis.frame.passes import TILE, program
+from dermis.frame.techniques.technique import AtlasTechnique
+from dermis.gpu import Recorder
+from dermis.optics.fits.gaussian import single_gaussian
+from dermis.optics.gaussians import GaussianSum
+
+LEFT = 0.5
+
+
+class Dim(AtlasTechnique):
+    """One level of light, which is not blurred."""
+
+    name = "dim"
+    sources = ("Borshukov2003",)
+
+    def gaussians(self, profile: GaussianSum) -> GaussianSum:
+        """All of the profile's light in one level."""
+        return single_gaussian(profile)
+
+    def relights(self, profile: GaussianSum) -> bool:
+        """No."""
+        return False
+
+    def halvings(self, split: Split, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
+        """None."""
+        return (0, 0)
+
+    def fill(self, graph: Recorder, levels: Levels, atlas: AtlasTextures, blur: Blur) -> None:
+        """Half of the light."""
+        shader = program(graph.device, Path(__file__).parent / "dim.wgsl", store=levels.texel)
+        bound = {"light": levels.layer(0), "stored": levels.layer(1)}
+        graph.compute("dim", shader, bound, (levels.size, levels.size), TILE)
+
+
+TECHNIQUE = Dim()
