@@ -1,0 +1,87 @@
+"""Writes a frame's graph down, in docs/frame_graph.md: python tools/frame_graph.py [ADAPTER [PAGE]]."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import dermis
+from dermis.gpu.listing import Listed, Listing
+from dermis.mesh.samples import cached
+
+PAGE = Path(__file__).parent.parent / "docs" / "frame_graph.md"
+SETTINGS = dermis.Settings(size=(1920, 1080), atlas=2048)
+
+
+def changes(scene: dermis.Scene) -> dict[str, tuple[dermis.Scene, dermis.Settings]]:
+    """What the marks are for."""
+    key, *others = scene.lights
+    moved = key.model_copy(update={"position": tuple(c + 20.0 for c in key.position)})  # type: ignore[union-attr]
+    rough = scene.skin.model_copy(update={"roughness": 0.4})
+    return {
+        "camera": (replace(scene, camera=dermis.three_quarter(scene.head)), SETTINGS),
+        "a light": (replace(scene, lights=(moved, *others)), SETTINGS),
+        "exposure": (scene, SETTINGS.model_copy(update={"exposure": 2.0})),
+        "profile": (replace(scene, skin=dermis.Skin(profile="dj3")), SETTINGS),
+        "roughness": (replace(scene, skin=rough), SETTINGS),
+        "size": (scene, SETTINGS.model_copy(update={"size": (1280, 720)})),
+    }
+
+
+def listed(renderer: dermis.Renderer, scene: dermis.Scene) -> Listing:
+    """A frame of which everything runs."""
+    renderer.graph.listing = listing = Listing()
+    renderer.draw(scene, SETTINGS, anew=True)
+    return listing
+
+
+def stage_rows(listing: Listing, ms: dict[str, float], marks: dict[str, set[str]]) -> Iterable[str]:
+    """A row of the table for each stage."""
+    for stage in dict.fromkeys(one.stage for one in listing.passes):
+        own = [one for one in listing.passes if one.stage == stage]
+        shaders = ", ".join(f"`{name}`" for name in dict.fromkeys(one.shader for one in own))
+        cells = " | ".join("x" if stage in ran else "" for ran in marks.values())
+        time = f"{ms[stage]:.3f}" if stage in ms else ""
+        yield f"| {stage} | {shaders} | {len(own)} | {time} | {cells} |"
+
+
+def pass_row(one: Listed) -> str:
+    """A row of the table of passes."""
+    bound = ", ".join(f"{name} {value}" for name, value in one.bindings.items() if value != "sampler")
+    groups = " x ".join(map(str, one.groups))
+    return f"| {'recorded' if one.recorded else ''} | {one.stage} | {one.shader} | {groups} | {bound} |"
+
+
+def main() -> None:
+    """Draw and write."""
+    adapter, page = (*sys.argv[1:], *("auto", str(PAGE))[len(sys.argv) - 1 :])[:2]
+    renderer = dermis.Renderer(adapter)
+    name = "lee_perry_smith" if cached("lee_perry_smith") else "bust"
+    scene = dermis.Scene(dermis.load_head(name))
+    renderer.draw(scene, SETTINGS)
+    ms = renderer.draw_warm(scene, SETTINGS).gpu_ms or {}
+    listing, marks = listed(renderer, scene), dict[str, set[str]]()
+    for change, frame in changes(scene).items():
+        renderer.draw(scene, SETTINGS)
+        renderer.draw(*frame)
+        marks[change] = set(renderer.graph.ran)
+    Path(page).write_text(
+        (PAGE.parent / "frame_graph.in.md")
+        .read_text(encoding="utf-8")
+        .format(
+            head=name,
+            adapter=f"{renderer.device.adapter.name}, {renderer.device.adapter.backend}",
+            changes=" | ".join(marks),
+            rule="|".join("---" for _ in marks),
+            stages="\n".join(stage_rows(listing, ms, marks)),
+            passes="\n".join(map(pass_row, listing.passes)),
+            resources="\n".join(f"{k}. {what}" for k, what in enumerate(listing.resources)),
+        ),
+        encoding="utf-8",
+    )
+
+
+if __name__ == "__main__":
+    main()
