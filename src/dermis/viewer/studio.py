@@ -149,23 +149,23 @@ class Studio:
         """(h, w, 3) bytes of an image."""
         return np.ascontiguousarray(download(self.renderer.device, image)[..., :3])
 
-    def _draw(self, state: ViewerState, place: str = "") -> Any:
+    def _draw(self, state: ViewerState, side: str = "") -> Any:
         parts = PARTS.get(state.view, state.settings.parts)
         settings = self.settings = changed(state.settings, parts=parts)
-        if state.view == ATLAS and self._shows_light_of(state, place):
-            return self._views.draw_chart(state.scene, settings, state.chart, place)
+        if state.view == ATLAS and self._shows_light_of(state, side):
+            return self._views.draw_chart(state.scene, settings, state.chart, side)
         self._lit = None
-        self.rendered = self.renderer.draw(state.scene, settings, view=place)
-        self._lit = None if self._thin_parts.provisional else (state, place)
+        self.rendered = self.renderer.draw(state.scene, settings, view=side)
+        self._lit = None if self._thin_parts.provisional else (state, side)
         if state.view in (PICTURE, *PARTS):
             return self.rendered.picture.bytes
         if state.view == ATLAS:
-            return self._views.draw_chart(state.scene, settings, state.chart, place)
-        return self._views.draw(state.scene, settings, state.view, place)
+            return self._views.draw_chart(state.scene, settings, state.chart, side)
+        return self._views.draw(state.scene, settings, state.view, side)
 
-    def _shows_light_of(self, state: ViewerState, place: str) -> bool:
+    def _shows_light_of(self, state: ViewerState, side: str) -> bool:
         """Whether the atlas holds a state's light: then another part of it takes no frame."""
-        if self._lit is None or self._lit[1] != place:
+        if self._lit is None or self._lit[1] != side:
             return False
         return same(replace(self._lit[0], chart=state.chart), state)
 

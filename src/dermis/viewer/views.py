@@ -47,12 +47,12 @@ class Views:
         self._thick: weakref.WeakKeyDictionary[PairBuffers, Any] = weakref.WeakKeyDictionary()
         self._density: weakref.WeakKeyDictionary[Any, float] = weakref.WeakKeyDictionary()
 
-    def draw(self, scene: Scene, settings: Settings, view: str, place: str = "") -> Any:
-        """A texture of bytes that shows an intermediate of the frame drawn last at a place.
+    def draw(self, scene: Scene, settings: Settings, view: str, side: str = "") -> Any:
+        """A texture of bytes that shows an intermediate of the frame drawn last on a side of the divider.
 
         Raises DermisError for what the technique does not make.
         """
-        inputs = self._renderer.prepare(scene, settings, place)
+        inputs = self._renderer.prepare(scene, settings, side)
         around = ("ENVIRONMENT", "HALF_SPACE")  # which the shader has not
         constants = tuple(switch for switch in inputs.light_constants if switch[0] not in around)
         shader = program(self._renderer.device, _INTERMEDIATE, constants)
@@ -69,12 +69,12 @@ class Views:
         }
         return self._computed(shader, bound, settings.size)
 
-    def draw_chart(self, scene: Scene, settings: Settings, chart: Chart, place: str = "") -> Any:
-        """A texture of bytes that shows a part of the atlas of the frame drawn last at a place.
+    def draw_chart(self, scene: Scene, settings: Settings, chart: Chart, side: str = "") -> Any:
+        """A texture of bytes that shows a part of the atlas of the frame drawn last on a side of the divider.
 
         Raises DermisError for what the technique does not make.
         """
-        inputs = self._renderer.prepare(scene, settings, place)
+        inputs = self._renderer.prepare(scene, settings, side)
         layer, scale = self._layer(inputs, chart.layer, settings)
         shown = {"centre": chart.centre, "span": chart.span, "scale": scale}
         sheet = self._flat.record("Sheet", what=_NUMBERS.get(chart.layer, 0), **shown)
