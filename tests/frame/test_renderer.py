@@ -65,10 +65,10 @@ def test_a_failed_frame_leaves_no_half_drawn_shadows(monkeypatch: pytest.MonkeyP
 
     dispatch = Frame.dispatch
 
-    def fail(frame: Frame, stage: str, *given: Any) -> None:
+    def fail(frame: Frame, stage: str, *given: Any, **named: Any) -> None:
         if stage == "shade":
             raise ValueError
-        dispatch(frame, stage, *given)
+        dispatch(frame, stage, *given, **named)
 
     with monkeypatch.context() as patch:
         patch.setattr(Frame, "dispatch", fail)
