@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Literal, TypeVar
 
 from dermis.gpu.access import Access
@@ -12,6 +12,7 @@ from dermis.gpu.device import Device
 from dermis.gpu.program import ComputeProgram, Resources
 from dermis.gpu.raster_program import FragmentProgram, RasterProgram
 from dermis.gpu.readback import Fetched
+from dermis.gpu.recorder import Recorder
 from dermis.gpu.timing import Timestamps, WallClock
 from dermis.gpu.uniforms import Uniforms
 
@@ -20,7 +21,7 @@ Timed = bool | Literal["whole"]
 """Whether stages are timed, each in a pass of its own, or the frame as it is when nobody asks, as a whole."""
 
 
-class Frame:
+class Frame(Recorder):
     """Records passes, submits them together, then knows how long each stage took.
 
     On software adapters each stage is submitted and waited for by itself, to time it.
@@ -45,18 +46,6 @@ class Frame:
         self._stamps = Timestamps(device, whole=whole) if stamped else None
         self._divided = self._wall is not None or (stamped and not whole)  # into a pass for each stage
 
-    def compute(
-        self,
-        stage: str,
-        program: ComputeProgram,
-        resources: Resources,
-        size: tuple[int, int],
-        tile: int = 8,
-        completes: str = "",
-    ) -> None:
-        """Run `program` once for each of size[0] x size[1] invocations, in tiles of `tile` squared."""
-        self.dispatch(stage, program, resources, (*program.groups_for(size, tile), 1))
-
     def dispatch(
         self,
         stage: str,
@@ -73,10 +62,6 @@ class Frame:
         """
         bound = program.bind_group(resources, self._uniforms, access)
         self.run([step_of(stage, program, *bound, groups)])
-
-    def repeat(self, record: Callable[..., T], *args: Any) -> T:
-        """Run the passes of `record(frame, *args)`."""
-        return record(self, *args)
 
     def run(self, steps: Sequence[Step]) -> None:
         """Run dispatches whose bind groups are known."""

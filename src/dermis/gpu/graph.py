@@ -13,6 +13,7 @@ from dermis.gpu.listing import Lister, Listing
 from dermis.gpu.program import ComputeProgram, Program, Resources
 from dermis.gpu.raster_program import FragmentProgram, RasterProgram
 from dermis.gpu.readback import Fetched
+from dermis.gpu.recorder import Recorder
 from dermis.gpu.recording import Recordings
 
 T = TypeVar("T")
@@ -34,7 +35,7 @@ class Pass:
     needs: list[tuple[int, Slot]] = field(default_factory=list)
 
 
-class Graph:
+class Graph(Recorder):
     """Takes the passes of one frame after the other, with the methods of `Frame`, and knows what they leave.
 
     What a pass reads and writes stands in its shader; what it leaves is told apart by its program, its
@@ -64,18 +65,6 @@ class Graph:
         self._frame = self.device.next_frame()
         self._passes.clear()
         self._fetches.clear()
-
-    def compute(
-        self,
-        stage: str,
-        program: ComputeProgram,
-        resources: Resources,
-        size: tuple[int, int],
-        tile: int = 8,
-        completes: str = "",
-    ) -> None:
-        """Declare a pass of size[0] x size[1] invocations, in tiles of `tile` squared."""
-        self.dispatch(stage, program, resources, (*program.groups_for(size, tile), 1), completes)
 
     def dispatch(
         self, stage: str, program: ComputeProgram, resources: Resources, groups: Groups, completes: str = ""

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, TypeVar
 
 from dermis.gpu.device import Device
 from dermis.gpu.program import ComputeProgram, Program, Resources
+from dermis.gpu.recorder import Recorder
 
 T = TypeVar("T")
 
@@ -91,7 +92,7 @@ class Listing:
         return self._numbers[id(value)]
 
 
-class Lister:
+class Lister(Recorder):
     """Takes the passes of a recording and writes them down.
 
     index : of the recording among the graph's passes
@@ -99,18 +100,6 @@ class Lister:
 
     def __init__(self, device: Device, listing: Listing, index: int) -> None:
         self.device, self._listing, self._index = device, listing, index
-
-    def compute(
-        self,
-        stage: str,
-        program: ComputeProgram,
-        resources: Resources,
-        size: tuple[int, int],
-        tile: int = 8,
-        completes: str = "",
-    ) -> None:
-        """Write a pass of size[0] x size[1] invocations down."""
-        self.dispatch(stage, program, resources, (*program.groups_for(size, tile), 1))
 
     def dispatch(
         self,
@@ -122,10 +111,6 @@ class Lister:
     ) -> None:
         """Write a pass of a number of workgroups down."""
         self._listing.add(stage, program, resources, groups, self._index, recorded=True)
-
-    def repeat(self, record: Callable[..., T], *args: Any) -> T:
-        """Write the passes of `record` down."""
-        return record(self, *args)
 
 
 def _described(value: Any) -> str:

@@ -1,9 +1,10 @@
-"""Where passes go: a graph, which runs what is due; a frame, which runs all at once; a recording."""
+"""Where passes go: a graph, which runs what is due; a frame, which runs all at once; a recording; a list."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from dermis.gpu.device import Device
 from dermis.gpu.program import ComputeProgram, Resources
@@ -11,12 +12,25 @@ from dermis.gpu.program import ComputeProgram, Resources
 T = TypeVar("T")
 
 
-class Recorder(Protocol):
-    """Takes the passes of a stage; see `Graph` for what each method means."""
+class Recorder(ABC):
+    """Takes the compute passes of a stage."""
 
-    @property
-    def device(self) -> Device:
-        """The passes' device."""
+    device: Device
+
+    @abstractmethod
+    def dispatch(
+        self,
+        stage: str,
+        program: ComputeProgram,
+        resources: Resources,
+        groups: tuple[int, int, int],
+        completes: str = "",
+    ) -> None:
+        """Take a pass of a number of workgroups along each axis.
+
+        completes : name of a resource that the pass fills up with what follows from its own content, which is
+            therefore no other afterwards
+        """
 
     def compute(
         self,
@@ -27,17 +41,9 @@ class Recorder(Protocol):
         tile: int = 8,
         completes: str = "",
     ) -> None:
-        """Take a pass of size[0] x size[1] invocations."""
-
-    def dispatch(
-        self,
-        stage: str,
-        program: ComputeProgram,
-        resources: Resources,
-        groups: tuple[int, int, int],
-        completes: str = "",
-    ) -> None:
-        """Take a pass of a number of workgroups."""
+        """Take a pass of size[0] x size[1] invocations, in tiles of `tile` squared."""
+        self.dispatch(stage, program, resources, (*program.groups_for(size, tile), 1), completes)
 
     def repeat(self, record: Callable[..., T], *args: Any) -> T:
         """Take the passes of `record(recorder, *args)`."""
+        return record(self, *args)

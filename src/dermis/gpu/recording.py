@@ -16,13 +16,14 @@ from dermis.gpu.device import Device
 from dermis.gpu.frame import step_of
 from dermis.gpu.memo import is_value, same
 from dermis.gpu.program import ComputeProgram, Resources
+from dermis.gpu.recorder import Recorder
 from dermis.gpu.uniforms import CHUNK_BYTES, Uniforms
 
 T = TypeVar("T")
 _MOST = 4  # recordings of a function: two states, each in motion and still
 
 
-class Recording:
+class Recording(Recorder):
     """Takes dispatches as a graph does, and keeps them with the numbers they read.
 
     It keeps no texture alive: what it would bind goes when its last owner does. The recording is void then,
@@ -55,18 +56,6 @@ class Recording:
         """Whether something that it binds is gone."""
         return len(self.steps) != len(self._pipelines)
 
-    def compute(
-        self,
-        stage: str,
-        program: ComputeProgram,
-        resources: Resources,
-        size: tuple[int, int],
-        tile: int = 8,
-        completes: str = "",
-    ) -> None:
-        """Keep a pass of size[0] x size[1] invocations, in tiles of `tile` squared."""
-        self.dispatch(stage, program, resources, (*program.groups_for(size, tile), 1), completes)
-
     def dispatch(
         self,
         stage: str,
@@ -90,10 +79,6 @@ class Recording:
         kept = program.device.ffi.new("uint32_t[]", offsets)
         steps.append(step_of(stage, program, group, kept, groups))
         self._note(program, resources, completes)
-
-    def repeat(self, record: Callable[..., T], *args: Any) -> T:
-        """Keep the passes of `record(recording, *args)` too."""
-        return record(self, *args)
 
     def _note(self, program: ComputeProgram, resources: Resources, completes: str) -> None:
         access = program.access(resources)
