@@ -46,7 +46,9 @@ class Slot:
 
     def sources(self, frame: int) -> list[Slot]:
         """The slots from which it gets what it holds in the frame: itself, its views, or its texture."""
-        found = [part for part in self.parts if part.frame == frame] if self.parts else []
+        if self.frame == frame and not self.parts:
+            return [self]
+        found = [part for part in self.parts if part.frame == frame]
         if self.frame == frame:
             found.append(self)
         elif self.parent is not None and self.parent.frame == frame:

@@ -205,6 +205,8 @@ class Graph(Recorder):
         lost: set[int] = set()  # slots that hold what is wanted, and will not any more
         while True:
             due = self._due_without(lost)
+            if all(due):
+                return due
             spoilt = {
                 id(slot)
                 for index, one in enumerate(self._passes)
