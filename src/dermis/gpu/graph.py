@@ -54,6 +54,7 @@ class Graph(Recorder):
         self._epoch = 0
         self._frame = 0
         self._passes: list[Pass] = []
+        self._hashes: dict[int, int] = {}  # of this frame's records, which its passes keep alive
         self._fetches: list[tuple[Any, Fetched]] = []
 
     def forget(self) -> None:
@@ -64,6 +65,7 @@ class Graph(Recorder):
         """Begin a frame."""
         self._frame = self.device.next_frame()
         self._passes.clear()
+        self._hashes.clear()
         self._fetches.clear()
 
     def dispatch(
@@ -85,7 +87,9 @@ class Graph(Recorder):
         def run(frame: Frame) -> None:
             frame.dispatch(stage, program, resources, groups, access=access)
 
-        self._add((stage,), (access.number, groups, program.numbers(resources)), access, writes, run)
+        self._add(
+            (stage,), (access.number, groups, program.numbers(resources, self._hashes)), access, writes, run
+        )
 
     def draw(
         self,
@@ -102,7 +106,7 @@ class Graph(Recorder):
         """Declare a pass that rasterises triangles into cleared targets, as `Frame.draw` does."""
         access, options = program.access(resources), {"layer": layer, "depth": depth, "far": far}
         writes = [slot_of(self.device, one) for one in (depth, target) if one is not None]
-        key = (access.number, vertices, layer, far, program.numbers(resources))
+        key = (access.number, vertices, layer, far, program.numbers(resources, self._hashes))
 
         def run(frame: Frame) -> None:
             frame.draw(stage, program, resources, vertices, target=target, **options)
@@ -116,7 +120,7 @@ class Graph(Recorder):
         """Declare a pass for each texel of its targets, as `Frame.fill` does."""
         access = program.access(resources)
         writes = [slot_of(self.device, one) for one in targets]
-        key = (access.number, program.numbers(resources))
+        key = (access.number, program.numbers(resources, self._hashes))
         self._list(stage, program, resources, (3,))
         self._add(
             (stage,),

@@ -23,6 +23,7 @@ Resources = Mapping[str, Any]
 P = TypeVar("P")
 _TOOLKIT_SHADERS = Path(__file__).parent / "wgsl"
 _UNIFORM = {"type": "uniform"}
+_LARGE_RECORD = 1024  # bytes
 _MOST_VARIANTS = 12  # of a shader: on a software adapter each takes some 7 MB
 Constants = tuple[tuple[str, float], ...]
 """Names and values of pipeline constants, a shader's `override`s; those left out keep their default."""
@@ -127,12 +128,24 @@ class Program:
             self._accesses.keep(key, bound, found)
         return found
 
-    def numbers(self, resources: Resources) -> tuple[bytes, ...]:
-        """What the shader reads of the records."""
+    def numbers(self, resources: Resources, known: dict[int, int]) -> tuple[bytes | int, ...]:
+        """What the shader reads of the records; of large ones, which several passes read, a hash of it all.
+
+        known : the hashes by the records' identity
+        """
+        found: list[bytes | int] = []
         try:
-            return tuple([read(resources[name]) for name, read in self._read_of.items()])
+            for name, read in self._read_of.items():
+                record = resources[name]
+                if record.nbytes <= _LARGE_RECORD:
+                    found.append(read(record))
+                    continue
+                if id(record) not in known:
+                    known[id(record)] = hash(record.tobytes())
+                found.append(known[id(record)])
         except KeyError as missing:
             raise self._unbound(missing) from None
+        return tuple(found)
 
     def _bound(self, resources: Resources) -> Sequence[Any]:
         """What is bound besides records, in the shader's order."""
