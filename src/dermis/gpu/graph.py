@@ -87,9 +87,8 @@ class Graph(Recorder):
         def run(frame: Frame) -> None:
             frame.dispatch(stage, program, resources, groups, access=access)
 
-        self._add(
-            (stage,), (access.number, groups, program.numbers(resources, self._hashes)), access, writes, run
-        )
+        key = (access.number, groups, program.numbers(resources, self._hashes))
+        self._add((stage,), key, access, writes, run)
 
     def draw(
         self,
