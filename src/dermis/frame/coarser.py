@@ -1,4 +1,4 @@
-"""The atlas at half the resolution, for light that is smooth already."""
+"""The atlas at half resolution, for light that is already smooth."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a frame reads: resources that stay, and what cameras and lights change."""
+"""Everything a frame reads: resources that persist, and what cameras and lights change."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The blurred levels of the light: where they are kept, how, and at which resolution."""
+"""The blurred levels of light: their textures, formats and resolutions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Frames that a device cannot hold are refused before anything is made for them."""
+"""Refuses frames that exceed the limits of a device, before anything is allocated."""
 
 from __future__ import annotations
 

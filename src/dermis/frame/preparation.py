@@ -1,4 +1,4 @@
-"""From a scene to what a frame reads, keeping what stays the same."""
+"""Turns a scene into a frame's inputs, and reuses what has not changed."""
 
 from __future__ import annotations
 

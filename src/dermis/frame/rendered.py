@@ -1,4 +1,4 @@
-"""What a renderer hands out: an image on the device, and what it took."""
+"""What the renderer returns: an image on the device, and its timings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a frame reads that cameras and lights leave as it is, and all that it is made of."""
+"""The resources of a frame that depend on neither the camera nor where lights stand."""
 
 from __future__ import annotations
 

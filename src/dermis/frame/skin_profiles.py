@@ -1,4 +1,4 @@
-"""The Gaussians of skins whose pigments or layers change from frame to frame."""
+"""Gaussian profiles of skins whose pigments or layers change from frame to frame."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What single pixels see of a head, and the light that enters the skin at given places."""
+"""Which surface points single pixels see, and the light that enters the skin at given points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What passes read and write, told by the shaders' own declarations, and what each resource holds."""
+"""What each pass reads and writes, taken from its shader's bindings, and what each resource holds."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ _number = count(1)
 
 @dataclass(eq=False, slots=True)
 class Slot:
-    """What a texture, a buffer or a view of one layer holds.
+    """The content of a texture, a buffer or a view of one layer.
 
-    Contents have numbers: the same number for what the same pass made of the same things, 0 for what nobody
-    has told. `value` is what the passes declared so far will leave, `held` what is there.
+    Contents have version numbers: equal for what the same pass made from equal inputs, 0 when unknown.
+    `value` is the version that the passes declared so far will leave, `held` the one that is there now.
 
     parent : of a view, the texture's slot
     parts : of a texture, the slots of its views
     frame : the one in which `value`, `writer` and `writers` hold
     writer : the pass that writes it last
     writers : all that do, and those that write what contains it or is contained
-    scratch : whether only passes read it, so that it may hold anything in between
+    scratch : whether it only carries data between passes, so that its content after a frame does not matter
     active : whether any pass has ever written it
     """
 

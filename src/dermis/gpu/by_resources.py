@@ -1,4 +1,4 @@
-"""What is made for a set of resources and goes with the first of them."""
+"""A cache keyed by resources: an entry goes as soon as one of its resources is released."""
 
 from __future__ import annotations
 

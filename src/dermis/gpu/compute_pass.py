@@ -1,4 +1,4 @@
-"""A compute pass that is quick to record: a frame's hundred calls go straight to the native library."""
+"""A compute pass that is quick to record: its calls go straight to the native library."""
 
 from __future__ import annotations
 

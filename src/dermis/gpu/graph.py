@@ -1,4 +1,4 @@
-"""A frame as a graph: passes are declared in order, and only those run whose results are not there."""
+"""The frame graph: stages declare passes in order, and only stale passes run."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ class Pass:
 
 
 class Graph(Recorder):
-    """Takes the passes of one frame after the other, with the methods of `Frame`, and knows what they leave.
+    """Declares the passes of each frame with the methods of `Frame`, and runs those that are stale.
 
-    What a pass reads and writes stands in its shader; what it leaves is told apart by its program, its
-    resources, what they hold, the workgroups, and the numbers in its records that the shader reads. A pass
-    whose result is still where it leaves it does not run, nor does one whose result nobody needs.
+    A pass' reads and writes come from its shader's bindings. The version that it writes follows from its
+    program, its resources and their versions, the workgroups, and the constants that the shader reads. A pass
+    is skipped while its outputs hold that version, and also when no pass that runs needs them.
 
     ran : stages of the passes that the last frame ran, in order
     listing : when it is set, the passes of the next frame are written down there
@@ -58,7 +58,7 @@ class Graph(Recorder):
         self._fetches: list[tuple[Any, Fetched]] = []
 
     def forget(self) -> None:
-        """Nobody knows what any resource holds: the next frame runs every pass."""
+        """Take all content for unknown: the next frame runs every pass."""
         self._epoch += 1
 
     def begin(self) -> None:

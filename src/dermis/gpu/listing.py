@@ -1,4 +1,4 @@
-"""A frame written down: its passes, what they bind, and which of them ran."""
+"""A frame graph as data: its passes, their bindings and resources, and which passes ran."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is made on the host and kept: maps uploaded, tables fitted, space for results."""
+"""A cache of what the CPU makes for frames: uploaded maps, fitted tables, textures to write to."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ class _Search:
 
 
 class Memo:
-    """Results of functions by their arguments, each made again only when an argument is another.
+    """Results of functions by their arguments; a function is called again only when an argument changes.
 
-    depth : how many results of a function are kept, for who goes back and forth between some; a function that
-        nobody asks is forgotten after the square of that many rounds, as there may be several in turn as well
+    depth : how many results of each function are kept, for callers that alternate between a few; a function
+        that is not asked for during depth squared rounds is forgotten
     patient : whether `meanwhile` waits
     """
 

@@ -1,4 +1,4 @@
-"""What the process holds on its devices, and what it must not ask of them."""
+"""How much device memory the process holds, and a check before asking for too much."""
 
 from __future__ import annotations
 

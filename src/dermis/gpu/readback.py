@@ -1,4 +1,4 @@
-"""Bytes on their way from the device, while it works on what comes next."""
+"""Asynchronous readback: copies of buffers that the CPU reads while the device works on."""
 
 from __future__ import annotations
 

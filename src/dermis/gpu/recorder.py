@@ -1,4 +1,4 @@
-"""Where passes go: a graph, which runs what is due; a frame, which runs all at once; a recording; a list."""
+"""The interface that takes passes: graphs, frames, recordings and listings implement it."""
 
 from __future__ import annotations
 

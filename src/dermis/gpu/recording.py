@@ -1,4 +1,4 @@
-"""Runs of dispatches that are the same in every frame: recorded once, then repeated."""
+"""Runs of compute passes whose bindings stay the same: recorded once, then replayed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How long each stage of a frame took: by the device's timestamps, or by the clock on the wall."""
+"""Stage times of a frame: from the device's timestamps, or from the wall clock."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The numbers of one frame's passes: gathered while it is recorded, handed over in one write."""
+"""Uniform data of one frame's passes: gathered while passes are recorded, uploaded in one write."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What sets the kinds of light apart for the frame: one object each, its shader beside it."""
+"""The interface of a kind of light for the frame; its shader lies beside its module."""
 
 from __future__ import annotations
 

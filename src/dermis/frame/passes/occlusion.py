@@ -1,4 +1,4 @@
-"""Which share of the sky each place of the surface sees; baked once for a mesh and an atlas."""
+"""Ambient occlusion: the share of the sky that each place sees, baked for a mesh and an atlas."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The finished picture on its way to NumPy: three bytes or three floats a pixel."""
+"""Packs the finished picture for readback: three bytes or three floats per pixel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From radiance to what a file or a display takes."""
+"""Post-processing: exposure, tone curve and encoding."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The image from all that was computed before it."""
+"""The image: shades every sample of the visibility buffer."""
 
 from __future__ import annotations
 

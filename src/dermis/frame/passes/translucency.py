@@ -1,4 +1,4 @@
-"""Light that enters on the far side of thin parts and leaves here: ears, nostrils, lips, lids."""
+"""Light that enters on the far side of thin parts and leaves here: ears, nostrils, lips, eyelids."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Ways for light to spread below the skin: each a Python file, with its shaders beside it."""
+"""Scattering techniques: one Python file each, with its shaders beside it."""

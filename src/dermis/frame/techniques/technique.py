@@ -1,4 +1,4 @@
-"""What every technique of scattering is asked for."""
+"""The interface of scattering techniques, and the base of those that diffuse light over the atlas."""
 
 from __future__ import annotations
 
