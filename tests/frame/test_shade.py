@@ -219,8 +219,7 @@ def test_software_adapters_get_the_picture_of_gpus(
     own = [one for one in passes.device_constants(renderer.device) if one[0] == "MESH_IN_BUFFERS"]
     made = []
     for constants in ((), (("PASSES_DARK", 1), ("STRIP", 16))):
-        for module in (passes, shade):
-            monkeypatch.setattr(module, "device_constants", lambda _, more=constants: (*own, *more))
+        monkeypatch.setattr(passes, "device_constants", lambda _, more=constants: (*own, *more))
         monkeypatch.setattr(renderer.device, "programs", {})
         made.append(image(renderer, scene, size=(45, 37), samples=samples, technique=technique))
     assert made[0].max() > 0.1 and np.array_equal(*made)

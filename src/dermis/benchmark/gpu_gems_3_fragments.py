@@ -22,8 +22,6 @@ _FOLDER = Path(__file__).parent
 class Fragments(GpuGems3):
     """Lights the atlas, blurs and adds up in render passes; the same up to the rounding of halves."""
 
-    name = "gpu-gems-3 as fragments"
-
     def make_levels(self, device: Device, side: int, count: int) -> Levels:
         """Space for the light that enters and `count` blurred levels, all of it halves."""
         stack = make_texture(device, (side, side), HALVES, layers=max(2, count + 1), use="raster")

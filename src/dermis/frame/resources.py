@@ -15,7 +15,7 @@ from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.atlas_textures import AtlasTextures, upload_atlas
 from dermis.frame.geometry import HeadResources, upload_geometry
 from dermis.frame.inputs import Resources, Split, view_record
-from dermis.frame.levels import FLOATS, Blur, Levels, make_levels
+from dermis.frame.levels import Blur, Levels
 from dermis.frame.limits import check_limits
 from dermis.frame.maps import upload_maps
 from dermis.frame.passes import bloom, post, shade, shadows, surface_texels, visibility_buffer
@@ -147,9 +147,8 @@ def _shared(memo: Memo, device: Device, asked: Asked, shadow_maps: shadows.Shado
 
 
 def _atlas(memo: Memo, device: Device, asked: Asked, name: str, index: int) -> tuple[Atlas, AtlasTextures]:
-    technique, settings = asked.technique, asked.settings
+    stretch = asked.technique.stretch(asked.settings)
     atlas = memo.keep(_cached_atlas, asked.head, asked.atlases.side, name, of=str(index))
-    stretch = technique.stretch(settings) if isinstance(technique, AtlasTechnique) else settings.stretch
     return atlas, memo.keep(upload_atlas, device, atlas, stretch, asked.remedy, of=str(index))
 
 
@@ -214,9 +213,7 @@ def _albedo(device: Device, model: str, fresnel: str) -> Any:
 
 
 def _make_levels(device: Device, technique: Technique, side: int, count: int, _: str) -> Levels:
-    if isinstance(technique, AtlasTechnique):
-        return technique.make_levels(device, side, count)
-    return make_levels(device, side, count, FLOATS)
+    return technique.make_levels(device, side, count)
 
 
 def _make_sum(device: Device, technique: Technique, side: int, _: str) -> Any:

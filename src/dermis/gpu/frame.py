@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 from dermis.gpu.access import Access
 from dermis.gpu.compute_pass import ComputePass, Step
@@ -16,7 +16,6 @@ from dermis.gpu.recorder import Recorder
 from dermis.gpu.timing import Timestamps, WallClock
 from dermis.gpu.uniforms import Uniforms
 
-T = TypeVar("T")
 Timed = bool | Literal["whole"]
 """Whether stages are timed, each in a pass of its own, or the frame as it is when nobody asks, as a whole."""
 
@@ -57,7 +56,7 @@ class Frame(Recorder):
     ) -> None:
         """Run `program` for a number of workgroups along each axis.
 
-        completes : of account where passes are declared, see `Graph.dispatch`
+        completes : of account where passes are declared, see `Recorder.dispatch`
         access : of these resources, for who has it
         """
         bound = program.bind_group(resources, self._uniforms, access)

@@ -71,22 +71,17 @@ class Graph(Recorder):
     def dispatch(
         self, stage: str, program: ComputeProgram, resources: Resources, groups: Groups, completes: str = ""
     ) -> None:
-        """Declare a pass of a number of workgroups along each axis.
-
-        completes : name of a resource that the pass fills up with what follows from its own content, which is
-            therefore no other afterwards
-        """
+        """Declare a pass of a number of workgroups along each axis; see `Recorder.dispatch`."""
         access = program.access(resources)
         writes: Sequence[Slot] = access.writes
         if completes:
             filled = slot_of(self.device, resources[completes])
             writes = [slot for slot in writes if slot is not filled]
-        if self.listing is not None:
-            self.listing.add(stage, program, resources, groups, len(self._passes))
 
         def run(frame: Frame) -> None:
             frame.dispatch(stage, program, resources, groups, access=access)
 
+        self._list(stage, program, resources, groups)
         key = (access.number, groups, program.numbers(resources, self._hashes))
         self._add((stage,), key, access, writes, run)
 

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, TypeVar
+from typing import Any
 
 from dermis.gpu.device import Device
 from dermis.gpu.program import ComputeProgram, Program, Resources
 from dermis.gpu.recorder import Recorder
-
-T = TypeVar("T")
 
 
 @dataclass

@@ -19,7 +19,6 @@ LEFT = 0.5
 class Dim(AtlasTechnique):
     """One level of light, which is not blurred."""
 
-    name = "dim"
     sources = ("Borshukov2003",)
 
     def gaussians(self, profile: GaussianSum) -> GaussianSum:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from dermis.frame.levels import FLOATS, HALVES, usual_texel
 from dermis.frame.lights import light_numbers
 from dermis.frame.lights.kind import light_shaders
 from dermis.frame.surface import lobe_shaders, surface_numbers
@@ -24,8 +25,8 @@ SHARED_SHADERS = ShaderFolder(
 TILE = 16
 """Side of workgroups that do little: smaller ones are done before the H200 has started the next."""
 _LEVELS = PASSES / "levels"
-_SOURCES = {"rgba32float": _LEVELS / "loaded", "rgba16float": _LEVELS / "filtered"}
-_STORES = {"rgba32float": _LEVELS / "floats", "rgba16float": _LEVELS / "halves"}
+_SOURCES = {FLOATS: _LEVELS / "loaded", HALVES: _LEVELS / "filtered"}
+_STORES = {FLOATS: _LEVELS / "floats", HALVES: _LEVELS / "halves"}
 _STRIP = 16  # pixels of an invocation on software adapters, see shade.wgsl
 
 
@@ -81,6 +82,8 @@ def warm_up(device: Device) -> None:
     """Begin to compile what most frames need, while others load what it is to work on."""
     for name in ("shade.wgsl", "surface_texels.wgsl", "shadow_bounds.wgsl", "post.wgsl", "pack.wgsl"):
         program(device, name)
-    texel = "rgba32float" if device.adapter.kind == "CPU" else "rgba16float"
-    for name in ("stitch_gather.wgsl", "diffuse_halve.wgsl"):
-        program(device, name, source=texel, store=texel)
+    texel = usual_texel(device)
+    program(device, "stitch_gather.wgsl", source=texel)
+    program(device, "diffuse_halve.wgsl", source=texel, store=texel)
+    for name in ("stitch_place.wgsl", "irradiance.wgsl"):
+        program(device, name, store=texel)

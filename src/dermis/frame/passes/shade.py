@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from dermis.frame.passes import device_constants, program
+from dermis.frame.passes import program
 from dermis.frame.passes.post import Picture
 from dermis.frame.passes.visibility_buffer import Layers
 from dermis.gpu import ComputeProgram, Constants, Device, Recorder, make_texture
@@ -39,8 +39,8 @@ def draw(
     device, (width, height) = graph.device, picture.size
     bound = {**lit, "shade": view, "seen": visibility.texture, "scattered": scattered}
     bound |= {"image": picture.radiance, "apart": apart or nothing_apart(device)}
-    strip = int(dict(device_constants(device)).get("STRIP", 1))
-    graph.compute("shade", shade_program(device, constants), bound, (width, -(-height // strip)))
+    shader = shade_program(device, constants)
+    graph.compute("shade", shader, bound, (width, -(-height // int(shader.constants.get("STRIP", 1)))))
     return picture.radiance
 
 

@@ -28,14 +28,9 @@ class StretchedLevels(Levels):
 class GpuGems3(AtlasTechnique):
     """Twelve passes for six Gaussians."""
 
-    name = "gpu-gems-3"
     sources = ("dEonLuebke2007",)
     stitches = False
     transmits = True
-
-    def texel(self, device: Device) -> str:
-        """Halves, as then."""
-        return HALVES
 
     def make_levels(self, device: Device, side: int, count: int) -> Levels:
         """Space for light, its blurred levels and a blurred stretch map."""

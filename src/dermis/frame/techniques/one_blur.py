@@ -11,7 +11,6 @@ from dermis.scene.settings import Settings
 class OneBlur(TextureSpace):
     """One Gaussian for all of the profile, alike everywhere on the map."""
 
-    name = "one-blur"
     sources = ("Borshukov2003", "Green2004")
     stitches = False
     transmits = False

@@ -44,7 +44,6 @@ class PreIntegrated:
 class PreIntegratedSkin(Technique):
     """Light by tables over curvature, and across the edges of shadows."""
 
-    name = "pre-integrated"
     sources = ("Penner2011",)
     shade_constants = (("PRE_INTEGRATED", 1),)
 

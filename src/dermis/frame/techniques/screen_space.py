@@ -53,7 +53,6 @@ class Kernel:
 class ScreenSpace(Technique):
     """Spreads the light of all skin in sight and joins it with what lies over it [Jimenez2015]."""
 
-    name = "screen-space"
     sources = ("Jimenez2015",)
     shade_constants = (("SPLIT", 1),)
     pixel_bytes = 64

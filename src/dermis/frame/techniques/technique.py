@@ -23,14 +23,16 @@ _RELIT_MM2 = 0.1**2
 class Technique:
     """A way for light to spread below the skin; this one lets it leave where it entered.
 
-    name : as settings, files and the command line have it
+    Its name is that of its line in `scene.techniques.TECHNIQUES`.
+
     sources : keys of the bibliography
+    on_atlas : whether light spreads over the atlas
     stitches : whether it can carry light across the map's seams
+    transmits : whether light comes through thin parts
     shade_constants : pipeline constants of the shading pass
     pixel_bytes : of memory for each pixel, besides the picture
     """
 
-    name: ClassVar[str] = "none"
     sources: ClassVar[tuple[str, ...]] = ()
     on_atlas: ClassVar[bool] = False
     stitches: ClassVar[bool] = True
@@ -45,6 +47,14 @@ class Technique:
         """
         total = _weights(profile, white).sum(axis=0)
         return Split(total, total, np.empty(0), np.empty((0, 3)))
+
+    def stretch(self, settings: Settings) -> str:
+        """How blurs follow the map's stretch, one of `Settings.stretch`."""
+        return settings.stretch
+
+    def make_levels(self, device: Device, side: int, count: int) -> Levels:
+        """Space for light and its blurred levels; of the least size where none is on the atlas."""
+        return make_levels(device, side, count, FLOATS)
 
     def make_sum(self, device: Device, side: int) -> Any:
         """Space for the light that leaves below the surface."""
@@ -99,17 +109,9 @@ class AtlasTechnique(Technique):
             return Split(weight[0], total, profile.variance_mm2[1:], weight[1:])
         return Split(np.zeros(3), total, profile.variance_mm2, weight)
 
-    def stretch(self, settings: Settings) -> str:
-        """How blurs follow the map's stretch, one of `Settings.stretch`."""
-        return settings.stretch
-
-    def texel(self, device: Device) -> str:
-        """Format of the levels of light."""
-        return usual_texel(device)
-
     def make_levels(self, device: Device, side: int, count: int) -> Levels:
         """Space for light and its blurred levels."""
-        return make_levels(device, side, count, self.texel(device))
+        return make_levels(device, side, count, usual_texel(device))
 
     def texel_bytes(self, levels: int) -> float:
         """Memory for each texel of the atlas on a software adapter, with the space between passes."""

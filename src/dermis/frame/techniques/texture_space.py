@@ -13,7 +13,6 @@ from dermis.frame.techniques.technique import AtlasTechnique
 class TextureSpace(AtlasTechnique):
     """The package's own technique [dEonLuebke2007]."""
 
-    name = "texture-space"
     sources = ("dEonLuebke2007", "Geusebroek2003")
     transmits = True
 
