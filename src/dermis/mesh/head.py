@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from dermis.mesh.maps import Maps
-from dermis.mesh.mesh import Mesh
+from dermis.mesh.mesh import Floats, Mesh
+from dermis.mesh.rig import Rig
 
 _CROWN_TO_CENTRE_MM = 120.0  # half the height of an adult head
 
@@ -19,12 +20,39 @@ class Head:
 
     name : sample or file
     attribution : whom to credit when a picture of it is shown, empty when that is not required
+    rig : what moves it; None for a head whose points move only if all their places are given
     """
 
     name: str
     mesh: Mesh
     maps: Maps
     attribution: str = ""
+    rig: Rig | None = None
+
+    @cached_property
+    def control(self) -> Rig:
+        """Its rig, or that of its points alone."""
+        if self.rig is not None:
+            return self.rig
+        points = np.zeros((int(self.mesh.point.max()) + 1, 3), np.float32)
+        points[self.mesh.point] = self.mesh.positions
+        return Rig(points)
+
+    @property
+    def positions_mm(self) -> Floats:
+        """(n, 3) the unique points of the mesh as it was loaded, before any subdivision [mm]."""
+        return self.control.positions_mm
+
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """Names of its morph targets."""
+        return self.control.targets.names
+
+    @property
+    def bones(self) -> tuple[str, ...]:
+        """Names of its bones."""
+        skeleton = self.control.skeleton
+        return skeleton.names if skeleton else ()
 
     @cached_property
     def centre_mm(self) -> tuple[float, float, float]:
