@@ -28,6 +28,11 @@ class Atlas:
     place : (f, 3, 2) float32 uv of each triangle's corners in the atlas, v down
     gutter : (a, 2) uint16 texels (x, y) beyond a chart's edge, which copy what other texels compute
     source : (a, 2) float32 place that each copies [texel], whole numbers at texel centres
+    beyond : (r, 2) uint16 texels (x, y) outside of the triangles, gutters and others, that are stretched as
+        another place is
+    root : (r,) int32 triangle of that place
+    root_weight : (r, 2) uint16 its weights of the second and third corner [1/65535]
+    per_uv : (f,) float32 texels in a unit of uv
     mapped : (f,) triangles that own texels; the others (opaque, collapsed, overlapped in uv) are lit directly
     """
 
@@ -39,6 +44,10 @@ class Atlas:
     place: NDArray[np.float32]
     gutter: NDArray[np.uint16]
     source: NDArray[np.float32]
+    beyond: NDArray[np.uint16]
+    root: NDArray[np.int32]
+    root_weight: NDArray[np.uint16]
+    per_uv: NDArray[np.float32]
     mapped: NDArray[np.bool_]
 
     @property

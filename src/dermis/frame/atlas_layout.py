@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dermis.frame.atlas_textures import AtlasTextures
+from dermis.frame.geometry import HeadResources
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +59,7 @@ class Translucency:
 class AtlasLayout:
     """An atlas of the head, and what its texels are lit by.
 
+    head : its triangles, as they lie in the atlas
     lit : resources by the shaders' names: geometry, maps, lights, shadows, surroundings
     surfaces : texture of the surface at each texel, as surface_texels.wgsl packs it
     scattered : texture of the light that leaves below the surface
@@ -65,6 +67,7 @@ class AtlasLayout:
     """
 
     atlas: AtlasTextures
+    head: HeadResources
     lit: dict[str, Any]
     surfaces: Any
     scattered: Any

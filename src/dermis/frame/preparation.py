@@ -10,6 +10,7 @@ from dermis.frame.inputs import Inputs, camera_views, pinhole, seen_by
 from dermis.frame.levels import Blur, scale_of
 from dermis.frame.lights import light_constants, light_records, light_views
 from dermis.frame.passes.shade import shade_program
+from dermis.frame.passes.shape import Motion, resting
 from dermis.frame.projection import ShadowView, shadow_layers
 from dermis.frame.resources import Asked, make_resources
 from dermis.frame.skin_profiles import SkinProfiles
@@ -65,6 +66,7 @@ class Preparation:
         return Inputs(
             resources=resources,
             settings=settings,
+            motion=keep(_motion, head),
             layouts=tuple(under(layout, record) for layout in resources.layouts),
             blurs=keep(_scaled, resources.blurs, scale),
             shadow_views=layers,
@@ -82,6 +84,10 @@ def under(layout: AtlasLayout, lights: Any) -> AtlasLayout:
     lights : the shader's array
     """
     return replace(layout, lit=layout.lit | {"lights": lights})
+
+
+def _motion(head: Head) -> Motion:
+    return resting(head.control)
 
 
 def _scaled(blurs: tuple[Blur, ...], scale: float) -> tuple[Blur, ...]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.atlas_textures import AtlasTextures, packed_texels
-from dermis.frame.passes import irradiance, shadows, surface_texels, visibility_buffer
+from dermis.frame.passes import irradiance, shadows, shape, surface_texels, visibility_buffer
 from dermis.frame.passes.surface_texels import make_surfaces
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Frame, download, make_texture
@@ -43,6 +43,7 @@ def surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> Surf
     inputs = renderer.prepare(scene, single)
     frame = Frame(renderer.device)
     made = inputs.resources
+    shape.draw(frame, made.shape, inputs.motion)
     visibility_buffer.draw(frame, made.visibility, inputs.camera, made.head)
     frame.submit()
     renderer.graph.forget()  # which does not know of this frame
@@ -85,12 +86,13 @@ def irradiance_at(
     device = renderer.device
     inputs = renderer.prepare(scene, settings)
     first = inputs.layouts[0]
-    listed = AtlasTextures({"atlas": texture_from(device, records, "rg32uint")}, sheared=False)
+    listed = AtlasTextures({"atlas": texture_from(device, records, "rg32uint")})
     lit = make_texture(device, (side, side), "rgba32float")
     frame = Frame(device)
     made = inputs.resources
+    shape.draw(frame, made.shape, inputs.motion)
     shadows.draw(frame, made.shadow_maps, inputs.shadow_views, made.head)
-    layout = AtlasLayout(listed, first.lit, make_surfaces(device, side), lit)
+    layout = AtlasLayout(listed, first.head, first.lit, make_surfaces(device, side), lit)
     surface_texels.draw(frame, layout)
     irradiance.draw(frame, layout, inputs.light_constants, lit, side)
     frame.submit()

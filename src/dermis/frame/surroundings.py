@@ -113,7 +113,7 @@ def occlusion_map(device: Device, head: Head, atlas: Atlas, lit: Resources, texe
     side = min(atlas.size, _FINEST_OCCLUSION)
 
     def bake() -> NDArray[np.uint16]:
-        baked = bake_occlusion(device, head.mesh, lit, texels, side)
+        baked = bake_occlusion(device, head, atlas, lit, texels, side)
         levels: NDArray[np.uint16] = np.rint(65535.0 * whole_map(baked, side)).astype(np.uint16)
         return levels
 

@@ -131,7 +131,7 @@ class Device:
         self._frames += 1
         return self._frames
 
-    def write(self, buffer: Any, data: bytearray, size: int) -> None:
+    def write(self, buffer: Any, data: bytearray | bytes, size: int) -> None:
         """Put the first `size` bytes of the data into a buffer before the next submit."""
         start = self.ffi.from_buffer(data)
         self.checked.wgpuQueueWriteBuffer(self.handle.queue._internal, buffer._internal, 0, start, size)

@@ -62,6 +62,11 @@ class Listing:
         self.passes.append(listed)
         self._indices.append(index)
 
+    def add_write(self, stage: str, buffer: Any, size: int, index: int) -> None:
+        """Write down that the host puts `size` bytes into a buffer."""
+        self.passes.append(Listed(stage, "from the host", {}, {"written": self._bound(buffer)}, (size,)))
+        self._indices.append(index)
+
     def finish(self, ran: Sequence[bool]) -> None:
         """Note which of the graph's passes ran."""
         for one, index in zip(self.passes, self._indices, strict=True):

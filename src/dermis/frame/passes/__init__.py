@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from dermis.frame.atlas_textures import atlas_numbers
 from dermis.frame.levels import FLOATS, HALVES, usual_texel
 from dermis.frame.lights import light_numbers
 from dermis.frame.lights.kind import light_shaders
@@ -20,13 +21,14 @@ TECHNIQUES = PASSES.parent / "techniques"
 SHARED_SHADERS = ShaderFolder(
     PASSES.parent / "wgsl",
     lists={"lights": light_shaders, "lobes": lobe_shaders},
-    numbers=lambda: {**light_numbers(), **surface_numbers()},
+    numbers=lambda: {**light_numbers(), **surface_numbers(), **atlas_numbers()},
 )
 TILE = 16
 """Side of workgroups that do little: smaller ones are done before the H200 has started the next."""
 _LEVELS = PASSES / "levels"
 _SOURCES = {FLOATS: _LEVELS / "loaded", HALVES: _LEVELS / "filtered"}
 _STORES = {FLOATS: _LEVELS / "floats", HALVES: _LEVELS / "halves"}
+_EACH, _ROW = 64, 32768  # invocations of a workgroup as in each.wgsl; workgroups in a row, at most 65535
 _STRIP = 16  # pixels of an invocation on software adapters, see shade.wgsl
 
 
@@ -60,6 +62,12 @@ def suited(
 ) -> dict[str, float]:
     """Pipeline constants, with those that the shader has of what suits the device."""
     return declared(path, folders, device_constants(device)) | dict(constants)
+
+
+def each(count: int) -> tuple[int, int, int]:
+    """Workgroups of shaders that have an invocation for each of a list, see each.wgsl."""
+    groups = max(1, -(-count // _EACH))
+    return min(groups, _ROW), -(-groups // _ROW), 1
 
 
 def registered() -> int:

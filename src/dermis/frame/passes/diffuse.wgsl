@@ -1,6 +1,7 @@
 // One axis of one Gaussian: spreads light along u, or along v as the surface has it, by a variance given in mm^2.
 //#include "source.wgsl"
 //#include "store.wgsl"
+//#include "reach.wgsl"
 
 override AXIS: u32 = 0u; // 0 along u, 1 along v
 override SHEARED: bool = true; // whether u and v may meet at other than right angles
@@ -40,8 +41,8 @@ struct Kernel {
 }
 
 @group(0) @binding(0) var<uniform> spread: Spread;
-// Halves: texels per mm along u, v; cosine between them; 1 in the gutter. Then texels on the same chart: left, right, up, down.
-@group(0) @binding(1) var sheet_map: texture_2d<u32>;
+@group(0) @binding(1) var stretch_map: texture_2d<f32>; // texels per mm along u and v; cosine between them
+@group(0) @binding(2) var reach_map: texture_2d<u32>; // as reach.wgsl reads it
 @group(0) @binding(3) var kernel_table: texture_2d<f32>; // row: variance, column: taps on each side; here and in the next row
 
 // Variance that is there already, or will be, where mm^2 have so many texel^2: where texels are large, halving the
@@ -145,15 +146,14 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let here = vec2i(id.xy);
     // All that is read here is asked for at once: what follows is short, and would wait for each by itself.
-    let sheet = textureLoad(sheet_map, here, 0);
-    let stretch = vec4f(unpack2x16float(sheet.x), unpack2x16float(sheet.y));
+    let stretch = textureLoad(stretch_map, here, 0);
+    let reach = textureLoad(reach_map, here, 0);
     var sum = texel(here);
     var limit = vec2f(1e6);
     if (EDGE == REPEATED) {
-        let reach = select(sheet.w, sheet.z, AXIS == 0u);
-        limit = vec2f(vec2u(reach & 0xffffu, reach >> 16u));
+        limit = reach_along(reach, AXIS);
     }
-    if (AXIS == 1u && stretch.w > 0.0) {
+    if (AXIS == 1u && is_gutter(reach)) {
         return; // the gutter is filled from where its light belongs
     }
     if (stretch.x == 0.0) {

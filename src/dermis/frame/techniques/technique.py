@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dermis.frame.atlas_textures import AtlasTextures
 from dermis.frame.inputs import Inputs, Split
 from dermis.frame.levels import FLOATS, MOST_HALVINGS, Blur, Levels, halvings_of, make_levels, usual_texel
-from dermis.frame.passes import blend, combine, irradiance, surface_texels, translucency
+from dermis.frame.passes import blend, combine, irradiance, stretch, surface_texels, translucency
 from dermis.gpu import Constants, Device, Graph, Memo
 from dermis.gpu.textures import FORMAT_BYTES
 from dermis.optics.gaussians import GaussianSum
@@ -131,6 +131,7 @@ class AtlasTechnique(Technique):
         levels, layouts = resources.levels, inputs.layouts
         for layout, blur in zip(layouts, inputs.blurs, strict=True):
             into = levels.layer(0), levels.size, levels.texel, blur.scale
+            graph.repeat(stretch.draw, layout.head, layout.atlas)
             surface_texels.draw(graph, layout)
             irradiance.draw(graph, layout, inputs.light_constants, *into)
             graph.repeat(self.spread, levels, layout.atlas, blur, layout.translucency, layout.scattered)

@@ -48,6 +48,11 @@ fn place_of_point(index: u32, w: vec3f) -> vec2f {
     return w.x * ab.xy + w.y * ab.zw + w.z * c.xy;
 }
 
+// Texels of the atlas in a unit of uv.
+fn texels_per_uv(index: u32) -> f32 {
+    return bitcast<f32>(triangle_row(index, 2u).z);
+}
+
 fn position_of(index: u32) -> vec3f {
     if (MESH_IN_BUFFERS) {
         return vertex_buffer[4u * index].xyz;
