@@ -3,9 +3,10 @@
 
 const PI: f32 = 3.14159265358979;
 
+// Members named as a field or property of scene/skin.py hold it; frame/surface.py derives the others.
 struct Skin {
-    roughness: f32,
-    rho_s: f32,
+    m: f32, // Beckmann roughness with the skin's oil where the roughness map is 1
+    strength: f32, // rho_s with the skin's oil where the specular map is 1
     f0: f32, // Schlick's reflectance at normal incidence
     eta: f32, // index of refraction
     loss: f32, // factor of the surface's albedo in what enters and leaves: 0 for no term, 1, or the published pi
