@@ -142,7 +142,7 @@ class Device:
         done = self.checked.wgpuCommandEncoderFinish(encoder._internal, self.ffi.NULL)
         commands = self.ffi.gc(done, self.lib.wgpuCommandBufferRelease)
         listed = self.ffi.new("WGPUCommandBuffer[]", [commands])
-        # wgpu's own submit returns no number, and without one can only wait for all submissions.
+        # wgpu's own submit returns no number, without which one can only wait for all submissions.
         return int(self.checked.wgpuQueueSubmitForIndex(self.handle.queue._internal, 1, listed))
 
     def wait(self, submitted: int | None = None) -> None:

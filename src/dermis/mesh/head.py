@@ -18,7 +18,7 @@ class Head:
     """A mesh in mm with its maps.
 
     name : sample or file
-    attribution : whom to credit when a picture of it is shown, empty when that is not required
+    attribution : credit to show with its pictures, empty when none is required
     """
 
     name: str
