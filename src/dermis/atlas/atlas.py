@@ -1,4 +1,4 @@
-"""The surface atlas: the point of the surface that each texel of the uv map stands for."""
+"""The surface atlas: the point of the surface at each texel of the uv map."""
 
 from __future__ import annotations
 

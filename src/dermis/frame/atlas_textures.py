@@ -1,4 +1,4 @@
-"""The atlas as textures, with the stretch correction and the remedies for seams that are asked for."""
+"""The atlas as textures, with the chosen stretch correction and remedy for seams."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from dermis.frame.seams import FEATHER_MM, REMEDIES, Remedy
 from dermis.gpu import Device, scratch
 from dermis.gpu.textures import texture_from
 
-_HALVING = "halved 1"  # raise when `halved` gives other results
+_HALVING = "halved 1"  # increment when `halved` gives other results
 _LEAST_SHARE = 1e-3  # of the blur at the edge itself: 0 would mean no surface
 
 
 @dataclass(frozen=True, eq=False)
 class AtlasTextures:
-    """What the shaders read of an atlas, by the names they use.
+    """Resources of an atlas, by their names in the shaders.
 
-    resources : atlas, stretch_map, sheet_map, and edge_map where two layouts are blended; sheet_map alone
-        of coarser ones
+    resources : atlas, stretch_map, sheet_map, and edge_map where two layouts are blended; coarser ones have
+        sheet_map alone
     sheared : whether u and v meet at other than right angles somewhere
-    gutter, gathered : the list of texels beyond the charts' edges and space for their light; None without any
-    coarser : the same, again and again at half the resolution; only of stitched layouts
+    gutter, gathered : buffers of the texels beyond charts' edges and of their light; None without any
+    coarser : the same at a half, a quarter, ... of the resolution; only of stitched layouts
     usual_per_mm : median of the texels per mm along the axis that has fewer
     """
 
@@ -40,7 +40,7 @@ class AtlasTextures:
     usual_per_mm: float = 0.0
 
     def sheets(self, edge: str) -> tuple[AtlasTextures, ...]:
-        """The atlas at its resolution and at those that blurs with this edge may use."""
+        """The atlas at its own resolution and at the coarser ones that blurs with this edge may use."""
         return (self, *(self.coarser if edge == "repeated" else ()))
 
 
@@ -49,7 +49,7 @@ def upload_atlas(
 ) -> AtlasTextures:
     """The atlas as the shaders read it.
 
-    stretch : "full" knows the angle between u and v, "axes" takes it for right, "none" is one density for all
+    stretch : "full" has the angle between u and v, "axes" takes it as right, "none" is one density for all
     """
     texels = packed_texels(atlas.triangle, atlas.barycentric)
     texels[~atlas.own] = 0
@@ -135,6 +135,6 @@ def edge_mm(atlas: Atlas) -> NDArray[np.float32]:
 
 
 def _feathered(atlas: Atlas, stretch: NDArray[np.float16]) -> NDArray[np.float16]:
-    """Texels per mm, fewer the nearer the edge, so that a blur hardly reaches over it."""
+    """Texels per mm, reduced towards the edge, so that a blur hardly crosses it."""
     share = np.clip(edge_mm(atlas) / FEATHER_MM, _LEAST_SHARE, 1.0)
     return np.asarray(stretch * share[..., None], np.float16)

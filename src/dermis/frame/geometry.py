@@ -1,4 +1,4 @@
-"""The mesh as textures and as buffers, with where each triangle's light is in the atlas."""
+"""The mesh as textures and as buffers, with the place of each triangle in the atlas."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _VERTICES_PER_ROW = 512
 
 @dataclass(frozen=True, eq=False)
 class HeadResources:
-    """What the shaders read of a head, by the names they use.
+    """Resources of a head, by their names in the shaders.
 
     resources : name in geometry.wgsl and skin.wgsl -> texture or sampler
     triangles : count
@@ -33,7 +33,7 @@ class HeadResources:
 def upload_geometry(device: Device, mesh: Mesh, atlas: Atlas) -> dict[str, Any]:
     """Textures and buffers by their names in geometry.wgsl."""
     triangles, vertices = _triangle_table(mesh, atlas), _vertex_table(mesh)
-    read = device.adapter.kind != "CPU"  # see geometry.wgsl; what is not read still needs to be there
+    read = device.adapter.kind != "CPU"  # see geometry.wgsl; what is not read must still be bound
     return {
         "triangle_table": texture_from(device, triangles, "rgba32uint"),
         "vertex_table": texture_from(device, vertices, "rgba32float"),

@@ -21,17 +21,17 @@ from dermis.specular.models import MODELS
 
 
 def model_of(skin: Skin) -> str:
-    """Name of the lobe in MODELS; skin without one keeps the default's, for wet materials beside it."""
+    """Name of the lobe in MODELS; skin without one keeps the default, for wet materials beside it."""
     return next(iter(MODELS)) if skin.specular == "none" else skin.specular
 
 
 def lobe_shaders() -> list[Member]:
-    """The models as lobe.wgsl includes them; their place is their number."""
+    """The models as lobe.wgsl includes them, numbered in order."""
     return [Member(name, model.shader) for name, model in MODELS.items()]
 
 
 def surface_numbers() -> dict[str, float]:
-    """What lobe.wgsl and the models' shaders fill in."""
+    """Numbers that lobe.wgsl and the models' shaders fill in."""
     of_models = {name: number for model in MODELS.values() for name, number in model.numbers.items()}
     return {"root_of_first_row": ROOT_OF_FIRST_ROW, **of_models}
 
@@ -70,7 +70,7 @@ def _derived(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any]:
 
 
 def _by_direction(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any]:
-    """What light does by its directions, for half-spaces of the skin's mean colour."""
+    """Members that direction.wgsl reads, for half-spaces of the skin's mean colour."""
     colour = profile.albedo if skin.albedo == "profile" else maps.mean_colour
     colour = np.full(3, DEFAULT_COLOUR) if colour is None else colour
     law = directions(colour, 1.0 if skin.specular == "none" else SKIN_ETA)

@@ -159,7 +159,7 @@ def _check_normals(path: PathLike, normals: Floats) -> None:
 
 
 def _kept(path: PathLike | None, how: str, load: Callable[[PathLike], NDArray[Any]]) -> Any:
-    """The map that `load` makes of a picture file, kept on disk when the file is large; None for no file.
+    """The map that `load` returns for a picture file, kept on disk when the file is large; None for no file.
 
     how : all that the map depends on besides the file
     """

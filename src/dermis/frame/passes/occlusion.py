@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 DIRECTIONS = 128
 MAP_SIZE = 512
 FORM = f"1 {DIRECTIONS} {MAP_SIZE}"
-"""Differs when baking gives other results."""
+"""To be changed when baking gives other results."""
 _BATCH = 32  # depth maps at a time
 
 
@@ -34,10 +34,10 @@ def bake_occlusion(
 ) -> NDArray[np.float32]:
     """(rows, side) open share of the sky, weighted by the cosine, 0 to 1; NaN where there is no surface.
 
-    The mesh is seen from all around, and each place counts where it is in sight.
+    Depth maps are drawn from all around, and each place counts those in which it is visible.
 
     lit : what the lighting passes read
-    atlas : texture of texels, of which side x side are baked, then the vertices, row by row
+    atlas : texture of the atlas' texels; side x side of them are baked, then the vertices, row by row
     """
     shader, towards = program(device, "occlusion.wgsl"), fibonacci_sphere(directions)
     rows = side - (-len(mesh.positions) // side)

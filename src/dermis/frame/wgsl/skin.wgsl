@@ -20,7 +20,7 @@ fn mip_for(image: texture_2d<f32>, footprint: f32) -> f32 {
     return max(0.0, log2(footprint * max(size.x, size.y)));
 }
 
-// How the skin looks at a point when one sample stands for `footprint` of the uv square's side.
+// The skin's surface at a point, filtered over `footprint`, a share of the uv square's side.
 // Relief too fine for it widens the lobe by its slope variance [OlanoBaker2010].
 fn surface_at(point: Point, footprint: f32) -> Surface {
     let length_u = length(point.dpdu);
