@@ -29,7 +29,7 @@ fn panorama_at(direction: vec3f, layer: u32) -> vec3f {
     );
     let azimuth = select(0.0, atan2(d.x, -d.z), any(d.xz != vec2f(0.0))); // undefined at the poles
     let uv = vec2f(0.5 + azimuth / (2.0 * PI), atan2(length(d.xz), d.y) / PI);
-    // Filtered here, as the steps of some GPUs' filters show in a wide picture.
+    // Filtered in the shader: the filters of some GPUs are too coarse for a wide picture.
     let place = uv * (vec2f(textureDimensions(panorama)) - 2.0) + 0.5;
     let a = vec2i(floor(place));
     let w = bilinear_weights(place);

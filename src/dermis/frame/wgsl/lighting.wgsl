@@ -7,8 +7,8 @@
 //#include "lights.wgsl"
 //#include "environment.wgsl"
 
-// Whether each point skips the lights behind its surface by itself. Software adapters would shade it with them all the same if
-// a point beside it sees them; GPUs read lights faster when all points read the same one.
+// Whether each point skips the lights behind its surface by itself. Without that, software adapters shade it with every light
+// that a point beside it sees. GPUs do without: they read lights faster when all points read the same one.
 override PASSES_DARK: bool = false;
 
 struct Lit {

@@ -49,7 +49,7 @@ fn bounds(a: vec3f, b: vec3f, c: vec3f) -> Box {
 }
 
 // Relative to the box's corner, for precision: weights that combine the corners into a pixel, linear in it
-// [OlanoGreer1997]. Times the distances of their corners they are all positive inside.
+// [OlanoGreer1997]. Multiplied by the distances of their corners they are all positive inside.
 fn set_up(index: u32, view: u32) -> Drawn {
     let t = triangle_at(index);
     let a = project(t.x, view);
