@@ -1,4 +1,4 @@
-"""The atlas as textures, with the stretch correction and the remedies for seams that are asked for."""
+"""The atlas as textures, with the chosen stretch correction and remedy for seams."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def atlas_numbers() -> dict[str, int | float]:
 
 @dataclass(frozen=True, eq=False)
 class AtlasTextures:
-    """What the shaders read of an atlas, by the names they use.
+    """Resources of an atlas, by their names in the shaders.
 
     resources : atlas, stretch_map (filled by its pass), reach_map, and edge_map for two layouts and feathered
         stretch; stretch_map and reach_map alone of coarser ones
@@ -49,7 +49,7 @@ class AtlasTextures:
     usual_per_mm: float = 0.0
 
     def sheets(self, edge: str) -> tuple[AtlasTextures, ...]:
-        """The atlas at its resolution and at those that blurs with this edge may use."""
+        """The atlas at its own resolution and at the coarser ones that blurs with this edge may use."""
         return (self, *(self.coarser if edge == "repeated" else ()))
 
 
@@ -58,7 +58,7 @@ def upload_atlas(
 ) -> AtlasTextures:
     """The atlas as the shaders read it; its stretch is left to the stretch pass.
 
-    stretch : "full" knows the angle between u and v, "axes" takes it for right, "none" is one density for all
+    stretch : "full" has the angle between u and v, "axes" takes it as right, "none" is one density for all
     """
     texels = packed_texels(atlas.triangle, atlas.barycentric)
     own = atlas.own

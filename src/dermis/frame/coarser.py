@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_SAME_PLACE = 4.0  # texels within which four neighbours of an gutter show one part of the surface
+_SAME_PLACE = 4.0  # texels: sources of four gutter neighbours nearer than this are averaged
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """What blurs and seams need of an atlas of n x n texels.
+    """The data of an n x n atlas that blurs and seams need.
 
     covered, own : (n, n) texels that show surface, and those of them that do not copy others
     reach : (n, n, 4) texels to the left, right, up and down of the same chart without a gap between
@@ -28,7 +28,7 @@ class Sheet:
 
 
 def halved(sheet: Sheet) -> Sheet:
-    """Each texel stands for four; texels that reading between them may touch are computed, not stitched."""
+    """The sheet at half resolution; texels that bilinear reads may touch are computed, not stitched."""
     from scipy.ndimage import binary_dilation
 
     own = _quads(sheet.own)

@@ -9,7 +9,7 @@ from dermis.gpu import Graph
 
 
 def draw_frame(graph: Graph, inputs: Inputs, technique: Technique) -> None:
-    """Light the skin, let the light spread below, look at it; only what has changed is computed."""
+    """Light the skin, scatter the light below it, shade the image; only stale passes run."""
     made = inputs.resources
     shape.draw(graph, made.shape, inputs.motion)
     bounded = ("SHAPES", 1) in inputs.light_constants

@@ -1,4 +1,4 @@
-"""The mesh as textures and as buffers, with where each triangle's light is in the atlas."""
+"""The mesh as textures and as buffers, with the place of each triangle in the atlas."""
 
 from __future__ import annotations
 

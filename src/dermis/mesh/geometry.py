@@ -10,7 +10,7 @@ from dermis.mesh.mesh import Floats, Ints, Material, Mesh
 Doubles = NDArray[np.float64]
 
 MIN_UV_CROSS = 1e-12
-"""Below this twice-signed uv area a triangle has no direction of u and v (1/70 texel at 8192)."""
+"""Twice the signed uv area below which u and v have no direction on a triangle (1/70 texel at 8192)."""
 
 
 def weld(rows: ArrayLike) -> Ints:
@@ -63,7 +63,7 @@ def uv_cross(corners: NDArray[np.floating]) -> Doubles:
 
 
 def _unit(vectors: Doubles, instead: Doubles) -> Doubles:
-    """`vectors` at length one, or `instead` where they have no length; both (n, 3)."""
+    """`vectors` normalised, or `instead` where they have no length; both (n, 3)."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     usable = length > 0
     return np.where(usable, vectors / np.where(usable, length, 1), instead)
@@ -94,8 +94,8 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
 def tangents(positions: Floats, uv: Floats, normals: Floats, triangles: Ints) -> tuple[Floats, Floats]:
     """Change of position with u and with v, dpdu and dpdv, each (v, 3) [mm per unit of uv].
 
-    Averaged over the triangles of each corner vertex by area. Triangles without uv area count for
-    nothing; a vertex with none left gets two orthogonal directions of 1 mm, so that nothing divides by 0.
+    Averaged over the triangles of each corner vertex by area, without those that have no uv area; a vertex
+    with no others gets two orthogonal directions of 1 mm, so that nothing divides by 0.
 
     positions, normals : (v, 3) [mm], unit
     uv : (v, 2)
@@ -116,7 +116,7 @@ def tangents(positions: Floats, uv: Floats, normals: Floats, triangles: Ints) ->
 
 
 def _with_length(dpdu: Doubles, dpdv: Doubles, normals: Doubles) -> tuple[Floats, Floats]:
-    """The pair, with 1 mm in two directions across the normal wherever either has no length."""
+    """The pair; where either has no length, two directions of 1 mm across the normal."""
     # the axis least along the normal cannot be parallel to it
     axis = np.eye(3)[np.abs(normals).argmin(axis=1)]
     across = _unit(np.cross(axis, normals), axis)

@@ -26,8 +26,8 @@ Origin = Literal["auto", "top", "bottom"]
 Up = Literal["y", "z"]
 
 FARTHEST_UV = 1e4
-"""Beyond this uv are damage, not tiles."""
-_FORM = 2  # raise when `load_mesh` gives other results for the same file
+"""uv beyond this are damaged data, not tiles."""
+_FORM = 2  # increment when `load_mesh` gives other results for the same file
 
 
 def load_mesh(
@@ -45,10 +45,10 @@ def load_mesh(
 
     path : the file
     unit_mm : length of the file's unit [mm]; None for the format's own (`default_unit_mm`)
-    v_origin : where v = 0 lies in the map by the file, "top" as glTF has it, "bottom" as OBJ and PLY have
-        it; "auto" takes the format's standard
+    v_origin : where the file has v = 0 in the map: "top" as in glTF, "bottom" as in OBJ and PLY; "auto" takes
+        the format's standard
     up : the file's axis that points up; with "z" the face looks along -Y, as in Blender
-    opaque : names of groups that are not skin, whatever they are called
+    opaque : names of groups that are not skin, even with "skin" in their name
 
     Raises `DermisError` when the file is missing, damaged or not a mesh, has no uv, or fails `check_mesh`.
     """
@@ -60,7 +60,7 @@ def load_mesh(
     data = source.read_bytes() if source.suffix.lower() == ".glb" and source.is_file() else b""
     if not data or b'"uri"' in data:  # parts of it lie in other files
         return load()
-    named = source.stem  # as a group without a name is
+    named = source.stem  # the name of groups without one
     return cached_mesh(data, repr((named, unit, v_origin, up, opaque)), load)
 
 
@@ -148,7 +148,7 @@ def _upright(vectors: Array, up: Up) -> Array:
 
 
 def _v_down(uv: Array, source: Path, v_origin: Origin) -> Array:
-    """`uv` (v, 2) with v = 0 in the top row; what misses [0, 1] by rounding only is put back."""
+    """`uv` (v, 2) with v = 0 in the top row; what misses [0, 1] only by rounding is clamped."""
     from_top = v_origin == "top" or (v_origin == "auto" and is_gltf(source))
     down = uv if from_top else np.column_stack((uv[:, 0], 1 - uv[:, 1]))
     inside = np.clip(down, 0, 1)
@@ -182,9 +182,9 @@ def _has(group: Group, word: str) -> bool:
 
 
 def cached_mesh(data: bytes, options: str, load: Callable[[], Mesh]) -> Mesh:
-    """The mesh that `load` makes of a file, kept on disk by its content.
+    """The mesh that `load` returns for a file, kept on disk by the file's content.
 
-    data : the file, with everything that the mesh is made of
+    data : bytes of the file, on which alone the mesh depends
     options : how it is read
     """
     arrays = [field.name for field in fields(Mesh) if field.name != "materials"]
@@ -205,5 +205,5 @@ def cached_mesh(data: bytes, options: str, load: Callable[[], Mesh]) -> Mesh:
         **found,
         materials=tuple(Material(one["name"], one["kind"], tuple(one["colour"])) for one in materials),
     )
-    vars(mesh)["outline"] = outline  # the import alone of what finds it takes longer than reading it
+    vars(mesh)["outline"] = outline  # importing scipy to find it takes longer
     return mesh

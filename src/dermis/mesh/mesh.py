@@ -30,7 +30,7 @@ class Material:
 class Mesh:
     """Triangles with attributes at corner vertices; Y up, face towards +Z, counter-clockwise is outside.
 
-    A place on a uv seam has one corner vertex for each of its uvs; `point` tells that they are one place.
+    A point on a uv seam has one corner vertex for each of its uvs; `point` is the same for all of them.
 
     positions : (v, 3) [mm]
     normals : (v, 3) unit vectors
@@ -58,7 +58,7 @@ class Mesh:
 
     @cached_property
     def outline(self) -> NDArray[np.float64]:
-        """(n, 3) corners of the convex hull [mm]: from wherever it is seen, no place lies farther out."""
+        """(n, 3) corners of the convex hull, which bound the mesh in every view [mm]."""
         from scipy.spatial import ConvexHull, QhullError
 
         points = self.positions.astype(np.float64)
@@ -69,14 +69,14 @@ class Mesh:
 
     @cached_property
     def outline_columns(self) -> NDArray[np.float32]:
-        """(4, n) the outline as columns, each with a 1 below, for matrices from its left [mm].
+        """(4, n) the outline as homogeneous columns, to be multiplied by matrices [mm].
 
-        As exact as the positions, and what comes of it in each frame takes half the memory.
+        In single precision, as the positions are: products in each frame take half the memory.
         """
         return np.vstack([self.outline.T, np.ones(len(self.outline))]).astype(np.float32)
 
     @cached_property
     def middle_mm(self) -> tuple[float, float, float]:
-        """Halfway between the least and the largest coordinates [mm]."""
+        """Middle of the bounding box [mm]."""
         x, y, z = 0.5 * (self.outline.min(axis=0) + self.outline.max(axis=0))
         return float(x), float(y), float(z)

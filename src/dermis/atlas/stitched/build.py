@@ -76,7 +76,7 @@ def build_stitched(mesh: Mesh, size: int, reach_mm: float) -> Atlas | None:
     if packing is None:
         return None
     made = _cover(surface, piece, packing, width, size)
-    # where a piece lies on itself only one layer has light: gutters must not read the other
+    # where a piece overlaps itself only one layer has light: gutters must not read the other
     lost = _lost(piece, packing, made)
     if lost.any():
         piece = np.where(lost, -1, piece)

@@ -24,7 +24,7 @@ SHARED_SHADERS = ShaderFolder(
     numbers=lambda: {**light_numbers(), **surface_numbers(), **atlas_numbers()},
 )
 TILE = 16
-"""Side of workgroups that do little: smaller ones are done before the H200 has started the next."""
+"""Side of workgroups that do little: smaller ones finish before the H200 has started the next."""
 _LEVELS = PASSES / "levels"
 _SOURCES = {FLOATS: _LEVELS / "loaded", HALVES: _LEVELS / "filtered"}
 _STORES = {FLOATS: _LEVELS / "floats", HALVES: _LEVELS / "halves"}
@@ -35,7 +35,7 @@ _STRIP = 16  # pixels of an invocation on software adapters, see shade.wgsl
 def shader_folders(source: str = "", store: str = "") -> tuple[Folder, ...]:
     """Where includes are looked up.
 
-    source, store : formats of the blurred light that the shader reads and stores, if it does
+    source, store : formats in which the shader reads and stores blurred light, if it does
     """
     levels = [_SOURCES[source]] if source else []
     levels += [_STORES[store]] if store else []
@@ -47,7 +47,7 @@ def program(
 ) -> ComputeProgram:
     """The shader of that name among the passes, or at that path, with pipeline constants.
 
-    What suits the device is added to them; see `shader_folders` for the formats.
+    The device's own constants are added to them; see `shader_folders` for the formats.
     """
 
     def make() -> ComputeProgram:
@@ -60,7 +60,7 @@ def program(
 def suited(
     device: Device, path: Path, folders: Sequence[Folder], constants: Constants = ()
 ) -> dict[str, float]:
-    """Pipeline constants, with those that the shader has of what suits the device."""
+    """Pipeline constants, with the device's own that the shader declares."""
     return declared(path, folders, device_constants(device)) | dict(constants)
 
 
@@ -71,14 +71,14 @@ def each(count: int) -> tuple[int, int, int]:
 
 
 def registered() -> int:
-    """Another number whenever a light or a lobe has been added to the shaders, or taken away."""
+    """A number that changes whenever a light or a lobe is added to the shaders or removed."""
     return LIGHTS.changes + MODELS.changes
 
 
 def device_constants(device: Device) -> Constants:
-    """Pipeline constants that suit the device, for shaders that have them.
+    """Pipeline constants that suit the device, for shaders that declare them.
 
-    GPUs read buffers faster. Software adapters read textures faster, pass over lights in the dark one by one,
+    GPUs read buffers faster. Software adapters read textures faster, skip lights behind each point's surface,
     and shade columns of pixels; see geometry.wgsl, lighting.wgsl and shade.wgsl.
     """
     if device.adapter.kind == "CPU":
@@ -87,7 +87,7 @@ def device_constants(device: Device) -> Constants:
 
 
 def warm_up(device: Device) -> None:
-    """Begin to compile what most frames need, while others load what it is to work on."""
+    """Start compiling what most frames need, while other threads load the scene."""
     for name in ("shade.wgsl", "surface_texels.wgsl", "shadow_bounds.wgsl", "post.wgsl", "pack.wgsl"):
         program(device, name)
     texel = usual_texel(device)

@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 DIRECTIONS = 128
 MAP_SIZE = 512
 FORM = f"1 {DIRECTIONS} {MAP_SIZE}"
-"""Differs when baking gives other results."""
+"""To be changed when baking gives other results."""
 _BATCH = 32  # depth maps at a time
 
 
@@ -36,7 +36,7 @@ def bake_occlusion(
 ) -> NDArray[np.float32]:
     """(rows, side) open share of the sky, weighted by the cosine, 0 to 1; NaN where there is no surface.
 
-    The mesh is seen from all around, and each place counts where it is in sight.
+    Depth maps are drawn from all around, and each place counts those in which it is visible.
 
     lit : what the lighting passes read, the surface aside
     texels : texture of the atlas' texels, of which side x side are baked, then the vertices, row by row
