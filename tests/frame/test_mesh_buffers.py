@@ -23,6 +23,7 @@ def test_buffers_hold_what_textures_hold(renderer: Renderer, monkeypatch: pytest
     adapter = replace(renderer.device.adapter, kind="DiscreteGPU")  # which reads buffers
     with monkeypatch.context() as patch:
         patch.setattr(renderer.device, "adapter", adapter)
+        patch.setattr(renderer.device, "programs", {})  # those of software write textures
         frame = Frame(renderer.device)
         held = at_rest(frame, BALL, cached_atlas(BALL.mesh, 64))
         frame.submit()

@@ -145,7 +145,7 @@ def test_steps_of_depth() -> None:
     at_far, before = np.array([[1, 2, far - 5, 1], [1, 2, far - 5 - little, 1]])
     step = (seen[2] @ before) / (seen[3] @ before) - (seen[2] @ at_far) / (seen[3] @ at_far)
     assert visibility_buffer._depth_range_mm(seen) == pytest.approx(little / step, rel=1e-4)
-    parallel = parallel_view(np.array([0.0, 0.6, -0.8]), BALL.mesh, 64)
+    parallel = parallel_view(np.array([0.0, 0.6, -0.8]), BALL.mesh.outline, 64)
     assert visibility_buffer._depth_range_mm(parallel.clip) == pytest.approx(parallel.far - parallel.near)
 
 

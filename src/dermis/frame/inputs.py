@@ -33,7 +33,7 @@ from dermis.frame.samples import pixel_samples
 from dermis.frame.shape import Shape
 from dermis.gpu import ComputeProgram, Constants
 from dermis.mesh.head import Head
-from dermis.mesh.mesh import Mesh
+from dermis.mesh.outline import Outline
 from dermis.scene.camera import Camera
 from dermis.scene.settings import Settings
 
@@ -143,10 +143,10 @@ def pinhole(camera: Camera, head: Head, settings: Settings) -> Pinhole:
     return Pinhole(eye, axes_of(path, camera.up), (half * width / height, half))
 
 
-def camera_views(pinhole: Pinhole, mesh: Mesh, samples: int) -> Views:
+def camera_views(pinhole: Pinhole, outline: Outline, samples: int) -> Views:
     """What the camera sees at each sample of the pixel."""
     rows = rows_of(pinhole.eye, pinhole.axes)
-    clip = perspective(rows, pinhole.half, *depth_range(mesh, rows))
+    clip = perspective(rows, pinhole.half, *depth_range(outline, rows))
     return Views(np.array([clip]), pixel_samples(samples))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
-from dermis.mesh.mesh import Mesh
+from dermis.mesh.outline import Outline
 from dermis.scene.lights import PointLight
 
 Vec = NDArray[np.float64]
@@ -132,15 +132,15 @@ def perspective(rows: Rows, half: tuple[float, float], near: float, far: float) 
     return [[c / half[0] for c in rows[0]], [c / half[1] for c in rows[1]], depth, rows[2]]
 
 
-def depth_range(mesh: Mesh, rows: Rows) -> tuple[float, float]:
-    """Nearest and farthest depth of the mesh before the eye, a little widened [mm]."""
-    z = np.array(rows[2], np.float32) @ mesh.outline_columns
+def depth_range(outline: Outline, rows: Rows) -> tuple[float, float]:
+    """Nearest and farthest depth of the shape before the eye, a little widened [mm]."""
+    z = np.array(rows[2], np.float32) @ outline.columns
     near, far = float(z.min()), float(z.max())
     return max(near - 1.0, 0.5, 1e-3 * far), max(far + 1.0, 2.0)
 
 
 def point_views(
-    lights: Sequence[tuple[str, PointLight]], centre: Triple, mesh: Mesh, size: int
+    lights: Sequence[tuple[str, PointLight]], centre: Triple, outline: Outline, size: int
 ) -> list[ShadowView]:
     """The tightest maps of `size` texels around the whole mesh for all lights, by a few products.
 
@@ -151,10 +151,10 @@ def point_views(
     if not lights:
         return []
     eyes = [place_of(light.position, centre) for _, light in lights]
-    axes = [axes_of(between(eye, mesh.middle_mm)) for eye in eyes]
+    axes = [axes_of(between(eye, outline.middle_mm)) for eye in eyes]
     rows = [rows_of(*one) for one in zip(eyes, axes, strict=True)]
     stacked = np.array(list(zip(*rows, strict=True)), np.float32).reshape(-1, 4)
-    seen = (stacked @ mesh.outline_columns).reshape(3, len(rows), -1)
+    seen = (stacked @ outline.columns).reshape(3, len(rows), -1)
     depth = seen[2]
     near, far = depth.min(axis=1).tolist(), depth.max(axis=1).tolist()
     _check_outside(lights, [one > _NEAREST_MM for one in near])
@@ -183,9 +183,9 @@ def _steepest(sides: NDArray[Any], depth: NDArray[Any]) -> list[float]:
     return found
 
 
-def parallel_view(direction: Vec, mesh: Mesh, size: int) -> ShadowView:
+def parallel_view(direction: Vec, outline: Outline, size: int) -> ShadowView:
     """The tightest map of `size` texels around the whole mesh in parallel light."""
-    points = mesh.outline
+    points = outline.places_mm
     axes = frame_of(direction, np.array(_UP))
     local = points @ np.stack(axes, axis=1)
     low, high = local.min(axis=0) - 1.0, local.max(axis=0) + 1.0

@@ -20,6 +20,7 @@ from dermis.mesh.check import UV_TOLERANCE, check_arrays, check_mesh
 from dermis.mesh.formats import READERS, Group, Part, default_unit_mm, is_gltf
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.mesh import Material, Mesh
+from dermis.mesh.outline import Outline
 
 Array = NDArray[np.float64]
 Origin = Literal["auto", "top", "bottom"]
@@ -192,15 +193,16 @@ def cached_mesh(data: bytes, options: str, load: Callable[[], Mesh]) -> Mesh:
     def make() -> Arrays:
         mesh = load()
         told = json.dumps([asdict(material) for material in mesh.materials]).encode()
-        return {name: getattr(mesh, name) for name in (*arrays, "outline")} | {
-            "materials": np.frombuffer(told, np.uint8)
+        return {name: getattr(mesh, name) for name in arrays} | {
+            "outline": mesh.outline.places_mm,
+            "materials": np.frombuffer(told, np.uint8),
         }
 
     digest = hashlib.sha256(f"{_FORM} {options}".encode())
     digest.update(data)
     found = stored("meshes", digest.hexdigest()[:40], [*arrays, "outline", "materials"], make)
     materials = json.loads(found.pop("materials").tobytes())
-    outline = found.pop("outline")
+    outline = Outline(found.pop("outline"))
     mesh = Mesh(
         **found,
         materials=tuple(Material(one["name"], one["kind"], tuple(one["colour"])) for one in materials),

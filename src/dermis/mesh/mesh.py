@@ -8,6 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.mesh.outline import Outline, hull
+
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]
 
@@ -57,26 +59,6 @@ class Mesh:
         return np.asarray(self.positions.max(axis=0) - self.positions.min(axis=0))
 
     @cached_property
-    def outline(self) -> NDArray[np.float64]:
-        """(n, 3) corners of the convex hull, which bound the mesh in every view [mm]."""
-        from scipy.spatial import ConvexHull, QhullError
-
-        points = self.positions.astype(np.float64)
-        try:
-            return np.asarray(points[ConvexHull(points).vertices])
-        except QhullError:  # it is flat
-            return points
-
-    @cached_property
-    def outline_columns(self) -> NDArray[np.float32]:
-        """(4, n) the outline as homogeneous columns, to be multiplied by matrices [mm].
-
-        In single precision, as the positions are: products in each frame take half the memory.
-        """
-        return np.vstack([self.outline.T, np.ones(len(self.outline))]).astype(np.float32)
-
-    @cached_property
-    def middle_mm(self) -> tuple[float, float, float]:
-        """Middle of the bounding box [mm]."""
-        x, y, z = 0.5 * (self.outline.min(axis=0) + self.outline.max(axis=0))
-        return float(x), float(y), float(z)
+    def outline(self) -> Outline:
+        """Corners of the convex hull."""
+        return hull(self.positions)

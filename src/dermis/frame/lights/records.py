@@ -24,6 +24,7 @@ from dermis.frame.projection import (
     unit,
 )
 from dermis.gpu import ComputeProgram
+from dermis.mesh.outline import Outline
 from dermis.scene.environment import Environment
 from dermis.scene.lights import DirectionalLight, Light
 from dermis.scene.model import Scene
@@ -70,8 +71,10 @@ def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
     return tuple((name, 1) for name, used in named.items() if used)
 
 
-def light_views(scene: Scene, size: int) -> list[ShadowView | None]:
+def light_views(scene: Scene, outline: Outline, size: int) -> list[ShadowView | None]:
     """The shadow view of each part of each light; None for those without shadows.
+
+    outline : of the head's shape
 
     Raises DermisError for more lights than the shader holds, and for one inside the head's bounds.
     """
@@ -88,11 +91,11 @@ def light_views(scene: Scene, size: int) -> list[ShadowView | None]:
         KINDS[light.kind].check(light, head, culprit)
     shadowed = [(culprit, light) for culprit, light in numbered if light.shadows]
     points = [(culprit, light) for culprit, light in shadowed if not isinstance(light, DirectionalLight)]
-    found = iter(point_views(points, head.centre_mm, head.mesh, size))
+    found = iter(point_views(points, head.centre_mm, outline, size))
 
     def view(light: Light) -> ShadowView:
         if isinstance(light, DirectionalLight):
-            return parallel_view(np.array(light.direction), head.mesh, size)
+            return parallel_view(np.array(light.direction), outline, size)
         return next(found)
 
     return [view(light) if light.shadows else None for _, light in numbered]

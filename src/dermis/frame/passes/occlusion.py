@@ -48,7 +48,7 @@ def bake_occlusion(
     sums = device.buffer(np.zeros((rows, side, 2), np.float32), "STORAGE")
     layers = make_layers(device, (map_size, map_size), _BATCH, triangles=False)
     for first in range(0, len(towards), _BATCH):
-        views = [parallel_view(-d, mesh, map_size) for d in towards[first : first + _BATCH]]
+        views = [parallel_view(-d, mesh.outline, map_size) for d in towards[first : first + _BATCH]]
         draw_layers(frame, "occlusion", layers, shadow_layers(views), resting)
         sky = shader.record("Sky", directions=len(views), side=side, vertices=len(mesh.positions))
         own = {"lights": _lights(shader, views), "shadow_maps": layers.texture, "sky": sky}
