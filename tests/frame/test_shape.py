@@ -75,7 +75,7 @@ def test_vertices_are_those_of_a_mesh_built_anew(device: Device, head: Head) -> 
         assert np.abs(table[:, first : first + 3] - tangent).max() < SHAPE * np.abs(tangent).max()
 
 
-def test_a_files_own_normals_rest_where_they_are_and_turn_with_the_surface(
+def test_a_files_own_normals_rest_and_turn_with_the_surface(
     device: Device, head: Head
 ) -> None:
     tilted = head.mesh.normals + RNG.uniform(-0.4, 0.4, head.mesh.normals.shape)
