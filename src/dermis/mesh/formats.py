@@ -11,7 +11,7 @@ import re
 import struct
 import warnings
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
+from dermis.mesh.quads import find_pairs, obj_sides, ply_sides
 
 Colour = tuple[float, float, float]
 Array = NDArray[np.float64]
@@ -48,7 +49,7 @@ class Group:
 class Part:
     """One group's triangles in the file's units and the file's v direction.
 
-    positions (v, 3), uv (v, 2) or None, normals (v, 3) or None, triangles (f, 3)
+    positions (v, 3), uv (v, 2) or None, normals (v, 3) or None, triangles (f, 3), quads (q, 2) pairs of them
     """
 
     group: Group
@@ -56,6 +57,7 @@ class Part:
     uv: Array | None
     normals: Array | None
     triangles: NDArray[np.int64]
+    quads: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), np.int64))
 
 
 def read_gltf(path: Path) -> list[Part]:
@@ -134,6 +136,8 @@ def read_obj(path: Path) -> list[Part]:
     materials = "\n".join(f"newmtl {k}" for k in range(len(groups)))
     # trimesh pops groups from the end: back to file order
     parts = list(_parts(text.encode(), "obj", groups, resolver={"marked.mtl": materials.encode()}))[::-1]
+    faces = {id(group): sides for group, sides in zip(groups, obj_sides(text, len(groups)), strict=True)}
+    parts = [replace(part, quads=find_pairs(faces[id(part.group)], part.triangles)) for part in parts]
     full, none = [part.group for part in parts], np.empty((0, 3))
     return parts + [Part(g, none, None, None, none.astype(int)) for g in groups if g.names and g not in full]
 
@@ -176,7 +180,7 @@ def read_ply(path: Path) -> list[Part]:
     # splitting would drop the normals as soon as one vertex is unused
     by_corner = b"texcoord" in header
     parts = list(_parts(data, "ply", [Group((path.stem,))], fix_texture=by_corner, skip_materials=True))
-    return [Part(p.group, p.positions, p.uv, None, p.triangles) for p in parts] if by_corner else parts
+    return [replace(part, normals=None) for part in parts] if by_corner else parts
 
 
 READERS: dict[str, Callable[[Path], list[Part]]] = {
@@ -223,6 +227,7 @@ def _placed(mesh: Any, transform: Array, group: Group) -> Part:
         None if uv is None else _real(uv),
         None if normals is None else _real(normals) @ (mirror / size * cofactors).T,
         triangles[:, ::-1] if mirror < 0 else triangles,
+        find_pairs(ply_sides(mesh.metadata), triangles),
     )
 
 

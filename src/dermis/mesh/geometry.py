@@ -33,8 +33,15 @@ def edges(triangles: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np
 
     triangles : (f, 3) point indices; sides come as all 0-1, then all 1-2, then all 2-0
     """
-    sides = np.vstack((triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]])).astype(np.int64)
-    sides.sort(axis=1)
+    return unite_sides(np.vstack((triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]])))
+
+
+def unite_sides(sides: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Unique edges (e, 2), the edge of each side (n,) and the number of sides on each edge (e,).
+
+    sides : (n, 2) point indices, in either order
+    """
+    sides = np.sort(sides.astype(np.int64), axis=1)
     stride = int(sides.max()) + 1 if len(sides) else 1
     keys, of_side, counts = np.unique(
         sides[:, 0] * stride + sides[:, 1], return_inverse=True, return_counts=True
@@ -141,6 +148,7 @@ def build_mesh(
     materials: tuple[Material, ...],
     normals: ArrayLike | None = None,
     point: ArrayLike | None = None,
+    quads: ArrayLike = (),
 ) -> Mesh:
     """A `Mesh` with its points welded and its normals and tangents computed.
 
@@ -150,6 +158,7 @@ def build_mesh(
     material : (f,) index into `materials`
     normals : (v, 3) kept where finite and of unit length; computed where not, or when None
     point : (v,) welded points if known; positions that are equal are welded when None
+    quads : (q, 2) triangles that are the halves of a quad, as `Mesh` has them
     """
     place = np.ascontiguousarray(positions, dtype=np.float32)
     corner = np.ascontiguousarray(triangles, dtype=np.int32)
@@ -160,4 +169,5 @@ def build_mesh(
         normal = _trusted(np.asarray(normals, dtype=np.float32), normal)
     dpdu, dpdv = tangents(place, flat, normal, corner)
     groups = np.ascontiguousarray(material, dtype=np.int32)
-    return Mesh(place, normal, flat, dpdu, dpdv, points, corner, groups, tuple(materials))
+    pairs = np.asarray(quads, dtype=np.int32).reshape(-1, 2)
+    return Mesh(place, normal, flat, dpdu, dpdv, points, corner, groups, tuple(materials), pairs)

@@ -23,6 +23,7 @@ from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.outline import Outline
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 Origin = Literal["auto", "top", "bottom"]
 Up = Literal["y", "z"]
 
@@ -69,14 +70,14 @@ def _loaded(source: Path, unit: float, v_origin: Origin, up: Up, opaque: tuple[s
     """The mesh as it is in the file."""
     with np.errstate(all="ignore"):
         parts = _read(source)
-        positions, uv, normals, triangles = _joined(parts, source)
+        positions, uv, normals, triangles, quads = _joined(parts, source)
         place, normals = _upright(unit * positions, up).astype(np.float32), _upright(normals, up)
         flat = _v_down(uv, source, v_origin).astype(np.float32)
         check_arrays(place, flat, triangles, source)
     material, materials = _materials(parts, opaque, source)
     used, compact = np.unique(triangles, return_inverse=True)
     corners = compact.reshape(-1, 3)
-    mesh = build_mesh(place[used], flat[used], corners, material, materials, normals[used])
+    mesh = build_mesh(place[used], flat[used], corners, material, materials, normals[used], quads=quads)
     check_mesh(mesh, source)
     return mesh
 
@@ -117,8 +118,8 @@ def _read(source: Path) -> list[Part]:
     return full
 
 
-def _joined(parts: list[Part], source: Path) -> tuple[Array, Array, Array, NDArray[np.int64]]:
-    """Positions, uv, normals (NaN where the file has none) and triangles of all parts together."""
+def _joined(parts: list[Part], source: Path) -> tuple[Array, Array, Array, Index, Index]:
+    """Positions, uv, normals (NaN where the file has none), triangles and quads of all parts together."""
     positions, uvs, normals, triangles, offset = [], [], [], [], 0
     for part in parts:
         count = len(part.positions)
@@ -129,7 +130,9 @@ def _joined(parts: list[Part], source: Path) -> tuple[Array, Array, Array, NDArr
         normals.append(np.full((count, 3), np.nan) if given is None else given)
         triangles.append(part.triangles + offset)
         offset += count
-    return np.vstack(positions), np.vstack(uvs), np.vstack(normals), np.vstack(triangles)
+    first = np.cumsum([0, *map(len, triangles)])
+    quads = np.vstack([part.quads + begin for part, begin in zip(parts, first, strict=False)])
+    return np.vstack(positions), np.vstack(uvs), np.vstack(normals), np.vstack(triangles), quads
 
 
 def _part_uv(part: Part, source: Path) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -41,6 +41,7 @@ class Mesh:
     point : (v,) index of the unique position
     triangles : (f, 3) corner vertices
     material : (f,) index into `materials`
+    quads : (q, 2) triangles (a, b, c) and (c, d, a) that are the halves of a quad abcd; no rows for none
     """
 
     positions: Floats
@@ -52,6 +53,7 @@ class Mesh:
     triangles: Ints
     material: Ints
     materials: tuple[Material, ...]
+    quads: Ints = field(default_factory=lambda: np.zeros((0, 2), np.int32))
 
     @property
     def size_mm(self) -> NDArray[np.float32]:
