@@ -12,7 +12,7 @@ from dermis.scene.settings import Settings
 
 _DISTANCE = 4  # bytes of a texel: distance to the edge of its chart
 _FLOATS = 16  # bytes of a texel: four floats
-_GEOMETRY = 8 + 8 + 16  # bytes of an atlas texel: place on the mesh, stretch, stretch with reach
+_GEOMETRY = 8 + 8 + 8  # bytes of an atlas texel: place on the mesh, stretch, reach
 _PICTURE = 36  # bytes of a pixel
 _SAMPLE = 8
 
