@@ -24,12 +24,14 @@ class MorphTargets:
     first : (t + 1,) where each target's displacements begin
     point : (n,) the point that each moves
     delta_mm : (n, 3) by how much at weight 1
+    rest : (t,) weights with which the points at rest were made; None where all are 0
     """
 
     names: tuple[str, ...]
     first: Ints
     point: Ints
     delta_mm: Floats
+    rest: Floats | None = None
 
 
 def no_targets() -> MorphTargets:

@@ -11,7 +11,7 @@ from dermis.errors import refuse
 from dermis.human.bust import BUSTS
 from dermis.mesh.check import check_head_height
 from dermis.mesh.formats import is_gltf
-from dermis.mesh.gltf import embedded_maps
+from dermis.mesh.gltf.pictures import embedded_maps
 from dermis.mesh.head import Head
 from dermis.mesh.load import load_mesh
 from dermis.mesh.maps import load_maps
