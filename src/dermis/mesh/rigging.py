@@ -111,13 +111,17 @@ def _targets(
 
 
 def _skeleton(part: Part, bones: Bones, first: Index, to_head: Array, culprit: object) -> Skeleton:
-    flat = np.flatnonzero(np.abs(np.linalg.det(bones.world[:, :3, :3])) < 1e-12)
-    if len(flat):
-        came = f"{bones.names[flat[0]]!r} is scaled to nothing at rest"
-        refuse(culprit, "bones with an extent", came, "Export it with another scale")
+    """The bones of points that follow them as the `first` of their vertices does."""
     assert part.bone is not None and part.weight is not None
     bone = np.zeros((len(first), INFLUENCES), np.int32)
     weight = np.zeros((len(first), INFLUENCES), np.float32)
     bone[:, : part.bone.shape[1]], weight[:, : part.weight.shape[1]] = part.bone[first], part.weight[first]
-    inverse = np.asarray(np.linalg.inv(bones.world), np.float64)
-    return Skeleton(bones.names, bones.parent, bones.local, inverse, to_head, bone, weight)
+    flat = np.abs(np.linalg.det(bones.world[:, :3, :3])) < 1e-12
+    followed = np.flatnonzero(flat & np.isin(np.arange(len(flat)), bone[weight > 0]))
+    if len(followed):
+        came = f"{bones.names[followed[0]]!r} is scaled to nothing at rest"
+        refuse(culprit, "bones with an extent", came, "Export it with another scale")
+    inverse = np.linalg.inv(np.where(flat[:, None, None], np.eye(4), bones.world))
+    return Skeleton(
+        bones.names, bones.parent, bones.local, np.asarray(inverse, np.float64), to_head, bone, weight
+    )
