@@ -116,7 +116,8 @@ def _skeleton(part: Part, bones: Bones, first: Index, to_head: Array, culprit: o
     bone = np.zeros((len(first), INFLUENCES), np.int32)
     weight = np.zeros((len(first), INFLUENCES), np.float32)
     bone[:, : part.bone.shape[1]], weight[:, : part.weight.shape[1]] = part.bone[first], part.weight[first]
-    flat = np.abs(np.linalg.det(bones.world[:, :3, :3])) < 1e-12
+    size = np.linalg.norm(bones.world[:, :3, :3], axis=(1, 2))
+    flat = np.abs(np.linalg.det(bones.world[:, :3, :3])) <= 1e-9 * size**3
     followed = np.flatnonzero(flat & np.isin(np.arange(len(flat)), bone[weight > 0]))
     if len(followed):
         came = f"{bones.names[followed[0]]!r} is scaled to nothing at rest"
