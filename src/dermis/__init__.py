@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         studio,
     )
     from dermis.scene.model import Scene
+    from dermis.scene.pose import Pose
     from dermis.scene.settings import Settings
     from dermis.scene.skin import Skin
 
@@ -61,6 +62,7 @@ _HOME = {
     "StripeLight": "scene.lights",
     "studio": "scene.lights",
     "Scene": "scene.model",
+    "Pose": "scene.pose",
     "Settings": "scene.settings",
     "Skin": "scene.skin",
 }
@@ -72,6 +74,7 @@ __all__ = [
     "Environment",
     "Head",
     "PointLight",
+    "Pose",
     "RectangleLight",
     "Renderer",
     "Scene",

@@ -16,7 +16,7 @@ class Outline:
     places_mm : (n, 3)
     """
 
-    places_mm: NDArray[np.float64]
+    places_mm: NDArray[np.floating]
 
     @cached_property
     def columns(self) -> NDArray[np.float32]:

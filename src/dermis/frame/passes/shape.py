@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from dermis.atlas.atlas import Atlas
 from dermis.frame.geometry import HeadResources, upload_geometry
 from dermis.frame.passes import each, program
@@ -49,9 +47,8 @@ def at_rest(frame: Frame, head: Head, atlas: Atlas) -> HeadResources:
 
 def resting(rig: Rig) -> Motion:
     """The motion that leaves a rig where it is."""
-    matrices = b"" if rig.skeleton is None else rig.skeleton.matrices().astype(np.float32).tobytes()
-    weights = np.zeros(len(rig.targets.names), np.float32).tobytes()
-    return Motion(rig.positions_mm.tobytes(), weights, matrices)
+    weights, matrices, positions = (array.tobytes() for array in rig.rest)
+    return Motion(positions, weights, matrices)
 
 
 def _evaluate(graph: Recorder, shape: Shape) -> None:
