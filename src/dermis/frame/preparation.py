@@ -68,7 +68,18 @@ class Preparation:
         record = keep(_record, *lights, views, using=(device, scene))
         layers = shadow_layers(views)
         counts = len(views), len(layers.clips)
-        asked = Asked(head, scene.skin, profile, settings, around, surroundings, technique, *counts, view)
+        asked = Asked(
+            head,
+            scene.skin,
+            profile,
+            _person(scene),
+            settings,
+            around,
+            surroundings,
+            technique,
+            *counts,
+            view,
+        )
         resources = keep(make_resources, self.memo, device, asked)
         seen_from, shone_on = pinhole(scene.camera, head, settings), light_constants(scene)
         scale = scale_of(resources.levels.texel, brightest(scene, surroundings))
@@ -90,6 +101,12 @@ class Preparation:
         """The head as it is posed, or at rest where no motion came."""
         resting = self.memo.keep(_resting, head)
         return self.memo.keep(_posed, head, motion, resting.motion) if motion else resting
+
+
+def _person(scene: Scene) -> Any:
+    """Where the control points rest, if not where the head's own do."""
+    motion, own = scene.motion, scene.head.positions_mm
+    return None if motion is None or motion.positions_mm is own else motion.positions_mm
 
 
 def _resting(head: Head) -> Moved:

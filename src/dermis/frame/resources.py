@@ -18,7 +18,8 @@ from dermis.frame.inputs import Resources, Split, view_record
 from dermis.frame.levels import Blur, Levels
 from dermis.frame.limits import check_limits
 from dermis.frame.maps import upload_maps
-from dermis.frame.passes import bloom, post, shade, shadows, surface_texels, visibility_buffer
+from dermis.frame.passes import bloom, gutters, post, shade, shadows, surface_texels, visibility_buffer
+from dermis.frame.passes.shape import rest_shape
 from dermis.frame.seams import LaidOut, Remedy, laid_out, remedy_of
 from dermis.frame.shape import Shape, make_shape
 from dermis.frame.surroundings import Surroundings
@@ -38,6 +39,7 @@ from dermis.specular.albedo import albedo_table
 class Asked:
     """What resources are made for.
 
+    person : (p, 3) places of the head's control points where another person rests, None for the head's own
     lights, shadow_layers : how many parts of lights there are, and how many of them cast shadows
     view : name of a scene among several that are drawn in turn
     """
@@ -45,6 +47,7 @@ class Asked:
     head: Head
     skin: Skin
     profile: GaussianSum
+    person: Any
     settings: Settings
     environment: Environment | None
     surroundings: Surroundings
@@ -169,6 +172,9 @@ def _layout(
     keep, number, head = memo.keep, str(index), asked.head
     held = keep(upload_geometry, device, head.mesh, atlas, shape, of=number)
     lit = held.resources | shared
+    if asked.person is not None:
+        resting = held.shaped(keep(rest_shape, device, head, asked.person))
+        textures = keep(gutters.walked, device, head.mesh, atlas, textures, resting, of=number)
     if asked.occluded:
         bound = lit, textures.resources["atlas"]
         lit["occlusion_map"] = keep(surroundings.occlusion_map, device, head, atlas, using=bound, of=number)

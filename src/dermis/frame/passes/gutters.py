@@ -2,11 +2,26 @@
 
 from __future__ import annotations
 
-from dermis.frame.atlas_textures import ENTRY_BYTES
+from dermis.atlas.atlas import Atlas
+from dermis.frame.atlas_textures import ENTRY_BYTES, AtlasTextures
 from dermis.frame.geometry import HeadResources
-from dermis.frame.gutters import Walks
+from dermis.frame.gutters import Walks, make_walks
 from dermis.frame.passes import each, program
-from dermis.gpu import Recorder
+from dermis.gpu import Device, Frame, Recorder
+from dermis.mesh.mesh import Mesh
+
+
+def walked(
+    device: Device, mesh: Mesh, atlas: Atlas, textures: AtlasTextures, head: HeadResources
+) -> AtlasTextures:
+    """The atlas with gutters that continue as a person's surface at rest does."""
+    walks = make_walks(device, mesh, atlas, textures)
+    if walks is None:
+        return textures
+    frame = Frame(device, timed=False)
+    draw(frame, head, walks)
+    frame.submit()
+    return walks.atlas
 
 
 def draw(graph: Recorder, head: HeadResources, walks: Walks) -> None:

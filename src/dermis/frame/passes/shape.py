@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
-from dermis.atlas.atlas import Atlas
-from dermis.frame.geometry import HeadResources, upload_geometry
+import numpy as np
+from numpy.typing import NDArray
+
 from dermis.frame.passes import each, program
 from dermis.frame.shape import LEAST_ACROSS, Shape, make_shape
-from dermis.gpu import Frame, Graph, Recorder
+from dermis.gpu import Device, Frame, Graph, Recorder
 from dermis.gpu.program import Resources
 from dermis.mesh.geometry import MIN_UV_CROSS
 from dermis.mesh.head import Head
-from dermis.mesh.rig import Rig
+from dermis.mesh.rig import Rig, no_targets
 
 
 class Motion(NamedTuple):
@@ -38,11 +40,16 @@ def draw(graph: Frame | Graph, shape: Shape, motion: Motion) -> None:
     graph.repeat(_evaluate, shape)
 
 
-def at_rest(frame: Frame, head: Head, atlas: Atlas) -> HeadResources:
-    """A head's surface as it rests, in resources of its own."""
-    made = make_shape(frame.device, head)
-    draw(frame, made, resting(head.control))
-    return upload_geometry(frame.device, head.mesh, atlas, made)
+def rest_shape(device: Device, head: Head, person: NDArray[np.float32] | None = None) -> Shape:
+    """A head's shape as it rests, evaluated in resources of its own.
+
+    person : (p, 3) other places of its control points, those of another person [mm]
+    """
+    rig = replace(head.control, targets=no_targets(), skeleton=None)
+    made, frame = make_shape(device, replace(head, rig=rig)), Frame(device, timed=False)
+    draw(frame, made, Motion((rig.positions_mm if person is None else person).tobytes()))
+    frame.submit()
+    return made
 
 
 def resting(rig: Rig) -> Motion:
