@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -118,6 +118,12 @@ class Rig:
         return cached_array(
             sources, _FORM, lambda: outline_points(self.positions_mm, targets, skeleton)
         ).astype(np.intp)
+
+    def points_mm(self, motion: Motion) -> Doubles:
+        """(q, 3) the points of the mesh in a motion, after any subdivision, as the device computes them [mm]."""
+        resting = replace(self, positions_mm=motion.positions_mm)
+        control = resting.posed(motion.weights.astype(np.float64), motion.matrices.astype(np.float64))
+        return control if self.stencils is None else self.stencils.points(control)
 
     def posed(self, weights: Doubles, matrices: Doubles | None = None) -> Doubles:
         """(p, 3) the points in a pose, as the device computes them [mm].
