@@ -1,4 +1,4 @@
-"""Light below a surface that moves: as much as at rest, as wide as the moved surface is, and nothing stale."""
+"""Light below a surface that moves: as much as at rest, as wide as the moved surface is, never stale."""
 
 from __future__ import annotations
 

@@ -120,7 +120,7 @@ class Rig:
         ).astype(np.intp)
 
     def points_mm(self, motion: Motion) -> Doubles:
-        """(q, 3) the points of the mesh in a motion, after any subdivision, as the device computes them [mm]."""
+        """(q, 3) the points of the mesh in a motion, after any subdivision [mm]."""
         resting = replace(self, positions_mm=motion.positions_mm)
         control = resting.posed(motion.weights.astype(np.float64), motion.matrices.astype(np.float64))
         return control if self.stencils is None else self.stencils.points(control)
