@@ -23,7 +23,7 @@ from dermis.frame.levels import FLOATS, Blur, halvings_of, make_levels
 from dermis.frame.passes import diffuse, shape, stretch
 from dermis.frame.passes.shape import Motion
 from dermis.frame.renderer import Renderer
-from dermis.frame.shape import make_shape
+from dermis.frame.shape import make_shape, shape_tables
 from dermis.gpu import Device, Frame, download, upload
 from dermis.mesh.head import Head
 from dermis.optics.profiles import load_profile
@@ -46,7 +46,7 @@ def atlas(head: Head) -> Atlas:
 
 def spread(device: Device, head: Head, atlas: Atlas, motion: Motion, light: Floats) -> list[Floats]:
     """The levels of (n, n, 1) light on a head in motion, each at its resolution."""
-    made, textures = make_shape(device, head), upload_atlas(device, atlas)
+    made, textures = make_shape(device, shape_tables(device, head)), upload_atlas(device, atlas)
     most = len(textures.sheets("repeated")) - 1
     halvings = halvings_of(BLURRED, textures.usual_per_mm, most)
     space = make_levels(device, SIDE, len(BLURRED), FLOATS)
