@@ -20,7 +20,7 @@ Ints = NDArray[np.int32]
 
 __all__ = ["INFLUENCES", "MorphTargets", "Motion", "Rig", "Skeleton", "Stencils", "no_targets"]
 
-_FORM = "outline 5"  # another number when other points are found
+_FORM = "outline 6"  # another number when other points are found
 
 
 class Motion(NamedTuple):
