@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from dermis.frame.maps import DEFAULT_COLOUR, relief_band
 from dermis.gpu import ComputeProgram
 from dermis.gpu.wgsl_source import Member
 from dermis.mesh.maps import Maps
@@ -17,6 +16,10 @@ from dermis.specular.albedo import ROOT_OF_FIRST_ROW
 from dermis.specular.energy import ENERGY
 from dermis.specular.fresnel import SKIN_ETA, SKIN_F0
 from dermis.specular.models import MODELS
+
+DEFAULT_COLOUR = 0.8
+"""Of heads without a colour map."""
+_NO_BAND = -1.0
 
 
 def model_of(skin: Skin) -> str:
@@ -59,7 +62,7 @@ def skin_record(
         returned=float(energy.returned),
         tint=float(skin.specular_colour == "wrong"),
         mix=skin.mix,
-        relief_band=relief_band(maps),
+        relief_band=_relief_band(maps),
         light_count=light_count,
         **(_by_direction(skin, maps, profile) if skin.direction == "half-space" else {}),
     )
@@ -77,3 +80,11 @@ def _by_direction(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any
         "back_from_everywhere": law.from_everywhere,
         "back": np.pad(law.returned, ((0, 0), (0, 1))),
     }
+
+
+def _relief_band(maps: Maps) -> float:
+    """Where both maps exist, a larger height map adds what is finer than the normal map; else all of it."""
+    if maps.normal is None or maps.height is None:
+        return _NO_BAND
+    finer = max(maps.height.shape[:2]) / max(maps.normal.shape[:2])
+    return float(np.log2(finer)) if finer > 1 else _NO_BAND
