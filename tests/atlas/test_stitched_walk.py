@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from dermis.atlas.stitched.build import find_pieces
 from dermis.atlas.stitched.overlap_cuts import cut_overlaps, find_conflicts
 from dermis.atlas.stitched.surface import FlatSurface, survey
+from dermis.atlas.stitched.walk import walk
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.mesh import Mesh
 
@@ -23,13 +24,9 @@ def go(
     surface: FlatSurface, triangle: NDArray[np.int32], start: Floats, target: Floats
 ) -> tuple[Floats, Floats]:
     """Where walks end in space, and whether the surface went on so far."""
-    from dermis.atlas.stitched.kernels.walk import walk
-
-    found, second = np.empty(len(triangle), np.int32), np.empty((len(triangle), 2))
-    whole = np.empty(len(triangle), np.bool_)
-    walk(surface.adjacency, triangle, start, target, found, second, whole)
-    weights = np.column_stack((1 - second.sum(axis=1), second))
-    return np.einsum("nk,nkc->nc", weights, surface.corners[found]), whole
+    ends = walk(surface.adjacency, triangle, start, target)
+    weights = np.column_stack((1 - ends.weights.sum(axis=1), ends.weights))
+    return np.einsum("nk,nkc->nc", weights, surface.corners[ends.triangle]), ends.whole
 
 
 def around(points: Floats) -> Floats:

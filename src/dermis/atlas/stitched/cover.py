@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from dermis.atlas.stitched.gutter import Border, GutterTexels, GutterWidth, Packing, walk_gutter
 from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
+from dermis.atlas.stitched.texels import fill, lost, read, runs, weigh
 
 Singles = NDArray[np.float32]
 _STEPS, _SLACK_MM = 2.0, 0.5  # neighbours farther apart than so many of their steps and so much have a gap
@@ -47,12 +48,8 @@ def cover(
 
     piece, own : (f,) and numbers of triangles, as for `find_border`
     """
-    from dermis.atlas.stitched.kernels.fill import fill, weigh
-
-    # triangles that are mirrored within their piece are drawn first, so that others win
-    drawn = own[np.argsort(~_mirrored(surface, piece[own], own), kind="stable")]
     owner, weights = np.full(shape, -1, np.int32), np.zeros((*shape, 2), np.float32)
-    fill(packing.places, drawn, owner)
+    fill(packing.places, _drawn(surface, piece, own), owner)
     weigh(packing.places, owner, weights)
     made = Cover(
         owner,
@@ -84,6 +81,18 @@ def _add_gutters(made: Cover, piece: Index, found: GutterTexels) -> None:
     for grid in (made.triangle, made.rooted):
         grid[gone] = -1
     made.gutter[gone] = False
+
+
+def hidden(surface: FlatSurface, piece: Index, packing: Packing, size: int) -> Flags:
+    """Triangles (f,) most of whose texels others of their piece own."""
+    own, owner = np.flatnonzero(piece >= 0), np.full((size, size), -1, np.int32)
+    fill(packing.places, _drawn(surface, piece, own), owner)
+    return lost(packing.places, own, owner)
+
+
+def _drawn(surface: FlatSurface, piece: Index, own: Index) -> Index:
+    """Triangles that are mirrored within their piece first, so that others win."""
+    return own[np.argsort(~_mirrored(surface, piece[own], own), kind="stable")]
 
 
 def _mirrored(surface: FlatSurface, piece: Index, own: Index) -> Flags:
@@ -132,8 +141,6 @@ def runs_of(
     chart : (h, w) -1 where nothing is
     metric, roots : of `metric_of` and `roots_of`
     """
-    from dermis.atlas.stitched.kernels.texels import runs
-
     points = _read(made.triangle, made.weights, surface.corners)
     reach = np.zeros((*chart.shape, 4), np.uint16)
     runs(chart, points, roots, metric, _STEPS, _SLACK_MM, reach)
@@ -142,8 +149,6 @@ def runs_of(
 
 def _read(triangle: NDArray[np.int32], weights: Singles, corners: Doubles) -> Singles:
     """(h, w, c) of (f, 3, c) at corners, 0 where there is no triangle."""
-    from dermis.atlas.stitched.kernels.texels import read
-
     values = np.zeros((*triangle.shape, corners.shape[2]), np.float32)
     read(triangle, weights, corners, values)
     return values
