@@ -95,3 +95,10 @@ SEAM = 0.01
 PICTURE_MEAN, PICTURE_TAIL = 0.4, 4.0
 """Whole frames against stored pictures, in bytes, in the mean and at the 99.5th percentile: other versions of
 the software adapter round otherwise."""
+
+SHAPE, SHAPE_NORMAL = 2e-6, 2e-5
+"""Points and tangents computed on the device against float64, of the largest; normals, by component."""
+
+STRETCHED = 1.5e-3
+"""Stretch on the device against the atlas' own, of the largest: both are halves, one of them of weights in
+steps of 1/65535."""

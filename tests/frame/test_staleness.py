@@ -208,7 +208,7 @@ def test_the_frame_can_be_written_down(renderer: Renderer) -> None:
     listing = renderer.graph.listing = Listing()
     renderer.draw(replace(BASE, camera=SCENES["camera"]), SETTINGS)
     stages = list(dict.fromkeys(one.stage for one in listing.passes))
-    assert stages == ["shadows", "surface", "irradiance", *SPREAD, "visibility", *SEEN]
+    assert stages == ["shape", "shadows", "stretch", "surface", "irradiance", *SPREAD, "visibility", *SEEN]
     ran = {one.stage for one in listing.passes if one.ran}
     assert ran == {"visibility", "shade", "post"}
     shade = next(one for one in listing.passes if one.stage == "shade")

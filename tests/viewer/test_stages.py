@@ -68,7 +68,7 @@ CHANGES: dict[str, tuple[Callable[[ViewerState], ViewerState], set[str]]] = {
     "pigments": (skin_of(0.05), SPREAD | PICTURE),
     "stretch": (
         lambda state: state.with_settings(stretch="none"),
-        {"surface", "irradiance"} | SPREAD | PICTURE,
+        {"stretch", "surface", "irradiance"} | SPREAD | PICTURE,
     ),
     "part": (lambda state: state.in_view("specular"), PICTURE),
     "background": (lambda state: state.with_settings(background=(0.1, 0.2, 0.3)), PICTURE),

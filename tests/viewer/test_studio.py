@@ -115,7 +115,7 @@ def assert_same_textures(a: Any, b: Any) -> None:
     """The maps, the mesh and the atlas are the same objects on the device."""
     for name in ("colour_map", "slope_map", "relief_map", "vertex_table", "albedo_table"):
         assert a.lit[name] is b.lit[name], name
-    for name in ("atlas", "stretch_map", "sheet_map"):
+    for name in ("atlas", "stretch_map", "reach_map"):
         assert a.layouts[0].atlas.resources[name] is b.layouts[0].atlas.resources[name], name
 
 

@@ -15,7 +15,7 @@ from dermis.atlas.translucency.pairs import TranslucentPairs, find_pairs
 from dermis.disk import Array, Arrays, stored
 from dermis.mesh.mesh import Mesh
 
-_FORM = 3  # raise when `build_atlas` gives other results for the same mesh
+_FORM = 4  # increment when `build_atlas` gives other results for the same mesh
 
 
 def cached_atlas(mesh: Mesh, size: int, layout: str = "mesh", reach_mm: float = REACH_MM) -> Atlas:
@@ -49,7 +49,7 @@ def cached_pairs(mesh: Mesh, atlas: Atlas, widest_mm: float) -> TranslucentPairs
 
 
 def pairs_key(mesh: Mesh, atlas: Atlas, widest_mm: float) -> str:
-    """What stands for the content of `find_pairs`' result."""
+    """Key that identifies the result of `find_pairs`."""
     return _baked_key(mesh, atlas, f"{PAIRS_FORM} {widest_mm!r}")
 
 

@@ -104,7 +104,8 @@ def _surface_of_blurs(inputs: Inputs, texels: int) -> float:
     sheets = (finest, *finest.coarser)
     moved = 0.0
     for source, halved in pairwise(blur.halvings):
-        moved += texel_bytes(sheets[halved].resources["sheet_map"]) * texels / 4**halved
+        maps = (sheets[halved].resources[name] for name in ("stretch_map", "reach_map"))
+        moved += sum(map(texel_bytes, maps)) * texels / 4**halved
         if blur.edge == "repeated" and (gutter := sheets[source].gutter):
             moved += gutter.size * (1 + 2 * texel_bytes(levels.stack) / _LISTED)
     return moved

@@ -1,4 +1,4 @@
-"""An atlas of the head that light is spread on, as textures."""
+"""An atlas of the head on the device, over which light spreads."""
 
 from __future__ import annotations
 
@@ -6,18 +6,19 @@ from dataclasses import dataclass
 from typing import Any
 
 from dermis.frame.atlas_textures import AtlasTextures
+from dermis.frame.geometry import HeadResources
 
 
 @dataclass(frozen=True, eq=False)
 class PairBuffers:
-    """Pairs of places on a device, and how they lie.
+    """Translucent pairs on a device, and their geometry.
 
     side : of the coarse atlas
-    receivers : buffer of cells that take light, as translucency.wgsl reads them
+    receivers : buffer of cells that receive light, as translucency.wgsl reads them
     pairs, sources : buffers of words, as translucency_weights.wgsl reads them
     count, source_count, receiver_count : of pairs, sources and receivers
-    light : texture of the coarse atlas for what comes through, none yet, and 1 where there is surface
-    key : what stands for all of it, so that what a profile makes of it can be kept on disk; empty for no key
+    light : texture of the coarse atlas for the transmitted light, none yet; alpha is 1 where there is surface
+    key : identifies the pairs, so that a profile's weights can be kept on disk; empty to keep none
     """
 
     side: int
@@ -35,11 +36,11 @@ class PairBuffers:
 
 @dataclass(frozen=True, eq=False)
 class Translucency:
-    """Thin parts of an atlas.
+    """Light through the thin parts of an atlas.
 
     pairs : translucent pairs
-    weights : what `weigh` made of them
-    layer : blurred level, counted from 0, whose light passes
+    weights : buffer from `weigh`
+    layer : blurred level, counted from 0, that the sources read
     gathered : buffer for the light of the sources
     """
 
@@ -50,21 +51,23 @@ class Translucency:
 
     @property
     def light(self) -> Any:
-        """Texture of the coarse atlas for what comes through."""
+        """Texture of the coarse atlas for the transmitted light."""
         return self.pairs.light
 
 
 @dataclass(frozen=True, eq=False)
 class AtlasLayout:
-    """An atlas of the head, and what its texels are lit by.
+    """An atlas of the head with the resources that light its texels.
 
+    head : its triangles, as they lie in the atlas
     lit : resources by the shaders' names: geometry, maps, lights, shadows, surroundings
     surfaces : texture of the surface at each texel, as surface_texels.wgsl packs it
     scattered : texture of the light that leaves below the surface
-    translucency : what comes through thin parts, None where no light comes through
+    translucency : light through thin parts, None without any
     """
 
     atlas: AtlasTextures
+    head: HeadResources
     lit: dict[str, Any]
     surfaces: Any
     scattered: Any

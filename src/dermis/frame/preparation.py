@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.inputs import Inputs, camera_views, pinhole, seen_by
 from dermis.frame.levels import Blur, scale_of
 from dermis.frame.lights import light_constants, light_records, light_views
 from dermis.frame.passes.shade import shade_program
+from dermis.frame.passes.shape import Motion, resting
 from dermis.frame.projection import ShadowView, shadow_layers
 from dermis.frame.resources import Asked, make_resources
 from dermis.frame.skin_profiles import SkinProfiles
@@ -17,6 +18,7 @@ from dermis.frame.surroundings import brightest, load_surroundings, with_suns
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Device, Memo
 from dermis.mesh.head import Head
+from dermis.mesh.outline import Outline
 from dermis.scene.lights import Light
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
@@ -53,8 +55,8 @@ class Preparation:
         profile = self.profile_of(scene.skin)
         surroundings = keep(load_surroundings, device, around.name if around else None)
         scene = with_suns(self.memo, scene, surroundings)
-        lights = head, tuple(scene.lights)
-        views = keep(_views, *lights, settings.shadow_size, using=(scene,))
+        lights, moved = (head, tuple(scene.lights)), keep(_moved, head)
+        views = keep(_views, *lights, moved.outline, settings.shadow_size, using=(scene,))
         record = keep(_record, *lights, views, using=(device, scene))
         layers = shadow_layers(views)
         counts = len(views), len(layers.clips)
@@ -65,11 +67,12 @@ class Preparation:
         return Inputs(
             resources=resources,
             settings=settings,
+            motion=moved.motion,
             layouts=tuple(under(layout, record) for layout in resources.layouts),
             blurs=keep(_scaled, resources.blurs, scale),
             shadow_views=layers,
             light_constants=shone_on,
-            camera=camera_views(seen_from, head.mesh, settings.samples),
+            camera=camera_views(seen_from, moved.outline, settings.samples),
             half=seen_from.half,
             view=seen_by(resources.view, seen_from),
             constants=resources.constants + shone_on,
@@ -84,12 +87,23 @@ def under(layout: AtlasLayout, lights: Any) -> AtlasLayout:
     return replace(layout, lit=layout.lit | {"lights": lights})
 
 
+class Moved(NamedTuple):
+    """A head's motion and how far out its shape reaches."""
+
+    motion: Motion
+    outline: Outline
+
+
+def _moved(head: Head) -> Moved:
+    return Moved(resting(head.control), head.mesh.outline)
+
+
 def _scaled(blurs: tuple[Blur, ...], scale: float) -> tuple[Blur, ...]:
     return tuple(replace(blur, scale=scale) for blur in blurs)
 
 
-def _views(_: Head, __: Lights, size: int, scene: Scene) -> Views:
-    return light_views(scene, size)
+def _views(_: Head, __: Lights, outline: Outline, size: int, scene: Scene) -> Views:
+    return light_views(scene, outline, size)
 
 
 def _record(_: Head, __: Lights, views: Views, device: Device, scene: Scene) -> Any:

@@ -13,13 +13,14 @@ from dermis.atlas.cached import cached_atlas
 from dermis.frame import surface, surroundings
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.atlas_textures import AtlasTextures, upload_atlas
-from dermis.frame.geometry import HeadResources, upload_geometry
+from dermis.frame.geometry import upload_geometry
 from dermis.frame.inputs import Resources, Split, view_record
 from dermis.frame.levels import Blur, Levels
 from dermis.frame.limits import check_limits
 from dermis.frame.maps import upload_maps
 from dermis.frame.passes import bloom, post, shade, shadows, surface_texels, visibility_buffer
 from dermis.frame.seams import LaidOut, Remedy, laid_out, remedy_of
+from dermis.frame.shape import Shape, make_shape
 from dermis.frame.surroundings import Surroundings
 from dermis.frame.techniques.technique import AtlasTechnique, Technique
 from dermis.frame.translucency import translucency_of
@@ -99,12 +100,13 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     maps = memo.soon(device.executor, upload_maps, *reading)  # which take long to read
     size = settings.shadow_size if asked.shadow_layers else 1
     shadow_maps = keep(_shadow_maps, device, asked.head, asked.shadow_layers, size, of=asked.view)
+    shape = keep(make_shape, device, asked.head)
     shared = _shared(memo, device, asked, shadow_maps)
     named = list(enumerate(asked.atlases.layouts))
     atlases = [_atlas(memo, device, asked, name, index) for index, name in named]
     uploaded: dict[str, Any] = memo.wait(maps)
     shared |= uploaded
-    layouts = [_layout(memo, device, asked, *atlases[index], shared, index) for index, _ in named]
+    layouts = [_layout(memo, device, asked, *atlases[index], shape, shared, index) for index, _ in named]
     own = technique.make(memo, device, settings, asked.profile)
     program = shade.shade_program(device)
     view = view_record(program, asked.head, settings, asked.split)
@@ -112,7 +114,8 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     first, _ = atlases[0]
     side, several = settings.atlas, len(layouts) > 1
     return Resources(
-        head=HeadResources(layouts[0].lit, len(asked.head.mesh.triangles)),
+        shape=shape,
+        head=layouts[0].head,
         layouts=tuple(layouts),
         shadow_maps=shadow_maps,
         scatters=asked.count > 0,
@@ -158,12 +161,14 @@ def _layout(
     asked: Asked,
     atlas: Atlas,
     textures: AtlasTextures,
+    shape: Shape,
     shared: dict[str, Any],
     index: int,
 ) -> AtlasLayout:
     """An atlas that light is spread on, without lights."""
     keep, number, head = memo.keep, str(index), asked.head
-    lit = keep(upload_geometry, device, head.mesh, atlas, of=number) | shared
+    held = keep(upload_geometry, device, head.mesh, atlas, shape, of=number)
+    lit = held.resources | shared
     if asked.occluded:
         bound = lit, textures.resources["atlas"]
         lit["occlusion_map"] = keep(surroundings.occlusion_map, device, head, atlas, using=bound, of=number)
@@ -175,7 +180,7 @@ def _layout(
         translucency = translucency_of(memo, device, head, atlas, *blurred, of=number)
     side = asked.settings.atlas if asked.count else 1
     surfaces = keep(surface_texels.make_surfaces, device, side, of=number)
-    return AtlasLayout(textures, lit, surfaces, _sum(memo, device, asked, side, number), translucency)
+    return AtlasLayout(textures, held, lit, surfaces, _sum(memo, device, asked, side, number), translucency)
 
 
 def _sum(memo: Memo, device: Device, asked: Asked, side: int, role: str) -> Any:

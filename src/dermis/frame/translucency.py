@@ -27,10 +27,10 @@ def translucency_of(
     changing: bool,
     of: str,
 ) -> Translucency:
-    """What comes through a head's thin parts, on an atlas.
+    """Light through a head's thin parts, on an atlas.
 
     variance_mm2, weight : (k,) and (k, 3) of the blurred levels
-    changing : whether profiles come and go, so that it is not worth while to keep what each lets pass
+    changing : whether profiles change too often for their weights to be worth keeping on disk
     of : name of the atlas among several
     """
     widest = float(np.sqrt(variance_mm2[-1]))
@@ -42,7 +42,7 @@ def translucency_of(
 
 
 def shared_width(widest_mm: float) -> float:
-    """The nearest of a few widths [mm]: similar skins share their pairs."""
+    """The width rounded to one of a few [mm], so that similar skins share their pairs."""
     step = round(_WIDTHS_TO_DOUBLE * float(np.log2(max(widest_mm, _LEAST_SHARED_MM))))
     return float(2.0 ** (step / _WIDTHS_TO_DOUBLE))
 
@@ -59,7 +59,7 @@ def pairs_of(device: Device, mesh: Mesh, atlas: Atlas, widest_mm: float, changin
 def translucency_from(
     device: Device, pairs: PairBuffers, variance_mm2: Floats, weight: Floats
 ) -> Translucency:
-    """What a profile lets pass between pairs, and space for it."""
+    """A profile's weights of the pairs, and buffers for the light."""
     gathered = scratch(device, device.buffer(np.zeros((pairs.source_count, 2), np.uint32), "STORAGE"))
     weights = weigh(device, pairs, variance_mm2, weight)
     return Translucency(pairs, weights, source_level(pairs, variance_mm2), gathered)

@@ -1,7 +1,7 @@
 """Mesh files as they lie on disk: groups of triangles in file units, with uv untouched.
 
-trimesh parses; what it would lose or change is marked in the file's text first: it flips v of glTF, drops
-uv of primitives without material and integer uv, and renames groups.
+trimesh parses. It flips v of glTF, drops uv of primitives without material and integer uv, and renames
+groups; so the file's text is marked first, and all of that survives.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import re
 import struct
 import warnings
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
+from dermis.mesh.quads import find_pairs, obj_sides, ply_sides
 
 Colour = tuple[float, float, float]
 Array = NDArray[np.float64]
@@ -27,18 +28,18 @@ GREY: Colour = (0.8, 0.8, 0.8)
 
 
 def is_gltf(path: str | Path) -> bool:
-    """Whether the file is glTF by its suffix."""
+    """Whether the file's suffix is glTF's."""
     return Path(path).suffix.lower() in (".glb", ".gltf")
 
 
 def default_unit_mm(path: str | Path) -> float:
-    """Length of the file's unit if nothing else is said [mm]: 1000 for glTF, which is in metres, else 1."""
+    """Default length of the file's unit [mm]: 1000 for glTF, which is in metres, else 1."""
     return 1000.0 if is_gltf(path) else 1.0
 
 
 @dataclass(frozen=True)
 class Group:
-    """Name of the material (or mesh) first, then all other names; diffuse colour, linear [-]."""
+    """Names of a group, that of its material (or mesh) first; its diffuse colour, linear [-]."""
 
     names: tuple[str, ...]
     colour: Colour = GREY
@@ -48,7 +49,7 @@ class Group:
 class Part:
     """One group's triangles in the file's units and the file's v direction.
 
-    positions (v, 3), uv (v, 2) or None, normals (v, 3) or None, triangles (f, 3)
+    positions (v, 3), uv (v, 2) or None, normals (v, 3) or None, triangles (f, 3), quads (q, 2) pairs of them
     """
 
     group: Group
@@ -56,6 +57,7 @@ class Part:
     uv: Array | None
     normals: Array | None
     triangles: NDArray[np.int64]
+    quads: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), np.int64))
 
 
 def read_gltf(path: Path) -> list[Part]:
@@ -77,7 +79,7 @@ def read_gltf(path: Path) -> list[Part]:
 
 
 def _mark_gltf(tree: dict[str, Any], path: Path) -> list[Group]:
-    """Give each primitive a group of its own and keep its raw uv and normals where trimesh leaves them be."""
+    """Give each primitive a group of its own and its raw uv and normals names that trimesh leaves alone."""
     _refuse_extensions(tree, path)
     groups: list[Group] = []
     wanted: set[int] = set()
@@ -132,8 +134,10 @@ def read_obj(path: Path) -> list[Part]:
         colours.update(_mtl_colours(path.parent / library))
     text, groups = _mark_obj(text, colours)
     materials = "\n".join(f"newmtl {k}" for k in range(len(groups)))
-    # trimesh pops groups from the end: file order again
+    # trimesh pops groups from the end: back to file order
     parts = list(_parts(text.encode(), "obj", groups, resolver={"marked.mtl": materials.encode()}))[::-1]
+    faces = {id(group): sides for group, sides in zip(groups, obj_sides(text, len(groups)), strict=True)}
+    parts = [replace(part, quads=find_pairs(faces[id(part.group)], part.triangles)) for part in parts]
     full, none = [part.group for part in parts], np.empty((0, 3))
     return parts + [Part(g, none, None, None, none.astype(int)) for g in groups if g.names and g not in full]
 
@@ -172,11 +176,11 @@ def read_ply(path: Path) -> list[Part]:
     """The one part of a .ply file; uv from the vertex properties s, t or u, v or texture_u, texture_v."""
     data = path.read_bytes()
     header = data[: data.find(b"end_header")]
-    # uv by face corner need vertices split, after which normals need not fit them any more; uv by vertex
-    # do not, and splitting would drop the normals as soon as one vertex is unused
+    # uv per face corner split vertices, which the file's normals may then not fit; uv per vertex do not, and
+    # splitting would drop the normals as soon as one vertex is unused
     by_corner = b"texcoord" in header
     parts = list(_parts(data, "ply", [Group((path.stem,))], fix_texture=by_corner, skip_materials=True))
-    return [Part(p.group, p.positions, p.uv, None, p.triangles) for p in parts] if by_corner else parts
+    return [replace(part, normals=None) for part in parts] if by_corner else parts
 
 
 READERS: dict[str, Callable[[Path], list[Part]]] = {
@@ -188,14 +192,14 @@ READERS: dict[str, Callable[[Path], list[Part]]] = {
 
 
 def _parts(data: bytes, kind: str, groups: list[Group], **options: Any) -> Iterator[Part]:
-    """What trimesh reads from `data`, in the world's frame, each under the group its material numbers."""
+    """Parts that trimesh reads from `data`, in world space, each with the group that its material numbers."""
     from io import BytesIO
 
     import trimesh
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        # text that breaks off in the middle must not pass as a shorter mesh
+        # a truncated text must not pass as a shorter mesh
         warnings.filterwarnings("error", message="string or file could not be read")
         scene = trimesh.load_scene(BytesIO(data), file_type=kind, process=False, **options)
     nodes = [scene.graph[node] for node in scene.graph.nodes_geometry]
@@ -213,7 +217,7 @@ def _placed(mesh: Any, transform: Array, group: Group) -> Part:
     if normals is None and "vertex_normals" in mesh._cache:
         normals = mesh.vertex_normals
     linear = transform[:3, :3]
-    # normals turn with the cofactors, for flat transforms too, and keep their length; mirrors turn triangles
+    # cofactors transform normals, for singular transforms too, and keep their length; mirrors flip triangles
     cofactors = np.array([np.cross(linear[(i + 1) % 3], linear[(i + 2) % 3]) for i in range(3)])
     mirror, size = np.sign(det := np.linalg.det(linear)) or 1.0, abs(det) ** (2 / 3) or 1.0
     triangles = np.array(mesh.faces, dtype=np.int64).reshape(-1, 3)
@@ -223,11 +227,12 @@ def _placed(mesh: Any, transform: Array, group: Group) -> Part:
         None if uv is None else _real(uv),
         None if normals is None else _real(normals) @ (mirror / size * cofactors).T,
         triangles[:, ::-1] if mirror < 0 else triangles,
+        find_pairs(ply_sides(mesh.metadata), triangles),
     )
 
 
 def _real(values: Any) -> Array:
-    """Floating numbers; integers are fractions of their type's largest, as glTF has it."""
+    """Values as floats; integers are fractions of their type's largest, as in glTF."""
     array = np.asarray(values)
     scale = np.iinfo(array.dtype).max if array.dtype.kind in "iu" else 1
     return np.asarray(array / scale, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""glTF beyond its triangles: the pictures that a file brings, and a head written as one .glb file."""
+"""glTF beyond its triangles: the pictures embedded in a file, and a head written as one .glb file."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ _WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 
 
 def embedded_maps(path: Path) -> dict[str, Any]:
-    """Options of `load_maps` that a .glb or .gltf file gives itself, {} for one without pictures.
+    """Options of `load_maps` for the pictures of a .glb or .gltf file, {} for one without.
 
-    The skin's material gives its base colour and, when the package wrote the file, the height, specular,
-    roughness and region maps of its extras; any other file gives its normal map.
+    The skin's material gives the base colour. Files that the package wrote give the height, specular,
+    roughness and region maps of the material's extras too, all others their normal map.
 
     Raises DermisError when the file is damaged.
     """
@@ -163,7 +163,7 @@ def encode_glb(
 
 
 def _placed(value: Any, places: Mapping[str, int]) -> Any:
-    """The tree with pictures' names replaced by their textures' numbers."""
+    """The tree with pictures' names replaced by the indices of their textures."""
     if isinstance(value, Mapping):
         return {
             key: places[one] if key == "index" and one in places else _placed(one, places)

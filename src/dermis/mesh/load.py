@@ -20,14 +20,16 @@ from dermis.mesh.check import UV_TOLERANCE, check_arrays, check_mesh
 from dermis.mesh.formats import READERS, Group, Part, default_unit_mm, is_gltf
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.mesh import Material, Mesh
+from dermis.mesh.outline import Outline
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 Origin = Literal["auto", "top", "bottom"]
 Up = Literal["y", "z"]
 
 FARTHEST_UV = 1e4
-"""Beyond this uv are damage, not tiles."""
-_FORM = 2  # raise when `load_mesh` gives other results for the same file
+"""uv beyond this are damaged data, not tiles."""
+_FORM = 2  # increment when `load_mesh` gives other results for the same file
 
 
 def load_mesh(
@@ -45,10 +47,10 @@ def load_mesh(
 
     path : the file
     unit_mm : length of the file's unit [mm]; None for the format's own (`default_unit_mm`)
-    v_origin : where v = 0 lies in the map by the file, "top" as glTF has it, "bottom" as OBJ and PLY have
-        it; "auto" takes the format's standard
+    v_origin : where the file has v = 0 in the map: "top" as in glTF, "bottom" as in OBJ and PLY; "auto" takes
+        the format's standard
     up : the file's axis that points up; with "z" the face looks along -Y, as in Blender
-    opaque : names of groups that are not skin, whatever they are called
+    opaque : names of groups that are not skin, even with "skin" in their name
 
     Raises `DermisError` when the file is missing, damaged or not a mesh, has no uv, or fails `check_mesh`.
     """
@@ -60,7 +62,7 @@ def load_mesh(
     data = source.read_bytes() if source.suffix.lower() == ".glb" and source.is_file() else b""
     if not data or b'"uri"' in data:  # parts of it lie in other files
         return load()
-    named = source.stem  # as a group without a name is
+    named = source.stem  # the name of groups without one
     return cached_mesh(data, repr((named, unit, v_origin, up, opaque)), load)
 
 
@@ -68,14 +70,14 @@ def _loaded(source: Path, unit: float, v_origin: Origin, up: Up, opaque: tuple[s
     """The mesh as it is in the file."""
     with np.errstate(all="ignore"):
         parts = _read(source)
-        positions, uv, normals, triangles = _joined(parts, source)
+        positions, uv, normals, triangles, quads = _joined(parts, source)
         place, normals = _upright(unit * positions, up).astype(np.float32), _upright(normals, up)
         flat = _v_down(uv, source, v_origin).astype(np.float32)
         check_arrays(place, flat, triangles, source)
     material, materials = _materials(parts, opaque, source)
     used, compact = np.unique(triangles, return_inverse=True)
     corners = compact.reshape(-1, 3)
-    mesh = build_mesh(place[used], flat[used], corners, material, materials, normals[used])
+    mesh = build_mesh(place[used], flat[used], corners, material, materials, normals[used], quads=quads)
     check_mesh(mesh, source)
     return mesh
 
@@ -116,8 +118,8 @@ def _read(source: Path) -> list[Part]:
     return full
 
 
-def _joined(parts: list[Part], source: Path) -> tuple[Array, Array, Array, NDArray[np.int64]]:
-    """Positions, uv, normals (NaN where the file has none) and triangles of all parts together."""
+def _joined(parts: list[Part], source: Path) -> tuple[Array, Array, Array, Index, Index]:
+    """Positions, uv, normals (NaN where the file has none), triangles and quads of all parts together."""
     positions, uvs, normals, triangles, offset = [], [], [], [], 0
     for part in parts:
         count = len(part.positions)
@@ -128,7 +130,9 @@ def _joined(parts: list[Part], source: Path) -> tuple[Array, Array, Array, NDArr
         normals.append(np.full((count, 3), np.nan) if given is None else given)
         triangles.append(part.triangles + offset)
         offset += count
-    return np.vstack(positions), np.vstack(uvs), np.vstack(normals), np.vstack(triangles)
+    first = np.cumsum([0, *map(len, triangles)])
+    quads = np.vstack([part.quads + begin for part, begin in zip(parts, first, strict=False)])
+    return np.vstack(positions), np.vstack(uvs), np.vstack(normals), np.vstack(triangles), quads
 
 
 def _part_uv(part: Part, source: Path) -> Array:
@@ -148,7 +152,7 @@ def _upright(vectors: Array, up: Up) -> Array:
 
 
 def _v_down(uv: Array, source: Path, v_origin: Origin) -> Array:
-    """`uv` (v, 2) with v = 0 in the top row; what misses [0, 1] by rounding only is put back."""
+    """`uv` (v, 2) with v = 0 in the top row; what misses [0, 1] only by rounding is clamped."""
     from_top = v_origin == "top" or (v_origin == "auto" and is_gltf(source))
     down = uv if from_top else np.column_stack((uv[:, 0], 1 - uv[:, 1]))
     inside = np.clip(down, 0, 1)
@@ -182,9 +186,9 @@ def _has(group: Group, word: str) -> bool:
 
 
 def cached_mesh(data: bytes, options: str, load: Callable[[], Mesh]) -> Mesh:
-    """The mesh that `load` makes of a file, kept on disk by its content.
+    """The mesh that `load` returns for a file, kept on disk by the file's content.
 
-    data : the file, with everything that the mesh is made of
+    data : bytes of the file, on which alone the mesh depends
     options : how it is read
     """
     arrays = [field.name for field in fields(Mesh) if field.name != "materials"]
@@ -192,18 +196,19 @@ def cached_mesh(data: bytes, options: str, load: Callable[[], Mesh]) -> Mesh:
     def make() -> Arrays:
         mesh = load()
         told = json.dumps([asdict(material) for material in mesh.materials]).encode()
-        return {name: getattr(mesh, name) for name in (*arrays, "outline")} | {
-            "materials": np.frombuffer(told, np.uint8)
+        return {name: getattr(mesh, name) for name in arrays} | {
+            "outline": mesh.outline.places_mm,
+            "materials": np.frombuffer(told, np.uint8),
         }
 
     digest = hashlib.sha256(f"{_FORM} {options}".encode())
     digest.update(data)
     found = stored("meshes", digest.hexdigest()[:40], [*arrays, "outline", "materials"], make)
     materials = json.loads(found.pop("materials").tobytes())
-    outline = found.pop("outline")
+    outline = Outline(found.pop("outline"))
     mesh = Mesh(
         **found,
         materials=tuple(Material(one["name"], one["kind"], tuple(one["colour"])) for one in materials),
     )
-    vars(mesh)["outline"] = outline  # the import alone of what finds it takes longer than reading it
+    vars(mesh)["outline"] = outline  # importing scipy to find it takes longer
     return mesh

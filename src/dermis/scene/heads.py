@@ -17,7 +17,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.load import load_mesh
 from dermis.mesh.maps import load_maps
 from dermis.mesh.samples import SAMPLES, fetch
-from dermis.mesh.subdivide import subdivide as subdivided
+from dermis.mesh.subdivide import subdivide_head
 from dermis.scene.head_table import NormalY, Up, VOrigin
 
 MapFile = str | os.PathLike[str] | None
@@ -50,7 +50,7 @@ def load_head(
     up : the file's upward axis
     normal_y : way in which green points in the normal map: "up" (OpenGL) or "down" (DirectX)
     opaque : groups of the file that are not skin, whatever they are called
-    subdivide : levels of Loop subdivision, 0 to 3
+    subdivide : levels of subdivision, 0 to 3: Catmull-Clark for a file of quads, else Loop
 
     Raises DermisError for files that cannot be rendered as a head.
     """
@@ -89,7 +89,7 @@ def load_head(
         check_head_height(mesh, name, unit_mm)
         maps = reading.result()
     thanks = f"{sample.attribution}, {sample.licence}" if sample else ""
-    return Head(name, subdivided(mesh, subdivide), maps, thanks)
+    return subdivide_head(Head(name, mesh, maps, thanks), subdivide)
 
 
 def _chosen(given: dict[str, MapFile], files: dict[str, Any]) -> dict[str, Any]:

@@ -63,7 +63,7 @@ class Views:
         bound = {
             **inputs.lit,
             "look": record,
-            "seen": inputs.resources.visibility.texture,
+            "visibility_buffer": inputs.resources.visibility.texture,
             "layer": layer,
             "bytes": self._space(settings.size),
         }

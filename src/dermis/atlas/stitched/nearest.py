@@ -20,7 +20,7 @@ class Sides(NamedTuple):
 
     ends : (k, 2, 2) [texel]
     steps : (k, 2, 2, 2) on the surface, at both ends, for a texel to the right and for one down [mm]
-    reach_mm : (k,) how far texels beyond it belong to it
+    reach_mm : (k,) how far from each side its texels may lie
     widest : (k,) and how far at most [texel]
     """
 
@@ -116,9 +116,9 @@ def _around(sides: Sides, metric: _Metric, shape: tuple[int, ...]) -> tuple[Inde
 def _within_a_texel(off: Doubles, along: Doubles) -> Flags:
     """Whether some place t along, 0 <= t <= 1, is less than a texel from `off` (2, n) along both axes."""
     low, high = np.minimum(along, 0.0), np.maximum(along, 0.0)
-    found = ((off > low - _TEXEL) & (off < high + _TEXEL)).all(axis=0)
+    found = np.asarray(((off > low - _TEXEL) & (off < high + _TEXEL)).all(axis=0))
     off, along = off[:, found], along[:, found]
     along = np.where(np.abs(along) < 1e-12, 1e-12, along)
     ends = np.sort(np.stack(((off - _TEXEL) / along, (off + _TEXEL) / along)), axis=0)
     found[found] = np.maximum(ends[0].max(axis=0), 0.0) <= np.minimum(ends[1].min(axis=0), 1.0)
-    return np.asarray(found)
+    return found

@@ -139,7 +139,7 @@ def _steps(
     along = np.einsum("fksi,fai->fksa", steps, axes)
     along *= (length / np.maximum(np.linalg.norm(along, axis=-1), 1e-12))[..., None]
     own = _own_steps(flat, uv)[:, None]
-    # the mean of triangles that face all ways may mean nothing: then the triangle's own steps
+    # the mean over triangles that face all ways may be meaningless: then the triangle's own steps
     bad = _turn(along) * np.sign(area_uv)[:, None] >= -0.05 * length.prod(axis=-1)
     along = np.where(bad[..., None, None], own, along)
     return along, np.concatenate((length, cosine[..., None]), axis=-1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -75,31 +77,36 @@ def runs(
     points : (h, w, 3) what each texel shows [mm]
     roots : (h, w, 2) nearest place on its chart [texel]
     metric : (h, w, 3) texels per mm along u and v, and a third number
-    steps, slack_mm : a gap is where texels beside each other show points farther apart than so many of their
-        steps on the surface and so much more, and belong to places that are farther apart than they are away
+    steps, slack_mm : neighbours have a gap between them if their points are farther apart than so many of
+        their steps on the surface plus the slack, and their roots farther apart than either texel is from its
+        root
     """
     y, x = np.indices(chart.shape, np.float32)
     away2 = (roots[..., 0] - x) ** 2 + (roots[..., 1] - y) ** 2
     for axis, first in ((1, 0), (0, 2)):
-        grids = (np.moveaxis(grid, axis, 1) for grid in (chart, points, roots, metric[..., 1 - axis], away2))
-        before, after = _lengths(_joined(*grids, steps, slack_mm))
+        grids = chart, points, roots, metric[..., 1 - axis], away2
+        rows = _Rows._make(np.moveaxis(grid, axis, 1) for grid in grids)
+        before, after = _lengths(_joined(rows, steps, slack_mm))
         reach[..., first], reach[..., first + 1] = (np.moveaxis(one, 1, axis) for one in (before, after))
 
 
-def _joined(
-    chart: NDArray[np.int32],
-    points: Singles,
-    roots: Singles,
-    density: Singles,
-    away2: Singles,
-    steps: float,
-    slack_mm: float,
-) -> Flags:
-    """(h, w) whether each texel goes on where the one before it in its row ends.
+class _Rows(NamedTuple):
+    """What `runs` is given, in rows along which runs go.
 
     density : texels per mm along the row
-    away2 : squared distance of each from its root
+    away2 : squared distance of each texel from its root
     """
+
+    chart: NDArray[np.int32]
+    points: Singles
+    roots: Singles
+    density: Singles
+    away2: Singles
+
+
+def _joined(rows: _Rows, steps: float, slack_mm: float) -> Flags:
+    """(h, w) whether each texel goes on where the one before it in its row ends."""
+    chart, points, roots, density, away2 = rows
     here, before = np.s_[:, 1:], np.s_[:, :-1]
     joined = np.zeros(chart.shape, np.bool_)
     joined[here] = (chart[here] >= 0) & (chart[here] == chart[before])

@@ -43,7 +43,7 @@ class Walkers(NamedTuple):
 
     def those(self, chosen: Flags) -> Walkers:
         """Some of them."""
-        return Walkers(*(part[chosen] for part in self))
+        return Walkers._make(part[chosen] for part in self)
 
 
 class Ends(NamedTuple):
@@ -68,7 +68,7 @@ class Ends(NamedTuple):
 
 
 def walk(adjacency: Adjacency, triangle: NDArray[np.integer], start: Doubles, target: Doubles) -> Ends:
-    """Go straight from a place in each triangle to a target in the triangle's plane, unfolded as one goes.
+    """Walk straight from a place in each triangle to a target in its plane, unfolding triangles on the way.
 
     triangle : (n,)
     start : (n, 2) in the triangle or on its border [mm]
@@ -97,9 +97,9 @@ def _begin(adjacency: Adjacency, triangle: Index, start: Complex, target: Comple
     all_of_them = Walkers(
         rows, triangle, side, corners[rows, side], after[rows, side], way, np.ones(len(triangle))
     )
-    leaves = passes.any(axis=1)
-    stay, corners = all_of_them.those(~leaves), corners[~leaves]
-    ends.write(stay, np.zeros(len(corners), np.int64), *_weights(*corners.T, stay.way), True)
+    leaves = np.asarray(passes.any(axis=1))
+    stay, (a, b, c) = all_of_them.those(~leaves), corners[~leaves].T
+    ends.write(stay, np.zeros(len(a), np.int64), *_weights(a, b, c, stay.way), True)
     return all_of_them.those(leaves)
 
 
@@ -118,7 +118,7 @@ def _step(adjacency: Adjacency, who: Walkers, ends: Ends) -> Walkers:
     a, b = np.where(flipped, who.a, who.b), np.where(flipped, who.b, who.a)
     forth, up = adjacency.apex[beside, entry].T
     apex = a + (forth + 1j * hand * up) * (b - a)
-    # out between the apex and the end on its other side
+    # it leaves between the apex and the end on the other side
     left, a_left = _cross(who.way, apex) > 0.0, _cross(who.way, a) > 0.0
     by_a = left != a_left
     side = (entry + np.where(by_a, 2, 1)) % 3
@@ -148,7 +148,7 @@ def _met(who: Walkers) -> Doubles:
 
 
 def _weights(a: Complex, b: Complex, c: Complex, at: Complex) -> tuple[Doubles, Doubles]:
-    """Of b and c, none negative."""
+    """Barycentric weights of b and c, none negative."""
     area = _cross(b - a, c - a)
     second = np.clip(_cross(at - a, c - a) / area, 0.0, 1.0)
     third = np.clip(_cross(b - a, at - a) / area, 0.0, 1.0)

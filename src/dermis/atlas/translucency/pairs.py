@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 
 Found = tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.uint16]]
 FORM = 11
-"""Raise it when the search gives other results."""
-_REACH = 3.2  # standard deviations of the widest Gaussian that two places are apart at most
-_SPACING = 0.36  # of the places, in the same unit: what is read between them is smooth
+"""To be incremented when the search gives other results."""
+_REACH = 3.2  # largest distance of a pair, in standard deviations of the widest Gaussian
+_SPACING = 0.36  # of the places, in the same unit: light is smooth between them
 _WIDEST_MM = 10.0  # pairs through wax, which spreads light farther, would be too many
 _MOST_CELLS = 2**21  # of a grid; narrow profiles would ask for thousands of times more
 _ROOM = 3.0  # spacings that a place may be away from the triangle that it stands for
@@ -49,7 +49,7 @@ class TranslucentPairs:
     first : (m + 3,) uint32 where the pairs of receivers 0, 1, 2, ... begin; 0 and 1 have none
     source : (l,) uint32 the place that each pair takes light from
     geometry : (l, 4) uint16 depth under its tangent plane, distance beside its normal, and along the surface
-        [1/65535 of the radius; 65535 where no blur leads]; share that counts [1/65535]
+        [1/65535 of the radius; 65535 where no blur gets there]; share that counts [1/65535]
     texel : (n, 2) uint16 of the sources, x and y in the atlas
     area_mm2 : (n,) float32 of the sources
     radius_mm, spacing_mm : () largest distance of a pair, and usual distance between sources
@@ -68,7 +68,7 @@ class TranslucentPairs:
 def find_pairs(mesh: Mesh, atlas: Atlas, widest_mm: float) -> TranslucentPairs:
     """All pairs of places that face away from each other and are near enough.
 
-    widest_mm : standard deviation of the widest Gaussian; pairs are 3.2 of them apart, 32 mm, at most [mm]
+    widest_mm : standard deviation of the widest Gaussian; pairs are at most 3.2 of them and 32 mm apart [mm]
     """
     widest = min(widest_mm, _WIDEST_MM)
     radius, fine = _REACH * widest, texel_mm(atlas)

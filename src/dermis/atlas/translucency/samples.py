@@ -114,7 +114,7 @@ def taking(mesh: Mesh, atlas: Atlas, surface: Chosen, thin: Chosen) -> Samples:
 
 
 def shown(atlas: Atlas, seen: Texels, given: Samples) -> NDArray[np.int32]:
-    """(n, n) the sample at or beside which each texel's light lies, -1 for none; in gutters, elsewhere."""
+    """(n, n) sample at or beside the place that each texel shows, -1 for none; gutters show other places."""
     beside = np.full((atlas.size + 2, atlas.size + 2), -1, np.int32)
     x, y = given.texel.T + 1
     for dy, dx in (*np.ndindex(3, 3), (1, 1)):  # a sample's own texel last

@@ -1,4 +1,4 @@
-"""The gutters of an atlas: texels beyond a chart's edge take the light of where the surface goes on."""
+"""The gutters of an atlas: texels beyond a chart's edge take the light from where the surface continues."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _BYTES = 16  # of a texel of the gutter in its list
 
 
 def draw(graph: Recorder, stage: str, atlas: AtlasTextures, light: Any, texel: str) -> None:
-    """Fill the gutter of `light`; no texture can be read and written at once, so by way of a list.
+    """Fill the gutter of `light` by way of a list, as no texture can be read and written at once.
 
     texel : its format
     """

@@ -3,10 +3,10 @@
 //#include "light_words.wgsl"
 
 struct Entering {
-    layer: u32, // blurred level that the sources show
+    layer: u32, // blurred level that the sources read
     sources: u32,
     mip: u32, // that holds the level
-    scale: f32, // of the light over what the level holds
+    scale: f32, // factor from what the level holds to light
 }
 
 @group(0) @binding(0) var<uniform> entering: Entering;

@@ -16,16 +16,14 @@ from dermis.optics.gaussians import MOST_GAUSSIANS
 
 Floats = NDArray[np.float64]
 ROW = 1024  # as in the shaders
-GRAIN = (
-    0.72  # sampled at their spacing, Gaussians of more variance than this times its square are even to 1e-6
-)
+GRAIN = 0.72  # Gaussians of more variance than this times the squared spacing sum evenly to 1e-6
 _SMOOTH = 0.45  # of the spacing; light of this standard deviation has no detail that the sources miss
 
 
 def upload_pairs(device: Device, table: TranslucentPairs, key: str = "") -> PairBuffers:
     """The pairs as the shaders read them.
 
-    key : what stands for the table, if what passes is to be kept on disk
+    key : identifies the table, if its weights are to be kept on disk
     """
     count, number = len(table.source), len(table.texel)
     pairs = np.zeros((max(1, count), 3), np.uint32)
@@ -51,10 +49,10 @@ def upload_pairs(device: Device, table: TranslucentPairs, key: str = "") -> Pair
 
 
 def _receivers(table: TranslucentPairs) -> NDArray[np.uint32]:
-    """(m, 3) cell, x and y packed, where its pairs begin, and where they end; one without pairs for none.
+    """(m, 3) cell, x and y packed, first pair, end of the pairs; one without pairs where there are none.
 
-    Those with most pairs come first: invocations that run side by side, and workgroups that are left for the
-    end, then have little to wait for.
+    Those with most pairs come first, so that invocations side by side have equally many, and the last
+    workgroups few.
     """
     y, x = np.nonzero(table.receiver > 1)
     which = table.receiver[y, x]
@@ -73,13 +71,13 @@ def _unlit(device: Device, surface: NDArray[np.bool_]) -> Any:
 
 
 def source_level(pairs: PairBuffers, variance_mm2: Floats) -> int:
-    """The blurred level that is smooth enough for the sources to tell all of it."""
+    """The first blurred level that is smooth enough for the sources to sample all of its detail."""
     smooth = np.flatnonzero(variance_mm2 >= (_SMOOTH * pairs.spacing_mm) ** 2)
     return int(smooth[0]) if len(smooth) else len(variance_mm2) - 1
 
 
 def weigh(device: Device, pairs: PairBuffers, variance_mm2: Floats, weight: Floats) -> Any:
-    """A buffer of the source of each pair and the share of its light, red, green and blue, that passes.
+    """A buffer of each pair's source and the share of its light, red, green and blue, that passes.
 
     variance_mm2, weight : (k,) and (k, 3) of the blurred levels
     """

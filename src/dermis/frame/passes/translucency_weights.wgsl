@@ -1,10 +1,10 @@
-// How much light passes through the flesh between translucent pairs, beyond what the blurs carry round.
+// How much light passes through the flesh between translucent pairs, beyond what blurs carry along the surface.
 
 struct Weighing {
-    radius_mm: f32, // pairs are nearer
+    radius_mm: f32, // pairs are nearer than this
     before_mm2: f32, // variance that the sources' light has already
-    cell_mm2: f32, // that a source usually stands for
-    grain: f32, // least variance that is added, over that or the source's own area: it hides their pattern
+    cell_mm2: f32, // usual area of a source
+    grain: f32, // least variance added, over the larger of that and the source's own area: it hides the sources' pattern
     count: u32,
     gaussian: array<vec4f, 24>, // weight per channel, variance [mm^2]
 }
@@ -12,12 +12,12 @@ struct Weighing {
 @group(0) @binding(0) var<uniform> weighing: Weighing;
 @group(0) @binding(1) var<storage, read> pairs: array<u32>; // three words: source; depth, aside; along, share
 @group(0) @binding(2) var<storage, read> sources: array<vec2u>; // texel; area [mm^2]
-@group(0) @binding(3) var<storage, read_write> weights: array<vec2u>; // source; share of its light, as encoded says
+@group(0) @binding(3) var<storage, read_write> weights: array<vec2u>; // source; share of its light, as `encoded` packs it
 
-const ROW: u32 = 1024u; // of the pairs, as they are spread over invocations
+const ROW: u32 = 1024u; // pairs in a row of invocations
 const PI: f32 = 3.14159265358979;
-const FAR_MM: f32 = 1e6; // as good as without end
-const LEAST_DISC: f32 = 0.3; // share of a Gaussian that the ball around a place must hold to stand for all of it
+const FAR_MM: f32 = 1e6; // as good as infinite
+const LEAST_DISC: f32 = 0.3; // least share of a Gaussian within the radius that is scaled up to all of it
 
 // Three shares with one exponent: nine bits each and five.
 fn encoded(c: vec3f) -> u32 {
@@ -30,8 +30,8 @@ fn encoded(c: vec3f) -> u32 {
     return m.r | (m.g << 9u) | (m.b << 18u) | (u32(e) << 27u);
 }
 
-// A Gaussian of the distance sqrt(t^2 + r^2) is exp(-t^2 / 2v) G(v, r) [dEonLuebke2007]; what is already in the sources'
-// light need not be added. The blur along the surface has brought its own share: that is taken off.
+// A Gaussian of the distance sqrt(t^2 + r^2) is exp(-t^2 / 2v) G(v, r) [dEonLuebke2007]; variance that the sources' light
+// already has is not added again. The share that the blur along the surface carries is subtracted.
 fn passed(depth: f32, aside: f32, along: f32, area: f32) -> vec3f {
     let edge2 = max(weighing.radius_mm * weighing.radius_mm - depth * depth, 0.0);
     var sum = vec3f(0.0);
@@ -56,7 +56,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let rest = unpack2x16unorm(pairs[3u * index + 2u]);
     var along = weighing.radius_mm * rest.x;
     if (rest.x == 1.0) {
-        along = FAR_MM; // no blur leads there
+        along = FAR_MM; // no blur gets there
     }
     let share = rest.y * passed(across.x, across.y, along, bitcast<f32>(sources[source].y));
     weights[index] = vec2u(source, encoded(share));

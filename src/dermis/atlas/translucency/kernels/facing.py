@@ -22,7 +22,7 @@ _ROUNDING = 1e-6  # of cosines
 def places(
     triangle: NDArray[np.int32], barycentric: NDArray[np.uint16], corner: NDArray[np.float32]
 ) -> tuple[NDArray[np.int16], NDArray[np.bool_]]:
-    """(n, n, 2) the texel nearest what each shows, x and y from -1 to n, and (n, n) whether that is its own.
+    """(n, n, 2) texel nearest the place that each shows, x and y from -1 to n; (n, n) whether it is its own.
 
     triangle, barycentric, corner : as `Atlas` has them, the last by the name `place`
     """
@@ -72,7 +72,7 @@ class Cells(NamedTuple):
 
 @compiled
 def face(patches: Patches, cells: Cells, radius_mm: float) -> NDArray[np.bool_]:
-    """(p,) whether a patch is near enough whose normals may be far enough from its own."""
+    """(p,) whether each patch has another near enough whose normals may be far enough from its own."""
     found = np.zeros(len(patches.low), np.bool_)
     for i in range(len(found)):
         found[i] = _faced(i, patches, cells, radius_mm)
@@ -98,7 +98,7 @@ def _faced(i: int, patches: Patches, cells: Cells, radius_mm: float) -> bool:
 
 @compiled
 def _askew(i: int, j: int, patches: Patches) -> bool:
-    """Whether normals of two patches may differ by so much that a place counts."""
+    """Whether normals of two patches may differ by enough for a pair."""
     cos_i, cos_j, sin_i, sin_j = patches.cosine[i], patches.cosine[j], patches.sine[i], patches.sine[j]
     cosine, sine = cos_i * cos_j - sin_i * sin_j, sin_i * cos_j + cos_i * sin_j  # of both angles together
     if cosine <= ASKEW or sine < 0.0:

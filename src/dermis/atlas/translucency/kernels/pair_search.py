@@ -15,9 +15,9 @@ Integers = NDArray[np.int64]
 Metric = tuple[float, float, float]  # texels per mm along u and v, and the cosine between these
 
 ASKEW = 0.5
-"""Cosine of two normals from which a place counts."""
+"""Cosine of two normals below which two places make a pair."""
 
-_OPPOSED = -0.2  # to which it counts more and more
+_OPPOSED = -0.2  # cosine at which a pair counts fully
 _NEIGHBOURS = 3.0  # texels within which the nine around one are found
 _ACROSS_AIR = -0.5  # mean cosine to the inward normals at which two places only see each other from outside
 
@@ -69,7 +69,7 @@ class Hits(NamedTuple):
 
 
 class Along(NamedTuple):
-    """For each source: distance in the map to the nearest texel that shows it [mm]; sum and number around."""
+    """For each source: distance in the map to the nearest texel that shows it [mm]; sum and count around."""
 
     nearest: NDArray[np.float32]
     sum: NDArray[np.float32]
@@ -88,7 +88,7 @@ def search(
     """Sources (l,) of some receivers, one after the other, and (l, 4) their geometry.
 
     That is: depth under the source's tangent plane, distance beside its normal, distance along the surface
-    [1/65535 of the radius; 65535 where no blur leads there]; share that counts [1/65535].
+    [1/65535 of the radius; 65535 where no blur gets there]; share that counts [1/65535].
 
     part : first receiver, and the one after the last
     count : (m,) sources of each receiver, to be written
