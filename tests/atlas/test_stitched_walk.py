@@ -8,7 +8,8 @@ from cut_meshes import cut_cone, cut_cylinder, cut_sphere
 from numpy.typing import NDArray
 
 from dermis.atlas.stitched.build import find_pieces
-from dermis.atlas.stitched.overlap_cuts import cut_overlaps, find_conflicts
+from dermis.atlas.stitched.conflicts import find_conflicts
+from dermis.atlas.stitched.overlap_cuts import cut_overlaps
 from dermis.atlas.stitched.surface import FlatSurface, survey
 from dermis.atlas.stitched.walk import walk
 from dermis.mesh.geometry import build_mesh
@@ -118,7 +119,7 @@ def test_an_overlap_is_cut_until_its_sides_have_room() -> None:
         find_conflicts(surface, cut >= 0, np.flatnonzero(cut == k), 8.0).length_mm
         for k in range(int(cut.max()) + 1)
     )
-    assert whole > 8.0
+    assert whole >= 8.0
     assert left < 0.5 * whole
 
 

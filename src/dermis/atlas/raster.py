@@ -34,7 +34,8 @@ def texels_in(p: Floats, shape: tuple[int, int], margin: float = -_EDGE) -> tupl
     margin : how far inside its edges along rows and columns they have to be [texel]
     """
     height, width = shape
-    top, bottom = _inside(p[:, :, 1].min(axis=1), p[:, :, 1].max(axis=1), height, margin)
+    low, high = (least(least(p[:, 0, 1], p[:, 1, 1]), p[:, 2, 1]) for least in (np.minimum, np.maximum))
+    top, bottom = _inside(low, high, height, margin)
     which, y = expand(top, np.maximum(bottom - top + 1, 0))
     left, right = _inside(*_span(p, which, y), width, margin)
     span, x = expand(left, np.maximum(right - left + 1, 0))

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import MOST_SHEAR, Atlas
-from dermis.atlas.stitched.cover import Cover, cover, hidden, metric_of, roots_of, runs_of
+from dermis.atlas.stitched.cover import Cover, cover, hidden, metric_of, runs_of
 from dermis.atlas.stitched.gutter import GutterWidth, Packing, find_border
 from dermis.atlas.stitched.overlap_cuts import cut_overlaps
 from dermis.atlas.stitched.pack import pack_pieces
@@ -85,7 +85,7 @@ def build_stitched(mesh: Mesh, size: int, reach_mm: float) -> Atlas | None:
 def _atlas(surface: FlatSurface, packing: Packing, made: Cover, mapped: NDArray[np.bool_]) -> Atlas:
     size = len(made.triangle)
     metric = metric_of(surface, packing, made)
-    reach = runs_of(surface, made, made.piece, metric, roots_of(packing, made))
+    reach = runs_of(surface, packing, made)
     y, x = np.nonzero(made.gutter)
     second = made.weights[y, x].astype(np.float64)
     weights = np.column_stack((1 - second.sum(axis=1), second))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,18 +124,30 @@ def walk_gutter(
 
 
 def walk_from(
-    surface: FlatSurface, border: Border, sides: Sides, nearest: Nearest, texels: Index
+    surface: FlatSurface, border: Border, sides: Sides, nearest: Nearest, texels: NDArray[Any]
 ) -> tuple[Ends, Doubles]:
     """Where straight walks to texels (n, 2) from the nearest places on a border end, and weights of these."""
-    k, t = nearest.side, nearest.share[:, None]
-    root, first, rows = border.triangle[k], border.side[k], np.arange(len(k))
+    t, root = nearest.share[:, None], border.triangle[nearest.side]
+    first, rows = border.side[nearest.side], np.arange(len(root))
     second = (first + 1) % 3
     start = _between(surface.adjacency.flat[root, first], surface.adjacency.flat[root, second], t)
-    off = texels - _between(sides.ends[k, 0], sides.ends[k, 1], t)
-    step = np.einsum("ns,nsa->na", off, _between(sides.steps[k, 0], sides.steps[k, 1], t[..., None]))
-    corner = np.zeros((len(k), 3))
+    off = texels - places_on(sides, nearest)
+    step = np.einsum("ns,nsa->na", off, steps_at(sides, nearest))
+    corner = np.zeros((len(root), 3))
     corner[rows, first], corner[rows, second] = 1 - t[:, 0], t[:, 0]
     return walk(surface.adjacency, root, start, start + step), corner[:, 1:]
+
+
+def places_on(sides: Sides, nearest: Nearest) -> Doubles:
+    """(n, 2) the nearest places [texel]."""
+    first, second = np.moveaxis(sides.ends[nearest.side], 1, 0)
+    return _between(first, second, nearest.share[:, None])
+
+
+def steps_at(sides: Sides, nearest: Nearest) -> Doubles:
+    """(n, 2, 2) steps on the surface there, for a texel to the right and for one down [mm]."""
+    first, second = np.moveaxis(sides.steps[nearest.side], 1, 0)
+    return _between(first, second, nearest.share[:, None, None])
 
 
 def _between(a: Doubles, b: Doubles, t: Doubles) -> Doubles:
