@@ -9,15 +9,17 @@ import pytest
 from cut_meshes import cut_sphere
 from numpy.typing import NDArray
 from setups import head_of
-from tolerances import SHAPE, SHAPE_NORMAL, STRETCHED
+from tolerances import SHAPE, SHAPE_NORMAL, STRETCHED, WALKED
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
 from dermis.frame.atlas_textures import upload_atlas
+from dermis.frame.coarser import Sheet, halved
 from dermis.frame.geometry import upload_geometry
-from dermis.frame.passes import shape, stretch
+from dermis.frame.gutters import make_walks
+from dermis.frame.passes import gutters, shape, stretch
 from dermis.frame.passes.shape import Motion
-from dermis.frame.shape import Shape, make_shape
+from dermis.frame.shape import Shape, make_shape, shape_tables
 from dermis.gpu import Device, Frame, download
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
@@ -44,7 +46,7 @@ def anew(mesh: Mesh, points: Floats) -> Mesh:
 
 def evaluated(device: Device, head: Head, motion: Motion) -> tuple[Shape, NDArray[np.float32]]:
     """The shape in motion, and (v, 16) its vertices."""
-    made, frame = make_shape(device, head), Frame(device)
+    made, frame = make_shape(device, shape_tables(device, head)), Frame(device)
     shape.draw(frame, made, motion)
     frame.submit()
     table = download(device, made.surface["vertex_table"]).reshape(-1, 16)
@@ -120,12 +122,13 @@ def test_targets_bones_and_stencils_are_those_of_the_rig(device: Device, head: H
     posed = rig.posed(weights, matrices)
     assert np.abs(points_of(device, made.stencils["control"]) - posed).max() < SHAPE * 30
     refined = rig.stencils.points(posed)
-    assert np.abs(points_of(device, made.points) - refined).max() < SHAPE * 30
+    assert np.abs(points_of(device, made.surface["points"]) - refined).max() < SHAPE * 30
     assert np.abs(table[:, :3] - refined[moving.mesh.point]).max() < SHAPE * 30
 
 
 def stretched(device: Device, head: Head, atlas: Atlas, points: Floats) -> NDArray[np.float16]:
-    made, textures, frame = make_shape(device, head), upload_atlas(device, atlas), Frame(device)
+    textures, frame = upload_atlas(device, atlas), Frame(device)
+    made = make_shape(device, shape_tables(device, head))
     shape.draw(frame, made, Motion(words(points)))
     stretch.draw(frame, upload_geometry(device, head.mesh, atlas, made), textures)
     frame.submit()
@@ -157,3 +160,42 @@ def test_a_scaled_ball_has_the_density_of_its_size(device: Device, head: Head, s
     made = stretched(device, head, atlas, scale * head.positions_mm).astype(float)
     expected = atlas.stretch.astype(float) / scale
     assert np.abs(made[..., :2] - expected)[atlas.coverage].max() < STRETCHED * expected.max()
+
+
+def sources(device: Device, head: Head, atlas: Atlas, points: Floats) -> list[Floats]:
+    """(a, 2) where each texel of the gutters has its light, at each resolution, walked on the device."""
+    textures, frame = upload_atlas(device, atlas), Frame(device)
+    made = make_shape(device, shape_tables(device, head))
+    walks = make_walks(device, head.mesh, atlas, textures)
+    shape.draw(frame, made, Motion(words(points)))
+    frame.submit()
+    walked = gutters.walked(device, textures, walks, upload_geometry(device, head.mesh, atlas, made))
+    lists = [one for one in (walked, *walked.coarser) if one.gutter]
+    found = [np.frombuffer(device.handle.queue.read_buffer(one.gutter), np.uint32) for one in lists]
+    for one, listed in zip(lists, found, strict=True):
+        assert np.array_equal(listed.reshape(-1, 4)[:, 2:], one.gutter_texels)
+    return [one.view(np.float32).reshape(-1, 4)[:, :2].astype(float) for one in found]
+
+
+def test_gutters_continue_where_they_do_at_rest(device: Device, head: Head) -> None:
+    """Whatever the size of the head, and however it is turned as a whole."""
+    atlas = build_atlas(head.mesh, 256, "stitched")
+    sheet = Sheet(atlas.coverage, atlas.own, atlas.reach, atlas.gutter, atlas.source)
+    turn = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]], float)
+    for points in (head.positions_mm, head.positions_mm @ turn.T):
+        fine, coarse, *_ = sources(device, head, atlas, points)
+        away = np.linalg.norm(fine - atlas.source, axis=1)
+        assert np.percentile(away, 98) < WALKED and np.median(away) < WALKED / 20
+        away = np.linalg.norm(coarse - halved(sheet).source, axis=1)
+        assert np.percentile(away, 97) < WALKED
+
+
+def test_gutters_of_another_shape_are_as_far_from_their_edge_as_on_it(device: Device, head: Head) -> None:
+    """A ball twice as large: the same texels beyond an edge are twice as many mm, and so the same places."""
+    atlas = build_atlas(head.mesh, 256, "stitched")
+    fine, *_ = sources(device, head, atlas, 2 * head.positions_mm)
+    away = np.linalg.norm(fine - atlas.source, axis=1)
+    assert np.percentile(away, 98) < WALKED
+    bean, *_ = sources(device, head, atlas, bent(head.positions_mm.astype(float)))
+    moved = np.linalg.norm(bean - atlas.source, axis=1)
+    assert np.percentile(moved, 90) > 10 * WALKED  # kept walks would be wrong by more than that

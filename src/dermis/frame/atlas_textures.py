@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,8 @@ from dermis.gpu import Constants, Device, make_texture, scratch
 from dermis.gpu.textures import texture_from
 
 _HALVING = "halved 2"  # raise when `halved` gives other results
+ENTRY_BYTES = 16
+"""Of a texel in a list of gutters, as gutter.wgsl reads it."""
 _GUTTER_BIT = 1 << 15  # of the first number of a texel's reach, see reach.wgsl
 
 
@@ -35,6 +37,7 @@ class AtlasTextures:
     stretching : pipeline constants of the stretch passes
     rooted : buffer of the texels whose stretch is that of another place; None without any
     gutter, gathered : buffers of the texels beyond the charts' edges and of their light; None without any
+    gutter_texels : (a, 2) these texels, x and y
     coarser : the same, again and again at half the resolution; only of stitched layouts
     usual_per_mm : median of the texels per mm along the axis that has fewer, at rest
     """
@@ -44,6 +47,7 @@ class AtlasTextures:
     stretching: Constants = ()
     rooted: Any = None
     gutter: Any = None
+    gutter_texels: NDArray[np.uint16] = field(default_factory=lambda: np.zeros((0, 2), np.uint16))
     gathered: Any = None
     coarser: tuple[AtlasTextures, ...] = ()
     usual_per_mm: float = 0.0
@@ -95,7 +99,8 @@ def _uploaded(device: Device, sheet: Sheet, resources: dict[str, Any], **more: A
     beyond = np.concatenate([sheet.source.view(np.uint32), sheet.gutter.astype(np.uint32)], axis=1)
     light = np.zeros((len(beyond), 4), np.float32)
     gutter, gathered = (device.buffer(words, "STORAGE") for words in (beyond, light))
-    return AtlasTextures(resources, gutter=gutter, gathered=scratch(device, gathered), **more)
+    lists = {"gutter": gutter, "gathered": scratch(device, gathered)}
+    return AtlasTextures(resources, gutter_texels=sheet.gutter, **lists, **more)
 
 
 def _rooted(atlas: Atlas) -> NDArray[np.uint32]:

@@ -19,13 +19,22 @@ from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Device, Memo
 from dermis.mesh.head import Head
 from dermis.mesh.outline import Outline
+from dermis.mesh.rig import Motion as RigMotion
 from dermis.scene.lights import Light
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES
 
+_SLACK_MM = 10.0  # that a rig's outermost points may miss of a pose
 Lights = tuple[Light, ...]
 Views = list[ShadowView | None]
+
+
+class Moved(NamedTuple):
+    """A head's motion and how far out its shape reaches."""
+
+    motion: Motion
+    outline: Outline
 
 
 class Preparation:
@@ -55,12 +64,23 @@ class Preparation:
         profile = self.profile_of(scene.skin)
         surroundings = keep(load_surroundings, device, around.name if around else None)
         scene = with_suns(self.memo, scene, surroundings)
-        lights, moved = (head, tuple(scene.lights)), keep(_moved, head)
+        lights, moved = (head, tuple(scene.lights)), self._moved(head, scene.motion)
         views = keep(_views, *lights, moved.outline, settings.shadow_size, using=(scene,))
         record = keep(_record, *lights, views, using=(device, scene))
         layers = shadow_layers(views)
         counts = len(views), len(layers.clips)
-        asked = Asked(head, scene.skin, profile, settings, around, surroundings, technique, *counts, view)
+        asked = Asked(
+            head,
+            scene.skin,
+            profile,
+            _person(scene),
+            settings,
+            around,
+            surroundings,
+            technique,
+            *counts,
+            view,
+        )
         resources = keep(make_resources, self.memo, device, asked)
         seen_from, shone_on = pinhole(scene.camera, head, settings), light_constants(scene)
         scale = scale_of(resources.levels.texel, brightest(scene, surroundings))
@@ -78,6 +98,28 @@ class Preparation:
             constants=resources.constants + shone_on,
         )
 
+    def _moved(self, head: Head, motion: RigMotion | None) -> Moved:
+        """The head as it is posed, or at rest where no motion came."""
+        resting = self.memo.keep(_resting, head)
+        return self.memo.keep(_posed, head, motion, resting.motion) if motion else resting
+
+
+def _person(scene: Scene) -> Any:
+    """Where the control points rest, if not where the head's own do."""
+    motion, own = scene.motion, scene.head.positions_mm
+    return None if motion is None or motion.positions_mm is own else motion.positions_mm
+
+
+def _resting(head: Head) -> Moved:
+    return Moved(resting(head.control), head.mesh.outline)
+
+
+def _posed(head: Head, motion: RigMotion, at_rest: Motion) -> Moved:
+    rig, weights, matrices = head.control, motion.weights.tobytes(), motion.matrices.tobytes()
+    same = motion.positions_mm is rig.positions_mm
+    positions = at_rest.positions if same else motion.positions_mm.tobytes()
+    return Moved(Motion(positions, weights, matrices), Outline(rig.outline_mm(motion), _SLACK_MM))
+
 
 def under(layout: AtlasLayout, lights: Any) -> AtlasLayout:
     """The layout under lights.
@@ -85,17 +127,6 @@ def under(layout: AtlasLayout, lights: Any) -> AtlasLayout:
     lights : the shader's array
     """
     return replace(layout, lit=layout.lit | {"lights": lights})
-
-
-class Moved(NamedTuple):
-    """A head's motion and how far out its shape reaches."""
-
-    motion: Motion
-    outline: Outline
-
-
-def _moved(head: Head) -> Moved:
-    return Moved(resting(head.control), head.mesh.outline)
 
 
 def _scaled(blurs: tuple[Blur, ...], scale: float) -> tuple[Blur, ...]:

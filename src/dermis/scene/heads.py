@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,9 @@ from dermis.errors import refuse
 from dermis.human.bust import BUSTS
 from dermis.mesh.check import check_head_height
 from dermis.mesh.formats import is_gltf
-from dermis.mesh.gltf import embedded_maps
+from dermis.mesh.gltf.pictures import embedded_maps
 from dermis.mesh.head import Head
-from dermis.mesh.load import load_mesh
+from dermis.mesh.load import load_rigged
 from dermis.mesh.maps import load_maps
 from dermis.mesh.samples import SAMPLES, fetch
 from dermis.mesh.subdivide import subdivide_head
@@ -41,7 +42,8 @@ def load_head(
 ) -> Head:
     """The built-in "bust", a sample ("lee_perry_smith") or a mesh file (.glb, .gltf, .obj, .ply) with maps.
 
-    Options replace what a sample or a glTF file has of its own.
+    Options replace what a sample or a glTF file has of its own. Morph targets and bones of a glTF file move
+    the head (`Pose`); it rests as the file has it, at the default weights of its targets.
 
     colour, normal, height, specular, roughness : image files; see `load_maps`
     height_mm : relief of one grey level of an 8-bit height map [mm]
@@ -85,11 +87,14 @@ def load_head(
         refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
     with ThreadPoolExecutor(1) as beside:
         reading = beside.submit(load_maps, **chosen, height_mm=height_mm, normal_y=normal_y)
-        mesh = load_mesh(path, unit_mm=unit_mm, v_origin=v_origin, up=up, opaque=tuple(opaque))
-        check_head_height(mesh, name, unit_mm)
+        rigged = load_rigged(path, unit_mm=unit_mm, v_origin=v_origin, up=up, opaque=tuple(opaque))
+        check_head_height(rigged.mesh, name, unit_mm)
         maps = reading.result()
     thanks = f"{sample.attribution}, {sample.licence}" if sample else ""
-    return subdivide_head(Head(name, mesh, maps, thanks), subdivide)
+    made = subdivide_head(Head(name, rigged.mesh, maps, thanks, rigged.rig), subdivide)
+    if subdivide and made.rig is not None:  # sequences of files have places for the file's own vertices
+        made = replace(made, rig=replace(made.rig, corner=rigged.mesh.point))
+    return made
 
 
 def _chosen(given: dict[str, MapFile], files: dict[str, Any]) -> dict[str, Any]:
