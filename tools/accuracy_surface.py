@@ -23,6 +23,7 @@ from dermis.frame.passes import stretch as stretched
 from dermis.frame.passes.shape import rest_shape
 from dermis.frame.renderer import Renderer
 from dermis.frame.seams import REMEDIES
+from dermis.frame.shape import shape_tables
 from dermis.gpu import Device, Frame, download, upload
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -76,7 +77,8 @@ def spread(
     levels = make_levels(device, len(light), len(variance), usual_texel(device))
     upload(device, levels.stack, np.dstack([light, light, light, np.ones_like(light)]))
     frame = Frame(device)
-    shape = rest_shape(device, Head("", mesh, Maps()))
+    head = Head("", mesh, Maps())
+    shape = rest_shape(device, shape_tables(device, head), head.positions_mm)
     stretched.draw(frame, upload_geometry(device, mesh, atlas, shape), textures)
     diffuse.draw(frame, levels, textures, blur)
     frame.submit()

@@ -25,6 +25,7 @@ from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES
 
+_SLACK_MM = 10.0  # that a rig's outermost points may miss of a pose
 Lights = tuple[Light, ...]
 Views = list[ShadowView | None]
 
@@ -117,7 +118,7 @@ def _posed(head: Head, motion: RigMotion, at_rest: Motion) -> Moved:
     rig, weights, matrices = head.control, motion.weights.tobytes(), motion.matrices.tobytes()
     same = motion.positions_mm is rig.positions_mm
     positions = at_rest.positions if same else motion.positions_mm.tobytes()
-    return Moved(Motion(positions, weights, matrices), Outline(rig.outline_mm(motion)))
+    return Moved(Motion(positions, weights, matrices), Outline(rig.outline_mm(motion), _SLACK_MM))
 
 
 def under(layout: AtlasLayout, lights: Any) -> AtlasLayout:

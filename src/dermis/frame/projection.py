@@ -136,7 +136,7 @@ def perspective(rows: Rows, half: tuple[float, float], near: float, far: float) 
 def depth_range(outline: Outline, rows: Rows) -> tuple[float, float]:
     """Nearest and farthest depth of the shape before the eye, a little widened [mm]."""
     z = np.array(rows[2], np.float32) @ outline.columns
-    near, far = float(z.min()), float(z.max())
+    near, far = float(z.min()) - outline.slack_mm, float(z.max()) + outline.slack_mm
     return max(near - 1.0, 0.5, 1e-3 * far), max(far + 1.0, 2.0)
 
 
@@ -161,7 +161,11 @@ def point_views(
     _check_outside(lights, [one > _NEAREST_MM for one in near])
     steepest = _steepest(seen[:2], depth)
     _check_outside(lights, [one <= _WIDEST_LIGHT for one in steepest])
-    bounds = [(_widened(h), 0.98 * n, 1.02 * f) for h, n, f in zip(steepest, near, far, strict=True)]
+    slack = outline.slack_mm
+    bounds = [
+        (_widened(h), max(0.98 * n - slack, 0.1 * n), 1.02 * f + slack)
+        for h, n, f in zip(steepest, near, far, strict=True)
+    ]
     clips = [perspective(r, (h, h), n, f) for r, (h, n, f) in zip(rows, bounds, strict=True)]
     return [
         ShadowView(clip, 2.0 * h / size, eye, right, up, n, f)
@@ -200,7 +204,8 @@ def parallel_view(direction: Vec, outline: Outline, size: int) -> ShadowView:
     points = outline.places_mm
     axes = frame_of(direction, np.array(_UP))
     local = points @ np.stack(axes, axis=1)
-    low, high = local.min(axis=0) - 1.0, local.max(axis=0) + 1.0
+    room = 1.0 + np.array([0.0, 0.0, outline.slack_mm])
+    low, high = local.min(axis=0) - room, local.max(axis=0) + room
     middle_x, middle_y = (_STEP_MM * round(0.5 * float(low[k] + high[k]) / _STEP_MM) for k in (0, 1))
     reach = max(high[0] - middle_x, middle_x - low[0], high[1] - middle_y, middle_y - low[1])
     half = _widened(float(reach))

@@ -14,6 +14,7 @@ from dermis.frame import surface, surroundings
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.atlas_textures import AtlasTextures, upload_atlas
 from dermis.frame.geometry import upload_geometry
+from dermis.frame.gutters import make_walks
 from dermis.frame.inputs import Resources, Split, view_record
 from dermis.frame.levels import Blur, Levels
 from dermis.frame.limits import check_limits
@@ -21,7 +22,7 @@ from dermis.frame.maps import upload_maps
 from dermis.frame.passes import bloom, gutters, post, shade, shadows, surface_texels, visibility_buffer
 from dermis.frame.passes.shape import rest_shape
 from dermis.frame.seams import LaidOut, Remedy, laid_out, remedy_of
-from dermis.frame.shape import Shape, make_shape
+from dermis.frame.shape import Shape, make_shape, shape_tables
 from dermis.frame.surroundings import Surroundings
 from dermis.frame.techniques.technique import AtlasTechnique, Technique
 from dermis.frame.translucency import translucency_of
@@ -103,7 +104,8 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     maps = memo.soon(device.executor, upload_maps, *reading)  # which take long to read
     size = settings.shadow_size if asked.shadow_layers else 1
     shadow_maps = keep(_shadow_maps, device, asked.head, asked.shadow_layers, size, of=asked.view)
-    shape = keep(make_shape, device, asked.head)
+    tables = keep(shape_tables, device, asked.head)
+    shape = keep(make_shape, device, tables)
     shared = _shared(memo, device, asked, shadow_maps)
     named = list(enumerate(asked.atlases.layouts))
     atlases = [_atlas(memo, device, asked, name, index) for index, name in named]
@@ -173,8 +175,9 @@ def _layout(
     held = keep(upload_geometry, device, head.mesh, atlas, shape, of=number)
     lit = held.resources | shared
     if asked.person is not None:
-        resting = held.shaped(keep(rest_shape, device, head, asked.person))
-        textures = keep(gutters.walked, device, head.mesh, atlas, textures, resting, of=number)
+        resting = held.shaped(keep(rest_shape, device, shape.tables, asked.person))
+        walks = keep(make_walks, device, head.mesh, atlas, textures, of=number)
+        textures = keep(gutters.walked, device, textures, walks, resting, of=number)
     if asked.occluded:
         bound = lit, textures.resources["atlas"]
         lit["occlusion_map"] = keep(surroundings.occlusion_map, device, head, atlas, using=bound, of=number)

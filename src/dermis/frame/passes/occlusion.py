@@ -13,6 +13,7 @@ from dermis.frame.passes import program
 from dermis.frame.passes.shape import rest_shape
 from dermis.frame.passes.visibility_buffer import draw_layers, make_layers
 from dermis.frame.projection import ShadowView, parallel_view, shadow_layers
+from dermis.frame.shape import shape_tables
 from dermis.gpu import ComputeProgram, Device, Frame
 from dermis.gpu.program import Resources
 from dermis.mesh.head import Head
@@ -42,7 +43,8 @@ def bake_occlusion(
     lit : what the lighting passes read, the surface aside
     texels : texture of the atlas' texels, of which side x side are baked, then the vertices, row by row
     """
-    mesh, frame, shape = head.mesh, Frame(device), rest_shape(device, head)
+    mesh, frame = head.mesh, Frame(device)
+    shape = rest_shape(device, shape_tables(device, head), head.positions_mm)
     resting = upload_geometry(device, mesh, atlas, shape)
     shader, towards = program(device, "occlusion.wgsl"), fibonacci_sphere(directions)
     rows = side - (-len(mesh.positions) // side)

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.passes import each, program
-from dermis.frame.shape import LEAST_ACROSS, Shape, make_shape
+from dermis.frame.shape import LEAST_ACROSS, Shape, ShapeTables, make_shape
 from dermis.gpu import Device, Frame, Graph, Recorder
 from dermis.gpu.program import Resources
 from dermis.mesh.geometry import MIN_UV_CROSS
-from dermis.mesh.head import Head
-from dermis.mesh.rig import Rig, no_targets
+from dermis.mesh.rig import Rig
 
 
 class Motion(NamedTuple):
@@ -40,14 +38,13 @@ def draw(graph: Frame | Graph, shape: Shape, motion: Motion) -> None:
     graph.repeat(_evaluate, shape)
 
 
-def rest_shape(device: Device, head: Head, person: NDArray[np.float32] | None = None) -> Shape:
-    """A head's shape as it rests, evaluated in resources of its own.
+def rest_shape(device: Device, tables: ShapeTables, positions_mm: NDArray[np.float32]) -> Shape:
+    """The shape of a person at rest, evaluated at once.
 
-    person : (p, 3) other places of its control points, those of another person [mm]
+    positions_mm : (p, 3) of the control points
     """
-    rig = replace(head.control, targets=no_targets(), skeleton=None)
-    made, frame = make_shape(device, replace(head, rig=rig)), Frame(device, timed=False)
-    draw(frame, made, Motion((rig.positions_mm if person is None else person).tobytes()))
+    made, frame = make_shape(device, tables, moves=False), Frame(device, timed=False)
+    draw(frame, made, Motion(positions_mm.tobytes()))
     frame.submit()
     return made
 
@@ -59,13 +56,13 @@ def resting(rig: Rig) -> Motion:
 
 
 def _evaluate(graph: Recorder, shape: Shape) -> None:
-    control, points, vertices = shape.counts
+    tables = shape.tables
     if shape.morphs:
-        _each(graph, "shape_pose.wgsl", shape.morphs, control, (("BONED", shape.boned),))
+        _each(graph, "shape_pose.wgsl", shape.morphs, tables.control, (("BONED", tables.bones > 0),))
     if shape.stencils:
-        _each(graph, "shape_refine.wgsl", shape.stencils, points)
+        _each(graph, "shape_refine.wgsl", shape.stencils, tables.points)
     least = (("LEAST_UV", MIN_UV_CROSS), ("LEAST_ACROSS", LEAST_ACROSS))
-    _each(graph, "shape_vertices.wgsl", shape.surface, vertices, least)
+    _each(graph, "shape_vertices.wgsl", shape.surface, tables.vertices, least)
 
 
 def _each(graph: Recorder, name: str, bound: Resources, count: int, constants: Any = ()) -> None:
