@@ -22,7 +22,8 @@ Rows = tuple[Row, Row, Row]
 _WIDEST_LIGHT = math.tan(math.radians(80.0))
 _NEAREST_MM = 1.0
 _UP = 0.0, 1.0, 0.0
-_MIDDLE = np.full((1, 2), 0.5)
+MIDDLE = np.full((1, 2), 0.5)
+"""The one place of a sample in the pixel: its middle."""
 
 
 class Views(NamedTuple):
@@ -67,7 +68,7 @@ class ShadowView(NamedTuple):
 
 def shadow_layers(views: Sequence[ShadowView | None]) -> Views:
     """A layer for each view but None, sampled at the middles of its pixels."""
-    return Views(np.array([view.clip for view in views if view]).reshape(-1, 4, 4), _MIDDLE)
+    return Views(np.array([view.clip for view in views if view]).reshape(-1, 4, 4), MIDDLE)
 
 
 def frame_of(forward: Vec, up: Vec) -> tuple[Vec, Vec, Vec]:

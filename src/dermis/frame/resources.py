@@ -19,6 +19,7 @@ from dermis.frame.levels import Blur, Levels
 from dermis.frame.limits import check_limits
 from dermis.frame.maps import upload_maps
 from dermis.frame.passes import bloom, post, shade, shadows, surface_texels, visibility_buffer
+from dermis.frame.passes.moving_occlusion import make_map, make_sky
 from dermis.frame.seams import LaidOut, Remedy, laid_out, remedy_of
 from dermis.frame.shape import Shape, make_shape
 from dermis.frame.surroundings import Surroundings
@@ -39,6 +40,7 @@ class Asked:
     """What resources are made for.
 
     lights, shadow_layers : how many parts of lights there are, and how many of them cast shadows
+    posed : whether the scene has a pose
     view : name of a scene among several that are drawn in turn
     """
 
@@ -51,6 +53,7 @@ class Asked:
     technique: Technique
     lights: int
     shadow_layers: int
+    posed: bool
     view: str
 
     @property
@@ -72,6 +75,11 @@ class Asked:
     def occluded(self) -> bool:
         """Whether the head hides some of its environment from itself."""
         return surroundings.is_occluded(self.environment, self.settings)
+
+    @property
+    def occlusion_moves(self) -> bool:
+        """Whether that follows the head's shape."""
+        return self.occluded and self.posed and self.settings.occlusion == "baked"
 
     @cached_property
     def remedy(self) -> Remedy:
@@ -127,6 +135,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         view=view,
         constants=surface.constants(asked.skin) + technique.shade_constants,
         suns=len(asked.surroundings.suns),
+        sky=keep(make_sky, device, asked.head, using=(first,)) if asked.occlusion_moves else None,
         gaussians=len(asked.profile.variance_mm2),
         picture=keep(post.make_picture, device, settings.size),
         glow=keep(bloom.make_glow, device, settings.size) if settings.bloom else None,
@@ -174,13 +183,17 @@ def _layout(
         lit["occlusion_map"] = keep(surroundings.occlusion_map, device, head, atlas, using=bound, of=number)
     else:
         lit["occlusion_map"] = surroundings.no_occlusion(device)
+    follows = None
+    if asked.occlusion_moves:
+        lit["occlusion_map"], follows = keep(make_map, device, lit["occlusion_map"], of=number)
     translucency = None
     if asked.count and asked.settings.transmission == "thin" and asked.technique.transmits:
         blurred = asked.split.blurred_mm2, asked.split.weight, asked.skin.has_own_tissue
         translucency = translucency_of(memo, device, head, atlas, *blurred, of=number)
     side = asked.settings.atlas if asked.count else 1
     surfaces = keep(surface_texels.make_surfaces, device, side, of=number)
-    return AtlasLayout(textures, held, lit, surfaces, _sum(memo, device, asked, side, number), translucency)
+    scattered = _sum(memo, device, asked, side, number)
+    return AtlasLayout(textures, held, lit, surfaces, scattered, translucency, follows)
 
 
 def _sum(memo: Memo, device: Device, asked: Asked, side: int, role: str) -> Any:
