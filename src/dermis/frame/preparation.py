@@ -10,7 +10,7 @@ from dermis.frame.inputs import Inputs, camera_views, pinhole, seen_by
 from dermis.frame.levels import Blur, scale_of
 from dermis.frame.lights import light_constants, light_records, light_views
 from dermis.frame.passes.shade import shade_program
-from dermis.frame.projection import ShadowView, shadow_layers
+from dermis.frame.projection import Views, shadow_layers
 from dermis.frame.resources import Asked, make_resources
 from dermis.frame.skin_profiles import SkinProfiles
 from dermis.frame.surroundings import brightest, load_surroundings, with_suns
@@ -23,7 +23,6 @@ from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES
 
 Lights = tuple[Light, ...]
-Views = list[ShadowView | None]
 
 
 class Preparation:
@@ -53,11 +52,9 @@ class Preparation:
         profile = self.profile_of(scene.skin)
         surroundings = keep(load_surroundings, device, around.name if around else None)
         scene = with_suns(self.memo, scene, surroundings)
-        lights = head, tuple(scene.lights)
-        views = keep(_views, *lights, settings.shadow_size, using=(scene,))
-        record = keep(_record, *lights, views, using=(device, scene))
-        layers = shadow_layers(views)
-        counts = len(views), len(layers.clips)
+        lit_by = head, tuple(scene.lights), settings.shadow_size
+        record, layers, parts = keep(_lights, *lit_by, using=(device, scene))
+        counts = parts, len(layers.clips)
         asked = Asked(head, scene.skin, profile, settings, around, surroundings, technique, *counts, view)
         resources = keep(make_resources, self.memo, device, asked)
         seen_from, shone_on = pinhole(scene.camera, head, settings), light_constants(scene)
@@ -81,16 +78,15 @@ def under(layout: AtlasLayout, lights: Any) -> AtlasLayout:
 
     lights : the shader's array
     """
-    return replace(layout, lit=layout.lit | {"lights": lights})
+    lit = layout.lit | {"lights": lights}
+    return AtlasLayout(layout.atlas, lit, layout.surfaces, layout.scattered, layout.translucency)
 
 
 def _scaled(blurs: tuple[Blur, ...], scale: float) -> tuple[Blur, ...]:
     return tuple(replace(blur, scale=scale) for blur in blurs)
 
 
-def _views(_: Head, __: Lights, size: int, scene: Scene) -> Views:
-    return light_views(scene, size)
-
-
-def _record(_: Head, __: Lights, views: Views, device: Device, scene: Scene) -> Any:
-    return light_records(shade_program(device), scene, views)
+def _lights(_: Head, __: Lights, size: int, device: Device, scene: Scene) -> tuple[Any, Views, int]:
+    """The shader's array of lights, how shadow maps see the head, and how many parts the lights have."""
+    views = light_views(scene, size)
+    return light_records(shade_program(device), scene, views), shadow_layers(views), len(views)

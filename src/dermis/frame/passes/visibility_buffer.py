@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -175,6 +176,7 @@ def _depth_range_mm(clip: Matrix) -> float:
     return rise / (slope * slope) / math.sqrt(scale)
 
 
+@cache
 def _shared_out(triangles: int, views: int, samples: int) -> tuple[Constants, int]:
     """What a workgroup takes when there are so many triangles, as one H200 was fastest, and their number."""
     fewest, most = _TAKEN
