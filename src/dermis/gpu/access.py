@@ -21,9 +21,9 @@ class Slot:
 
     parent : of a view, the texture's slot
     parts : of a texture, the slots of its views
-    frame : the one in which `value`, `writer` and `writers` hold
+    frame : the one in which `value`, `writer` and `last` hold
     writer : the pass that writes it last
-    writers : all that do, and those that write what contains it or is contained
+    last : the same, or a later one that writes what contains it or is contained
     scratch : whether it only carries data between passes, so that its content after a frame does not matter
     active : whether any pass has ever written it
     """
@@ -34,7 +34,7 @@ class Slot:
     value: int = 0
     frame: int = 0
     writer: int = 0
-    writers: list[int] = field(default_factory=list)
+    last: int = 0
     scratch: bool = False
     active: bool = False
 
@@ -57,16 +57,13 @@ class Slot:
 
     def write(self, frame: int, index: int, value: int) -> None:
         """Let the pass of that index leave a value."""
-        if self.frame != frame:
-            self.writers = []
-        self.frame, self.value, self.writer = frame, value, index
-        self.writers.append(index)
+        self.frame, self.value, self.writer, self.last = frame, value, index, index
         for part in self.parts:
             if part.frame == frame:
-                part.writers.append(index)
+                part.last = index
                 part.frame = 0  # what is read of it now is the texture's
         if self.parent is not None and self.parent.frame == frame:
-            self.parent.writers.append(index)
+            self.parent.last = index
 
     def hold(self, value: int) -> None:
         """Note what is there now; what overlaps it is no longer what it was."""

@@ -28,13 +28,14 @@ class Frame(Recorder):
     timed : False leaves the stages' times out; dispatches then share passes across stages, as they do in
         frames that are timed as a "whole", from the start of their first pass to the end of the last one.
         Software adapters can only time stages
+    uniforms : for the passes' records, its own when left out
     submitted : number of the last submit, for `Device.wait`
     """
 
-    def __init__(self, device: Device, *, timed: Timed = True) -> None:
+    def __init__(self, device: Device, *, timed: Timed = True, uniforms: Uniforms | None = None) -> None:
         self.device = device
         self._open: Any = None
-        self._uniforms = Uniforms(device)
+        self._uniforms = uniforms or Uniforms(device)
         self._fetched: list[Fetched] = []
         self.submitted = 0
         self._stage = ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from dermis.gpu.access import Access, Slot, slot_of
@@ -15,6 +15,7 @@ from dermis.gpu.raster_program import FragmentProgram, RasterProgram
 from dermis.gpu.readback import Fetched
 from dermis.gpu.recorder import Recorder
 from dermis.gpu.recording import Recordings
+from dermis.gpu.uniforms import Uniforms
 
 T = TypeVar("T")
 Groups = tuple[int, int, int]
@@ -25,14 +26,15 @@ class Pass:
     """One pass of a frame, or a recorded run of them.
 
     run : does it
-    writes : what it leaves in which slots
+    writes, version : slots, and what it leaves in all of them
     needs : passes before it, and the slots in which they leave what it reads
     """
 
     stages: tuple[str, ...]
     run: Callable[[Frame], None]
-    writes: list[tuple[Slot, int]]
-    needs: list[tuple[int, Slot]] = field(default_factory=list)
+    writes: Sequence[Slot]
+    version: int
+    needs: list[tuple[int, Slot]]
 
 
 class Graph(Recorder):
@@ -54,7 +56,7 @@ class Graph(Recorder):
         self._epoch = 0
         self._frame = 0
         self._passes: list[Pass] = []
-        self._hashes: dict[int, int] = {}  # of this frame's records, which its passes keep alive
+        self._uniforms = Uniforms(device)
         self._fetches: list[tuple[Any, Fetched]] = []
 
     def forget(self) -> None:
@@ -65,7 +67,7 @@ class Graph(Recorder):
         """Begin a frame."""
         self._frame = self.device.next_frame()
         self._passes.clear()
-        self._hashes.clear()
+        self._uniforms.clear()
         self._fetches.clear()
 
     def dispatch(
@@ -82,7 +84,7 @@ class Graph(Recorder):
             frame.dispatch(stage, program, resources, groups, access=access)
 
         self._list(stage, program, resources, groups)
-        key = (access.number, groups, program.numbers(resources, self._hashes))
+        key = (access.number, groups, program.numbers(resources, self._uniforms))
         self._add((stage,), key, access, writes, run)
 
     def draw(
@@ -100,7 +102,7 @@ class Graph(Recorder):
         """Declare a pass that rasterises triangles into cleared targets, as `Frame.draw` does."""
         access, options = program.access(resources), {"layer": layer, "depth": depth, "far": far}
         writes = [slot_of(self.device, one) for one in (depth, target) if one is not None]
-        key = (access.number, vertices, layer, far, program.numbers(resources, self._hashes))
+        key = (access.number, vertices, layer, far, program.numbers(resources, self._uniforms))
 
         def run(frame: Frame) -> None:
             frame.draw(stage, program, resources, vertices, target=target, **options)
@@ -114,7 +116,7 @@ class Graph(Recorder):
         """Declare a pass for each texel of its targets, as `Frame.fill` does."""
         access = program.access(resources)
         writes = [slot_of(self.device, one) for one in targets]
-        key = (access.number, program.numbers(resources, self._hashes))
+        key = (access.number, program.numbers(resources, self._uniforms))
         self._list(stage, program, resources, (3,))
         self._add(
             (stage,),
@@ -145,7 +147,7 @@ class Graph(Recorder):
 
     def submit(self, timed: Timed = False) -> Frame:
         """Run what has to be run; returns the frame, which knows how long it took."""
-        frame = Frame(self.device, timed=timed)
+        frame = Frame(self.device, timed=timed, uniforms=self._uniforms)
         try:
             runs = self._due()
             due = [one for one, now in zip(self._passes, runs, strict=True) if now]
@@ -163,8 +165,8 @@ class Graph(Recorder):
         finally:
             self._passes, self._fetches = [], []  # which keep resources alive
         for one in due:
-            for slot, value in one.writes:
-                slot.hold(value)
+            for slot in one.writes:
+                slot.hold(one.version)
         self.ran = [stage for one in due for stage in one.stages]
         return frame
 
@@ -189,42 +191,41 @@ class Graph(Recorder):
                 needs.append((source.writer, source))
             if not sources and slot not in writes:
                 found.append(slot.held or (slot.parent.held if slot.parent else 0))
-        made = hash((self._epoch, key, *found))
-        left = [(slot, made + number) for number, slot in enumerate(writes, start=1)]
-        for slot, value in left:
+        version = hash((self._epoch, key, *found))
+        for slot in writes:
             if not slot.active:
                 slot.active = True
                 self.device.active_slots += 1
-            slot.write(now, index, value)
-        self._passes.append(Pass(stages, run, left, needs))
+            slot.write(now, index, version)
+        self._passes.append(Pass(stages, run, writes, version, needs))
 
     def _due(self) -> list[bool]:
         """Which passes have to run for every resource to hold what all of them together leave."""
-        lost: set[int] = set()  # slots that hold what is wanted, and will not any more
+        lost: set[Slot] = set()  # that hold what is wanted, and will not any more
         while True:
             due = self._due_without(lost)
             if all(due):
                 return due
             spoilt = {
-                id(slot)
-                for index, one in enumerate(self._passes)
-                if due[index]
-                for slot, _ in one.writes
-                if not due[slot.writers[-1]]
+                slot
+                for one, now in zip(self._passes, due, strict=True)
+                if now
+                for slot in one.writes
+                if not due[slot.last]
             }
             if spoilt <= lost:
                 return due
             lost |= spoilt
 
-    def _due_without(self, lost: set[int]) -> list[bool]:
-        due, wanted = [False] * len(self._passes), set[tuple[int, int]]()
+    def _due_without(self, lost: set[Slot]) -> list[bool]:
+        due, wanted = [False] * len(self._passes), set[tuple[int, Slot]]()
         for index in range(len(self._passes) - 1, -1, -1):
             one = self._passes[index]
-            for slot, value in one.writes:
-                last = slot.writers[-1] == index
-                there = last and slot.held == value and id(slot) not in lost
-                if not there and ((last and not slot.scratch) or (index, id(slot)) in wanted):
+            for slot in one.writes:
+                last = slot.last == index
+                there = last and slot.held == one.version and slot not in lost
+                if not there and ((last and not slot.scratch) or (index, slot) in wanted):
                     due[index] = True
-            if due[index]:
-                wanted.update((before, id(slot)) for before, slot in one.needs)
+                    wanted.update(one.needs)
+                    break
         return due

@@ -73,7 +73,7 @@ class Program:
         self._uniforms = [b for b in self.bindings if _is_uniform(b)]
         self._others = [b for b in self.bindings if not _is_uniform(b)]
         self._read = _reader([b.name for b in self._others])
-        self._read_of = {one.name: members_read(self.source.text, one.name) for one in self._uniforms}
+        self._numbers_of = [(one.name, members_read(self.source.text, one.name)) for one in self._uniforms]
         self.kept_groups: ByResources[Any] = ByResources()
         self._accesses: ByResources[Access] = ByResources()
         self._group_layout = device.handle.create_bind_group_layout(entries=self._layout_entries())
@@ -128,21 +128,13 @@ class Program:
             self._accesses.keep(key, bound, found)
         return found
 
-    def numbers(self, resources: Resources, known: dict[int, int]) -> tuple[bytes | int, ...]:
-        """What the shader reads of the records; of large ones, which several passes read, a hash of it all.
-
-        known : the hashes by the records' identity
-        """
-        found: list[bytes | int] = []
+    def numbers(self, resources: Resources, uniforms: Uniforms) -> tuple[Hashable, ...]:
+        """What the shader reads of the records; all of large ones, whose hash several passes share."""
+        found: list[Hashable] = []
         try:
-            for name, read in self._read_of.items():
-                record = resources[name]
-                if record.nbytes <= _LARGE_RECORD:
-                    found.append(read(record))
-                    continue
-                if id(record) not in known:
-                    known[id(record)] = hash(record.tobytes())
-                found.append(known[id(record)])
+            for name, read in self._numbers_of:
+                raw = uniforms.bytes_of(resources[name])
+                found.append(raw if len(raw) > _LARGE_RECORD else read(raw))
         except KeyError as missing:
             raise self._unbound(missing) from None
         return tuple(found)
