@@ -81,7 +81,6 @@ class Device:
     ffi, lib, checked : the native library, for the calls of every frame, without what wgpu's Python adds;
         calls of `checked` raise what the library finds wrong, in passes when their encoder is submitted
     slots : what textures, buffers and views hold, see access.py
-    active_slots : how many of them passes have written
     programs : compiled shaders, see program.py
     spare_records : memory in which no frame gathers its numbers at the moment; new memory takes longer
     """
@@ -112,10 +111,8 @@ class Device:
         self._uniform_chunks: list[Any] = []
         self.spare_records: list[bytearray] = []
         self.slots: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
-        self.active_slots = 0
         self.programs: dict[Any, Any] = {}
         self._shared: dict[str, Any] = {}
-        self._frames = 0
         self._staging: dict[int, list[Any]] = {}
         self.fetching: set[Any] = set()
         self._samplers: dict[tuple[tuple[str, str], ...], Any] = {}
@@ -125,11 +122,6 @@ class Device:
         if name not in self._shared:
             self._shared[name] = make()
         return self._shared[name]
-
-    def next_frame(self) -> int:
-        """Number of a frame that begins."""
-        self._frames += 1
-        return self._frames
 
     def write(self, buffer: Any, data: bytearray, size: int) -> None:
         """Put the first `size` bytes of the data into a buffer before the next submit."""

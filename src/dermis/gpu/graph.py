@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from dermis.gpu.access import Access, Slot, slot_of
+from dermis.gpu.dependencies import Declared, Dependencies
 from dermis.gpu.device import Device
 from dermis.gpu.frame import Frame, Timed
 from dermis.gpu.listing import Lister, Listing
@@ -19,6 +20,7 @@ from dermis.gpu.uniforms import Uniforms
 
 T = TypeVar("T")
 Groups = tuple[int, int, int]
+_MOST_KNOWN = 8  # kinds of frames in turn: pictures, their readback, and those of several views
 
 
 @dataclass(slots=True)
@@ -26,15 +28,13 @@ class Pass:
     """One pass of a frame, or a recorded run of them.
 
     run : does it
-    writes, version : slots, and what it leaves in all of them
-    needs : passes before it, and the slots in which they leave what it reads
+    key : what its result follows from besides the content that it reads
     """
 
     stages: tuple[str, ...]
     run: Callable[[Frame], None]
-    writes: Sequence[Slot]
-    version: int
-    needs: list[tuple[int, Slot]]
+    key: Any
+    declared: Declared
 
 
 class Graph(Recorder):
@@ -54,9 +54,9 @@ class Graph(Recorder):
         self.ran: list[str] = []
         self.listing: Listing | None = None
         self._epoch = 0
-        self._frame = 0
         self._passes: list[Pass] = []
         self._uniforms = Uniforms(device)
+        self._known: list[Dependencies] = []
         self._fetches: list[tuple[Any, Fetched]] = []
 
     def forget(self) -> None:
@@ -65,7 +65,6 @@ class Graph(Recorder):
 
     def begin(self) -> None:
         """Begin a frame."""
-        self._frame = self.device.next_frame()
         self._passes.clear()
         self._uniforms.clear()
         self._fetches.clear()
@@ -75,17 +74,15 @@ class Graph(Recorder):
     ) -> None:
         """Declare a pass of a number of workgroups along each axis; see `Recorder.dispatch`."""
         access = program.access(resources)
-        writes: Sequence[Slot] = access.writes
+        writes = access.writes
         if completes:
             filled = slot_of(self.device, resources[completes])
-            writes = [slot for slot in writes if slot is not filled]
+            writes = tuple(slot for slot in writes if slot is not filled)
 
         def run(frame: Frame) -> None:
             frame.dispatch(stage, program, resources, groups, access=access)
 
-        self._list(stage, program, resources, groups)
-        key = (access.number, groups, program.numbers(resources, self._uniforms))
-        self._add((stage,), key, access, writes, run)
+        self._add(stage, program, resources, groups, access, writes, run)
 
     def draw(
         self,
@@ -100,31 +97,24 @@ class Graph(Recorder):
         target: Any = None,
     ) -> None:
         """Declare a pass that rasterises triangles into cleared targets, as `Frame.draw` does."""
-        access, options = program.access(resources), {"layer": layer, "depth": depth, "far": far}
-        writes = [slot_of(self.device, one) for one in (depth, target) if one is not None]
-        key = (access.number, vertices, layer, far, program.numbers(resources, self._uniforms))
+        writes = tuple(slot_of(self.device, one) for one in (depth, target) if one is not None)
 
         def run(frame: Frame) -> None:
-            frame.draw(stage, program, resources, vertices, target=target, **options)
+            frame.draw(stage, program, resources, vertices, layer=layer, depth=depth, far=far, target=target)
 
-        self._list(stage, program, resources, (vertices,))
-        self._add((stage,), key, access, writes, run)
+        access = program.access(resources)
+        self._add(stage, program, resources, (vertices,), access, writes, run, (layer, far))
 
     def fill(
         self, stage: str, program: FragmentProgram, resources: Resources, targets: Sequence[Any]
     ) -> None:
         """Declare a pass for each texel of its targets, as `Frame.fill` does."""
-        access = program.access(resources)
-        writes = [slot_of(self.device, one) for one in targets]
-        key = (access.number, program.numbers(resources, self._uniforms))
-        self._list(stage, program, resources, (3,))
-        self._add(
-            (stage,),
-            key,
-            access,
-            writes,
-            lambda frame: frame.fill(stage, program, resources, targets),
-        )
+        writes = tuple(slot_of(self.device, one) for one in targets)
+
+        def run(frame: Frame) -> None:
+            frame.fill(stage, program, resources, targets)
+
+        self._add(stage, program, resources, (3,), program.access(resources), writes, run)
 
     def repeat(self, record: Callable[..., T], *args: Any) -> T:
         """Declare the passes that `record(graph, *args)` declares, recorded once for the same arguments.
@@ -132,11 +122,11 @@ class Graph(Recorder):
         Compute passes only. The recording runs as a whole or not at all, and takes Python next to no time.
         """
         recording, result = self.recordings.find(self.device, record, args)
-        steps = recording.steps
         if self.listing is not None:
             record(Lister(self.device, self.listing, len(self._passes)), *args)
-        access = recording.access
-        self._add(recording.stages, (access.number,), access, access.writes, lambda frame: frame.run(steps))
+        access, steps = recording.access, recording.steps
+        declared = access.number, access.reads, access.writes
+        self._passes.append(Pass(recording.stages, lambda frame: frame.run(steps), access.number, declared))
         return result
 
     def fetch(self, buffer: Any) -> Fetched:
@@ -149,7 +139,9 @@ class Graph(Recorder):
         """Run what has to be run; returns the frame, which knows how long it took."""
         frame = Frame(self.device, timed=timed, uniforms=self._uniforms)
         try:
-            runs = self._due()
+            needed = self._dependencies()
+            versions = needed.versions(self._epoch, [one.key for one in self._passes])
+            runs = needed.due(versions)
             due = [one for one, now in zip(self._passes, runs, strict=True) if now]
             if self.listing is not None:
                 self.listing.finish(runs)
@@ -164,68 +156,31 @@ class Graph(Recorder):
             raise
         finally:
             self._passes, self._fetches = [], []  # which keep resources alive
-        for one in due:
-            for slot in one.writes:
-                slot.hold(one.version)
+        needed.ran(runs, versions)
         self.ran = [stage for one in due for stage in one.stages]
         return frame
 
-    def _list(self, stage: str, program: Program, resources: Resources, groups: Sequence[int]) -> None:
-        if self.listing is not None:
-            self.listing.add(stage, program, resources, groups, len(self._passes))
+    def _dependencies(self) -> Dependencies:
+        """Of the passes that are declared."""
+        declared = [one.declared for one in self._passes]
+        for known in self._known:
+            if known.declared == declared:
+                return known
+        self._known = [Dependencies(declared), *self._known][:_MOST_KNOWN]
+        return self._known[0]
 
     def _add(
         self,
-        stages: tuple[str, ...],
-        key: tuple[Any, ...],
+        stage: str,
+        program: Program,
+        resources: Resources,
+        size: tuple[int, ...],
         access: Access,
-        writes: Sequence[Slot],
-        run: Any,
+        writes: tuple[Slot, ...],
+        run: Callable[[Frame], None],
+        more: tuple[float, ...] = (),
     ) -> None:
-        now, index = self._frame, len(self._passes)
-        needs, found = list[tuple[int, Slot]](), list[int]()
-        for slot in access.changing(self.device.active_slots):
-            sources = slot.sources(now)
-            for source in sources:
-                found.append(source.value)
-                needs.append((source.writer, source))
-            if not sources and slot not in writes:
-                found.append(slot.held or (slot.parent.held if slot.parent else 0))
-        version = hash((self._epoch, key, *found))
-        for slot in writes:
-            if not slot.active:
-                slot.active = True
-                self.device.active_slots += 1
-            slot.write(now, index, version)
-        self._passes.append(Pass(stages, run, writes, version, needs))
-
-    def _due(self) -> list[bool]:
-        """Which passes have to run for every resource to hold what all of them together leave."""
-        lost: set[Slot] = set()  # that hold what is wanted, and will not any more
-        while True:
-            due = self._due_without(lost)
-            if all(due):
-                return due
-            spoilt = {
-                slot
-                for one, now in zip(self._passes, due, strict=True)
-                if now
-                for slot in one.writes
-                if not due[slot.last]
-            }
-            if spoilt <= lost:
-                return due
-            lost |= spoilt
-
-    def _due_without(self, lost: set[Slot]) -> list[bool]:
-        due, wanted = [False] * len(self._passes), set[tuple[int, Slot]]()
-        for index in range(len(self._passes) - 1, -1, -1):
-            one = self._passes[index]
-            for slot in one.writes:
-                last = slot.last == index
-                there = last and slot.held == one.version and slot not in lost
-                if not there and ((last and not slot.scratch) or (index, slot) in wanted):
-                    due[index] = True
-                    wanted.update(one.needs)
-                    break
-        return due
+        if self.listing is not None:
+            self.listing.add(stage, program, resources, size, len(self._passes))
+        key = access.number, size, more, program.numbers(resources, self._uniforms)
+        self._passes.append(Pass((stage,), run, key, (access.number, access.reads, writes)))
