@@ -54,13 +54,13 @@ class Access:
 
     number : of this program with these resources, never given twice
     reads, writes : slots; what is both stands in both
-    groups : bind groups with the buffers of a device's frames, by these
+    steps : dispatches of a device's frames with their bind groups, by stage, workgroups and places of records
     """
 
     number: int
     reads: tuple[Slot, ...]
     writes: tuple[Slot, ...]
-    groups: dict[tuple[int, ...], Any] = field(default_factory=dict)
+    steps: dict[Any, tuple[Any, Any]] = field(default_factory=dict)
 
 
 def new_number() -> int:

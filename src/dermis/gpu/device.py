@@ -86,10 +86,10 @@ class Device:
     """
 
     def __init__(self, adapter: Adapter, reason: str, *, bare: bool = False) -> None:
-        from wgpu.backends.wgpu_native import ffi, lib
+        from wgpu.backends.wgpu_native import GPUCommandEncoder, ffi, lib
         from wgpu.backends.wgpu_native._api import libf
 
-        self.ffi, self.lib, self.checked = ffi, lib, libf
+        self.ffi, self.lib, self.checked, self._encoder = ffi, lib, libf, GPUCommandEncoder
         self.adapter = adapter
         self.reason = reason
         features = [] if bare else list(adapter.features)
@@ -127,6 +127,11 @@ class Device:
         """Put the first `size` bytes of the data into a buffer before the next submit."""
         start = self.ffi.from_buffer(data)
         self.checked.wgpuQueueWriteBuffer(self.handle.queue._internal, buffer._internal, 0, start, size)
+
+    def command_encoder(self) -> Any:
+        """wgpu's encoder, without the description that it would make of no label."""
+        made = self.checked.wgpuDeviceCreateCommandEncoder(self.handle._internal, self.ffi.NULL)
+        return self._encoder("", made, self.handle)
 
     def submit(self, encoder: Any) -> int:
         """Hand over what an encoder has recorded; returns its number, to wait for."""

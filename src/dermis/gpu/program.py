@@ -86,34 +86,27 @@ class Program:
             record[member] = value
         return record
 
-    def bind_group(
-        self, resources: Resources, uniforms: Uniforms, access: Access | None = None
-    ) -> tuple[Any, list[int]]:
+    def places(self, resources: Resources, uniforms: Uniforms) -> tuple[int, ...]:
+        """Where the records are among the uniforms."""
+        try:
+            return tuple([uniforms.place(resources[name]) for name, _ in self._numbers_of])
+        except KeyError as missing:
+            raise self._unbound(missing) from None
+
+    def bind_group(self, resources: Resources, uniforms: Uniforms) -> tuple[Any, list[int]]:
         """A bind group of resources by their name in the shader, and the offsets of its uniforms.
 
         A resource is a buffer, a texture, a texture view, a sampler, or a numpy record, which finds a place
         among the uniforms.
-
-        access : of these resources, for who has it and uses the uniforms' buffers of all frames
         """
-        try:
-            placed = [uniforms.place(resources[one.name]) for one in self._uniforms]
-        except KeyError as missing:
-            raise self._unbound(missing) from None
-        offsets = [offset for _, offset in placed]
-        buffers = tuple([id(buffer) for buffer, _ in placed]) if access else ()
-        group = access.groups.get(buffers) if access else None
-        if group is not None:
-            return group, offsets
-        bound = [*self._bound(resources), *(buffer for buffer, _ in placed)]
+        found = [uniforms.at(place) for place in self.places(resources, uniforms)]
+        bound = [*self._bound(resources), *(buffer for buffer, _ in found)]
         key = key_of(bound)
         group = self.kept_groups.find(key)
         if group is None:
             group = self._make_group(bound, resources)
             self.kept_groups.keep(key, bound, group)
-        if access:
-            access.groups[buffers] = group
-        return group, offsets
+        return group, [offset for _, offset in found]
 
     def access(self, resources: Resources) -> Access:
         """What a pass of this program with these resources reads and writes, records aside."""

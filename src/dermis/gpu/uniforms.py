@@ -26,9 +26,9 @@ class Uniforms:
         self._device = device
         self._chunk = chunk or partial(device.uniform_chunk, size=CHUNK_BYTES)
         self._staged: list[bytearray] = []
-        self._end, self._buffer = CHUNK_BYTES, None
+        self._end = CHUNK_BYTES
         self._taken: dict[int, tuple[bytes, NDArray[Any]]] = {}  # which keeps the records' names
-        self._placed: dict[int, tuple[Any, int]] = {}
+        self._placed: dict[int, int] = {}
 
     def bytes_of(self, record: NDArray[Any]) -> bytes:
         """A record as it is when it comes first; it must not be changed until the frame is submitted."""
@@ -37,12 +37,17 @@ class Uniforms:
             found = self._taken[id(record)] = record.tobytes(), record
         return found[0]
 
-    def place(self, record: NDArray[Any]) -> tuple[Any, int]:
-        """The buffer and the offset [byte] at which the record will be."""
+    def place(self, record: NDArray[Any]) -> int:
+        """Where the record will be, counted through all buffers [byte]."""
         found = self._placed.get(id(record))
         if found is None:
             found = self._placed[id(record)] = self._add(self.bytes_of(record))
         return found
+
+    def at(self, place: int) -> tuple[Any, int]:
+        """The buffer of a place, and the offset in it."""
+        number, offset = divmod(place, CHUNK_BYTES)
+        return self._chunk(number), offset
 
     def upload(self) -> None:
         """Write all records for the next submit."""
@@ -61,13 +66,13 @@ class Uniforms:
         self._taken.clear()
         self._placed.clear()
 
-    def _add(self, record: bytes) -> tuple[Any, int]:
+    def _add(self, record: bytes) -> int:
         size = len(record)
         if self._end + size > CHUNK_BYTES:
             spare = self._device.spare_records
             self._staged.append(spare.pop() if spare else bytearray(CHUNK_BYTES))
-            self._end, self._buffer = 0, self._chunk(len(self._staged) - 1)
+            self._end = 0
         start = self._end
         self._staged[-1][start : start + size] = record
         self._end += -(-size // _STEP) * _STEP
-        return self._buffer, start
+        return (len(self._staged) - 1) * CHUNK_BYTES + start
