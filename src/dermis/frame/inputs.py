@@ -182,8 +182,8 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Sp
 def seen_by(view: Any, pinhole: Pinhole) -> Any:
     """A shading pass' record with the rays of a camera."""
     eye, (right, up, forward), half = pinhole
-    record = np.zeros((), view.dtype)  # a copy would hold anything between the members
-    record[...] = view
+    # Its bytes: numpy's own copy takes the members one by one, and has anything between them.
+    record: Any = np.ndarray((), view.dtype, bytearray(view.tobytes()))
     record["eye"], record["forward"] = eye, forward
     record["right"], record["up"] = tuple(half[0] * c for c in right), tuple(half[1] * c for c in up)
     return record
