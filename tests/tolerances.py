@@ -111,3 +111,9 @@ WALKED = 0.05
 STRETCHED = 1.5e-3
 """Stretch on the device against the atlas' own, of the largest: both are halves, one of them of weights in
 steps of 1/65535."""
+
+HARMONIC = 0.003
+"""Share of light in proportion to x that a Gaussian leaves on a ball, against the heat equation's."""
+
+POSED = 0.005
+"""A picture of a posed head against one of a head loaded in that shape, relative root mean square."""

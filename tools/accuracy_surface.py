@@ -16,12 +16,14 @@ from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
 from dermis.atlas.cached import cached_atlas
 from dermis.frame.atlas_textures import upload_atlas
+from dermis.frame.geometry import upload_geometry
 from dermis.frame.levels import Blur, Levels, halvings_of, make_levels, usual_texel
 from dermis.frame.passes import diffuse
 from dermis.frame.passes import stretch as stretched
-from dermis.frame.passes.shape import at_rest
+from dermis.frame.passes.shape import rest_shape
 from dermis.frame.renderer import Renderer
 from dermis.frame.seams import REMEDIES
+from dermis.frame.shape import shape_tables
 from dermis.gpu import Device, Frame, download, upload
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -75,7 +77,9 @@ def spread(
     levels = make_levels(device, len(light), len(variance), usual_texel(device))
     upload(device, levels.stack, np.dstack([light, light, light, np.ones_like(light)]))
     frame = Frame(device)
-    stretched.draw(frame, at_rest(frame, Head("", mesh, Maps()), atlas), textures)
+    head = Head("", mesh, Maps())
+    shape = rest_shape(device, shape_tables(device, head), head.positions_mm)
+    stretched.draw(frame, upload_geometry(device, mesh, atlas, shape), textures)
     diffuse.draw(frame, levels, textures, blur)
     frame.submit()
     return levels, blur

@@ -9,9 +9,10 @@ import pytest
 from setups import frontal, head_of, probe, run_frame, scene_of
 
 from dermis.atlas.cached import cached_atlas
-from dermis.frame.passes.shape import at_rest
+from dermis.frame.geometry import upload_geometry
+from dermis.frame.passes.shape import rest_shape
 from dermis.frame.renderer import Renderer
-from dermis.gpu import Frame
+from dermis.frame.shape import shape_tables
 from dermis.mesh.primitives import uv_sphere
 
 BALL = head_of(uv_sphere(30.0, 24, 12))
@@ -24,9 +25,9 @@ def test_buffers_hold_what_textures_hold(renderer: Renderer, monkeypatch: pytest
     with monkeypatch.context() as patch:
         patch.setattr(renderer.device, "adapter", adapter)
         patch.setattr(renderer.device, "programs", {})  # those of software write textures
-        frame = Frame(renderer.device)
-        held = at_rest(frame, BALL, cached_atlas(BALL.mesh, 64))
-        frame.submit()
+        tables = shape_tables(renderer.device, BALL)
+        shape = rest_shape(renderer.device, tables, BALL.positions_mm)
+        held = upload_geometry(renderer.device, BALL.mesh, cached_atlas(BALL.mesh, 64), shape)
     # the texture from one, the buffers from the other: what is read is the same
     both = held.resources | {name: inputs.lit[name] for name in ("triangle_table", "vertex_table")}
     atlas = inputs.layouts[0].atlas.resources["atlas"]

@@ -19,7 +19,7 @@ from dermis.frame.geometry import upload_geometry
 from dermis.frame.gutters import make_walks
 from dermis.frame.passes import gutters, shape, stretch
 from dermis.frame.passes.shape import Motion
-from dermis.frame.shape import Shape, make_shape
+from dermis.frame.shape import Shape, make_shape, shape_tables
 from dermis.gpu import Device, Frame, download
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
@@ -46,7 +46,7 @@ def anew(mesh: Mesh, points: Floats) -> Mesh:
 
 def evaluated(device: Device, head: Head, motion: Motion) -> tuple[Shape, NDArray[np.float32]]:
     """The shape in motion, and (v, 16) its vertices."""
-    made, frame = make_shape(device, head), Frame(device)
+    made, frame = make_shape(device, shape_tables(device, head)), Frame(device)
     shape.draw(frame, made, motion)
     frame.submit()
     table = download(device, made.surface["vertex_table"]).reshape(-1, 16)
@@ -122,12 +122,13 @@ def test_targets_bones_and_stencils_are_those_of_the_rig(device: Device, head: H
     posed = rig.posed(weights, matrices)
     assert np.abs(points_of(device, made.stencils["control"]) - posed).max() < SHAPE * 30
     refined = rig.stencils.points(posed)
-    assert np.abs(points_of(device, made.points) - refined).max() < SHAPE * 30
+    assert np.abs(points_of(device, made.surface["points"]) - refined).max() < SHAPE * 30
     assert np.abs(table[:, :3] - refined[moving.mesh.point]).max() < SHAPE * 30
 
 
 def stretched(device: Device, head: Head, atlas: Atlas, points: Floats) -> NDArray[np.float16]:
-    made, textures, frame = make_shape(device, head), upload_atlas(device, atlas), Frame(device)
+    textures, frame = upload_atlas(device, atlas), Frame(device)
+    made = make_shape(device, shape_tables(device, head))
     shape.draw(frame, made, Motion(words(points)))
     stretch.draw(frame, upload_geometry(device, head.mesh, atlas, made), textures)
     frame.submit()
@@ -163,13 +164,13 @@ def test_a_scaled_ball_has_the_density_of_its_size(device: Device, head: Head, s
 
 def sources(device: Device, head: Head, atlas: Atlas, points: Floats) -> list[Floats]:
     """(a, 2) where each texel of the gutters has its light, at each resolution, walked on the device."""
-    made, textures, frame = make_shape(device, head), upload_atlas(device, atlas), Frame(device)
+    textures, frame = upload_atlas(device, atlas), Frame(device)
+    made = make_shape(device, shape_tables(device, head))
     walks = make_walks(device, head.mesh, atlas, textures)
-    assert walks is not None
     shape.draw(frame, made, Motion(words(points)))
-    gutters.draw(frame, upload_geometry(device, head.mesh, atlas, made), walks)
     frame.submit()
-    lists = [one for one in (walks.atlas, *walks.atlas.coarser) if one.gutter]
+    walked = gutters.walked(device, textures, walks, upload_geometry(device, head.mesh, atlas, made))
+    lists = [one for one in (walked, *walked.coarser) if one.gutter]
     found = [np.frombuffer(device.handle.queue.read_buffer(one.gutter), np.uint32) for one in lists]
     for one, listed in zip(lists, found, strict=True):
         assert np.array_equal(listed.reshape(-1, 4)[:, 2:], one.gutter_texels)

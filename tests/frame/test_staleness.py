@@ -23,6 +23,7 @@ from dermis.scene.environment import Environment
 from dermis.scene.lights import LIGHTS, PointLight, SpotLight
 from dermis.scene.model import Scene
 from dermis.scene.plain import Plain, choices_of
+from dermis.scene.pose import Pose
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments, Skin, TissueLayer
 
@@ -146,6 +147,7 @@ SCENES: dict[str, Any] = {
     "camera": front_camera(HEAD, frame_mm=60.0),
     "skin": Skin(specular="none", direction="half-space"),
     "environment": Environment(name="uniform"),
+    "pose": Pose(positions_mm=1.1 * HEAD.positions_mm),
 }
 
 

@@ -90,6 +90,30 @@ def test_matrices_stand_for_those_at_rest(bones: tuple[str, ...]) -> None:
     np.testing.assert_array_equal(listed.motion(RIG).matrices, pose.motion(RIG).matrices)
 
 
+@pytest.mark.parametrize("moved", [5, 30])
+def test_many_bones_move_as_few_do(moved: int) -> None:
+    """Clips move all bones at once: these go by depth."""
+    rng = np.random.default_rng(3)
+    parent = np.array([-1, -1, *(rng.integers(0, k) for k in range(2, 30))], np.int32)
+    local = np.tile(np.eye(4), (30, 1, 1))
+    local[:, :3, :3] = Rotation.random(30, random_state=1).as_matrix()
+    local[:, :3, 3] = rng.normal(scale=0.02, size=(30, 3))
+    names = tuple(f"bone{k}" for k in range(30))
+    skeleton = replace(SKELETON, names=names, parent=parent, local=local)
+    world = local.copy()
+    for bone in range(30):
+        world[bone] = world[parent[bone]] @ local[bone] if parent[bone] >= 0 else local[bone]
+    bound = np.linalg.inv(world)
+    for inverse_bind, tolerance in ((bound, 1e-3), (bound @ _about(np.ones(3), (3, 4, 5)), 1e-2)):
+        skeleton = replace(skeleton, inverse_bind=inverse_bind)
+        posed = local.copy()
+        chosen = rng.permutation(30)[:moved]
+        posed[chosen, :3, :3] = Rotation.random(moved, random_state=2).as_matrix()
+        pose = Pose(bones={names[k]: posed[k] for k in chosen})
+        motion = pose.motion(Rig(RIG.positions_mm, skeleton=skeleton))
+        np.testing.assert_allclose(motion.matrices, skeleton.matrices(posed), atol=tolerance)
+
+
 def test_bones_bound_elsewhere_than_they_rest() -> None:
     shifted = replace(
         SKELETON,

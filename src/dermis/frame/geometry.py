@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,10 @@ class HeadResources:
 
     resources: dict[str, Any]
     triangles: int
+
+    def shaped(self, shape: Shape) -> HeadResources:
+        """The same triangles with the vertices of another shape."""
+        return replace(self, resources=self.resources | shape.vertices)
 
 
 def upload_geometry(device: Device, mesh: Mesh, atlas: Atlas, shape: Shape) -> HeadResources:

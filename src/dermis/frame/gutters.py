@@ -21,36 +21,34 @@ _NONE = 0xFFFFFFFF  # across a side
 
 @dataclass(frozen=True, eq=False)
 class Walks:
-    """Gutters that are walked on the device.
+    """What walks begin with, as buffers.
 
-    atlas : the atlas with lists of gutters of its own, which the passes fill
-    walked : resources of gutter_walk.wgsl, surface aside
-    halved : those of gutter_halve.wgsl for each coarser atlas
+    walks, sides : as gutter_walk.wgsl reads them
+    halvings : of the coarser atlases that have gutters, as gutter_halve.wgsl reads them
     """
 
-    atlas: AtlasTextures
-    walked: dict[str, Any]
-    halved: tuple[dict[str, Any], ...]
+    walks: Any
+    sides: Any
+    halvings: tuple[dict[str, Any], ...]
 
 
 def make_walks(device: Device, mesh: Mesh, atlas: Atlas, textures: AtlasTextures) -> Walks | None:
-    """What the passes read and write; None where the atlas has no gutters."""
+    """What the passes read; None where the atlas has no gutters."""
     if textures.gutter is None:
         return None
-    sheets = [_with_list(device, sheet) for sheet in (textures, *textures.coarser)]
-    walked = {
-        "walks": device.buffer(_walks(atlas), "STORAGE"),
-        "sides": device.buffer(_side_words(mesh), "STORAGE"),
-        "gutter": sheets[0].gutter,
-    }
-    halved = tuple(_halving(device, *pair) for pair in pairwise(sheets) if pair[1].gutter)
-    return Walks(replace(sheets[0], coarser=tuple(sheets[1:])), walked, halved)
+    walks, sides = (device.buffer(words, "STORAGE") for words in (_walks(atlas), _side_words(mesh)))
+    sheets = (textures, *textures.coarser)
+    return Walks(walks, sides, tuple(_halving(device, *pair) for pair in pairwise(sheets) if pair[1].gutter))
 
 
-def _with_list(device: Device, sheet: AtlasTextures) -> AtlasTextures:
-    """The sheet with a list of its own, none of whose sources is known yet."""
-    listed = np.zeros((len(sheet.gutter_texels), ENTRY_BYTES // 4), np.uint32)
-    return replace(sheet, gutter=device.buffer(listed, "STORAGE")) if len(listed) else sheet
+def with_lists(device: Device, textures: AtlasTextures) -> AtlasTextures:
+    """The atlas with lists of gutters of its own, none of whose sources is known yet."""
+
+    def listed(sheet: AtlasTextures) -> AtlasTextures:
+        words = np.zeros((len(sheet.gutter_texels), ENTRY_BYTES // 4), np.uint32)
+        return replace(sheet, gutter=device.buffer(words, "STORAGE")) if len(words) else sheet
+
+    return replace(listed(textures), coarser=tuple(map(listed, textures.coarser)))
 
 
 def _walks(atlas: Atlas) -> Words:
@@ -87,6 +85,4 @@ def _halving(device: Device, finer: AtlasTextures, coarser: AtlasTextures) -> di
     return {
         "squares": device.buffer(listed, "STORAGE"),
         "members": device.buffer(order.astype(np.uint32), "STORAGE"),
-        "finer": finer.gutter,
-        "coarser": coarser.gutter,
     }

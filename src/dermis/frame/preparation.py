@@ -27,6 +27,7 @@ from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES
 
+_SLACK_MM = 10.0  # that a rig's outermost points may miss of a pose
 Lights = tuple[Light, ...]
 Views = list[ShadowView | None]
 
@@ -70,7 +71,18 @@ class Preparation:
         record = keep(_record, *lights, views, using=(device, scene))
         layers = shadow_layers(views)
         counts = len(views), len(layers.clips), scene.motion is not None
-        asked = Asked(head, scene.skin, profile, settings, around, surroundings, technique, *counts, view)
+        asked = Asked(
+            head,
+            scene.skin,
+            profile,
+            _person(scene),
+            settings,
+            around,
+            surroundings,
+            technique,
+            *counts,
+            view,
+        )
         resources = keep(make_resources, self.memo, device, asked)
         seen_from, shone_on = pinhole(scene.camera, head, settings), light_constants(scene)
         scale = scale_of(resources.levels.texel, brightest(scene, surroundings))
@@ -100,6 +112,12 @@ class Preparation:
         return self.memo.keep(_posed, head, motion, resting.motion) if motion else resting
 
 
+def _person(scene: Scene) -> Any:
+    """Where the control points rest, if not where the head's own do."""
+    motion, own = scene.motion, scene.head.positions_mm
+    return None if motion is None or motion.positions_mm is own else motion.positions_mm
+
+
 def _resting(head: Head) -> Moved:
     return Moved(resting(head.control), head.mesh.outline)
 
@@ -108,7 +126,7 @@ def _posed(head: Head, motion: RigMotion, at_rest: Motion) -> Moved:
     rig, weights, matrices = head.control, motion.weights.tobytes(), motion.matrices.tobytes()
     same = motion.positions_mm is rig.positions_mm
     positions = at_rest.positions if same else motion.positions_mm.tobytes()
-    return Moved(Motion(positions, weights, matrices), Outline(rig.outline_mm(motion)))
+    return Moved(Motion(positions, weights, matrices), Outline(rig.outline_mm(motion), _SLACK_MM))
 
 
 def _looked(

@@ -20,6 +20,7 @@ Axes = tuple[Triple, Triple, Triple]
 Row = tuple[float, float, float, float]
 Rows = tuple[Row, Row, Row]
 _WIDEST_LIGHT = math.tan(math.radians(80.0))
+_STEP_MM, _STEPS_TO_DOUBLE = 4.0, 16  # of shadow maps: where they look, and how wide they are
 _NEAREST_MM = 1.0
 _UP = 0.0, 1.0, 0.0
 MIDDLE = np.full((1, 2), 0.5)
@@ -136,7 +137,7 @@ def perspective(rows: Rows, half: tuple[float, float], near: float, far: float) 
 def depth_range(outline: Outline, rows: Rows) -> tuple[float, float]:
     """Nearest and farthest depth of the shape before the eye, a little widened [mm]."""
     z = np.array(rows[2], np.float32) @ outline.columns
-    near, far = float(z.min()), float(z.max())
+    near, far = float(z.min()) - outline.slack_mm, float(z.max()) + outline.slack_mm
     return max(near - 1.0, 0.5, 1e-3 * far), max(far + 1.0, 2.0)
 
 
@@ -152,7 +153,7 @@ def point_views(
     if not lights:
         return []
     eyes = [place_of(light.position, centre) for _, light in lights]
-    axes = [axes_of(between(eye, outline.middle_mm)) for eye in eyes]
+    axes = [axes_of(between(eye, _steady(outline.middle_mm))) for eye in eyes]
     rows = [rows_of(*one) for one in zip(eyes, axes, strict=True)]
     stacked = np.array(list(zip(*rows, strict=True)), np.float32).reshape(-1, 4)
     seen = (stacked @ outline.columns).reshape(3, len(rows), -1)
@@ -161,12 +162,27 @@ def point_views(
     _check_outside(lights, [one > _NEAREST_MM for one in near])
     steepest = _steepest(seen[:2], depth)
     _check_outside(lights, [one <= _WIDEST_LIGHT for one in steepest])
-    bounds = [(1.02 * h, 0.98 * n, 1.02 * f) for h, n, f in zip(steepest, near, far, strict=True)]
+    slack = outline.slack_mm
+    bounds = [
+        (_widened(h), max(0.98 * n - slack, 0.1 * n), 1.02 * f + slack)
+        for h, n, f in zip(steepest, near, far, strict=True)
+    ]
     clips = [perspective(r, (h, h), n, f) for r, (h, n, f) in zip(rows, bounds, strict=True)]
     return [
         ShadowView(clip, 2.0 * h / size, eye, right, up, n, f)
         for clip, eye, (right, up, _), (h, n, f) in zip(np.array(clips), eyes, axes, bounds, strict=True)
     ]
+
+
+def _steady(middle: Triple) -> Triple:
+    """Where maps look: in steps, so that their texels stay where they are while a head moves a little."""
+    x, y, z = (_STEP_MM * round(c / _STEP_MM) for c in middle)
+    return x, y, z
+
+
+def _widened(half: float) -> float:
+    """Half the extent of a map, a little wider, in steps for the same reason."""
+    return float(2.0 ** (math.ceil(_STEPS_TO_DOUBLE * math.log2(1.005 * half)) / _STEPS_TO_DOUBLE))
 
 
 def _check_outside(lights: Sequence[tuple[str, PointLight]], outside: Sequence[bool]) -> None:
@@ -189,13 +205,16 @@ def parallel_view(direction: Vec, outline: Outline, size: int) -> ShadowView:
     points = outline.places_mm
     axes = frame_of(direction, np.array(_UP))
     local = points @ np.stack(axes, axis=1)
-    low, high = local.min(axis=0) - 1.0, local.max(axis=0) + 1.0
-    half = 0.51 * float(max(high[0] - low[0], high[1] - low[1]))
+    room = 1.0 + np.array([0.0, 0.0, outline.slack_mm])
+    low, high = local.min(axis=0) - room, local.max(axis=0) + room
+    middle_x, middle_y = (_STEP_MM * round(0.5 * float(low[k] + high[k]) / _STEP_MM) for k in (0, 1))
+    reach = max(high[0] - middle_x, middle_x - low[0], high[1] - middle_y, middle_y - low[1])
+    half = _widened(float(reach))
     clip = np.eye(4)
     clip[0, :3], clip[1, :3] = axes[0] / half, axes[1] / half
     clip[2, :3] = -axes[2] / (high[2] - low[2])
-    clip[0, 3], clip[1, 3] = -0.5 * (low[0] + high[0]) / half, -0.5 * (low[1] + high[1]) / half
+    clip[0, 3], clip[1, 3] = -middle_x / half, -middle_y / half
     clip[2, 3] = high[2] / (high[2] - low[2])
-    middle = 0.5 * (low[0] + high[0]) * axes[0] + 0.5 * (low[1] + high[1]) * axes[1]
+    middle = middle_x * axes[0] + middle_y * axes[1]
     origin, right, up = ((float(x), float(y), float(z)) for x, y, z in (middle, axes[0], axes[1]))
     return ShadowView(clip, 2.0 * half / size, origin, right, up, float(low[2]), float(high[2]))

@@ -14,14 +14,16 @@ from dermis.frame import surface, surroundings
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.atlas_textures import AtlasTextures, upload_atlas
 from dermis.frame.geometry import upload_geometry
+from dermis.frame.gutters import make_walks
 from dermis.frame.inputs import Resources, Split, view_record
 from dermis.frame.levels import Blur, Levels
 from dermis.frame.limits import check_limits
 from dermis.frame.maps import upload_maps
-from dermis.frame.passes import bloom, post, shade, shadows, surface_texels, visibility_buffer
+from dermis.frame.passes import bloom, gutters, post, shade, shadows, surface_texels, visibility_buffer
 from dermis.frame.passes.moving_occlusion import make_map, make_sky
+from dermis.frame.passes.shape import rest_shape
 from dermis.frame.seams import LaidOut, Remedy, laid_out, remedy_of
-from dermis.frame.shape import Shape, make_shape
+from dermis.frame.shape import Shape, make_shape, shape_tables
 from dermis.frame.surroundings import Surroundings
 from dermis.frame.techniques.technique import AtlasTechnique, Technique
 from dermis.frame.translucency import translucency_of
@@ -39,6 +41,7 @@ from dermis.specular.albedo import albedo_table
 class Asked:
     """What resources are made for.
 
+    person : (p, 3) places of the head's control points where another person rests, None for the head's own
     lights, shadow_layers : how many parts of lights there are, and how many of them cast shadows
     posed : whether the scene has a pose
     view : name of a scene among several that are drawn in turn
@@ -47,6 +50,7 @@ class Asked:
     head: Head
     skin: Skin
     profile: GaussianSum
+    person: Any
     settings: Settings
     environment: Environment | None
     surroundings: Surroundings
@@ -108,7 +112,8 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     maps = memo.soon(device.executor, upload_maps, *reading)  # which take long to read
     size = settings.shadow_size if asked.shadow_layers else 1
     shadow_maps = keep(_shadow_maps, device, asked.head, asked.shadow_layers, size, of=asked.view)
-    shape = keep(make_shape, device, asked.head)
+    tables = keep(shape_tables, device, asked.head)
+    shape = keep(make_shape, device, tables)
     shared = _shared(memo, device, asked, shadow_maps)
     named = list(enumerate(asked.atlases.layouts))
     atlases = [_atlas(memo, device, asked, name, index) for index, name in named]
@@ -119,11 +124,12 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     program = shade.shade_program(device)
     view = view_record(program, asked.head, settings, asked.split)
     technique.describe(view, program, own)
-    first, _ = atlases[0]
+    (first, _), held = atlases[0], layouts[0].head
+    sky = keep(make_sky, device, asked.head, using=(held, tables)) if asked.occlusion_moves else None
     side, several = settings.atlas, len(layouts) > 1
     return Resources(
         shape=shape,
-        head=layouts[0].head,
+        head=held,
         layouts=tuple(layouts),
         shadow_maps=shadow_maps,
         scatters=asked.count > 0,
@@ -135,7 +141,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         view=view,
         constants=surface.constants(asked.skin) + technique.shade_constants,
         suns=len(asked.surroundings.suns),
-        sky=keep(make_sky, device, asked.head, using=(first,)) if asked.occlusion_moves else None,
+        sky=sky,
         gaussians=len(asked.profile.variance_mm2),
         picture=keep(post.make_picture, device, settings.size),
         glow=keep(bloom.make_glow, device, settings.size) if settings.bloom else None,
@@ -178,6 +184,10 @@ def _layout(
     keep, number, head = memo.keep, str(index), asked.head
     held = keep(upload_geometry, device, head.mesh, atlas, shape, of=number)
     lit = held.resources | shared
+    if asked.person is not None:
+        resting = held.shaped(keep(rest_shape, device, shape.tables, asked.person))
+        walks = keep(make_walks, device, head.mesh, atlas, textures, of=number)
+        textures = keep(gutters.walked, device, textures, walks, resting, of=number)
     if asked.occluded:
         bound = lit, textures.resources["atlas"]
         lit["occlusion_map"] = keep(surroundings.occlusion_map, device, head, atlas, using=bound, of=number)

@@ -19,6 +19,8 @@ Doubles = NDArray[np.float64]
 Words = NDArray[np.uint32]
 VERTICES_PER_ROW = 512
 """Of the texture of vertices, four texels each."""
+VERTICES = ("vertex_table", "vertex_buffer", "vertex_lengths")
+"""Names of the vertices in geometry.wgsl and stretch_of.wgsl."""
 _PARTS = ("uv", "f4", 2), ("point", "u4"), ("curvature", "f4"), ("normal", "f4", 3), ("pad", "u4")
 _VERTEX = np.dtype(list(_PARTS))  # as shape_vertices.wgsl reads it
 LEAST_ACROSS = 1e-3
@@ -26,16 +28,33 @@ LEAST_ACROSS = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
+class ShapeTables:
+    """What a shape is made by: buffers by their names in the shaders, that no motion changes.
+
+    morphs : what moves the control points, as shape_pose.wgsl reads it; empty for nothing
+    stencils : means of control points, as shape_refine.wgsl reads them; empty for no subdivision
+    surface : the mesh, as shape_vertices.wgsl reads it
+    control, points, vertices : counts
+    targets, bones : counts
+    """
+
+    morphs: dict[str, Any]
+    stencils: dict[str, Any]
+    surface: dict[str, Any]
+    control: int
+    points: int
+    vertices: int
+    targets: int
+    bones: int
+
+
+@dataclass(frozen=True, eq=False)
 class Shape:
-    """What the passes of the shape read and write.
+    """What the passes of the shape read and write, by the names in their shaders.
 
     rest, weights, matrices : buffers that each frame's motion is written to
-    morphs : buffers of what moves the control points, by the names in shape_pose.wgsl; empty for nothing
-    stencils : the same in shape_refine.wgsl
-    surface : the same in shape_vertices.wgsl, the vertices it writes among them
-    points : buffer of the points that the surface spans
-    counts : of control points, points and vertices
-    boned : whether there are bones
+    morphs, stencils, surface : of shape_pose.wgsl, shape_refine.wgsl, shape_vertices.wgsl; empty for no pass
+    tables : those that it is made by
     """
 
     rest: Any
@@ -44,38 +63,55 @@ class Shape:
     morphs: dict[str, Any]
     stencils: dict[str, Any]
     surface: dict[str, Any]
-    points: Any
-    counts: tuple[int, int, int]
-    boned: bool
+    tables: ShapeTables
 
     @property
     def vertices(self) -> dict[str, Any]:
-        """The vertices by their names in geometry.wgsl."""
-        return {name: self.surface[name] for name in ("vertex_table", "vertex_buffer")}
+        """The vertices by their names in the shaders that read them."""
+        return {name: self.surface[name] for name in VERTICES}
 
 
-def make_shape(device: Device, head: Head) -> Shape:
-    """What a head's shape needs on a device."""
+def shape_tables(device: Device, head: Head) -> ShapeTables:
+    """What the shapes of a head are made by."""
     rig, mesh = head.control, head.mesh
-    count, points = len(rig.positions_mm), int(mesh.point.max()) + 1
-    rest = device.buffer(np.zeros(3 * count, np.float32), "STORAGE")
-    weights = device.buffer(np.zeros(max(1, len(rig.targets.names)), np.float32), "STORAGE")
-    bones = len(rig.skeleton.names) if rig.skeleton else 1
-    matrices = device.buffer(np.zeros((bones, 3, 4), np.float32), "STORAGE")
-    posed, morphs, stencils = rest, dict[str, Any](), dict[str, Any]()
-    if rig.targets.names or rig.skeleton:
-        posed = device.buffer(np.zeros(3 * count, np.float32), "STORAGE")
-        morphs = _buffers(device, _morph_tables(rig))
-        morphs |= {"rest": rest, "weights": weights, "matrices": matrices, "posed": posed}
-    finer = posed
-    if rig.stencils:
-        finer = device.buffer(np.zeros(3 * points, np.float32), "STORAGE")
-        stencils = _buffers(device, _stencil_tables(rig.stencils))
-        stencils |= {"control": posed, "points": finer}
-    surface = _buffers(device, _surface_tables(mesh))
-    surface |= {"points": finer} | _vertices(device, len(mesh.positions))
-    counts = count, points, len(mesh.positions)
-    return Shape(rest, weights, matrices, morphs, stencils, surface, finer, counts, rig.skeleton is not None)
+    moves, bones = bool(rig.targets.names or rig.skeleton), len(rig.skeleton.names) if rig.skeleton else 0
+    return ShapeTables(
+        morphs=_buffers(device, _morph_tables(rig)) if moves else {},
+        stencils=_buffers(device, _stencil_tables(rig.stencils)) if rig.stencils else {},
+        surface=_buffers(device, _surface_tables(mesh)),
+        control=len(rig.positions_mm),
+        points=int(mesh.point.max()) + 1,
+        vertices=len(mesh.positions),
+        targets=len(rig.targets.names),
+        bones=bones,
+    )
+
+
+def make_shape(device: Device, tables: ShapeTables, *, moves: bool = True) -> Shape:
+    """Space for a shape.
+
+    moves : False for one that no morph target and no bone moves
+    """
+    rest, morphs, stencils = _points(device, tables.control), dict[str, Any](), dict[str, Any]()
+    weights, matrices = _floats(device, max(1, tables.targets)), _floats(device, 12 * max(1, tables.bones))
+    points = rest
+    if moves and tables.morphs:
+        points = _points(device, tables.control)
+        moving = {"rest": rest, "weights": weights, "matrices": matrices, "posed": points}
+        morphs = tables.morphs | moving
+    if tables.stencils:
+        finer = _points(device, tables.points)
+        stencils, points = tables.stencils | {"control": points, "points": finer}, finer
+    surface = tables.surface | {"points": points} | _vertices(device, tables.vertices)
+    return Shape(rest, weights, matrices, morphs, stencils, surface, tables)
+
+
+def _points(device: Device, count: int) -> Any:
+    return _floats(device, 3 * count)
+
+
+def _floats(device: Device, count: int) -> Any:
+    return device.buffer(np.zeros(count, np.float32), "STORAGE")
 
 
 def _buffers(device: Device, tables: dict[str, NDArray[Any]]) -> dict[str, Any]:
@@ -87,7 +123,9 @@ def _vertices(device: Device, count: int) -> dict[str, Any]:
     rows, software = -(-count // VERTICES_PER_ROW), device.adapter.kind == "CPU"
     table = make_texture(device, (4 * VERTICES_PER_ROW, rows if software else 1), "rgba32float")
     words = np.zeros((1 if software else rows * VERTICES_PER_ROW, 4, 4), np.float32)
-    return {"vertex_table": table, "vertex_buffer": device.buffer(words, "STORAGE")}
+    return dict(
+        zip(VERTICES, (table, device.buffer(words, "STORAGE"), _floats(device, 4 * count)), strict=True)
+    )
 
 
 def _morph_tables(rig: Rig) -> dict[str, NDArray[Any]]:

@@ -60,8 +60,9 @@ def _barycentric(scene: Scene, view: NDArray[np.void], triangle: Index, mask: ND
     x, y = 2.0 * (columns + 0.5) / width - 1.0, 1.0 - 2.0 * (rows + 0.5) / height
     forward, right, up, eye = (view[name].astype(np.float64) for name in ("forward", "right", "up", "eye"))
     ray = forward + x[:, None] * right + y[:, None] * up
-    mesh = scene.head.mesh
-    a, b, c = (mesh.positions[mesh.triangles[triangle, k]].astype(np.float64) - eye for k in range(3))
+    mesh, motion = scene.head.mesh, scene.motion
+    places = mesh.positions if motion is None else scene.head.control.points_mm(motion)[mesh.point]
+    a, b, c = (places[mesh.triangles[triangle, k]].astype(np.float64) - eye for k in range(3))
     sides = (np.cross(b, c), np.cross(c, a), np.cross(a, b))
     weights = np.stack([(side * ray).sum(axis=1) for side in sides], axis=-1)
     weights *= np.sign(weights.sum(axis=1, keepdims=True))  # triangles seen from behind

@@ -96,7 +96,12 @@ class Model:
 
 def read_obj(path: Path) -> Model:
     """Parts of a .obj file by `usemtl` and `g`; colours are Kd of its .mtl, taken as linear."""
-    text = path.read_bytes().decode("utf-8", errors="replace").replace("\r\n", "\n").replace("\\\n", " ")
+    return obj_model(path, path.read_bytes().decode("utf-8", errors="replace"))
+
+
+def obj_model(path: Path, text: str) -> Model:
+    """The same of a file's text."""
+    text = text.replace("\r\n", "\n").replace("\\\n", " ")
     text = re.sub(r"^((?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", r"\1", text, flags=re.MULTILINE)
     if re.search(r"^f[^\n]*[ /]-\d", text, re.MULTILINE):
         came = "it has relative (negative) ones"

@@ -69,7 +69,7 @@ def load_rigged(
     """
     source = Path(path)
     unit = default_unit_mm(source) if unit_mm is None else float(unit_mm)
-    _check_options(source, unit, v_origin, up)
+    check_options(source, unit, v_origin, up)
 
     load = partial(_loaded, source, unit, v_origin, up, opaque)
     data = source.read_bytes() if source.suffix.lower() == ".glb" and source.is_file() else b""
@@ -85,8 +85,8 @@ def _loaded(source: Path, unit: float, v_origin: Origin, up: Up, opaque: tuple[s
         model = read_model(source)
         part, to_head = joined(model.parts, source), np.eye(4)
         assert part.uv is not None and part.normals is not None
-        to_head[:3, :3] = _upright(unit * np.eye(3), up).T
-        place, normals = _upright(unit * part.positions, up).astype(np.float32), _upright(part.normals, up)
+        to_head[:3, :3] = upright(unit * np.eye(3), up).T
+        place, normals = upright(unit * part.positions, up).astype(np.float32), upright(part.normals, up)
         flat = _v_down(part.uv, source, v_origin).astype(np.float32)
         check_arrays(place, flat, part.triangles, source)
         material, materials = _materials(model.parts, opaque, source)
@@ -100,7 +100,8 @@ def _loaded(source: Path, unit: float, v_origin: Origin, up: Up, opaque: tuple[s
     return Rigged(mesh, build_rig(mesh.positions, point, kept, model.bones, model.weights, to_head, source))
 
 
-def _check_options(source: Path, unit: float, v_origin: str, up: str) -> None:
+def check_options(source: Path, unit: float, v_origin: str, up: str) -> None:
+    """Refuse options that no file can be read with."""
     if not (math.isfinite(unit) and unit > 0):
         refuse(source, "a unit above 0 mm", f"{unit} came", "Set the millimetres per unit of the file")
     if v_origin not in ("auto", "top", "bottom"):
@@ -136,7 +137,7 @@ def read_model(source: Path) -> Model:
     return replace(model, parts=full)
 
 
-def _upright(vectors: Array, up: Up) -> Array:
+def upright(vectors: Array, up: Up) -> Array:
     """`vectors` (v, 3) with Y up: z-up turns about X, so that -Y, Blender's front, becomes +Z."""
     return vectors if up == "y" else np.column_stack((vectors[:, 0], vectors[:, 2], -vectors[:, 1]))
 

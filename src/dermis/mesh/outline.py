@@ -14,9 +14,11 @@ class Outline:
     """Places of a shape beyond which, seen from wherever, none of it lies.
 
     places_mm : (n, 3)
+    slack_mm : how far out some of it may lie all the same; depth ranges leave so much room
     """
 
     places_mm: NDArray[np.floating]
+    slack_mm: float = 0.0
 
     @cached_property
     def columns(self) -> NDArray[np.float32]:

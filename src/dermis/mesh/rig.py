@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -20,7 +20,7 @@ Ints = NDArray[np.int32]
 
 __all__ = ["INFLUENCES", "MorphTargets", "Motion", "Rig", "Skeleton", "Stencils", "no_targets"]
 
-_FORM = "outline 5"  # another number when other points are found
+_FORM = "outline 6"  # another number when other points are found
 
 
 class Motion(NamedTuple):
@@ -118,6 +118,12 @@ class Rig:
         return cached_array(
             sources, _FORM, lambda: outline_points(self.positions_mm, targets, skeleton)
         ).astype(np.intp)
+
+    def points_mm(self, motion: Motion) -> Doubles:
+        """(q, 3) the points of the mesh in a motion, after any subdivision [mm]."""
+        resting = replace(self, positions_mm=motion.positions_mm)
+        control = resting.posed(motion.weights.astype(np.float64), motion.matrices.astype(np.float64))
+        return control if self.stencils is None else self.stencils.points(control)
 
     def posed(self, weights: Doubles, matrices: Doubles | None = None) -> Doubles:
         """(p, 3) the points in a pose, as the device computes them [mm].

@@ -6,6 +6,7 @@ are drawn at random; so a bound over them is stable while the head moves, and co
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -21,6 +22,7 @@ Index = NDArray[np.intp]
 _DIRECTIONS, _FEW = 512, 256
 _FINER = 64, 512, 2048  # one after the other: points beside one that is taken already are left out
 _CLOSE_MM = 0.5
+_PRODUCT = 80_000  # heights at a time
 _LAYERS = 16  # points beneath the outermost ones that a pose may bring out
 _POSES, _SEED = 128, 0
 _TURN_DEGREES = 60.0
@@ -77,7 +79,7 @@ def outline_of(places: Floats, targets: MorphTargets, skeleton: Skeleton | None,
 
 def outermost(places: Floats, count: int = _FEW) -> Index:
     """Numbers of the points (p, 3) that lie farthest in any of some directions."""
-    return np.unique((_directions(count) @ places.T).argmax(axis=1))
+    return np.unique(np.concatenate([height.argmax(axis=1) for height in _heights(places, count)]))
 
 
 def outline_points(places: Floats, targets: MorphTargets, skeleton: Skeleton | None) -> Index:
@@ -100,10 +102,20 @@ def outline_points(places: Floats, targets: MorphTargets, skeleton: Skeleton | N
 
 def _take(taken: NDArray[np.bool_], places: Floats, count: int = _DIRECTIONS) -> None:
     """Take the points that lie farther out in one of some directions than those taken before."""
-    height = _directions(count) @ places.T
-    top = height.argmax(axis=1)
-    reached = height[:, taken].max(axis=1, initial=-np.inf)
-    taken[top[height[np.arange(count), top] - reached > _CLOSE_MM]] = True
+    for height in _heights(places, count):
+        top = height.argmax(axis=1)
+        reached = height[:, taken].max(axis=1, initial=-np.inf)
+        taken[top[height[np.arange(len(top)), top] - reached > _CLOSE_MM]] = True
+
+
+def _heights(places: Floats, count: int) -> Iterator[Floats]:
+    """How far out points (p, 3) lie in some directions, (n, p) for a few at a time.
+
+    A few, because a product as small as these is done by one thread: where others work, threads wait longer.
+    """
+    few = max(1, _PRODUCT // len(places))
+    for start in range(0, count, few):
+        yield _directions(count)[start : start + few] @ places.T
 
 
 @lru_cache(maxsize=3)
@@ -117,12 +129,10 @@ def _directions(count: int) -> Floats:
 
 def _pool(places: Floats, targets: MorphTargets, skeleton: Skeleton | None) -> Index:
     """Numbers of points among which those that are outermost in any pose are looked for."""
-    height = _directions(_DIRECTIONS) @ places.T
     layers = min(_LAYERS, len(places))
-    found: list[NDArray[Any]] = [
-        outermost(places, _FINER[-1]),
-        np.argpartition(height, -layers, axis=1)[:, -layers:].ravel(),
-    ]
+    found: list[NDArray[Any]] = [outermost(places, _FINER[-1])]
+    for height in _heights(places, _DIRECTIONS):
+        found.append(np.argpartition(height, -layers, axis=1)[:, -layers:].ravel())
     for target in range(len(targets.names)):
         moved = targets.point[targets.of(target)]
         if len(moved):

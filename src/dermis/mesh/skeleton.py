@@ -18,6 +18,7 @@ Ints = NDArray[np.int32]
 INFLUENCES = 4
 """Bones that move a point; of more, those with the largest weights stay."""
 _STILL = np.eye(4)
+_FEW = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,19 +87,41 @@ class Skeleton:
         bones : (n,) their numbers, parents before children
         changes : (n, 4, 4) what moves each in the head's space at rest [mm]
 
-        It costs as much as there are changes, not bones.
+        Few cost as much as there are changes, not bones.
         """
+        taken = self._taken(bones, changes) if len(bones) <= _FEW else self._all_taken(bones, changes)
+        if self._bound_at_rest:
+            return taken[:, :3].astype(np.float32)
+        moved = taken[:, :3].copy()
+        moved[:, :, 3:] += taken[:, :3, :3] @ self.resting[:, :, 3:]
+        moved[:, :, :3] = taken[:, :3, :3] @ self.resting[:, :, :3]
+        return moved.astype(np.float32)
+
+    def _taken(self, bones: Sequence[int], changes: Doubles) -> Doubles:
+        """(b, 4, 4) where each bone is taken, by one change after the other."""
         nearest, taken = self._unmoved.copy(), np.empty((len(bones) + 1, 4, 4))
         taken[0] = _STILL
         for number, bone in enumerate(bones, start=1):
             np.matmul(taken[nearest[bone]], changes[number - 1], out=taken[number])
             nearest[self._below[bone]] = number
-        if self._bound_at_rest:
-            return taken[:, :3].astype(np.float32)[nearest]
-        moved = taken[nearest]
-        moved[:, :3, 3:] += moved[:, :3, :3] @ self.resting[:, :, 3:]
-        moved[:, :3, :3] = moved[:, :3, :3] @ self.resting[:, :, :3]
-        return moved[:, :3].astype(np.float32)
+        return taken[nearest]
+
+    def _all_taken(self, bones: Sequence[int], changes: Doubles) -> Doubles:
+        """The same, all bones of one depth at once."""
+        taken = np.tile(_STILL, (len(self.names), 1, 1))
+        taken[list(bones)] = changes
+        for bones_of_depth, parents in self._depths[1:]:
+            taken[bones_of_depth] = taken[parents] @ taken[bones_of_depth]
+        return taken
+
+    @cached_property
+    def _depths(self) -> list[tuple[Ints, Ints]]:
+        """Numbers of the bones at each depth, and of their parents."""
+        depth = np.zeros(len(self.names), np.int64)
+        for bone, parent in enumerate(self.parent.tolist()):
+            depth[bone] = depth[parent] + 1 if parent >= 0 else 0
+        levels = [np.flatnonzero(depth == k) for k in range(int(depth.max(initial=0)) + 1)]
+        return [(level.astype(np.int32), self.parent[level]) for level in levels]
 
     def _world(self, local: Doubles) -> Doubles:
         """(b, 4, 4) from each bone's space to the file's."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -87,7 +88,10 @@ def load_head(
         refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
     maps = load_maps(**chosen, height_mm=height_mm, normal_y=normal_y)
     thanks = f"{sample.attribution}, {sample.licence}" if sample else ""
-    return subdivide_head(Head(name, rigged.mesh, maps, thanks, rigged.rig), subdivide)
+    made = subdivide_head(Head(name, rigged.mesh, maps, thanks, rigged.rig), subdivide)
+    if subdivide and made.rig is not None:  # sequences of files have places for the file's own vertices
+        made = replace(made, rig=replace(made.rig, corner=rigged.mesh.point))
+    return made
 
 
 def _chosen(given: dict[str, MapFile], files: dict[str, Any]) -> dict[str, Any]:

@@ -114,22 +114,47 @@ def _changes(
     skeleton: Skeleton, ordered: list[tuple[int, str]], given: Mapping[str, Any], culprit: object
 ) -> Doubles:
     """(n, 4, 4) what angles or matrices of bones do in the head's space at rest [mm]."""
-    rows: list[float] = []
+    changes = np.empty((len(ordered), 4, 4))
+    rows: list[list[float]] = []
+    turned: list[int] = []
     own: list[int] = []
     for place, (bone, name) in enumerate(ordered):
         try:
-            angles = len(given[name]) == 3
-            if not angles:
+            if len(given[name]) == 3:
+                rows.append(skeleton.turned(bone, _finite(given[name])))
+                turned.append(place)
+            else:
+                changes[place] = given[name]
                 own.append(place)
-            rows += skeleton.turned(bone, _finite(given[name])) if angles else _flat(given[name])
         except (TypeError, ValueError):
-            came = f"{given[name]!r:.80} came"
-            refuse(f"{culprit}: bones.{name}", f"{_FORMS}, all of them finite", came, "Correct it")
-    changes = np.array(rows).reshape(-1, 4, 4)
+            _refuse_form(f"{culprit}: bones.{name}", given[name])
+    if turned:
+        changes[turned] = np.array(rows).reshape(-1, 4, 4)
     if own:
-        _check_matrices(changes[own], [f"{culprit}: bones.{ordered[place][1]}" for place in own])
+        _check_matrices(changes[own], [ordered[place][1] for place in own], given, culprit)
         changes[own] = skeleton.changes([ordered[place][0] for place in own], changes[own])
     return changes
+
+
+def _check_matrices(matrices: Doubles, names: list[str], given: Mapping[str, Any], culprit: object) -> None:
+    """Refuse matrices that were broadcast, are not finite or flatten what they move."""
+    for name in names:
+        if np.shape(given[name]) != (4, 4):
+            _refuse_form(f"{culprit}: bones.{name}", given[name])
+    lost = ~np.isfinite(matrices).all(axis=(1, 2))
+    if lost.any():
+        name = names[int(lost.argmax())]
+        _refuse_form(f"{culprit}: bones.{name}", given[name])
+    linear = matrices[:, :3, :3]
+    size = np.sqrt(np.einsum("nij,nij->n", linear, linear))
+    flat = np.abs(np.linalg.det(linear)) <= _FLAT * size**3
+    if flat.any():
+        where = f"{culprit}: bones.{names[int(flat.argmax())]}"
+        refuse(where, "a matrix that can be inverted", "this one flattens what it moves", "Correct it")
+
+
+def _refuse_form(culprit: str, given: Any) -> NoReturn:
+    refuse(culprit, f"{_FORMS}, all of them finite", f"{given!r:.80} came", "Correct it")
 
 
 def _finite(degrees: Any) -> Any:
@@ -137,26 +162,6 @@ def _finite(degrees: Any) -> Any:
     if not math.isfinite(sum(degrees)):
         raise ValueError(degrees)
     return degrees
-
-
-def _flat(given: Any) -> list[float]:
-    """The numbers of a (4, 4) matrix; raises ValueError or TypeError for what is none."""
-    matrix = np.asarray(given, np.float64)
-    if matrix.shape != (4, 4):
-        raise ValueError(given)
-    numbers: list[float] = matrix.ravel().tolist()
-    if not math.isfinite(sum(numbers)):
-        raise ValueError(given)
-    return numbers
-
-
-def _check_matrices(matrices: Doubles, culprits: list[str]) -> None:
-    linear = matrices[:, :3, :3]
-    size = np.sqrt(np.einsum("nij,nij->n", linear, linear))
-    flat = np.abs(np.linalg.det(linear)) <= _FLAT * size**3
-    if flat.any():
-        culprit = culprits[int(flat.argmax())]
-        refuse(culprit, "a matrix that can be inverted", "this one flattens what it moves", "Correct it")
 
 
 def _refuse_weights(weights: Mapping[Any, Any], names: tuple[str, ...], culprit: object) -> NoReturn:

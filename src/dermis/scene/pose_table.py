@@ -15,7 +15,7 @@ _Weight = Annotated[float, Field(ge=-MOST_WEIGHT, le=MOST_WEIGHT)]
 class PoseTable(Plain):
     """The [pose] of a scene: what `Pose` takes, without places of points, for which a text is too long."""
 
-    weights: dict[str, _Weight] = {}  # noqa: RUF012 pydantic copies it
+    weights: dict[str, _Weight] = Field(default_factory=dict)
     """Weights of morph targets by name, mostly 0 to 1."""
-    bones: dict[str, Any] = {}  # noqa: RUF012
+    bones: dict[str, Any] = Field(default_factory=dict)
     """By name of the bone: three angles about the head's x, y and z [degrees], or a (4, 4) matrix."""

@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
+from dermis.frame.geometry import upload_geometry
 from dermis.frame.passes import program
-from dermis.frame.passes.shape import at_rest
+from dermis.frame.passes.shape import rest_shape
 from dermis.frame.passes.visibility_buffer import draw_layers, make_layers
 from dermis.frame.projection import ShadowView, parallel_view, shadow_layers
+from dermis.frame.shape import shape_tables
 from dermis.frame.sky import fibonacci_sphere
 from dermis.gpu import ComputeProgram, Device, Frame
 from dermis.gpu.program import Resources
@@ -42,7 +44,8 @@ def bake_occlusion(
     texels : texture of the atlas' texels, of which side x side are baked, then the vertices, row by row
     """
     mesh, frame = head.mesh, Frame(device)
-    resting = at_rest(frame, head, atlas)
+    shape = rest_shape(device, shape_tables(device, head), head.positions_mm)
+    resting = upload_geometry(device, mesh, atlas, shape)
     shader, towards = program(device, "occlusion.wgsl"), fibonacci_sphere(directions)
     rows = side - (-len(mesh.positions) // side)
     sums = device.buffer(np.zeros((rows, side, 2), np.float32), "STORAGE")

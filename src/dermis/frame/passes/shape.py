@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from dermis.atlas.atlas import Atlas
-from dermis.frame.geometry import HeadResources, upload_geometry
+import numpy as np
+from numpy.typing import NDArray
+
 from dermis.frame.passes import each, program
-from dermis.frame.shape import LEAST_ACROSS, Shape, make_shape
-from dermis.gpu import Frame, Graph, Recorder
+from dermis.frame.shape import LEAST_ACROSS, Shape, ShapeTables, make_shape
+from dermis.gpu import Device, Frame, Graph, Recorder
 from dermis.gpu.program import Resources
 from dermis.mesh.geometry import MIN_UV_CROSS
-from dermis.mesh.head import Head
 from dermis.mesh.rig import Rig
 
 
@@ -38,11 +38,15 @@ def draw(graph: Frame | Graph, shape: Shape, motion: Motion) -> None:
     graph.repeat(_evaluate, shape)
 
 
-def at_rest(frame: Frame, head: Head, atlas: Atlas) -> HeadResources:
-    """A head's surface as it rests, in resources of its own."""
-    made = make_shape(frame.device, head)
-    draw(frame, made, resting(head.control))
-    return upload_geometry(frame.device, head.mesh, atlas, made)
+def rest_shape(device: Device, tables: ShapeTables, positions_mm: NDArray[np.float32]) -> Shape:
+    """The shape of a person at rest, evaluated at once.
+
+    positions_mm : (p, 3) of the control points
+    """
+    made, frame = make_shape(device, tables, moves=False), Frame(device, timed=False)
+    draw(frame, made, Motion(positions_mm.tobytes()))
+    frame.submit()
+    return made
 
 
 def resting(rig: Rig) -> Motion:
@@ -52,13 +56,13 @@ def resting(rig: Rig) -> Motion:
 
 
 def _evaluate(graph: Recorder, shape: Shape) -> None:
-    control, points, vertices = shape.counts
+    tables = shape.tables
     if shape.morphs:
-        _each(graph, "shape_pose.wgsl", shape.morphs, control, (("BONED", shape.boned),))
+        _each(graph, "shape_pose.wgsl", shape.morphs, tables.control, (("BONED", tables.bones > 0),))
     if shape.stencils:
-        _each(graph, "shape_refine.wgsl", shape.stencils, points)
+        _each(graph, "shape_refine.wgsl", shape.stencils, tables.points)
     least = (("LEAST_UV", MIN_UV_CROSS), ("LEAST_ACROSS", LEAST_ACROSS))
-    _each(graph, "shape_vertices.wgsl", shape.surface, vertices, least)
+    _each(graph, "shape_vertices.wgsl", shape.surface, tables.vertices, least)
 
 
 def _each(graph: Recorder, name: str, bound: Resources, count: int, constants: Any = ()) -> None:

@@ -24,6 +24,7 @@ struct Tangents {
 @group(0) @binding(2) var<storage, read> spans: array<vec4u>; // corners around the vertex' point; those of its own
 @group(0) @binding(3) var<storage, read> corners: array<vec2u>; // the next two vertices of the triangle
 @group(0) @binding(4) var<storage, read_write> vertex_buffer: array<vec4f>;
+@group(0) @binding(6) var<storage, read_write> vertex_lengths: array<vec4f>; // of both tangents, the cosine between them
 @group(0) @binding(5) var vertex_table: texture_storage_2d<rgba32float, write>;
 
 fn position_of(vertex: u32) -> vec3f {
@@ -123,4 +124,6 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     put(index, 1u, vec4f(normal, vertex.uv.y));
     put(index, 2u, vec4f(along.u, vertex.curvature));
     put(index, 3u, vec4f(along.v, 0.0));
+    let lengths = vec2f(length(along.u), length(along.v));
+    vertex_lengths[index] = vec4f(lengths, dot(along.u, along.v) / max(lengths.x * lengths.y, 1e-12), 0.0);
 }

@@ -10,28 +10,13 @@ override FEATHER_MM: f32 = 0.0; // width over which blurs narrow towards the edg
 const MOST_PER_MM: f32 = 6e4;
 const LEAST_SHARE: f32 = 1e-3; // of the blur at the edge itself: 0 would mean no surface
 
+@group(0) @binding(25) var<storage, read> vertex_lengths: array<vec4f>; // of dpdu and dpdv, the cosine between them
 @group(0) @binding(30) var stretch_map: texture_storage_2d<rgba16float, write>;
-
-struct Lengths {
-    u: f32, // [mm per unit of uv]
-    v: f32,
-    cosine: f32,
-}
-
-fn lengths_at(index: u32) -> Lengths {
-    let corner = corner_at(index);
-    let u = length(corner.dpdu);
-    let v = length(corner.dpdv);
-    return Lengths(u, v, dot(corner.dpdu, corner.dpdv) / max(u * v, 1e-12));
-}
 
 // Of a place in a triangle, by its barycentric weights.
 fn stretch_of(triangle: u32, w: vec3f) -> vec3f {
     let t = triangle_at(triangle);
-    let a = lengths_at(t.x);
-    let b = lengths_at(t.y);
-    let c = lengths_at(t.z);
-    let lengths = w.x * vec3f(a.u, a.v, a.cosine) + w.y * vec3f(b.u, b.v, b.cosine) + w.z * vec3f(c.u, c.v, c.cosine);
+    let lengths = (w.x * vertex_lengths[t.x] + w.y * vertex_lengths[t.y] + w.z * vertex_lengths[t.z]).xyz;
     let per_mm = min(texels_per_uv(triangle) / max(lengths.xy, vec2f(1e-3)), vec2f(MOST_PER_MM));
     let density = select(per_mm, vec2f(EVEN), EVEN > 0.0);
     return vec3f(density, select(0.0, clamp(lengths.z, -MOST_SHEAR, MOST_SHEAR), SHEAR));
