@@ -70,19 +70,9 @@ class Preparation:
         views = keep(_views, *lights, moved.outline, settings.shadow_size, using=(scene,))
         record = keep(_record, *lights, views, using=(device, scene))
         layers = shadow_layers(views)
+        who = head, scene.skin, profile, _person(scene)
         counts = len(views), len(layers.clips), scene.motion is not None
-        asked = Asked(
-            head,
-            scene.skin,
-            profile,
-            _person(scene),
-            settings,
-            around,
-            surroundings,
-            technique,
-            *counts,
-            view,
-        )
+        asked = Asked(*who, settings, around, surroundings, technique, *counts, view)
         resources = keep(make_resources, self.memo, device, asked)
         seen_from, shone_on = pinhole(scene.camera, head, settings), light_constants(scene)
         scale = scale_of(resources.levels.texel, brightest(scene, surroundings))

@@ -20,10 +20,10 @@ from dermis.frame.levels import Blur, Levels
 from dermis.frame.limits import check_limits
 from dermis.frame.maps import upload_maps
 from dermis.frame.passes import bloom, gutters, post, shade, shadows, surface_texels, visibility_buffer
-from dermis.frame.passes.moving_occlusion import make_map, make_sky
+from dermis.frame.passes.moving_occlusion import Sky, make_map, make_sky
 from dermis.frame.passes.shape import rest_shape
 from dermis.frame.seams import LaidOut, Remedy, laid_out, remedy_of
-from dermis.frame.shape import Shape, make_shape, shape_tables
+from dermis.frame.shape import Shape, ShapeTables, make_shape, shape_tables
 from dermis.frame.surroundings import Surroundings
 from dermis.frame.techniques.technique import AtlasTechnique, Technique
 from dermis.frame.translucency import translucency_of
@@ -124,12 +124,11 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     program = shade.shade_program(device)
     view = view_record(program, asked.head, settings, asked.split)
     technique.describe(view, program, own)
-    (first, _), held = atlases[0], layouts[0].head
-    sky = keep(make_sky, device, asked.head, using=(held, tables)) if asked.occlusion_moves else None
+    first, _ = atlases[0]
     side, several = settings.atlas, len(layouts) > 1
     return Resources(
         shape=shape,
-        head=held,
+        head=layouts[0].head,
         layouts=tuple(layouts),
         shadow_maps=shadow_maps,
         scatters=asked.count > 0,
@@ -141,7 +140,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         view=view,
         constants=surface.constants(asked.skin) + technique.shade_constants,
         suns=len(asked.surroundings.suns),
-        sky=sky,
+        sky=_sky(memo, device, asked, layouts[0], tables) if asked.occlusion_moves else None,
         gaussians=len(asked.profile.variance_mm2),
         picture=keep(post.make_picture, device, settings.size),
         glow=keep(bloom.make_glow, device, settings.size) if settings.bloom else None,
@@ -162,6 +161,12 @@ def _shared(memo: Memo, device: Device, asked: Asked, shadow_maps: shadows.Shado
         "panorama": asked.surroundings.panorama,
         "albedo_table": memo.keep(_albedo, device, surface.model_of(skin), skin.fresnel),
     }
+
+
+def _sky(memo: Memo, device: Device, asked: Asked, layout: AtlasLayout, tables: ShapeTables) -> Sky:
+    """The open sky at the head's vertices, known as it rests."""
+    resting = layout.head.shaped(memo.keep(rest_shape, device, tables, asked.head.positions_mm, of="head"))
+    return memo.keep(make_sky, device, asked.head, using=(resting,))
 
 
 def _atlas(memo: Memo, device: Device, asked: Asked, name: str, index: int) -> tuple[Atlas, AtlasTextures]:
@@ -185,7 +190,7 @@ def _layout(
     held = keep(upload_geometry, device, head.mesh, atlas, shape, of=number)
     lit = held.resources | shared
     if asked.person is not None:
-        resting = held.shaped(keep(rest_shape, device, shape.tables, asked.person))
+        resting = held.shaped(keep(rest_shape, device, shape.tables, asked.person, of="person"))
         walks = keep(make_walks, device, head.mesh, atlas, textures, of=number)
         textures = keep(gutters.walked, device, textures, walks, resting, of=number)
     if asked.occluded:

@@ -11,9 +11,7 @@ import numpy as np
 from dermis.frame.atlas_layout import AtlasLayout, MovingOcclusion
 from dermis.frame.geometry import HeadResources
 from dermis.frame.passes import TILE, each, program
-from dermis.frame.passes.shape import rest_shape
 from dermis.frame.passes.visibility_buffer import Drawer, Layers, draw_layers, make_layers
-from dermis.frame.shape import ShapeTables
 from dermis.frame.sky import SIDE, VIEWS, Look, look_around
 from dermis.gpu import Device, Frame, make_texture
 from dermis.mesh.head import Head
@@ -36,16 +34,15 @@ class Sky:
     vertices: int
 
 
-def make_sky(device: Device, head: Head, held: HeadResources, tables: ShapeTables) -> Sky:
+def make_sky(device: Device, head: Head, resting: HeadResources) -> Sky:
     """Space for the shares, and those of the head as it rests.
 
-    held : the head's triangles
+    resting : its surface then
     """
     count, rig, frame = len(head.mesh.positions), head.control, Frame(device, timed=False)
     layers = make_layers(device, (SIDE, SIDE), VIEWS, triangles=False)
     sky = Sky(layers, device.buffer(np.zeros((count, 2), np.float32), "STORAGE"), count)
     look = look_around(Outline(rig.outline_mm(rig.rest)), np.eye(3))
-    resting = held.shaped(rest_shape(device, tables, head.positions_mm))
     _draw_vertices(frame, sky, look, sky_record(device, look, count), resting, True)
     frame.submit()
     return sky
