@@ -36,6 +36,8 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.specular.albedo import albedo_table
 
+Laid = tuple[Atlas, AtlasTextures]
+
 
 @dataclass(frozen=True)
 class Asked:
@@ -115,11 +117,10 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     tables = keep(shape_tables, device, asked.head)
     shape = keep(make_shape, device, tables)
     shared = _shared(memo, device, asked, shadow_maps)
-    named = list(enumerate(asked.atlases.layouts))
-    atlases = [_atlas(memo, device, asked, name, index) for index, name in named]
+    atlases = [_atlas(memo, device, asked, name, k) for k, name in enumerate(asked.atlases.layouts)]
     uploaded: dict[str, Any] = memo.wait(maps)
     shared |= uploaded
-    layouts = [_layout(memo, device, asked, *atlases[index], shape, shared, index) for index, _ in named]
+    layouts = [_layout(memo, device, asked, one, shape, shared, k) for k, one in enumerate(atlases)]
     own = technique.make(memo, device, settings, asked.profile)
     program = shade.shade_program(device)
     view = view_record(program, asked.head, settings, asked.split)
@@ -169,24 +170,17 @@ def _sky(memo: Memo, device: Device, asked: Asked, layout: AtlasLayout, tables: 
     return memo.keep(make_sky, device, asked.head, using=(resting,))
 
 
-def _atlas(memo: Memo, device: Device, asked: Asked, name: str, index: int) -> tuple[Atlas, AtlasTextures]:
+def _atlas(memo: Memo, device: Device, asked: Asked, name: str, index: int) -> Laid:
     stretch = asked.technique.stretch(asked.settings)
     atlas = memo.keep(_cached_atlas, asked.head, asked.atlases.side, name, of=str(index))
     return atlas, memo.keep(upload_atlas, device, atlas, stretch, asked.remedy, of=str(index))
 
 
 def _layout(
-    memo: Memo,
-    device: Device,
-    asked: Asked,
-    atlas: Atlas,
-    textures: AtlasTextures,
-    shape: Shape,
-    shared: dict[str, Any],
-    index: int,
+    memo: Memo, device: Device, asked: Asked, laid: Laid, shape: Shape, shared: dict[str, Any], index: int
 ) -> AtlasLayout:
     """An atlas that light is spread on, without lights."""
-    keep, number, head = memo.keep, str(index), asked.head
+    keep, number, head, (atlas, textures) = memo.keep, str(index), asked.head, laid
     held = keep(upload_geometry, device, head.mesh, atlas, shape, of=number)
     lit = held.resources | shared
     if asked.person is not None:

@@ -73,6 +73,7 @@ def look_around(outline: Outline, turn: Floats) -> Look:
     seen = (axes.reshape(-1, 3).astype(np.float32) @ outline.columns[:3]).reshape(*axes.shape[:2], -1)
     low, high = seen.min(axis=2).astype(np.float64), seen.max(axis=2).astype(np.float64)
     half, middle = 0.5 * (high - low) + _MARGIN_MM, 0.5 * (high + low)
+    half[:, 2] += outline.slack_mm
     half[:, :2] *= SIDE / (SIDE - 2.0 * _BORDER)
     clips = np.zeros((VIEWS, 4, 4))
     clips[:, :3, :3], clips[:, :3, 3] = axes / half[..., None], -middle / half
