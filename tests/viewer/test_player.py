@@ -54,37 +54,43 @@ def after(player: Player, clock: Clock, seconds: float) -> float:
     return jaw(player)
 
 
+def start(player: Player, clock: Clock) -> None:
+    """Play, up to the picture from which the clock counts."""
+    player.play()
+    player.advance()
+    after(player, clock, 0.0)
+
+
 def test_it_rests_until_it_is_played(player: Player, rigged: ViewerState, clock: Clock) -> None:
     assert after(player, clock, 1.0) == 0.0 and player.shown is rigged and not player.is_playing
 
 
 def test_it_runs_by_the_clock_however_long_frames_take(player: Player, clock: Clock) -> None:
     player.play()
-    assert after(player, clock, 5.0) == 0.0  # the first frame shows its beginning
+    assert after(player, clock, 5.0) == 0.0
+    assert after(player, clock, 5.0) == 0.0  # the first picture took so long
     assert after(player, clock, 0.1) == pytest.approx(0.2)
     assert after(player, clock, 0.35) == pytest.approx(0.9)
     assert player.seconds == pytest.approx(0.45)
 
 
 def test_it_begins_again(player: Player, clock: Clock) -> None:
-    player.play()
-    after(player, clock, 0.0)
+    start(player, clock)
     assert after(player, clock, 0.6) == pytest.approx(0.2)
     assert after(player, clock, 50.1) == pytest.approx(0.4)
 
 
 def test_without_loop_it_stops_at_its_end_and_plays_from_the_beginning(player: Player, clock: Clock) -> None:
     player.loops = False
-    player.play()
-    after(player, clock, 0.0)
+    start(player, clock)
     assert after(player, clock, 0.7) == 1.0 and not player.is_playing and player.seconds == 0.5
     player.toggle()
-    assert after(player, clock, 0.1) == 0.0
+    assert player.is_playing and after(player, clock, 0.1) == 0.0
 
 
 def test_a_run_is_one_step(player: Player, history: History, rigged: ViewerState, clock: Clock) -> None:
-    player.play()
-    for _ in range(4):
+    start(player, clock)
+    for _ in range(3):
         after(player, clock, 0.1)
     assert not history.can_undo
     player.toggle()
@@ -92,14 +98,12 @@ def test_a_run_is_one_step(player: Player, history: History, rigged: ViewerState
     history.undo()
     assert history.state is rigged and player.seconds == 0.0 and not history.can_undo
     history.redo()
-    player.toggle()
-    after(player, clock, 0.0)
+    start(player, clock)
     assert after(player, clock, 0.1) == pytest.approx(0.8)
 
 
 def test_what_changes_meanwhile_is_a_step_of_its_own(player: Player, history: History, clock: Clock) -> None:
-    player.play()
-    after(player, clock, 0.0)
+    start(player, clock)
     camera = history.state.scene.camera
     for k in range(3):
         turned = history.state.with_camera(orbit(camera, 0.1 * (k + 1), 0.0))
@@ -113,8 +117,7 @@ def test_what_changes_meanwhile_is_a_step_of_its_own(player: Player, history: Hi
 
 
 def test_a_slider_keeps_what_the_motion_does_not_move(player: Player, history: History, clock: Clock) -> None:
-    player.play()
-    after(player, clock, 0.0)
+    start(player, clock)
     brow = with_weight(history.state.scene, "browInnerUp", 0.5)
     history.change(history.state.with_pose(brow))
     after(player, clock, 0.2)
@@ -122,22 +125,19 @@ def test_a_slider_keeps_what_the_motion_does_not_move(player: Player, history: H
 
 
 def test_scrubbing_stops_and_stays_there(player: Player, history: History, clock: Clock) -> None:
-    player.play()
-    after(player, clock, 0.0)
+    start(player, clock)
     for seconds in (0.1, 0.25, 0.35):
         history.change(player.scrubbed(seconds), "hold time")
     assert after(player, clock, 1.0) == pytest.approx(0.7) and player.seconds == 0.35
     assert len(history.states) == 2
-    player.play()
-    after(player, clock, 0.0)
+    start(player, clock)
     assert after(player, clock, 0.1) == pytest.approx(0.9)
 
 
 def test_a_head_without_its_names_is_told_and_the_first_one_plays_on(
     player: Player, history: History, state: ViewerState, rigged: ViewerState, clock: Clock
 ) -> None:
-    player.play()
-    after(player, clock, 0.0)
+    start(player, clock)
     history.change(state)
     assert player.clip is None and player.shown is state and "JawOpen" in player.note
     after(player, clock, 0.1)
@@ -149,11 +149,11 @@ def test_a_head_without_its_names_is_told_and_the_first_one_plays_on(
 
 
 def test_another_motion_plays_from_its_beginning(player: Player, clock: Clock, rigged_file: Path) -> None:
-    player.play()
-    after(player, clock, 0.0)
+    start(player, clock)
     after(player, clock, 0.3)
     player.open(MotionFile(rigged_file))
     assert player.is_playing and player.seconds == 0.0
+    player.advance()
     after(player, clock, 0.0)
     assert after(player, clock, 0.25) == pytest.approx(0.25)
     with pytest.raises(DermisError, match="no such file"):
@@ -169,8 +169,7 @@ def test_a_frame_that_cannot_be_read_stops_it(
 
     clip = player.clip
     assert clip is not None
-    player.play()
-    after(player, clock, 0.0)
+    start(player, clock)
     monkeypatch.setattr(type(clip), "pose_at", lambda _, seconds: broken(seconds))
     assert after(player, clock, 0.1) == 0.0
     assert not player.is_playing and "frame 3" in player.note
@@ -178,6 +177,5 @@ def test_a_frame_that_cannot_be_read_stops_it(
 
 def test_a_motion_of_one_frame_stands(rigged: ViewerState, clock: Clock, tmp_path: Path) -> None:
     player = Player(History(rigged), MotionFile(write_take(tmp_path / "one.csv", 0.5)), clock)
-    player.play()
-    assert after(player, clock, 0.1) == 0.5
+    start(player, clock)
     assert after(player, clock, 0.1) == 0.5 and not player.is_playing

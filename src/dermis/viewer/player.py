@@ -60,6 +60,7 @@ class Player:
         self._head: Head | None = None
         self._seconds = 0.0
         self._playing = False
+        self._starting = False  # whether no picture of it has been drawn yet
         self._began: float | None = None  # by the clock, where the motion's beginning would lie
         self._shown: tuple[ViewerState, float, ViewerState] | None = None
 
@@ -123,7 +124,7 @@ class Player:
             return
         start = self.seconds if seconds is None else seconds
         self._seconds = 0.0 if start >= self.clip.duration_s else start
-        self._playing, self._began = True, None
+        self._playing, self._starting, self._began = True, True, None
 
     def stop(self) -> None:
         """End without a step: the state is as it was before."""
@@ -145,12 +146,10 @@ class Player:
             self.play()
 
     def advance(self) -> None:
-        """Go on to the time of the clock."""
-        if not self._playing:
-            return
-        now, clip = self._clock(), self.clip
-        if clip is None:
-            self.stop()
+        """Go on to the time of the clock, which begins when the first picture is there: it may take long."""
+        now, clip = self._clock(), self.clip if self._playing else None
+        if clip is None or self._starting:
+            self._playing, self._starting = clip is not None, False
             return
         if self._began is None:
             self._began = now - self._seconds

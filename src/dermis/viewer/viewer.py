@@ -84,8 +84,6 @@ class Viewer:
     def is_still(self) -> bool:
         """Whether the last picture is final until something changes."""
         state, studio = self.session.shown, self.session.studio
-        if self.session.player.is_playing:
-            return False
         arrived = self._last_state is state and self._easing.camera == state.scene.camera
         final = studio.is_current or self._refused is state
         return arrived and final and not self._is_moving(self._clock())
@@ -151,7 +149,7 @@ class Viewer:
         return session.studio.last_image, None
 
     def _is_moving(self, now: float) -> bool:
-        return now - self._last_change < _QUIET_S
+        return self.session.player.is_playing or now - self._last_change < _QUIET_S
 
     def _status(self, size: tuple[int, int]) -> str:
         studio = self.session.studio
