@@ -163,7 +163,8 @@ def _layout(
 ) -> AtlasLayout:
     """An atlas that light is spread on, without lights."""
     keep, number, head = memo.keep, str(index), asked.head
-    lit = keep(upload_geometry, device, head.mesh, atlas, of=number) | shared
+    shape = keep(upload_geometry, device, head.mesh, atlas, of=number)
+    lit = shape | shared
     if asked.occluded:
         bound = lit, textures.resources["atlas"]
         lit["occlusion_map"] = keep(surroundings.occlusion_map, device, head, atlas, using=bound, of=number)
@@ -172,7 +173,8 @@ def _layout(
     translucency = None
     if asked.count and asked.settings.transmission == "thin" and asked.technique.transmits:
         blurred = asked.split.blurred_mm2, asked.split.weight, asked.skin.has_own_tissue
-        translucency = translucency_of(memo, device, head, atlas, *blurred, of=number)
+        surface = shape | textures.resources
+        translucency = translucency_of(memo, device, surface, atlas, *blurred, of=number)
     side = asked.settings.atlas if asked.count else 1
     surfaces = keep(surface_texels.make_surfaces, device, side, of=number)
     return AtlasLayout(textures, lit, surfaces, _sum(memo, device, asked, side, number), translucency)
