@@ -14,11 +14,13 @@ from dermis.gallery.script import Script, find_scripts
 from dermis.scene import Camera, Environment, Settings, Skin
 from dermis.scene.head_table import HeadTable
 from dermis.scene.plain import Plain, help_of, shown, values_of
+from dermis.scene.pose_table import PoseTable
 from dermis.scene.skin import Pigments, TissueLayer
 
 HERE = Path(__file__).parent
 TABLES: dict[str, tuple[type[Plain], dict[str, str] | None]] = {
     "[head]": (HeadTable, {"name": ""} | HEAD),
+    "[pose]": (PoseTable, None),
     "[skin]": (Skin, {}),
     "[skin.pigments]": (Pigments, None),
     "[[skin.layers]]": (TissueLayer, None),

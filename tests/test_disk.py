@@ -18,7 +18,7 @@ from dermis.atlas import cached
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.cached import cached_atlas
 from dermis.disk import cached_array, cached_mips
-from dermis.mesh.load import cached_mesh
+from dermis.mesh.cached import Rigged, cached_rigged
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import plane, uv_sphere
 
@@ -314,17 +314,19 @@ def test_a_mesh_comes_back_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     mesh, made = uv_sphere(20.0), []
 
-    def load() -> Mesh:
+    def load() -> Rigged:
         made.append(1)
-        return mesh
+        return Rigged(mesh, None)
 
-    first, second = (cached_mesh(b"file", "up y", load) for _ in range(2))
+    first, second = (cached_rigged(b"file", "up y", load).mesh for _ in range(2))
     for one in (first, second):
-        assert one.materials == mesh.materials and np.array_equal(one.outline, mesh.outline)
+        assert one.materials == mesh.materials and np.array_equal(
+            one.outline.places_mm, mesh.outline.places_mm
+        )
         for name in ("positions", "normals", "uv", "dpdu", "dpdv", "point", "triangles", "material"):
             kept, given = getattr(one, name), getattr(mesh, name)
             assert kept.dtype == given.dtype and np.array_equal(kept, given)
     assert len(made) == 1
-    cached_mesh(b"file", "up z", load)
-    cached_mesh(b"another", "up y", load)
+    cached_rigged(b"file", "up z", load)
+    cached_rigged(b"another", "up y", load)
     assert len(made) == 3

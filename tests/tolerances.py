@@ -95,3 +95,19 @@ SEAM = 0.01
 PICTURE_MEAN, PICTURE_TAIL = 0.4, 4.0
 """Whole frames against stored pictures, in bytes, in the mean and at the 99.5th percentile: other versions of
 the software adapter round otherwise."""
+
+SHAPE, SHAPE_NORMAL = 2e-6, 2e-5
+"""Points and tangents computed on the device against float64, of the largest; normals, by component."""
+
+WALKED = 0.05
+"""Where a gutter continues, walked in single precision, against walks in float64 [texel]."""
+
+STRETCHED = 1.5e-3
+"""Stretch on the device against the atlas' own, of the largest: both are halves, one of them of weights in
+steps of 1/65535."""
+
+HARMONIC = 0.003
+"""Share of light in proportion to x that a Gaussian leaves on a ball, against the heat equation's."""
+
+POSED = 0.005
+"""A picture of a posed head against one of a head loaded in that shape, relative root mean square."""

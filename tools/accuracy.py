@@ -27,7 +27,7 @@ SIZE = 256
 
 def spread(device: Device, mesh: Mesh, light: np.ndarray, stretch: str = "full") -> list[np.ndarray]:
     """The blurred levels of light (n, n) on a mesh's atlas."""
-    levels, blur = surface.spread(device, build_atlas(mesh, len(light)), light[..., None], stretch)
+    levels, blur = surface.spread(device, mesh, build_atlas(mesh, len(light)), light[..., None], stretch)
     return [download(device, levels.stack, layer=k + 1)[..., 0] for k in range(len(blur.variance_mm2))]
 
 

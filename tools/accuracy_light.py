@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 import dermis
+from dermis.atlas.cached import cached_atlas
 from dermis.environment.panorama import directions, load_panorama, resampled, solid_angles, split_suns
 from dermis.environment.prefilter import (
     ROUGHEST,
@@ -172,9 +173,9 @@ def occlusion_error(renderer: dermis.Renderer) -> float:
     """Root mean square difference of the open share of the sky from 1024 directions, on the scan."""
     head = dermis.load_head("lee_perry_smith")
     inputs = renderer.prepare(Scene(head), Settings(size=(64, 64), atlas=512, samples=1))
-    texels = inputs.layouts[0].atlas.resources["atlas"]
+    texels, atlas = inputs.layouts[0].atlas.resources["atlas"], cached_atlas(head.mesh, 512, "stitched")
     few, many = (
-        bake_occlusion(renderer.device, head.mesh, inputs.lit, texels, 512, count)[:512]
+        bake_occlusion(renderer.device, head, atlas, inputs.lit, texels, 512, count)[:512]
         for count in (DIRECTIONS, 1024)
     )
     return float(np.sqrt(np.nanmean((few - many) ** 2)))

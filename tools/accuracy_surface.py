@@ -16,13 +16,18 @@ from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
 from dermis.atlas.cached import cached_atlas
 from dermis.frame.atlas_textures import upload_atlas
+from dermis.frame.geometry import upload_geometry
 from dermis.frame.levels import Blur, Levels, halvings_of, make_levels, usual_texel
 from dermis.frame.passes import diffuse
+from dermis.frame.passes import stretch as stretched
+from dermis.frame.passes.shape import rest_shape
 from dermis.frame.renderer import Renderer
 from dermis.frame.seams import REMEDIES
+from dermis.frame.shape import shape_tables
 from dermis.gpu import Device, Frame, download, upload
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
+from dermis.mesh.mesh import Mesh
 from dermis.optics.profiles import load_profile
 from dermis.scene import DirectionalLight, Light, Scene, Settings, Skin, StripeLight
 
@@ -51,7 +56,7 @@ def first_harmonic(renderer: Renderer, radius_mm: float) -> str:
     mesh = cut_sphere(radius_mm, 20)
     atlas = build_atlas(mesh, BALL_SIDE, "stitched")
     light = np.nan_to_num(shown(atlas, mesh, own=True))[..., :1] / radius_mm
-    left = widest(renderer, *spread(renderer.device, atlas, light))
+    left = widest(renderer, *spread(renderer.device, mesh, atlas, light))
     density = np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
     area = atlas.own[..., None] / density
     map_share = (area * left * light).sum() / (area * light**2).sum()
@@ -61,8 +66,10 @@ def first_harmonic(renderer: Renderer, radius_mm: float) -> str:
     return f"| {radius_mm:g} | {map_share:.3f} | {np.exp(-v):.3f} | {chords:.3f} |"
 
 
-def spread(device: Device, atlas: Atlas, light: np.ndarray, stretch: str = "full") -> tuple[Levels, Blur]:
-    """Grey light (n, n, 1) on an atlas, blurred by all Gaussians of PROFILE but the narrowest."""
+def spread(
+    device: Device, mesh: Mesh, atlas: Atlas, light: np.ndarray, stretch: str = "full"
+) -> tuple[Levels, Blur]:
+    """Grey light (n, n, 1) on a mesh's atlas, blurred by all Gaussians of PROFILE but the narrowest."""
     textures, variance = upload_atlas(device, atlas, stretch), PROFILE.variance_mm2[1:]
     most = len(textures.sheets("repeated")) - 1
     halvings = halvings_of(variance, textures.usual_per_mm, most)
@@ -70,6 +77,9 @@ def spread(device: Device, atlas: Atlas, light: np.ndarray, stretch: str = "full
     levels = make_levels(device, len(light), len(variance), usual_texel(device))
     upload(device, levels.stack, np.dstack([light, light, light, np.ones_like(light)]))
     frame = Frame(device)
+    head = Head("", mesh, Maps())
+    shape = rest_shape(device, shape_tables(device, head), head.positions_mm)
+    stretched.draw(frame, upload_geometry(device, mesh, atlas, shape), textures)
     diffuse.draw(frame, levels, textures, blur)
     frame.submit()
     return levels, blur

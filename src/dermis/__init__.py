@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from dermis.optics.profiles import load_profile
     from dermis.optics.tissue import Tissue, load_tissue
     from dermis.scene.camera import Camera, portrait, profile, three_quarter
+    from dermis.scene.clips.clip import Clip
+    from dermis.scene.clips.load import load_motion
     from dermis.scene.environment import Environment
     from dermis.scene.files import load_lights, load_scene
     from dermis.scene.heads import load_head
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
         studio,
     )
     from dermis.scene.model import Scene
+    from dermis.scene.pose import Pose
     from dermis.scene.settings import Settings
     from dermis.scene.skin import Skin
 
@@ -50,6 +53,8 @@ _HOME = {
     "portrait": "scene.camera",
     "profile": "scene.camera",
     "three_quarter": "scene.camera",
+    "Clip": "scene.clips.clip",
+    "load_motion": "scene.clips.load",
     "Environment": "scene.environment",
     "load_lights": "scene.files",
     "load_scene": "scene.files",
@@ -61,17 +66,20 @@ _HOME = {
     "StripeLight": "scene.lights",
     "studio": "scene.lights",
     "Scene": "scene.model",
+    "Pose": "scene.pose",
     "Settings": "scene.settings",
     "Skin": "scene.skin",
 }
 
 __all__ = [
     "Camera",
+    "Clip",
     "DermisError",
     "DirectionalLight",
     "Environment",
     "Head",
     "PointLight",
+    "Pose",
     "RectangleLight",
     "Renderer",
     "Scene",
@@ -83,6 +91,7 @@ __all__ = [
     "Tissue",
     "load_head",
     "load_lights",
+    "load_motion",
     "load_profile",
     "load_scene",
     "load_tissue",

@@ -15,10 +15,13 @@ from dermis.images.io import read_image, write_png
 
 Run = Callable[..., Any]
 STAGES = {
+    "shape",
     "shadows",
+    "stretch",
     "irradiance",
     "diffuse",
     "surface",
+    "pairs",
     "translucency",
     "combine",
     "visibility",

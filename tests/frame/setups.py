@@ -6,17 +6,21 @@ Places are given in the mesh's own coordinates; a scene wants them from the head
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dermis.atlas.atlas import Atlas
+from dermis.frame.atlas_textures import AtlasTextures, upload_atlas
 from dermis.frame.frame import draw_frame
 from dermis.frame.inputs import Inputs
 from dermis.frame.passes import SHARED_SHADERS
+from dermis.frame.passes.stretch import draw_coarser
 from dermis.frame.renderer import Renderer
-from dermis.gpu import ComputeProgram, Constants, Device, Frame, download, make_texture
+from dermis.gpu import ComputeProgram, Constants, Device, Frame, download, make_texture, upload
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -68,6 +72,20 @@ def settings_of(**given: Any) -> Settings:
     """Small sizes unless told otherwise, and an atlas laid out as the mesh's maps are."""
     small = {"size": (48, 48), "atlas": 64, "samples": 1, "shadow_size": 64, "seams": "alpha"}
     return Settings(**(small | given))
+
+
+def resting(device: Device, atlas: Atlas, stretch: str = "full", **more: Any) -> AtlasTextures:
+    """An atlas stretched as its arrays say, where no mesh says it.
+
+    more : what its textures have otherwise
+    """
+    made = replace(upload_atlas(device, atlas, stretch), **more)
+    metric = np.dstack([atlas.stretch, atlas.shear * (stretch == "full"), np.zeros_like(atlas.shear)])
+    upload(device, made.resources["stretch_map"], metric)
+    frame = Frame(device)
+    draw_coarser(frame, made)
+    frame.submit()
+    return made
 
 
 def run_frame(renderer: Renderer, scene: Scene, **given: Any) -> Inputs:

@@ -148,7 +148,7 @@ def test_a_stripe_is_as_wide_as_asked(renderer: Renderer, close: float) -> None:
 def visibility(renderer: Renderer, head: Any, light: Light, size: int = 1024) -> tuple[Floats, Floats]:
     """Along the floor's middle: places on x, and how much of the light each sees (one part after another)."""
     scene = scene_of(head, light)
-    views = light_views(scene, size)
+    views = light_views(scene, scene.head.mesh.outline, size)
     inputs = run_frame(renderer, scene, shadow_size=size)
     x = np.linspace(-55, 55, 4 * SIZE * SIZE // 4).astype(np.float32).reshape(SIZE, SIZE)
     points = np.dstack([x, np.zeros_like(x), np.zeros_like(x), np.ones_like(x)])

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import twins
 from numpy.typing import NDArray
-from setups import bent_plane
+from setups import bent_plane, resting
 from tolerances import FLAT, SHEARED_PEAK, SHEARED_VARIANCE, SPREAD_ENERGY, SPREAD_PEAK, SPREAD_VARIANCE, TWIN
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.frame.atlas_textures import AtlasTextures, upload_atlas
+from dermis.frame.atlas_textures import AtlasTextures
 from dermis.frame.levels import FLOATS, Blur, halvings_of, make_levels
 from dermis.frame.passes import combine, diffuse
 from dermis.gpu import Device, Frame, download, make_texture, upload
@@ -67,7 +67,7 @@ def metric(atlas: Atlas) -> Floats:
 def test_twin(device: Device, shear: float, edge: str) -> None:
     atlas = random_atlas(64, shear)
     source = np.random.default_rng(2).random((64, 64, 3)).astype(np.float32).astype(float)
-    made = blur(device, source, upload_atlas(device, atlas), edge=edge)
+    made = blur(device, source, resting(device, atlas), edge=edge)
     reach = atlas.reach if edge == "repeated" else None
     for level, twin in zip(made, twins.levels(source, metric(atlas), reach, BLURRED), strict=True):
         assert np.abs(level - twin).max() < TWIN
@@ -76,7 +76,7 @@ def test_twin(device: Device, shear: float, edge: str) -> None:
 def test_empty_texels_show_the_clear_colour(device: Device) -> None:
     """Black bleeds in where they are black; constant light stays constant where they have its colour."""
     atlas = build_atlas(plane(60.0, 2, uv_scale=0.7), 64)
-    source, resources = atlas.coverage[..., None] * np.ones(4), upload_atlas(device, atlas)
+    source, resources = atlas.coverage[..., None] * np.ones(4), resting(device, atlas)
     black, white = (
         blur(device, source, resources, edge="cleared", clear=(level,) * 3)[-1] for level in (0.0, 1.0)
     )
@@ -123,7 +123,7 @@ def test_point_of_light_is_the_sum_of_gaussians(device: Device, name: str) -> No
     """A lit texel of power 1 receives R(r) times a texel's area from itself; the unblurred level aside."""
     atlas = patch(*(UNIFORM | UNEVEN)[name])
     source, (y, x), r2, area = point_of_light(atlas)
-    parts = blur(device, source, upload_atlas(device, atlas))
+    parts = blur(device, source, resting(device, atlas))
     image = sum(weight * part for weight, part in zip(PROFILE.weight[1:], parts, strict=True))
     exact = twins.gaussian_sum(PROFILE, 1, r2) * area
     rows, columns = np.indices((256, 256))
@@ -140,7 +140,7 @@ def test_blurred_point_is_round_and_as_wide_as_asked(device: Device, name: str) 
     source, (y, x), _, _ = point_of_light(atlas)
     per_mm = atlas.stretch[y, x].astype(float)
     rows, columns = np.indices((256, 256))
-    parts = blur(device, source, upload_atlas(device, atlas))
+    parts = blur(device, source, resting(device, atlas))
     for variance, part in zip(BLURRED, parts, strict=True):
         image = np.where(atlas.coverage, part[..., 0], 0.0)
         along_x = (image * (columns - x) ** 2).sum() / per_mm[0] ** 2
@@ -156,7 +156,7 @@ def test_constant_light_stays_constant(device: Device, mesh: Any, size: int) -> 
     atlas = build_atlas(mesh, size)
     colour = np.array([1.0, 0.3, 2.7])
     source = atlas.coverage[..., None] * colour
-    for level in blur(device, source, upload_atlas(device, atlas)):
+    for level in blur(device, source, resting(device, atlas)):
         assert np.abs(level[atlas.coverage] / colour - 1).max() < FLAT
         assert not level[~atlas.coverage].any()
 
@@ -165,7 +165,7 @@ def test_the_order_of_the_axes_does_not_matter(device: Device, monkeypatch: pyte
     """Where the stretch is the same everywhere, first along v and then along u is the same blur."""
     atlas = build_atlas(plane(40.0), 64)
     source = np.random.default_rng(9).random((64, 64, 3))
-    resources, along = upload_atlas(device, atlas), diffuse._along
+    resources, along = resting(device, atlas), diffuse._along
     first = blur(device, source, resources)
     monkeypatch.setattr(diffuse, "_along", lambda *given: along(*given[:2], 1 - given[2], *given[3:]))
     swapped = blur(device, source, resources)
@@ -176,7 +176,7 @@ def test_a_symmetric_patch_stays_symmetric(device: Device) -> None:
     atlas = build_atlas(plane(40.0), 64)
     source = np.random.default_rng(9).random((64, 64, 3))
     source = source + source.transpose(1, 0, 2)
-    for level in blur(device, source, upload_atlas(device, atlas)):
+    for level in blur(device, source, resting(device, atlas)):
         assert np.abs(level - level.transpose(1, 0, 2)).max() < TWIN * level.max()
 
 
@@ -185,7 +185,7 @@ def test_one_wide_gaussian_alone_is_smooth(device: Device, texels_per_mm: float)
     """No narrower level prepares the source: it must not be read sparsely."""
     atlas = build_atlas(plane(256 / texels_per_mm), 256)
     source, _, r2, area = point_of_light(atlas)
-    (image,) = blur(device, source, upload_atlas(device, atlas), np.array([7.41]))
+    (image,) = blur(device, source, resting(device, atlas), np.array([7.41]))
     exact = np.exp(-r2 / (2 * 7.41)) / (2 * np.pi * 7.41) * area
     assert np.abs(image[..., 0] - exact).max() < SPREAD_PEAK * exact.max()
     assert image[..., 0].sum() == pytest.approx(1.0, rel=SPREAD_ENERGY)
@@ -214,7 +214,7 @@ def test_sheared_maps_spread_light_in_circles(device: Device, name: str) -> None
     matrix = np.array(SHEARED[name])[:, :2]
     area = (60.0 / 256) ** 2 / abs(np.linalg.det(matrix))
     away = position - position[y, x]
-    for variance, level in zip(BLURRED, blur(device, source, upload_atlas(device, atlas)), strict=True):
+    for variance, level in zip(BLURRED, blur(device, source, resting(device, atlas)), strict=True):
         if variance * 256**2 / 60**2 * np.linalg.eigvalsh(matrix @ matrix.T)[0] < 2.0:
             continue  # finer than the texels are wide
         image = np.where(atlas.coverage, level[..., 0], 0.0)

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from setups import resting
 
 from dermis.atlas.build import build_atlas
-from dermis.frame.atlas_textures import upload_atlas
 from dermis.frame.levels import Blur
 from dermis.frame.techniques.gpu_gems_3 import TECHNIQUE
 from dermis.gpu import Device, Frame, download, upload
@@ -30,7 +30,7 @@ def levels(device: Device) -> list[np.ndarray]:
     light[SIZE // 2, SIZE // 2, :3] = 1000.0
     upload(device, space.stack, light)
     frame = Frame(device)
-    TECHNIQUE.fill(frame, space, upload_atlas(device, atlas), BLUR)
+    TECHNIQUE.fill(frame, space, resting(device, atlas), BLUR)
     frame.submit()
     return [
         download(device, space.stack, layer=k + 1)[..., 0].astype(float) / 1000.0
@@ -64,7 +64,7 @@ def test_the_clear_colour_takes_no_light_away(device: Device) -> None:
     space = TECHNIQUE.make_levels(device, SIZE, len(VARIANCES))
     upload(device, space.stack, np.dstack([np.zeros((SIZE, SIZE, 3)), np.ones((SIZE, SIZE))]))
     frame = Frame(device)
-    atlas = upload_atlas(device, build_atlas(plane(SIZE / TEXELS_PER_MM), SIZE))
+    atlas = resting(device, build_atlas(plane(SIZE / TEXELS_PER_MM), SIZE))
     TECHNIQUE.fill(frame, space, atlas, replace(BLUR, edge="cleared", clear=(0.5, 0.35, 0.3)))
     frame.submit()
     dark = download(device, space.stack, layer=len(VARIANCES))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from cut_meshes import cut_sphere
 from numpy.typing import NDArray
+from setups import resting
 from tolerances import FLAT, HALVED, HALVES, SPREAD_ENERGY
 
 from dermis.atlas.atlas import Atlas
@@ -37,7 +38,7 @@ def atlas() -> Atlas:
 
 @pytest.fixture(scope="module")
 def textures(device: Device, atlas: Atlas) -> AtlasTextures:
-    return upload_atlas(device, atlas)
+    return resting(device, atlas)
 
 
 def test_halvings_are_the_same_from_disk(
@@ -46,12 +47,13 @@ def test_halvings_are_the_same_from_disk(
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     first, second = upload_atlas(device, atlas), upload_atlas(device, atlas)
     assert len(list(tmp_path.rglob("*.arrays"))) == 1 and len(first.coarser) == len(second.coarser) == 3
-    sheet = Sheet(download(device, first.resources["stretch_map"]), atlas.reach, atlas.gutter, atlas.source)
+    sheet = Sheet(atlas.coverage, atlas.own, atlas.reach, atlas.gutter, atlas.source)
     for one, other in zip(first.coarser, second.coarser, strict=True):
         sheet = halved(sheet)
-        expected = np.concatenate([part.view(np.uint32) for part in (sheet.metric, sheet.reach)], axis=-1)
         for made in (one, other):
-            assert np.array_equal(download(device, made.resources["sheet_map"]), expected)
+            reach = download(device, made.resources["reach_map"])
+            assert np.array_equal(reach & 0x7FFF, sheet.reach)
+            assert np.array_equal(reach[..., 0] >> 15, sheet.covered & ~sheet.own)
         gutters = [device.handle.queue.read_buffer(made.gutter).tobytes() for made in (one, other)]
         words = np.concatenate([sheet.source.view(np.uint32), sheet.gutter], axis=1, dtype=np.uint32)
         assert one.sheared == other.sheared and gutters == [words.tobytes()] * 2
@@ -109,10 +111,8 @@ def test_constant_light_stays_constant_at_every_resolution(
 def test_what_halving_adds_too_much_is_taken_off_the_next_level(device: Device) -> None:
     """Texels of 1 mm: the second level widens by 0.4 mm2, halving alone by 1, which the third makes good."""
     atlas = build_atlas(plane(256.0), 256)
-    metric = np.zeros((256, 256, 4), np.float16)
-    metric[..., :2] = atlas.stretch
-    coarser = _coarser(device, Sheet(metric, atlas.reach, atlas.gutter, atlas.source))
-    textures = replace(upload_atlas(device, atlas), coarser=coarser, usual_per_mm=2.0)
+    coarser = _coarser(device, Sheet(atlas.coverage, atlas.own, atlas.reach, atlas.gutter, atlas.source))
+    textures = resting(device, atlas, coarser=coarser, usual_per_mm=2.0)
     variances = np.array([0.5, 0.9, 3.0])
     halvings = halvings_of(variances, 2.0, len(coarser))
     space, light = make_levels(device, 256, 3, FLOATS), np.zeros((256, 256, 4))
@@ -159,17 +159,15 @@ def test_resolution_falls_step_by_step(texels_per_mm: float, most: int) -> None:
     assert (max(found) > 0) == (texels_per_mm > 1.0)
 
 
-def test_a_halved_atlas_is_the_same_surface(atlas: Atlas) -> None:
+def test_a_halved_atlas_is_the_same_surface(device: Device, atlas: Atlas, textures: AtlasTextures) -> None:
     """Stretch of half as many texels, runs of half the length, and gutters that show the same places."""
-    metric = np.zeros((256, 256, 4), np.float16)
-    metric[..., :2], metric[..., 2] = atlas.stretch, atlas.shear
-    metric[atlas.coverage & ~atlas.own, 3] = 1
-    coarse = halved(Sheet(metric, atlas.reach, atlas.gutter, atlas.source))
-    own = (coarse.metric[..., 0] > 0) & (coarse.metric[..., 3] == 0)
+    coarse = halved(Sheet(atlas.coverage, atlas.own, atlas.reach, atlas.gutter, atlas.source))
+    own, made = coarse.own, textures.coarser[0].resources
+    metric = download(device, made["stretch_map"]).astype(np.float64)
+    assert np.array_equal(metric[..., 0] > 0, coarse.covered)
     y, x = np.nonzero(own)
-    assert np.median(coarse.metric[y, x, :2] / atlas.stretch[2 * y, 2 * x].clip(1e-3)) == pytest.approx(
-        0.5, 1e-2
-    )
+    ratio = metric[y, x, :2] / atlas.stretch[2 * y, 2 * x].clip(1e-3)
+    assert np.median(ratio) == pytest.approx(0.5, 1e-2)
     assert (2 * coarse.reach[..., 0] <= atlas.reach[::2, ::2, 0].max() + 1).all()
     assert own[atlas.own[::2, ::2]].all() and len(coarse.gutter) > 50
     assert not own[coarse.gutter[:, 1], coarse.gutter[:, 0]].any()

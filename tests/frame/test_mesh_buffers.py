@@ -10,7 +10,9 @@ from setups import frontal, head_of, probe, run_frame, scene_of
 
 from dermis.atlas.cached import cached_atlas
 from dermis.frame.geometry import upload_geometry
+from dermis.frame.passes.shape import rest_shape
 from dermis.frame.renderer import Renderer
+from dermis.frame.shape import shape_tables
 from dermis.mesh.primitives import uv_sphere
 
 BALL = head_of(uv_sphere(30.0, 24, 12))
@@ -22,9 +24,14 @@ def test_buffers_hold_what_textures_hold(renderer: Renderer, monkeypatch: pytest
     adapter = replace(renderer.device.adapter, kind="DiscreteGPU")  # which reads buffers
     with monkeypatch.context() as patch:
         patch.setattr(renderer.device, "adapter", adapter)
-        held = upload_geometry(renderer.device, BALL.mesh, cached_atlas(BALL.mesh, 64))
+        patch.setattr(renderer.device, "programs", {})  # those of software write textures
+        tables = shape_tables(renderer.device, BALL)
+        shape = rest_shape(renderer.device, tables, BALL.positions_mm)
+        held = upload_geometry(renderer.device, BALL.mesh, cached_atlas(BALL.mesh, 64), shape)
+    # the texture from one, the buffers from the other: what is read is the same
+    both = held.resources | {name: inputs.lit[name] for name in ("triangle_table", "vertex_table")}
     atlas = inputs.layouts[0].atlas.resources["atlas"]
-    bound = inputs.lit | held | {"atlas": atlas, "footprint": {"side": 1 / 64}}
+    bound = inputs.lit | both | {"atlas": atlas, "footprint": {"side": 1 / 64}}
     outputs = ["relief", "arriving"]
     for one, other in zip(
         probe(renderer.device, "surface_probe", (64, 64), outputs, **bound),

@@ -12,6 +12,7 @@ from setups import front_camera, head_of, joined, run_frame, scene_of, settings_
 from tolerances import LIT, OCCLUSION
 from twins import surface
 
+from dermis.atlas.build import build_atlas
 from dermis.atlas.cached import cached_atlas
 from dermis.frame import surroundings
 from dermis.frame.passes.occlusion import bake_occlusion, fibonacci_sphere, whole_map
@@ -49,7 +50,9 @@ def baked(renderer: Renderer, head: Head, side: int = SIDE, **options: Any) -> N
     """Rows of the bake: the atlas and the vertices."""
     inputs = renderer.prepare(scene_of(head), settings_of(atlas=side))
     texels = inputs.layouts[0].atlas.resources["atlas"]
-    return bake_occlusion(renderer.device, head.mesh, inputs.lit, texels, side, **options)
+    return bake_occlusion(
+        renderer.device, head, build_atlas(head.mesh, side), inputs.lit, texels, side, **options
+    )
 
 
 def test_directions_share_the_sphere() -> None:

@@ -60,7 +60,7 @@ def test_edges_of_a_plates_shadow(renderer: Renderer, shadow_size: int, softness
     visibility, _, points = seen(renderer, PLATE, light, atlas=512, shadow_size=shadow_size)
     row = int(np.argmin(np.abs(points[:300, 100, 1])))
     x, profile = points[row, :350, 0], visibility[row, :350]
-    (view,) = light_views(scene_of(PLATE, light), shadow_size)
+    (view,) = light_views(scene_of(PLATE, light), PLATE.mesh.outline, shadow_size)
     assert view is not None
     allowed = view.texel * np.sqrt(2) + softness
     near = (x > -40) & (x < 5)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,11 @@ from setups import front_camera, head_of, run_frame, scene_of
 from tolerances import TWIN
 
 from dermis.frame import surface
+from dermis.frame.passes import SHARED_SHADERS
 from dermis.frame.renderer import Renderer
-from dermis.gpu import download
+from dermis.gpu import ComputeProgram, download
 from dermis.mesh.primitives import plane
+from dermis.optics.gaussians import GaussianSum
 from dermis.scene.lights import DirectionalLight
 from dermis.scene.skin import Skin
 from dermis.specular.cosines import cosines
@@ -26,6 +29,8 @@ Floats = NDArray[np.float64]
 Z = np.array([0.0, 0.0, 1.0])
 COLOUR = np.array([0.5, 0.25, 0.75])
 PATCH = head_of(plane(100.0), colour=np.broadcast_to(COLOUR, (8, 8, 3)))
+SURFACE = Path(SHARED_SHADERS) / "surface.wgsl"
+PROFILE = GaussianSum("white", np.array([1.0]), np.ones((1, 3)))
 LIGHT = DirectionalLight(direction=(0.6, 0, -1), irradiance=(2.0, 2.0, 2.0), shadows=False)
 
 
@@ -84,6 +89,32 @@ def test_oil_smoothes_a_roughness_map_too(renderer: Renderer) -> None:
 def test_strength_stays_within_one() -> None:
     assert Skin(rho_s=0.9, oiliness=1.0).strength == 1.0
     assert Skin(rho_s=0.9, specular="none").strength == 0.0
+
+
+class WaxedSkin(Skin):
+    """Skin with a dial that the package does not know."""
+
+    wax: float = 0.25
+
+
+def skin_struct(tmp_path: Path, renderer: Renderer, *members: str) -> ComputeProgram:
+    """A shader with the package's `Skin`, and more members at its start."""
+    declared = SURFACE.read_text("utf-8").replace("struct Skin {", "\n".join(["struct Skin {", *members]))
+    path = tmp_path / "waxed.wgsl"
+    path.write_text(f"{declared}\n@compute @workgroup_size(1) fn main() {{}}", "utf-8")
+    return ComputeProgram(renderer.device, path, (SHARED_SHADERS,))
+
+
+def test_a_new_dial_reaches_the_struct_by_its_name(tmp_path: Path, renderer: Renderer) -> None:
+    program = skin_struct(tmp_path, renderer, "wax: f32,")
+    record = surface.skin_record(program, WaxedSkin(), PATCH.maps, PROFILE, 1)
+    assert record["wax"] == 0.25 and record["mix"] == 0.5
+
+
+def test_every_member_of_the_struct_is_filled_in(tmp_path: Path, renderer: Renderer) -> None:
+    skin = Skin(direction="half-space", specular_colour="wrong")  # so that none should be 0
+    record = surface.skin_record(skin_struct(tmp_path, renderer), skin, PATCH.maps, PROFILE, 1)
+    assert [name for name in record.dtype.names if not record[name].any()] == []
 
 
 def test_only_other_models_than_the_default_ask_for_another_pipeline() -> None:

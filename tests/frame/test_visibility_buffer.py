@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from setups import front_camera, frontal, head_of, scene_of, settings_of
 
-from dermis.frame.passes import visibility_buffer
+from dermis.frame.passes import shape, visibility_buffer
 from dermis.frame.passes.visibility_buffer import Layers, draw_layers, make_layers
 from dermis.frame.projection import parallel_view
 from dermis.frame.renderer import Renderer
@@ -75,6 +75,7 @@ def shown(layers: Layers, renderer: Renderer, head: Head, camera: Camera, sample
     settings = settings_of(size=SIZE, samples=samples)
     inputs = renderer.prepare(scene_of(head, frontal(), camera=camera), settings)
     frame = Frame(renderer.device)
+    shape.draw(frame, inputs.resources.shape, inputs.motion)
     draw_layers(frame, "nearest", layers, inputs.camera, inputs.resources.head)
     frame.submit()
     made = [download(renderer.device, layers.texture, layer=k) for k in range(layers.count)]
@@ -145,7 +146,7 @@ def test_steps_of_depth() -> None:
     at_far, before = np.array([[1, 2, far - 5, 1], [1, 2, far - 5 - little, 1]])
     step = (seen[2] @ before) / (seen[3] @ before) - (seen[2] @ at_far) / (seen[3] @ at_far)
     assert visibility_buffer._depth_range_mm(seen) == pytest.approx(little / step, rel=1e-4)
-    parallel = parallel_view(np.array([0.0, 0.6, -0.8]), BALL.mesh, 64)
+    parallel = parallel_view(np.array([0.0, 0.6, -0.8]), BALL.mesh.outline, 64)
     assert visibility_buffer._depth_range_mm(parallel.clip) == pytest.approx(parallel.far - parallel.near)
 
 

@@ -14,7 +14,8 @@ import pytest
 from dermis.errors import DermisError
 from dermis.images.codecs import encode_png8, encode_png16
 from dermis.images.io import Picture, read_image
-from dermis.mesh.gltf import embedded_maps, encode_glb
+from dermis.mesh.gltf.encode import encode_glb
+from dermis.mesh.gltf.pictures import embedded_maps
 from dermis.mesh.load import load_mesh
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.heads import load_head

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gltf_file import GltfFile, add_mesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dermis.errors import DermisError
-from dermis.mesh.load import load_mesh
+from dermis.mesh.gltf.clips import read_clip
+from dermis.mesh.load import load_mesh, load_rigged
 from dermis.mesh.primitives import uv_sphere
 
 FORMATS = ("obj", "glb", "ply", "ascii.ply")
@@ -97,3 +99,48 @@ def test_damaged_scan(sample_folder: Path, tmp_path_factory, data: st.DataObject
     path = tmp_path_factory.getbasetemp() / "scan.glb"
     path.write_bytes(bytes(content[: data.draw(st.sampled_from([len(content), len(content) // 2]))]))
     _sound_or_refused(path)
+
+
+@pytest.fixture(scope="module")
+def rigged(tmp_path_factory) -> bytes:
+    """A file with targets, a skin and a clip."""
+    file, sphere = GltfFile(), uv_sphere(1.0, 6, 4)
+    count = len(sphere.positions)
+    given = {
+        "JOINTS_0": file.numbers(np.tile([0, 1, 0, 0], (count, 1)), "<u1"),
+        "WEIGHTS_0": file.numbers(np.tile([0.5, 0.5, 0, 0], (count, 1))),
+    }
+    targets = {"grow": file.sparse(sphere.positions), "rise": file.numbers(0.1 * sphere.normals)}
+    mesh = add_mesh(file, sphere.positions, sphere.triangles, targets, given)
+    file.add("nodes", name="root", children=[1])
+    file.add("nodes", name="tip", translation=[0, 1, 0])
+    file.add("nodes", mesh=mesh, skin=file.add("skins", joints=[0, 1]))
+    sampler = {"input": file.numbers([[0], [1]]), "output": file.numbers(np.tile([0, 0, 0, 1], (2, 1)))}
+    channel = {"sampler": 0, "target": {"node": 1, "path": "rotation"}}
+    file.add("animations", samplers=[sampler], channels=[channel])
+    return file.write(tmp_path_factory.mktemp("rigged") / "rigged.glb", 0, 2).read_bytes()
+
+
+@given(data=st.data())
+@settings(PATIENT, max_examples=200)
+def test_damaged_rigs_and_clips(rigged, tmp_path_factory, data: st.DataObject) -> None:
+    content = bytearray(rigged)
+    for _ in range(data.draw(st.integers(1, 4))):
+        content[data.draw(st.integers(12, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path = tmp_path_factory.getbasetemp() / "damaged.glb"
+    path.write_bytes(bytes(content))
+    try:
+        _, rig = load_rigged(path)
+        if rig is not None:
+            assert np.isfinite(rig.positions_mm).all() and np.isfinite(rig.targets.delta_mm).all()
+            assert rig.targets.point.max(initial=0) < len(rig.positions_mm)
+            if rig.skeleton is not None:
+                np.testing.assert_allclose(rig.skeleton.weight.sum(axis=1), 1, atol=1e-5)
+                assert np.isfinite(rig.skeleton.matrices()).all()
+    except DermisError as error:
+        assert str(path) in str(error)
+    try:
+        for track in read_clip(path, None).tracks:
+            assert np.isfinite(track.curve.at(0.5)).all()
+    except DermisError as error:
+        assert str(path) in str(error)

@@ -23,7 +23,7 @@ def _euler(mesh: Mesh) -> int:
 @pytest.mark.parametrize("levels", [1, 2])
 def test_closed_sphere_stays_a_sphere(levels: int) -> None:
     sphere = uv_sphere(50, 16, 8)
-    finer = subdivide(sphere, levels)
+    finer = subdivide(sphere, levels).mesh
     assert len(finer.triangles) == 4**levels * len(sphere.triangles)
     assert _euler(finer) == _euler(sphere) == 2
     radius = np.linalg.norm(finer.positions, axis=1)
@@ -34,7 +34,7 @@ def test_closed_sphere_stays_a_sphere(levels: int) -> None:
 
 def test_it_converges_by_a_quarter_a_level() -> None:
     sphere = uv_sphere(50, 16, 8)
-    radii = [np.linalg.norm(subdivide(sphere, n).positions, axis=1).mean() for n in range(4)]
+    radii = [np.linalg.norm(subdivide(sphere, n).mesh.positions, axis=1).mean() for n in range(4)]
     steps = -np.diff(radii)
     assert (steps > 0).all()
     assert steps[1] < 0.6 * steps[0] and steps[2] < 0.6 * steps[1]
@@ -50,7 +50,7 @@ def test_an_icosahedron_moves_as_the_weights_say() -> None:
     turned = (np.linalg.det(positions[hull.simplices]) < 0)[:, None]
     triangles = np.where(turned, hull.simplices[:, ::-1], hull.simplices)
     mesh = build_mesh(positions, np.zeros((12, 2)), triangles, np.zeros(20), (Material("skin"),))
-    finer = subdivide(mesh, 1)
+    finer = subdivide(mesh, 1).mesh
     # the five neighbours of a corner average to 1/sqrt(5) of it: 5/8 + 3/8/sqrt(5)
     np.testing.assert_allclose(finer.positions[:12], positions * (5 / 8 + 3 / 8 / 5**0.5), atol=1e-6)
     # a new point takes 3/8 of the two ends of its edge and 1/8 of the two corners that are next to both
@@ -69,7 +69,7 @@ def test_corners_of_three_triangles_have_a_weight_of_their_own() -> None:
     triangles = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
     mesh = build_mesh(positions, np.zeros((4, 2)), triangles, np.zeros(4), (Material("skin"),))
     # 7/16 of itself and 3/16 of each neighbour, which sum to its opposite
-    np.testing.assert_allclose(subdivide(mesh, 1).positions[:4], positions / 4, atol=1e-6)
+    np.testing.assert_allclose(subdivide(mesh, 1).mesh.positions[:4], positions / 4, atol=1e-6)
 
 
 def test_curved_border_is_smoothed_along_itself() -> None:
@@ -78,7 +78,7 @@ def test_curved_border_is_smoothed_along_itself() -> None:
     positions = np.vstack((rim, [[0, 0, 5]]))  # the tip must not lift the rim
     triangles = [[k, (k + 1) % 6, 6] for k in range(6)]
     mesh = build_mesh(positions, np.zeros((7, 2)), triangles, np.zeros(6), (Material("skin"),))
-    finer = subdivide(mesh, 1)
+    finer = subdivide(mesh, 1).mesh
     np.testing.assert_allclose(finer.positions[:6], rim * 7 / 8, atol=1e-6)
     np.testing.assert_allclose(finer.positions[6], [0, 0, 5 * 5 / 8], atol=1e-6)
     middles = np.sort(np.linalg.norm(finer.positions[7:][finer.positions[7:, 2] == 0], axis=1))
@@ -87,7 +87,7 @@ def test_curved_border_is_smoothed_along_itself() -> None:
 
 def test_seam_stays_welded_and_uncreased_and_uv_stays_cut() -> None:
     sphere = uv_sphere(50, 16, 8)
-    finer = subdivide(sphere, 2)
+    finer = subdivide(sphere, 2).mesh
     assert finer.point.max() + 1 == weld(finer.positions).max() + 1
     first = np.zeros(finer.point.max() + 1, dtype=int)
     first[finer.point] = np.arange(len(finer.point))
@@ -101,19 +101,18 @@ def test_seam_stays_welded_and_uncreased_and_uv_stays_cut() -> None:
 
 def test_uv_is_linear_and_no_chart_changes() -> None:
     sphere = uv_sphere(50, 16, 8)
-    finer = subdivide(sphere, 2)
+    finer = subdivide(sphere, 2).mesh
     before, after = charts(sphere), charts(finer)
     np.testing.assert_array_equal(np.repeat(before, 16), after)
     np.testing.assert_allclose(chart_uv_area(sphere, before), chart_uv_area(finer, after), rtol=1e-6)
     a, b, c = sphere.uv[sphere.triangles[7]]
-    np.testing.assert_allclose(
-        subdivide(sphere, 1).uv[subdivide(sphere, 1).triangles[28]], [a, (a + b) / 2, (a + c) / 2]
-    )
+    once = subdivide(sphere, 1).mesh
+    np.testing.assert_allclose(once.uv[once.triangles[28]], [a, (a + b) / 2, (a + c) / 2])
 
 
 def test_open_border_stays_open_and_flat() -> None:
     flat = plane(100, 4)
-    finer = subdivide(flat, 2)
+    finer = subdivide(flat, 2).mesh
     assert np.abs(finer.positions[:, 2]).max() == 0
     assert np.abs(finer.positions[:, :2]).max() <= 50
     ends, _, counts = edges(finer.point[finer.triangles])
@@ -129,7 +128,7 @@ def test_materials_are_kept() -> None:
     flat = plane(100, 2)
     two = (Material("skin"), Material("eyes", "opaque"))
     mesh = build_mesh(flat.positions, flat.uv, flat.triangles, np.arange(8) % 2, two)
-    finer = subdivide(mesh, 1)
+    finer = subdivide(mesh, 1).mesh
     np.testing.assert_array_equal(finer.material, np.repeat(mesh.material, 4))
     assert finer.materials == two
     # each of the four lies within the uv of the triangle it came from
@@ -139,7 +138,7 @@ def test_materials_are_kept() -> None:
 
 def test_levels() -> None:
     flat = plane(100, 1)
-    assert subdivide(flat, 0) is flat
+    assert subdivide(flat, 0).mesh is flat and subdivide(flat, 0).stencils is None
     for levels in (-1, 4):
         with pytest.raises(DermisError, match="0 to 3 levels"):
             subdivide(flat, levels)

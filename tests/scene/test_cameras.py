@@ -20,7 +20,7 @@ def head(tmp_path_factory: pytest.TempPathFactory) -> Head:
 
 def _seen(camera: Camera, head: Head, points: np.ndarray) -> np.ndarray:
     """Places of points [mm, relative to the head's centre] in the image: x to the right, y up, -1..1."""
-    (clip,) = camera_views(pinhole(camera, head, Settings(size=(64, 64))), head.mesh, 1).clips
+    (clip,) = camera_views(pinhole(camera, head, Settings(size=(64, 64))), head.mesh.outline, 1).clips
     world = np.column_stack((points + head.centre_mm, np.ones(len(points))))
     x, y, _, w = clip @ world.T
     assert (w > 0).all()

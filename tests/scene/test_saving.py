@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from random_rig import random_rig
 
+from dermis.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
@@ -25,6 +28,7 @@ from dermis.scene.lights import (
 )
 from dermis.scene.model import Scene
 from dermis.scene.plain import Plain
+from dermis.scene.pose import Pose
 from dermis.scene.saving import save_scene, scene_toml
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments, Skin, TissueLayer
@@ -125,6 +129,53 @@ def test_a_scene_comes_back(scene: Scene, tmp_path: Path) -> None:
         SETTINGS,
     )
     assert tuple(made.lights) == tuple(scene.lights)
+
+
+def test_a_pose_comes_back(tmp_path: Path) -> None:
+    rig = random_rig()
+    rig = replace(rig, targets=replace(rig.targets, names=("mouth open", "é", *rig.targets.names[2:])))
+    head = replace(HEAD, rig=rig)
+    matrix = np.diag([1.0, 2.0, 1.0, 1.0])
+    bones = {"head": np.float32([1, 2, 3]), "jaw": (0.5, 0, 0), "neck": matrix}
+    given = Pose({"mouth open": 0.1, "é": np.float32(-2), "target2": 1}, bones)
+    save_scene(tmp_path / "scene.toml", Scene(head, pose=given), SETTINGS, {"name": "bust"})
+    made, _ = load_scene(tmp_path / "scene.toml", head)
+    assert isinstance(made.pose, Pose)
+    assert made.pose.weights == {"mouth open": 0.1, "é": -2.0, "target2": 1.0}
+    assert made.pose.bones == {"head": [1, 2, 3], "jaw": [0.5, 0, 0], "neck": matrix.tolist()}
+    for mine, other in zip(made.motion, given.motion(rig), strict=True):
+        np.testing.assert_array_equal(mine, other)
+
+
+def test_a_pose_of_nothing_comes_back(tmp_path: Path) -> None:
+    save_scene(tmp_path / "scene.toml", Scene(HEAD, pose=Pose()), SETTINGS, {"name": "bust"})
+    made, _ = load_scene(tmp_path / "scene.toml", HEAD)
+    assert isinstance(made.pose, Pose) and not made.pose.weights and not made.pose.bones
+
+
+def test_places_of_points_are_not_saved_as_text(tmp_path: Path) -> None:
+    scene = Scene(HEAD, pose=Pose(positions_mm=HEAD.positions_mm))
+    with pytest.raises(DermisError, match=r"weights and bones, .* but it has positions_mm"):
+        save_scene(tmp_path / "scene.toml", scene, SETTINGS, {"name": "bust"})
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ('weights = {target9 = 1.0}', r"scene\.toml: pose: weights: .*no 'target9'"),
+        ('weights = {target1 = "much"}', r"scene\.toml: pose: weights\.target1: expected a valid number"),
+        ('weights = {target1 = nan}', r"scene\.toml: pose: weights\.target1: expected a number"),
+        ('weights = 1', r"scene\.toml: pose: weights: expected"),
+        ('bones = {head = [1, 2]}', r"scene\.toml: pose: bones\.head: expected three angles"),
+        ('bones = {chin = [1, 2, 3]}', r"scene\.toml: pose: bones: .*no 'chin'"),
+        ('positions_mm = [[0, 0, 0]]', r"scene\.toml: pose: positions_mm: expected one of weights, bones"),
+    ],
+)  # fmt: skip
+def test_a_pose_that_cannot_be_names_file_and_key(tmp_path: Path, table: str, words: str) -> None:
+    (tmp_path / "scene.toml").write_text(f'[head]\nname = "bust"\n[pose]\n{table}\n')
+    with pytest.raises(DermisError, match=words):
+        load_scene(tmp_path / "scene.toml", replace(HEAD, rig=random_rig()))
 
 
 @pytest.mark.parametrize("name", ['a"b\\c.obj', "tab\tline\n.obj", "delete\x7f.obj", "é\u2028ø.obj"])

@@ -1,4 +1,4 @@
-"""The surface atlas: the point of the surface that each texel of the uv map stands for."""
+"""The surface atlas: the point of the surface at each texel of the uv map."""
 
 from __future__ import annotations
 
@@ -22,12 +22,17 @@ class Atlas:
     triangle : (n, n) int32 triangle at the texel's centre, -1 where none is. Beyond a chart's edge it is the
         nearest one or, in a stitched layout, the one across the seam
     barycentric : (n, n, 2) uint16 weights of the triangle's second and third corner [1/65535]
-    stretch : (n, n, 2) float16 texels per mm along u and v [1/mm]; beyond an edge as they are there
+    stretch : (n, n, 2) float16 texels per mm along u and v [1/mm]; beyond a chart's edge those at the edge
     shear : (n, n) float16 cosine of the angle that the directions of u and v make on the surface
     reach : (n, n, 4) uint16 texels to the left, right, up and down of the same chart without a gap between
     place : (f, 3, 2) float32 uv of each triangle's corners in the atlas, v down
     gutter : (a, 2) uint16 texels (x, y) beyond a chart's edge, which copy what other texels compute
     source : (a, 2) float32 place that each copies [texel], whole numbers at texel centres
+    beyond : (r, 2) uint16 texels (x, y) outside of the triangles, gutters and others, that are stretched as
+        another place is
+    root : (r,) int32 triangle of that place
+    root_weight : (r, 2) uint16 its weights of the second and third corner [1/65535]
+    per_uv : (f,) float32 texels in a unit of uv
     mapped : (f,) triangles that own texels; the others (opaque, collapsed, overlapped in uv) are lit directly
     """
 
@@ -39,6 +44,10 @@ class Atlas:
     place: NDArray[np.float32]
     gutter: NDArray[np.uint16]
     source: NDArray[np.float32]
+    beyond: NDArray[np.uint16]
+    root: NDArray[np.int32]
+    root_weight: NDArray[np.uint16]
+    per_uv: NDArray[np.float32]
     mapped: NDArray[np.bool_]
 
     @property

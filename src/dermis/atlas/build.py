@@ -1,4 +1,4 @@
-"""A mesh in, its atlas out."""
+"""Builds the atlas of a mesh in one of its layouts."""
 
 from __future__ import annotations
 

@@ -82,8 +82,22 @@ def build_own_layout(mesh: Mesh, size: int) -> Atlas:
     chart_map = np.where(owner >= 0, chart[np.maximum(owner, 0)], -1)
     stretch, shear = _metric(mesh, size, owner, barycentric)
     place = mesh.uv[mesh.triangles]
-    gutter, source = np.zeros((0, 2), np.uint16), np.zeros((0, 2), np.float32)
-    return Atlas(owner, barycentric, stretch, shear, _reach(chart_map), place, gutter, source, mapped)
+    none = np.zeros((0, 2), np.uint16)
+    return Atlas(
+        triangle=owner,
+        barycentric=barycentric,
+        stretch=stretch,
+        shear=shear,
+        reach=_reach(chart_map),
+        place=place,
+        gutter=none,
+        source=none.astype(np.float32),
+        beyond=none,
+        root=np.zeros(0, np.int32),
+        root_weight=none,
+        per_uv=np.full(len(place), size, np.float32),
+        mapped=mapped,
+    )
 
 
 def _overlapped(

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dermis.benchmark.rigged import pose_at, rigged
 from dermis.mesh.head import Head
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import load_profile
@@ -36,6 +37,7 @@ class Case:
     lights : spots with shadows
     environment : name of a panorama, "" for none
     subdivide : levels of subdivision of the head, each with four times the triangles
+    targets : morph targets that all move in each frame, with four bones; 0 for a head that stands still
     samples : of a pixel
     technique : of `Settings`, or `FRAGMENTS`
     varies : how it differs from the usual frame, "" for that itself
@@ -47,6 +49,7 @@ class Case:
     lights: int = 3
     environment: str = ""
     subdivide: int = 0
+    targets: int = 0
     samples: int = 4
     technique: str = "texture-space"
     varies: str = ""
@@ -62,13 +65,15 @@ class Preset:
     gaussians: tuple[int, ...]
     lights: tuple[int, ...]
     subdivide: tuple[int, ...]
+    targets: tuple[int, ...] = (52,)
     environment: tuple[str, ...] = ("uniform",)
     technique: tuple[str, ...] = (GPU_GEMS_3, FRAGMENTS)
 
     def cases(self) -> list[Case]:
         """The usual frame, then the others."""
         found = [self.usual]
-        for name in ("technique", "image", "atlas", "gaussians", "lights", "environment", "subdivide"):
+        sizes = "image", "atlas", "gaussians", "lights", "environment", "targets", "subdivide"
+        for name in ("technique", *sizes):
             for value in getattr(self, name):
                 if value != getattr(self.usual, name):
                     found.append(replace(self.usual, varies=name, **{name: value}))
@@ -114,19 +119,21 @@ def settings_of(case: Case) -> Settings:
 
 
 def scenes_of(case: Case, head: Head, folder: Path, count: int) -> list[Scene]:
-    """The case at `count` moments: camera and lights are never in the same place twice.
+    """The case at `count` moments: camera, lights and a moving head are never in the same place twice.
 
     folder : for the profile's file
     """
     skin, camera = Skin(profile=str(_profile_file(case.gaussians, folder))), portrait(head)
     lights = _lights(case.lights)
     around = Environment(name=case.environment) if case.environment else None
+    head = rigged(head, case.targets) if case.targets else head
     scenes = []
     for k in range(count):
         sway = _SWAY_MM * math.sin(1.0 + k)
         moved = [light.model_copy(update={"position": _aside(light.position, sway)}) for light in lights]
         eye = camera.model_copy(update={"position": _aside(camera.position, sway)})
-        scenes.append(Scene(head, lights=tuple(moved), environment=around, camera=eye, skin=skin))
+        pose = pose_at(head, k) if case.targets else None
+        scenes.append(Scene(head, tuple(moved), eye, skin, around, pose))
     return scenes
 
 

@@ -45,7 +45,7 @@ def _row(row: Row) -> dict[str, Any]:
 
 
 _OTHERS = {GPU_GEMS_3: "2007, compute [ms]", FRAGMENTS: "2007, fragments [ms]"}
-_CASE = ("image", "atlas", "Gaussians", "lights", "around", "triangles", "technique")
+_CASE = ("image", "atlas", "Gaussians", "lights", "around", "targets", "triangles", "technique")
 _TIMES = ("frame [ms]", "device [ms]", "floor [ms]", "ratio", "Python [ms]", "image out [ms]")
 COLUMNS = (*_CASE, *_TIMES, "memory [MB]")
 
@@ -59,6 +59,7 @@ def cells(row: Row) -> tuple[str, ...]:
         str(case.gaussians),
         str(case.lights),
         case.environment or "-",
+        str(case.targets or "-"),
         str(row.triangles),
         case.technique,
         *map(plain, (row.frame_ms, *device, row.python_ms, row.image_ms)),
@@ -98,7 +99,8 @@ def _told(case: Case) -> str:
     width, height = case.image
     sizes = f"{width}x{height}, atlas {case.atlas}, {case.gaussians} Gaussians, {case.lights} lights"
     around = f", environment {case.environment}" if case.environment else ""
-    return f"{sizes}{around}, subdivided {case.subdivide} times, {case.technique}"
+    moving = f", {case.targets} targets" if case.targets else ""
+    return f"{sizes}{around}{moving}, subdivided {case.subdivide} times, {case.technique}"
 
 
 def summary(made: Benchmark) -> str:

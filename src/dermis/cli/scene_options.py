@@ -71,6 +71,7 @@ def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
         camera=scene.camera if given.camera is None else load_camera(given.camera, scene.head),
         skin=Skin(**(scene.skin.model_dump() | given.skin)),
         environment=environment,
+        pose=scene.pose,
     ), Settings(**(settings.model_dump() | given.settings))
 
 

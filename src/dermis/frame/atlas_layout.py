@@ -7,6 +7,8 @@ from typing import Any
 
 from dermis.atlas.translucency.cells import Cells
 from dermis.frame.atlas_textures import AtlasTextures
+from dermis.frame.geometry import HeadResources
+from dermis.gpu.program import Resources
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +47,7 @@ class Translucency:
     """
 
     pairs: PairBuffers
-    surface: dict[str, Any]
+    surface: Resources
     weighing: Any
     gaussians: int
     receiver_points: Any
@@ -62,15 +64,17 @@ class Translucency:
 
 @dataclass(frozen=True, eq=False)
 class AtlasLayout:
-    """An atlas of the head, and what its texels are lit by.
+    """An atlas of the head with the resources that light its texels.
 
+    head : its triangles, as they lie in the atlas
     lit : resources by the shaders' names: geometry, maps, lights, shadows, surroundings
     surfaces : texture of the surface at each texel, as surface_texels.wgsl packs it
     scattered : texture of the light that leaves below the surface
-    translucency : what comes through thin parts, None where no light comes through
+    translucency : light through thin parts, None without any
     """
 
     atlas: AtlasTextures
+    head: HeadResources
     lit: dict[str, Any]
     surfaces: Any
     scattered: Any

@@ -1,92 +1,119 @@
-"""The atlas as textures, with the stretch correction and the remedies for seams that are asked for."""
+"""The atlas as textures, with the chosen stretch correction and remedy for seams."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.atlas.atlas import GUTTER, Atlas
+from dermis.atlas.atlas import GUTTER, MOST_SHEAR, Atlas
 from dermis.disk import cached_arrays
 from dermis.frame.coarser import Sheet, halved
 from dermis.frame.levels import MOST_HALVINGS
 from dermis.frame.seams import FEATHER_MM, REMEDIES, Remedy
-from dermis.gpu import Device, scratch
+from dermis.gpu import Constants, Device, make_texture, scratch
 from dermis.gpu.textures import texture_from
 
-_HALVING = "halved 1"  # raise when `halved` gives other results
-_LEAST_SHARE = 1e-3  # of the blur at the edge itself: 0 would mean no surface
+_HALVING = "halved 2"  # raise when `halved` gives other results
+ENTRY_BYTES = 16
+"""Of a texel in a list of gutters, as gutter.wgsl reads it."""
+_GUTTER_BIT = 1 << 15  # of the first number of a texel's reach, see reach.wgsl
+
+
+def atlas_numbers() -> dict[str, int | float]:
+    """What shaders that read the atlas fill in."""
+    return {"gutter_bit": _GUTTER_BIT, "most_shear": MOST_SHEAR}
 
 
 @dataclass(frozen=True, eq=False)
 class AtlasTextures:
-    """What the shaders read of an atlas, by the names they use.
+    """Resources of an atlas, by their names in the shaders.
 
-    resources : atlas, stretch_map, sheet_map, and edge_map where two layouts are blended; sheet_map alone
-        of coarser ones
-    sheared : whether u and v meet at other than right angles somewhere
-    gutter, gathered : the list of texels beyond the charts' edges and space for their light; None without any
+    resources : atlas, stretch_map (filled by its pass), reach_map, and edge_map for two layouts and feathered
+        stretch; stretch_map and reach_map alone of coarser ones
+    sheared : whether u and v may meet at other than right angles
+    stretching : pipeline constants of the stretch passes
+    rooted : buffer of the texels whose stretch is that of another place; None without any
+    gutter, gathered : buffers of the texels beyond the charts' edges and of their light; None without any
+    gutter_texels : (a, 2) these texels, x and y
     coarser : the same, again and again at half the resolution; only of stitched layouts
-    usual_per_mm : median of the texels per mm along the axis that has fewer
+    usual_per_mm : median of the texels per mm along the axis that has fewer, at rest
     """
 
     resources: dict[str, Any]
-    sheared: bool
+    sheared: bool = True
+    stretching: Constants = ()
+    rooted: Any = None
     gutter: Any = None
+    gutter_texels: NDArray[np.uint16] = field(default_factory=lambda: np.zeros((0, 2), np.uint16))
     gathered: Any = None
     coarser: tuple[AtlasTextures, ...] = ()
     usual_per_mm: float = 0.0
 
     def sheets(self, edge: str) -> tuple[AtlasTextures, ...]:
-        """The atlas at its resolution and at those that blurs with this edge may use."""
+        """The atlas at its own resolution and at the coarser ones that blurs with this edge may use."""
         return (self, *(self.coarser if edge == "repeated" else ()))
 
 
 def upload_atlas(
     device: Device, atlas: Atlas, stretch: str = "full", remedy: Remedy = REMEDIES["stitch"]
 ) -> AtlasTextures:
-    """The atlas as the shaders read it.
+    """The atlas as the shaders read it; its stretch is left to the stretch pass.
 
-    stretch : "full" knows the angle between u and v, "axes" takes it for right, "none" is one density for all
+    stretch : "full" has the angle between u and v, "axes" takes it as right, "none" is one density for all
     """
     texels = packed_texels(atlas.triangle, atlas.barycentric)
-    texels[~atlas.own] = 0
-    metric = _metric(atlas, stretch)
-    if remedy.feathered:
-        metric[..., :2] = _feathered(atlas, metric[..., :2])
-    resources = {
-        "atlas": texture_from(device, texels, "rg32uint"),
-        "stretch_map": texture_from(device, metric, "rgba16float"),
-    }
-    if len(remedy.layouts) > 1:
-        resources["edge_map"] = texture_from(device, edge_mm(atlas), "r32float")
-    sheet = Sheet(metric, atlas.reach, atlas.gutter, atlas.source)
-    own = metric[atlas.own, :2].min(axis=-1)
-    usual = float(np.median(own)) if len(own) else 0.0
-    coarser = _coarser(device, sheet) if len(atlas.gutter) else ()
-    return _uploaded(device, sheet, resources, coarser=coarser, usual_per_mm=usual)
+    own = atlas.own
+    texels[~own] = 0
+    resources = {"atlas": texture_from(device, texels, "rg32uint")}
+    if remedy.feathered or len(remedy.layouts) > 1:
+        resources["edge_map"] = texture_from(device, edge_texels(atlas), "r32float")
+    held = atlas.stretch[own].astype(np.float32)
+    usual = float(np.median(held.min(axis=-1))) if len(held) else 0.0
+    even = float(np.sqrt((held.astype(np.float64) ** 2).mean())) if stretch == "none" and len(held) else 0.0
+    feather = FEATHER_MM if remedy.feathered else 0.0
+    sheet = Sheet(atlas.coverage, own, atlas.reach, atlas.gutter, atlas.source)
+    return _uploaded(
+        device,
+        sheet,
+        resources,
+        sheared=stretch == "full",
+        stretching=(("SHEAR", stretch == "full"), ("EVEN", even), ("FEATHER_MM", feather)),
+        rooted=device.buffer(_rooted(atlas), "STORAGE") if len(atlas.beyond) else None,
+        coarser=_coarser(device, sheet) if len(atlas.gutter) else (),
+        usual_per_mm=usual,
+    )
 
 
 def _uploaded(device: Device, sheet: Sheet, resources: dict[str, Any], **more: Any) -> AtlasTextures:
-    words = np.concatenate([part.view(np.uint32) for part in (sheet.metric, sheet.reach)], axis=-1)
-    resources = resources | {"sheet_map": texture_from(device, words, "rgba32uint")}
-    sheared = bool(sheet.metric[..., 2].any())
+    reach = sheet.reach.copy()
+    reach[..., 0] |= np.where(sheet.covered & ~sheet.own, _GUTTER_BIT, 0).astype(np.uint16)
+    resources = resources | {
+        "reach_map": texture_from(device, reach, "rgba16uint"),
+        "stretch_map": make_texture(device, (reach.shape[1], reach.shape[0]), "rgba16float"),
+    }
     if not len(sheet.gutter):
-        return AtlasTextures(resources, sheared, **more)
+        return AtlasTextures(resources, **more)
     beyond = np.concatenate([sheet.source.view(np.uint32), sheet.gutter.astype(np.uint32)], axis=1)
     light = np.zeros((len(beyond), 4), np.float32)
-    lists = [device.buffer(words, "STORAGE") for words in (beyond, light)]
-    scratch(device, lists[1])
-    return AtlasTextures(resources, sheared, *lists, **more)
+    gutter, gathered = (device.buffer(words, "STORAGE") for words in (beyond, light))
+    lists = {"gutter": gutter, "gathered": scratch(device, gathered)}
+    return AtlasTextures(resources, gutter_texels=sheet.gutter, **lists, **more)
+
+
+def _rooted(atlas: Atlas) -> NDArray[np.uint32]:
+    """(r, 3) texel, triangle and weights as stretch_beyond.wgsl reads them."""
+    (x, y), (second, third) = (pair.T.astype(np.uint32) for pair in (atlas.beyond, atlas.root_weight))
+    return np.stack([x | (y << 16), atlas.root.astype(np.uint32), second | (third << 16)], axis=1)
 
 
 def _coarser(device: Device, sheet: Sheet) -> tuple[AtlasTextures, ...]:
     """The sheet at half, a quarter, ... of its resolution, made or read from disk."""
     parts = [field.name for field in fields(Sheet)]
     count = 0
-    while count < MOST_HALVINGS and len(sheet.metric) % (2 << count) == 0:
+    while count < MOST_HALVINGS and len(sheet.reach) % (2 << count) == 0:
         count += 1
 
     def make() -> dict[str, NDArray[Any]]:
@@ -111,30 +138,10 @@ def packed_texels(triangle: NDArray[Any], barycentric: NDArray[Any]) -> NDArray[
     return np.stack([(triangle + 1).astype(np.uint32), packed], axis=-1)
 
 
-def _metric(atlas: Atlas, stretch: str) -> NDArray[np.float16]:
-    """(n, n, 4) texels per mm along u and v, the cosine between the two, and 1 in the gutter."""
-    metric = np.zeros((atlas.size, atlas.size, 4), np.float16)
-    metric[..., :2] = atlas.stretch
-    if stretch == "full":
-        metric[..., 2] = atlas.shear
-    if stretch == "none":
-        covered = atlas.stretch[atlas.own].astype(np.float64)
-        metric[atlas.coverage, :2] = np.sqrt((covered**2).mean()) if len(covered) else 0.0
-    metric[atlas.coverage & ~atlas.own, 3] = 1.0
-    return metric
-
-
-def edge_mm(atlas: Atlas) -> NDArray[np.float32]:
-    """(n, n) distance of each texel to the nearest edge of its chart, roughly [mm]."""
+def edge_texels(atlas: Atlas) -> NDArray[np.float32]:
+    """(n, n) distance of each texel to the nearest edge of its chart, roughly [texel]."""
     from scipy.ndimage import distance_transform_edt
 
     inner = atlas.own & (atlas.reach > 0).all(axis=-1)  # charts may touch without an empty texel between
-    texels = np.maximum(distance_transform_edt(np.pad(inner, 1))[1:-1, 1:-1] - GUTTER, 0.0)
-    density = np.sqrt(atlas.stretch.astype(np.float32).prod(axis=-1))
-    return np.asarray(texels / np.maximum(density, 1e-3), np.float32)
-
-
-def _feathered(atlas: Atlas, stretch: NDArray[np.float16]) -> NDArray[np.float16]:
-    """Texels per mm, fewer the nearer the edge, so that a blur hardly reaches over it."""
-    share = np.clip(edge_mm(atlas) / FEATHER_MM, _LEAST_SHARE, 1.0)
-    return np.asarray(stretch * share[..., None], np.float16)
+    texels = distance_transform_edt(np.pad(inner, 1))[1:-1, 1:-1] - GUTTER
+    return np.asarray(np.maximum(texels, 0.0), np.float32)

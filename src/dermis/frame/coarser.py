@@ -8,41 +8,35 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_SAME_PLACE = 4.0  # texels within which four neighbours of an gutter show one part of the surface
+_SAME_PLACE = 4.0  # texels: sources of four gutter neighbours nearer than this are averaged
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """What blurs and seams need of an atlas of n x n texels.
+    """The data of an n x n atlas that blurs and seams need.
 
-    metric : (n, n, 4) texels per mm along u and v, the cosine between the two, and 1 in the gutter
+    covered, own : (n, n) texels that show surface, and those of them that do not copy others
     reach : (n, n, 4) texels to the left, right, up and down of the same chart without a gap between
     gutter, source : (a, 2) texels (x, y) beyond a chart's edge, and where their light is [texel]
     """
 
-    metric: NDArray[np.float16]
+    covered: NDArray[np.bool_]
+    own: NDArray[np.bool_]
     reach: NDArray[np.uint16]
     gutter: NDArray[np.uint16]
     source: NDArray[np.float32]
 
 
 def halved(sheet: Sheet) -> Sheet:
-    """Each texel stands for four; texels that reading between them may touch are computed, not stitched."""
+    """The sheet at half resolution; texels that bilinear reads may touch are computed, not stitched."""
     from scipy.ndimage import binary_dilation
 
-    covered = sheet.metric[..., 0] > 0
-    own = _quads(covered & (sheet.metric[..., 3] == 0))
+    own = _quads(sheet.own)
     some_own = own[0] | own[1] | own[2] | own[3]
-    counted = np.where(some_own, own, _quads(covered))
+    counted = np.where(some_own, own, _quads(sheet.covered))
     some = counted[0] | counted[1] | counted[2] | counted[3]
-    metric = np.zeros((*some.shape, 4), np.float16)
-    count = np.maximum(counted.sum(axis=0, dtype=np.uint8), 1)
-    for k, scale in enumerate((0.5, 0.5, 1.0)):
-        total = (counted * _quads(sheet.metric[..., k]).astype(np.float32)).sum(axis=0)
-        metric[..., k] = scale * total / count
-    metric[..., 3] = some & ~binary_dilation(some_own, np.ones((3, 3), bool))
-    gutter, source = _gutter(sheet, metric[..., 3] > 0)
-    return Sheet(metric, _reach(sheet.reach, counted), gutter, source)
+    stitched = some & ~binary_dilation(some_own, np.ones((3, 3), bool))
+    return Sheet(some, some & ~stitched, _reach(sheet.reach, counted), *_gutter(sheet, stitched))
 
 
 def _quads(image: NDArray[Any]) -> NDArray[Any]:

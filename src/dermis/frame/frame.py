@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dermis.frame.inputs import Inputs
-from dermis.frame.passes import bloom, post, shade, shadows, visibility_buffer
+from dermis.frame.passes import bloom, post, shade, shadows, shape, visibility_buffer
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Graph
 
 
 def draw_frame(graph: Graph, inputs: Inputs, technique: Technique) -> None:
-    """Light the skin, let the light spread below, look at it; only what has changed is computed."""
+    """Light the skin, scatter the light below it, shade the image; only stale passes run."""
     made = inputs.resources
+    shape.draw(graph, made.shape, inputs.motion)
     bounded = ("SHAPES", 1) in inputs.light_constants
     shadows.draw(graph, made.shadow_maps, inputs.shadow_views, made.head, bounded)
     below = technique.scatter(graph, inputs)

@@ -14,10 +14,10 @@ WIDEST = 9
 TRUNCATION = 3.3
 """Standard deviations at which a Gaussian is cut off."""
 SUMMED_TRUNCATION = 2.4
-"""The same where a Gaussian starts from a narrower one: what the cut takes from its shape, its width not
-changed, the next one's evens out (0.014 % of an image at most)."""
+"""The same for a Gaussian that starts from a narrower one: the cut keeps its variance, and the next blur
+smooths what it changes of the shape (0.014 % of an image at most)."""
 NARROW = 1.5
-"""Standard deviation up to which a Gaussian that starts from nothing may be cut off like those [texel]."""
+"""Standard deviation up to which a Gaussian that starts from unblurred light may be cut off there [texel]."""
 _MOST_TAPS = math.ceil(TRUNCATION * math.sqrt(WIDEST))
 _BISECTIONS = 60
 
@@ -31,8 +31,8 @@ def taps(variance: float, truncation: float = TRUNCATION) -> int:
 def kernel_table() -> NDArray[np.float32]:
     """q = w(1) / w(0) of the kernel w(n) = q^(n^2): rows by variance (1/64 step^2), columns by taps a side.
 
-    A Gaussian sampled at whole steps and cut off does not have the Gaussian's variance: narrow ones lose
-    most of theirs. So the width of the sampled curve is solved for, with the number of taps it is cut to.
+    A Gaussian that is sampled and cut off loses variance, a narrow one most of it. So q is solved for each
+    number of taps such that the kernel has the variance asked for.
     """
     variance = np.arange(WIDEST * ROWS_PER_UNIT + 2)[:, None] / ROWS_PER_UNIT
     n = np.arange(_MOST_TAPS + 1)

@@ -16,6 +16,7 @@ from dermis.frame.levels import Blur, Levels
 from dermis.frame.passes.bloom import Glow
 from dermis.frame.passes.post import Picture
 from dermis.frame.passes.shadows import ShadowMaps
+from dermis.frame.passes.shape import Motion
 from dermis.frame.passes.visibility_buffer import Layers
 from dermis.frame.projection import (
     Axes,
@@ -29,9 +30,10 @@ from dermis.frame.projection import (
     rows_of,
 )
 from dermis.frame.samples import pixel_samples
+from dermis.frame.shape import Shape
 from dermis.gpu import ComputeProgram, Constants
 from dermis.mesh.head import Head
-from dermis.mesh.mesh import Mesh
+from dermis.mesh.outline import Outline
 from dermis.scene.camera import Camera
 from dermis.scene.settings import Settings
 
@@ -44,6 +46,7 @@ _PARTS = {"all": (1.0, 1.0), "diffuse": (1.0, 0.0), "specular": (0.0, 1.0)}  # f
 class Resources:
     """What cameras and lights leave as it is.
 
+    shape : the head's, which the motion of each frame moves
     layouts : atlases that light is spread on; the first is the one that is looked at
     scatters : whether light spreads over them
     blurs : how, on each, where light is as bright as it was given
@@ -56,6 +59,7 @@ class Resources:
     unscattered : share of the skin's triangles that the atlas cannot hold
     """
 
+    shape: Shape
     head: HeadResources
     layouts: tuple[AtlasLayout, ...]
     shadow_maps: ShadowMaps
@@ -78,6 +82,7 @@ class Resources:
 class Inputs:
     """Everything that a frame reads.
 
+    motion : what moves the head's shape
     layouts, blurs : those of the resources in the light of now
     shadow_views : how the shadow maps see the head
     light_constants : pipeline constants of what is lit
@@ -88,6 +93,7 @@ class Inputs:
 
     resources: Resources
     settings: Settings
+    motion: Motion
     layouts: tuple[AtlasLayout, ...]
     blurs: tuple[Blur, ...]
     shadow_views: Views
@@ -137,10 +143,10 @@ def pinhole(camera: Camera, head: Head, settings: Settings) -> Pinhole:
     return Pinhole(eye, axes_of(path, camera.up), (half * width / height, half))
 
 
-def camera_views(pinhole: Pinhole, mesh: Mesh, samples: int) -> Views:
+def camera_views(pinhole: Pinhole, outline: Outline, samples: int) -> Views:
     """What the camera sees at each sample of the pixel."""
     rows = rows_of(pinhole.eye, pinhole.axes)
-    clip = perspective(rows, pinhole.half, *depth_range(mesh, rows))
+    clip = perspective(rows, pinhole.half, *depth_range(outline, rows))
     return Views(np.array([clip]), pixel_samples(samples))
 
 

@@ -11,19 +11,19 @@ from numpy.typing import NDArray
 from dermis.gpu import Device, make_texture, scratch
 
 FLOATS = "rgba32float"
-"""Format of light that is neither blurred nor rounded to halves."""
+"""Format of light in full precision."""
 HALVES = "rgba16float"
 MOST_HALVINGS = 3
-_BRIGHT = 16.0  # what the lights are brought to, a 4000th of what halves hold
-_MOST_SCALED = 2.0**100  # it and its inverse are floats; light that would need more is none
-SHARP = 0.45  # least standard deviation [mm] of what is halved, over the square of the result's texels [mm]
+_BRIGHT = 16.0  # scaled irradiance of all lights, a 4000th of the largest half
+_MOST_SCALED = 2.0**100  # its inverse is a float too; light that would need more counts as none
+SHARP = 0.45  # least standard deviation [mm] of a halved level, over its squared texel side [mm^2]
 
 
 @dataclass(frozen=True, eq=False)
 class Levels:
-    """Space for light and its blurred levels, layer 0 not blurred, and for what lies between two passes.
+    """Textures for light and its blurred levels, layer 0 unblurred, and for light between two passes.
 
-    A level of less resolution is in its layer's mip of that number.
+    A level that is halved k times is in mip k of its layer.
 
     texel : format of the textures
     """
@@ -39,7 +39,7 @@ class Levels:
         return self._view(self.stack, k, halvings)
 
     def spare(self, halvings: int = 0) -> Any:
-        """A view of the space between two passes."""
+        """A view of the texture between two passes."""
         return self._view(self.scratch, -1, halvings)
 
     def _view(self, texture: Any, k: int, mip: int) -> Any:
@@ -56,7 +56,7 @@ class Blur:
 
     variance_mm2, weight : (k,) increasing, and (k, 3) of the Gaussians
     halvings : how often the resolution of each layer is halved, that of the unblurred one first
-    scale : what light is multiplied with in the layers
+    scale : factor of the light in the layers
     edge : what lies beyond a chart's edge and its gutter: "repeated", "cleared" or "skipped"
     clear : the light that empty texels show when the edge is "cleared"
     """
@@ -86,9 +86,9 @@ def make_levels(device: Device, size: int, count: int, texel: str, halved: bool 
 
 
 def scale_of(texel: str, brightest: float) -> float:
-    """What brings light to where halves are at home: a power of two, which rounds nothing; 1 for floats.
+    """Factor that brings light into the range of halves: a power of two, which is exact; 1 for floats.
 
-    brightest : irradiance that the lights were given together; skin nearer to one gets more
+    brightest : sum of the lights' irradiances as given; skin nearer to a light gets more
     """
     if texel == FLOATS or brightest == 0.0:
         return 1.0
@@ -98,8 +98,8 @@ def scale_of(texel: str, brightest: float) -> float:
 def halvings_of(variance_mm2: NDArray[np.float64], texels_per_mm: float, most: int) -> tuple[int, ...]:
     """How often the resolution of each layer may be halved, the unblurred one included.
 
-    Twice as large texels want four times as wide a blur before: what they lose in the sparse parts of a map
-    is then as small a part of what is seen (docs/performance.md has the errors).
+    Texels twice as large need a blur four times as wide: what they lose in the sparse parts of a map is then
+    as small a part of the image (docs/performance.md has the errors).
 
     variance_mm2 : of the blurred layers, increasing
     texels_per_mm : of the map

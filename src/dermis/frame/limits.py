@@ -10,10 +10,10 @@ from dermis.gpu import Device
 from dermis.gpu.memory import check_memory
 from dermis.scene.settings import Settings
 
-_DISTANCE = 4  # of a texel: to the edge of its chart
-_FLOATS = 16  # of a texel
-_GEOMETRY = 8 + 8 + 16  # of a texel of an atlas: place on the mesh, stretch, both with reach
-_PICTURE = 36  # of a pixel
+_DISTANCE = 4  # bytes of a texel: distance to the edge of its chart
+_FLOATS = 16  # bytes of a texel: four floats
+_GEOMETRY = 8 + 8 + 8  # bytes of an atlas texel: place on the mesh, stretch, reach
+_PICTURE = 36  # bytes of a pixel
 _SAMPLE = 8
 
 
@@ -22,7 +22,7 @@ def check_limits(
 ) -> None:
     """Raises DermisError for sizes over the device's limits.
 
-    levels : Gaussians that light is blurred by over the atlas, 0 when there is none
+    levels : number of Gaussians that blur light over the atlas
     """
     limit, name = device.max_texture_size, device.adapter.name
     sides = {"size": max(settings.size), "atlas": atlases.side, "shadow_size": settings.shadow_size}
@@ -38,10 +38,10 @@ def check_limits(
 
 
 def atlas_texel_bytes(technique: Technique, levels: int, layouts: int) -> float:
-    """Bytes of a texel of the atlas on a software adapter: geometry, levels, space between passes, their sum.
+    """Bytes of an atlas texel on a software adapter: geometry, levels, light between passes, their sum.
 
-    levels : Gaussians that light is blurred by
-    layouts : atlases of that size
+    levels : number of Gaussians that blur light
+    layouts : number of atlases of that size
     """
     if not levels:
         return layouts * _GEOMETRY

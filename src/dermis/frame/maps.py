@@ -22,13 +22,13 @@ from dermis.mesh.uv import triangle_uv_area
 from dermis.specular.beckmann import beckmann_table
 
 DEFAULT_COLOUR = 0.8
-"""Of heads without a colour map."""
+"""Albedo of heads without a colour map."""
 
 _MEAN_TEXELS = 512  # a side of the grid that a map's mean is taken on
 _NO_BAND = -1.0
 _FOUR = "rgba16float"
 _LARGE = 1 << 20  # numbers in a map whose mips are kept on disk
-_FORM = "1"  # raise when a map's mips become others
+_FORM = "1"  # increment when a map's mips change
 
 
 def upload_maps(device: Device, head: Head, use_colour: bool, decoded: bool = True) -> dict[str, Any]:
@@ -90,7 +90,7 @@ def _moments(slopes: NDArray[np.float32] | None) -> NDArray[np.float32]:
 
 
 def relief_band(maps: Maps) -> float:
-    """Where both maps exist, a larger height map adds what is finer than the normal map; else all of it."""
+    """Mip of a larger height map that matches the normal map: it adds only finer relief. -1: it adds all."""
     if maps.normal is None or maps.height is None:
         return _NO_BAND
     finer = max(maps.height.shape[:2]) / max(maps.normal.shape[:2])
@@ -103,9 +103,9 @@ def _mipped(
     texel: str,
     source: NDArray[np.float32] | None = None,
 ) -> Any:
-    """A texture with all its mips, of halves.
+    """A half-float texture with all its mips.
 
-    source : all that the picture is made of, so that a large one can be kept on disk
+    source : the data that the picture is made from, by which large ones are kept on disk
     """
 
     def chain() -> list[NDArray[Any]]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.inputs import Inputs, camera_views, pinhole, seen_by
 from dermis.frame.levels import Blur, scale_of
 from dermis.frame.lights import light_constants, light_records, light_views
 from dermis.frame.passes.shade import shade_program
+from dermis.frame.passes.shape import Motion, resting
 from dermis.frame.projection import ShadowView, shadow_layers
 from dermis.frame.resources import Asked, make_resources
 from dermis.frame.skin_profiles import SkinProfiles
@@ -17,13 +18,23 @@ from dermis.frame.surroundings import brightest, load_surroundings, with_suns
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Device, Memo
 from dermis.mesh.head import Head
+from dermis.mesh.outline import Outline
+from dermis.mesh.rig import Motion as RigMotion
 from dermis.scene.lights import Light
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES
 
+_SLACK_MM = 10.0  # that a rig's outermost points may miss of a pose
 Lights = tuple[Light, ...]
 Views = list[ShadowView | None]
+
+
+class Moved(NamedTuple):
+    """A head's motion and how far out its shape reaches."""
+
+    motion: Motion
+    outline: Outline
 
 
 class Preparation:
@@ -43,7 +54,6 @@ class Preparation:
 
         Raises DermisError for sizes over the device's limits.
         """
-        self.memo.begin()
         inputs = self._inputs(scene, settings, TECHNIQUES[settings.technique], view)
         self.memo.end()
         return inputs
@@ -53,27 +63,61 @@ class Preparation:
         profile = self.profile_of(scene.skin)
         surroundings = keep(load_surroundings, device, around.name if around else None)
         scene = with_suns(self.memo, scene, surroundings)
-        lights = head, tuple(scene.lights)
-        views = keep(_views, *lights, settings.shadow_size, using=(scene,))
+        lights, moved = (head, tuple(scene.lights)), self._moved(head, scene.motion)
+        views = keep(_views, *lights, moved.outline, settings.shadow_size, using=(scene,))
         record = keep(_record, *lights, views, using=(device, scene))
         layers = shadow_layers(views)
         counts = len(views), len(layers.clips)
-        asked = Asked(head, scene.skin, profile, settings, around, surroundings, technique, *counts, view)
+        asked = Asked(
+            head,
+            scene.skin,
+            profile,
+            _person(scene),
+            settings,
+            around,
+            surroundings,
+            technique,
+            *counts,
+            view,
+        )
         resources = keep(make_resources, self.memo, device, asked)
         seen_from, shone_on = pinhole(scene.camera, head, settings), light_constants(scene)
         scale = scale_of(resources.levels.texel, brightest(scene, surroundings))
         return Inputs(
             resources=resources,
             settings=settings,
+            motion=moved.motion,
             layouts=tuple(under(layout, record) for layout in resources.layouts),
             blurs=keep(_scaled, resources.blurs, scale),
             shadow_views=layers,
             light_constants=shone_on,
-            camera=camera_views(seen_from, head.mesh, settings.samples),
+            camera=camera_views(seen_from, moved.outline, settings.samples),
             half=seen_from.half,
             view=seen_by(resources.view, seen_from),
             constants=resources.constants + shone_on,
         )
+
+    def _moved(self, head: Head, motion: RigMotion | None) -> Moved:
+        """The head as it is posed, or at rest where no motion came."""
+        resting = self.memo.keep(_resting, head)
+        return self.memo.keep(_posed, head, motion, resting.motion) if motion else resting
+
+
+def _person(scene: Scene) -> Any:
+    """Where the control points rest, if not where the head's own do."""
+    motion, own = scene.motion, scene.head.positions_mm
+    return None if motion is None or motion.positions_mm is own else motion.positions_mm
+
+
+def _resting(head: Head) -> Moved:
+    return Moved(resting(head.control), head.mesh.outline)
+
+
+def _posed(head: Head, motion: RigMotion, at_rest: Motion) -> Moved:
+    rig, weights, matrices = head.control, motion.weights.tobytes(), motion.matrices.tobytes()
+    same = motion.positions_mm is rig.positions_mm
+    positions = at_rest.positions if same else motion.positions_mm.tobytes()
+    return Moved(Motion(positions, weights, matrices), Outline(rig.outline_mm(motion), _SLACK_MM))
 
 
 def under(layout: AtlasLayout, lights: Any) -> AtlasLayout:
@@ -88,8 +132,8 @@ def _scaled(blurs: tuple[Blur, ...], scale: float) -> tuple[Blur, ...]:
     return tuple(replace(blur, scale=scale) for blur in blurs)
 
 
-def _views(_: Head, __: Lights, size: int, scene: Scene) -> Views:
-    return light_views(scene, size)
+def _views(_: Head, __: Lights, outline: Outline, size: int, scene: Scene) -> Views:
+    return light_views(scene, outline, size)
 
 
 def _record(_: Head, __: Lights, views: Views, device: Device, scene: Scene) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
-from dermis.mesh.mesh import Mesh
+from dermis.mesh.outline import Outline
 from dermis.scene.lights import PointLight
 
 Vec = NDArray[np.float64]
@@ -20,23 +20,24 @@ Axes = tuple[Triple, Triple, Triple]
 Row = tuple[float, float, float, float]
 Rows = tuple[Row, Row, Row]
 _WIDEST_LIGHT = math.tan(math.radians(80.0))
+_STEP_MM, _STEPS_TO_DOUBLE = 4.0, 16  # of shadow maps: where they look, and how wide they are
 _NEAREST_MM = 1.0
 _UP = 0.0, 1.0, 0.0
 _MIDDLE = np.full((1, 2), 0.5)
 
 
 class Views(NamedTuple):
-    """How layers of a texture array see the world: a layer for each place of each view.
+    """Views of the world for the layers of a texture array: a layer for each sample of each view.
 
     clips : (k, 4, 4) world to clip space
-    places : (n, 2) in a pixel, from 0 to 1 to the right and down
+    places : (n, 2) of the samples in a pixel, from 0 to 1 to the right and down
     """
 
     clips: Matrix
     places: Matrix
 
     def matrices(self, size: tuple[int, int]) -> Matrix:
-        """(k n, 4, 4) from the world to clip space where each layer's place is the middle of the pixel.
+        """(k n, 4, 4) world to clip space, shifted so that each layer's sample is the middle of the pixel.
 
         size : of the picture [pixel]
         """
@@ -47,7 +48,7 @@ class Views(NamedTuple):
 
 
 class ShadowView(NamedTuple):
-    """How a light sees the head.
+    """A light's view of the head, for its shadow map.
 
     clip : (4, 4) world to clip space
     texel : side of a texel of its map [mm]; for all but parallel light per mm of distance
@@ -66,7 +67,7 @@ class ShadowView(NamedTuple):
 
 
 def shadow_layers(views: Sequence[ShadowView | None]) -> Views:
-    """A layer for each view that there is, of the middles of its pixels."""
+    """A layer for each view but None, sampled at the middles of its pixels."""
     return Views(np.array([view.clip for view in views if view]).reshape(-1, 4, 4), _MIDDLE)
 
 
@@ -87,7 +88,7 @@ def axes_of(forward: Sequence[float], up: Sequence[float] = _UP) -> Axes:
 
 
 def place_of(position: Sequence[float], centre: Sequence[float]) -> Triple:
-    """A place in the world.
+    """A point in world space.
 
     position : relative to the head's centre
     """
@@ -95,7 +96,7 @@ def place_of(position: Sequence[float], centre: Sequence[float]) -> Triple:
 
 
 def between(start: Sequence[float], end: Sequence[float]) -> Triple:
-    """The way from one place to another."""
+    """The vector from one place to another."""
     return end[0] - start[0], end[1] - start[1], end[2] - start[2]
 
 
@@ -116,15 +117,15 @@ def _cross(a: Sequence[float], b: Sequence[float]) -> Triple:
 
 
 def rows_of(eye: Triple, axes: Axes) -> Rows:
-    """The upper three rows of the matrix from the world to what an eye sees: to the right, up, and depth."""
+    """The upper three rows of the view matrix: right, up and depth."""
     right, up, forward = axes
     return (*right, -_dot(right, eye)), (*up, -_dot(up, eye)), (*forward, -_dot(forward, eye))
 
 
 def perspective(rows: Rows, half: tuple[float, float], near: float, far: float) -> list[Sequence[float]]:
-    """The matrix' rows from `rows_of` with the tangents `half` of the half angles; depth 1 at near, 0 at far.
+    """Rows of the matrix to clip space, for tangents `half` of the half angles; depth 1 at near, 0 at far.
 
-    Floats are densest at 0: depths turned round are even over the whole range.
+    Floats are densest at 0: reversed depth is evenly precise over the whole range.
     """
     scale = -near / (far - near)
     depth = [scale * c for c in rows[2]]
@@ -132,40 +133,55 @@ def perspective(rows: Rows, half: tuple[float, float], near: float, far: float) 
     return [[c / half[0] for c in rows[0]], [c / half[1] for c in rows[1]], depth, rows[2]]
 
 
-def depth_range(mesh: Mesh, rows: Rows) -> tuple[float, float]:
-    """Nearest and farthest depth of the mesh before the eye, a little widened [mm]."""
-    z = np.array(rows[2], np.float32) @ mesh.outline_columns
-    near, far = float(z.min()), float(z.max())
+def depth_range(outline: Outline, rows: Rows) -> tuple[float, float]:
+    """Nearest and farthest depth of the shape before the eye, a little widened [mm]."""
+    z = np.array(rows[2], np.float32) @ outline.columns
+    near, far = float(z.min()) - outline.slack_mm, float(z.max()) + outline.slack_mm
     return max(near - 1.0, 0.5, 1e-3 * far), max(far + 1.0, 2.0)
 
 
 def point_views(
-    lights: Sequence[tuple[str, PointLight]], centre: Triple, mesh: Mesh, size: int
+    lights: Sequence[tuple[str, PointLight]], centre: Triple, outline: Outline, size: int
 ) -> list[ShadowView]:
-    """The tightest maps of `size` texels from lights around the whole mesh, all of them in a few products.
+    """The tightest maps of `size` texels around the whole mesh for all lights, by a few products.
 
-    lights : each after what it is called
+    lights : each with its name before it
 
-    Raises DermisError when one stands inside the mesh's bounds: one map cannot look all around.
+    Raises DermisError when one stands inside the mesh's bounds: a single map cannot look all around.
     """
     if not lights:
         return []
     eyes = [place_of(light.position, centre) for _, light in lights]
-    axes = [axes_of(between(eye, mesh.middle_mm)) for eye in eyes]
+    axes = [axes_of(between(eye, _steady(outline.middle_mm))) for eye in eyes]
     rows = [rows_of(*one) for one in zip(eyes, axes, strict=True)]
     stacked = np.array(list(zip(*rows, strict=True)), np.float32).reshape(-1, 4)
-    seen = (stacked @ mesh.outline_columns).reshape(3, len(rows), -1)
+    seen = (stacked @ outline.columns).reshape(3, len(rows), -1)
     depth = seen[2]
     near, far = depth.min(axis=1).tolist(), depth.max(axis=1).tolist()
     _check_outside(lights, [one > _NEAREST_MM for one in near])
     steepest = _steepest(seen[:2], depth)
     _check_outside(lights, [one <= _WIDEST_LIGHT for one in steepest])
-    bounds = [(1.02 * h, 0.98 * n, 1.02 * f) for h, n, f in zip(steepest, near, far, strict=True)]
+    slack = outline.slack_mm
+    bounds = [
+        (_widened(h), max(0.98 * n - slack, 0.1 * n), 1.02 * f + slack)
+        for h, n, f in zip(steepest, near, far, strict=True)
+    ]
     clips = [perspective(r, (h, h), n, f) for r, (h, n, f) in zip(rows, bounds, strict=True)]
     return [
         ShadowView(clip, 2.0 * h / size, eye, right, up, n, f)
         for clip, eye, (right, up, _), (h, n, f) in zip(np.array(clips), eyes, axes, bounds, strict=True)
     ]
+
+
+def _steady(middle: Triple) -> Triple:
+    """Where maps look: in steps, so that their texels stay where they are while a head moves a little."""
+    x, y, z = (_STEP_MM * round(c / _STEP_MM) for c in middle)
+    return x, y, z
+
+
+def _widened(half: float) -> float:
+    """Half the extent of a map, a little wider, in steps for the same reason."""
+    return float(2.0 ** (math.ceil(_STEPS_TO_DOUBLE * math.log2(1.005 * half)) / _STEPS_TO_DOUBLE))
 
 
 def _check_outside(lights: Sequence[tuple[str, PointLight]], outside: Sequence[bool]) -> None:
@@ -176,25 +192,28 @@ def _check_outside(lights: Sequence[tuple[str, PointLight]], outside: Sequence[b
 
 
 def _steepest(sides: NDArray[Any], depth: NDArray[Any]) -> list[float]:
-    """The largest tangent that each eye sees; sides are overwritten: new memory takes longer than sums."""
+    """The largest tangent in each view; overwrites `sides`, as new memory takes longer than arithmetic."""
     for side in sides:
-        side /= depth  # one by one: to divide them at once has numpy make buffers
+        side /= depth  # one by one: dividing them at once makes numpy allocate buffers
     found: list[float] = np.abs(sides, out=sides).max(axis=(0, 2)).tolist()
     return found
 
 
-def parallel_view(direction: Vec, mesh: Mesh, size: int) -> ShadowView:
+def parallel_view(direction: Vec, outline: Outline, size: int) -> ShadowView:
     """The tightest map of `size` texels around the whole mesh in parallel light."""
-    points = mesh.outline
+    points = outline.places_mm
     axes = frame_of(direction, np.array(_UP))
     local = points @ np.stack(axes, axis=1)
-    low, high = local.min(axis=0) - 1.0, local.max(axis=0) + 1.0
-    half = 0.51 * float(max(high[0] - low[0], high[1] - low[1]))
+    room = 1.0 + np.array([0.0, 0.0, outline.slack_mm])
+    low, high = local.min(axis=0) - room, local.max(axis=0) + room
+    middle_x, middle_y = (_STEP_MM * round(0.5 * float(low[k] + high[k]) / _STEP_MM) for k in (0, 1))
+    reach = max(high[0] - middle_x, middle_x - low[0], high[1] - middle_y, middle_y - low[1])
+    half = _widened(float(reach))
     clip = np.eye(4)
     clip[0, :3], clip[1, :3] = axes[0] / half, axes[1] / half
     clip[2, :3] = -axes[2] / (high[2] - low[2])
-    clip[0, 3], clip[1, 3] = -0.5 * (low[0] + high[0]) / half, -0.5 * (low[1] + high[1]) / half
+    clip[0, 3], clip[1, 3] = -middle_x / half, -middle_y / half
     clip[2, 3] = high[2] / (high[2] - low[2])
-    middle = 0.5 * (low[0] + high[0]) * axes[0] + 0.5 * (low[1] + high[1]) * axes[1]
+    middle = middle_x * axes[0] + middle_y * axes[1]
     origin, right, up = ((float(x), float(y), float(z)) for x, y, z in (middle, axes[0], axes[1]))
     return ShadowView(clip, 2.0 * half / size, origin, right, up, float(low[2]), float(high[2]))

@@ -17,15 +17,15 @@ from dermis.gpu.device import gpu_failures
 
 @dataclass(frozen=True)
 class Rendered:
-    """An image, still on the device, until its renderer draws the next one.
+    """An image on the device, valid until its renderer draws the next one.
 
     gpu_ms : device time of each stage that was timed, and "total" [ms]; None without timestamps
     frame_ms : from recording the frame to its end [ms]
-    setup_ms : what was made for this scene before: loading to the device, atlas, shaders [ms]
+    setup_ms : what the scene needed before its frame: loading to the device, atlas, shaders [ms]
     gaussians : levels of the profile
     unscattered : share of the skin's triangles that the atlas cannot hold; they are lit directly
     suns : sun-like peaks of the environment that shine as lights of their own
-    leave : sends the picture's bytes on their way
+    leave : starts reading the picture's bytes back
     """
 
     device: Device

@@ -27,14 +27,14 @@ from dermis.scene.techniques import TECHNIQUES
 
 T = TypeVar("T")
 _WARMING_FRAMES = 100
-_IN_FLIGHT = 3  # frames submitted and not done: Python and the device work side by side, pictures stay fresh
+_IN_FLIGHT = 3  # frames submitted and not done: Python and the device overlap, with little latency
 
 
 class Renderer:
     """Renders scenes on one device; what does not change between two frames is not computed again.
 
     adapter : "auto", "cpu" or part of an adapter's name
-    depth : how many sizes of things are kept, for who goes back and forth between some
+    depth : how many variants of each resource are kept, for callers that alternate between a few
     """
 
     def __init__(self, adapter: str = "auto", depth: int = 1) -> None:
@@ -51,7 +51,7 @@ class Renderer:
         self._opening_ms = 1e3 * (time.perf_counter() - started)
 
     def forget(self) -> None:
-        """Make and compute everything again."""
+        """Forget all that is kept; the next frame makes it again."""
         self.memo.forget()
         self.graph.forget()
 
@@ -66,11 +66,10 @@ class Renderer:
     ) -> Rendered:
         """Render one frame and leave the image on the device.
 
-        anew : True computes everything, also what is there already
+        anew : True runs all passes, not only stale ones
         timed : True times each stage in a pass of its own, which takes longer than the frame otherwise does;
             "whole" times only the frame, with its stages in one pass; False returns as soon as the frame is
-            submitted, so that the device never waits for Python; only when it is three frames behind is it
-            waited for
+            submitted, and waits only for a device that is three frames behind
         view : name of a scene among several drawn in turn: each keeps light and shadows of its own
 
         Raises DermisError for sizes over the device's limits and when the device fails.
@@ -116,9 +115,9 @@ class Renderer:
     def _submit(
         self, inputs: Inputs, timed: Timed, anew: bool, leave: Callable[[Graph, Picture], T] | None = None
     ) -> tuple[Frame, T | None]:
-        """Declare a frame and run what has to be run of it.
+        """Declare a frame and run its stale passes.
 
-        leave : sends the picture on its way to NumPy at once
+        leave : starts reading the picture back in the same submission
         """
         if anew:
             self.graph.forget()
@@ -130,7 +129,7 @@ class Renderer:
         return frame, leaving
 
     def _keep_pace(self, frame: Frame) -> None:
-        """Wait for the frame before those that may be in flight."""
+        """Wait until no more frames than allowed are in flight."""
         self._in_flight.append(frame.submitted)
         while len(self._in_flight) > _IN_FLIGHT:
             self.device.wait(self._in_flight.popleft())
@@ -158,7 +157,7 @@ class Renderer:
     def render_many(
         self, scenes: Iterable[Scene], *, linear: bool = False, **settings: Any
     ) -> Iterator[NDArray[Any]]:
-        """(h, w, 3) sRGB bytes of each scene in turn, each handed out while the next ones are drawn.
+        """(h, w, 3) sRGB bytes of each scene in turn, each yielded while the next ones are drawn.
 
         linear : float32 linear Rec. 709 instead, as of `render`
         settings : those of `Settings`, for all of them; heads and textures that scenes share are loaded once
@@ -178,7 +177,7 @@ class Renderer:
             return leaving.image()
 
     def _send(self, scene: Scene, settings: Settings, linear: bool) -> Leaving:
-        """Submit a frame and send its picture on its way."""
+        """Submit a frame and start reading its picture back."""
         with gpu_failures(self.device):
             inputs = self.prepare(scene, settings)
             _, leaving = self._submit(inputs, False, False, partial(pack.draw, linear=linear))

@@ -14,12 +14,15 @@ from dermis.frame import surface, surroundings
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.atlas_textures import AtlasTextures, upload_atlas
 from dermis.frame.geometry import HeadResources, upload_geometry
+from dermis.frame.gutters import make_walks
 from dermis.frame.inputs import Resources, Split, view_record
 from dermis.frame.levels import Blur, Levels
 from dermis.frame.limits import check_limits
 from dermis.frame.maps import upload_maps
-from dermis.frame.passes import bloom, post, shade, shadows, surface_texels, visibility_buffer
+from dermis.frame.passes import bloom, gutters, post, shade, shadows, surface_texels, visibility_buffer
+from dermis.frame.passes.shape import rest_shape
 from dermis.frame.seams import LaidOut, Remedy, laid_out, remedy_of
+from dermis.frame.shape import Shape, make_shape, shape_tables
 from dermis.frame.surroundings import Surroundings
 from dermis.frame.techniques.technique import AtlasTechnique, Technique
 from dermis.frame.translucency import translucency_of
@@ -37,6 +40,7 @@ from dermis.specular.albedo import albedo_table
 class Asked:
     """What resources are made for.
 
+    person : (p, 3) places of the head's control points where another person rests, None for the head's own
     lights, shadow_layers : how many parts of lights there are, and how many of them cast shadows
     view : name of a scene among several that are drawn in turn
     """
@@ -44,6 +48,7 @@ class Asked:
     head: Head
     skin: Skin
     profile: GaussianSum
+    person: Any
     settings: Settings
     environment: Environment | None
     surroundings: Surroundings
@@ -99,12 +104,14 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     maps = memo.soon(device.executor, upload_maps, *reading)  # which take long to read
     size = settings.shadow_size if asked.shadow_layers else 1
     shadow_maps = keep(_shadow_maps, device, asked.head, asked.shadow_layers, size, of=asked.view)
+    tables = keep(shape_tables, device, asked.head)
+    shape = keep(make_shape, device, tables)
     shared = _shared(memo, device, asked, shadow_maps)
     named = list(enumerate(asked.atlases.layouts))
     atlases = [_atlas(memo, device, asked, name, index) for index, name in named]
     uploaded: dict[str, Any] = memo.wait(maps)
     shared |= uploaded
-    layouts = [_layout(memo, device, asked, *atlases[index], shared, index) for index, _ in named]
+    layouts = [_layout(memo, device, asked, *atlases[index], shape, shared, index) for index, _ in named]
     own = technique.make(memo, device, settings, asked.profile)
     program = shade.shade_program(device)
     view = view_record(program, asked.head, settings, asked.split)
@@ -112,7 +119,8 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     first, _ = atlases[0]
     side, several = settings.atlas, len(layouts) > 1
     return Resources(
-        head=HeadResources(layouts[0].lit, len(asked.head.mesh.triangles)),
+        shape=shape,
+        head=layouts[0].head,
         layouts=tuple(layouts),
         shadow_maps=shadow_maps,
         scatters=asked.count > 0,
@@ -158,13 +166,18 @@ def _layout(
     asked: Asked,
     atlas: Atlas,
     textures: AtlasTextures,
+    shape: Shape,
     shared: dict[str, Any],
     index: int,
 ) -> AtlasLayout:
     """An atlas that light is spread on, without lights."""
     keep, number, head = memo.keep, str(index), asked.head
-    shape = keep(upload_geometry, device, head.mesh, atlas, of=number)
-    lit = shape | shared
+    held = keep(upload_geometry, device, head.mesh, atlas, shape, of=number)
+    lit = held.resources | shared
+    if asked.person is not None:
+        walks = keep(make_walks, device, head.mesh, atlas, textures, of=number)
+        resting = _resting(memo, device, asked, held, shape, number)
+        textures = keep(gutters.walked, device, textures, walks, resting, of=number)
     if asked.occluded:
         bound = lit, textures.resources["atlas"]
         lit["occlusion_map"] = keep(surroundings.occlusion_map, device, head, atlas, using=bound, of=number)
@@ -172,12 +185,21 @@ def _layout(
         lit["occlusion_map"] = surroundings.no_occlusion(device)
     translucency = None
     if asked.count and asked.settings.transmission == "thin" and asked.technique.transmits:
+        heads = held, _resting(memo, device, asked, held, shape, number)
+        now, at_rest = (one.resources | textures.resources for one in heads)
         blurred = asked.split.blurred_mm2, asked.split.weight, asked.skin.has_own_tissue
-        surface = shape | textures.resources
-        translucency = translucency_of(memo, device, surface, atlas, *blurred, of=number)
+        translucency = translucency_of(memo, device, now, at_rest, atlas, *blurred, of=number)
     side = asked.settings.atlas if asked.count else 1
     surfaces = keep(surface_texels.make_surfaces, device, side, of=number)
-    return AtlasLayout(textures, lit, surfaces, _sum(memo, device, asked, side, number), translucency)
+    return AtlasLayout(textures, held, lit, surfaces, _sum(memo, device, asked, side, number), translucency)
+
+
+def _resting(
+    memo: Memo, device: Device, asked: Asked, held: HeadResources, shape: Shape, of: str
+) -> HeadResources:
+    """The head as the person rests."""
+    person = asked.head.positions_mm if asked.person is None else asked.person
+    return memo.keep(HeadResources.shaped, held, memo.keep(rest_shape, device, shape.tables, person), of=of)
 
 
 def _sum(memo: Memo, device: Device, asked: Asked, side: int, role: str) -> Any:

@@ -1,4 +1,4 @@
-"""Where in a pixel its samples lie."""
+"""Positions of samples in a pixel."""
 
 from __future__ import annotations
 

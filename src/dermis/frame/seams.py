@@ -1,4 +1,4 @@
-"""What is done where the map is cut: the stitched atlas, and the remedies of the 2007 talk [Dudash2007]."""
+"""Remedies for seams: the stitched atlas, and those of the 2007 talk [Dudash2007]."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FEATHER_MM = 3.0  # width over which an edited stretch map narrows the blur towa
 
 @dataclass(frozen=True)
 class Remedy:
-    """How an atlas is laid out and what its blurs find beyond a chart's edge.
+    """How an atlas is laid out, and what blurs read beyond a chart's edge.
 
     layouts : of the atlas: "stitched", "mesh" for the mesh's own uv, "unwrapped" for one with other seams
     edge : one of `diffuse.EDGES`
@@ -38,9 +38,9 @@ REMEDIES = {
 
 
 def remedy_of(seams: str, stitches: bool) -> Remedy:
-    """What is done at the seams.
+    """The remedy by its name.
 
-    stitches : whether the technique can stitch; else it takes a remedy of its time where that is asked for
+    stitches : whether the technique can stitch; others clear the colour instead
     """
     return REMEDIES["clear-colour" if seams == "stitch" and not stitches else seams]
 
@@ -53,9 +53,9 @@ class LaidOut(NamedTuple):
 
 
 def laid_out(remedy: Remedy, settings: Settings, levels: int, occluded: bool) -> LaidOut:
-    """The atlases that a frame needs: the least where no light spreads over them and nothing else lies there.
+    """The atlases that a frame needs: of the least size where neither light nor occlusion lies on them.
 
-    levels : Gaussians that light is blurred by over the atlas
+    levels : number of Gaussians that blur light over the atlas
     occluded : whether an environment's occlusion lies on it
     """
     layouts = remedy.layouts

@@ -15,7 +15,7 @@ _KEPT = 4  # the live skin, one to compare with, and those just before
 class SkinProfiles:
     """Profiles of skins; each fit starts from the last one of its kind, which is several times faster.
 
-    A file is read, if it has changed, when another skin is asked for, and not for each frame of the same one.
+    Files are checked for changes when the skin changes, not for each frame of the same skin.
     """
 
     def __init__(self) -> None:
@@ -56,5 +56,5 @@ def _tissue(skin: Skin) -> tuple[object, ...]:
 
 
 def _kind(skin: Skin) -> tuple[object, ...]:
-    """What skins share whose profiles are similar."""
+    """Key that skins with similar profiles share."""
     return skin.profile, skin.pigments and skin.pigments.structure, len(skin.layers)

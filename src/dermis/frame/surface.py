@@ -8,6 +8,7 @@ import numpy as np
 
 from dermis.frame.maps import DEFAULT_COLOUR, relief_band
 from dermis.gpu import ComputeProgram
+from dermis.gpu.shader_types import struct_dtype
 from dermis.gpu.wgsl_source import Member
 from dermis.mesh.maps import Maps
 from dermis.optics.directions import directions
@@ -20,17 +21,17 @@ from dermis.specular.models import MODELS
 
 
 def model_of(skin: Skin) -> str:
-    """Name of the lobe in MODELS; skin without one keeps the default's, for wet materials beside it."""
+    """Name of the lobe in MODELS; skin without one keeps the default, for wet materials beside it."""
     return next(iter(MODELS)) if skin.specular == "none" else skin.specular
 
 
 def lobe_shaders() -> list[Member]:
-    """The models as lobe.wgsl includes them; their place is their number."""
+    """The models as lobe.wgsl includes them, numbered in order."""
     return [Member(name, model.shader) for name, model in MODELS.items()]
 
 
 def surface_numbers() -> dict[str, float]:
-    """What lobe.wgsl and the models' shaders fill in."""
+    """Numbers that lobe.wgsl and the models' shaders fill in."""
     of_models = {name: number for model in MODELS.values() for name, number in model.numbers.items()}
     return {"root_of_first_row": ROOT_OF_FIRST_ROW, **of_models}
 
@@ -44,29 +45,32 @@ def constants(skin: Skin) -> tuple[tuple[str, int], ...]:
 def skin_record(
     program: ComputeProgram, skin: Skin, maps: Maps, profile: GaussianSum, light_count: int
 ) -> Any:
-    """The skin's parameters; a roughness map replaces the constant.
+    """The shader's `Skin`: members that the model has by name come from it, the others are derived.
 
     profile : of the skin
     """
+    members = struct_dtype(program.source.text, "Skin").names or ()
+    dials = {name: getattr(skin, name) for name in members if hasattr(skin, name)}
+    return program.record("Skin", **dials, **_derived(skin, maps, profile), light_count=light_count)
+
+
+def _derived(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any]:
+    """Members that no field or property of the model holds; a roughness map replaces the model's number."""
     energy, mapped = ENERGY[skin.energy], maps.roughness is not None
-    return program.record(
-        "Skin",
-        roughness=skin.smoothing * (1.0 if mapped else skin.roughness),
-        rho_s=skin.strength,
-        f0=SKIN_F0,
-        eta=SKIN_ETA,
-        loss=energy.loss,
-        returned=float(energy.returned),
-        tint=float(skin.specular_colour == "wrong"),
-        mix=skin.mix,
-        relief_band=relief_band(maps),
-        light_count=light_count,
+    return {
+        "m": skin.smoothing * (1.0 if mapped else skin.roughness),
+        "f0": SKIN_F0,
+        "eta": SKIN_ETA,
+        "loss": energy.loss,
+        "returned": energy.returned,
+        "tint": skin.specular_colour == "wrong",
+        "relief_band": relief_band(maps),
         **(_by_direction(skin, maps, profile) if skin.direction == "half-space" else {}),
-    )
+    }
 
 
 def _by_direction(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any]:
-    """What light does by its directions, for half-spaces of the skin's mean colour."""
+    """Members that direction.wgsl reads, for half-spaces of the skin's mean colour."""
     colour = profile.albedo if skin.albedo == "profile" else maps.mean_colour
     colour = np.full(3, DEFAULT_COLOUR) if colour is None else colour
     law = directions(colour, 1.0 if skin.specular == "none" else SKIN_ETA)

@@ -1,4 +1,4 @@
-"""Which surface points single pixels see, and the light that enters the skin at given points."""
+"""Surface points under pixel centres, and the light that enters the skin at given points."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.atlas_textures import AtlasTextures, packed_texels
-from dermis.frame.passes import irradiance, shadows, surface_texels, visibility_buffer
+from dermis.frame.passes import irradiance, shadows, shape, surface_texels, visibility_buffer
 from dermis.frame.passes.surface_texels import make_surfaces
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Frame, download, make_texture
@@ -23,7 +23,7 @@ Index = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class SurfacePoints:
-    """Where the middles of pixels meet the head.
+    """Points of the head under the centres of pixels.
 
     mask : (h, w) pixels that see it
     triangle, barycentric : (n,) and (n, 3) of those pixels, row by row
@@ -37,15 +37,16 @@ class SurfacePoints:
 def surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> SurfacePoints:
     """The points that an image of one sample for each pixel shows.
 
-    settings : technique and samples are of no account
+    settings : technique and samples do not matter
     """
     single = settings.model_copy(update={"samples": 1, "technique": "none"})
     inputs = renderer.prepare(scene, single)
     frame = Frame(renderer.device)
     made = inputs.resources
+    shape.draw(frame, made.shape, inputs.motion)
     visibility_buffer.draw(frame, made.visibility, inputs.camera, made.head)
     frame.submit()
-    renderer.graph.forget()  # which does not know of this frame
+    renderer.graph.forget()  # it does not know of this frame
     seen = download(renderer.device, made.visibility.texture).astype(np.int64)
     mask = seen > 0
     triangle = seen[mask] - 1
@@ -59,8 +60,9 @@ def _barycentric(scene: Scene, view: NDArray[np.void], triangle: Index, mask: ND
     x, y = 2.0 * (columns + 0.5) / width - 1.0, 1.0 - 2.0 * (rows + 0.5) / height
     forward, right, up, eye = (view[name].astype(np.float64) for name in ("forward", "right", "up", "eye"))
     ray = forward + x[:, None] * right + y[:, None] * up
-    mesh = scene.head.mesh
-    a, b, c = (mesh.positions[mesh.triangles[triangle, k]].astype(np.float64) - eye for k in range(3))
+    mesh, motion = scene.head.mesh, scene.motion
+    places = mesh.positions if motion is None else scene.head.control.points_mm(motion)[mesh.point]
+    a, b, c = (places[mesh.triangles[triangle, k]].astype(np.float64) - eye for k in range(3))
     sides = (np.cross(b, c), np.cross(c, a), np.cross(a, b))
     weights = np.stack([(side * ray).sum(axis=1) for side in sides], axis=-1)
     weights *= np.sign(weights.sum(axis=1, keepdims=True))  # triangles seen from behind
@@ -71,9 +73,9 @@ def _barycentric(scene: Scene, view: NDArray[np.void], triangle: Index, mask: ND
 def irradiance_at(
     renderer: Renderer, scene: Scene, settings: Settings, triangle: Index, barycentric: Floats
 ) -> Floats:
-    """(n, 3) light that enters the skin at places, times the colour's share before scattering.
+    """(n, 3) light that enters the skin at points, times the colour's share before scattering.
 
-    scene : without maps and environment, whose texels and occlusion belong to places of the atlas
+    scene : without maps and environment, whose texels and occlusion are looked up by place in the atlas
     triangle, barycentric : (n,) and (n, 3)
     """
     side = max(1, int(np.ceil(np.sqrt(len(triangle)))))
@@ -85,14 +87,15 @@ def irradiance_at(
     device = renderer.device
     inputs = renderer.prepare(scene, settings)
     first = inputs.layouts[0]
-    listed = AtlasTextures({"atlas": texture_from(device, records, "rg32uint")}, sheared=False)
+    listed = AtlasTextures({"atlas": texture_from(device, records, "rg32uint")})
     lit = make_texture(device, (side, side), "rgba32float")
     frame = Frame(device)
     made = inputs.resources
+    shape.draw(frame, made.shape, inputs.motion)
     shadows.draw(frame, made.shadow_maps, inputs.shadow_views, made.head)
-    layout = AtlasLayout(listed, first.lit, make_surfaces(device, side), lit)
+    layout = AtlasLayout(listed, first.head, first.lit, make_surfaces(device, side), lit)
     surface_texels.draw(frame, layout)
     irradiance.draw(frame, layout, inputs.light_constants, lit, side)
     frame.submit()
-    renderer.graph.forget()  # which does not know of this frame
+    renderer.graph.forget()  # it does not know of this frame
     return download(device, lit).reshape(-1, 4)[: len(triangle), :3].astype(np.float64)

@@ -34,7 +34,7 @@ class Surroundings:
 
     panorama : layers of irradiance and of reflections, black without an environment
     suns : its peaks
-    brightest : irradiance that a surface gets from the rest at most
+    brightest : largest irradiance from the rest
     """
 
     panorama: Any
@@ -59,7 +59,7 @@ def load_surroundings(device: Device, name: str | None) -> Surroundings:
 
 
 def _bordered(layer: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A layer with what a filter finds around it: beyond a pole the first row again, half way around."""
+    """A layer with a border for filters: beyond a pole its first row again, rotated by half a turn."""
     half = layer.shape[1] // 2
     rows = np.concatenate([np.roll(layer[:1], half, axis=1), layer, np.roll(layer[-1:], half, axis=1)])
     return np.concatenate([rows[:, -1:], rows, rows[:, :1]], axis=1)
@@ -113,7 +113,7 @@ def occlusion_map(device: Device, head: Head, atlas: Atlas, lit: Resources, texe
     side = min(atlas.size, _FINEST_OCCLUSION)
 
     def bake() -> NDArray[np.uint16]:
-        baked = bake_occlusion(device, head.mesh, lit, texels, side)
+        baked = bake_occlusion(device, head, atlas, lit, texels, side)
         levels: NDArray[np.uint16] = np.rint(65535.0 * whole_map(baked, side)).astype(np.uint16)
         return levels
 
@@ -122,10 +122,10 @@ def occlusion_map(device: Device, head: Head, atlas: Atlas, lit: Resources, texe
 
 
 def is_occluded(environment: Environment | None, settings: Settings) -> bool:
-    """Whether the head hides some of its environment from itself."""
+    """Whether the head occludes its environment."""
     return environment is not None and settings.occlusion == "baked"
 
 
 def no_occlusion(device: Device) -> Any:
-    """Stands for the map where nothing is occluded."""
+    """Placeholder for the map where nothing is occluded."""
     return device.shared("no occlusion", lambda: make_texture(device, (1, 1), "r32float", use="map"))

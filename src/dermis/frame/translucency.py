@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.translucency.cells import Cells, divide
 from dermis.frame.atlas_layout import PairBuffers, Translucency
-from dermis.frame.passes.pair_search.search import Found, search, upload_receivers, upload_sources
+from dermis.frame.passes.pair_search.places import upload_receivers, upload_sources
+from dermis.frame.passes.pair_search.search import Found, search
 from dermis.frame.passes.translucency_points import RECEIVER_BYTES, SOURCE_BYTES, space
 from dermis.frame.passes.translucency_weights import source_level, weighing
 from dermis.gpu import Device, Memo, make_texture, scratch, upload
+from dermis.gpu.program import Resources
 
 Floats = NDArray[np.float64]
 _WIDTHS_TO_DOUBLE, _LEAST_SHARED_MM = 2, 0.5
@@ -24,7 +26,8 @@ _COARSER = 1.5  # times the side of cells whose pairs memory does not hold
 def translucency_of(
     memo: Memo,
     device: Device,
-    surface: dict[str, Any],
+    surface: Resources,
+    at_rest: Resources,
     atlas: Atlas,
     variance_mm2: Floats,
     weight: Floats,
@@ -33,14 +36,14 @@ def translucency_of(
 ) -> Translucency:
     """What comes through a head's thin parts, on an atlas.
 
-    surface : resources of geometry.wgsl and of the atlas
+    surface, at_rest : resources of geometry.wgsl and of the atlas, as the head is now and for the search
     variance_mm2, weight : (k,) and (k, 3) of the blurred levels
     changing : whether profiles come and go, so that similar ones should share their pairs
     of : name of the atlas among several
     """
     widest = float(np.sqrt(variance_mm2[-1]))
     widest = shared_width(widest) if changing else widest
-    pairs = memo.keep(find_pairs, device, surface, atlas, widest, of=of)
+    pairs = memo.keep(find_pairs, device, at_rest, atlas, widest, of=of)
     return memo.keep(translucency_from, device, surface, pairs, variance_mm2, weight, of=of)
 
 
@@ -50,7 +53,7 @@ def shared_width(widest_mm: float) -> float:
     return float(2.0 ** (step / _WIDTHS_TO_DOUBLE))
 
 
-def find_pairs(device: Device, surface: dict[str, Any], atlas: Atlas, widest_mm: float) -> PairBuffers:
+def find_pairs(device: Device, surface: Resources, atlas: Atlas, widest_mm: float) -> PairBuffers:
     """The translucent pairs of a surface, with cells so coarse that memory holds them.
 
     widest_mm : standard deviation of the widest Gaussian [mm]
@@ -59,11 +62,12 @@ def find_pairs(device: Device, surface: dict[str, Any], atlas: Atlas, widest_mm:
         cells = divide(atlas, widest_mm, _COARSER**number)
         found = search(device, surface, cells)
         if found is not None:
-            return _buffers(device, cells, found)
+            return pairs_from(device, cells, found)
     raise AssertionError
 
 
-def _buffers(device: Device, cells: Cells, found: Found) -> PairBuffers:
+def pairs_from(device: Device, cells: Cells, found: Found) -> PairBuffers:
+    """Pairs that were found, as the frame's passes read them."""
     return PairBuffers(
         cells=cells,
         receivers=upload_receivers(device, cells, found.receiver),
@@ -96,7 +100,7 @@ def _unlit(device: Device, surface: NDArray[np.bool_]) -> Any:
 
 
 def translucency_from(
-    device: Device, surface: dict[str, Any], pairs: PairBuffers, variance_mm2: Floats, weight: Floats
+    device: Device, surface: Resources, pairs: PairBuffers, variance_mm2: Floats, weight: Floats
 ) -> Translucency:
     """What a profile lets pass between pairs, and space for it."""
     receivers, sources = pairs.receivers[1], pairs.sources[1]

@@ -12,7 +12,7 @@ from dermis.errors import refuse
 from dermis.gpu.native_types import tell_wgpus_types
 
 WANTED_FEATURES = ("timestamp-query",)
-"""Features that a device is opened with where the adapter has them; nothing is lacking without."""
+"""Optional features, requested where the adapter has them; everything works without them."""
 
 _KINDS = ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", "CPU")
 INSTALL_HINT = "On Debian or Ubuntu: sudo apt-get install mesa-vulkan-drivers"
@@ -52,7 +52,7 @@ def list_adapters() -> list[Adapter]:
     try:
         with _quiet_drivers():
             found = [_describe(handle) for handle in wgpu.gpu.enumerate_adapters_sync()]
-    except Exception as error:  # whatever a broken driver makes of it
+    except Exception as error:  # a broken driver may raise anything
         refuse("graphics drivers", "a list of adapters", f"they fail: {error}", INSTALL_HINT)
     return sorted(found, key=lambda a: (_rank(a.kind), len(a.missing), a.backend == "OpenGL"))
 
@@ -63,7 +63,7 @@ def fitting_adapters(wanted: str) -> tuple[list[Adapter], str]:
     Raises DermisError when there is none.
     """
     adapters = list_adapters()
-    # OpenGL draws wrong pictures, if any: it is taken only by its name.
+    # OpenGL renders wrongly or not at all, so it has to be asked for by name.
     right = [a for a in adapters if a.backend != "OpenGL"]
     if not adapters or (wanted in ("auto", "cpu") and not right):
         came = "this machine shows only OpenGL's" if adapters else "this machine shows none"

@@ -1,4 +1,4 @@
-"""A cache keyed by resources: an entry goes as soon as one of its resources is released."""
+"""A cache keyed by resources: an entry is dropped as soon as one of its resources is released."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ T = TypeVar("T")
 
 
 class ByResources(Generic[T]):
-    """Bind groups, and the like, by the identity of all that they bind.
+    """Bind groups and the like, keyed by the identity of the resources that they bind.
 
-    A group lets go of its resources' memory only when it goes itself, so it is forgotten as soon as one of
-    them is no longer held elsewhere.
+    A bind group keeps its resources' memory alive, so it is dropped as soon as one of them is no longer held
+    elsewhere.
     """
 
     def __init__(self) -> None:
@@ -26,21 +26,21 @@ class ByResources(Generic[T]):
 
     @property
     def followed(self) -> int:
-        """How many resources there are things for."""
+        """Number of resources that entries depend on."""
         return len(self._users)
 
     def find(self, key: Key) -> T | None:
-        """What was made for a key from `key_of`, None when there is none (any more)."""
+        """The entry for a key from `key_of`, None without one."""
         return self._kept.get(key)
 
     def keep(self, key: Key, resources: Sequence[Any], made: T) -> None:
-        """Keep it for as long as all the resources that gave the key live."""
+        """Keep an entry for as long as all of its key's resources live."""
         self._kept[key] = made
         for resource in resources:
             self._user(resource).add(key)
 
     def _user(self, resource: Any) -> set[Key]:
-        """The keys that a resource is in; new resources are followed to their end."""
+        """The keys that contain a resource; new resources are watched until they are released."""
         name = id(resource)
         if name not in self._users:
             this = weakref.ref(self)
@@ -62,5 +62,5 @@ class ByResources(Generic[T]):
 
 
 def key_of(resources: Sequence[Any]) -> Key:
-    """Tells a set of resources from others."""
+    """The key for these resources in this order."""
     return tuple(map(id, resources))

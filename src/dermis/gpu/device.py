@@ -51,14 +51,14 @@ DEFAULT_LIMITS = {
     "max-compute-workgroups-per-dimension": 65535,
     "max-immediate-size": 0,
 }
-"""What WebGPU promises on every machine ("Limits" in its specification)."""
+"""Limits that WebGPU guarantees on every machine ("Limits" in its specification)."""
 _RAISED_LIMITS = ("max-texture-dimension-2d", "max-storage-buffer-binding-size", "max-buffer-size")
 
 
 def open_device(adapter: str = "auto", *, bare: bool = False) -> Device:
     """Open "auto" (the best), "cpu" (software) or the first adapter whose name contains the text.
 
-    bare : True asks for nothing beyond what WebGPU promises everywhere
+    bare : True requests nothing beyond what WebGPU guarantees everywhere
 
     Raises DermisError when there is no such adapter or when it does not open.
     """
@@ -70,20 +70,21 @@ def open_device(adapter: str = "auto", *, bare: bool = False) -> Device:
 
 
 class Device:
-    """A logical device; nothing here is shared between two of them.
+    """A logical device; devices share no state.
 
     It has WebGPU's default limits, so that a program that needs more fails on every machine alike; only the
-    sizes of textures and buffers are the adapter's own. Of the optional features it has `WANTED_FEATURES`.
+    largest sizes of textures and buffers are the adapter's own. It has those of `WANTED_FEATURES` that the
+    adapter offers.
 
-    bare : True leaves the sizes at their defaults too, and asks for no feature
-    executor : threads for what the driver and the disk do by themselves: compile, read, copy; what they have
-        not begun when the device is dropped is left
-    ffi, lib, checked : the native library, for the calls of every frame, without what wgpu's Python adds;
-        calls of `checked` raise what the library finds wrong, in passes when their encoder is submitted
+    bare : True keeps the default sizes too, and requests no feature
+    executor : threads for work outside Python (compiling, reading, copying); jobs that have not started are
+        cancelled when the device is dropped
+    ffi, lib, checked : the native library, called directly in each frame to save the overhead of wgpu's
+        Python; calls of `checked` raise the library's errors, for passes when their encoder is submitted
     slots : what textures, buffers and views hold, see access.py
     active_slots : how many of them passes have written
     programs : compiled shaders, see program.py
-    spare_records : memory in which no frame gathers its numbers at the moment; new memory takes longer
+    spare_records : memory for records that no frame uses at the moment; allocating it takes longer
     """
 
     def __init__(self, adapter: Adapter, reason: str, *, bare: bool = False) -> None:
@@ -121,51 +122,51 @@ class Device:
         self._samplers: dict[tuple[tuple[str, str], ...], Any] = {}
 
     def shared(self, name: str, make: Callable[[], Any]) -> Any:
-        """Something small that lives as long as the device, made when it is first asked for by its name."""
+        """A small object by its name, made on first use and kept as long as the device."""
         if name not in self._shared:
             self._shared[name] = make()
         return self._shared[name]
 
     def next_frame(self) -> int:
-        """Number of a frame that begins."""
+        """The number of a new frame."""
         self._frames += 1
         return self._frames
 
-    def write(self, buffer: Any, data: bytearray, size: int) -> None:
+    def write(self, buffer: Any, data: bytearray | bytes, size: int) -> None:
         """Put the first `size` bytes of the data into a buffer before the next submit."""
         start = self.ffi.from_buffer(data)
         self.checked.wgpuQueueWriteBuffer(self.handle.queue._internal, buffer._internal, 0, start, size)
 
     def submit(self, encoder: Any) -> int:
-        """Hand over what an encoder has recorded; returns its number, to wait for."""
+        """Submit what an encoder has recorded; returns the number of the submission, for `wait`."""
         done = self.checked.wgpuCommandEncoderFinish(encoder._internal, self.ffi.NULL)
         commands = self.ffi.gc(done, self.lib.wgpuCommandBufferRelease)
         listed = self.ffi.new("WGPUCommandBuffer[]", [commands])
-        # wgpu's own submit does not tell the number, without which there is only waiting for everything.
+        # wgpu's own submit returns no number, without which one can only wait for all submissions.
         return int(self.checked.wgpuQueueSubmitForIndex(self.handle.queue._internal, 1, listed))
 
     def wait(self, submitted: int | None = None) -> None:
-        """Return when the device has done what was submitted up to a number from `submit`, or all."""
+        """Wait for all submissions up to the one with this number from `submit`, or for all."""
         number = self.ffi.NULL if submitted is None else self.ffi.new("WGPUSubmissionIndex *", submitted)
         self.checked.wgpuDevicePoll(self.handle._internal, True, number)
 
     @cached_property
     def timestamp_period_ns(self) -> float:
-        """Length of a timestamp's tick [ns]; wgpu hands out the native API's ticks."""
+        """Length of a timestamp's tick [ns]; wgpu returns the native API's ticks."""
         return float(self.lib.wgpuQueueGetTimestampPeriod(self.handle.queue._internal))
 
     def uniform_chunk(self, index: int, size: int) -> Any:
-        """One of the buffers for the records of frames [byte]; made when first asked for."""
+        """One of the frames' uniform buffers, of `size` bytes; made on first use."""
         while len(self._uniform_chunks) <= index:
             self._uniform_chunks.append(self.uniform_buffer(size))
         return self._uniform_chunks[index]
 
     def uniform_buffer(self, size: int) -> Any:
-        """A new buffer for records [byte]."""
+        """A new uniform buffer of `size` bytes."""
         return self.buffer(np.zeros(size, np.uint8), "UNIFORM")
 
     def staging(self, size: int) -> Any:
-        """A buffer of at least `size` bytes that the CPU can read, one given back if there is any."""
+        """A staging buffer of at least `size` bytes, one given back if there is any."""
         import wgpu
 
         size = -(-size // _STAGING_STEP) * _STAGING_STEP
@@ -174,7 +175,7 @@ class Device:
         return spare.pop() if spare else self.handle.create_buffer(size=size, usage=usage)
 
     def give_back(self, buffer: Any) -> None:
-        """Keep a buffer from `staging` for the next one of its size; those of other sizes go."""
+        """Keep a buffer from `staging` for reuse at its size; the first of another size drops the others."""
         if buffer.size not in self._staging:
             self._staging.clear()
         self._staging.setdefault(buffer.size, []).append(buffer)
@@ -185,6 +186,13 @@ class Device:
 
         flags = getattr(wgpu.BufferUsage, usage) | wgpu.BufferUsage.COPY_DST | wgpu.BufferUsage.COPY_SRC
         return self.handle.create_buffer_with_data(data=np.ascontiguousarray(data), usage=flags)
+
+    def space(self, size: int) -> Any:
+        """A new buffer that shaders write [byte]."""
+        import wgpu
+
+        flags = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_DST | wgpu.BufferUsage.COPY_SRC
+        return self.handle.create_buffer(size=size, usage=flags)
 
     def sampler(self, **options: str) -> Any:
         """A sampler with wgpu's options; made once for each set of them."""
@@ -205,7 +213,7 @@ class Device:
 
 
 def _limits(offered: Mapping[str, int], raised: Sequence[str]) -> dict[str, int]:
-    """WebGPU's default limits, the adapter's own where it offers less or the limit is one to raise."""
+    """WebGPU's default limits; the adapter's own where it offers less or the limit is to be raised."""
     fitting = {
         name: (max if name.startswith("min-") else min)(default, offered.get(name, default))
         for name, default in DEFAULT_LIMITS.items()
@@ -215,7 +223,7 @@ def _limits(offered: Mapping[str, int], raised: Sequence[str]) -> dict[str, int]
 
 @contextlib.contextmanager
 def gpu_failures(device: Device) -> Iterator[None]:
-    """Turn what the driver reports (memory used up, device lost, a refused call) into a DermisError."""
+    """Turn the driver's errors (out of memory, device lost, invalid call) into a DermisError."""
     import wgpu
 
     try:

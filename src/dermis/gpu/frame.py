@@ -70,6 +70,10 @@ class Frame(Recorder):
         elif steps:
             self._compute_pass(steps[0].stage).run(steps)
 
+    def write(self, stage: str, buffer: Any, data: bytes) -> None:
+        """Put bytes into the start of a buffer, before what is submitted next."""
+        self.device.write(buffer, data, len(data))
+
     def clear(self, buffer: Any) -> None:
         """Fill a buffer with zeros."""
         self._end_pass()

@@ -85,6 +85,20 @@ class Graph(Recorder):
         key = (access.number, groups, program.numbers(resources, self._hashes))
         self._add((stage,), key, access, writes, run)
 
+    def write(self, stage: str, buffer: Any, data: bytes) -> None:
+        """Declare that the host puts bytes into the start of a buffer, before all passes.
+
+        data : the same object in each frame costs nothing, as Python keeps the hash of bytes
+        """
+        slot = slot_of(self.device, buffer)
+
+        def run(frame: Frame) -> None:
+            frame.write(stage, buffer, data)
+
+        if self.listing is not None:
+            self.listing.add_write(stage, buffer, len(data), len(self._passes))
+        self._add((stage,), (data,), Access(0, (), (slot,)), [slot], run)
+
     def draw(
         self,
         stage: str,

@@ -17,9 +17,9 @@ class Listed:
 
     shader : name of its file
     constants : pipeline constants
-    bindings : by the shader's names: number of a resource, "sampler", or bytes of a record as "record 128"
+    bindings : by name in the shader: number of a resource, "sampler", or "record 128" with its bytes
     groups : workgroups, or vertices of a raster pass
-    recorded : whether it is part of a recording, whose records stay as they are
+    recorded : whether it is part of a recording, whose records do not change
     ran : whether it ran in that frame
     """
 
@@ -36,7 +36,7 @@ class Listed:
 class Listing:
     """Passes in order, and the resources that they bind.
 
-    resources : what each is: "rgba32float 512 x 512 x 7", "buffer 4096"
+    resources : each described: "rgba32float 512 x 512 x 7", "buffer 4096"
     """
 
     passes: list[Listed] = field(default_factory=list)
@@ -53,13 +53,18 @@ class Listing:
         index: int,
         recorded: bool = False,
     ) -> None:
-        """Write a pass down.
+        """Add a pass.
 
-        index : of the graph's pass that it is, or is part of
+        index : of the graph's pass that it belongs to
         """
         bindings = {one.name: self._bound(resources[one.name]) for one in program.bindings}
         listed = Listed(stage, program.name, dict(program.constants), bindings, tuple(groups), recorded)
         self.passes.append(listed)
+        self._indices.append(index)
+
+    def add_write(self, stage: str, buffer: Any, size: int, index: int) -> None:
+        """Write down that the host puts `size` bytes into a buffer."""
+        self.passes.append(Listed(stage, "from the host", {}, {"written": self._bound(buffer)}, (size,)))
         self._indices.append(index)
 
     def finish(self, ran: Sequence[bool]) -> None:
@@ -68,7 +73,7 @@ class Listing:
             one.ran = ran[index]
 
     def as_dict(self) -> dict[str, Any]:
-        """All of it as what JSON can hold."""
+        """The listing as plain data for JSON."""
         return {"resources": self.resources, "passes": [asdict(one) for one in self.passes]}
 
     def lines(self) -> Iterator[str]:
@@ -91,7 +96,7 @@ class Listing:
 
 
 class Lister(Recorder):
-    """Takes the passes of a recording and writes them down.
+    """Lists the passes of a recording.
 
     index : of the recording among the graph's passes
     """
@@ -107,7 +112,7 @@ class Lister(Recorder):
         groups: tuple[int, int, int],
         completes: str = "",
     ) -> None:
-        """Write a pass of a number of workgroups down."""
+        """Add a pass with its number of workgroups along each axis."""
         self._listing.add(stage, program, resources, groups, self._index, recorded=True)
 
 

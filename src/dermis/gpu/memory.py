@@ -17,10 +17,10 @@ def held_bytes() -> int:
 
 
 def check_memory(device: Device, needed: float, option: str, sizes: str) -> None:
-    """Refuse what does not fit into main memory, from which a software adapter takes textures.
+    """Refuse sizes that do not fit into main memory, where software adapters keep textures.
 
-    needed : bytes; the system ends who takes too much
-    option, sizes : what to say of them
+    needed : bytes; the system kills a process that takes too much
+    option, sizes : named in the message
 
     Raises DermisError.
     """

@@ -1,7 +1,7 @@
-"""C types that wgpu asks cffi for by name, told beforehand.
+"""C types that wgpu asks cffi for by name, registered in advance.
 
 cffi parses each new name together with all typedefs of the header, which takes some ten milliseconds, and
-a first frame asks for seventy five. Here they are put together from what cffi has already parsed.
+a first frame asks for seventy-five. Here they are built from what cffi has already parsed.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ _NUMBERS = ("char", "uint8_t", "uint32_t", "uintptr_t", "intptr_t")
 
 
 def tell_wgpus_types() -> None:
-    """Call before wgpu is used."""
-    with contextlib.suppress(ImportError):  # another kind of wgpu needs nothing
+    """Register the types; to be called before wgpu is used."""
+    with contextlib.suppress(ImportError):  # other builds of wgpu need nothing
         from wgpu.backends.wgpu_native import ffi
 
         tell_types(ffi)
 
 
 def tell_types(ffi: Any) -> int:
-    """Add names of pointers, arrays and callbacks to those that cffi knows; returns how many.
+    """Register names of pointers, arrays and callbacks with cffi; returns how many.
 
-    This reaches into cffi. Where that is built otherwise it does nothing, and the first frame takes longer.
+    This uses cffi's internals. Where those differ it does nothing, and the first frame takes longer.
     """
     try:
         with ffi._lock:  # as its own callers do
@@ -34,13 +34,13 @@ def tell_types(ffi: Any) -> int:
             made |= {name: (ffi._get_cached_btype(kind), True) for name, kind in _callbacks(declared)}
         for name, found in made.items():
             ffi._parsed_types.setdefault(name, found)
-    except Exception:  # whatever another cffi makes of it
+    except Exception:  # another cffi may raise anything
         return 0
     return len(made)
 
 
 def _types(declared: Any) -> Iterator[tuple[str, Any]]:
-    """Names as wgpu spells them, with cffi's description of what they stand for."""
+    """Names of types as wgpu spells them, with cffi's descriptions of the types."""
     from cffi import model  # type: ignore[import-untyped]
 
     named = {name.removeprefix(_TYPEDEF): kind for name, (kind, _) in declared.items() if _TYPEDEF in name}
@@ -56,7 +56,7 @@ def _types(declared: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _callbacks(declared: Any) -> Iterator[tuple[str, Any]]:
-    """Signatures of callbacks as wgpu spells them, with cffi's description of pointers to such functions."""
+    """Signatures of callbacks as wgpu spells them, with cffi's descriptions of the function pointers."""
     from cffi import model
 
     named = {name.removeprefix(_TYPEDEF): kind for name, (kind, _) in declared.items() if _TYPEDEF in name}

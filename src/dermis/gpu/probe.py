@@ -15,7 +15,7 @@ _SIDE = 64
 
 
 def half_store_rounding(device: Device) -> str:
-    """ "nearest", "toward zero" or "other": what a store to rgba16float does with numbers between halves."""
+    """ "nearest", "toward zero" or "other": how stores to rgba16float round."""
     program = ComputeProgram(device, Path(__file__).parent / "wgsl" / "store_probe.wgsl")
     texture = make_texture(device, (_SIDE, _SIDE), "rgba16float")
     frame = Frame(device)

@@ -1,4 +1,4 @@
-"""Asynchronous readback: copies of buffers that the CPU reads while the device works on."""
+"""Asynchronous readback: copies of buffers that the CPU reads while the device keeps working."""
 
 from __future__ import annotations
 
@@ -13,36 +13,36 @@ from dermis.gpu.device import Device
 
 
 class Fetched:
-    """A copy of a buffer that becomes readable when a submit is done.
+    """A copy of a buffer that becomes readable when a submission is done.
 
-    wgpu's own mapping has a thread wait for the newest submit; here only the one that fills the copy is
-    waited for, and by who wants the bytes.
+    wgpu's own mapping makes a thread wait for the newest submission; here only the reader waits, and only for
+    the submission that fills the copy.
     """
 
     def __init__(self, device: Device, size: int) -> None:
         self._device, self._size, self._submitted = device, size, 0
         self._status: int | None = None
-        self._name: Any = None  # by which the driver knows it
+        self._name: Any = None  # what the driver's callback gets
         self.buffer = device.staging(size)
 
     def begin(self, submitted: int) -> None:
-        """Ask for the copy to be readable when the submit of that number is done."""
+        """Map the copy for reading once the submission of that number is done."""
         ffi, lib = self._device.ffi, self._device.lib
         info = ffi.new("WGPUBufferMapCallbackInfo *")
         info.mode, info.callback = lib.WGPUCallbackMode_AllowProcessEvents, _when_mapped()
         self._submitted, self._name = submitted, ffi.new_handle(self)
         info.userdata1 = self._name
-        self._device.fetching.add(self)  # the driver calls back even when nobody wants the bytes any more
+        self._device.fetching.add(self)  # has to live until the driver calls back
         asked = self.buffer._internal, lib.WGPUMapMode_Read, 0, self.buffer.size, info[0]
         self._device.checked.wgpuBufferMapAsync(*asked)
 
     def arrive(self, status: int) -> None:
-        """The driver's answer to `begin`."""
+        """Take the driver's answer to `begin`."""
         self._status, self._name = status, None
         self._device.fetching.discard(self)
 
     def array(self) -> NDArray[np.uint8]:
-        """The bytes; waits until they are here. To be called once.
+        """The bytes; waits for them. To be called once.
 
         Raises DermisError when the device fails.
         """
@@ -62,7 +62,7 @@ class Fetched:
 
 @cache
 def _when_mapped() -> Any:
-    """What the driver calls: one function for all, for making one takes as long as a stage of a frame."""
+    """The driver's callback, one for all copies: making one takes as long as a stage of a frame."""
     from wgpu.backends.wgpu_native import ffi
 
     @ffi.callback("void(WGPUMapAsyncStatus, WGPUStringView, void *, void *)")  # type: ignore[untyped-decorator]

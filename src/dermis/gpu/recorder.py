@@ -1,4 +1,4 @@
-"""The interface that takes passes: graphs, frames, recordings and listings implement it."""
+"""The interface for declaring passes, which graphs, frames, recordings and listings implement."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ T = TypeVar("T")
 
 
 class Recorder(ABC):
-    """Takes the compute passes of a stage."""
+    """Takes compute passes."""
 
     device: Device
 
@@ -26,10 +26,10 @@ class Recorder(ABC):
         groups: tuple[int, int, int],
         completes: str = "",
     ) -> None:
-        """Take a pass of a number of workgroups along each axis.
+        """Take a pass with its number of workgroups along each axis.
 
-        completes : name of a resource that the pass fills up with what follows from its own content, which is
-            therefore no other afterwards
+        completes : name of a resource that the pass completes from its own content, as gutters are, and that
+            therefore counts as unchanged
         """
 
     def compute(
@@ -41,7 +41,7 @@ class Recorder(ABC):
         tile: int = 8,
         completes: str = "",
     ) -> None:
-        """Take a pass of size[0] x size[1] invocations, in tiles of `tile` squared."""
+        """Take a pass of size[0] x size[1] invocations, in workgroups of tile x tile."""
         self.dispatch(stage, program, resources, (*program.groups_for(size, tile), 1), completes)
 
     def repeat(self, record: Callable[..., T], *args: Any) -> T:

@@ -40,7 +40,7 @@ _TYPES: dict[str, tuple[str, tuple[int, ...], int, int]] = {
 
 @dataclass(frozen=True)
 class Binding:
-    """One resource of a shader: where it is bound and what wgpu's layout entry for it holds."""
+    """One resource of a shader: the index of its binding and wgpu's layout entry for it."""
 
     index: int
     name: str
@@ -48,7 +48,7 @@ class Binding:
 
     @property
     def holds(self) -> bool:
-        """Whether it has a content: samplers have none."""
+        """Whether it has content, as all but samplers have."""
         return "sampler" not in self.entry
 
     @property
@@ -58,7 +58,7 @@ class Binding:
 
     @property
     def reads(self) -> bool:
-        """Whether the shader may depend on what is bound; what it only stores to it does not know."""
+        """Whether the shader may read what is bound: all but write-only textures."""
         return bool(self.entry.get("storage_texture", {}).get("access") != "write-only")
 
 
@@ -73,9 +73,9 @@ def struct_dtype(text: str, name: str) -> np.dtype[np.void]:
 
 
 def members_read(text: str, name: str) -> Callable[[np.ndarray[Any, Any]], bytes]:
-    """Takes out of a record bound by that name the bytes of the members that the shader's text names.
+    """A function that takes from the record bound as `name` the bytes of the members that the shader uses.
 
-    All of it where the text hands the record on as a whole.
+    It takes all of them where the shader passes the record on as a whole.
     """
     code = _COMMENT.sub("", text)
     code = re.sub(rf"var<uniform>\s*{name}\b", "", code)
@@ -133,10 +133,10 @@ def _round_up(value: int, step: int) -> int:
 
 
 def bindings(text: str) -> tuple[Binding, ...]:
-    """Every resource that the shader declares, in order: all in group 0, as binding takes time in each frame.
+    """Every resource that the shader declares, by index: all in group 0, as each group costs time per frame.
 
-    A float texture is taken as one that is only loaded; `// filtered` after its declaration says that a
-    sampler filters it. `// non-filtering` after a sampler says that it does not filter.
+    Float textures are unfilterable unless `// filtered` follows their declaration; samplers filter unless
+    `// non-filtering` follows theirs.
     """
     found = [
         Binding(int(index), name, _entry((space or "").replace(" ", ""), kind.replace(" ", ""), note))

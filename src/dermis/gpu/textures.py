@@ -79,7 +79,7 @@ def upload(device: Device, texture: Any, array: NDArray[Any], *, mip: int = 0, l
         (width, height, 1),
     )
     if data.nbytes > _LARGE:
-        device.handle.queue.submit([])  # so that it is copied while Python goes on
+        device.handle.queue.submit([])  # starts the copy while Python goes on
 
 
 def texel_bytes(texture: Any) -> int:

@@ -13,7 +13,7 @@ from dermis.gpu.device import Device
 class Timestamps:
     """A timestamp at the start of each pass; a pass lasts until the next one begins, so stages add up.
 
-    whole : True leaves out all but the first and the one at the end, which take time themselves
+    whole : True takes only the first and the last, as each takes time itself
     """
 
     def __init__(self, device: Device, *, whole: bool = False) -> None:
@@ -22,7 +22,7 @@ class Timestamps:
         self._stages: list[str] = []
 
     def begin(self, stage: str) -> dict[str, Any] | None:
-        """What a pass descriptor takes as timestamp_writes."""
+        """A pass descriptor's `timestamp_writes`; None for no timestamp."""
         full = len(self._stages) >= self._queries.count - 1  # the last one is for the end
         if full or (self._whole and self._stages):
             return None
@@ -33,7 +33,7 @@ class Timestamps:
         return {"query_set": self._queries, "beginning_of_pass_write_index": len(self._stages) - 1}
 
     def end(self, encoder: Any) -> None:
-        """Mark the end of the last pass and fetch the timestamps."""
+        """Mark the end of the last pass and resolve the timestamps."""
         if self._stages:
             encoder.begin_compute_pass(label="end", timestamp_writes=self._mark("end")).end()
             encoder.resolve_query_set(self._queries, 0, len(self._stages), self._resolved, 0)

@@ -1,11 +1,11 @@
 """WGSL files with directives, and compile errors that name file and line.
 
-A whole line may be
+A directive takes a whole line:
 
 - `//#include "name.wgsl"`: another file, inserted once;
 - `//#include <list>`: the file of each member of a list;
-- `//#each list: text`: the text once for each member, with its words for {name}, {NAME}, {number} and others;
-- `//#fill text`: the text with a number of Python's in place of each {word}.
+- `//#each list: text`: the text once for each member, with its {name}, {NAME}, {number} and words filled in;
+- `//#fill text`: the text with a number from Python for each {word}.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ Words = tuple[tuple[str, str], ...]
 
 
 class Member(NamedTuple):
-    """One of a list of shaders that can grow.
+    """One of a list of shaders to which others may be added.
 
-    name : as people write it; in shaders with underscores, {name}, or in capitals, {NAME}
-    words : what stands for other {words} in lines that are repeated
+    name : as in scene files; in shaders {name} has underscores for hyphens, and {NAME} is in capitals
+    words : replacements for other {words} in repeated lines
     """
 
     name: str
@@ -44,10 +44,10 @@ class Member(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ShaderFolder(os.PathLike[str]):
-    """A folder of shaders with what its files repeat and fill in.
+    """A folder of shaders with the lists and numbers that their directives use.
 
-    lists : members of each list, asked for whenever a shader is composed
-    numbers : constants that Python has too, asked for likewise
+    lists : members of each list, called for whenever a shader is composed
+    numbers : constants that Python uses too, called for likewise
     """
 
     path: Path
@@ -84,9 +84,9 @@ class Source:
 def compose(path: Path, folders: Sequence[Folder]) -> Source:
     """The shader at `path` with its directives carried out.
 
-    folders : where files are looked up that are not beside the one that asks for them
+    folders : where includes are looked up that are not beside the including file
 
-    Raises DermisError for a file, a list or a {word} that is not there.
+    Raises DermisError for a missing file, list or {word}.
     """
     shared = [folder for folder in folders if isinstance(folder, ShaderFolder)]
     lists = {name: tuple(members()) for folder in shared for name, members in folder.lists.items()}
@@ -132,7 +132,7 @@ class _Composed:
                 self.lines += [(text, (path.name, number)) for text in self._filled(directive, path)]
 
     def _filled(self, directive: re.Match[str], asker: Path) -> list[str]:
-        """The lines that one directive stands for."""
+        """The lines that a directive expands to."""
         if text := directive["filled"]:
             return [directive["indent"] + _fill(text, self._numbers, asker)]
         members = enumerate(self._members(directive["list"], asker))

@@ -25,7 +25,7 @@ from dermis.human.skin_maps.paint import Painted, paint_skin
 from dermis.images.codecs import encode_png8, encode_png16
 from dermis.images.colour import encode_srgb8
 from dermis.images.filters import fill_empty
-from dermis.mesh.gltf import encode_glb
+from dermis.mesh.gltf.encode import encode_glb
 from dermis.mesh.mesh import Mesh
 from dermis.outputs import reason, replacing
 
@@ -173,7 +173,7 @@ def _code() -> str:
     below = ("atlas", "atlas/unwrap", "human", "human/bust", "human/skin_maps", "human/skin_maps/kernels")
     files = [file for folder in below for kind in ("*.py", "*.csv") for file in (package / folder).glob(kind)]
     digest = hashlib.sha256()
-    used = (package / name for name in ("mesh/geometry.py", "mesh/gltf.py"))
+    used = (package / name for name in ("mesh/geometry.py", "mesh/gltf/encode.py"))
     for file in sorted((*files, *used)):
         digest.update(file.read_bytes())
     return digest.hexdigest()

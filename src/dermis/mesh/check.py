@@ -12,12 +12,12 @@ from dermis.mesh.mesh import Mesh
 
 UV_TOLERANCE = 1e-4
 FARTHEST_MM = 1e6
-"""Beyond a kilometre single precision is too coarse for skin, and no head is meant."""
+"""A kilometre: beyond it single precision is too coarse for skin, and the mesh is hardly a head."""
 HEAD_MM = (100.0, 1000.0)
 LIKELY_HEAD_MM = (150.0, 500.0)
 UNITS_MM = (1.0, 10.0, 25.4, 100.0, 1000.0)
 FLAT = 1e-6
-"""Area over squared longest side below which a triangle has none in single precision [-]."""
+"""Area over squared longest side below which a triangle is degenerate in single precision [-]."""
 _DAMAGED = "The file is damaged: export it again"
 _UNIT = "Set the millimetres per unit of the file with --unit-mm"
 

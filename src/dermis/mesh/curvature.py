@@ -1,4 +1,4 @@
-"""How strongly a mesh is curved, corner vertex by corner vertex."""
+"""Curvature of a mesh at its corner vertices."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from dermis.mesh.geometry import Doubles, edges, sum_at, triangle_areas
 from dermis.mesh.mesh import Floats, Mesh
 
 SMOOTH_MM = 3.0
-"""Standard deviation of what curvature is averaged over, about the way of light in skin."""
+"""Standard deviation of the smoothing, about the distance that light travels in skin."""
 
 _MOST_STEPS = 256
-_FORM = "curvature 1"  # raise when the same mesh gives other results
+_FORM = "curvature 1"  # increment when the same mesh gives other results
 
 
 def vertex_curvature(mesh: Mesh) -> Floats:
@@ -53,14 +53,14 @@ def _bend(mesh: Mesh) -> Doubles:
 
 
 def _smoothed(values: Doubles, corners: NDArray[np.integer], mesh: Mesh) -> Doubles:
-    """Averaged over neighbours, again and again, until that spans `SMOOTH_MM`."""
+    """Averaged over neighbours repeatedly, until the smoothing reaches `SMOOTH_MM`."""
     pairs, _, _ = edges(corners)
     both = np.concatenate([pairs, pairs[:, ::-1]])
     place = np.zeros((len(values), 3))
     place[mesh.point] = mesh.positions
     square = ((place[pairs[:, 0]] - place[pairs[:, 1]]) ** 2).sum(axis=1)
     degree = 1.0 + np.bincount(both[:, 0], minlength=len(values))
-    # A step moves a value by an edge or leaves it: so much variance along each of the surface's two axes.
+    # A step moves a value by an edge or leaves it; its variance along each of the surface's two axes:
     step = 0.5 * float(np.median(square)) * (1.0 - 1.0 / float(np.median(degree)))
     for _ in range(int(np.clip(np.ceil(SMOOTH_MM**2 / max(step, 1e-12)), 1, _MOST_STEPS))):
         around = np.bincount(both[:, 0], weights=values[both[:, 1]], minlength=len(values))

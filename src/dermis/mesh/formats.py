@@ -1,17 +1,14 @@
 """Mesh files as they lie on disk: groups of triangles in file units, with uv untouched.
 
-trimesh parses; what it would lose or change is marked in the file's text first: it flips v of glTF, drops
-uv of primitives without material and integer uv, and renames groups.
+trimesh parses OBJ and PLY; the groups, which it would rename, are numbered in the file's text first.
 """
 
 from __future__ import annotations
 
-import json
 import re
-import struct
 import warnings
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
+from dermis.mesh.quads import find_pairs, obj_sides, ply_sides
 
 Colour = tuple[float, float, float]
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 GREY: Colour = (0.8, 0.8, 0.8)
 
@@ -46,82 +45,63 @@ class Group:
 
 @dataclass(frozen=True)
 class Part:
-    """One group's triangles in the file's units and the file's v direction.
+    """One group's triangles in the file's units and the file's v direction, at rest.
 
     positions (v, 3), uv (v, 2) or None, normals (v, 3) or None, triangles (f, 3)
+    targets : by name the vertices that a morph target moves (n,) and by how much at weight 1 (n, 3)
+    bone, weight : (v, k) bones that each vertex follows, by shares that add up to 1; None for no bones
+    quads : (q, 2) pairs of triangles that are the halves of one
     """
 
     group: Group
     positions: Array
     uv: Array | None
     normals: Array | None
-    triangles: NDArray[np.int64]
+    triangles: Index
+    targets: Mapping[str, tuple[Index, Array]] = field(default_factory=dict)
+    bone: Index | None = None
+    weight: Array | None = None
+    quads: Index = field(default_factory=lambda: np.empty((0, 2), np.int64))
 
 
-def read_gltf(path: Path) -> list[Part]:
-    """Parts of a .glb or .gltf file, each node's transform applied."""
-    from trimesh.resolvers import FilePathResolver
+@dataclass(frozen=True)
+class Bones:
+    """Bones of a file, parents before children; -1 for the parent of a root.
 
-    data, binary = path.read_bytes(), path.suffix.lower() == ".glb"
-    chunk = struct.unpack_from("<I", data, 12)[0] if binary else len(data)
-    start = 20 if binary else 0
-    tree = json.loads(data[start : start + chunk])
-    groups = _mark_gltf(tree, path)
-    text = json.dumps(tree).encode()
-    text += b" " * (-len(text) % 4)
-    if binary:
-        rest = data[20 + chunk :]
-        lengths = struct.pack("<II", 20 + len(text) + len(rest), len(text))
-        text = data[:8] + lengths + data[16:20] + text + rest
-    return list(_parts(text, path.suffix[1:].lower(), groups, resolver=FilePathResolver(str(path))))
+    local, world : (b, 4, 4) from each bone's space to its parent's and to the file's, at rest
+    """
+
+    names: tuple[str, ...]
+    parent: NDArray[np.int32]
+    local: Array
+    world: Array
 
 
-def _mark_gltf(tree: dict[str, Any], path: Path) -> list[Group]:
-    """Give each primitive a group of its own and keep its raw uv and normals where trimesh leaves them be."""
-    _refuse_extensions(tree, path)
-    groups: list[Group] = []
-    wanted: set[int] = set()
-    for mesh in tree.get("meshes", []):
-        for primitive in mesh["primitives"]:
-            given = primitive["attributes"]
-            kept = {"POSITION": "POSITION", "NORMAL": "_NORMAL", "TEXCOORD_0": "_UV"}
-            primitive["attributes"] = {mark: given[name] for name, mark in kept.items() if name in given}
-            wanted.update(primitive["attributes"].values())
-            wanted.update([primitive["indices"]] if "indices" in primitive else [])
-            groups.append(_gltf_group(tree, mesh, primitive))
-            primitive["material"] = len(groups) - 1
-    # pictures are read elsewhere, and unused accessors may ask for any amount of memory
-    for key in ("textures", "images", "samplers", "cameras", "animations", "skins"):
-        tree.pop(key, None)
-    tree["materials"] = [{"name": str(k)} for k in range(len(groups))]
-    for index, accessor in enumerate(tree.get("accessors", [])):
-        if index not in wanted:
-            tree["accessors"][index] = {"componentType": 5126, "count": 0, "type": "SCALAR"}
-        elif "sparse" in accessor or "bufferView" not in accessor:
-            came = f"accessor {index} is sparse or empty"
-            refuse(path, "plain glTF accessors", came, "Export without morph targets")
-    return groups
+@dataclass(frozen=True)
+class Model:
+    """All that a file says of a head's shape.
+
+    weights : of morph targets at rest, by name, where they are not 0
+    """
+
+    parts: list[Part]
+    bones: Bones | None = None
+    weights: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def moves(self) -> bool:
+        """Whether it has bones or targets."""
+        return self.bones is not None or any(part.targets for part in self.parts)
 
 
-def _refuse_extensions(tree: dict[str, Any], path: Path) -> None:
-    """Refuse geometry in an encoding that would be read wrongly."""
-    harmless = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_")
-    foreign = [name for name in tree.get("extensionsRequired", []) if not str(name).startswith(harmless)]
-    if foreign:
-        came = f"the file requires {', '.join(map(str, foreign))}"
-        refuse(path, "plain glTF geometry", came, "Export without compression and quantisation")
-
-
-def _gltf_group(tree: dict[str, Any], mesh: dict[str, Any], primitive: dict[str, Any]) -> Group:
-    material = tree["materials"][primitive["material"]] if "material" in primitive else {}
-    names = tuple(str(thing["name"]) for thing in (material, mesh) if thing.get("name"))
-    factor = material.get("pbrMetallicRoughness", {}).get("baseColorFactor")
-    return Group(names, _colour(factor) if factor else GREY)
-
-
-def read_obj(path: Path) -> list[Part]:
+def read_obj(path: Path) -> Model:
     """Parts of a .obj file by `usemtl` and `g`; colours are Kd of its .mtl, taken as linear."""
-    text = path.read_bytes().decode("utf-8", errors="replace").replace("\r\n", "\n").replace("\\\n", " ")
+    return obj_model(path, path.read_bytes().decode("utf-8", errors="replace"))
+
+
+def obj_model(path: Path, text: str) -> Model:
+    """The same of a file's text."""
+    text = text.replace("\r\n", "\n").replace("\\\n", " ")
     text = re.sub(r"^((?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", r"\1", text, flags=re.MULTILINE)
     if re.search(r"^f[^\n]*[ /]-\d", text, re.MULTILINE):
         came = "it has relative (negative) ones"
@@ -134,8 +114,11 @@ def read_obj(path: Path) -> list[Part]:
     materials = "\n".join(f"newmtl {k}" for k in range(len(groups)))
     # trimesh pops groups from the end: file order again
     parts = list(_parts(text.encode(), "obj", groups, resolver={"marked.mtl": materials.encode()}))[::-1]
+    faces = {id(group): sides for group, sides in zip(groups, obj_sides(text, len(groups)), strict=True)}
+    parts = [replace(part, quads=find_pairs(faces[id(part.group)], part.triangles)) for part in parts]
     full, none = [part.group for part in parts], np.empty((0, 3))
-    return parts + [Part(g, none, None, None, none.astype(int)) for g in groups if g.names and g not in full]
+    empty = [Part(g, none, None, None, none.astype(int)) for g in groups if g.names and g not in full]
+    return Model(parts + empty)
 
 
 def _mark_obj(text: str, colours: dict[str, Colour]) -> tuple[str, list[Group]]:
@@ -164,11 +147,11 @@ def _mtl_colours(path: Path) -> dict[str, Colour]:
         if key == "newmtl":
             name = value.strip()
         elif key == "Kd":
-            colours[name] = _colour(value.split())
+            colours[name] = colour_of(value.split())
     return colours
 
 
-def read_ply(path: Path) -> list[Part]:
+def read_ply(path: Path) -> Model:
     """The one part of a .ply file; uv from the vertex properties s, t or u, v or texture_u, texture_v."""
     data = path.read_bytes()
     header = data[: data.find(b"end_header")]
@@ -176,19 +159,11 @@ def read_ply(path: Path) -> list[Part]:
     # do not, and splitting would drop the normals as soon as one vertex is unused
     by_corner = b"texcoord" in header
     parts = list(_parts(data, "ply", [Group((path.stem,))], fix_texture=by_corner, skip_materials=True))
-    return [Part(p.group, p.positions, p.uv, None, p.triangles) for p in parts] if by_corner else parts
-
-
-READERS: dict[str, Callable[[Path], list[Part]]] = {
-    ".glb": read_gltf,
-    ".gltf": read_gltf,
-    ".obj": read_obj,
-    ".ply": read_ply,
-}
+    return Model([replace(part, normals=None) for part in parts] if by_corner else parts)
 
 
 def _parts(data: bytes, kind: str, groups: list[Group], **options: Any) -> Iterator[Part]:
-    """What trimesh reads from `data`, in the world's frame, each under the group its material numbers."""
+    """What trimesh reads from `data`, each under the group that its material numbers."""
     from io import BytesIO
 
     import trimesh
@@ -198,42 +173,35 @@ def _parts(data: bytes, kind: str, groups: list[Group], **options: Any) -> Itera
         # text that breaks off in the middle must not pass as a shorter mesh
         warnings.filterwarnings("error", message="string or file could not be read")
         scene = trimesh.load_scene(BytesIO(data), file_type=kind, process=False, **options)
-    nodes = [scene.graph[node] for node in scene.graph.nodes_geometry]
-    for transform, name in nodes or [(np.eye(4), name) for name in scene.geometry]:
-        mesh = scene.geometry[name]
+    names = [scene.graph[node][1] for node in scene.graph.nodes_geometry]
+    for mesh in (scene.geometry[name] for name in names or scene.geometry):
         if isinstance(mesh, trimesh.Trimesh):
             tag = getattr(getattr(mesh.visual, "material", None), "name", None)
-            yield _placed(mesh, np.asarray(transform), groups[int(tag or 0) if len(groups) > 1 else 0])
+            yield _part(mesh, groups[int(tag or 0) if len(groups) > 1 else 0])
 
 
-def _placed(mesh: Any, transform: Array, group: Group) -> Part:
-    """A trimesh's arrays, moved by `transform` (4, 4)."""
-    uv = mesh.vertex_attributes.get("_UV", getattr(mesh.visual, "uv", None))
-    normals = mesh.vertex_attributes.get("_NORMAL")
-    if normals is None and "vertex_normals" in mesh._cache:
-        normals = mesh.vertex_normals
-    linear = transform[:3, :3]
-    # normals turn with the cofactors, for flat transforms too, and keep their length; mirrors turn triangles
-    cofactors = np.array([np.cross(linear[(i + 1) % 3], linear[(i + 2) % 3]) for i in range(3)])
-    mirror, size = np.sign(det := np.linalg.det(linear)) or 1.0, abs(det) ** (2 / 3) or 1.0
+def _part(mesh: Any, group: Group) -> Part:
+    """A trimesh's arrays."""
+    uv = getattr(mesh.visual, "uv", None)
+    normals = mesh.vertex_normals if "vertex_normals" in mesh._cache else None
     triangles = np.array(mesh.faces, dtype=np.int64).reshape(-1, 3)
     return Part(
         group,
-        np.asarray(mesh.vertices, dtype=np.float64) @ linear.T + transform[:3, 3],
-        None if uv is None else _real(uv),
-        None if normals is None else _real(normals) @ (mirror / size * cofactors).T,
-        triangles[:, ::-1] if mirror < 0 else triangles,
+        np.asarray(mesh.vertices, dtype=np.float64) + 0.0,  # without -0
+        None if uv is None else fractions(np.asarray(uv)),
+        None if normals is None else fractions(np.asarray(normals)) + 0.0,
+        triangles,
+        quads=find_pairs(ply_sides(mesh.metadata), triangles),
     )
 
 
-def _real(values: Any) -> Array:
-    """Floating numbers; integers are fractions of their type's largest, as glTF has it."""
-    array = np.asarray(values)
-    scale = np.iinfo(array.dtype).max if array.dtype.kind in "iu" else 1
-    return np.asarray(array / scale, dtype=np.float64)
+def fractions(values: NDArray[Any]) -> Array:
+    """Numbers of which integers stand for fractions of their type's largest."""
+    scale = np.iinfo(values.dtype).max if values.dtype.kind in "iu" else 1
+    return np.asarray(values / scale, dtype=np.float64)
 
 
-def _colour(numbers: Any) -> Colour:
+def colour_of(numbers: Any) -> Colour:
     """Three numbers in [0, 1]."""
     r, g, b = (min(max(float(x), 0.0), 1.0) for x in list(numbers)[:3])
     return (r, g, b)

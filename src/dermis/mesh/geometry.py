@@ -10,7 +10,7 @@ from dermis.mesh.mesh import Floats, Ints, Material, Mesh
 Doubles = NDArray[np.float64]
 
 MIN_UV_CROSS = 1e-12
-"""Below this twice-signed uv area a triangle has no direction of u and v (1/70 texel at 8192)."""
+"""Twice the signed uv area below which u and v have no direction on a triangle (1/70 texel at 8192)."""
 
 
 def weld(rows: ArrayLike) -> Ints:
@@ -33,8 +33,15 @@ def edges(triangles: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np
 
     triangles : (f, 3) point indices; sides come as all 0-1, then all 1-2, then all 2-0
     """
-    sides = np.vstack((triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]])).astype(np.int64)
-    sides.sort(axis=1)
+    return unite_sides(np.vstack((triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]])))
+
+
+def unite_sides(sides: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Unique edges (e, 2), the edge of each side (n,) and the number of sides on each edge (e,).
+
+    sides : (n, 2) point indices, in either order
+    """
+    sides = np.sort(sides.astype(np.int64), axis=1)
     stride = int(sides.max()) + 1 if len(sides) else 1
     keys, of_side, counts = np.unique(
         sides[:, 0] * stride + sides[:, 1], return_inverse=True, return_counts=True
@@ -63,7 +70,7 @@ def uv_cross(corners: NDArray[np.floating]) -> Doubles:
 
 
 def _unit(vectors: Doubles, instead: Doubles) -> Doubles:
-    """`vectors` at length one, or `instead` where they have no length; both (n, 3)."""
+    """`vectors` normalised, or `instead` where they have no length; both (n, 3)."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     usable = length > 0
     return np.where(usable, vectors / np.where(usable, length, 1), instead)
@@ -94,8 +101,8 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
 def tangents(positions: Floats, uv: Floats, normals: Floats, triangles: Ints) -> tuple[Floats, Floats]:
     """Change of position with u and with v, dpdu and dpdv, each (v, 3) [mm per unit of uv].
 
-    Averaged over the triangles of each corner vertex by area. Triangles without uv area count for
-    nothing; a vertex with none left gets two orthogonal directions of 1 mm, so that nothing divides by 0.
+    Averaged over the triangles of each corner vertex by area, without those that have no uv area; a vertex
+    with no others gets two orthogonal directions of 1 mm, so that nothing divides by 0.
 
     positions, normals : (v, 3) [mm], unit
     uv : (v, 2)
@@ -116,7 +123,7 @@ def tangents(positions: Floats, uv: Floats, normals: Floats, triangles: Ints) ->
 
 
 def _with_length(dpdu: Doubles, dpdv: Doubles, normals: Doubles) -> tuple[Floats, Floats]:
-    """The pair, with 1 mm in two directions across the normal wherever either has no length."""
+    """The pair; where either has no length, two directions of 1 mm across the normal."""
     # the axis least along the normal cannot be parallel to it
     axis = np.eye(3)[np.abs(normals).argmin(axis=1)]
     across = _unit(np.cross(axis, normals), axis)
@@ -141,6 +148,7 @@ def build_mesh(
     materials: tuple[Material, ...],
     normals: ArrayLike | None = None,
     point: ArrayLike | None = None,
+    quads: ArrayLike = (),
 ) -> Mesh:
     """A `Mesh` with its points welded and its normals and tangents computed.
 
@@ -150,6 +158,7 @@ def build_mesh(
     material : (f,) index into `materials`
     normals : (v, 3) kept where finite and of unit length; computed where not, or when None
     point : (v,) welded points if known; positions that are equal are welded when None
+    quads : (q, 2) triangles that are the halves of a quad, as `Mesh` has them
     """
     place = np.ascontiguousarray(positions, dtype=np.float32)
     corner = np.ascontiguousarray(triangles, dtype=np.int32)
@@ -160,4 +169,5 @@ def build_mesh(
         normal = _trusted(np.asarray(normals, dtype=np.float32), normal)
     dpdu, dpdv = tangents(place, flat, normal, corner)
     groups = np.ascontiguousarray(material, dtype=np.int32)
-    return Mesh(place, normal, flat, dpdu, dpdv, points, corner, groups, tuple(materials))
+    pairs = np.asarray(quads, dtype=np.int32).reshape(-1, 2)
+    return Mesh(place, normal, flat, dpdu, dpdv, points, corner, groups, tuple(materials), pairs)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 from collections.abc import Callable
-from dataclasses import asdict, fields
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Literal
@@ -14,20 +12,25 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.disk import Arrays, stored
 from dermis.errors import DermisError, refuse
+from dermis.mesh.cached import Rigged, cached_rigged
 from dermis.mesh.check import UV_TOLERANCE, check_arrays, check_mesh
-from dermis.mesh.formats import READERS, Group, Part, default_unit_mm, is_gltf
-from dermis.mesh.geometry import build_mesh
+from dermis.mesh.formats import Array, Group, Model, Part, default_unit_mm, is_gltf, read_obj, read_ply
+from dermis.mesh.geometry import build_mesh, weld
+from dermis.mesh.gltf.geometry import read_gltf
+from dermis.mesh.joined import joined, taken
 from dermis.mesh.mesh import Material, Mesh
+from dermis.mesh.rigging import build_rig, part_points
 
-Array = NDArray[np.float64]
 Origin = Literal["auto", "top", "bottom"]
 Up = Literal["y", "z"]
 
-FARTHEST_UV = 1e4
-"""Beyond this uv are damage, not tiles."""
-_FORM = 2  # raise when `load_mesh` gives other results for the same file
+READERS: dict[str, Callable[[Path], Model]] = {
+    ".glb": read_gltf,
+    ".gltf": read_gltf,
+    ".obj": read_obj,
+    ".ply": read_ply,
+}
 
 
 def load_mesh(
@@ -38,7 +41,19 @@ def load_mesh(
     up: Up = "y",
     opaque: tuple[str, ...] = (),
 ) -> Mesh:
-    """The mesh of a .glb, .gltf, .obj or .ply file: millimetres, Y up, v down.
+    """The mesh of a file alone; see `load_rigged`."""
+    return load_rigged(path, unit_mm=unit_mm, v_origin=v_origin, up=up, opaque=opaque).mesh
+
+
+def load_rigged(
+    path: str | Path,
+    *,
+    unit_mm: float | None = None,
+    v_origin: Origin = "auto",
+    up: Up = "y",
+    opaque: tuple[str, ...] = (),
+) -> Rigged:
+    """The mesh of a .glb, .gltf, .obj or .ply file, in millimetres, Y up, v down, and what moves it.
 
     A group (material, or glTF mesh or OBJ `g`) with "skin" in its name is skin and all others are opaque;
     in a file without one, every group is skin. The mesh has passed `check_mesh`; its size is not judged.
@@ -54,33 +69,39 @@ def load_mesh(
     """
     source = Path(path)
     unit = default_unit_mm(source) if unit_mm is None else float(unit_mm)
-    _check_options(source, unit, v_origin, up)
+    check_options(source, unit, v_origin, up)
 
     load = partial(_loaded, source, unit, v_origin, up, opaque)
     data = source.read_bytes() if source.suffix.lower() == ".glb" and source.is_file() else b""
     if not data or b'"uri"' in data:  # parts of it lie in other files
         return load()
     named = source.stem  # as a group without a name is
-    return cached_mesh(data, repr((named, unit, v_origin, up, opaque)), load)
+    return cached_rigged(data, repr((named, unit, v_origin, up, opaque)), load)
 
 
-def _loaded(source: Path, unit: float, v_origin: Origin, up: Up, opaque: tuple[str, ...]) -> Mesh:
-    """The mesh as it is in the file."""
+def _loaded(source: Path, unit: float, v_origin: Origin, up: Up, opaque: tuple[str, ...]) -> Rigged:
+    """The mesh and the rig as they are in the file."""
     with np.errstate(all="ignore"):
-        parts = _read(source)
-        positions, uv, normals, triangles = _joined(parts, source)
-        place, normals = _upright(unit * positions, up).astype(np.float32), _upright(normals, up)
-        flat = _v_down(uv, source, v_origin).astype(np.float32)
-        check_arrays(place, flat, triangles, source)
-    material, materials = _materials(parts, opaque, source)
-    used, compact = np.unique(triangles, return_inverse=True)
+        model = read_model(source)
+        part, to_head = joined(model.parts, source), np.eye(4)
+        assert part.uv is not None and part.normals is not None
+        to_head[:3, :3] = upright(unit * np.eye(3), up).T
+        place, normals = upright(unit * part.positions, up).astype(np.float32), upright(part.normals, up)
+        flat = _v_down(part.uv, source, v_origin).astype(np.float32)
+        check_arrays(place, flat, part.triangles, source)
+        material, materials = _materials(model.parts, opaque, source)
+        used, compact = np.unique(part.triangles, return_inverse=True)
+        kept, point = taken(part, used), weld(place[used])
+        if model.moves:
+            point = part_points(point, kept, to_head[:3, :3])
     corners = compact.reshape(-1, 3)
-    mesh = build_mesh(place[used], flat[used], corners, material, materials, normals[used])
+    mesh = build_mesh(place[used], flat[used], corners, material, materials, normals[used], point, part.quads)
     check_mesh(mesh, source)
-    return mesh
+    return Rigged(mesh, build_rig(mesh.positions, point, kept, model.bones, model.weights, to_head, source))
 
 
-def _check_options(source: Path, unit: float, v_origin: str, up: str) -> None:
+def check_options(source: Path, unit: float, v_origin: str, up: str) -> None:
+    """Refuse options that no file can be read with."""
     if not (math.isfinite(unit) and unit > 0):
         refuse(source, "a unit above 0 mm", f"{unit} came", "Set the millimetres per unit of the file")
     if v_origin not in ("auto", "top", "bottom"):
@@ -89,8 +110,8 @@ def _check_options(source: Path, unit: float, v_origin: str, up: str) -> None:
         refuse(source, "up y or z", f"{up!r} came", "Choose one of the two")
 
 
-def _read(source: Path) -> list[Part]:
-    """The file's parts; whatever its reader raises on a damaged file becomes a refusal."""
+def read_model(source: Path) -> Model:
+    """The file as it is; whatever its reader raises on a damaged file becomes a refusal."""
     reader = READERS.get(source.suffix.lower())
     if reader is None:
         came = f"the suffix is {source.suffix!r}"
@@ -98,7 +119,7 @@ def _read(source: Path) -> list[Part]:
     if not source.is_file():
         refuse(source, "a mesh file", "there is no such file", "Check the path")
     try:
-        parts = reader(source)
+        model = reader(source)
     except DermisError:
         raise
     # a damaged file makes the reader fail anywhere, with any exception
@@ -106,43 +127,17 @@ def _read(source: Path) -> list[Part]:
         came = f"it cannot be read ({f'{type(error).__name__}: {error}'.splitlines()[0][:200]})"
         remedy = "The file is damaged or cut short: export it again"
         refuse(source, f"a sound {source.suffix} mesh", came, remedy)
-    full = [part for part in parts if len(part.triangles)]
+    full = [part for part in model.parts if len(part.triangles)]
     if not full:
         refuse(source, "a mesh of triangles", "it has none", "Export the head as a polygon mesh")
-    skins = [part for part in parts if _has(part.group, "skin")]
+    skins = [part for part in model.parts if _has(part.group, "skin")]
     if skins and not any(len(part.triangles) for part in skins):
         came = f"skin group {skins[0].group.names[0]!r} has no triangles"
         refuse(source, "a group of triangles that is skin", came, "Assign its faces to it, or rename it")
-    return full
+    return replace(model, parts=full)
 
 
-def _joined(parts: list[Part], source: Path) -> tuple[Array, Array, Array, NDArray[np.int64]]:
-    """Positions, uv, normals (NaN where the file has none) and triangles of all parts together."""
-    positions, uvs, normals, triangles, offset = [], [], [], [], 0
-    for part in parts:
-        count = len(part.positions)
-        uvs.append(_part_uv(part, source))
-        check_arrays(part.positions, part.uv if part.uv is not None else uvs[-1], part.triangles, source)
-        positions.append(part.positions)
-        given = part.normals if part.normals is not None and len(part.normals) == count else None
-        normals.append(np.full((count, 3), np.nan) if given is None else given)
-        triangles.append(part.triangles + offset)
-        offset += count
-    return np.vstack(positions), np.vstack(uvs), np.vstack(normals), np.vstack(triangles)
-
-
-def _part_uv(part: Part, source: Path) -> Array:
-    name = part.group.names[0] if part.group.names else "the mesh"
-    if part.uv is None or part.uv.shape != (len(part.positions), 2):
-        remedy = "Unwrap it (in Blender: Edit Mode, U > Unwrap) and export with uv"
-        refuse(source, "uv at every vertex", f"{name!r} has none", remedy)
-    if not np.abs(part.uv).max() <= FARTHEST_UV:
-        came = f"{name!r} has some that are NaN, infinite or beyond {FARTHEST_UV:g}"
-        refuse(source, "finite uv", came, "The file is damaged: export it again")
-    return part.uv
-
-
-def _upright(vectors: Array, up: Up) -> Array:
+def upright(vectors: Array, up: Up) -> Array:
     """`vectors` (v, 3) with Y up: z-up turns about X, so that -Y, Blender's front, becomes +Z."""
     return vectors if up == "y" else np.column_stack((vectors[:, 0], vectors[:, 2], -vectors[:, 1]))
 
@@ -179,31 +174,3 @@ def _materials(
 
 def _has(group: Group, word: str) -> bool:
     return any(word in name.casefold() for name in group.names)
-
-
-def cached_mesh(data: bytes, options: str, load: Callable[[], Mesh]) -> Mesh:
-    """The mesh that `load` makes of a file, kept on disk by its content.
-
-    data : the file, with everything that the mesh is made of
-    options : how it is read
-    """
-    arrays = [field.name for field in fields(Mesh) if field.name != "materials"]
-
-    def make() -> Arrays:
-        mesh = load()
-        told = json.dumps([asdict(material) for material in mesh.materials]).encode()
-        return {name: getattr(mesh, name) for name in (*arrays, "outline")} | {
-            "materials": np.frombuffer(told, np.uint8)
-        }
-
-    digest = hashlib.sha256(f"{_FORM} {options}".encode())
-    digest.update(data)
-    found = stored("meshes", digest.hexdigest()[:40], [*arrays, "outline", "materials"], make)
-    materials = json.loads(found.pop("materials").tobytes())
-    outline = found.pop("outline")
-    mesh = Mesh(
-        **found,
-        materials=tuple(Material(one["name"], one["kind"], tuple(one["colour"])) for one in materials),
-    )
-    vars(mesh)["outline"] = outline  # the import alone of what finds it takes longer than reading it
-    return mesh

@@ -21,9 +21,9 @@ PathLike = str | Path | Picture
 
 MIN_SIZE, MAX_SIZE = 16, 16384
 _MIN_NORMAL_Z = 0.05  # slopes steeper than 87 degrees are capped; nothing real leans further
-_LARGE = 1 << 14  # bytes of a file whose map is kept on disk: it is read back faster than decoded
-_MEAN_TEXELS, _MOST_APART = 64, 16  # a mean is taken of at least as many a side, at most so far apart
-_FORM = 1  # raise when the same files give other maps
+_LARGE = 1 << 14  # bytes; maps of larger files are kept on disk, to be read faster than decoded
+_MEAN_TEXELS, _MOST_APART = 64, 16  # for means: fewest samples a side, largest stride
+_FORM = 1  # increment when the same files give other maps
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Maps:
     height : (H, W) outwards, from an arbitrary zero [mm]
     specular : (H, W) plain grey 0..1; the renderer scales it to a mean over the skin [-]
     roughness : (H, W) plain grey 0..1 [-]
-    region : (H, W) uint8 part of the face, by its place in the list of the head that has it
+    region : (H, W) uint8 part of the face, an index into the head's own list
     """
 
     colour: Floats | None = None
@@ -149,7 +149,7 @@ def _slopes(path: PathLike, normal_y: str) -> Floats:
 
 
 def _check_normals(path: PathLike, normals: Floats) -> None:
-    """Refuse a picture of something else: hardly a texel of it is a unit vector that points outwards."""
+    """Refuse pictures that are no normal maps: few of their texels are unit vectors that point outwards."""
     length = np.sqrt(np.einsum("hwc,hwc->hw", normals, normals))
     outward = (np.abs(length - 1) < 0.15) & (normals[..., 2] > 0)
     # A quarter is enough: the rest may be empty space between uv islands.
@@ -159,7 +159,7 @@ def _check_normals(path: PathLike, normals: Floats) -> None:
 
 
 def _kept(path: PathLike | None, how: str, load: Callable[[PathLike], NDArray[Any]]) -> Any:
-    """The map that `load` makes of a picture file, kept on disk when the file is large; None for no file.
+    """The map that `load` returns for a picture file, kept on disk when the file is large; None for no file.
 
     how : all that the map depends on besides the file
     """
@@ -187,7 +187,7 @@ def _read(path: PathLike, role: str) -> NDArray[Any]:
 def _grey(path: PathLike, role: str, image: NDArray[Any]) -> Floats:
     """(H, W) in units of the full scale, of a grey picture or of RGB whose channels agree."""
     channels = _as_unit(image[..., :3] if image.shape[2] > 1 else image)
-    # JPEG may part the channels of a grey picture by a level or two.
+    # JPEG may separate the channels of a grey picture by a level or two.
     others = range(1, channels.shape[2])
     apart = max((float(np.abs(channels[..., k] - channels[..., 0]).max()) for k in others), default=0.0)
     if apart > 2.5 / 255:

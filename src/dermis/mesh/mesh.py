@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+
+from dermis.mesh.outline import Outline, hull
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]
@@ -30,7 +32,7 @@ class Material:
 class Mesh:
     """Triangles with attributes at corner vertices; Y up, face towards +Z, counter-clockwise is outside.
 
-    A place on a uv seam has one corner vertex for each of its uvs; `point` tells that they are one place.
+    A point on a uv seam has one corner vertex for each of its uvs; `point` is the same for all of them.
 
     positions : (v, 3) [mm]
     normals : (v, 3) unit vectors
@@ -39,6 +41,7 @@ class Mesh:
     point : (v,) index of the unique position
     triangles : (f, 3) corner vertices
     material : (f,) index into `materials`
+    quads : (q, 2) triangles (a, b, c) and (c, d, a) that are the halves of a quad abcd; no rows for none
     """
 
     positions: Floats
@@ -50,6 +53,7 @@ class Mesh:
     triangles: Ints
     material: Ints
     materials: tuple[Material, ...]
+    quads: Ints = field(default_factory=lambda: np.zeros((0, 2), np.int32))
 
     @property
     def size_mm(self) -> NDArray[np.float32]:
@@ -57,26 +61,6 @@ class Mesh:
         return np.asarray(self.positions.max(axis=0) - self.positions.min(axis=0))
 
     @cached_property
-    def outline(self) -> NDArray[np.float64]:
-        """(n, 3) corners of the convex hull [mm]: from wherever it is seen, no place lies farther out."""
-        from scipy.spatial import ConvexHull, QhullError
-
-        points = self.positions.astype(np.float64)
-        try:
-            return np.asarray(points[ConvexHull(points).vertices])
-        except QhullError:  # it is flat
-            return points
-
-    @cached_property
-    def outline_columns(self) -> NDArray[np.float32]:
-        """(4, n) the outline as columns, each with a 1 below, for matrices from its left [mm].
-
-        As exact as the positions, and what comes of it in each frame takes half the memory.
-        """
-        return np.vstack([self.outline.T, np.ones(len(self.outline))]).astype(np.float32)
-
-    @cached_property
-    def middle_mm(self) -> tuple[float, float, float]:
-        """Halfway between the least and the largest coordinates [mm]."""
-        x, y, z = 0.5 * (self.outline.min(axis=0) + self.outline.max(axis=0))
-        return float(x), float(y), float(z)
+    def outline(self) -> Outline:
+        """Corners of the convex hull."""
+        return hull(self.positions)

@@ -2,72 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from dermis.disk import cached_array
+from dermis.mesh.morph_targets import MorphTargets, no_targets
+from dermis.mesh.rig_outline import RigOutline, outermost, outline_of, outline_points
+from dermis.mesh.skeleton import INFLUENCES, Skeleton
 
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-INFLUENCES = 4
-"""Bones that move a point; of more, those with the largest weights stay."""
+__all__ = ["INFLUENCES", "MorphTargets", "Motion", "Rig", "Skeleton", "Stencils", "no_targets"]
+
+_FORM = "outline 6"  # another number when other points are found
 
 
-@dataclass(frozen=True, eq=False)
-class MorphTargets:
-    """Displacements of some of the points by name, target after target.
+class Motion(NamedTuple):
+    """How a rig is moved, as numbers.
 
-    names : (t,)
-    first : (t + 1,) where each target's displacements begin
-    point : (n,) the point that each moves
-    delta_mm : (n, 3) by how much at weight 1
+    weights : (t,) of its targets, beyond those at rest
+    matrices : (b, 3, 4) of its bones, from where a point is at rest to where it is taken [mm]
+    positions_mm : (p, 3) its points at rest
     """
 
-    names: tuple[str, ...]
-    first: Ints
-    point: Ints
-    delta_mm: Floats
-
-
-def no_targets() -> MorphTargets:
-    """Of a head that has none."""
-    return MorphTargets((), np.zeros(1, np.int32), np.zeros(0, np.int32), np.zeros((0, 3), np.float32))
-
-
-@dataclass(frozen=True, eq=False)
-class Skeleton:
-    """Bones, parents before children, and the points that follow them.
-
-    names : (b,)
-    parent : (b,) -1 for a root
-    local : (b, 4, 4) from each bone's space to its parent's, at rest
-    inverse_bind : (b, 4, 4) from the file's space to the bone's, where its points are bound
-    to_head : (4, 4) from the file's space to the head's [mm]
-    bone, weight : (p, 4) bones that each point follows, and how much; the weights of a point add up to 1
-    """
-
-    names: tuple[str, ...]
-    parent: Ints
-    local: Doubles
-    inverse_bind: Doubles
-    to_head: Doubles
-    bone: Ints
-    weight: Floats
-
-    def matrices(self, local: Doubles | None = None) -> Doubles:
-        """(b, 3, 4) from where a point is at rest to where each bone takes it, in the head's space [mm].
-
-        local : (b, 4, 4) instead of those at rest
-        """
-        local = self.local if local is None else local
-        world = np.empty_like(local)
-        for bone, parent in enumerate(self.parent.tolist()):
-            world[bone] = world[parent] @ local[bone] if parent >= 0 else local[bone]
-        moved = self.to_head @ world @ self.inverse_bind @ np.linalg.inv(self.to_head)
-        return np.asarray(moved[:, :3])
+    weights: Floats
+    matrices: Floats
+    positions_mm: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,22 +62,73 @@ class Rig:
     positions_mm : (p, 3) the points at rest, before any subdivision, in the head's space
     targets, skeleton : what moves them; None for no bones
     stencils : from the control points to those of the mesh; None where they are the same
+    corner : (v,) the control point of each vertex of the file's mesh; None where `Mesh.point` tells it
     """
 
     positions_mm: Floats
     targets: MorphTargets = field(default_factory=no_targets)
     skeleton: Skeleton | None = None
     stencils: Stencils | None = None
+    corner: Ints | None = None
 
     @cached_property
+    def rest(self) -> Motion:
+        """That of a rig which nothing moves."""
+        bones = np.zeros((0, 3, 4), np.float32) if self.skeleton is None else self.skeleton.resting
+        return Motion(np.zeros(len(self.targets.names), np.float32), bones, self.positions_mm)
+
+    @property
     def target_index(self) -> dict[str, int]:
         """Number of each target by its name."""
-        return {name: index for index, name in enumerate(self.targets.names)}
+        return self.targets.index
+
+    @cached_property
+    def outline(self) -> RigOutline:
+        """Its outermost points; found once and kept on disk."""
+        return outline_of(self.positions_mm, self.targets, self.skeleton, self._outline_points)
+
+    def outline_mm(self, motion: Motion) -> Floats:
+        """(s, 3) points that lie as far out as any other in each direction, to a millimetre or so [mm].
+
+        Of a rig that rests elsewhere, its outermost ones there are among them.
+        """
+        if motion.positions_mm is self.positions_mm:
+            return self.outline.posed(motion.weights, motion.matrices)
+        return self._outline_at(motion.positions_mm).posed(motion.weights, motion.matrices)
+
+    def _outline_at(self, places: Floats) -> RigOutline:
+        """The outline of a rig that rests elsewhere; the last one is kept, and checked by its own points."""
+        points, outline = self._elsewhere
+        if not np.array_equal(places[points].T, outline.rest_mm[:3]):
+            points = np.union1d(self._outline_points, outermost(places))
+            outline = outline_of(places, self.targets, self.skeleton, points)
+            vars(self)["_elsewhere"] = points, outline
+        return outline
+
+    @cached_property
+    def _elsewhere(self) -> tuple[NDArray[np.intp], RigOutline]:
+        return self._outline_points, self.outline
+
+    @cached_property
+    def _outline_points(self) -> NDArray[np.intp]:
+        targets, skeleton = self.targets, self.skeleton
+        sources: list[NDArray[Any]] = [self.positions_mm, targets.first, targets.point, targets.delta_mm]
+        if skeleton is not None:
+            sources += [skeleton.parent, skeleton.local, skeleton.to_head, skeleton.bone, skeleton.weight]
+        return cached_array(
+            sources, _FORM, lambda: outline_points(self.positions_mm, targets, skeleton)
+        ).astype(np.intp)
+
+    def points_mm(self, motion: Motion) -> Doubles:
+        """(q, 3) the points of the mesh in a motion, after any subdivision [mm]."""
+        resting = replace(self, positions_mm=motion.positions_mm)
+        control = resting.posed(motion.weights.astype(np.float64), motion.matrices.astype(np.float64))
+        return control if self.stencils is None else self.stencils.points(control)
 
     def posed(self, weights: Doubles, matrices: Doubles | None = None) -> Doubles:
         """(p, 3) the points in a pose, as the device computes them [mm].
 
-        weights : (t,) of the targets
+        weights : (t,) of the targets, beyond those at rest
         matrices : (b, 3, 4) of the bones, from `Skeleton.matrices`; None for those at rest
         """
         targets, points = self.targets, self.positions_mm.astype(np.float64)

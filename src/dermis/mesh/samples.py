@@ -66,7 +66,7 @@ SAMPLES = _load_registry()
 
 
 def fetch(name: str) -> dict[str, Path]:
-    """Where the files of a sample are, by role, downloading those that are not there yet.
+    """Paths of a sample's files by role; missing files are downloaded.
 
     name : a key of `SAMPLES`
     DermisError : no such sample; no network; or a file differs from the one that is known
@@ -118,7 +118,7 @@ def _is_right(path: Path, file: SampleFile) -> bool:
 
 @lru_cache(maxsize=256)
 def _sha256(path: Path, size: int, mtime_ns: int) -> str:
-    """Hash of a file, computed once for each state of it."""
+    """Hash of a file, computed once for each size and time of change."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
@@ -140,7 +140,7 @@ def _download(sample: Sample, roles: list[str]) -> None:
 
 
 class _Progress:
-    """A progress bar on stderr, of the form that pooch calls."""
+    """A progress bar on stderr, with the methods that pooch calls."""
 
     def __init__(self, name: str) -> None:
         from rich.console import Console

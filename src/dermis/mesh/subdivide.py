@@ -1,95 +1,103 @@
-"""Loop subdivision: four triangles for each, smoothed over the welded surface."""
+"""Subdivision: a finer mesh, smoothed over the welded surface, whose points are means of control points."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import NamedTuple
+
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.disk import Arrays, cached_arrays
 from dermis.errors import refuse
-from dermis.mesh.geometry import Doubles, build_mesh, edges, sum_at
+from dermis.mesh.geometry import build_mesh
+from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
-
-Index = NDArray[np.int64]
+from dermis.mesh.quads import halves, polygons
+from dermis.mesh.rig import Stencils
+from dermis.mesh.subdivision_rules import Cage, catmull_clark_limit, refine_catmull_clark, refine_loop
 
 MAX_LEVELS = 3
+_FORM = "subdivision 1"  # raise when weights or corners change for the same mesh
+_MANY = 500_000
+"""Finer triangles from which on reading weights from disk saves half a second or more."""
 
 
-def subdivide(mesh: Mesh, levels: int) -> Mesh:
+class Subdivided(NamedTuple):
+    """A finer mesh, and its points as means of those of the coarser one; None where they are the same."""
+
+    mesh: Mesh
+    stencils: Stencils | None
+
+
+def subdivide_head(head: Head, levels: int) -> Head:
+    """The head on a finer mesh; what moved its points now moves the control points of that mesh.
+
+    head : not subdivided yet
+    levels : 0 to 3
+    """
+    mesh, stencils = subdivide(head.mesh, levels)
+    return (
+        head if stencils is None else replace(head, mesh=mesh, rig=replace(head.control, stencils=stencils))
+    )
+
+
+def subdivide(mesh: Mesh, levels: int) -> Subdivided:
     """The mesh refined `levels` times: positions smoothed, uv halved linearly, materials kept.
 
-    Positions follow the welded points, so uv seams neither crack nor crease; open borders are smoothed
-    as curves of their own. Normals and tangents are computed anew, normals of the file are given up.
+    A mesh of more quads than triangles is refined by Catmull's and Clark's rules and put on the surface that
+    further levels tend to; others are refined by Loop's. Positions follow the welded points, so uv seams
+    neither crack nor crease; open borders are smoothed as curves of their own. Normals and tangents are
+    computed anew, normals of the file are given up.
 
     levels : 0 to 3, each takes four times the triangles
-
-    Source: Loop, Smooth subdivision surfaces based on triangles, 1987, with Warren's weights.
     """
     if levels not in range(MAX_LEVELS + 1):
         refuse("subdivide", f"0 to {MAX_LEVELS} levels", f"{levels} came", "Each level takes 4x the memory")
     if levels == 0:
-        return mesh
-    uv = mesh.uv.astype(np.float64)
-    point, triangles = mesh.point.astype(np.int64), mesh.triangles.astype(np.int64)
-    places = np.zeros((int(point.max()) + 1, 3))
-    places[point] = mesh.positions
-    for _ in range(levels):
-        places, uv, point, triangles = _refine(places, uv, point, triangles)
-    material = np.repeat(mesh.material, 4**levels)
-    return build_mesh(places[point], uv, triangles, material, mesh.materials, point=point)
+        return Subdivided(mesh, None)
+    from scipy.sparse import csr_array
+
+    by_quads = 2 * len(mesh.quads) > len(mesh.triangles) - len(mesh.quads)
+    finer = _kept(mesh, levels, by_quads)
+    control = np.zeros((int(mesh.point.max()) + 1, 3))
+    control[mesh.point] = mesh.positions
+    first, column, weight, point = (finer[name] for name in ("first", "control", "weight", "point"))
+    places = csr_array((weight, column, first), shape=(len(first) - 1, len(control))) @ control
+    triangles = halves(finer["corner"].reshape(-1, 4)) if by_quads else finer["corner"].reshape(-1, 3)
+    quads = np.arange(len(triangles)).reshape(-1, 2) if by_quads else ()
+    uv, material = finer["uv"], finer["material"]
+    made = build_mesh(places[point], uv, triangles, material, mesh.materials, point=point, quads=quads)
+    return Subdivided(made, Stencils(first, column, weight.astype(np.float32)))
 
 
-def _refine(
-    places: Doubles, uv: Doubles, point: Index, triangles: Index
-) -> tuple[Doubles, Doubles, Index, Index]:
-    """One level: places (p, 3), uv (v, 2), point (v,) and triangles (f, 3), all of the finer mesh."""
-    welded = point[triangles]
-    ends, of_side, counts = edges(welded)
-    finer_places = np.vstack(
-        (_old_points(places, ends, counts), _edge_points(places, welded, ends, of_side, counts))
-    )
-    cuts, cut_of_side, _ = edges(triangles)
-    edge_of_cut = np.empty(len(cuts), dtype=np.int64)
-    edge_of_cut[cut_of_side] = of_side
-    finer_uv = np.vstack((uv, uv[cuts].mean(axis=1)))
-    finer_point = np.concatenate((point, len(places) + edge_of_cut))
-    return finer_places, finer_uv, finer_point, _quarter(triangles, len(uv) + cut_of_side)
+def _kept(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
+    """What `_refined` returns, of large meshes kept on disk for all heads of the same topology."""
+    if len(mesh.triangles) * 4**levels < _MANY:
+        return _refined(mesh, levels, by_quads)
+    sources = [mesh.uv, mesh.point, mesh.triangles, mesh.material, mesh.quads]
+    names = ["first", "control", "weight", "uv", "point", "corner", "material"]
+    return cached_arrays(sources, f"{_FORM} {levels}", names, lambda: _refined(mesh, levels, by_quads))
 
 
-def _quarter(triangles: Index, middle: Index) -> Index:
-    """(4f, 3) three corner triangles and the middle one, the four of a triangle side by side."""
-    a, b, c = triangles.T
-    ab, bc, ca = middle.reshape(3, -1)
-    four = np.array([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]])
-    return np.ascontiguousarray(four.transpose(2, 0, 1).reshape(-1, 3))
-
-
-def _edge_points(places: Doubles, welded: Index, ends: Index, of_side: Index, counts: Index) -> Doubles:
-    """New point on each edge: 3/8 of its ends and 1/8 of the two corners across; the middle on a border."""
-    middle = places[ends].mean(axis=1)
-    across = sum_at(of_side, places[welded[:, [2, 0, 1]].T.ravel()], len(ends))
-    inside = (counts == 2)[:, None]
-    return np.asarray(np.where(inside, 0.75 * middle + across / 8, middle))
-
-
-def _old_points(places: Doubles, ends: Index, counts: Index) -> Doubles:
-    """Old points moved towards their neighbours; on a border only towards the two along it."""
-    beta_sum, mean = _towards(places, ends)
-    border = ends[counts != 2]
-    on_border = np.bincount(border.ravel(), minlength=len(places))
-    _, border_mean = _towards(places, border)
-    moved = (1 - beta_sum) * places + beta_sum * mean
-    along = 0.75 * places + 0.25 * border_mean
-    # where borders meet, and where the surface is not one sheet, the point stays
-    held = np.where((on_border == 2)[:, None], along, places)
-    return np.asarray(np.where((on_border == 0)[:, None], moved, held))
-
-
-def _towards(places: Doubles, ends: Index) -> tuple[Doubles, Doubles]:
-    """Weight of all neighbours together (p, 1) by Warren, and the neighbours' mean (p, 3)."""
-    both = np.concatenate((ends[:, 0], ends[:, 1]))
-    other = np.concatenate((ends[:, 1], ends[:, 0]))
-    valence = np.bincount(both, minlength=len(places)).astype(np.float64)[:, None]
-    mean = sum_at(both, places[other], len(places)) / np.maximum(valence, 1)
-    # 3/8 in all, 9/16 for valence 3; a point without neighbours stays
-    weight = np.where(valence == 3, 9 / 16, np.where(valence > 0, 3 / 8, 0))
-    return weight, mean
+def _refined(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
+    """Corners of the finer faces, and weights of control points, row after row as `Stencils` have them."""
+    alone = mesh.triangles.astype(np.int64).ravel(), np.full(len(mesh.triangles), 3), mesh.material
+    faces = polygons(mesh) if by_quads else alone
+    cage = Cage(mesh.uv.astype(np.float64), mesh.point.astype(np.int64), *faces)
+    refine = refine_catmull_clark if by_quads else refine_loop
+    weights, cage = refine(cage)
+    for _ in range(levels - 1):
+        finer, cage = refine(cage)
+        weights = finer @ weights
+    if by_quads:
+        weights = catmull_clark_limit(cage) @ weights
+    weights.sort_indices()
+    return {
+        "first": weights.indptr.astype(np.int32),
+        "control": weights.indices.astype(np.int32),
+        "weight": weights.data,
+        "uv": cage.uv.astype(np.float32),
+        "point": cage.point.astype(np.int32),
+        "corner": cage.corner.astype(np.int32),
+        "material": np.repeat(cage.material, 2 if by_quads else 1),
+    }

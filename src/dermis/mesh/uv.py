@@ -40,7 +40,7 @@ def chart_uv_area(mesh: Mesh, chart: Ints) -> Doubles:
 
 
 def usable(mesh: Mesh, atlas: int, min_texels: float = 4.0) -> NDArray[np.bool_]:
-    """Whether each triangle (f,) can be worked on in texture space.
+    """Whether each triangle (f,) can be processed in texture space.
 
     False for triangles without uv area and for all triangles of a chart that is collapsed.
 

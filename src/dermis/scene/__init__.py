@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from dermis.scene.files import load_camera, load_lights, load_scene
     from dermis.scene.lights import *  # noqa: F403 each kind
     from dermis.scene.model import Scene
+    from dermis.scene.pose import Pose
     from dermis.scene.settings import Settings
     from dermis.scene.skin import Skin
 
@@ -19,6 +20,7 @@ _HOMES = {
     "environment": ("Environment",),
     "files": ("load_camera", "load_lights", "load_scene"),
     "model": ("Scene",),
+    "pose": ("Pose",),
     "settings": ("Settings",),
     "skin": ("Skin",),
 }
@@ -26,6 +28,7 @@ _HOMES = {
 __all__ = [  # besides those of dermis.scene.lights
     "Camera",
     "Environment",
+    "Pose",
     "Scene",
     "Settings",
     "Skin",

@@ -19,13 +19,15 @@ from dermis.scene.heads import load_head
 from dermis.scene.lights import LIGHTS, Light, preset_lights
 from dermis.scene.model import Scene
 from dermis.scene.plain import ImpossibleError, Plain
+from dermis.scene.pose import Pose
+from dermis.scene.pose_table import PoseTable
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 
 P = TypeVar("P", bound=Plain)
 NO_LIGHTS = "none"
 """Name of the rig without lights, for an environment alone."""
-_PARTS = {"head", "skin", "lights", "environment", "camera", "render"}
+_PARTS = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
 _MAPS = ("colour", "normal", "height", "specular", "roughness")
 
 
@@ -51,9 +53,9 @@ def load_scene(path: Path, known: Head | None = None) -> tuple[Scene, Settings]:
     """Scene and settings of a TOML file; what it leaves out keeps its default.
 
     Tables: [head] (file or sample under `name`, the options of `load_head`, and `regions`, a table as for
-    `with_regions`), [skin], [[lights]] or lights = "preset", [environment], [camera] or camera = "preset",
-    [render]. File names are relative to the scene's folder. With an environment there are no other lights
-    unless the file names some.
+    `with_regions`), [pose] (`weights` and `bones` by name), [skin], [[lights]] or lights = "preset",
+    [environment], [camera] or camera = "preset", [render]. File names are relative to the scene's folder.
+    With an environment there are no other lights unless the file names some.
 
     known : the head of the file's [head], when the caller has it already
     """
@@ -66,6 +68,7 @@ def load_scene(path: Path, known: Head | None = None) -> tuple[Scene, Settings]:
     _check_said_once(path, described, skin)
     head, skin = (known, skin) if known else head_and_skin(described, skin, path.parent)
     environment = _environment(path, table["environment"]) if "environment" in table else None
+    pose = _pose(path, table["pose"], head) if "pose" in table else None
     lights, camera = table.get("lights"), table.get("camera", "portrait")
     if lights is None:
         lights = "studio" if environment is None else NO_LIGHTS
@@ -79,6 +82,7 @@ def load_scene(path: Path, known: Head | None = None) -> tuple[Scene, Settings]:
         if isinstance(camera, str)
         else _made(Camera, path, "camera", camera),
         skin=skin.model_copy(update={"profile": _beside(path.parent, skin.profile)}),
+        pose=pose,
     ), settings
 
 
@@ -115,6 +119,13 @@ def _check_said_once(path: Path, table: HeadTable, skin: Skin) -> None:
         if table.regions is not None and name in skin.model_fields_set:
             came = "it came beside the head's regions, which say it for each region"
             refuse(f"{path}: skin: {name}", "one or the other", came, "Leave one out, or use oiliness")
+
+
+def _pose(path: Path, table: Any, head: Head) -> Pose:
+    told = _made(PoseTable, path, "pose", table)
+    pose = Pose(told.weights, told.bones)
+    pose.motion(head.control, f"{path}: pose")  # so that an error names the file
+    return pose
 
 
 def _environment(path: Path, table: Any) -> Environment:

@@ -42,6 +42,6 @@ class HeadTable(Plain):
     opaque: tuple[str, ...] = ()
     """Groups of the file that are not skin, whatever they are called."""
     subdivide: Annotated[int, Field(ge=0, le=3)] = 0
-    """Levels of Loop subdivision."""
+    """Levels of subdivision: Catmull-Clark for a file of quads (.obj, .ply), else Loop."""
     regions: str | None = None
     """Roughness and strength by region of the face: "default" (an artist's values), or a TOML file."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +12,12 @@ from dermis.errors import refuse
 from dermis.human.bust import BUSTS
 from dermis.mesh.check import check_head_height
 from dermis.mesh.formats import is_gltf
-from dermis.mesh.gltf import embedded_maps
+from dermis.mesh.gltf.pictures import embedded_maps
 from dermis.mesh.head import Head
-from dermis.mesh.load import load_mesh
+from dermis.mesh.load import load_rigged
 from dermis.mesh.maps import load_maps
 from dermis.mesh.samples import SAMPLES, fetch
-from dermis.mesh.subdivide import subdivide as subdivided
+from dermis.mesh.subdivide import subdivide_head
 from dermis.scene.head_table import NormalY, Up, VOrigin
 
 MapFile = str | os.PathLike[str] | None
@@ -40,7 +41,8 @@ def load_head(
 ) -> Head:
     """The built-in "bust", a sample ("lee_perry_smith") or a mesh file (.glb, .gltf, .obj, .ply) with maps.
 
-    Options replace what a sample or a glTF file has of its own.
+    Options replace what a sample or a glTF file has of its own. Morph targets and bones of a glTF file move
+    the head (`Pose`); it rests as the file has it, at the default weights of its targets.
 
     colour, normal, height, specular, roughness : image files; see `load_maps`
     height_mm : relief of one grey level of an 8-bit height map [mm]
@@ -49,7 +51,7 @@ def load_head(
     up : the file's upward axis
     normal_y : way in which green points in the normal map: "up" (OpenGL) or "down" (DirectX)
     opaque : groups of the file that are not skin, whatever they are called
-    subdivide : levels of Loop subdivision, 0 to 3
+    subdivide : levels of subdivision, 0 to 3: Catmull-Clark for a file of quads, else Loop
 
     Raises DermisError for files that cannot be rendered as a head.
     """
@@ -74,8 +76,8 @@ def load_head(
         refuse(name or "head", f"a mesh file or a sample ({known})", f"{name!r} is neither", "Check the name")
     if sample is None and is_gltf(path):
         files = embedded_maps(path)
-    mesh = load_mesh(path, unit_mm=unit_mm, v_origin=v_origin, up=up, opaque=tuple(opaque))
-    check_head_height(mesh, name, unit_mm)
+    rigged = load_rigged(path, unit_mm=unit_mm, v_origin=v_origin, up=up, opaque=tuple(opaque))
+    check_head_height(rigged.mesh, name, unit_mm)
     own = {"colour": colour, "normal": normal, "height": height}
     own |= {"specular": specular, "roughness": roughness}
     chosen = _chosen(own, files)
@@ -86,7 +88,10 @@ def load_head(
         refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
     maps = load_maps(**chosen, height_mm=height_mm, normal_y=normal_y)
     thanks = f"{sample.attribution}, {sample.licence}" if sample else ""
-    return Head(name, subdivided(mesh, subdivide), maps, thanks)
+    made = subdivide_head(Head(name, rigged.mesh, maps, thanks, rigged.rig), subdivide)
+    if subdivide and made.rig is not None:  # sequences of files have places for the file's own vertices
+        made = replace(made, rig=replace(made.rig, corner=rigged.mesh.point))
+    return made
 
 
 def _chosen(given: dict[str, MapFile], files: dict[str, Any]) -> dict[str, Any]:

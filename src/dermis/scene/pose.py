@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import difflib
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from dermis.errors import refuse
+from dermis.mesh.rig import Motion, Rig
+from dermis.mesh.skeleton import Skeleton
+
+MOST_WEIGHT = 100.0
+FARTHEST_MM = 1e6
+_FORMS = "three angles [degrees] or a (4, 4) matrix"
+_NEAR = 3  # names that are proposed
+_FLAT = 1e-9  # determinant over size cubed
+
+Doubles = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Pose:
     """Weights of morph targets, turns of bones, or places of all points.
 
-    weights : of targets by name, mostly 0 to 1
+    weights : of targets by name, mostly 0 to 1; those that are left out keep the weight that they rest with
     bones : by name; three angles [degrees] about the head's own axes (x: nod, y: turn, z: tilt) from where
         the bone rests, done about z first, then x, then y; or a (4, 4) matrix from its space to its parent's
         instead of the one at rest, in the file's units, as animations have
@@ -29,4 +43,151 @@ class Pose:
     @classmethod
     def of(cls, given: Any) -> Pose | None:
         """A pose, the pose of a plain mapping of weights, or None."""
-        return given if given is None or isinstance(given, Pose) else cls(weights=given)
+        if given is None or isinstance(given, Pose):
+            return given
+        if not isinstance(given, Mapping):
+            refuse("pose", "a Pose or a mapping of weights by name", f"{given!r:.80} came", "Correct it")
+        return cls(weights=given)
+
+    def motion(self, rig: Rig, culprit: object = "pose") -> Motion:
+        """The pose as numbers for a rig.
+
+        culprit : named in messages
+
+        Raises DermisError for names that the rig lacks, and for numbers and shapes that cannot be.
+        """
+        return Motion(
+            self._weights(rig, culprit), self._matrices(rig, culprit), self._positions(rig, culprit)
+        )
+
+    def _weights(self, rig: Rig, culprit: object) -> NDArray[np.float32]:
+        weights = np.zeros(len(rig.targets.names), np.float32)
+        if not self.weights:
+            return weights
+        try:
+            index = rig.target_index
+            places = [index[name] for name in self.weights]
+            given = np.array(list(self.weights.values()), np.float64)
+            sound = given.ndim == 1 and bool((np.abs(given) <= MOST_WEIGHT).all())
+        except (KeyError, TypeError, ValueError):
+            sound = False
+        if not sound:
+            _refuse_weights(self.weights, rig.targets.names, culprit)
+        weights[places] = given if rig.targets.rest is None else given - rig.targets.rest[places]
+        return weights
+
+    def _matrices(self, rig: Rig, culprit: object) -> NDArray[np.float32]:
+        if not self.bones:
+            return rig.rest.matrices
+        if rig.skeleton is None:
+            _refuse_name(f"{culprit}: bones", next(iter(self.bones)), (), "bone")
+        index = rig.skeleton.index
+        for name in self.bones:
+            if name not in index:
+                _refuse_name(f"{culprit}: bones", name, index, "bone")
+        ordered = sorted((index[name], name) for name in self.bones)
+        bones = [bone for bone, _ in ordered]
+        return rig.skeleton.moved(bones, _changes(rig.skeleton, ordered, self.bones, culprit))
+
+    def _positions(self, rig: Rig, culprit: object) -> NDArray[np.float32]:
+        if self.positions_mm is None:
+            return rig.positions_mm
+        try:
+            places = np.ascontiguousarray(self.positions_mm, np.float32)
+        except (TypeError, ValueError):
+            places = np.zeros(0, np.float32)
+        expected = rig.positions_mm.shape
+        if places.shape != expected:
+            came = f"{np.shape(self.positions_mm)} came"
+            remedy = "Give as many points as Head.positions_mm lists, in its order"
+            refuse(f"{culprit}: positions_mm", f"an array of {expected}", came, remedy)
+        with np.errstate(invalid="ignore"):
+            if not np.abs(places).max(initial=0) <= FARTHEST_MM:
+                lost = np.flatnonzero(~(np.abs(places) <= FARTHEST_MM).all(axis=1))
+                came = f"{len(lost)} are NaN, infinite or farther, first {lost[0]}"
+                expected_mm = f"points within {FARTHEST_MM:g} mm"
+                refuse(f"{culprit}: positions_mm", expected_mm, came, "Correct them")
+        return places
+
+
+def _changes(
+    skeleton: Skeleton, ordered: list[tuple[int, str]], given: Mapping[str, Any], culprit: object
+) -> Doubles:
+    """(n, 4, 4) what angles or matrices of bones do in the head's space at rest [mm]."""
+    changes = np.empty((len(ordered), 4, 4))
+    rows: list[list[float]] = []
+    turned: list[int] = []
+    own: list[int] = []
+    for place, (bone, name) in enumerate(ordered):
+        try:
+            if len(given[name]) == 3:
+                rows.append(skeleton.turned(bone, _finite(given[name])))
+                turned.append(place)
+            else:
+                changes[place] = given[name]
+                own.append(place)
+        except (TypeError, ValueError):
+            _refuse_form(f"{culprit}: bones.{name}", given[name])
+    if turned:
+        changes[turned] = np.array(rows).reshape(-1, 4, 4)
+    if own:
+        _check_matrices(changes[own], [ordered[place][1] for place in own], given, culprit)
+        changes[own] = skeleton.changes([ordered[place][0] for place in own], changes[own])
+    return changes
+
+
+def _check_matrices(matrices: Doubles, names: list[str], given: Mapping[str, Any], culprit: object) -> None:
+    """Refuse matrices that were broadcast, are not finite or flatten what they move."""
+    for name in names:
+        if np.shape(given[name]) != (4, 4):
+            _refuse_form(f"{culprit}: bones.{name}", given[name])
+    lost = ~np.isfinite(matrices).all(axis=(1, 2))
+    if lost.any():
+        name = names[int(lost.argmax())]
+        _refuse_form(f"{culprit}: bones.{name}", given[name])
+    linear = matrices[:, :3, :3]
+    size = np.sqrt(np.einsum("nij,nij->n", linear, linear))
+    flat = np.abs(np.linalg.det(linear)) <= _FLAT * size**3
+    if flat.any():
+        where = f"{culprit}: bones.{names[int(flat.argmax())]}"
+        refuse(where, "a matrix that can be inverted", "this one flattens what it moves", "Correct it")
+
+
+def _refuse_form(culprit: str, given: Any) -> NoReturn:
+    refuse(culprit, f"{_FORMS}, all of them finite", f"{given!r:.80} came", "Correct it")
+
+
+def _finite(degrees: Any) -> Any:
+    """The angles; raises ValueError or TypeError for what are none."""
+    if not math.isfinite(sum(degrees)):
+        raise ValueError(degrees)
+    return degrees
+
+
+def _refuse_weights(weights: Mapping[Any, Any], names: tuple[str, ...], culprit: object) -> NoReturn:
+    """Raise the error of the first weight that cannot be."""
+    for name, weight in weights.items():
+        if name not in names:
+            _refuse_name(f"{culprit}: weights", name, names, "morph target")
+        number = isinstance(weight, int | float | np.number)
+        if not number or not abs(float(weight)) <= MOST_WEIGHT:
+            expected = f"a number from -{MOST_WEIGHT:g} to {MOST_WEIGHT:g}"
+            refuse(f"{culprit}: weights.{name}", expected, f"{weight!r:.80} came", "Correct it")
+    refuse(f"{culprit}: weights", "a number for each target", "something else came", "Correct it")
+
+
+def _refuse_name(culprit: str, name: Any, known: Iterable[str], kind: str) -> NoReturn:
+    """Raise the error of a name that the head lacks, with those that are nearest to it."""
+    names = list(known)
+    if not names:
+        came = f"{name!r} came and it has none"
+        refuse(culprit, f"a {kind} of the head", came, f"Load a glTF file with {kind}s, or leave it out")
+    plain = {one.casefold(): one for one in names}
+    near = difflib.get_close_matches(str(name).casefold(), plain, _NEAR, 0.5)
+    meant = f"Nearest: {', '.join(plain[one] for one in near)}" if near else f"It has {_some(names)}"
+    refuse(culprit, f"a {kind} of the head", f"there is no {name!r}", meant)
+
+
+def _some(names: list[str]) -> str:
+    shown = ", ".join(names[:8])
+    return f"{shown} and {len(names) - 8} more" if len(names) > 8 else shown

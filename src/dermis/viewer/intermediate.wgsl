@@ -19,7 +19,7 @@ struct Look {
 }
 
 @group(0) @binding(30) var<uniform> look: Look;
-@group(0) @binding(31) var seen: texture_2d_array<u32>;
+@group(0) @binding(31) var visibility_buffer: texture_2d_array<u32>;
 @group(0) @binding(32) var layer: texture_2d<f32>; // of the atlas: light, stretch, or thickness [mm]
 @group(0) @binding(33) var bytes: texture_storage_2d<rgba8uint, write>;
 
@@ -84,7 +84,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     var sum = vec3f(0.0);
     for (var s = 0u; s < look.samples; s++) {
-        let triangle = textureLoad(seen, id.xy, s, 0).x;
+        let triangle = textureLoad(visibility_buffer, id.xy, s, 0).x;
         if (triangle > 0u) {
             let place = vec2f(id.xy) + look.jitter[s].xy;
             sum += clamp(shown(point_under(triangle - 1u, place, vec2f(size))), vec3f(0.0), vec3f(1.0));

@@ -76,7 +76,7 @@ def build_stitched(mesh: Mesh, size: int, reach_mm: float) -> Atlas | None:
     if packing is None:
         return None
     made = _cover(surface, piece, packing, width, size)
-    # where a piece lies on itself only one layer has light: gutters must not read the other
+    # where a piece overlaps itself only one layer has light: gutters must not read the other
     lost = _lost(piece, packing, made)
     if lost.any():
         piece = np.where(lost, -1, piece)
@@ -107,6 +107,9 @@ def _atlas(surface: FlatSurface, packing: Packing, made: Cover, mapped: NDArray[
     weights = np.column_stack((1 - second.sum(axis=1), second))
     source = np.einsum("nk,nka->na", weights, packing.places[made.triangle[y, x]])
     place = np.where(mapped[:, None, None], (packing.places + 0.5) / size, 0.0)
+    # the rims of pieces show what lies across a seam, but are stretched as their own side of it
+    outer = (made.rooted >= 0) & ((made.rooted != made.triangle) | made.gutter)
+    row, column = np.nonzero(outer)
     shear = np.clip(metric[..., 2], -MOST_SHEAR, MOST_SHEAR)
     return Atlas(
         triangle=made.triangle,
@@ -117,5 +120,9 @@ def _atlas(surface: FlatSurface, packing: Packing, made: Cover, mapped: NDArray[
         place=place.astype(np.float32),
         gutter=np.column_stack((x, y)).astype(np.uint16),
         source=source.astype(np.float32),
+        beyond=np.column_stack((column, row)).astype(np.uint16),
+        root=made.rooted[row, column],
+        root_weight=np.floor(made.roots[row, column] * 65535.0).astype(np.uint16),
+        per_uv=packing.per_uv.astype(np.float32),
         mapped=mapped,
     )

@@ -11,7 +11,7 @@ from dermis.atlas.stitched.gutter import Border, GutterTexels, GutterWidth, Pack
 from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
 
 Singles = NDArray[np.float32]
-_STEPS, _SLACK_MM = 2.0, 0.5  # neighbours farther apart than so many of their steps and so much have a gap
+_STEPS, _SLACK_MM = 2.0, 0.5  # neighbours farther apart than so many steps plus the slack have a gap
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def _add_gutters(made: Cover, piece: Index, found: GutterTexels) -> None:
     astray = ~found.whole & ~found.rim
     made.triangle[y[astray], x[astray]] = -1
     _repeat_edge(made, piece, ended, y[astray], x[astray])
-    # a gutter ends where its light is not in the atlas
+    # gutters end where the atlas does not hold their light
     gone = made.gutter & ((made.triangle < 0) | (piece[np.maximum(made.triangle, 0)] < 0))
     for grid in (made.triangle, made.rooted):
         grid[gone] = -1
@@ -93,9 +93,9 @@ def _mirrored(surface: FlatSurface, piece: Index, own: Index) -> Flags:
 
 
 def _repeat_edge(made: Cover, piece: Index, ended: Flags, y: Index, x: Index) -> None:
-    """Texels of a gutter just beyond the end of the surface take what those beside them show.
+    """Gutter texels just beyond the end of the surface repeat their neighbours.
 
-    A blur along the edge then reads from the gutter what it reads from the rim of a piece.
+    A blur along the edge then reads the same from a gutter as from the rim of a piece.
 
     ended : (h, w) texels that the surface does not reach
     y, x : (n,) such texels in gutters
@@ -111,7 +111,7 @@ def _repeat_edge(made: Cover, piece: Index, ended: Flags, y: Index, x: Index) ->
 
 
 def metric_of(surface: FlatSurface, packing: Packing, made: Cover) -> Singles:
-    """(h, w, 3) texels per mm along u and v and the cosine between them; beyond a border as there."""
+    """(h, w, 3) texels per mm along u and v and the cosine between them; in gutters those at the border."""
     metric = _read(made.rooted, made.roots, surface.lengths)
     covered = made.rooted >= 0
     per_uv = packing.per_uv[made.rooted[covered]].astype(np.float32)

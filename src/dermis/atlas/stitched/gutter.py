@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
 
-_MOST_STRETCH = 2.0  # of a border's texels per mm over the mean of its piece, for the width of its gutter
+_MOST_STRETCH = 2.0  # largest texels per mm of a border over its piece's mean, for gutter widths
 
 
 class Border(NamedTuple):
@@ -48,7 +48,7 @@ def find_border(surface: FlatSurface, piece: Index, own: Index) -> Border:
     """Where pieces end.
 
     piece : (f,) piece of each triangle, -1 for triangles that have no place
-    own : those to be looked at, all of which have one
+    own : triangles to examine, all of which have one
     """
     beside = surface.beside_uv[own]
     row, index = np.nonzero((beside == own[:, None]) | (piece[own, None] != piece[beside]))
@@ -78,13 +78,13 @@ def sides_of(surface: FlatSurface, border: Border, packing: Packing, width: Gutt
     ends = np.stack([packing.places[triangle, k] for k in both], axis=1)
     steps = np.stack([surface.along[triangle, k] for k in both], axis=1)
     steps = steps / packing.per_uv[triangle][:, None, None, None]
-    # slivers may be stretched a hundredfold: their gutters are not worth so much room
+    # slivers may be stretched a hundredfold: gutters that wide would waste room
     widest = np.minimum(width.widest, _MOST_STRETCH * width.reach_mm * packing.per_mm[triangle])
     return Sides(ends, steps, np.where(border.seam, width.reach_mm, 0.0), widest)
 
 
 class NearestSides(NamedTuple):
-    """For each texel of a grid (h, w) outside of pieces, the place on a border that it is nearest to.
+    """For each texel of a grid (h, w) outside of pieces, the nearest place on a border.
 
     side, share : number of the side, -1 without one; how far along it, 0 to 1
     away_mm2 : squared distance by the metric that the surface has there
@@ -136,7 +136,7 @@ class GutterTexels(NamedTuple):
     away_mm : distance from the piece
     root, root_weights : nearest place on its border: triangle, weights of the second and third corner
     triangle, weights : the same where a straight walk from there ends
-    whole : whether the surface reaches so far
+    whole : whether the surface reaches that far
     """
 
     y: Index

@@ -16,9 +16,9 @@ _MOST_TEXELS = 300_000  # of a piece on such a grid
 _MOST_CELLS = 2_000_000  # of the grid
 _NEAR = 0.6  # of the reach: conflicts farther out hardly matter
 _LEAST = 1.0  # length of conflicts, in reaches, that is worth a cut
-_WORTH = 0.2  # conflicts parted per length of a cut for it to be made
+_WORTH = 0.2  # fewest conflicts that a cut separates per texel of its length
 _ANGLES, _OFFSETS = 8, 16
-_FRESH = 1.0  # share of the conflicts that a cut may miss to be shorter by as much
+_FRESH = 1.0  # of the conflicts' number: added to lengths, so that short cuts do not win by too much
 _CRUMB = 0.1  # area in squares of the reach
 _DEEPEST = 4
 _GROWTH = 0.25  # of all pieces by gutters along cuts, at most
@@ -41,7 +41,7 @@ class Conflicts(NamedTuple):
 
     @property
     def length_mm(self) -> float:
-        """How far they go along each other."""
+        """Length along which the gutters overlap."""
         return len(self.one) * self.texel_mm
 
 
@@ -99,7 +99,7 @@ def _cut(surface: FlatSurface, placed: Flags, own: Index, reach_mm: float) -> In
 
 
 def _clusters(found: Conflicts, reach: float) -> list[Index]:
-    """Numbers of the conflicts that are near each other."""
+    """Clusters of conflicts near each other, as their indices."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import KDTree
@@ -114,7 +114,7 @@ def _clusters(found: Conflicts, reach: float) -> list[Index]:
 
 
 def _strip(surface: FlatSurface, own: Index, overlap: Conflicts, half: Flags, reach: float) -> Flags:
-    """Triangles along that side of a overlap on which they are smaller."""
+    """Triangles along that side of an overlap where they have less area."""
     from scipy.spatial import KDTree
 
     corners = surface.uv[own] * overlap.per_uv
@@ -156,7 +156,7 @@ def find_conflicts(surface: FlatSurface, placed: Flags, own: Index, reach_mm: fl
 
 
 def _meetings(surface: FlatSurface, packing: Packing, made: Cover, near_mm: float) -> tuple[Doubles, Doubles]:
-    """Places (n, 2) that texels on both sides of gaps belong to [texel]."""
+    """Roots (n, 2) of the texels on both sides of gaps [texel]."""
     near = np.where(made.away_mm < near_mm, made.piece, -1)
     roots = roots_of(packing, made)
     reach = runs_of(surface, made, near, metric_of(surface, packing, made), roots)
@@ -167,7 +167,7 @@ def _meetings(surface: FlatSurface, packing: Packing, made: Cover, near_mm: floa
 
 
 def _best_line(overlap: Conflicts, reach: float) -> tuple[Doubles, float, int]:
-    """Normal and offset of the line that parts most conflicts for its length near them, and their number."""
+    """Normal and offset of the line that separates most conflicts for its length near them; their number."""
     from scipy.spatial import KDTree
 
     tree = KDTree(np.concatenate((overlap.one, overlap.other)))

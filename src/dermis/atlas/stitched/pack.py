@@ -21,7 +21,7 @@ class _Piece(NamedTuple):
 
     part : its triangles, as a surface of their own
     uv : (t, 3, 2) corners, scaled, the least at 0
-    most : (2,) of all corners
+    most : (2,) greatest of all corners
     scale : of its uv
     per_mm : scaled uv in a mm of the surface
     border : its sides, by the triangles' number within the piece
@@ -51,9 +51,9 @@ class _Shape(NamedTuple):
 def pack_pieces(
     surface: FlatSurface, piece: Index, scale: Doubles, size: int, width: GutterWidth
 ) -> Packing | None:
-    """Pieces side by side with room for their gutters, as large as can be.
+    """Pieces side by side with room for their gutters, as large as possible.
 
-    None if they do not fit however small.
+    None if they do not fit at any scale.
 
     piece : (f,) from 0, -1 for triangles without a place
     scale : (f,) of the uv of each triangle's piece, by which density is evened out
@@ -137,7 +137,7 @@ def _pack(
 
 
 def _shape(one: _Piece, scale: float, width: GutterWidth, by_columns: bool) -> _Shape:
-    """All cells in which a texel might be needed; with `by_columns` rows and columns change places."""
+    """All cells in which a texel might be needed; `by_columns` swaps rows and columns."""
     margin = np.ceil(_half_extent(one, scale, width)) + 2
     across, down = np.ceil(one.most * scale + 2 * margin).astype(int) + 1
     every = np.ones(len(one.uv))
@@ -157,7 +157,7 @@ def _shape(one: _Piece, scale: float, width: GutterWidth, by_columns: bool) -> _
 
 
 def _spans(mask: Flags) -> tuple[NDArray[np.int32], tuple[int, int]]:
-    """Runs (m, 3) of true cells, long ones first: those most often are in the way; columns and rows."""
+    """Runs (m, 3) of true cells, long ones first, as they collide most often; columns and rows."""
     step = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     row, begin = np.nonzero(step > 0)
     end = np.nonzero(step < 0)[1] - 1

@@ -83,7 +83,16 @@ def survey(mesh: Mesh) -> FlatSurface:
     same_uv = weld(np.hstack((mesh.positions, mesh.uv)))[mesh.triangles]
     beside_uv = (across(same_uv.astype(np.int64)) % len(uv)).reshape(3, -1).T
     return FlatSurface(
-        corners, uv, area, area_uv, skin, sound, _adjacency(mesh, flat, skin), beside_uv, along, lengths
+        corners,
+        uv,
+        area,
+        area_uv,
+        skin,
+        sound,
+        Adjacency(flat, *sides_across(mesh), _apexes(flat), skin),
+        beside_uv,
+        along,
+        lengths,
     )
 
 
@@ -97,21 +106,19 @@ def _flat(corners: Doubles) -> tuple[Doubles, Doubles]:
     return np.einsum("fki,fai->fka", corners - corners[:, :1], axes), axes
 
 
-def _adjacency(mesh: Mesh, flat: Doubles, skin: Flags) -> Adjacency:
-    points, count = mesh.point[mesh.triangles].astype(np.int64), len(flat)
+def sides_across(mesh: Mesh) -> tuple[NDArray[np.int32], NDArray[np.int8], Flags]:
+    """(f, 3) triangle across each side, -1 for none, its side of this edge, and whether it is turned over."""
+    points, count = mesh.point[mesh.triangles].astype(np.int64), len(mesh.triangles)
     side = np.arange(3 * count)
     other = across(points)
     start = points.T.ravel()
     beside = np.where(other == side, -1, other % count).reshape(3, -1).T
     entry = (other // count).reshape(3, -1).T
     flipped = (start[other] == start).reshape(3, -1).T
-    return Adjacency(
-        flat,
+    return (
         np.ascontiguousarray(beside, np.int32),
         np.ascontiguousarray(entry, np.int8),
         np.ascontiguousarray(flipped),
-        _apexes(flat),
-        skin,
     )
 
 
@@ -139,7 +146,7 @@ def _steps(
     along = np.einsum("fksi,fai->fksa", steps, axes)
     along *= (length / np.maximum(np.linalg.norm(along, axis=-1), 1e-12))[..., None]
     own = _own_steps(flat, uv)[:, None]
-    # the mean of triangles that face all ways may mean nothing: then the triangle's own steps
+    # the mean over triangles that face all ways may be meaningless: then the triangle's own steps
     bad = _turn(along) * np.sign(area_uv)[:, None] >= -0.05 * length.prod(axis=-1)
     along = np.where(bad[..., None, None], own, along)
     return along, np.concatenate((length, cosine[..., None]), axis=-1)

@@ -15,8 +15,8 @@ Flags = NDArray[np.bool_]
 TILE = 4
 """Cells along the side of a tile."""
 
-BESIDE = 0.2
-"""Texels by which a triangle may show beyond its edges."""
+BESIDE = 0.7
+"""Texels by which a tile may show more than it covers: its cells have whole ones, and triangles reach farther."""
 
 _REACH = 3.2  # standard deviations of the widest Gaussian that two places are apart at most
 _SPACING = 0.36  # of the cells, in the same unit: what is read between them is smooth
@@ -72,7 +72,7 @@ class Cells:
 
 
 def divide(atlas: Atlas, widest_mm: float, coarser: float = 1.0) -> Cells:
-    """The cells for light that Gaussians of at most this standard deviation spread; farther than 32 mm it is cut.
+    """The cells for light that Gaussians of at most this standard deviation spread, up to 32 mm far.
 
     coarser : times the usual side of cells
     """
@@ -140,7 +140,7 @@ def _tile_of(atlas: Atlas, middle: Words, side: int, tiles: int) -> Index:
 
 def _packed(low: NDArray[np.integer], high: NDArray[np.integer]) -> Words:
     """Two numbers of 16 bits in each word."""
-    return low.astype(np.uint32) | (high.astype(np.uint32) << 16)
+    return np.asarray(low.astype(np.uint32) | (high.astype(np.uint32) << 16), np.uint32)
 
 
 def _triangles(atlas: Atlas, side: int, tiles: int) -> tuple[Words, Words]:
@@ -161,7 +161,7 @@ def _triangles(atlas: Atlas, side: int, tiles: int) -> tuple[Words, Words]:
 
 
 def _copies(atlas: Atlas, side: int) -> tuple[Index, Words]:
-    """Where the texels begin that show each cell from elsewhere, and these: where they are, and what they show."""
+    """Where the list of those begins that show each cell from elsewhere, and texels with what they show."""
     rim, place = _rim(atlas)
     texel = np.concatenate([atlas.gutter, rim])
     x, y = np.clip(np.rint(np.concatenate([atlas.source, place])), 0, atlas.size - 1).astype(np.int64).T
@@ -173,13 +173,13 @@ def _copies(atlas: Atlas, side: int) -> tuple[Index, Words]:
 
 def _rim(atlas: Atlas) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
     """(r, 2) texels beside charts that are lit themselves, and the places that they show [texel]."""
-    inner = np.pad(atlas.own, GUTTER)
+    inner, view = np.pad(atlas.own, GUTTER), np.lib.stride_tricks.sliding_window_view
     for axis in (0, 1):
-        inner = np.logical_and.reduce(np.lib.stride_tricks.sliding_window_view(inner, 2 * GUTTER + 1, axis), -1)
+        inner = np.logical_and.reduce(view(inner, 2 * GUTTER + 1, axis), -1)
     y, x = np.nonzero(atlas.own & ~inner)
-    texel = np.stack([x, y], axis=-1)
-    weights = _packed(*atlas.barycentric[y, x].T)
-    place = np.stack(_places(atlas, atlas.triangle[y, x], weights), axis=-1) * np.float32(atlas.size) - np.float32(0.5)
+    texel, weights = np.stack([x, y], axis=-1), _packed(*atlas.barycentric[y, x].T)
+    place = np.stack(_places(atlas, atlas.triangle[y, x], weights), axis=-1)
+    place = place * np.float32(atlas.size) - np.float32(0.5)
     elsewhere = np.abs(place - texel).max(axis=1, initial=0.0) > _INSIDE
     return texel[elsewhere].astype(np.uint16), place[elsewhere]
 

@@ -11,11 +11,11 @@ Index = NDArray[np.int64]
 Doubles = NDArray[np.float64]
 
 _SMOOTHINGS = 4
-_BEND = 3.0  # how much farther it is across a right angle than over a flat place
+_BEND = 3.0  # extra distance across a right angle, in multiples of the distance
 
 
 def across(triangles: Index) -> Index:
-    """The side on the other side of each side (3 f,), itself where there is none or more than one.
+    """The neighbour's side along each side (3 f,), itself where there is none or more than one.
 
     Sides are numbered as in `geometry.edges`: all 01, then all 12, then all 20.
     """
@@ -87,7 +87,7 @@ def _strays(chart: Index, beside: Index) -> NDArray[np.bool_]:
 
 
 def grow(positions: Doubles, triangles: Index, count: int, seed: int = 0) -> Index:
-    """About `count` charts (f,) grown from random triangles, each flatter than it is wide.
+    """About `count` charts (f,) grown from random triangles, avoiding bends.
 
     positions : (n, 3) [mm]
     triangles : (f, 3)

@@ -50,7 +50,7 @@ def sheets(triangles: Index, n: int) -> Index:
 
 
 def _cotangents(shapes: Complexes) -> Doubles:
-    """Of the angle across from the sides 01, 12, 20 (f, 3)."""
+    """Cotangents of the angles opposite the sides 01, 12, 20 (f, 3)."""
     apex = np.roll(shapes, -2, axis=1)
     product = np.conj(shapes - apex) * (np.roll(shapes, -1, axis=1) - apex)
     return np.asarray(product.real / np.maximum(np.abs(product.imag), 1e-9 * np.abs(product)))
@@ -96,7 +96,7 @@ def _far_points(points: Doubles, sheet: Index) -> tuple[Index, Index]:
 
 
 def _factor(matrix: Any) -> Any:
-    """The function that solves with a symmetric matrix, or a Hermitian one."""
+    """A solver for a symmetric or Hermitian matrix."""
     from scipy.sparse.linalg import splu
 
     if matrix.shape[0] == 0:

@@ -37,7 +37,7 @@ class Flat(NamedTuple):
 
 
 class Surface(NamedTuple):
-    """What is to be laid flat; see `layout.unwrap`."""
+    """The triangles to lay flat; see `unwrap.unwrap`."""
 
     positions: Doubles
     triangles: Index

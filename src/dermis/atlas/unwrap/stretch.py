@@ -1,4 +1,4 @@
-"""How a triangle changes when it is laid flat."""
+"""How laying a triangle flat stretches it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def turning_and_shear(shapes: Complexes, places: Complexes) -> tuple[Complexes, 
 
 
 def singular_values(corners: NDArray[np.floating], uv: NDArray[np.floating]) -> Doubles:
-    """Greatest and least length in uv of a unit on the surface (f, 2) [1/mm]; the least is signed.
+    """Greatest and least length in uv of a mm on the surface (f, 2) [1/mm]; the least is signed.
 
     corners : (f, 3, 3) [mm]
     uv : (f, 3, 2) v down; triangles that are mirrored as seen from outside have a negative least value

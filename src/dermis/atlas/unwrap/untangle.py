@@ -1,4 +1,4 @@
-"""Mirrored triangles turned back, by drawing their surroundings even."""
+"""Untangles mirrored triangles by smoothing their surroundings."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ _RINGS = 5  # around mirrored triangles, of points that may move
 def untangle(places: Doubles, triangles: Index) -> Doubles:
     """The places (n, 2) with few or no mirrored triangles.
 
-    Points around these come to the mean of their neighbours, which turns no triangle over within a convex
-    outline [Tutte1963]; more and more of them until all is well. The border stays.
+    Points around these move to the mean of their neighbours, which mirrors no triangle within a convex
+    outline [Tutte1963]; more and more points, until none is mirrored. The border stays.
 
     places : (n, 2) x to the right, y up
     triangles : (f, 3)

@@ -1,4 +1,4 @@
-"""A mesh with charts in, a uv layout out."""
+"""Unwraps a mesh with given charts to a uv layout."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Doubles = NDArray[np.float64]
 PADDING = 1 / 128
 """Empty space between charts, of the map's side: 8 texels at 1024."""
 UPRIGHT = (0.0, 1.0, -0.1)
-"""Points up on a map: up in space and, for what lies level, towards the back."""
+"""Direction in space that points up on a map: up and, for level surfaces, towards the back."""
 
 _LEAST_MM2 = 1e-10
 
@@ -96,7 +96,7 @@ def _turn(flat: Flat, height: Doubles) -> Doubles:
     """The places (v, 2), each sheet turned so that `height` (f, 3) of the corners grows upwards."""
     z = flat.places[:, 0] + 1j * flat.places[:, 1]
     z3 = z[flat.corner]
-    # i times the side across from a corner is the slope of what is 1 there and 0 on that side
+    # i times the side opposite a corner points along the gradient of what is 1 there and 0 on that side
     slope = 1j * (height * (np.roll(z3, -2, axis=1) - np.roll(z3, -1, axis=1))).sum(axis=1)
     up = np.bincount(flat.piece, slope.real) + 1j * np.bincount(flat.piece, slope.imag)
     turn = np.where(np.abs(up) > 0, 1j * np.conj(up) / np.maximum(np.abs(up), 1e-300), 1)

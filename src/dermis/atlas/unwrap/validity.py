@@ -1,4 +1,4 @@
-"""Whether sheets that were laid flat can carry maps: nothing mirrored, nothing on top of itself."""
+"""Whether flattened sheets can carry maps: nothing mirrored, nothing overlapping."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _ROWS = 256  # sides compared with all others at a time
 def faults(places: Doubles, corner: Index, piece: Index) -> Flags:
     """Which triangles (f,) are mirrored or collapsed, or have a side on the border that crosses another.
 
-    A piece without any lies nowhere upon itself.
+    A piece without any does not overlap itself.
 
     places : (v, 2) x to the right, y up
     corner : (f, 3)

@@ -19,14 +19,14 @@ _UP = np.array([0.0, 1.0, 0.0])
 
 
 class Kind(Generic[L]):
-    """Light from one place or, where it is parallel, in one direction.
+    """A kind of light; by default all of it comes from one place or, where it is parallel, in one direction.
 
     Its shader lies beside its module under the same name and has
     `fn NAME_incident(light: Light, p: vec3f, part: u32) -> Incident`,
     NAME as in scene files, with underscores for hyphens.
 
-    always : whether all shaders have it; others are compiled for the scenes that call for them
-    narrow : whether all of it comes from its position or along its direction
+    always : whether all shaders have it; others are compiled only for scenes that use them
+    narrow : whether all of it comes from its position or along its direction; else it is an area light
     round : whether it is a disc as seen from the head, not a rectangle
     """
 
@@ -40,18 +40,18 @@ class Kind(Generic[L]):
         return Path(inspect.getfile(type(self))).with_suffix(".wgsl")
 
     def has_size(self, light: L) -> bool:
-        """Whether what it shadows softens with the distance from what casts the shadow."""
+        """Whether its shadows soften with the distance from the occluder."""
         return not self.narrow
 
     def parts(self, light: L) -> list[Light]:
-        """Lights that together are this one and see the head each for itself."""
+        """Lights that together make up this one, each with a shadow map of its own."""
         return [light]
 
     def check(self, light: L, head: Head, culprit: str) -> None:
-        """Raise DermisError where the light cannot stand."""
+        """Raise DermisError if the light cannot stand where it is."""
 
     def members(self, light: L, centre: Triple, distance: float) -> dict[str, Any]:
-        """Of the shader's `Light`, what other kinds have not.
+        """Members of the shader's `Light` that are this kind's own.
 
         centre : of the head [mm]
         distance : from the light to its target, 1 for parallel light [mm]
@@ -60,11 +60,11 @@ class Kind(Generic[L]):
 
 
 KINDS: Registry[Kind[Any]] = Registry("light", {name: f"{__package__}.{name}:KIND" for name in LIGHTS})
-"""By the names of scene files."""
+"""Keyed by the names of scene files."""
 
 
 def facing(light: PointLight, radiance: float, half_width: float, half_height: float) -> dict[str, Any]:
-    """Members of a light of some size that faces its target; it carries its radiance.
+    """Members of an area light that faces its target; `irradiance` holds its radiance.
 
     radiance : for an irradiance of 1 at the target [1/sr]
     half_width, half_height : [mm]

@@ -1,4 +1,4 @@
-"""The scene's lights as the shaders read them, and how each sees the head."""
+"""The scene's lights as the shaders read them, and their shadow views."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from dermis.frame.projection import (
     unit,
 )
 from dermis.gpu import ComputeProgram
+from dermis.mesh.outline import Outline
 from dermis.scene.environment import Environment
 from dermis.scene.lights import DirectionalLight, Light
 from dermis.scene.model import Scene
@@ -31,23 +32,23 @@ from dermis.scene.model import Scene
 Floats = NDArray[np.float64]
 _MOST_LIGHTS = 64
 _WIDEST_SHADOW_FILTER = 6
-_SIDE, _PART_SIDE = 4, 2  # a light of some size is shaded as SIDE x SIDE lights, a part as fewer
-_LINES, _LEAST_LINES, _SUN_LINES = 64, 12, 32  # of sight to places on a light, for its shadow
+_SIDE, _PART_SIDE = 4, 2  # an area light is shaded as SIDE x SIDE lights, each of several parts as fewer
+_LINES, _LEAST_LINES, _SUN_LINES = 64, 12, 32  # shadow rays to an area light, fewest to a part, to a sun
 
 
 def light_numbers() -> dict[str, float]:
-    """What lights.wgsl fills in."""
+    """Numbers that lights.wgsl fills in."""
     return {"most_lights": _MOST_LIGHTS, "most_lines": _LINES}
 
 
 def sun_lights(suns: tuple[Sun, ...], environment: Environment) -> tuple[DirectionalLight, ...]:
-    """The peaks of a panorama as lights, turned and exposed with it."""
+    """The peaks of a panorama as lights, with its rotation and exposure."""
     angle = np.radians(environment.rotation_degrees)
     lights = []
     for sun in suns:
         x, y, z = -sun.direction
         lights.append(
-            # Not checked: with the exposure it may be brighter than lights that are written down.
+            # Not checked: with the exposure it may be brighter than scene files allow.
             DirectionalLight.model_construct(
                 direction=(np.cos(angle) * x + np.sin(angle) * z, y, np.cos(angle) * z - np.sin(angle) * x),
                 irradiance=tuple(environment.exposure * sun.irradiance),
@@ -59,7 +60,7 @@ def sun_lights(suns: tuple[Sun, ...], environment: Environment) -> tuple[Directi
 
 
 def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
-    """Values of the `override`s of lighting.wgsl that what is lit and what lights it call for."""
+    """Values of the `override`s of lighting.wgsl that the scene needs."""
     kinds = {light.kind: KINDS[light.kind] for light in scene.lights}
     named = {
         "SHAPES": any(kinds[light.kind].has_size(light) for light in scene.lights),
@@ -70,10 +71,12 @@ def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
     return tuple((name, 1) for name, used in named.items() if used)
 
 
-def light_views(scene: Scene, size: int) -> list[ShadowView | None]:
-    """How each part of each light sees the head; None for those without shadows.
+def light_views(scene: Scene, outline: Outline, size: int) -> list[ShadowView | None]:
+    """The shadow view of each part of each light; None for those without shadows.
 
-    Raises DermisError for more lights than the shader holds, and for one that the head reaches into.
+    outline : of the head's shape
+
+    Raises DermisError for more lights than the shader holds, and for one inside the head's bounds.
     """
     numbered = [
         (f"light {number}", part)
@@ -88,11 +91,11 @@ def light_views(scene: Scene, size: int) -> list[ShadowView | None]:
         KINDS[light.kind].check(light, head, culprit)
     shadowed = [(culprit, light) for culprit, light in numbered if light.shadows]
     points = [(culprit, light) for culprit, light in shadowed if not isinstance(light, DirectionalLight)]
-    found = iter(point_views(points, head.centre_mm, head.mesh, size))
+    found = iter(point_views(points, head.centre_mm, outline, size))
 
     def view(light: Light) -> ShadowView:
         if isinstance(light, DirectionalLight):
-            return parallel_view(np.array(light.direction), head.mesh, size)
+            return parallel_view(np.array(light.direction), outline, size)
         return next(found)
 
     return [view(light) if light.shadows else None for _, light in numbered]
@@ -113,7 +116,7 @@ def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView 
         layer = next(layers) if view else -1
         one = {**none, **_members(light, scene.head.centre_mm, view, siblings), "layer": layer}
         made.append(tuple(one.values()))
-    lights[: len(made)] = made  # at once: each place in a record takes as long as a light's arithmetic
+    lights[: len(made)] = made  # at once: each access to a record takes as long as a light's arithmetic
     return record
 
 

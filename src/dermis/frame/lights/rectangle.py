@@ -1,4 +1,4 @@
-"""Rectangles as lights: how much light they give, and the parts that each see the head for themselves."""
+"""Rectangular lights: their irradiance, and parts with a shadow map each."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class _Rectangle(Kind[RectangleLight]):
     round = False
 
     def parts(self, light: RectangleLight) -> list[Light]:
-        """Rectangles of 0.35 of the distance in width and height, at most 3 x 3 of them."""
+        """Rectangles no wider or higher than 0.35 of the distance, but at most 3 x 3 of them."""
         path = np.subtract(light.target, light.position)
         right, up, _ = frame_of(path, _UP)
         sides, distance = np.array([light.width_mm, light.height_mm]), float(np.linalg.norm(path))
@@ -59,7 +59,7 @@ KIND = _Rectangle()
 
 
 def rectangle_irradiance(corners: Floats, normal: Floats) -> float:
-    """Irradiance from an even polygon of radiance 1 on a surface at the origin that sees all of it [-].
+    """Irradiance from a uniform polygon of radiance 1 on a surface at the origin that sees all of it [-].
 
     corners : (k, 3) in order around the polygon
     normal : (3,) of the surface

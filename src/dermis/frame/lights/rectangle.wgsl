@@ -1,4 +1,4 @@
-// An even rectangle, as points in the middles of its parts that shine as Lambert's law has it.
+// A uniform rectangle, as Lambertian points in the middles of its parts.
 
 fn rectangle_incident(light: Light, p: vec3f, part: u32) -> Incident {
     let place = place_of(part, light.side);

@@ -1,4 +1,4 @@
-"""An evenly bright sphere."""
+"""A uniformly bright sphere."""
 
 from __future__ import annotations
 

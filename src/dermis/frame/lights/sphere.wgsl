@@ -1,5 +1,5 @@
-// An even sphere: parts of the cone that it fills, equal as seen from its foot, the square laid on its disc [ShirleyChiu1997].
-// Together they light any surface that sees all of the sphere as much as the sphere does.
+// A uniform sphere: directions of equal projected solid angle in its cone, from the concentric map of the square to the
+// disc [ShirleyChiu1997]. Together they light any surface that sees all of the sphere as much as the sphere does.
 
 fn sphere_incident(light: Light, p: vec3f, part: u32) -> Incident {
     let d = light.position - p;

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from dermis.frame.atlas_textures import atlas_numbers
 from dermis.frame.levels import FLOATS, HALVES, usual_texel
 from dermis.frame.lights import light_numbers
 from dermis.frame.lights.kind import light_shaders
@@ -20,20 +21,21 @@ TECHNIQUES = PASSES.parent / "techniques"
 SHARED_SHADERS = ShaderFolder(
     PASSES.parent / "wgsl",
     lists={"lights": light_shaders, "lobes": lobe_shaders},
-    numbers=lambda: {**light_numbers(), **surface_numbers()},
+    numbers=lambda: {**light_numbers(), **surface_numbers(), **atlas_numbers()},
 )
 TILE = 16
-"""Side of workgroups that do little: smaller ones are done before the H200 has started the next."""
+"""Side of workgroups that do little: smaller ones finish before the H200 has started the next."""
 _LEVELS = PASSES / "levels"
 _SOURCES = {FLOATS: _LEVELS / "loaded", HALVES: _LEVELS / "filtered"}
 _STORES = {FLOATS: _LEVELS / "floats", HALVES: _LEVELS / "halves"}
+_EACH, _ROW = 64, 32768  # invocations of a workgroup as in each.wgsl; workgroups in a row, at most 65535
 _STRIP = 16  # pixels of an invocation on software adapters, see shade.wgsl
 
 
 def shader_folders(source: str = "", store: str = "") -> tuple[Folder, ...]:
     """Where includes are looked up.
 
-    source, store : formats of the blurred light that the shader reads and stores, if it does
+    source, store : formats in which the shader reads and stores blurred light, if it does
     """
     levels = [_SOURCES[source]] if source else []
     levels += [_STORES[store]] if store else []
@@ -45,7 +47,7 @@ def program(
 ) -> ComputeProgram:
     """The shader of that name among the passes, or at that path, with pipeline constants.
 
-    What suits the device is added to them; see `shader_folders` for the formats.
+    The device's own constants are added to them; see `shader_folders` for the formats.
     """
 
     def make() -> ComputeProgram:
@@ -58,19 +60,25 @@ def program(
 def suited(
     device: Device, path: Path, folders: Sequence[Folder], constants: Constants = ()
 ) -> dict[str, float]:
-    """Pipeline constants, with those that the shader has of what suits the device."""
+    """Pipeline constants, with the device's own that the shader declares."""
     return declared(path, folders, device_constants(device)) | dict(constants)
 
 
+def each(count: int) -> tuple[int, int, int]:
+    """Workgroups of shaders that have an invocation for each of a list, see each.wgsl."""
+    groups = max(1, -(-count // _EACH))
+    return min(groups, _ROW), -(-groups // _ROW), 1
+
+
 def registered() -> int:
-    """Another number whenever a light or a lobe has been added to the shaders, or taken away."""
+    """A number that changes whenever a light or a lobe is added to the shaders or removed."""
     return LIGHTS.changes + MODELS.changes
 
 
 def device_constants(device: Device) -> Constants:
-    """Pipeline constants that suit the device, for shaders that have them.
+    """Pipeline constants that suit the device, for shaders that declare them.
 
-    GPUs read buffers faster. Software adapters read textures faster, pass over lights in the dark one by one,
+    GPUs read buffers faster. Software adapters read textures faster, skip lights behind each point's surface,
     and shade columns of pixels; see geometry.wgsl, lighting.wgsl and shade.wgsl.
     """
     if device.adapter.kind == "CPU":
@@ -79,7 +87,7 @@ def device_constants(device: Device) -> Constants:
 
 
 def warm_up(device: Device) -> None:
-    """Begin to compile what most frames need, while others load what it is to work on."""
+    """Start compiling what most frames need, while other threads load the scene."""
     for name in ("shade.wgsl", "surface_texels.wgsl", "shadow_bounds.wgsl", "post.wgsl", "pack.wgsl"):
         program(device, name)
     texel = usual_texel(device)

@@ -1,4 +1,4 @@
-"""Two layouts blended so that neither's seams are seen: the talk's several uv sets."""
+"""Two layouts blended so that neither's seams show: the talk's several uv sets."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from dermis.gpu import Recorder
 
 
 def draw(graph: Recorder, first: AtlasLayout, second: AtlasLayout, into: Any) -> None:
-    """The first layout's light, near its edges the second's, in a texture of the first's atlas."""
+    """Blend the first layout's light, near its edges the second's, into a texture of the first's atlas."""
     bound = {
-        **second.lit,  # whose triangle table tells the second layout's places
+        **second.lit,  # whose triangle table has places in the second layout
         **first.atlas.resources,
         "first": first.scattered,
         "second": second.scattered,

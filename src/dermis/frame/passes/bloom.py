@@ -1,4 +1,4 @@
-"""Light that the lens scatters around: ever wider Gaussians of the whole picture, without a threshold."""
+"""Bloom, light that the lens scatters: ever wider Gaussians of the whole picture, without a threshold."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _COARSEST = 4  # halvings short of one pixel: the widest Gaussian spans a sixtee
 
 @dataclass(frozen=True, eq=False)
 class Glow:
-    """Space for a picture's halvings, for the sums on the way back, and for the result."""
+    """Textures for a picture's halvings, for the sums on the way back up, and for the result."""
 
     halved: list[Any]
     sums: list[Any]
@@ -30,7 +30,7 @@ def make_glow(device: Device, size: tuple[int, int]) -> Glow:
 
 
 def draw(graph: Recorder, glow: Glow, picture: Any, share: float) -> Any:
-    """The picture with `share` of its light scattered, in a texture of `glow`; none of it is lost."""
+    """The picture with `share` of its light scattered, none of it lost; a texture of `glow`."""
     source = picture
     for halved in glow.halved:
         _step(graph, 0, source, source, halved, 0.0, 0.0)

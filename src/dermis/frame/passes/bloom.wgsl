@@ -1,4 +1,4 @@
-// One step of the bloom: to half the size under a binomial filter, or a picture plus a smaller one made as large.
+// One step of the bloom: halves a picture by a binomial filter, or adds a smaller one, enlarged.
 //#include "bilinear.wgsl"
 
 override WIDEN: bool = false; // false: halve; true: add the smaller picture

@@ -18,9 +18,9 @@ def make_sum(device: Device, side: int) -> Any:
 
 
 def draw(graph: Recorder, levels: Levels, blur: Blur, into: Any, transmitted: Any = None) -> None:
-    """Sum of the blurred layers, which start after the unblurred one, from coarse resolution to fine.
+    """Sum the blurred layers, all but the first, from coarse resolution to fine.
 
-    transmitted : texture of what comes through thin parts, None without any
+    transmitted : texture of the light through thin parts, None without any
     """
     device, blurred = graph.device, blur.halvings[1 : len(blur.weight) + 1]
     coarsest = max(blurred)
@@ -45,16 +45,16 @@ def draw(graph: Recorder, levels: Levels, blur: Blur, into: Any, transmitted: An
 
 
 def nothing(device: Device) -> Any:
-    """Stands for what comes through where nothing does."""
+    """Placeholder for transmitted light where there is none."""
     return device.shared("nothing", lambda: make_texture(device, (1, 1), "rgba32float", use="map"))
 
 
 def _program(device: Device, texel: str, between: bool, coarser: bool, transmitted: bool) -> ComputeProgram:
-    """The pass into the space between, or into the sum of 32-bit floats."""
+    """The pass into the texture between passes, or into the sum of 32-bit floats."""
     constants = (("COARSER", coarser), ("TRANSMITTED", transmitted))
     return program(device, "combine.wgsl", constants, texel, texel if between else FLOATS)
 
 
 def _finest_for(transmitted: Any, size: int, coarsest: int) -> int:
-    """The resolution at which what comes through is added: half the finest one, if it has no finer detail."""
+    """Halvings of the resolution at which transmitted light is added: 1 if it has no finer detail, else 0."""
     return int(transmitted is not None and coarsest > 0 and 2 * transmitted.size[0] <= size)

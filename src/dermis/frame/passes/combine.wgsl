@@ -1,24 +1,23 @@
-// The weighted sum of the blurred levels of one resolution, of the sum of the coarser ones, and of what comes through
-// thin parts.
+// The weighted sum of the blurred levels of one resolution, the sum of the coarser ones, and the light through thin parts.
 //#include "source.wgsl"
 //#include "store.wgsl"
 //#include "bilinear.wgsl"
 
 override COARSER: bool = false; // whether there are levels of less resolution
-override TRANSMITTED: bool = false; // whether something comes through
+override TRANSMITTED: bool = false; // whether light comes through thin parts
 
 struct Weights {
-    first: u32, // layer
+    first: u32, // first layer
     count: u32,
     mip: i32, // of these layers
-    scale: f32, // of what is stored over the layers
-    through: f32, // of what comes through
+    scale: f32, // factor from the layers to what is stored
+    through: f32, // factor of the transmitted light
     weight: array<vec4f, 24>,
 }
 
 @group(0) @binding(0) var<uniform> weights: Weights;
 @group(0) @binding(1) var levels: texture_2d_array<f32>;
-@group(0) @binding(2) var transmitted: texture_2d<f32>; // light, and 1 where there is surface; maybe fewer texels
+@group(0) @binding(2) var transmitted: texture_2d<f32>; // light, and 1 where there is surface; maybe at less resolution
 // source: the sum of the coarser levels, and 1 where there is surface
 
 @compute @workgroup_size(16, 16)
@@ -29,7 +28,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     var sum = vec4f(0.0);
     var k = 0u;
-    loop { // left at its end, as in lighting.wgsl
+    loop { // with its test at the end, as in lighting.wgsl
         sum += weights.weight[k] * textureLoad(levels, id.xy, weights.first + k, weights.mip);
         k++;
         if (k >= weights.count) {

@@ -24,7 +24,7 @@ from dermis.gpu import ComputeProgram, Device, Recorder
 from dermis.gpu.textures import texture_from
 
 EDGES = ("repeated", "cleared", "skipped")
-# Variance that a halved resolution adds: the mean of four texels, and reading between such means [texel^2].
+# Variance that halving the resolution adds: averaging four texels, and interpolating the means [texel^2].
 _AVERAGED, _READ = 1 / 16, 3 / 16
 
 
@@ -79,7 +79,7 @@ def _kernel_texture(device: Device) -> Any:
 
 
 def _added(variance_mm2: NDArray[np.float64], halvings: tuple[int, ...]) -> Iterator[dict[str, float]]:
-    """What each level adds to the one before, and halving to both, as the shader's struct Spread has it."""
+    """Members of the shader's `Spread`: variance that levels add to the one before, and halving to both."""
     before = owed = paid = 0.0
     for variance, (finer, here) in zip(variance_mm2, pairwise(halvings), strict=True):
         halved = _AVERAGED + _READ if here > finer else 0.0

@@ -1,6 +1,7 @@
-// One axis of one Gaussian: spreads light along u, or along v as the surface has it, by a variance given in mm^2.
+// One axis of one Gaussian: blurs light along u, or along v as it leans on the surface, by a variance given in mm^2.
 //#include "source.wgsl"
 //#include "store.wgsl"
+//#include "reach.wgsl"
 
 override AXIS: u32 = 0u; // 0 along u, 1 along v
 override SHEARED: bool = true; // whether u and v may meet at other than right angles
@@ -9,19 +10,19 @@ override EDGE: u32 = 0u; // what lies beyond a chart's edge
 override ROWS_PER_UNIT: f32; // rows of the kernel table per unit of variance
 override WIDEST: f32; // variance of the table's last row [step^2]
 
-const REPEATED: u32 = 0u; // the edge repeats itself: nothing from beyond it bleeds in
-const CLEARED: u32 = 1u; // whatever the texture holds, the clear colour where that is nothing
-const SKIPPED: u32 = 2u; // whatever the texture holds, left out where that is nothing
+const REPEATED: u32 = 0u; // the edge is repeated: nothing bleeds in from beyond it
+const CLEARED: u32 = 1u; // blurs read across the edge, and the clear colour from empty texels
+const SKIPPED: u32 = 2u; // blurs read across the edge, and leave out empty texels
 const WIDE_TRUNCATION: f32 = 4.0; // beyond the table, where the sampled Gaussian needs no correction
-const SMOOTH: f32 = 1.6; // widest step over the source's width: its ripple stays under 0.1 %
+const SMOOTH: f32 = 1.6; // largest step over the source's standard deviation: ripple stays under 0.1 %
 
 struct Spread {
     variance_mm2: f32, // to be added
     before_mm2: f32, // already in the source
-    resampled: f32, // of it what going to this resolution and back adds [texel^2]
-    to_come: f32, // what reading between texels at the end will add to the source [texel^2]
-    owed: f32, // what the same added to the level before [texel^2]
-    paid_mm2: f32, // and the variance it was taken off; the rest is taken off now
+    resampled: f32, // part of it that resampling to this resolution and back adds [texel^2]
+    to_come: f32, // what interpolation at the end will add to the source [texel^2]
+    owed: f32, // what resampling added to the level before [texel^2]
+    paid_mm2: f32, // variance of that level, from which it was taken off; any rest is taken off now
     truncation: f32, // taps reach this many standard deviations
     clear: vec3f, // the light that empty texels show, as the levels have light
 }
@@ -30,7 +31,7 @@ struct Spread {
 struct Axis {
     variance: f32, // to be added
     before: f32, // already in the source
-    lean: f32, // texels of u for each one of v
+    lean: f32, // texels along u for each one along v
 }
 
 struct Kernel {
@@ -40,18 +41,18 @@ struct Kernel {
 }
 
 @group(0) @binding(0) var<uniform> spread: Spread;
-// Halves: texels per mm along u, v; cosine between them; 1 in the gutter. Then texels on the same chart: left, right, up, down.
-@group(0) @binding(1) var sheet_map: texture_2d<u32>;
+@group(0) @binding(1) var stretch_map: texture_2d<f32>; // texels per mm along u and v; cosine between them
+@group(0) @binding(2) var reach_map: texture_2d<u32>; // as reach.wgsl reads it
 @group(0) @binding(3) var kernel_table: texture_2d<f32>; // row: variance, column: taps on each side; here and in the next row
 
-// Variance that is there already, or will be, where mm^2 have so many texel^2: where texels are large, halving the
-// resolution adds more than the blur it is part of may have.
+// Variance of resampling, which the blur need not add [texel^2]; upright: texel^2 in a mm^2. Where texels are large, it may
+// exceed the variance of the blur itself, and the rest is taken off the next one.
 fn taken_off(upright: f32) -> f32 {
     return spread.resampled + max(spread.owed - spread.paid_mm2 * upright, 0.0);
 }
 
-// Any covariance is that of a blur along u and one along a leaning v [Geusebroek2003]: the lower right element is the
-// latter's, and what that leaves of the upper left one is the former's.
+// Any covariance is that of a blur along u and one along a leaning v [Geusebroek2003]: the latter has the lower right
+// element, and the former what remains of the upper left one.
 fn along_v(stretch: vec4f) -> Axis {
     let upright = stretch.xy * stretch.xy / (1.0 - stretch.z * stretch.z);
     var variance = spread.variance_mm2 * upright.y;
@@ -94,7 +95,7 @@ fn first_ratio(taps: i32, variance: f32) -> f32 {
     return mix(ratio.x, ratio.y, fract(row));
 }
 
-// Variance that reading between two texels of u will add on the way along v: the mean of f (1 - f) over the taps.
+// Variance along u that interpolation will add in the pass along v: the mean of f (1 - f) over the taps.
 fn added_by_lean(v: Axis) -> f32 {
     let kernel = kernel_of(v.variance, tap_step(v));
     var ratio = kernel.q;
@@ -130,7 +131,7 @@ fn texel(at: vec2i) -> vec4f {
     return shown(textureLoad(source, clamp(at, vec2i(0), vec2i(textureDimensions(source)) - 1), 0));
 }
 
-// The light some texels from here along the axis; its fourth component is the share of it that is surface.
+// Light `offset` texels from here along the axis; its alpha is the share that is surface.
 fn tap(here: vec2f, offset: f32, lean: f32) -> vec4f {
     if (AXIS == 1u && SHEARED) {
         return shown(source_between(here + offset * vec2f(lean, 1.0)));
@@ -145,15 +146,14 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let here = vec2i(id.xy);
     // All that is read here is asked for at once: what follows is short, and would wait for each by itself.
-    let sheet = textureLoad(sheet_map, here, 0);
-    let stretch = vec4f(unpack2x16float(sheet.x), unpack2x16float(sheet.y));
+    let stretch = textureLoad(stretch_map, here, 0);
+    let reach = textureLoad(reach_map, here, 0);
     var sum = texel(here);
     var limit = vec2f(1e6);
     if (EDGE == REPEATED) {
-        let reach = select(sheet.w, sheet.z, AXIS == 0u);
-        limit = vec2f(vec2u(reach & 0xffffu, reach >> 16u));
+        limit = reach_along(reach, AXIS);
     }
-    if (AXIS == 1u && stretch.w > 0.0) {
+    if (AXIS == 1u && is_gutter(reach)) {
         return; // the gutter is filled from where its light belongs
     }
     if (stretch.x == 0.0) {
@@ -176,7 +176,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var weight = 1.0;
     var offset = 0.0;
     var n = 0;
-    loop { // left at its end, as in lighting.wgsl; without taps q is 0
+    loop { // with its test at the end, as in lighting.wgsl; without taps q is 0
         weight *= ratio;
         ratio *= growth;
         offset += step;

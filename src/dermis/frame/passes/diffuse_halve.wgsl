@@ -1,4 +1,4 @@
-// Light at half the resolution: the mean of those of four texels that are surface.
+// Light at half the resolution: the mean of the texels with surface among each four.
 //#include "source.wgsl"
 //#include "store.wgsl"
 

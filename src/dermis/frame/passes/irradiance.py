@@ -21,7 +21,7 @@ def draw(
 ) -> None:
     """Irradiance that passes the surface, times albedo^mix, into a texture of the atlas' size.
 
-    constants : of the lights
+    constants : pipeline constants of the lights
     texel : the texture's format
     scale : factor of what is stored
     """

@@ -4,7 +4,7 @@
 //#include "store.wgsl"
 
 struct Entering {
-    scale: f32, // of what is stored over the light
+    scale: f32, // factor from light to what is stored
 }
 
 @group(0) @binding(30) var surfaces: texture_2d_array<u32>; // as surface_texels.wgsl packs them
@@ -23,7 +23,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let surface = unpack_surface(packed);
     let open = open_at((vec2f(id.xy) + 0.5) / vec2f(size));
-    // The view is of no account: what is reflected is left out, and the compiler leaves out its computation.
+    // Any view will do: the reflection is not used, so the compiler drops it.
     let lit = light_up(unpack_point(packed), surface, surface.normal, open);
     store(id.xy, vec4f(entering.scale * lit.entered * share_of(surface.colour, skin.mix), 1.0));
 }

@@ -7,49 +7,55 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.geometry import HeadResources
+from dermis.atlas.atlas import Atlas
+from dermis.frame.geometry import upload_geometry
 from dermis.frame.passes import program
+from dermis.frame.passes.shape import rest_shape
 from dermis.frame.passes.visibility_buffer import draw_layers, make_layers
 from dermis.frame.projection import ShadowView, parallel_view, shadow_layers
+from dermis.frame.shape import shape_tables
 from dermis.gpu import ComputeProgram, Device, Frame
 from dermis.gpu.program import Resources
-from dermis.mesh.mesh import Mesh
+from dermis.mesh.head import Head
 
 Floats = NDArray[np.float64]
 DIRECTIONS = 128
 MAP_SIZE = 512
 FORM = f"1 {DIRECTIONS} {MAP_SIZE}"
-"""Differs when baking gives other results."""
+"""To be changed when baking gives other results."""
 _BATCH = 32  # depth maps at a time
 
 
 def bake_occlusion(
     device: Device,
-    mesh: Mesh,
+    head: Head,
+    atlas: Atlas,
     lit: Resources,
-    atlas: Any,
+    texels: Any,
     side: int,
     directions: int = DIRECTIONS,
     map_size: int = MAP_SIZE,
 ) -> NDArray[np.float32]:
     """(rows, side) open share of the sky, weighted by the cosine, 0 to 1; NaN where there is no surface.
 
-    The mesh is seen from all around, and each place counts where it is in sight.
+    Depth maps are drawn from all around, and each place counts those in which it is visible.
 
-    lit : what the lighting passes read
-    atlas : texture of texels, of which side x side are baked, then the vertices, row by row
+    lit : what the lighting passes read, the surface aside
+    texels : texture of the atlas' texels, of which side x side are baked, then the vertices, row by row
     """
+    mesh, frame = head.mesh, Frame(device)
+    shape = rest_shape(device, shape_tables(device, head), head.positions_mm)
+    resting = upload_geometry(device, mesh, atlas, shape)
     shader, towards = program(device, "occlusion.wgsl"), fibonacci_sphere(directions)
     rows = side - (-len(mesh.positions) // side)
     sums = device.buffer(np.zeros((rows, side, 2), np.float32), "STORAGE")
     layers = make_layers(device, (map_size, map_size), _BATCH, triangles=False)
-    head, frame = HeadResources(dict(lit), len(mesh.triangles)), Frame(device)
     for first in range(0, len(towards), _BATCH):
-        views = [parallel_view(-d, mesh, map_size) for d in towards[first : first + _BATCH]]
-        draw_layers(frame, "occlusion", layers, shadow_layers(views), head)
+        views = [parallel_view(-d, mesh.outline, map_size) for d in towards[first : first + _BATCH]]
+        draw_layers(frame, "occlusion", layers, shadow_layers(views), resting)
         sky = shader.record("Sky", directions=len(views), side=side, vertices=len(mesh.positions))
         own = {"lights": _lights(shader, views), "shadow_maps": layers.texture, "sky": sky}
-        bound = {**lit, **own, "atlas": atlas, "open": sums}
+        bound = {**lit, **resting.resources, **own, "atlas": texels, "open": sums}
         frame.compute("occlusion", shader, bound, (side, rows))
     frame.submit()
     raw = np.frombuffer(device.handle.queue.read_buffer(sums), np.float32).reshape(rows, side, 2)

@@ -1,4 +1,4 @@
-// How much of the sky texels of the atlas and vertices see: cosines of the directions that are free, and of all.
+// Open sky at texels of the atlas and at vertices: sums of the cosines of the free directions, and of all.
 //#include "geometry.wgsl"
 //#include "skin.wgsl"
 //#include "lights.wgsl"

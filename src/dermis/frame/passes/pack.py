@@ -15,16 +15,16 @@ from dermis.gpu import Device, Graph
 from dermis.gpu.readback import Fetched
 
 _ROW = 1024  # as in the shaders
-_PIXELS, _WORDS = 4, 3  # of one invocation that packs bytes
+_PIXELS, _WORDS = 4, 3  # read and written by one invocation that packs bytes
 _CHANNELS = 3
 
 
 @dataclass(frozen=True)
 class Leaving:
-    """A picture that is not here yet.
+    """A picture on its way from the device.
 
     size : (width, height) [pixel]
-    kind : of its numbers
+    kind : dtype of its numbers
     """
 
     fetched: Fetched
@@ -40,7 +40,7 @@ class Leaving:
 
 
 def draw(graph: Graph, picture: Picture, *, linear: bool = False) -> Leaving:
-    """The picture as the passes so far leave it, on its way to NumPy.
+    """Pack the picture and start reading it back to NumPy.
 
     linear : floats rather than bytes
 
@@ -67,7 +67,7 @@ def _check(device: Device, size: int, pixels: int) -> None:
 
 
 def _packed(device: Device, picture: Picture, words: int) -> Any:
-    """Space for words of 4 bytes, which lives as long as the picture."""
+    """A buffer of words of 4 bytes, which lives as long as the picture."""
     if words not in picture.packed:
         picture.packed[words] = device.buffer(np.zeros(words, np.uint32), "STORAGE")
     return picture.packed[words]

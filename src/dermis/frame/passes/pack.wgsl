@@ -1,4 +1,4 @@
-// Pixels of four bytes as rows of three, without gaps, so that fewer bytes are read back and none is moved again.
+// Pixels of four bytes as rows of three, without gaps, so that fewer bytes are read back and none is copied again.
 
 const ROW: u32 = 1024u; // invocations a row
 

@@ -14,9 +14,9 @@ _TONES = ("none", "filmic", "neutral")  # numbered as in tone.wgsl
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """Radiance as shaded; exposed and linear; exposed, sRGB, in bytes.
+    """Textures of an image: radiance as shaded; exposed, linear; exposed, in sRGB bytes.
 
-    packed : buffers in which it leaves the device, by their words
+    packed : buffers for reading it back, by their number of words
     """
 
     radiance: Any

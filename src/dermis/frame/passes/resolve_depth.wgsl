@@ -1,4 +1,4 @@
-// Depths from the buffer where they were found into the layers of a texture; the buffer is left empty for the next time.
+// Copies depths from the compute pass' buffer to the layers of a texture, and empties the buffer for the next frame.
 //#include "resolve.wgsl"
 
 @group(0) @binding(31) var<storage, read_write> nearness: array<u32>;

@@ -1,4 +1,4 @@
-// Triangles from the buffer where they were found into the layers of a texture; the buffers are left empty for next time.
+// Copies triangles from the compute pass' buffers to the layers of a texture, and empties the buffers for the next frame.
 //#include "resolve.wgsl"
 
 @group(0) @binding(31) var<storage, read_write> nearness: array<u32>;

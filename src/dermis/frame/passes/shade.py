@@ -12,7 +12,7 @@ from dermis.gpu.program import Resources
 
 
 def shade_program(device: Device, constants: Constants = ()) -> ComputeProgram:
-    """The pass' shader, whose structs the records of lights, skin and camera have too.
+    """The pass' shader, which also has the structs of the lights', skin's and camera's records.
 
     constants : of the lights, the surface and the technique
     """
@@ -34,10 +34,10 @@ def draw(
     view : record of the shader's struct Shade
     constants : of the lights, the surface and the technique
     scattered : light below the skin by place on the atlas, or the tables of pre-integrated skin
-    apart : layers for the light below the skin and how it leaves, which the radiance is then without
+    apart : layers for the light below the skin and how it leaves, which the radiance then lacks
     """
     device, (width, height) = graph.device, picture.size
-    bound = {**lit, "shade": view, "seen": visibility.texture, "scattered": scattered}
+    bound = {**lit, "shade": view, "visibility_buffer": visibility.texture, "scattered": scattered}
     bound |= {"image": picture.radiance, "apart": apart or nothing_apart(device)}
     shader = shade_program(device, constants)
     graph.compute("shade", shader, bound, (width, -(-height // int(shader.constants.get("STRIP", 1)))))
@@ -45,5 +45,5 @@ def draw(
 
 
 def nothing_apart(device: Device) -> Any:
-    """Stands for the layers where nothing is kept apart."""
+    """Placeholder for the layers where no light is kept apart."""
     return device.shared("nothing apart", lambda: make_texture(device, (1, 1), "rgba32float", layers=2))

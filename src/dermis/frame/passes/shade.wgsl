@@ -1,16 +1,16 @@
-// The image: light that scattered below, relit at its finest level, under the white lobe of the surface.
+// The image: light scattered below the skin, relit at its finest level, under the white lobe of the surface.
 //#include "lighting.wgsl"
 //#include "pre_integrated.wgsl"
 //#include "sample_bits.wgsl"
 //#include "shaded.wgsl"
 
 override SPLIT: bool = false; // whether light below the skin is kept apart, to spread over the picture
-// Pixels of an invocation, one below the other. Software adapters run both sides of every branch for all of a vector's pixels
-// as long as one of them needs it: there each pixel goes on to the next when it is done, past those that see nothing.
+// Pixels of an invocation, one below the other. Software adapters run a branch for all lanes of a vector as long as one of
+// them needs it: with a strip, each lane goes on to its next pixel that sees the head when it is done with one.
 override STRIP: u32 = 1u;
 
 const EYE_ROUGHNESS: f32 = 0.1; // plain materials are wet: eyeballs, teeth
-const FINEST_RATIO: f32 = 4.0; // longest over shortest side of a footprint that one map sample may stand for
+const FINEST_RATIO: f32 = 4.0; // longest over shortest side of a footprint that one map sample may cover
 
 struct Shade {
     eye: vec3f,
@@ -20,7 +20,7 @@ struct Shade {
     up: vec3f,
     relit: vec3f, // weight of the level that is not blurred
     total: vec3f, // weight of all levels
-    shown: vec2f, // factors of the light from below and of that off the surface
+    shown: vec2f, // factors of the light from below and of the reflected light
     pre: PreIntegrated,
     background: vec3f,
     material_colour: array<vec4f, 64>,
@@ -28,10 +28,10 @@ struct Shade {
 }
 
 @group(0) @binding(30) var<uniform> shade: Shade;
-@group(0) @binding(31) var seen: texture_2d_array<u32>;
-@group(0) @binding(32) var scattered: texture_2d<f32>; // per texel of the atlas, blurred and combined; or pre-integrated
+@group(0) @binding(31) var visibility_buffer: texture_2d_array<u32>; // triangle + 1 of each sample
+@group(0) @binding(32) var scattered: texture_2d<f32>; // light on the atlas, blurred and combined; or pre-integrated tables
 @group(0) @binding(33) var image: texture_storage_2d<rgba32float, write>;
-@group(0) @binding(34) var apart: texture_storage_2d_array<rgba32float, write>; // light below, depth; its share that leaves
+@group(0) @binding(34) var apart: texture_storage_2d_array<rgba32float, write>; // light below, depth; share of it that leaves
 
 // t: corners of the triangle, w: barycentric weights
 fn open_sky(point: Point, t: vec4u, w: vec3f) -> f32 {
@@ -57,9 +57,9 @@ fn shaded_skin(point: Point, surface: Surface, lit: Lit, out: f32, footprint: f3
     var over = shade.shown.y * lit.reflected * mix(vec3f(1.0), surface.colour, skin.tint);
     var leaving = shade.shown.x * out * share_of(surface.colour, 1.0 - skin.mix);
     if (HALF_SPACE) {
-        // What is more than the mean has scattered once and is spread no further: at grazing angles it is many times what
-        // else is below, and light from around must not be multiplied by that.
-        let beyond = turned(lit, shade.total * share, below);
+        // Light above the mean has scattered once and is not blurred: at grazing angles it is many times the rest, and
+        // blurred light from around must not be multiplied by it.
+        let beyond = directional_share(lit, shade.total * share, below);
         over += below * leaving * max(beyond, vec3f(0.0));
         leaving *= 1.0 + min(beyond, vec3f(0.0));
     }
@@ -89,7 +89,7 @@ fn ray_through(place: vec2f, size: vec2f) -> vec3f {
     return shade.forward + ndc.x * shade.right + ndc.y * shade.up;
 }
 
-// share: part of the pixel that this shading stands for; maps are filtered over it.
+// share: part of the pixel that is shaded at once; maps are filtered over it.
 fn shaded(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Shaded {
     let t = triangle_at(triangle);
     let a = corner_at(t.x);
@@ -126,17 +126,17 @@ fn shaded(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Shaded {
     return shaded_skin(point, surface, lit, out, footprint, open);
 }
 
-// What some samples of a pixel see together.
+// Samples of a pixel that see the same triangle.
 struct Part {
     triangle: u32,
     place: vec2f, // in the image
     share: f32, // of the pixel; 0 for nothing
 }
 
-// A pixel on its way.
+// A pixel being shaded.
 struct Pixel {
     at: vec2u,
-    left: vec2u, // samples that have not been looked at
+    left: vec2u, // samples that have not been shaded
     sum: vec4f, // radiance and coverage
     skin: PixelSkin,
 }
@@ -150,11 +150,11 @@ fn next_part(pixel: ptr<function, Pixel>) -> Part {
     let at = (*pixel).at;
     var left = (*pixel).left;
     var s = select(32u + firstTrailingBit(left.y), firstTrailingBit(left.x), left.x != 0u);
-    let triangle = textureLoad(seen, at, s, 0).x;
+    let triangle = textureLoad(visibility_buffer, at, s, 0).x;
     var place = vec2f(0.0);
     var n = 0u;
     loop {
-        if (textureLoad(seen, at, s, 0).x == triangle) {
+        if (textureLoad(visibility_buffer, at, s, 0).x == triangle) {
             place += shade.jitter[s].xy;
             n++;
             left &= ~bit_of(s);
@@ -169,7 +169,7 @@ fn next_part(pixel: ptr<function, Pixel>) -> Part {
     return Part(triangle - 1u, vec2f(at) + place / f32(n), share);
 }
 
-// The next part that shows something, here or further down; pixels on the way are finished.
+// The next part that sees the head, in this pixel or further down the strip; pixels left behind are finished.
 fn find(pixel: ptr<function, Pixel>, end: u32) -> Part {
     loop {
         if (all((*pixel).left == vec2u(0u))) {
@@ -190,7 +190,7 @@ fn find(pixel: ptr<function, Pixel>, end: u32) -> Part {
 fn finish(pixel: Pixel) {
     var sum = pixel.sum;
     if (SPLIT) {
-        // What is taken out here comes back spread; light of a pixel's lesser surfaces stays where it is.
+        // The light taken out here comes back spread; that of the pixel's lesser surfaces stays where it is.
         let skin = pixel.skin;
         let held = max(skin.share, 1e-6);
         sum -= vec4f(skin.below * skin.leaving / held, 0.0);
@@ -213,7 +213,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var pixel = pixel_at(first);
     var part = find(&pixel, end);
     if (part.share == 0.0) {
-        return; // all of the strip is behind the head, and the next one is another's
+        return; // no pixel of the strip sees the head
     }
     loop {
         let one = shaded(part.triangle, part.place, part.share, vec2f(size));

@@ -1,15 +1,15 @@
-// The nearest depth in squares of 4, 8, 16, 32 and 64 texels of each shadow map, to pass over what cannot hide a light.
-// The squares of 4 texels lie at the left, below each other on their right the larger ones.
+// The nearest depth in squares of 4, 8, 16, 32 and 64 texels of each shadow map, to skip those that cannot hide a light.
+// The squares of 4 texels lie on the left, the larger ones below each other on their right.
 
 @group(0) @binding(0) var maps: texture_2d_array<f32>;
 @group(0) @binding(1) var maps_sampler: sampler; // non-filtering
 @group(0) @binding(2) var bounds: texture_storage_2d_array<r32float, write>;
 
-const SIDE: u32 = 16u; // squares of 4 texels that a workgroup takes
+const SIDE: u32 = 16u; // squares of 4 texels along the side of a workgroup
 
 var<workgroup> nearest: array<f32, 256>;
 
-// Of 4 x 4 texels; beyond the map those at its edge stand in.
+// Nearest depth of 4 x 4 texels; beyond the map its edge is repeated.
 fn nearest_in_square(square: vec2u, layer: u32) -> f32 {
     let size = vec2f(textureDimensions(maps));
     var found = vec4f(0.0);

@@ -19,7 +19,7 @@ _DEPTH_BYTES = 4
 class ShadowMaps:
     """A depth layer for each light.
 
-    bounds : texture of the nearest depths in ever larger squares of each layer, for lights of some size
+    bounds : texture of the nearest depths in ever larger squares of each layer, for area lights
     """
 
     layers: Layers
@@ -46,7 +46,7 @@ def make_shadow_maps(device: Device, layers: int, size: int) -> ShadowMaps:
 def draw(graph: Drawer, maps: ShadowMaps, views: Views, head: HeadResources, bounded: bool = True) -> None:
     """Draw the depth that each light sees.
 
-    bounded : whether some light has a size, so that the bounds are read
+    bounded : whether there are area lights, which read the bounds
     """
     if not len(views.clips):
         return
@@ -59,5 +59,5 @@ def draw(graph: Drawer, maps: ShadowMaps, views: Views, head: HeadResources, bou
 
 
 def _squares(size: int) -> int:
-    """Squares of 4 texels along a side of the map, in whole squares of 64."""
+    """Number of squares of 4 texels along a side of the map, rounded up to whole squares of 64."""
     return 16 * -(-size // 64)

@@ -1,19 +1,18 @@
-"""The gutters of an atlas: texels beyond a chart's edge take the light of where the surface goes on."""
+"""The gutters of an atlas: texels beyond a chart's edge take the light from where the surface continues."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from dermis.frame.atlas_textures import AtlasTextures
+from dermis.frame.atlas_textures import ENTRY_BYTES, AtlasTextures
 from dermis.frame.passes import TILE, program
 from dermis.gpu import Recorder
 
 _ROW = 1024  # as in gutter.wgsl
-_BYTES = 16  # of a texel of the gutter in its list
 
 
 def draw(graph: Recorder, stage: str, atlas: AtlasTextures, light: Any, texel: str) -> None:
-    """Fill the gutter of `light`; no texture can be read and written at once, so by way of a list.
+    """Fill the gutter of `light` by way of a list, as no texture can be read and written at once.
 
     texel : its format
     """
@@ -23,7 +22,7 @@ def draw(graph: Recorder, stage: str, atlas: AtlasTextures, light: Any, texel: s
     gather = program(device, "stitch_gather.wgsl", source=texel)
     place = program(device, "stitch_place.wgsl", store=texel)
     linear = device.sampler(mag_filter="linear", min_filter="linear")
-    size = (_ROW, -(-atlas.gutter.size // (_BYTES * _ROW)))
+    size = (_ROW, -(-atlas.gutter.size // (ENTRY_BYTES * _ROW)))
     lists = {"gutter": atlas.gutter, "gathered": atlas.gathered}
     graph.compute(stage, gather, {**lists, "source": light, "linear": linear}, size, TILE)
     graph.compute(stage, place, {**lists, "stored": light}, size, TILE, completes="stored")

@@ -1,4 +1,4 @@
-// Light beyond a chart's edge, gathered into a list from where the surface truly goes on.
+// Gathers the light of texels beyond a chart's edge into a list, from where the surface continues.
 //#include "gutter.wgsl"
 //#include "source.wgsl"
 

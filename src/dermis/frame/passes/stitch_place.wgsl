@@ -1,4 +1,4 @@
-// Light from the list put in its place beyond a chart's edge.
+// Writes the gathered light to the texels beyond a chart's edge.
 //#include "gutter.wgsl"
 //#include "store.wgsl"
 

@@ -9,11 +9,11 @@ from dermis.frame.passes import program
 from dermis.gpu import Device, Recorder, make_texture, scratch
 
 SURFACE_BYTES = 32
-"""Of a texel."""
+"""Bytes of a texel."""
 
 
 def make_surfaces(device: Device, side: int) -> Any:
-    """Space for positions, normals, colours and gloss: two layers, as packed_surface.wgsl reads them."""
+    """A texture for positions, normals, colours and gloss: two layers, as packed_surface.wgsl packs them."""
     return scratch(device, make_texture(device, (side, side), "rgba32uint", layers=2))
 
 

@@ -12,13 +12,13 @@ from dermis.gpu import Constants, Recorder
 _TEAMS: Constants = (("SIZE", 128), ("TEAM", 16), ("ROUND", 4))
 _ALONE: Constants = (("SIZE", 128), ("TEAM", 1), ("ROUND", 1))  # software adapters pay for barriers
 _GATHERING = 64  # invocations of a workgroup, as in translucency_gather.wgsl
-_ROW = 1024  # workgroups, of which no more than 65535 fit in a row
+_ROW = 1024  # workgroups in a row, of 65535 at most
 
 
 def draw(graph: Recorder, levels: Levels, blur: Blur, thin: Translucency, constants: Constants = ()) -> Any:
-    """The light that comes through, from the blurred layers, summed from all places opposite.
+    """The light through thin parts: that of the blurred layers, summed over each receiver's sources.
 
-    constants : of translucency.wgsl, where others than those that suit the device are wanted
+    constants : of translucency.wgsl, in place of those that suit the device
 
     Source: [JensenBuhler2002; dEonLuebke2007].
     """
@@ -52,6 +52,6 @@ def draw(graph: Recorder, levels: Levels, blur: Blur, thin: Translucency, consta
 
 
 def _rows(count: int, each: int) -> tuple[int, int, int]:
-    """Rows of workgroups that take `each` of `count`."""
-    groups = -(-count // each)
+    """Workgroups along each axis for `count` items, `each` in a workgroup."""
+    groups = max(1, -(-count // each))
     return min(groups, _ROW), -(-groups // _ROW), 1

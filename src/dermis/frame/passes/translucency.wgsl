@@ -2,8 +2,8 @@
 //#include "light_words.wgsl"
 
 override SIZE: u32 = 128u; // invocations of a workgroup
-override TEAM: u32 = 32u; // a power of two up to SIZE; 1: no team
-override ROUND: u32 = 4u; // pairs that an invocation has on their way at once: 1, 2 or 4
+override TEAM: u32 = 32u; // invocations of a receiver: a power of two up to SIZE
+override ROUND: u32 = 4u; // pairs that an invocation loads at once: 1, 2 or 4
 
 struct Receiver {
     cell: u32, // of the coarse atlas, x and y packed
@@ -29,7 +29,7 @@ fn passed(k: u32, end: u32) -> vec3f {
     return select(0.0, 1.0, k < end) * decoded(pair.y) * light_of(gathered[pair.x]);
 }
 
-// Loads that do not wait for each other: memory is far.
+// Several pairs at once, to hide the latency of memory.
 fn passed_together(k: u32, end: u32) -> vec3f {
     var sum = passed(k, end);
     if (ROUND > 1u) {

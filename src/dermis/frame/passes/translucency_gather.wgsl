@@ -4,10 +4,10 @@
 //#include "translucent_pair.wgsl"
 
 struct Entering {
-    layer: u32, // blurred level that the sources show
+    layer: u32, // blurred level that the sources read
     sources: u32,
     mip: u32, // that holds the level
-    scale: f32, // of the light over what the level holds
+    scale: f32, // factor from what the level holds to light
 }
 
 @group(0) @binding(0) var<uniform> entering: Entering;

@@ -7,39 +7,24 @@ from typing import Any
 import numpy as np
 
 from dermis.atlas.translucency.cells import Cells
-from dermis.frame.passes import program
+from dermis.frame.passes import each, program
 from dermis.gpu import ComputeProgram, Constants, Device, Recorder
+from dermis.gpu.program import Resources
 
 RECEIVER_BYTES, SOURCE_BYTES = 48, 32
 """Of a place that takes light, and of one that gives it; see translucent_pair.wgsl."""
 
-_SIZE = 64  # invocations of a workgroup, as in the shaders
-_ROW = 1024  # workgroups, of which no more than 65535 fit in a row
 _FACETS: Constants = (("FACETS", 1),)
-
-
-def workgroups(count: int) -> tuple[int, int, int]:
-    """Rows of workgroups for a number of invocations."""
-    groups = -(-count // _SIZE)
-    return min(groups, _ROW), -(-groups // _ROW), 1
-
-
-def room(count: int) -> int:
-    """Workgroups in a row of `workgroups`."""
-    return workgroups(count)[0]
 
 
 def space(device: Device, count: int, size: int = 4) -> Any:
     """A buffer for a number of things of some bytes; never without any."""
-    import wgpu
-
-    usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_SRC | wgpu.BufferUsage.COPY_DST
-    return device.handle.create_buffer(size=size * max(1, count), usage=usage)
+    return device.space(size * max(1, count))
 
 
 def draw_receivers(
     graph: Recorder,
-    surface: dict[str, Any],
+    surface: Resources,
     cells: Cells,
     asked: tuple[Any, int],
     points: Any,
@@ -55,11 +40,11 @@ def draw_receivers(
     shader = program(graph.device, "translucency_receivers.wgsl", _FACETS if facets else ())
     listed, count = asked
     bound = {"cells": _record(shader, cells, count), "receivers": listed, "receiver_points": points}
-    graph.dispatch("translucency", shader, {**surface, **bound}, workgroups(count))
+    graph.dispatch("pairs", shader, {**surface, **bound}, each(count))
 
 
 def draw_sources(
-    graph: Recorder, surface: dict[str, Any], cells: Cells, asked: tuple[Any, int], points: Any
+    graph: Recorder, surface: Resources, cells: Cells, asked: tuple[Any, int], points: Any
 ) -> None:
     """Centres, normals and areas of cells that give light.
 
@@ -70,9 +55,9 @@ def draw_sources(
     shader = program(graph.device, "translucency_sources.wgsl")
     listed, count = asked
     bound = {"cells": _record(shader, cells, count), "sources": listed, "source_points": points}
-    graph.dispatch("translucency", shader, {**surface, **bound}, workgroups(count))
+    graph.dispatch("pairs", shader, {**surface, **bound}, each(count))
 
 
 def _record(shader: ComputeProgram, cells: Cells, count: int) -> np.ndarray[Any, Any]:
     shape = {"size": cells.size, "side": cells.side, "stride": cells.stride}
-    return shader.record("Cells", **shape, count=count, room=room(count))
+    return shader.record("Cells", **shape, count=count)

@@ -28,9 +28,13 @@ fn metric_of(index: u32, along: mat2x3f) -> vec3f {
     return vec3f(dot(u, u), dot(v, v), dot(u, v));
 }
 
-@compute @workgroup_size(SIZE)
-fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
-    let index = number_of(group, local);
+@compute @workgroup_size(EACH)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let index = number_of(group, groups, lane);
     if (index >= cells.count) {
         return;
     }

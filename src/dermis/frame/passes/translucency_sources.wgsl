@@ -44,9 +44,13 @@ fn with_texel(shown: Shown, at: vec2u, middle: vec2f) -> Shown {
     return made;
 }
 
-@compute @workgroup_size(SIZE)
-fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
-    let index = number_of(group, local);
+@compute @workgroup_size(EACH)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let index = number_of(group, groups, lane);
     if (index >= cells.count) {
         return;
     }

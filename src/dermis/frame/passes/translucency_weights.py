@@ -1,4 +1,4 @@
-"""How much light passes between translucent pairs: again whenever the surface moves or the profile changes."""
+"""How much light passes between translucent pairs, of the surface as it is and for a profile."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def draw(graph: Recorder, thin: Translucency) -> None:
         "weights": thin.weights,
     }
     shader = _shader(graph.device, thin.gaussians)
-    graph.dispatch("translucency", shader, bound, (_ROW // _SIZE, -(-pairs.count // _ROW), 1))
+    graph.dispatch("pairs", shader, bound, (_ROW // _SIZE, max(1, -(-pairs.count // _ROW)), 1))
 
 
 def source_level(spacing_mm: float, variance_mm2: Floats) -> int:

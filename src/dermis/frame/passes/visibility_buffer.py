@@ -21,7 +21,7 @@ from dermis.gpu.program import Program
 Drawer = Frame | Graph
 _GROUPS = 2048  # workgroups that keep a GPU busy; where there are more triangles, each takes more of them
 _TAKEN = (8, 128)  # triangles of a workgroup of visibility_buffer.wgsl: fewest and most
-_RUN = 16  # of them that follow each other, where they are many and so small
+_RUN = 16  # of them in a row in the mesh, where they are many and small
 _GROUPS_PER_ROW = 32768
 _TILE = (64, 32)  # pixels, in tiles.wgsl
 _DEPTH, _FOUND, _BOTH = 0, 1, 2  # what visibility_buffer.wgsl records
@@ -37,7 +37,7 @@ class Layers:
     texture : depth (1 near, 0 nothing) as float, or triangle + 1 as uint where `triangles`
     depth : the rasteriser's depth attachments, one a layer, or one for all when triangles are wanted
     targets : the rasteriser's colour targets, one a layer
-    nearness, found, tiles : the compute pass' buffers; triangles found get theirs when a frame needs it
+    nearness, found, tiles : the compute pass' buffers; `found` is made when a frame needs it
     """
 
     texture: Any
@@ -57,7 +57,7 @@ def make_layers(
     """Space for `count` views of size (width, height); those too large for a buffer are rasterised.
 
     triangles : whether the layers hold triangles rather than depths
-    compute : which way to take; None chooses by the adapter
+    compute : whether to rasterise in compute; None chooses by the adapter
     """
     compute = device.adapter.kind != "CPU" if compute is None else compute
     fits = 4 * size[0] * size[1] * count <= device.max_storage_bytes
@@ -66,7 +66,7 @@ def make_layers(
 
 
 def draw_layers(graph: Drawer, stage: str, layers: Layers, views: Views, head: HeadResources) -> None:
-    """Fill a layer for each place of each view; depth 1 is near and 0 far."""
+    """Fill a layer for each sample of each view; depth 1 is near and 0 far."""
     if layers.nearness is not None:
         _draw_compute(graph, stage, layers, views, head)
     else:
@@ -131,7 +131,7 @@ def _draw_compute(graph: Recorder, stage: str, layers: Layers, views: Views, hea
 
 
 def _recorded(layers: Layers, triangles: int, clips: Matrix) -> tuple[int, ...]:
-    """What is recorded, time after time: depth and triangle in one word where that is fine enough."""
+    """What each draw records, in order: depth and triangle in one word where that is precise enough."""
     if not layers.triangles:
         return (_DEPTH,)
     steps = 2.0 ** (32 - triangles.bit_length())
@@ -164,7 +164,7 @@ def _views(shader: Program, layers: Layers, clips: Matrix, head: HeadResources) 
 
 
 def _depth_range_mm(clip: Matrix) -> float:
-    """How far apart depths 0 and 1 would be if all depths were as coarse as the coarsest [mm]."""
+    """Distance between depths 0 and 1 if all depths were as coarse as the coarsest [mm]."""
     rows: list[list[float]] = clip.tolist()
     _, _, (*depth, start), (*away, before) = rows
     scale = sum(a * a for a in away)
@@ -176,7 +176,7 @@ def _depth_range_mm(clip: Matrix) -> float:
 
 
 def _shared_out(triangles: int, views: int, samples: int) -> tuple[Constants, int]:
-    """What a workgroup takes when there are so many triangles, as one H200 was fastest, and their number."""
+    """Pipeline constants for so many triangles, tuned on an H200, and the number of workgroups."""
     fewest, most = _TAKEN
     taken = min(most, max(fewest, 1 << (triangles * views // _GROUPS).bit_length() >> 1))
     many = taken == most  # and small

@@ -1,14 +1,14 @@
 // Rasterises triangles in compute: the nearest depth of each sample, and which triangle it belongs to.
-// A workgroup takes some triangles of one view, an invocation sets each of them up. Small ones it draws at once; of the others it
+// A workgroup takes some triangles of one view, and one invocation sets up each. It draws a small one at once; for others it
 // lists the blocks of pixels that they may cover, and teams of invocations draw those.
 //#include "projected_triangle.wgsl"
 //#include "record_visibility.wgsl"
 //#include "tiles.wgsl"
 
 override TAKEN: u32 = 32u; // triangles of a workgroup, at most as many as its invocations
-override RUN: u32 = 1u; // of them that follow each other in the mesh
-override SMALL: u32 = 16u; // pixels of a box that one invocation draws
-override MOST_BLOCKS: u32 = 16u; // that one invocation tests and lists, at most 32
+override RUN: u32 = 1u; // of them that follow each other in the mesh, as a run
+override SMALL: u32 = 16u; // most pixels of a box that one invocation draws by itself
+override MOST_BLOCKS: u32 = 16u; // of a triangle, that one invocation tests and lists; at most 32
 override LISTED: u32 = 8u * TAKEN; // blocks that a workgroup can list
 
 override THREADS: u32 = 128u;
@@ -19,9 +19,9 @@ const TEAM: u32 = 16u; // invocations that draw a block
 @group(0) @binding(34) var<storage, read_write> tiles: array<atomic<u32>>;
 
 var<workgroup> taken: array<Drawn, TAKEN>;
-var<workgroup> blocks: array<u32, LISTED>; // place of the triangle, then x and y from the box's first block
+var<workgroup> blocks: array<u32, LISTED>; // index of the triangle in `taken`, then x and y from the box's first block
 var<workgroup> block_count: atomic<u32>;
-var<workgroup> large: array<u32, TAKEN>; // places of triangles with more blocks
+var<workgroup> large: array<u32, TAKEN>; // indices in `taken` of triangles with more blocks
 var<workgroup> large_count: atomic<u32>;
 
 @compute @workgroup_size(THREADS)
@@ -33,7 +33,7 @@ fn main(
     let first = group.y * groups.x + group.x;
     let step = groups.x * groups.y;
     let index = triangle_of(number, first, step);
-    if (number == 0u) { // some software adapters leave what the workgroup before counted
+    if (number == 0u) { // some software adapters keep the last workgroup's counts
         atomicStore(&block_count, 0u);
         atomicStore(&large_count, 0u);
     }
@@ -57,7 +57,7 @@ fn main(
     }
 }
 
-// Runs of triangles far from each other in the list: neighbours share corners, but are often all large.
+// A workgroup's runs lie far apart in the mesh: neighbours share corners, but are often all large.
 fn triangle_of(place: u32, first: u32, step: u32) -> u32 {
     return (place / RUN * step + first) * RUN + place % RUN;
 }
@@ -75,7 +75,7 @@ fn take(index: u32, place: u32, view: u32) {
     }
 }
 
-// Those that the triangle may cover. Where there is no space it counts as large: what is drawn twice is the same.
+// Lists the blocks that the triangle may cover. Where the list is full it counts as large: drawing a block twice does no harm.
 fn list_blocks(triangle: Drawn, place: u32, view: u32) {
     let first = first_block(triangle.box);
     let size = blocks_of(triangle.box);
@@ -102,7 +102,7 @@ fn list_blocks(triangle: Drawn, place: u32, view: u32) {
     }
 }
 
-// The block so many further on in its row, or in one of those below.
+// Carries x beyond the row's end over to the rows below.
 fn wrapped(k: vec2u, width: u32) -> vec2u {
     var at = k;
     while (at.x >= width) {
@@ -111,7 +111,7 @@ fn wrapped(k: vec2u, width: u32) -> vec2u {
     return at;
 }
 
-// turn: of the team, another one for each triangle
+// turn: of the team, which changes from triangle to triangle
 fn draw_large(index: u32, triangle: Drawn, turn: u32, lane: u32, view: u32) {
     let most = most_within_block(triangle);
     let first = first_block(triangle.box);
@@ -126,10 +126,10 @@ fn draw_large(index: u32, triangle: Drawn, turn: u32, lane: u32, view: u32) {
     }
 }
 
-// One invocation's part of a block: a pixel, or one in every few rows where each has but one sample.
+// One invocation's part of a block: a pixel, or four pixels of a column where each has only one sample.
 fn draw_block(index: u32, triangle: Drawn, block: vec2u, lane: u32, view: u32) {
     let pixel = block * BLOCK + vec2u(lane % BLOCK, lane / BLOCK);
-    let at = pixel - triangle.box.low; // left of and above the box it is greater than any size
+    let at = pixel - triangle.box.low; // wraps round to more than any size left of and above the box
     if (SAMPLES > 1u) {
         draw_samples(index, triangle, at, all(at < triangle.box.size), view);
         return;
@@ -173,7 +173,7 @@ fn draw_samples(index: u32, triangle: Drawn, at: vec2u, inside: bool, view: u32)
     }
 }
 
-// Four places in the triangle's box and where they are recorded.
+// Tests four places in the triangle's box, and records those inside the triangle.
 fn draw_four(index: u32, triangle: Drawn, x: vec4f, y: vec4f, wanted: vec4<bool>, texels: vec4u) {
     let a = triangle.at_low.x + x * triangle.along_x.x + y * triangle.along_y.x;
     let b = triangle.at_low.y + x * triangle.along_x.y + y * triangle.along_y.y;
@@ -199,7 +199,7 @@ fn mark_box(box: Box, view: u32) {
     }
 }
 
-// Something may be drawn in a tile.
+// Marks a tile in which something may be drawn.
 fn mark(tile: vec2u, layer: u32) {
     if (RECORDED != AS_FOUND) {
         atomicStore(&tiles[tile_at(tile, layer)], DRAWN);

@@ -1,5 +1,5 @@
 // One axis of one blur as published in 2007, in compute: light and the stretch map.
-// Kept as it was, with the faults that the frame's own blur mends.
+// Kept as published, with the faults that the frame's own blur mends.
 //#include "gpu_gems_3_taps.wgsl"
 
 @group(0) @binding(4) var blurred: texture_storage_2d<rgba16float, write>;

@@ -3,7 +3,7 @@
 override AXIS: u32 = 0u; // 0 along u, 1 along v
 override SKIPPED: bool = false; // whether empty texels are left out, as the talk's remedy with alpha does
 
-const LEAST: f32 = 1e-3; // of the weights that may stand for all
+const LEAST: f32 = 1e-3; // least sum of weights to normalise by
 
 struct Spread {
     sigma_mm: f32, // of the Gaussian to be added
@@ -41,7 +41,7 @@ fn blurred_at(uv: vec2f) -> Blurred {
     if (SKIPPED) {
         light = vec4f(light.rgb / max(light.a, LEAST), select(0.0, 1.0, light.a > LEAST));
     } else {
-        light.a = 1.0; // not the weights' sum, or the next pass would take the clear colour's share off
+        light.a = 1.0; // not the weights' sum, or the next pass would subtract some of the clear colour
     }
     return Blurred(light, wide);
 }

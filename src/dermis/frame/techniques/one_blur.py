@@ -20,11 +20,11 @@ class OneBlur(TextureSpace):
         return single_gaussian(profile)
 
     def relights(self, profile: GaussianSum) -> bool:
-        """It never did."""
+        """No: it blurs all light."""
         return False
 
     def stretch(self, settings: Settings) -> str:
-        """It took the map for even."""
+        """One density for the whole map."""
         return "none"
 
 

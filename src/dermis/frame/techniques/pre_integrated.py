@@ -1,4 +1,4 @@
-"""Tables of light that spread on spheres and across the edges of shadows [Penner2011]."""
+"""Tables of scattered light on spheres and across the edges of shadows [Penner2011]."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ MOST_CURVED = 0.5
 _COSINES = 257  # odd: N.L = 0, where unspread light begins, has a column of its own
 _CURVATURES, _EDGES = 33, 9  # as in pre_integrated.wgsl
 _NODES = 48
-_SIGMAS = 7.0  # to which a Gaussian is followed
-_SHADOW_TAIL = 0.01  # of the light that a shadow's edge may send farther than its row knows
+_SIGMAS = 7.0  # standard deviations over which a Gaussian is integrated
+_SHADOW_TAIL = 0.01  # of the light that scatters across a shadow's edge: share beyond the table
 _MOST_PENUMBRA_MM = 8.0
 
 
 @dataclass(frozen=True, eq=False)
 class PreIntegrated:
-    """What shade reads in place of light on an atlas.
+    """What the shading pass reads in place of light on an atlas.
 
     table : texture of `tables`
     penumbra_mm : distance over which light spreads across a shadow's edge
@@ -52,7 +52,7 @@ class PreIntegratedSkin(Technique):
         return memo.keep(pre_integrate, device, profile)
 
     def describe(self, view: Any, shade: ComputeProgram, own: PreIntegrated) -> None:
-        """The tables' scales."""
+        """Write the tables' scales."""
         scales = {"most_curved": MOST_CURVED, "penumbra": own.penumbra_mm, "relief": own.relief_mm}
         view["pre"] = shade.record("PreIntegrated", **scales)
 
@@ -74,11 +74,11 @@ def pre_integrate(device: Device, profile: GaussianSum) -> PreIntegrated:
 
 
 def lit_spheres(profile: GaussianSum) -> Floats:
-    """What max(N.L, 0) becomes on spheres, (n, m, c): rows by curvature to `MOST_CURVED`, columns by N.L [-].
+    """Scattered max(N.L, 0) on spheres, (n, m, c): rows by curvature to `MOST_CURVED`, columns by N.L [-].
 
-    Light spreads by the straight distance d: on a sphere of radius r a Gaussian of variance v is
-    exp(r^2/v (cos a - 1)), and is made to hold all of its light. [Penner2011] integrates around a ring
-    instead, which does not conserve the light of the sphere that it stands for.
+    Light spreads by straight distance: on a sphere of radius r a Gaussian of variance v is
+    exp(r^2/v (cos a - 1)), normalised over the sphere. [Penner2011] integrates around a ring instead, which
+    does not conserve light.
     """
     cosines = np.linspace(-1.0, 1.0, _COSINES)
     rows = [np.repeat(np.maximum(cosines, 0.0)[:, None], len(profile.albedo), axis=1)]
@@ -102,16 +102,16 @@ def spread_cosine(cosines: ArrayLike, concentration: float) -> Floats:
     x, w = np.polynomial.legendre.leggauss(_NODES)
     half = 0.5 * (high - low)[..., None]
     lit, theta = low[..., None] + half * (1.0 + x), theta[..., None]
-    ring = i0e(concentration * np.sin(theta) * np.sin(lit))  # the bell over all azimuths
+    ring = i0e(concentration * np.sin(theta) * np.sin(lit))  # the kernel over all azimuths
     bell = np.exp(concentration * (np.cos(theta - lit) - 1.0)) * ring
     scale = concentration / -np.expm1(-2.0 * concentration)
     return np.asarray(scale * (half * w * np.cos(lit) * np.sin(lit) * bell).sum(axis=-1))
 
 
 def shadow_edge(profile: GaussianSum, radius_mm: float, half_width_mm: float = 0.0) -> Floats:
-    """Light that spread over a shadow's straight edge, (m, c), from -radius (dark) to the radius (lit) [-].
+    """Scattered light across a shadow's straight edge, (m, c), from -radius (dark) to the radius (lit) [-].
 
-    half_width_mm : of the tent that already makes the edge soft
+    half_width_mm : of the tent filter that already softens the edge
     """
     kernel = preintegrate(profile)
     distance = radius_mm * np.linspace(-1.0, 1.0, _COSINES)
@@ -123,14 +123,14 @@ def shadow_edge(profile: GaussianSum, radius_mm: float, half_width_mm: float = 0
 
 
 def penumbra_mm(profile: GaussianSum) -> float:
-    """Distance from a shadow's edge at which all but little of its light has come to rest [mm]."""
+    """Distance from a shadow's edge beyond which scattering changes the light by at most 1 % [mm]."""
     distance = np.geomspace(0.05, _MOST_PENUMBRA_MM, 512)
     beyond = (0.5 - preintegrate(profile).one_side(distance)).max(axis=1) > _SHADOW_TAIL
     return float(distance[min(int(beyond.sum()), len(distance) - 1)])
 
 
 def half_light_sigma(profile: GaussianSum) -> Floats:
-    """Standard deviation of the Gaussian with half of its light within the profile's radius, (c,) [mm]."""
+    """Standard deviation of the Gaussian with the profile's half-light radius, (c,) [mm]."""
     radius = np.geomspace(1e-3, 100.0, 2048)
     within = profile.within(radius) / profile.albedo
     half = [np.interp(0.5, channel, radius) for channel in within.T]

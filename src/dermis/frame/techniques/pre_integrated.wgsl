@@ -1,17 +1,17 @@
-// Light that spread over curved skin and into shadows, from tables made once for a profile [Penner2011]: `scattered`
+// Scattered light on curved skin and across shadow edges, from tables made once for a profile [Penner2011]: `scattered`
 // holds them, `shade.pre` their scales.
 
 override PRE_INTEGRATED: bool = false;
 
 const SPHERES: u32 = 33u; // rows, evenly by curvature
 const EDGES: u32 = 9u; // rows, evenly by the half width of the shadow's own edge up to `penumbra`
-const PROBES: u32 = 64u; // places around a point whose share in the light tells how far off a shadow's edge is
+const PROBES: u32 = 64u; // places around a point; the share of them in the light gives the distance of a shadow's edge
 const GOLDEN: f32 = 2.3999632; // angle from one place to the next, the outermost first
-const FEWEST_PROBES: u32 = 24u; // that may stand for all
-const LEAST_COSINE: f32 = 0.3; // of the light on the plane that the places lie in
-const HIGHEST: f32 = 3.0; // that a point past its horizon is lifted [mm]
-const WAYS: u32 = 16u; // places that tell the curvature towards the horizon
-const WAYS_MM: f32 = 2.0; // that they are off the way to the light
+const FEWEST_PROBES: u32 = 24u; // probes after which the others are skipped if all agree
+const LEAST_COSINE: f32 = 0.3; // of the light on the probes' plane
+const HIGHEST: f32 = 3.0; // most that a point beyond the light's horizon is lifted [mm]
+const WAYS: u32 = 16u; // probes of the curvature towards the horizon
+const WAYS_MM: f32 = 2.0; // radius in which they lie around the line to the light
 
 struct PreIntegrated {
     most_curved: f32, // curvature of the table's last row [1/mm]
@@ -19,28 +19,28 @@ struct PreIntegrated {
     relief: vec3f, // standard deviation of the Gaussian that smooths the relief [mm]
 }
 
-// A place of the tables: rows of spheres, then of the edges of shadows.
+// Looks up the tables: rows of spheres, then of shadow edges.
 fn table_at(x: f32, row: f32) -> vec3f {
     let size = vec2f(textureDimensions(scattered));
     return load_bilinear(scattered, (vec2f(x * (size.x - 1.0), row) + 0.5) / size).rgb;
 }
 
-// What max(N.L, 0) becomes when light spreads, by the cosines for red, green and blue.
+// Scattered max(N.L, 0), for the cosines of red, green and blue.
 fn spread_cosine(cosines: vec3f, curvature: f32) -> vec3f {
     let row = f32(SPHERES - 1u) * min(curvature / shade.pre.most_curved, 1.0);
     let x = 0.5 + 0.5 * cosines;
     return vec3f(table_at(x.r, row).r, table_at(x.g, row).g, table_at(x.b, row).b);
 }
 
-// The normal as red, green and blue light see it, which forget relief that they spread over.
+// The normals for red, green and blue light, without the relief that each scatters over.
 fn spread_normals(point: Point, footprint: f32) -> mat3x3f {
     let mm = max(sqrt(length(point.dpdu) * length(point.dpdv)), 1e-3); // per side of the uv square
     let wide = sqrt(footprint * footprint + 12.0 * shade.pre.relief * shade.pre.relief / (mm * mm));
     return mat3x3f(surface_at(point, wide.r).normal, surface_at(point, wide.g).normal, surface_at(point, wide.b).normal);
 }
 
-// Light from a side that the surface turns away from reaches it from beyond its horizon: what shadows it is judged
-// from there, on a plane that faces the light.
+// A point that faces away from the light gets its light from skin beyond its horizon: shadows are tested from there, on a
+// plane that faces the light.
 fn above_horizon(point: Point, l: vec3f) -> Point {
     var out = point;
     let cosine = dot(point.normal, l);
@@ -50,8 +50,8 @@ fn above_horizon(point: Point, l: vec3f) -> Point {
     return out;
 }
 
-// Share of a light that reaches a point and its surroundings, for red, green and blue: by how far off the shadow's
-// edge is, taken for straight. Shadows of lights of some size, mostly wider, stay as they are.
+// Scattered visibility of a light, for red, green and blue: by the distance to the shadow's edge, taken as straight.
+// Shadows of area lights, mostly wider, stay as they are.
 fn spread_visibility(light: Light, point: Point, l: vec3f) -> vec3f {
     let raised = above_horizon(point, l);
     let seen = clamp(visibility(light, raised, l), 0.0, 1.0);
@@ -66,9 +66,9 @@ fn spread_visibility(light: Light, point: Point, l: vec3f) -> vec3f {
     if (soft >= radius) {
         return vec3f(seen);
     }
-    let near = soft * select(1.0 - sqrt(2.0 - 2.0 * seen), sqrt(2.0 * seen) - 1.0, seen < 0.5); // under a tent
-    // The places tell how much farther off it is than the tent reaches; narrow shadows they miss, so that within the
-    // tent they count by and by.
+    let near = soft * select(1.0 - sqrt(2.0 - 2.0 * seen), sqrt(2.0 * seen) - 1.0, seen < 0.5); // inverts the filter's tent
+    // The probes find edges farther off than the tent reaches. They miss narrow shadows, so within the tent they count
+    // only gradually.
     let far = radius * (2.0 * around.share - 1.0);
     let beyond = select(min(far + soft, 0.0), max(far - soft, 0.0), seen > 0.5);
     let outside = abs(2.0 * seen - 1.0);
@@ -87,8 +87,8 @@ struct Around {
     along: vec3f, // unit vector on the surface along the shadow's edge
 }
 
-// The places lie like those of a ball seen from above, so that an edge that crosses them hides a share that is linear
-// in its distance. They are lifted like the filter's points.
+// The probes lie like even points on a ball seen from above, so that an edge across them hides a share that is linear in
+// its distance. They are lifted off the surface as the filter's point is.
 fn light_around(light: Light, point: Point, l: vec3f, lift: f32, unknown: f32) -> Around {
     let axes = shade.pre.penumbra * beside(point.normal);
     let cosine = clamp(dot(point.normal, l), 0.0, 1.0);
@@ -96,7 +96,7 @@ fn light_around(light: Light, point: Point, l: vec3f, lift: f32, unknown: f32) -
     let centre = light.to_map * vec4f(lifted, 1.0);
     let right = light.to_map * vec4f(axes[0], 0.0);
     let up = light.to_map * vec4f(axes[1], 0.0);
-    // Between the places and the light the surface itself may rise, in hollows: by twice what its curvature says.
+    // In hollows the surface may rise between the probes and the light: they are lifted by twice what its curvature says.
     let rise = light.to_map * vec4f(l, 0.0) * (point.curvature * shade.pre.penumbra * shade.pre.penumbra);
     var lit = 0u;
     var known = 0u;
@@ -116,10 +116,10 @@ fn light_around(light: Light, point: Point, l: vec3f, lift: f32, unknown: f32) -
     return Around(select(f32(lit) / f32(max(known, 1u)), unknown, known == 0u), along);
 }
 
-// What the light's map shows on the way to a place.
+// What the shadow map shows on the way to a place.
 const HIDDEN: u32 = 0u;
 const LIGHT: u32 = 1u;
-const AIR: u32 = 2u; // the place is lit, but skin is farther behind than light spreads
+const AIR: u32 = 2u; // lit, but in the air: the skin is farther behind than light scatters
 
 fn sees(light: Light, clip: vec4f) -> u32 {
     if (clip.w <= 0.0) {
@@ -140,8 +140,8 @@ fn nearest_at(light: Light, clip: vec4f) -> f32 {
     return textureLoad(shadow_maps, clamp(texel, vec2i(0), vec2i(size) - 1), light.layer, 0).x;
 }
 
-// Curvature towards the horizon, which may be farther away than the point's own says: the mean of balls that touch the
-// surface here and hold a place that the light sees near by.
+// Curvature towards the horizon, which may be farther away than the point's own says: the mean of those of spheres that
+// touch the surface here and go through a place near by that the light sees.
 fn curvature_towards(light: Light, point: Point, l: vec3f) -> f32 {
     let cosine = dot(point.normal, l);
     if (cosine >= LEAST_COSINE || light.layer < 0 || (SHAPES && light.extent.x > 0.0)) {
@@ -162,14 +162,14 @@ fn curvature_towards(light: Light, point: Point, l: vec3f) -> f32 {
     return mix(found, point.curvature, smoothstep(0.0, LEAST_COSINE, cosine));
 }
 
-// Irradiance that enters around a point and leaves there. What the surface reflects of it is taken from the mean
-// cosine of the light that arrives.
+// Irradiance that enters around a point and leaves there. The surface's reflectance is that at the mean cosine of the
+// arriving light.
 fn pre_integrated(point: Point, surface: Surface, footprint: f32, open: f32) -> vec3f {
     let normals = spread_normals(point, footprint);
     var sum = vec3f(0.0);
     for (var i = 0u; i < skin.light_count; i++) {
         let light = lights.light[i];
-        var seen = vec3f(-1.0); // how much of the light: not known yet
+        var seen = vec3f(-1.0); // visibility of the light, -1 where not known yet
         for (var part = 0u; part < parts_of(light); part++) {
             let arriving = incident(light, point.position, part);
             let curvature = curvature_towards(light, point, arriving.direction);

@@ -1,8 +1,8 @@
-// The picture of skin whose light spread in screen space: what leaves of it, under what lies over it.
+// The picture of skin whose light spread in screen space: the part of it that leaves, plus the light that did not spread.
 
 @group(0) @binding(0) var over: texture_2d<f32>; // light that does not spread, and coverage
 @group(0) @binding(1) var below: texture_2d<f32>; // light below the skin, spread
-@group(0) @binding(2) var leaving: texture_2d<f32>; // share of it that the pixel gets
+@group(0) @binding(2) var leaving: texture_2d<f32>; // share of it that leaves towards the eye
 @group(0) @binding(3) var image: texture_storage_2d<rgba32float, write>;
 
 @compute @workgroup_size(8, 8)

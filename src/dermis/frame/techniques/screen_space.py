@@ -17,14 +17,14 @@ from dermis.optics.fits.separable import SeparableKernel, preintegrate
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.settings import Settings
 
-_TAIL = 5e-4  # of the light that goes to one side: the kernel is followed until no channel has more beyond
-_FINEST_MM, _WIDEST_MM = 0.01, 400.0  # where that distance is looked for
+_TAIL = 5e-4  # of the light that goes to one side: no channel has more beyond the kernel's reach
+_FINEST_MM, _WIDEST_MM = 0.01, 400.0  # between which the reach is searched
 _ENTRIES = 256
 
 
 @dataclass(frozen=True, eq=False)
 class Apart:
-    """What shade keeps apart, and space for what comes of it.
+    """Textures of the light that the shading keeps apart, and for spreading it.
 
     layers : light below the skin with its depth [mm]; the share of it that leaves towards the eye
     below, leaving : views of the two
@@ -41,7 +41,7 @@ class Apart:
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """Share of the light that goes up to a distance to one side, as a texture over its root.
+    """Share of the light that goes to one side up to a distance, as a texture over the distance's root.
 
     reach_mm : distance of the last entry
     """
@@ -51,7 +51,7 @@ class Kernel:
 
 
 class ScreenSpace(Technique):
-    """Spreads the light of all skin in sight and joins it with what lies over it [Jimenez2015]."""
+    """Spreads the light of all visible skin in the image, and adds the light that does not [Jimenez2015]."""
 
     sources = ("Jimenez2015",)
     shade_constants = (("SPLIT", 1),)
@@ -97,7 +97,7 @@ def draw(graph: Recorder, apart: Apart, kernel: Kernel, half: tuple[float, float
     """The picture, a texture of `apart`.
 
     half : tangents of the half angles of view
-    over : what shade has seen apart from the light below the skin
+    over : the shaded picture without the light below the skin
     """
     device, size = graph.device, over.size[:2]
     along = [program(device, TECHNIQUES / "screen_space.wgsl", (("AXIS", axis),)) for axis in (0, 1)]
@@ -115,7 +115,7 @@ def kernel_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:
     """(1, n, 4) shares by the root of the distance over the reach, and the reach [mm]."""
     reach = _reach(kernel)
     shares = kernel.one_side(reach * np.linspace(0.0, 1.0, _ENTRIES) ** 2)
-    shares *= 0.5 / shares[-1]  # what would go farther stays within reach
+    shares *= 0.5 / shares[-1]  # light that would go farther stays within reach
     return np.concatenate([shares, np.zeros((_ENTRIES, 1))], axis=1)[None], reach
 
 

@@ -1,12 +1,12 @@
-// What is seen of a surface in a part of a pixel, and all the skin of a pixel together.
+// The shading of a part of a pixel, and all the skin of a pixel together.
 
-const ONE_SURFACE: f32 = 4.0; // difference of depth within a pixel over its width that is still one surface
-const CROSSED: f32 = 2.0; // step in depth that light below the skin crosses [mm]: no other surface either
+const ONE_SURFACE: f32 = 4.0; // largest change of depth over width within one surface, in a pixel
+const CROSSED: f32 = 2.0; // step in depth that light below the skin crosses [mm]: still one surface
 
 struct Shaded {
     below: vec3f, // light below the skin
     leaving: vec3f, // share of it that leaves towards the eye
-    over: vec3f, // light that does not spread: off the surface, from plain materials, scattered but once
+    over: vec3f, // light that does not spread: off the surface, from plain materials, scattered only once
     depth: f32, // of skin [mm], else 0
 }
 
@@ -18,7 +18,7 @@ struct PixelSkin {
     share: f32,
 }
 
-// Adds a part of a pixel to its skin, which is the one surface that most samples see.
+// Adds a part of a pixel to its skin; of several surfaces the one that most samples see is kept.
 fn keep(held: PixelSkin, part: Shaded, share: f32, pixel: f32) -> PixelSkin {
     let one = PixelSkin(share * part.below, share * part.leaving, share * part.depth, share);
     let apart = abs(part.depth - held.depth / max(held.share, 1e-6));

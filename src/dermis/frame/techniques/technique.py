@@ -10,18 +10,26 @@ from numpy.typing import NDArray
 from dermis.frame.atlas_textures import AtlasTextures
 from dermis.frame.inputs import Inputs, Split
 from dermis.frame.levels import FLOATS, MOST_HALVINGS, Blur, Levels, halvings_of, make_levels, usual_texel
-from dermis.frame.passes import blend, combine, irradiance, surface_texels, translucency, translucency_weights
+from dermis.frame.passes import (
+    blend,
+    combine,
+    irradiance,
+    stretch,
+    surface_texels,
+    translucency,
+    translucency_weights,
+)
 from dermis.gpu import Constants, Device, Graph, Memo
 from dermis.gpu.textures import FORMAT_BYTES
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.settings import Settings
 
-# A Gaussian narrower than this is finer than texels and pores: it is lit again, not blurred.
+# A Gaussian narrower than this is finer than texels and pores: it is relit in the image, not blurred.
 _RELIT_MM2 = 0.1**2
 
 
 class Technique:
-    """A way for light to spread below the skin; this one lets it leave where it entered.
+    """How light spreads below the skin; in this base class it leaves where it entered.
 
     Its name is that of its line in `scene.techniques.TECHNIQUES`.
 
@@ -53,7 +61,7 @@ class Technique:
         return settings.stretch
 
     def make_levels(self, device: Device, side: int, count: int) -> Levels:
-        """Space for light and its blurred levels; of the least size where none is on the atlas."""
+        """Textures for light and its blurred levels; of the least size where no light is on the atlas."""
         return make_levels(device, side, count, FLOATS)
 
     def make_sum(self, device: Device, side: int) -> Any:
@@ -65,11 +73,11 @@ class Technique:
         return 0.0
 
     def make(self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum) -> Any:
-        """What it needs of its own: tables and textures, kept by the memo."""
+        """The technique's own tables and textures, kept by the memo."""
         return None
 
     def describe(self, view: Any, shade: Any, own: Any) -> None:
-        """Put what the shading pass must know into its record.
+        """Write what the shading pass needs to its record.
 
         shade : the pass' program
         """
@@ -93,7 +101,7 @@ class AtlasTechnique(Technique):
     on_atlas = True
 
     def gaussians(self, profile: GaussianSum) -> GaussianSum:
-        """The sum of Gaussians that is blurred with."""
+        """The sum of Gaussians to blur by."""
         return profile
 
     def relights(self, profile: GaussianSum) -> bool:
@@ -131,6 +139,7 @@ class AtlasTechnique(Technique):
         levels, layouts = resources.levels, inputs.layouts
         for layout, blur in zip(layouts, inputs.blurs, strict=True):
             into = levels.layer(0), levels.size, levels.texel, blur.scale
+            graph.repeat(stretch.draw, layout.head, layout.atlas)
             surface_texels.draw(graph, layout)
             irradiance.draw(graph, layout, inputs.light_constants, *into)
             if layout.translucency:

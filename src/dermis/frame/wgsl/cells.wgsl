@@ -1,20 +1,14 @@
 // The atlas in coarse cells.
+//#include "each.wgsl"
 
 struct Cells {
     size: u32, // texels along the atlas' side
     side: u32, // cells
     stride: u32, // between the texels that sources are made of
     count: u32, // of what is asked for
-    room: u32, // workgroups in a row
 }
 
 @group(0) @binding(2) var<uniform> cells: Cells;
-
-const SIZE: u32 = 64u; // of a workgroup
-
-fn number_of(group: vec3u, local: u32) -> u32 {
-    return (group.y * cells.room + group.x) * SIZE + local;
-}
 
 fn unpacked(word: u32) -> vec2u {
     return vec2u(word & 0xffffu, word >> 16u);

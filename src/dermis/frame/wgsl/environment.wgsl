@@ -5,7 +5,7 @@ override ENVIRONMENT: bool = false; // whether there is one
 const LAYERS: f32 = 10.0; // of reflections, even in the logarithm of the roughness
 const SMOOTHEST: f32 = 0.05; // roughness of the first and of the last of them
 const ROUGHEST: f32 = 1.0;
-const MIRRORS: u32 = 8u; // rows and columns of their table
+const MIRRORS: u32 = 8u; // rows and columns of the table of mirror lobes
 
 struct Environment {
     turn: vec2f, // cosine and sine of the rotation about +Y
@@ -27,9 +27,9 @@ fn panorama_at(direction: vec3f, layer: u32) -> vec3f {
         direction.y,
         environment.turn.y * direction.x + environment.turn.x * direction.z,
     );
-    let azimuth = select(0.0, atan2(d.x, -d.z), any(d.xz != vec2f(0.0))); // of a pole it has no value
+    let azimuth = select(0.0, atan2(d.x, -d.z), any(d.xz != vec2f(0.0))); // undefined at the poles
     let uv = vec2f(0.5 + azimuth / (2.0 * PI), atan2(length(d.xz), d.y) / PI);
-    // Filters of some GPUs are as coarse as the texels, which shows in a wide picture.
+    // Filtered in the shader: the filters of some GPUs are too coarse for a wide picture.
     let place = uv * (vec2f(textureDimensions(panorama)) - 2.0) + 0.5;
     let a = vec2i(floor(place));
     let w = bilinear_weights(place);
@@ -45,7 +45,7 @@ fn reflection(direction: vec3f, m: f32) -> vec3f {
     return mix(panorama_at(direction, 1u + low), panorama_at(direction, 2u + low), layer - f32(low));
 }
 
-// What is behind the head along a ray from the eye: the panorama as a lens sees it that is focused on the head, or a colour.
+// Background along a ray from the eye: the panorama, out of focus as behind a head in focus, or a colour.
 fn seen_behind(ray: vec3f, colour: vec3f) -> vec3f {
     if (!ENVIRONMENT || environment.visible == 0u) {
         return colour;
@@ -53,7 +53,7 @@ fn seen_behind(ray: vec3f, colour: vec3f) -> vec3f {
     return panorama_at(normalize(ray), 1u);
 }
 
-// Irradiance of a surface that sees the open share of the sky; the rest is skin, which passes light on: a fit to
+// Irradiance of a surface that sees the open share of the sky; the rest is skin, which bounces light: a fit to
 // path-traced corners [Jimenez2016].
 fn ambient(normal: vec3f, open: f32, albedo: vec3f) -> vec3f {
     let a = 2.0404 * albedo - 0.3324;
@@ -62,7 +62,7 @@ fn ambient(normal: vec3f, open: f32, albedo: vec3f) -> vec3f {
     return panorama_at(normal, 0u) * max(vec3f(open), ((open * a + b) * open + c) * open);
 }
 
-// Direction and roughness of the round lobe that stands for the surface's, in the plane of view and normal.
+// Direction and roughness of the round lobe that approximates the surface's, in the plane of view and normal.
 fn mirror_at(cosine: f32, m: f32) -> vec3f {
     let last = f32(MIRRORS - 1u);
     let place = clamp(vec2f(cosine, log(m / SMOOTHEST) / log(ROUGHEST / SMOOTHEST)), vec2f(0.0), vec2f(1.0)) * last;
@@ -74,8 +74,8 @@ fn mirror_at(cosine: f32, m: f32) -> vec3f {
     return mix(low, high, f.y).xyz;
 }
 
-// Radiance that a lobe sees, for the surface's albedo 1, less what hides it [LagardeRousiers2014] and nothing from
-// below the surface that carries the relief.
+// Reflected radiance for a surface albedo of 1, dimmed by specular occlusion [LagardeRousiers2014] and below the horizon of
+// the surface that carries the relief.
 fn mirrored(point: Point, normal: vec3f, v: vec3f, m: f32, open: f32) -> vec3f {
     let cosine = clamp(dot(normal, v), 0.0, 1.0);
     let mirror = mirror_at(cosine, m);

@@ -1,12 +1,12 @@
 // Points of the mesh's surface by triangle and barycentric weights.
 //#include "mesh_textures.wgsl"
 
-override MESH_IN_BUFFERS: bool = false; // whether the mesh is read from them, which GPUs do faster than textures
+override MESH_IN_BUFFERS: bool = false; // whether the mesh is read from buffers, which GPUs read faster than textures
 
 const MAPPED: u32 = 1u; // the triangle has texels in the atlas
 const OPAQUE: u32 = 2u; // plain material, no scattering
 
-@group(0) @binding(23) var<storage, read> triangle_buffer: array<vec4u>; // texel after texel of the textures
+@group(0) @binding(23) var<storage, read> triangle_buffer: array<vec4u>; // the texels of the textures, in order
 @group(0) @binding(24) var<storage, read> vertex_buffer: array<vec4f>;
 
 struct Corner {
@@ -23,7 +23,7 @@ struct Point {
     lit_position: vec3f, // moved onto the smooth surface, for shadow rays
     normal: vec3f, // interpolated, unit
     uv: vec2f, // in the maps
-    place: vec2f, // in the atlas, where someone asked for it
+    place: vec2f, // in the atlas, set only by the shading
     dpdu: vec3f, // [mm per unit of uv]
     dpdv: vec3f,
     curvature: f32, // root mean square over directions [1/mm]
@@ -41,11 +41,16 @@ fn triangle_at(index: u32) -> vec4u {
     return triangle_row(index, 0u);
 }
 
-// Where in the atlas, from 0 to 1, the light of a point of a triangle is.
+// Place in the atlas, from 0 to 1, of a point of a triangle.
 fn place_of_point(index: u32, w: vec3f) -> vec2f {
     let ab = bitcast<vec4f>(triangle_row(index, 1u));
     let c = bitcast<vec4f>(triangle_row(index, 2u));
     return w.x * ab.xy + w.y * ab.zw + w.z * c.xy;
+}
+
+// Texels of the atlas in a unit of uv.
+fn texels_per_uv(index: u32) -> f32 {
+    return bitcast<f32>(triangle_row(index, 2u).z);
 }
 
 fn position_of(index: u32) -> vec3f {

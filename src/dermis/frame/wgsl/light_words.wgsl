@@ -1,6 +1,6 @@
 // Light in two words: three floats without their sign and with 13 bits of fraction, so that no scale has to fit them.
 
-const LAST_BITS: u32 = 10u; // of a float's fraction, which are rounded off
+const LAST_BITS: u32 = 10u; // of a float's fraction, rounded off
 const HIGH_HALF: u32 = 0xffe00000u; // the upper eleven of the 21 bits that are left
 
 // light: not negative

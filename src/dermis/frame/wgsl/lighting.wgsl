@@ -1,4 +1,4 @@
-// What all light does at a point of the head: some of it enters the skin, some is reflected by the surface.
+// Light from everywhere at a point of the head: the part that enters the skin, and the part that the surface reflects.
 //#include "geometry.wgsl"
 //#include "bilinear.wgsl"
 //#include "skin.wgsl"
@@ -7,28 +7,28 @@
 //#include "lights.wgsl"
 //#include "environment.wgsl"
 
-// Whether each point passes over lights from behind its surface by itself. Software adapters shade such points all the same, as
-// long as one beside them sees the light; GPUs read lights faster that are the same for all.
+// Whether each point skips the lights behind its surface by itself. Without that, software adapters shade it with every light
+// that a point beside it sees. GPUs do without: they read lights faster when all points read the same one.
 override PASSES_DARK: bool = false;
 
 struct Lit {
-    entered: vec3f, // irradiance that enters the skin, times what of it comes back over that of light from above
+    entered: vec3f, // irradiance that enters the skin, times the share that comes back over that from straight above
     reflected: vec3f, // radiance off the surface
-    turned: vec3f, // of `entered` what leaves towards the eye beyond the mean over all directions
+    directional: vec3f, // part of `entered` that leaves towards the eye beyond the mean over all directions
 }
 
-// The normal of the facets that are seen: where the relief turns away from the eye, it is turned back to the horizon. A lobe
-// has no value beyond it, and with light from behind the head none that is finite.
+// The normal, turned back to the eye's horizon where the relief faces away: beyond it a lobe is undefined, and unbounded with
+// light from behind the head.
 fn seen_normal(normal: vec3f, v: vec3f) -> vec3f {
     let turned = normal - min(dot(normal, v), 0.0) * v;
     return turned / max(length(turned), 1e-3);
 }
 
-// What leaves towards the eye of light below the skin beyond the mean of all directions, over that light. What scattered only
-// once came in here; the rest, from around it, goes all ways alike.
+// Light that leaves towards the eye beyond the mean of all directions, over all light below the skin. Only light that scattered
+// once, and so entered here, depends on direction; the rest, from around, leaves evenly.
 // share: of `entered` that comes back
-fn turned(lit: Lit, share: vec3f, below: vec3f) -> vec3f {
-    return share * lit.turned / max(max(share * lit.entered, below), vec3f(1e-12));
+fn directional_share(lit: Lit, share: vec3f, below: vec3f) -> vec3f {
+    return share * lit.directional / max(max(share * lit.entered, below), vec3f(1e-12));
 }
 
 // The first light from `first` on that a point may see, or the last.
@@ -51,7 +51,7 @@ fn light_up(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
     let mirror = seen_normal(surface.normal, v);
     let by_direction = HALF_SPACE && (point.flags & OPAQUE) == 0u;
     let facing = clamp(dot(surface.normal, v), 0.0, 1.0);
-    // Loops are left at their end: software adapters run them through once more for a test at the start.
+    // Loops have their test at the end: with it at the start, software adapters run them once more.
     var i = 0u;
     loop {
         if (skin.light_count == 0u) {
@@ -61,7 +61,7 @@ fn light_up(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
             i = next_that_may_shine(i, point.position, surface.normal);
         }
         let light = lights.light[i];
-        var seen = -1.0; // how much of the light: not known yet
+        var seen = -1.0; // visibility of the light, -1 where not known yet
         var part = 0u;
         loop {
             let arriving = incident(light, point.position, part);
@@ -73,7 +73,7 @@ fn light_up(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
                 let e = arriving.irradiance * seen;
                 var entering = e * (cosine * enters(cosine, surface.roughness, surface.rho_s));
                 if (by_direction) {
-                    lit.turned += entering * beyond_mean(cosine, facing);
+                    lit.directional += entering * beyond_mean(cosine, facing);
                     entering *= coming_back(cosine);
                 }
                 lit.entered += entering;
@@ -95,7 +95,7 @@ fn light_up(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
         let albedo = surface.rho_s * surface_albedo(dot(mirror, v), surface.roughness).x;
         var entering = around * enters_from_everywhere(surface.roughness, surface.rho_s);
         if (by_direction) {
-            lit.turned += entering * beyond_mean_from_everywhere(facing);
+            lit.directional += entering * beyond_mean_from_everywhere(facing);
             entering *= skin.back_from_everywhere;
         }
         lit.entered += entering;

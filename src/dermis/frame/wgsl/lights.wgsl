@@ -4,9 +4,9 @@
 //#include "soft_shadows.wgsl"
 //#include <lights>
 
-override SHAPES: bool = false; // whether some light is more than a point, a cone or one direction
+override SHAPES: bool = false; // whether there are area lights
 
-// Whether the scene has lights of a kind that is compiled only for those that do.
+// Whether the scene has lights of each kind; optional kinds are compiled only where it does.
 //#each lights: override {override}: bool = {always};
 
 struct Light {
@@ -15,7 +15,7 @@ struct Light {
     kind: u32,
     direction: vec3f, // from the light to its target
     reference_mm: f32, // distance at which `irradiance` holds
-    irradiance: vec3f, // on a surface that faces the light there; of lights of some size the radiance
+    irradiance: vec3f, // on a surface that faces the light there; of area lights the radiance
     cos_inner: f32,
     half_u: vec3f, // half sides [mm]; of a stripe the axes over its half sides [1/mm]
     cos_outer: f32,
@@ -30,7 +30,7 @@ struct Light {
     half_width: u32, // of the shadow filter's tent [shadow texel]
     layer: i32, // in the shadow maps, -1 casts none
     side: u32, // it is shaded as side x side lights
-    lines: u32, // of sight to places on the light, for its shadow
+    lines: u32, // shadow rays to places on the light
     parallel: u32, // 1 where its map has no perspective
     round: u32, // 1 where it is a disc on its map, 0 for a square
     narrow: u32, // 1 where all of it comes from its position or, in parallel light, along its direction
@@ -54,7 +54,7 @@ fn is_parallel(light: Light) -> bool {
     return light.parallel != 0u;
 }
 
-// How many directions a light is taken to come from.
+// Number of directions that a light is sampled from.
 fn parts_of(light: Light) -> u32 {
     return select(1u, light.side * light.side, SHAPES);
 }
@@ -64,7 +64,7 @@ fn place_of(part: u32, side: u32) -> vec2f {
     return (2.0 * vec2f(vec2u(part % side, part / side)) + 1.0) / f32(side) - 1.0;
 }
 
-// What arrives of a part of a light, as its kind has it.
+// Incident light from a part of a light, by its kind.
 fn incident(light: Light, p: vec3f, part: u32) -> Incident {
     //#each lights: if ({override} && light.kind == {number}) { return {name}_incident(light, p, part); }
     return Incident(vec3f(0.0), vec3f(0.0));

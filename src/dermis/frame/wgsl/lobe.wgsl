@@ -1,4 +1,4 @@
-// The rough white surface over the skin: the model in use, and how light shares itself out between it and the skin.
+// The rough white surface over the skin: the lobe in use, and how light divides between the surface and the skin.
 //#include "surface.wgsl"
 //#include <lobes>
 
@@ -34,12 +34,12 @@ fn enters(cos_theta: f32, m: f32, rho_s: f32) -> f32 {
     return max(0.0, 1.0 - rho_s * skin.loss * surface_albedo(cos_theta, m).x);
 }
 
-// Share of light from everywhere alike that enters the skin.
+// Share of uniform light from all directions that enters the skin.
 fn enters_from_everywhere(m: f32, rho_s: f32) -> f32 {
     return max(0.0, 1.0 - rho_s * skin.loss * surface_albedo(1.0, m).y);
 }
 
-// What leaves in a direction, over the mean of all directions unless light that is thrown back inside is lost [Kelemen2001].
+// Share of light that leaves in a direction, over the mean of all directions unless light reflected inside is lost [Kelemen2001].
 fn leaves(cos_theta: f32, m: f32, rho_s: f32) -> f32 {
     let rho = rho_s * skin.loss * surface_albedo(cos_theta, m);
     return max(0.0, 1.0 - rho.x) / max(1.0 - skin.returned * rho.y, 0.5);

@@ -3,7 +3,7 @@
 @group(0) @binding(0) var triangle_table: texture_2d<u32>; // three tables one over the other
 @group(0) @binding(1) var vertex_table: texture_2d<f32>; // four texels: position u, normal v, dpdu curvature, dpdv
 
-// Of the tables: corners a, b, c and flags | material << 8; atlas places of a and b; that of c.
+// Of the tables: corners a, b, c and flags | material << 8; atlas places of a and b; that of c, texels per uv.
 fn triangle_texel(index: u32, table: u32) -> vec4u {
     let size = textureDimensions(triangle_table);
     return textureLoad(triangle_table, vec2u(index % size.x, index / size.x + table * (size.y / 3u)), 0);

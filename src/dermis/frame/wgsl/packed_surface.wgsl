@@ -1,4 +1,4 @@
-// What lighting reads of the surface at a texel of the atlas, in 32 bytes.
+// The surface at a texel of the atlas as lighting reads it, in 32 bytes.
 //#include "geometry.wgsl"
 //#include "skin.wgsl"
 
@@ -10,7 +10,7 @@ struct Packed {
     look: vec4u, // normal with the relief; colour and height over the facet; roughness and rho_s, 0 for no surface
 }
 
-// Unit vectors on the octahedron, unfolded. Source: [Cigolle2014].
+// Octahedral encoding of unit vectors. Source: [Cigolle2014].
 fn pack_direction(d: vec3f) -> u32 {
     let on = d.xy / (abs(d.x) + abs(d.y) + abs(d.z));
     let folded = (1.0 - abs(on.yx)) * select(vec2f(-1.0), vec2f(1.0), on >= vec2f(0.0));
@@ -43,7 +43,7 @@ fn pack_surface(point: Point, surface: Surface) -> Packed {
     );
 }
 
-// What only the view asks for is left out.
+// Without the members that only shading the image needs.
 fn unpack_point(packed: Packed) -> Point {
     var point: Point;
     point.position = bitcast<vec3f>(packed.place.xyz);

@@ -1,12 +1,12 @@
-// Triangles as a view sees them: planes over its pixels, and which blocks of pixels they may cover.
+// Triangles projected into a view: planes over its pixels, and the blocks of pixels that they may cover.
 //#include "geometry.wgsl"
 //#include "views.wgsl"
 
-override SAMPLES: u32 = 1u; // places in a pixel at which each view is seen, a layer each
+override SAMPLES: u32 = 1u; // samples of each view in a pixel, a layer each
 override BLOCK: u32 = select(8u, 4u, SAMPLES > 1u); // pixels along a side of a block
 
 const SLACK: f32 = 1e-5; // covers rounding, so that no pixel falls between two triangles
-const LEAST: f32 = 0.1; // of the greatest distance: less, beside the eye, would let slack reach far beyond an edge
+const LEAST: f32 = 0.1; // least distance over the greatest: with less, beside the eye, slack would reach far beyond an edge
 
 // Corner in homogeneous pixels: place times w, w; and its clip depth.
 struct Projected {
@@ -14,7 +14,7 @@ struct Projected {
     z: f32,
 }
 
-// Pixels from the lowest one on.
+// A box of pixels.
 struct Box {
     low: vec2u,
     size: vec2u,
@@ -48,8 +48,8 @@ fn bounds(a: vec3f, b: vec3f, c: vec3f) -> Box {
     return Box(vec2u(low), vec2u(max(high - low + 1.0, vec2f(0.0))));
 }
 
-// Seen from the box's corner, for precision: weights that combine the corners into a pixel, linear in it
-// [OlanoGreer1997]. Each times its corner's distance they are all positive inside.
+// Relative to the box's corner, for precision: weights that combine the corners into a pixel, linear in it
+// [OlanoGreer1997]. Multiplied by the distances of their corners they are all positive inside.
 fn set_up(index: u32, view: u32) -> Drawn {
     let t = triangle_at(index);
     let a = project(t.x, view);
@@ -81,7 +81,7 @@ fn first_block(box: Box) -> vec2u {
     return box.low / BLOCK;
 }
 
-// Across and down.
+// Number of blocks across and down.
 fn blocks_of(box: Box) -> vec2u {
     return (box.low + box.size - 1u) / BLOCK - first_block(box) + 1u;
 }
@@ -94,7 +94,7 @@ fn most_within_block(triangle: Drawn) -> vec3f {
     return max(x * views.reach.x, x * far.x) + max(y * views.reach.y, y * far.y) + SLACK;
 }
 
-// Whether some sample of a block may lie inside: no weight is negative in all of it.
+// Whether some sample of a block may lie inside: no weight is negative throughout the block.
 fn may_cover(triangle: Drawn, most: vec3f, block: vec2u) -> bool {
     let at = vec2f(vec2i(block * BLOCK) - vec2i(triangle.box.low));
     let best = triangle.at_low.xyz + at.x * triangle.along_x.xyz + at.y * triangle.along_y.xyz + most;

@@ -1,17 +1,17 @@
-// What is nearest in each sample: words that only grow, so that the order in which triangles are drawn does not matter.
+// Records the nearest surface of each sample by atomic maxima, so that the order in which triangles are drawn does not matter.
 //#include "views.wgsl"
 
 override RECORDED: u32 = 0u; // what is recorded of a sample
 
 const AS_DEPTH: u32 = 0u; // the bits of its depth
-const AS_FOUND: u32 = 1u; // its triangle, where the depths recorded before are its own
+const AS_FOUND: u32 = 1u; // its triangle, where its depth is the one recorded before
 const AS_BOTH: u32 = 2u; // its depth in fewer bits above its triangle
 const ROUNDING: u32 = 4u; // depths are computed twice and may be rounded differently
 
 @group(0) @binding(31) var<storage, read_write> nearness: array<atomic<u32>>; // depth, or depth and triangle + 1; 0 empty
 @group(0) @binding(32) var<storage, read_write> found: array<atomic<u32>>; // triangle + 1
 
-// Of two triangles at one depth the later one, always.
+// Of two triangles at one depth the later one wins, in any order.
 fn record_four(index: u32, depth: vec4f, inside: vec4<bool>, texels: vec4u) {
     var near = bitcast<vec4u>(depth); // positive floats sort like their bits
     if (RECORDED == AS_FOUND) {
@@ -35,7 +35,7 @@ fn record_near(inside: bool, texel: u32, near: u32) {
 }
 
 fn record_found(index: u32, near: vec4u, inside: vec4<bool>, texels: vec4u) {
-    let nearest = vec4u( // read together, as each read is waited for
+    let nearest = vec4u( // loaded together, so that the loads overlap
         nearest_at(inside.x, texels.x),
         nearest_at(inside.y, texels.y),
         nearest_at(inside.z, texels.z),

@@ -1,5 +1,5 @@
-// From buffers into the layers of a texture, a workgroup for each tile: those where something was drawn are copied, those that
-// hold something from the time before are emptied, the others are as they should be.
+// Copies buffers to the layers of a texture, a workgroup for each tile: tiles where something was drawn are copied, those that
+// still hold something of the last frame are emptied, all others are up to date.
 //#include "tiles.wgsl"
 
 @group(0) @binding(34) var<storage, read_write> tiles: array<u32>;
@@ -10,7 +10,7 @@ const ROWS: u32 = 4u; // that a workgroup takes at a time
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) lane: vec3u) {
     let tile = tile_at(group.xy, group.z);
     let state = tiles[tile];
-    storageBarrier(); // all have read it
+    storageBarrier(); // until all have read it
     if (all(lane == vec3u(0u))) {
         tiles[tile] = select(0u, HELD, state == DRAWN);
     }
@@ -22,7 +22,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) lane:
     }
 }
 
-// Four pixels of a column, read together as each read is waited for.
+// Four pixels of a column, loaded together so that the loads overlap.
 fn resolve(pixel: vec2u, layer: u32, drawn: bool) {
     let rows = pixel.y + vec4u(0u, 1u, 2u, 3u) * ROWS;
     let at = (layer * views.height + rows) * views.width + pixel.x;

@@ -1,6 +1,6 @@
-// Which share of a light reaches a point, from the light's map of depths.
+// Share of a light that reaches a point, from the light's shadow map.
 
-// The point moves off the surface by the filter's width, so that the surface does not shade itself.
+// The point is lifted off the surface by the filter's width, so that the surface does not shadow itself.
 fn visibility(light: Light, point: Point, l: vec3f) -> f32 {
     if (light.layer < 0) {
         return 1.0;
@@ -23,7 +23,7 @@ fn visibility(light: Light, point: Point, l: vec3f) -> f32 {
     return filtered_depth(light, vec2f(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y), ndc.z);
 }
 
-// Percentage-closer filtering [Reeves1987] under a tent, 4 x 4 texels at a time: their reads wait for each other's no more.
+// Percentage-closer filtering [Reeves1987] under a tent, 4 x 4 texels at a time, so that their loads overlap.
 fn filtered_depth(light: Light, uv: vec2f, depth: f32) -> f32 {
     let size = vec2f(textureDimensions(shadow_maps));
     let texel = 1.0 / size;
@@ -34,7 +34,7 @@ fn filtered_depth(light: Light, uv: vec2f, depth: f32) -> f32 {
     let width = f32(h);
     let columns = vec4f(0.0, 1.0, 2.0, 3.0);
     var lit = 0.0;
-    var j = 1 - h; // loops that are left at their end, as in lighting.wgsl
+    var j = 1 - h; // loops with their test at the end, as in lighting.wgsl
     loop {
         let wy = max(vec4f(0.0), width - abs(f32(j) + columns - f.y));
         var i = 1 - h;
@@ -65,7 +65,7 @@ fn quad_at(light: Light, corner: vec2f) -> vec4f {
     return textureGather(0, shadow_maps, nearest_sampler, corner, light.layer);
 }
 
-// What is free of a quad, weighted by column and row; gather returns its texels in the order (0,1) (1,1) (1,0) (0,0).
+// Unoccluded share of a quad, weighted by column and row; gather returns its texels in the order (0,1) (1,1) (1,0) (0,0).
 fn free_share(nearest: vec4f, depth: f32, wx: vec2f, wy: vec2f) -> f32 {
     let free = select(vec4f(0.0), vec4f(1.0), nearest <= vec4f(depth));
     return dot(free, vec4f(wx.x * wy.y, wx.y * wy.y, wx.y * wy.x, wx.x * wy.x));

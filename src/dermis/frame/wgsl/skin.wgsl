@@ -20,7 +20,7 @@ fn mip_for(image: texture_2d<f32>, footprint: f32) -> f32 {
     return max(0.0, log2(footprint * max(size.x, size.y)));
 }
 
-// How the skin looks at a point when one sample stands for `footprint` of the uv square's side.
+// The skin's surface at a point, filtered over `footprint`, a share of the uv square's side.
 // Relief too fine for it widens the lobe by its slope variance [OlanoBaker2010].
 fn surface_at(point: Point, footprint: f32) -> Surface {
     let length_u = length(point.dpdu);
@@ -38,12 +38,12 @@ fn surface_at(point: Point, footprint: f32) -> Surface {
     let gradient = (fine.xy - coarse.xy) * size + vec2f(s.x * length_u, -s.y * length_v);
     let per_mm = size / max(vec2f(length_u, length_v), vec2f(1e-3));
     let spread = max(s.zw - s.xy * s.xy, vec2f(0.0)) + max(fine.zw - fine.xy * fine.xy, vec2f(0.0)) * per_mm * per_mm;
-    let m = skin.roughness * textureSampleLevel(roughness_map, map_sampler, point.uv, mip_for(roughness_map, footprint)).x;
+    let m = skin.m * textureSampleLevel(roughness_map, map_sampler, point.uv, mip_for(roughness_map, footprint)).x;
     var out: Surface;
     out.normal = bend(point, gradient);
     out.colour = textureSampleLevel(colour_map, map_sampler, point.uv, mip_for(colour_map, footprint)).rgb;
     out.roughness = clamp(sqrt(m * m + spread.x + spread.y), 0.05, 1.0);
-    out.rho_s = skin.rho_s * textureSampleLevel(specular_map, map_sampler, point.uv, mip_for(specular_map, footprint)).x;
+    out.rho_s = skin.strength * textureSampleLevel(specular_map, map_sampler, point.uv, mip_for(specular_map, footprint)).x;
     return out;
 }
 

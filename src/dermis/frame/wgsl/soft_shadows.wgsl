@@ -1,10 +1,10 @@
-// Which share of a light of some size reaches a point: lines of sight followed through the light's map of depths.
+// Share of an area light that reaches a point: shadow rays marched through the light's shadow map.
 
-const STEPS: u32 = 8u; // of a line of sight to a light of some size
+const STEPS: u32 = 8u; // of a shadow ray
 const CLOSE: u32 = 2u; // steps that are near the point's own surface
-const THICKNESS: f32 = 4.0; // that what hides has at least [mm]
-const STEEP: f32 = 1.5; // steps by which a line may be behind a surface just before it goes through
-const LEAST_PROBES: u32 = 8u; // lines of sight that may stand for all
+const THICKNESS: f32 = 4.0; // least thickness of occluders [mm]
+const STEEP: f32 = 1.5; // steps by which a ray may be behind a surface that it goes through
+const LEAST_PROBES: u32 = 8u; // rays after which the others are skipped if all agree
 const LEAST_TEXELS: f32 = 1.5; // half width of the sharpest soft shadow's edge
 
 // A point as the light sees it, in the map's frame: right, up, forward.
@@ -16,11 +16,11 @@ struct Receiver {
     least: f32, // half width of the sharpest edge, as `place`
 }
 
-// Where lines of sight are at one of the steps from a point to the light, and what they meet there.
+// One of the steps of the rays from a point to the light.
 struct Station {
     depth: f32, // [mm]
-    lean: f32, // times the light's half sides: how far its edge's line is from that to its middle, as a place
-    thickness: f32, // a line farther behind a surface went past the edge of what is in front [mm]
+    lean: f32, // times the light's half sides: distance on the map of the ray to its edge from that to its middle
+    thickness: f32, // a ray farther behind a surface than this has passed behind it [mm]
 }
 
 fn receiver(light: Light, point: Point) -> Receiver {
@@ -33,8 +33,8 @@ fn receiver(light: Light, point: Point) -> Receiver {
     return Receiver(n, dot(n, p), p.xy / p.z, p.z, max(light.softness / p.z, LEAST_TEXELS * light.texel));
 }
 
-// Share of what rises of a light of some size that is in sight: lines to places spread over it are followed through the
-// light's map of depths. Close to what hides it a shadow is sharp.
+// Visible share of the part of an area light above the point's tangent plane: rays to places spread over the light are marched
+// through its shadow map. Shadows are sharp close to their occluder.
 fn soft_visibility(light: Light, point: Point) -> f32 {
     let at = receiver(light, point);
     if (at.depth <= light.map_near) {
@@ -48,7 +48,7 @@ fn soft_visibility(light: Light, point: Point) -> f32 {
         let places = four_places(light, i);
         let rising = bits(rise(light, at, places)) & ((1u << min(light.lines - i, 4u)) - 1u);
         if (rising == 0u) {
-            continue; // they give no light here, as their cosines say
+            continue; // below the tangent plane: they give no light here
         }
         if (steps == 0u) {
             return 1.0;
@@ -65,7 +65,7 @@ fn soft_visibility(light: Light, point: Point) -> f32 {
     return select(0.0, 1.0 - f32(hidden) / f32(followed), followed > 0u);
 }
 
-// Four places on a light or on its map, taken together so that their reads do not wait for each other's.
+// Four places on a light or on its map, taken together so that their loads overlap.
 struct Four {
     x: vec4f,
     y: vec4f,
@@ -100,7 +100,7 @@ fn rise(light: Light, at: Receiver, places: Four) -> vec4<bool> {
     return at.normal.x * x + at.normal.y * y > vec4f(foot);
 }
 
-// A bit for each of four places on the light that something is in the way to.
+// A bit for each of four places on the light that is hidden.
 fn hidden_of(light: Light, at: Receiver, places: Four, steps: u32) -> u32 {
     var met = 0u;
     for (var left = steps; left != 0u && met != 15u; left &= left - 1u) {
@@ -109,10 +109,10 @@ fn hidden_of(light: Light, at: Receiver, places: Four, steps: u32) -> u32 {
     return met;
 }
 
-// A bit for each step at which anything is nearer to the light than the lines are, wherever on the light they end.
+// A bit for each step at which anything is nearer to the light than rays to any place on it.
 fn steps_with_something(light: Light, at: Receiver) -> u32 {
     let middle = texels_at(light, at.place);
-    // Most see nothing farther off than their own surface.
+    // Most points find nothing beyond their own surface.
     let close = select(1u, 0u, is_clear(light, at, middle, 0u, 0u)) | select(2u, 0u, is_clear(light, at, middle, 1u, 1u));
     if (is_clear(light, at, middle, CLOSE, STEPS - 1u)) {
         return close;
@@ -124,17 +124,17 @@ fn steps_with_something(light: Light, at: Receiver) -> u32 {
     return steps;
 }
 
-// Whether nothing is nearer to the light than lines are at the first step, as far around as they reach at the last.
+// Whether nothing is nearer to the light than rays are at the first step, within their spread at the last.
 fn is_clear(light: Light, at: Receiver, middle: vec2f, first: u32, last: u32) -> bool {
     let lean = station_at(light, at.depth, last).lean;
     let radius = (max(light.extent.x, light.extent.y) * lean + at.least) / light.texel;
     let nearest = nearest_around(light, middle, radius);
-    return (nearest == 0.0) | (depth_of(light, nearest) >= depth_on_line(light, at.depth, f32(first) + 0.5));
+    return (nearest == 0.0) | (depth_of(light, nearest) >= depth_on_ray(light, at.depth, f32(first) + 0.5));
 }
 
-// Nearest depth within a radius around a place on the light's map, or nearer; 1 where the radius is too large to say.
+// A depth no farther than any within a radius around a place on the light's map; 1 where the radius is too large to say.
 fn nearest_around(light: Light, place: vec2f, radius: f32) -> f32 {
-    // half of a square reaches as far
+    // half a square covers the radius
     let level = u32(radius > 2.0) + u32(radius > 4.0) + u32(radius > 8.0) + u32(radius > 16.0);
     let size = textureDimensions(shadow_bounds);
     let count = size.y >> level;
@@ -144,15 +144,15 @@ fn nearest_around(light: Light, place: vec2f, radius: f32) -> f32 {
     return select(max(max(found.x, found.y), max(found.z, found.w)), 1.0, radius > 32.0);
 }
 
-// Whether something above the point's tangent plane is in the way to places of the light at a station.
+// Whether something above the point's tangent plane hides places of the light at a station.
 fn hides(light: Light, at: Receiver, places: Four, station: Station) -> vec4<bool> {
     let reach = station.lean * light.extent + at.least;
-    let lines = Four(at.place.x + reach.x * places.x, at.place.y + reach.y * places.y);
-    let nearness = four_nearest(light, lines);
+    let rays = Four(at.place.x + reach.x * places.x, at.place.y + reach.y * places.y);
+    let nearness = four_nearest(light, rays);
     let found = depths_of(light, nearness);
     let behind = station.depth - found;
     let spread = select(found, vec4f(1.0), is_parallel(light));
-    let height = spread * (at.normal.x * lines.x + at.normal.y * lines.y) + at.normal.z * found - at.height;
+    let height = spread * (at.normal.x * rays.x + at.normal.y * rays.y) + at.normal.z * found - at.height;
     return (nearness > vec4f(0.0)) & (behind > vec4f(0.0)) & (behind < vec4f(station.thickness))
         & (height > 2.0 * light.texel * spread);
 }
@@ -181,8 +181,8 @@ fn depths_of(light: Light, nearness: vec4f) -> vec4f {
 }
 
 fn station_at(light: Light, from_depth: f32, step: u32) -> Station {
-    let depth = depth_on_line(light, from_depth, f32(step) + 0.5);
-    let next = depth_on_line(light, from_depth, f32(step) + 1.5);
+    let depth = depth_on_ray(light, from_depth, f32(step) + 0.5);
+    let next = depth_on_ray(light, from_depth, f32(step) + 1.5);
     let thickness = max(THICKNESS, STEEP * (depth - next));
     if (is_parallel(light)) {
         return Station(depth, from_depth - depth, thickness);
@@ -190,8 +190,8 @@ fn station_at(light: Light, from_depth: f32, step: u32) -> Station {
     return Station(depth, 1.0 / depth - 1.0 / from_depth, thickness);
 }
 
-// Depth after a number of steps from the point to the nearest surface, finer at first: shadows are sharp there.
-fn depth_on_line(light: Light, from_depth: f32, step: f32) -> f32 {
+// Depth after a number of steps from the point to the nearest surface; steps are finer at first, where shadows are sharp.
+fn depth_on_ray(light: Light, from_depth: f32, step: f32) -> f32 {
     let way = min(1.0, step * step / f32(STEPS * STEPS));
     if (is_parallel(light)) {
         return mix(from_depth, light.map_near, way);

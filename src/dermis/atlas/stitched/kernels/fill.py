@@ -113,7 +113,7 @@ def nearest_side(
 
     ends : (k, 2, 2) of the border's sides [texel]
     along_u, along_v : (k, 2, 2) step on the surface, at both ends, for a texel to the right and down [mm]
-    reach_mm : (k,) how far from each side texels are nearest_sides [mm]
+    reach_mm : (k,) how far from each side its texels may lie [mm]
     widest : (k,) and how far at most [texel]
     owner : (h, w) triangles, -1 outside
     side, share, away_mm2 : (h, w) nearest side, how far along it from 0 to 1, squared distance, to be written

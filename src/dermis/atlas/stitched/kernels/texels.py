@@ -25,8 +25,9 @@ def runs(
     points : (h, w, 3) what each texel shows [mm]
     roots : (h, w, 2) nearest place on its chart [texel]
     metric : (h, w, 3) texels per mm along u and v, and a third number
-    steps, slack_mm : a gap is where texels beside each other show points farther apart than so many of their
-        steps on the surface and so much more, and belong to places that are farther apart than they are away
+    steps, slack_mm : neighbours have a gap between them if their points are farther apart than so many of
+        their steps on the surface plus the slack, and their roots farther apart than either texel is from its
+        root
     """
     height, width = chart.shape
     for y in range(height):
@@ -54,7 +55,7 @@ def _apart(a: Any, b: Any, limit: float) -> bool:
 
 @compiled
 def _opposed(roots: Any, y: int, x: int, other_y: int, other_x: int) -> bool:
-    """Whether two texels belong to places farther apart than they are away from these."""
+    """Whether the roots of two texels are farther apart than either texel is from its root."""
     one, other = roots[y, x], roots[other_y, other_x]
     away = max((one[0] - x) ** 2 + (one[1] - y) ** 2, (other[0] - other_x) ** 2 + (other[1] - other_y) ** 2)
     return bool((one[0] - other[0]) ** 2 + (one[1] - other[1]) ** 2 > away)

@@ -27,7 +27,7 @@ def walk(
     weights: Doubles,
     whole: NDArray[np.bool_],
 ) -> None:
-    """Go straight from a place in each triangle to a target in the triangle's plane, unfolded as one goes.
+    """Walk straight from a place in each triangle to a target in its plane, unfolding triangles on the way.
 
     triangle : (n,)
     start : (n, 2) in the triangle or on its border [mm]
@@ -97,7 +97,7 @@ def _trace(
         cy = ay + forth * (by - ay) + hand * up * (bx - ax)
         left = _cross(dx, dy, cx - sx, cy - sy) > 0.0
         a_left = _cross(dx, dy, ax - sx, ay - sy) > 0.0
-        # out between the apex and the end on its other side
+        # it leaves between the apex and the end on the other side
         if left != a_left:
             ox, oy, k = bx, by, (j + 2) % 3
             px, py, qx, qy = cx, cy, ax, ay
@@ -136,7 +136,7 @@ def _in_order(j: int, b: float, c: float) -> tuple[float, float]:
 def _weights(
     ax: float, ay: float, bx: float, by: float, cx: float, cy: float, tx: float, ty: float
 ) -> tuple[float, float]:
-    """Of b and c at t, none negative."""
+    """Barycentric weights of b and c at t, none negative."""
     area = _cross(bx - ax, by - ay, cx - ax, cy - ay)
     b = min(max(_cross(tx - ax, ty - ay, cx - ax, cy - ay) / area, 0.0), 1.0)
     c = min(max(_cross(bx - ax, by - ay, tx - ax, ty - ay) / area, 0.0), 1.0)

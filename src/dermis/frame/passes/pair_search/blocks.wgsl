@@ -4,9 +4,13 @@
 @group(0) @binding(3) var<storage, read> tiles: array<Bounds>;
 @group(0) @binding(4) var<storage, read_write> blocks: array<Bounds>;
 
-@compute @workgroup_size(SIZE)
-fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
-    let index = number_of(group, local);
+@compute @workgroup_size(EACH)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let index = number_of(group, groups, lane);
     if (index >= search.count) {
         return;
     }

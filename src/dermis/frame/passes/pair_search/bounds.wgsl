@@ -1,5 +1,6 @@
 // Boxes with cones of normals, and whether places in two of them may be translucent pairs.
 //#include "translucent_pair.wgsl"
+//#include "each.wgsl"
 //#include "search.wgsl"
 
 const FAR: f32 = 1e18; // the box of nothing, whose distance from others has a square

@@ -1,6 +1,7 @@
 // Where gutters show each source: the middle of each patch of texels that copy its texel or one beside it.
 //#include "translucent_pair.wgsl"
 //#include "map_places.wgsl"
+//#include "each.wgsl"
 //#include "search.wgsl"
 
 @group(0) @binding(3) var<storage, read> source_points: array<Source>;
@@ -35,9 +36,13 @@ fn add(place: vec2i) {
     }
 }
 
-@compute @workgroup_size(SIZE)
-fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
-    let index = number_of(group, local);
+@compute @workgroup_size(EACH)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let index = number_of(group, groups, lane);
     if (index >= search.count) {
         return;
     }

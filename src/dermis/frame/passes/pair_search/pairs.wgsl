@@ -1,4 +1,5 @@
 // The pairs that hits.wgsl has found, one after the other, and which sources have any.
+//#include "each.wgsl"
 //#include "search.wgsl"
 
 @group(0) @binding(3) var<storage, read> looks: array<vec4u>; // as in hits.wgsl
@@ -9,9 +10,13 @@
 @group(0) @binding(8) var<storage, read_write> pairs: array<u32>; // three words: source, receiver, free
 @group(0) @binding(9) var<storage, read_write> used: array<atomic<u32>>; // 1 for sources with a pair
 
-@compute @workgroup_size(SIZE)
-fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
-    let index = number_of(group, local);
+@compute @workgroup_size(EACH)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let index = number_of(group, groups, lane);
     if (index >= search.count) {
         return;
     }

@@ -52,9 +52,13 @@ fn part_of(index: u32, tile_low: vec2f, tile_high: vec2f) -> Part {
     return part;
 }
 
-@compute @workgroup_size(SIZE)
-fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
-    let tile = number_of(group, local);
+@compute @workgroup_size(EACH)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let tile = number_of(group, groups, lane);
     if (tile >= search.count) {
         return;
     }

@@ -1,0 +1,155 @@
+"""Measures heads that move: python benchmarks/motion.py -o result.json
+
+Ratios are of one run: a frame in which light, skin and camera are new, and one with a new shape too.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import count, cycle
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from cyclopts import Parameter, run
+from viewer_page import resident_mb
+
+from dermis.benchmark.cases import Case, scenes_of, settings_of
+from dermis.benchmark.measure import ON_CPU, Effort, row_ms, stage_ms
+from dermis.benchmark.rigged import pose_at, rigged
+from dermis.cli.console import print_json
+from dermis.frame.renderer import Renderer
+from dermis.gpu.memory import held_bytes
+from dermis.mesh.head import Head
+from dermis.outputs import check_output, replacing
+from dermis.scene import Pose, Scene, Settings, Skin
+from dermis.scene.heads import load_head
+
+_ON_GPU = Case()  # 1920 x 1080, atlas 2048, three shadowed lights, six Gaussians
+_ON_CPU = Case((1024, 1024), atlas=1024)
+_TARGETS, _MOMENTS = 52, 60
+_PEOPLE = 4
+_SAMPLES = 40  # of the memory
+
+
+def main(
+    *,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    head: str = "lee_perry_smith",
+    adapter: str = "auto",
+    frames: int = 0,
+) -> int:
+    """Measure and print, and write the figures where a file is named.
+
+    Parameters
+    ----------
+    output:
+        JSON to write.
+    head:
+        A sample or a file.
+    adapter:
+        auto (the best), cpu (software), or a part of an adapter's name.
+    frames:
+        Of motion for the memory; 5000 for the table of docs/performance.md.
+    """
+    if output is not None:
+        check_output(output, (".json",))
+    renderer, loaded = Renderer(adapter), load_head(head)
+    software = renderer.device.adapter.kind == "CPU"
+    case, effort = (_ON_CPU, ON_CPU) if software else (_ON_GPU, Effort())
+    with tempfile.TemporaryDirectory() as folder:
+        found: dict[str, Any] = {"adapter": renderer.device.adapter.name, "head": head}
+        found |= moving(renderer, case, loaded, Path(folder), effort)
+        found |= {"another_person_ms": people(renderer, case, loaded)}
+        if frames:
+            found |= {
+                "memory": memory(renderer, replace(case, targets=_TARGETS), loaded, Path(folder), frames)
+            }
+    print_json(found)
+    if output is not None:
+        with replacing(output) as trial:
+            trial.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+    return 0
+
+
+def moving(renderer: Renderer, case: Case, head: Head, folder: Path, effort: Effort) -> dict[str, Any]:
+    """Frames that each have another skin, other lights and another camera; at rest, and with a new shape."""
+    settings, found = settings_of(case), dict[str, Any]()
+    scenes = {
+        "still": scenes_of(case, head, folder, _MOMENTS),
+        "moving": scenes_of(replace(case, targets=_TARGETS), head, folder, _MOMENTS),
+    }
+    endless = {name: anew(several) for name, several in scenes.items()}
+    for each in endless.values():
+        row_ms(renderer, each, max(2, effort.warming), settings)
+    times: dict[str, list[float]] = {name: [] for name in endless}
+    for _ in range(3):  # in turn, so that a busy machine slows both down
+        for name, each in endless.items():
+            row_ms(renderer, each, 2, settings)  # another head: its tables
+            times[name].append(row_ms(renderer, each, effort.row, settings) / effort.row)
+    for name, each in endless.items():
+        row_ms(renderer, each, 2, settings)
+        found[name] = {"frame_ms": min(times[name]), "device_ms": stage_ms(renderer, each, settings, effort)}
+        found[name]["python_ms"] = python_ms(renderer, each, settings, effort)
+    ratio = statistics.median(a / b for a, b in zip(times["moving"], times["still"], strict=True))
+    return found | {"moving_over_still": ratio}
+
+
+def anew(scenes: list[Scene]) -> Iterator[Scene]:
+    """The scenes again and again, each time with a skin that was never seen before."""
+    for number, scene in zip(count(), cycle(scenes), strict=False):
+        skin = scene.skin.model_copy(update={"roughness": 0.2 + 0.3 * ((0.618 * number) % 1.0)})
+        yield replace(scene, skin=skin)
+
+
+def python_ms(renderer: Renderer, scenes: Iterator[Scene], settings: Settings, effort: Effort) -> float:
+    """Median of Python's time for a frame while the device is idle [ms]."""
+    found = []
+    for _ in range(max(effort.row, 3)):
+        scene = next(scenes)
+        renderer.device.wait()
+        started = time.perf_counter()
+        renderer.draw(scene, settings, timed=False)
+        found.append(1e3 * (time.perf_counter() - started))
+    return statistics.median(found)
+
+
+def people(renderer: Renderer, case: Case, head: Head) -> list[float]:
+    """Time to the first frame of other people of the same topology, one after the other [ms]."""
+    settings, found = settings_of(case), []
+    renderer.draw(Scene(head), settings)
+    for number in range(_PEOPLE):
+        stretched = head.positions_mm * np.array([1.0 + 0.02 * number, 0.97, 1.0], np.float32)
+        scene = Scene(head, skin=Skin(), pose=Pose(positions_mm=stretched))
+        renderer.device.wait()
+        started = time.perf_counter()
+        renderer.draw(scene, settings, timed=False)
+        renderer.device.wait()
+        found.append(1e3 * (time.perf_counter() - started))
+    return found
+
+
+def memory(renderer: Renderer, case: Case, head: Head, folder: Path, frames: int) -> dict[str, Any]:
+    """Memory of the process and of the device over frames of a motion that never repeats [MB]."""
+    scene, settings = scenes_of(case, head, folder, 1)[0], settings_of(case)
+    moving, taken = rigged(head, case.targets), list[tuple[int, float, float]]()
+    for number in range(frames):
+        posed = replace(scene, head=moving, pose=pose_at(moving, number))
+        renderer.draw(posed, settings, timed=False)
+        if number * _SAMPLES // frames >= len(taken):
+            taken.append((number, resident_mb(), held_bytes() / 1e6))
+    renderer.device.wait()
+    later = [one for one in taken if one[0] >= min(200, frames // 2)]
+    growth = {
+        name: max(one[k] for one in later) / later[0][k] - 1.0 for k, name in ((1, "process"), (2, "device"))
+    }
+    return {"growth": growth, "frame_process_device_mb": taken}
+
+
+if __name__ == "__main__":
+    run(main)

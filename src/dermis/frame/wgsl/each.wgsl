@@ -1,0 +1,7 @@
+// One invocation for each of a long list, in rows of workgroups.
+
+const EACH: u32 = 64u; // invocations of a workgroup
+
+fn number_of(group: vec3u, groups: vec3u, lane: u32) -> u32 {
+    return (group.y * groups.x + group.x) * EACH + lane;
+}

@@ -1,0 +1,153 @@
+"""Animation clips of a glTF file."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from dermis.errors import DermisError, refuse
+from dermis.mesh.curves import Curve
+from dermis.mesh.formats import Array
+from dermis.mesh.gltf.document import Document, Tree, read_document
+from dermis.mesh.gltf.nodes import Nodes, read_nodes
+from dermis.mesh.gltf.targets import target_names
+
+_WIDTH = {"translation": 3, "rotation": 4, "scale": 3}
+_KINDS = ("STEP", "LINEAR", "CUBICSPLINE")
+_DAMAGED = "The file is damaged: export it again"
+
+
+class Track(NamedTuple):
+    """What one curve moves: `path` of the named nodes, or "weights" of the named morph targets."""
+
+    path: str
+    names: tuple[str, ...]
+    curve: Curve
+
+
+@dataclass(frozen=True, eq=False)
+class Animation:
+    """A clip of a file."""
+
+    name: str
+    tracks: tuple[Track, ...]
+
+
+class _Keys(NamedTuple):
+    times_s: Array
+    values: Array
+    kind: str
+
+    @property
+    def plain(self) -> Array:
+        """(k, n) the values without tangents."""
+        return self.values[:, 1] if self.kind == "CUBICSPLINE" else self.values
+
+
+def clip_names(path: Path) -> tuple[str, ...]:
+    """Names of the file's clips; those without are numbered."""
+    return _names(_opened(path))
+
+
+def read_clip(path: Path, name: str | None) -> Animation:
+    """A clip of a .glb or .gltf file; the only one when no name is given.
+
+    Raises DermisError for a clip that is not there, and for one that is damaged.
+    """
+    document = _opened(path)
+    names = _names(document)
+    if not names:
+        refuse(path, "a file with animation clips", "it has none", "Export it with its animation")
+    if name is None and len(names) > 1:
+        came, remedy = f"it has {', '.join(names)}", f"Name one, as in {path.name}#{names[0]}"
+        refuse(path, "to know which of its clips is meant", came, remedy)
+    if name is not None and name not in names:
+        refuse(path, f"one of its clips ({', '.join(names)})", f"{name!r} came", "Correct the name")
+    index = 0 if name is None else names.index(name)
+    try:
+        return Animation(names[index], tuple(_tracks(document, index, names[index])))
+    except DermisError:
+        raise
+    except (KeyError, IndexError, ValueError, TypeError, AttributeError, OSError) as fault:
+        came = f"{names[index]!r} cannot be read ({type(fault).__name__}: {fault})"
+        refuse(path, "sound animation clips", came[:250], _DAMAGED)
+
+
+def _opened(path: Path) -> Document:
+    try:
+        return read_document(path)
+    except (KeyError, ValueError, TypeError, struct.error, OSError) as fault:
+        came = f"it cannot be read ({f'{type(fault).__name__}: {fault}'.splitlines()[0][:200]})"
+        refuse(path, "a glTF file", came, "Check its name, or export it again")
+
+
+def _names(document: Document) -> tuple[str, ...]:
+    clips = document.all("animations")
+    return tuple(str(clip.get("name") or f"clip {k}") for k, clip in enumerate(clips))
+
+
+def _tracks(document: Document, index: int, name: str) -> list[Track]:
+    """The clip's curves, those of the same kind and keys side by side in one."""
+    clip, nodes = document.tree["animations"][index], read_nodes(document)
+    groups: dict[tuple[object, ...], list[tuple[str, _Keys]]] = {}
+    found = []
+    for number, channel in enumerate(clip["channels"]):
+        target, culprit = channel["target"], f"{document.path}: clip {name!r}, channel {number}"
+        if "node" not in target or target["path"] not in (*_WIDTH, "weights"):
+            continue  # of an extension
+        _check_node(nodes, target["node"], culprit)
+        sampler = clip["samplers"][channel["sampler"]]
+        if target["path"] == "weights":
+            found.append(_weights(document, target["node"], sampler, culprit))
+            continue
+        keys = _keys(document, sampler, _WIDTH[target["path"]], culprit)
+        if target["path"] == "rotation" and not keys.plain.any(axis=-1).all():
+            refuse(culprit, "rotations as unit quaternions", "one is 0", _DAMAGED)
+        group = (target["path"], keys.kind, keys.times_s.tobytes())
+        groups.setdefault(group, []).append((nodes.names[target["node"]], keys))
+    return found + [_side_by_side(str(path), members) for (path, *_), members in groups.items()]
+
+
+def _check_node(nodes: Nodes, node: int, culprit: str) -> None:
+    if not 0 <= node < len(nodes.names):
+        refuse(culprit, f"nodes from 0 to {len(nodes.names) - 1}", f"it moves node {node}", _DAMAGED)
+
+
+def _weights(document: Document, node: int, sampler: Tree, culprit: str) -> Track:
+    mesh = document.tree["nodes"][node].get("mesh")
+    names = () if mesh is None else target_names(document.tree["meshes"][mesh])
+    if not names:
+        came = f"node {node} has no morph targets"
+        refuse(culprit, "weights of a mesh with morph targets", came, _DAMAGED)
+    keys = _keys(document, sampler, len(names), culprit)
+    return Track("weights", names, Curve(keys.times_s, keys.values[..., None, :], keys.kind))  # type: ignore[arg-type]
+
+
+def _side_by_side(path: str, members: list[tuple[str, _Keys]]) -> Track:
+    keys = members[0][1]
+    values = np.stack([one.values for _, one in members], axis=-2)
+    curve = Curve(keys.times_s, values, keys.kind, turns=path == "rotation")  # type: ignore[arg-type]
+    return Track(path, tuple(name for name, _ in members), curve)
+
+
+def _keys(document: Document, sampler: Tree, width: int, culprit: str) -> _Keys:
+    """Times and values of a sampler, (k, n), or (k, 3, n) with the tangents of a spline."""
+    kind = sampler.get("interpolation", "LINEAR")
+    if kind not in _KINDS:
+        refuse(culprit, f"an interpolation of {', '.join(_KINDS)}", f"{kind!r} came", _DAMAGED)
+    times, values = document.real(sampler["input"]).ravel(), document.real(sampler["output"])
+    shape = (len(times), 3, width) if kind == "CUBICSPLINE" else (len(times), width)
+    if len(times) == 0 or values.size != np.prod(shape):
+        came = f"{len(times)} and {values.size} came"
+        refuse(culprit, f"a time and {np.prod(shape[1:])} numbers for each key", came, _DAMAGED)
+    if not (np.isfinite(times).all() and np.isfinite(values).all()):
+        refuse(culprit, "finite keys", "some are NaN or infinite", _DAMAGED)
+    if (np.diff(times) < 0).any():
+        late = int(np.flatnonzero(np.diff(times) < 0)[0])
+        came = f"key {late + 1} at {times[late + 1]:g} s comes after {times[late]:g} s"
+        refuse(culprit, "keys in the order of time", came, _DAMAGED)
+    return _Keys(times, values.reshape(shape), kind)

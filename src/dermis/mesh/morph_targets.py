@@ -1,0 +1,57 @@
+"""Morph targets: displacements of points by name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float32]
+Ints = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class MorphTargets:
+    """Displacements of some of the points by name, target after target.
+
+    names : (t,)
+    first : (t + 1,) where each target's displacements begin
+    point : (n,) the point that each moves
+    delta_mm : (n, 3) by how much at weight 1
+    rest : (t,) weights with which the points at rest were made; None where all are 0
+    """
+
+    names: tuple[str, ...]
+    first: Ints
+    point: Ints
+    delta_mm: Floats
+    rest: Floats | None = None
+
+    @cached_property
+    def index(self) -> dict[str, int]:
+        """Number of each target by its name."""
+        return {name: index for index, name in enumerate(self.names)}
+
+    def of(self, target: int) -> slice:
+        """Which of the displacements are a target's."""
+        return slice(int(self.first[target]), int(self.first[target + 1]))
+
+    def dense(self, points: NDArray[np.intp], count: int) -> Floats:
+        """(t, n, 3) displacements of some points by all targets.
+
+        count : of all points
+        """
+        place = np.full(count, -1, np.int64)
+        place[points] = np.arange(len(points))
+        at, target = place[self.point], np.repeat(np.arange(len(self.names)), np.diff(self.first))
+        kept = at >= 0
+        found = np.zeros((len(self.names), len(points), 3), np.float32)
+        found[target[kept], at[kept]] = self.delta_mm[kept]
+        return found
+
+
+def no_targets() -> MorphTargets:
+    """Of a head that has none."""
+    return MorphTargets((), np.zeros(1, np.int32), np.zeros(0, np.int32), np.zeros((0, 3), np.float32))

@@ -1,0 +1,201 @@
+"""One level of Loop's and of Catmull's and Clark's subdivision: where each new point lies, as weights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.mesh.geometry import unite_sides
+from dermis.mesh.mesh import Ints
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+Index = NDArray[np.int64]
+Doubles = NDArray[np.float64]
+
+
+class Cage(NamedTuple):
+    """Polygons to be refined.
+
+    uv : (v, 2) of each corner vertex
+    point : (v,) the point where it lies
+    corner : (n,) corner vertices, face after face
+    sides : (f,) the number of corners of each face
+    material : (f,)
+    """
+
+    uv: Doubles
+    point: Index
+    corner: Index
+    sides: Index
+    material: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class _Sides:
+    """Sides of all faces, each from a corner to the next, and the edges that they lie on.
+
+    points : how many there are
+    start : (n,) the point where each side begins
+    before : (n,) the side that ends there
+    face : (n,) whose side it is
+    ends : (e, 2) points of each edge
+    edge : (n,) of each side
+    border : (e,) whether an edge has another number of sides than two
+    cuts, cut : as `ends` and `edge` for corner vertices: an edge on a uv seam is two cuts
+    """
+
+    points: int
+    start: Index
+    before: Index
+    face: Index
+    ends: Index
+    edge: Index
+    border: NDArray[np.bool_]
+    cuts: Index
+    cut: Index
+
+    @cached_property
+    def valence(self) -> Index:
+        """(p,) edges at each point."""
+        return np.bincount(self.ends.ravel(), minlength=self.points)
+
+    @cached_property
+    def border_valence(self) -> Index:
+        """(p,) border edges at each point."""
+        return np.bincount(self.ends[self.border].ravel(), minlength=self.points)
+
+
+def _sides(cage: Cage) -> _Sides:
+    last = np.cumsum(cage.sides) - 1
+    first = last + 1 - cage.sides
+    number = np.arange(len(cage.corner))
+    after, before = number + 1, number - 1
+    after[last], before[first] = first, last
+    cuts, cut, _ = unite_sides(np.column_stack((cage.corner, cage.corner[after])))
+    start = cage.point[cage.corner]
+    ends, edge, counts = unite_sides(np.column_stack((start, start[after])))
+    face = np.repeat(np.arange(len(cage.sides)), cage.sides)
+    return _Sides(int(cage.point.max()) + 1, start, before, face, ends, edge, counts != 2, cuts, cut)
+
+
+def refine_loop(cage: Cage) -> tuple[csr_array, Cage]:
+    """Weights (q, p) of the finer points, and four triangles for each: three at its corners, one between.
+
+    Old points come first, then one on each edge. Borders become cubic B-splines.
+
+    Source: [Loop1987], with Warren's weights of the old points.
+    """
+    from scipy.sparse import vstack
+
+    sides = _sides(cage)
+    # 3/8 for all neighbours together, 9/16 for three
+    around = np.where(sides.valence == 3, 9 / 16, 3 / 8)
+    old = _old_points(sides, 1 - around, around / np.maximum(sides.valence, 1), along=1 / 8)
+    opposite = sides.start[sides.before]
+    across = _matrix(sides.edge, opposite, _inside(sides, 1 / 8), (len(sides.ends), sides.points))
+    new = _from_ends(sides, np.where(sides.border, 1 / 2, 3 / 8)) + across
+    uv, point = _with_edges(cage, sides)
+    a, b, c = cage.corner.reshape(-1, 3).T
+    ab, bc, ca = (len(cage.uv) + sides.cut).reshape(-1, 3).T
+    four = np.array([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]])
+    corner, count = four.transpose(2, 0, 1).ravel(), np.repeat(cage.sides, 4)
+    return vstack((old, new), "csr"), Cage(uv, point, corner, count, np.repeat(cage.material, 4))
+
+
+def refine_catmull_clark(cage: Cage) -> tuple[csr_array, Cage]:
+    """Weights (q, p) of the finer points, and a quad for each corner of each face.
+
+    Old points come first, then one on each edge, then one in each face. A quad begins at its old corner and
+    has the middle of the face opposite to it. Borders become cubic B-splines.
+
+    Sources: [CatmullClark1978]; uv and borders as in [DeRose1998].
+    """
+    from scipy.sparse import vstack
+
+    sides = _sides(cage)
+    n, count = np.maximum(sides.valence, 1), len(cage.sides)
+    middles = _matrix(sides.face, sides.start, 1 / cage.sides[sides.face], (count, sides.points))
+    beside = _matrix(sides.edge, sides.face, _inside(sides, 1 / 4), (len(sides.ends), count))
+    new = _from_ends(sides, np.where(sides.border, 1 / 2, 1 / 4)) + beside @ middles
+    around = _matrix(sides.start, sides.face, _around(sides, 1 / n**2), (sides.points, count))
+    old = _old_points(sides, (n - 2) / n, 1 / n**2, along=1 / 8) + around @ middles
+    uv, point = _with_edges(cage, sides)
+    centre = np.add.reduceat(cage.uv[cage.corner], np.cumsum(cage.sides) - cage.sides) / cage.sides[:, None]
+    edge, face = len(cage.uv) + sides.cut, len(uv) + sides.face
+    finer = Cage(
+        np.vstack((uv, centre)),
+        np.concatenate((point, sides.points + len(sides.ends) + np.arange(count))),
+        np.column_stack((cage.corner, edge, face, edge[sides.before])).ravel(),
+        np.full(len(cage.corner), 4),
+        np.repeat(cage.material, cage.sides),
+    )
+    return vstack((old, new, middles), "csr"), finer
+
+
+def catmull_clark_limit(cage: Cage) -> csr_array:
+    """Weights (p, p) that take the points of quads to where further levels would bring them.
+
+    Source: [Halstead1993]; borders as cubic B-splines.
+    """
+    sides = _sides(cage)
+    n = np.maximum(sides.valence, 1)
+    near = _old_points(sides, n / (n + 5), 4 / (n * (n + 5)), along=1 / 6)
+    opposite = sides.start.reshape(-1, 4)[:, [2, 3, 0, 1]].ravel()
+    diagonal = _matrix(sides.start, opposite, _around(sides, 1 / (n * (n + 5))), near.shape)
+    limit: csr_array = near + diagonal
+    return limit
+
+
+def _inside(sides: _Sides, weight: float) -> Doubles:
+    """(n,) the weight for sides on inner edges, 0 for those on borders."""
+    return np.where(sides.border, 0, weight)[sides.edge]
+
+
+def _around(sides: _Sides, weight: Doubles) -> Doubles:
+    """(n,) weight (p,) of the point where each side begins, 0 for points on borders."""
+    return np.where(sides.border_valence == 0, weight, 0)[sides.start]
+
+
+def _from_ends(sides: _Sides, weight: Doubles) -> csr_array:
+    """(e, p) the weight (e,) of either end of each edge."""
+    rows = np.repeat(np.arange(len(sides.ends)), 2)
+    return _matrix(rows, sides.ends.ravel(), np.repeat(weight, 2), (len(sides.ends), sides.points))
+
+
+def _old_points(sides: _Sides, own: Doubles, each: Doubles, along: float) -> csr_array:
+    """(p, p) weights of the old points.
+
+    own, each : (p,) inside: of the point itself, and of each of its neighbours
+    along : on a border: of either neighbour along it
+    """
+    inside, curve = (sides.border_valence == 0) & (sides.valence > 0), sides.border_valence == 2
+    both, other = sides.ends.T.ravel(), sides.ends[:, ::-1].T.ravel()
+    towards = np.where(inside, each, 0)[both]
+    towards[np.tile(sides.border, 2) & curve[both]] = along
+    # where borders meet, and where the surface is not one sheet, the point stays
+    stay = np.where(inside, own, np.where(curve, 1 - 2 * along, 1))
+    itself = np.arange(sides.points)
+    rows, columns = np.concatenate((itself, both)), np.concatenate((itself, other))
+    return _matrix(rows, columns, np.concatenate((stay, towards)), (sides.points, sides.points))
+
+
+def _with_edges(cage: Cage, sides: _Sides) -> tuple[Doubles, Index]:
+    """Uv and point of the old corner vertices and of one in the middle of each cut."""
+    edge_of_cut = np.empty(len(sides.cuts), dtype=np.int64)
+    edge_of_cut[sides.cut] = sides.edge
+    uv = np.vstack((cage.uv, cage.uv[sides.cuts].mean(axis=1)))
+    return uv, np.concatenate((cage.point, sides.points + edge_of_cut))
+
+
+def _matrix(rows: Index, columns: Index, weights: Doubles, shape: tuple[int, int]) -> csr_array:
+    """The weights that are not 0 in their rows and columns; those of one place are added."""
+    from scipy.sparse import coo_array
+
+    used = weights != 0
+    return coo_array((weights[used], (rows[used], columns[used])), shape=shape).tocsr()

@@ -1,0 +1,1 @@
+"""Motion from files: animation clips, face captures, sequences of meshes."""

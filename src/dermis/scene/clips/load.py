@@ -1,0 +1,67 @@
+"""Motion by file, of any kind."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+
+from dermis.errors import refuse
+from dermis.mesh.formats import is_gltf
+from dermis.mesh.head import Head
+from dermis.scene.clips.clip import Clip
+from dermis.scene.clips.gltf_clip import load_gltf_clip
+from dermis.scene.clips.live_link import load_live_link
+from dermis.scene.clips.mediapipe import load_mediapipe
+from dermis.scene.clips.sequence import is_sequence, load_sequence
+from dermis.scene.head_table import Up
+
+_LINES = (".jsonl", ".ndjson", ".json")
+_KINDS = "a glTF clip (.glb .gltf), Live Link Face (.csv), MediaPipe (.jsonl) or a sequence of .obj or .ply"
+
+
+def load_motion(
+    path: str | os.PathLike[str],
+    head: Head,
+    *,
+    clip: str | None = None,
+    fps: float | None = None,
+    unit_mm: float | None = None,
+    up: Up = "y",
+) -> Clip:
+    """The motion that a file holds, for a head: `Clip.pose_at` gives its pose at any time.
+
+    path : a glTF file, the head's own or another with nodes or targets of the same names, "file.glb#clip"
+        for one of several clips; a CSV of Live Link Face; lines of JSON with MediaPipe's blend shapes; or
+        files with one topology: a folder, "face_%05d.obj" or "face_*.ply"
+    clip : the clip of a glTF file
+    fps : frames a second of a sequence, 30 when left out; of a CSV's timecode where it does not tell; of
+        lines without time
+    unit_mm, up : of a sequence's files, see `load_head`
+
+    Raises DermisError for files that cannot be read, which it names with their lines, and for motion of
+    which the head has no name; what it has only in part, `Clip.note` tells.
+    """
+    if fps is not None and not (math.isfinite(fps) and fps > 0):
+        refuse("fps", "a number of frames a second above 0", f"{fps} came", "Correct it")
+    source, inside = _parted(Path(path), clip)
+    if is_gltf(source):
+        return load_gltf_clip(source, head, inside)
+    if inside is not None:
+        refuse(source, "a clip's name with a glTF file alone", f"{inside!r} came", "Leave it out")
+    if is_sequence(source):
+        return load_sequence(source, head, fps, unit_mm, up)
+    if not source.is_file():
+        refuse(source, _KINDS, "there is no such file", "Check the name")
+    if source.suffix.lower() not in (".csv", *_LINES):
+        refuse(source, _KINDS, f"the suffix is {source.suffix!r}", "Convert it to one of these")
+    load = load_live_link if source.suffix.lower() == ".csv" else load_mediapipe
+    return load(source, head, fps)
+
+
+def _parted(path: Path, clip: str | None) -> tuple[Path, str | None]:
+    """A file, and the name of a clip that was written after it."""
+    file, sign, name = str(path).rpartition("#")
+    if sign and not path.exists() and is_gltf(file):
+        return Path(file), clip or name
+    return path, clip

@@ -1,0 +1,129 @@
+"""Light below a surface that moves: as much as at rest, as wide as the moved surface is, never stale."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from atlas_reading import shown
+from cut_meshes import cut_sphere
+from numpy.typing import NDArray
+from setups import head_of, scene_of, settings_of
+from test_shape import anew, bent, words
+from tolerances import FLAT, HARMONIC, POSED
+
+from dermis import Pose
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.build import build_atlas
+from dermis.benchmark.rigged import pose_at, rigged
+from dermis.frame.atlas_textures import upload_atlas
+from dermis.frame.geometry import upload_geometry
+from dermis.frame.levels import FLOATS, Blur, halvings_of, make_levels
+from dermis.frame.passes import diffuse, shape, stretch
+from dermis.frame.passes.shape import Motion
+from dermis.frame.renderer import Renderer
+from dermis.frame.shape import make_shape, shape_tables
+from dermis.gpu import Device, Frame, download, upload
+from dermis.mesh.head import Head
+from dermis.optics.profiles import load_profile
+from dermis.scene.lights import DirectionalLight
+
+Floats = NDArray[np.float64]
+SIDE, RADIUS = 256, 30.0
+BLURRED = load_profile("gpu-gems-3").variance_mm2[1:]
+
+
+@pytest.fixture(scope="module")
+def head() -> Head:
+    return head_of(cut_sphere(RADIUS, 20))
+
+
+@pytest.fixture(scope="module")
+def atlas(head: Head) -> Atlas:
+    return build_atlas(head.mesh, SIDE, "stitched")
+
+
+def spread(device: Device, head: Head, atlas: Atlas, motion: Motion, light: Floats) -> list[Floats]:
+    """The levels of (n, n, 1) light on a head in motion, each at its resolution."""
+    made, textures = make_shape(device, shape_tables(device, head)), upload_atlas(device, atlas)
+    most = len(textures.sheets("repeated")) - 1
+    halvings = halvings_of(BLURRED, textures.usual_per_mm, most)
+    space = make_levels(device, SIDE, len(BLURRED), FLOATS)
+    upload(device, space.stack, np.dstack([light, light, light, atlas.own[..., None]]))
+    frame = Frame(device)
+    shape.draw(frame, made, motion)
+    stretch.draw(frame, upload_geometry(device, head.mesh, atlas, made), textures)
+    diffuse.draw(frame, space, textures, Blur(BLURRED, np.zeros((len(BLURRED), 3)), halvings))
+    frame.submit()
+    return [
+        download(device, space.stack, layer=k + 1, mip=halvings[k + 1])[..., :1].astype(float)
+        for k in range(len(BLURRED))
+    ]
+
+
+@pytest.mark.parametrize("moment", range(0, 21, 5))
+def test_even_light_stays_even_in_every_pose(device: Device, head: Head, atlas: Atlas, moment: int) -> None:
+    moving = rigged(head, 12)
+    motion = pose_at(moving, moment).motion(moving.control)
+    held = Motion(words(motion.positions_mm), words(40 * motion.weights), words(motion.matrices))
+    light = np.ones((SIDE, SIDE, 1)) * atlas.own[..., None]
+    for level in spread(device, moving, atlas, held, light):
+        covered = level[..., 0] > 0
+        assert covered.any() and np.abs(level[covered] - 1).max() < FLAT
+
+
+@pytest.mark.parametrize("scale", [0.5, 0.8, 1.25, 2.0])
+def test_light_on_a_scaled_ball_widens_as_on_a_ball_of_that_size(
+    device: Device, head: Head, atlas: Atlas, scale: float
+) -> None:
+    """Of light in proportion to x a Gaussian of variance v leaves exp(-v / r^2)."""
+    light = np.nan_to_num(shown(atlas, head.mesh, own=True))[..., :1] / RADIUS
+    levels = spread(device, head, atlas, Motion(words(scale * head.positions_mm)), light)
+    area = atlas.own[..., None] / np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
+    for variance, level in zip(BLURRED, levels, strict=True):
+        if len(level) == SIDE:  # the others are read between their texels
+            left = (area * level * light).sum() / (area * light**2).sum()
+            assert left == pytest.approx(np.exp(-variance / (scale * RADIUS) ** 2), abs=HARMONIC)
+
+
+LIGHT = DirectionalLight(direction=(-1, -0.5, -1), irradiance=(3, 3, 3))
+
+
+def picture(renderer: Renderer, head: Head, pose: Pose | None = None, **given: object) -> Floats:
+    settings = settings_of(size=(96, 96), atlas=SIDE, samples=4, shadow_size=512, seams="stitch", **given)
+    return renderer.draw(replace(scene_of(head, LIGHT), pose=pose), settings).linear().astype(float)
+
+
+def apart(a: Floats, b: Floats) -> float:
+    return float(np.sqrt(((a - b) ** 2).mean() / (b**2).mean()))
+
+
+@pytest.mark.parametrize("technique", ["texture-space", "screen-space", "pre-integrated", "none"])
+def test_a_posed_head_looks_like_one_loaded_in_that_shape(
+    renderer: Renderer, head: Head, technique: str
+) -> None:
+    points = bent(head.positions_mm.astype(float)).astype(np.float32)
+    posed = picture(renderer, head, Pose(positions_mm=points), technique=technique)
+    other = replace(head, mesh=anew(head.mesh, points.astype(float)))
+    vars(other)["centre_mm"] = head.centre_mm
+    assert apart(posed, picture(renderer, other, technique=technique)) < POSED
+    assert apart(posed, picture(renderer, head, technique=technique)) > 10 * POSED
+
+
+def test_a_pose_at_rest_is_no_pose(renderer: Renderer, head: Head) -> None:
+    moving = rigged(head, 4)
+    assert np.array_equal(picture(renderer, moving, Pose()), picture(renderer, moving))
+
+
+def test_a_pose_runs_the_shape_and_what_follows_and_coming_back_is_exact(
+    renderer: Renderer, head: Head
+) -> None:
+    moving = rigged(head, 4)
+    first = picture(renderer, moving, pose_at(moving, 1))
+    picture(renderer, moving, pose_at(moving, 2))
+    ran = set(renderer.graph.ran)
+    assert {"shape", "shadows", "stretch", "surface", "irradiance", "visibility", "shade"} <= ran
+    assert np.array_equal(picture(renderer, moving, pose_at(moving, 1)), first)
+    picture(renderer, moving, pose_at(moving, 1))
+    assert renderer.graph.ran == []

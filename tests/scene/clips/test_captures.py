@@ -1,0 +1,244 @@
+"""Live Link Face and MediaPipe: what their lines say comes out, and broken lines are named."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from random_rig import random_rig
+from scipy.spatial.transform import Rotation
+
+import dermis
+from dermis.errors import DermisError
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.primitives import uv_sphere
+from dermis.mesh.rig import Rig
+
+NAMES = ("jawOpen", "eyeBlinkLeft", "mouthSmileRight", *(f"other{k}" for k in range(5)))
+
+
+def _head(*bones: str, names: tuple[str, ...] = NAMES) -> Head:
+    rig = random_rig()
+    skeleton = replace(rig.skeleton, names=bones) if bones else None
+    moved = Rig(rig.positions_mm, replace(rig.targets, names=names), skeleton)
+    return Head("ball", uv_sphere(100.0, 8, 4), Maps(), rig=moved)
+
+
+HEAD = _head("root", "neck", "head", "LeftEye")
+COLUMNS = "Timecode,BlendShapeCount,EyeBlinkLeft,JawOpen,TongueOut"
+COLUMNS += ",HeadYaw,HeadPitch,HeadRoll,LeftEyeYaw,LeftEyePitch,LeftEyeRoll"
+
+
+def _csv(path: Path, *rows: str, header: str = COLUMNS) -> Path:
+    path.write_text("\n".join([header, *rows, ""]), encoding="utf-8")
+    return path
+
+
+ROWS = (
+    "10:59:59:58.500,61,0.1,0.2,0.9,0.2,0.1,0,0.05,0.1,0",
+    "10:59:59:59.500,61,0.3,0.4,0.9,0.4,0.1,0,0.05,0.1,0",
+    "11:00:00:00.500,61,0.5,0.8,0.9,0.6,0.1,0,0.05,0.1,0",
+)
+
+
+def test_rows_of_live_link(tmp_path: Path) -> None:
+    clip = dermis.load_motion(_csv(tmp_path / "take.csv", *ROWS), HEAD)
+    assert clip.name == "take" and clip.rate == 60.0 and clip.duration_s == pytest.approx(2 / 60)
+    assert clip.targets == ("eyeBlinkLeft", "jawOpen") and set(clip.bones) == {"neck", "head", "LeftEye"}
+    assert clip.left_out == ("TongueOut",) and "TongueOut" in clip.note
+    pose = clip.pose_at(0.5 / 60)
+    assert pose.weights == pytest.approx({"eyeBlinkLeft": 0.2, "jawOpen": 0.3})
+    np.testing.assert_allclose(pose.bones["LeftEye"], np.degrees([0.1, 0.05, 0]))
+    motion = clip.pose_at(2 / 60).motion(HEAD.control)
+    expected = Rotation.from_euler("zxy", [0, 0.1, 0.6]).as_matrix()
+    np.testing.assert_allclose(motion.matrices[2, :, :3], expected, atol=1e-5)
+
+
+def test_columns_count_by_their_names(tmp_path: Path) -> None:
+    plain = dermis.load_motion(_csv(tmp_path / "a.csv", *ROWS), HEAD).pose_at(0.01)
+    order = np.random.default_rng(0).permutation(11)
+    turned = [",".join(np.array(row.split(","))[order]) for row in (COLUMNS.upper(), *ROWS)]
+    other = dermis.load_motion(_csv(tmp_path / "b.csv", *turned[1:], header=turned[0]), HEAD).pose_at(0.01)
+    assert dict(other.weights) == dict(plain.weights) and set(other.bones) == set(plain.bones)
+    for name in plain.bones:
+        np.testing.assert_array_equal(other.bones[name], plain.bones[name])
+
+
+def test_windows_lines_and_a_byte_order_mark(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"\xef\xbb\xbf" + "\r\n".join([COLUMNS, *ROWS, "", ""]).encode())
+    assert dermis.load_motion(path, HEAD).rate == 60.0
+
+
+def test_a_head_without_bones_notes_what_it_cannot_turn(tmp_path: Path) -> None:
+    clip = dermis.load_motion(_csv(tmp_path / "a.csv", *ROWS), _head())
+    assert clip.bones == () and clip.pose_at(0.0).bones == {}
+    assert {"HeadYaw", "HeadPitch", "LeftEyeYaw"} <= set(clip.left_out)
+
+
+@pytest.mark.parametrize(
+    ("frames", "fps"), [((23, 0), 24.0), ((29, 0), 30.0), ((58.2, 0), 60.0), ((119, 0), 120.0)]
+)
+def test_the_timecode_tells_its_rate(tmp_path: Path, frames: tuple[float, float], fps: float) -> None:
+    rows = [f"01:02:0{k}:{frame},0,0.5" for k, frame in enumerate(frames)]
+    clip = dermis.load_motion(
+        _csv(tmp_path / "a.csv", *rows, header="Timecode,BlendShapeCount,JawOpen"), HEAD
+    )
+    assert clip.duration_s == pytest.approx(1 - frames[0] / fps)
+
+
+def test_a_short_take_is_at_sixty_and_fps_says_otherwise(tmp_path: Path) -> None:
+    path = _csv(tmp_path / "a.csv", "01:00:00:03,0,1", "01:00:00:06,0,1", header="Timecode,,JawOpen")
+    assert dermis.load_motion(path, HEAD).duration_s == pytest.approx(3 / 60)
+    assert dermis.load_motion(path, HEAD, fps=30).duration_s == pytest.approx(3 / 30)
+
+
+def test_midnight_is_no_step_back(tmp_path: Path) -> None:
+    rows = ("23:59:59:59,0,0", "00:00:00:00,0,1")
+    clip = dermis.load_motion(
+        _csv(tmp_path / "a.csv", *rows, header="Timecode,BlendShapeCount,JawOpen"), HEAD
+    )
+    assert clip.duration_s == pytest.approx(1 / 60)
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ((), r"a\.csv: .*only its header"),
+        ((ROWS[0], ROWS[1][:-6]), r"a\.csv, line 3: expected 11 cells, but 9 came"),
+        ((ROWS[0], ROWS[1] + ",7"), r"a\.csv, line 3: expected 11 cells, but 12 came"),
+        ((ROWS[0], "", ROWS[1].replace("0.4", "much")), r"a\.csv, line 4: .*JawOpen is 'much'"),
+        ((ROWS[0], ROWS[1].replace("0.3", "nan")), r"a\.csv, line 3: .*EyeBlinkLeft is nan"),
+        ((ROWS[0], ROWS[1].replace("0.3", "inf")), r"line 3: .*EyeBlinkLeft is inf"),
+        ((ROWS[0], ROWS[1].replace("0.3", "")), r"line 3: .*EyeBlinkLeft is ''"),
+        ((ROWS[1], ROWS[0]), r"a\.csv, line 3: .*Timecode that goes on, .* 0\.017 s before"),
+        (("noon" + ROWS[0],), r"a\.csv, line 2: .*HH:MM:SS:FF\.fff, but 'noon10"),
+    ],
+)
+def test_broken_lines_are_named(tmp_path: Path, rows: tuple[str, ...], words: str) -> None:
+    with pytest.raises(DermisError, match=words):
+        dermis.load_motion(_csv(tmp_path / "a.csv", *rows), HEAD)
+
+
+@pytest.mark.parametrize(
+    ("header", "words"),
+    [
+        ("Time,JawOpen", r"a\.csv, line 1: expected a column Timecode, but the columns are Time, JawOpen"),
+        ("Timecode,BlendShapeCount", r"line 1: expected columns of blend shapes"),
+        ("Timecode,JawOpen,jawopen", r"line 1: expected each column once, but JawOpen comes twice"),
+        (
+            "Timecode,Leg",
+            r"a\.csv: expected names of which the head has some, but it has Leg and the head jawOpen",
+        ),
+    ],
+)
+def test_other_headers_are_refused(tmp_path: Path, header: str, words: str) -> None:
+    row = ",".join(["00:00:00:00", "0", "0"][: header.count(",") + 1])
+    with pytest.raises(DermisError, match=words):
+        dermis.load_motion(_csv(tmp_path / "a.csv", row, header=header), HEAD)
+
+
+def test_an_empty_file_and_none(tmp_path: Path) -> None:
+    for name, content in (("a.csv", ""), ("a.jsonl", "\n\n")):
+        (tmp_path / name).write_text(content)
+        with pytest.raises(DermisError, match=rf"{name}: .*(empty|there are none)"):
+            dermis.load_motion(tmp_path / name, HEAD)
+        with pytest.raises(DermisError, match="there is no such file"):
+            dermis.load_motion(tmp_path / f"no{name}", HEAD)
+    (tmp_path / "a.txt").write_text("")
+    with pytest.raises(DermisError, match=r"the suffix is '\.txt'"):
+        dermis.load_motion(tmp_path / "a.txt", HEAD)
+    with pytest.raises(DermisError, match="fps: expected"):
+        dermis.load_motion(tmp_path / "a.csv", HEAD, fps=0)
+
+
+def _lines(path: Path, *rows: object) -> Path:
+    path.write_text("\n".join(row if isinstance(row, str) else json.dumps(row) for row in rows))
+    return path
+
+
+def _matrix(turn: Rotation) -> np.ndarray:
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = turn.as_matrix(), (1, 2, -40)
+    return matrix
+
+
+@pytest.mark.parametrize("form", ["rows", "flat", "columns"])
+def test_lines_of_mediapipe(tmp_path: Path, form: str) -> None:
+    turns = Rotation.from_euler("zxy", [[5, -10, 20], [0, 0, 40]], degrees=True)
+    forms = {
+        "rows": lambda m: m.tolist(),
+        "flat": lambda m: m.ravel().tolist(),
+        "columns": lambda m: m.T.tolist(),
+    }
+    listed = [{"categoryName": "_neutral", "score": 1e-6}, {"categoryName": "jawOpen", "score": 0.6}]
+    path = _lines(
+        tmp_path / "face.jsonl",
+        {
+            "timestamp_ms": 1000,
+            "blendshapes": {"jawOpen": 0.2, "tongueOut": 0.1},
+            "matrix": forms[form](_matrix(turns[0])),
+        },
+        {"timestamp_ms": 1020, "blendshapes": []},  # no face was found
+        {"timestamp_ms": 1040, "blendshapes": listed, "matrix": forms[form](_matrix(turns[1]))},
+    )
+    clip = dermis.load_motion(path, HEAD)
+    assert clip.duration_s == pytest.approx(0.04) and clip.rate == 25.0
+    assert clip.targets == ("jawOpen",) and clip.left_out == ("tongueOut",)
+    assert clip.pose_at(0.02).weights["jawOpen"] == pytest.approx(0.4)
+    for seconds, turn in zip((0.0, 0.04), turns, strict=True):
+        motion = clip.pose_at(seconds).motion(HEAD.control)
+        np.testing.assert_allclose(motion.matrices[2, :, :3], turn.as_matrix(), atol=1e-5)
+
+
+def test_lines_without_time_take_the_rate(tmp_path: Path) -> None:
+    path = _lines(tmp_path / "face.jsonl", *({"blendshapes": {"jawOpen": k / 4}} for k in range(5)))
+    clip = dermis.load_motion(path, HEAD, fps=10)
+    assert clip.duration_s == pytest.approx(0.4) and clip.rate == pytest.approx(10.0)
+    assert clip.pose_at(0.15).weights["jawOpen"] == pytest.approx(0.375)
+    with pytest.raises(DermisError, match=r"face\.jsonl, line 1: expected a time"):
+        dermis.load_motion(path, HEAD)
+
+
+GOOD = {"time": 0.0, "blendshapes": {"jawOpen": 0.1}}
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        ('{"time": 0.1, "blend', r"a\.jsonl, line 2: expected an object in JSON, but .* at letter"),
+        ("[1, 2]", r"line 2: expected an object in JSON, but \[1, 2\] came"),
+        ({"time": 0.1}, r"line 2: expected blendshapes, but it has time"),
+        ({"time": "soon", "blendshapes": {}}, r"line 2: expected time as a number, but 'soon' came"),
+        ({"time": 0.1, "blendshapes": 7}, r"line 2: expected blendshapes by name"),
+        (
+            {"time": 0.1, "blendshapes": {"jawOpen": "x"}},
+            r"line 2: expected scores as numbers, but jawOpen is 'x'",
+        ),
+        ('{"time": 0.1, "blendshapes": {"jawOpen": NaN}}', r"line 2: .*jawOpen is nan"),
+        ({"time": 0.1, "blendshapes": [{"score": 1}]}, r"line 2: expected a categoryName"),
+        (
+            {"time": -0.1, "blendshapes": {"jawOpen": 0}},
+            r"line 2: expected times that go on, but -0\.1 s comes",
+        ),
+        (GOOD | {"matrix": [1, 2]}, r"line 2: expected a matrix of 4 x 4"),
+        (GOOD | {"matrix": np.zeros((4, 4)).tolist()}, r"line 2: expected a matrix that turns"),
+    ],
+)
+def test_broken_json_is_named_by_its_line(tmp_path: Path, row: object, words: str) -> None:
+    with pytest.raises(DermisError, match=words):
+        dermis.load_motion(_lines(tmp_path / "a.jsonl", GOOD, row), HEAD)
+
+
+def test_a_time_that_is_none(tmp_path: Path) -> None:
+    clip = dermis.load_motion(_lines(tmp_path / "a.jsonl", GOOD), HEAD)
+    assert clip.duration_s == 0.0 and clip.rate is None and clip.frame_count(30) == 1
+    for seconds in (float("nan"), float("inf")):
+        with pytest.raises(DermisError, match="a finite time"):
+            clip.pose_at(seconds)
+    with pytest.raises(DermisError, match="a rate above 0"):
+        clip.frame_count(0)
