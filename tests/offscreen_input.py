@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,8 +33,6 @@ class InputDriver:
         """The picture when nothing moves any more."""
         for _ in range(60):
             self.frame()
-            while self.viewer.session.studio.is_searching:  # which takes time, not frames
-                time.sleep(0.005)
             if self.viewer.is_still:
                 return self.frame()
         raise AssertionError("the viewer does not come to rest")

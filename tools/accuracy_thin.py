@@ -11,8 +11,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import dermis
-from dermis.atlas.cached import cached_atlas
-from dermis.atlas.translucency.samples import giving, texels
 from dermis.gpu import download
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -80,20 +78,27 @@ def slabs(renderer: dermis.Renderer) -> str:
 
 def across_air(mesh: Mesh, way: Array, places: Array, normals: Array) -> Array:
     """Red light in the sum that would cross air rather than tissue."""
-    atlas = cached_atlas(mesh, ATLAS, "stitched")
-    given = giving(mesh, atlas, texels(atlas), ATLAS // 2, np.ones(len(mesh.triangles), bool))
-    flux = given.area_mm2 * np.maximum(given.normal @ -way, 0.0)
+
+    def light(at: Places) -> Array:
+        turned = at.interpolate(mesh, mesh.normals)
+        return np.repeat(np.maximum(turned @ -way, 0.0)[:, None], 3, axis=1)
+
+    samples = surface_integral.sample_irradiance(mesh, light, 0.5)
+    corners = samples.positions[samples.triangles]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = 0.5 * np.linalg.norm(across, axis=1)
+    flux = area * samples.irradiance[samples.triangles][..., 0].mean(axis=1)
     lit = np.flatnonzero(flux)
-    near = cKDTree(given.position[lit]).query_ball_point(places, 4.0 * np.sqrt(BLURRED.variance_mm2[-1]))
+    at, out = corners[lit].mean(axis=1), across[lit] / (2.0 * area[lit, None])
+    near = cKDTree(at).query_ball_point(places, 4.0 * np.sqrt(BLURRED.variance_mm2[-1]))
     total = np.zeros(len(places))
-    for i, found in enumerate(near):
-        j = lit[found]
-        to = given.position[j] - places[i]
-        facing = (to * given.normal[j]).sum(axis=1) < to @ normals[i]
-        turned = given.normal[j] @ normals[i] < 0.5
+    for i, j in enumerate(near):
+        to = at[j] - places[i]
+        facing = (to * out[j]).sum(axis=1) < to @ normals[i]
+        turned = out[j] @ normals[i] < 0.5
         square = (to**2).sum(axis=1)[facing & turned, None]
         profile = np.exp(-0.5 * square / BLURRED.variance_mm2) / (2.0 * np.pi * BLURRED.variance_mm2)
-        total[i] = flux[j][facing & turned] @ profile @ BLURRED.weight[:, 0]
+        total[i] = flux[lit][j][facing & turned] @ profile @ BLURRED.weight[:, 0]
     return total
 
 

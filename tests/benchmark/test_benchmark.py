@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dermis.atlas.cached import cached_atlas, cached_pairs
 from dermis.benchmark import run as running
 from dermis.benchmark.cases import FRAGMENTS, GPU_GEMS_3, PRESETS, Case, scenes_of, settings_of, with_terms
 from dermis.benchmark.floor import copy_rate, moved_by, stage_bytes
@@ -17,7 +16,6 @@ from dermis.benchmark.report import COLUMNS, as_json, cells, left_out_lines, sta
 from dermis.benchmark.run import Benchmark, LeftOut, run
 from dermis.errors import DermisError
 from dermis.frame.renderer import Renderer
-from dermis.frame.seams import REMEDIES
 from dermis.gpu import Device, download
 from dermis.gpu.textures import texel_bytes
 from dermis.optics.profiles import load_profile
@@ -98,7 +96,7 @@ def test_the_floor_by_hand(renderer: Renderer, head_file: str, tmp_path: Path) -
 
 
 def test_the_floor_of_thin_parts_is_their_buffers(renderer: Renderer, tmp_path: Path) -> None:
-    """Against the pairs kept on disk, which the buffers were made from."""
+    """By the numbers that the buffers were made from."""
     from small_head import obj_text
 
     vertices = [line.split() for line in obj_text().splitlines()]
@@ -108,16 +106,15 @@ def test_the_floor_of_thin_parts_is_their_buffers(renderer: Renderer, tmp_path: 
     (scene,), settings = scenes_of(case, head, tmp_path, 1), settings_of(case)
     renderer.draw(scene, settings)
     moved = moved_by(renderer.device, renderer.prepare(scene, settings), len(head.mesh.positions))
-    blur = moved.inputs.blurs[0]
-    atlas = cached_atlas(head.mesh, settings.atlas, REMEDIES[settings.seams].layouts[0])
-    table = cached_pairs(head.mesh, atlas, float(np.sqrt(blur.variance_mm2[-1])))
-    assert len(table.source) > 100
-    receivers = len(table.first) - 3  # of 12 bytes; their cells alone are written
-    pairs = 8 * len(table.source) + 8 * len(table.texel) + 12 * receivers
     thin, levels = moved.inputs.layouts[0].translucency, moved.inputs.resources.levels
     assert thin is not None
-    light = min(4 * len(table.texel), (levels.size >> blur.halvings[1 + thin.layer]) ** 2)
-    assert stage_bytes(moved)["translucency"] == pairs + light * texel_bytes(levels.stack) + 16 * receivers
+    receivers, sources = thin.pairs.receivers[1], thin.pairs.sources[1]
+    assert thin.pairs.count > receivers > 10
+    words = np.frombuffer(renderer.device.handle.queue.read_buffer(thin.weights), np.uint32)
+    assert len(words) == 2 * thin.pairs.count and words[::2].max() == sources - 1
+    lists = 8 * thin.pairs.count + 4 * sources + 12 * receivers
+    light = min(4 * sources, (levels.size >> moved.inputs.blurs[0].halvings[1 + thin.layer]) ** 2)
+    assert stage_bytes(moved)["translucency"] == lists + light * texel_bytes(levels.stack) + 16 * receivers
 
 
 def test_a_row_is_complete(row: Row) -> None:

@@ -16,11 +16,12 @@ from dermis.images.io import read_image, write_png
 Run = Callable[..., Any]
 STAGES = {
     "shape",
-    "stretch",
     "shadows",
+    "stretch",
     "irradiance",
     "diffuse",
     "surface",
+    "pairs",
     "translucency",
     "combine",
     "visibility",

@@ -279,7 +279,7 @@ def test_what_a_frame_reports(renderer: Renderer) -> None:
     assert rendered.frame_ms > 0 and rendered.setup_ms > 0
     if rendered.gpu_ms is not None:
         lit = {"surface", "irradiance", "diffuse", "translucency", "combine"}
-        stages = lit | {"shape", "stretch", "visibility", "shade", "post"}
+        stages = lit | {"pairs", "shape", "stretch", "visibility", "shade", "post"}
         assert stages <= set(rendered.gpu_ms) <= stages | {"shadows", "total"}
 
 

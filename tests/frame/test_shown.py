@@ -64,7 +64,7 @@ def test_what_is_there_is_left_as_it_is(keeping: Renderer) -> None:
         keeping.draw(one, settings_of(exposure=exposure))
         ran.append(set(keeping.graph.ran))
     lit = {"irradiance", "diffuse", "translucency", "combine"}
-    whole = lit | {"shape", "stretch", "surface", "visibility", "shade", "post"}
+    whole = lit | {"pairs", "shape", "stretch", "surface", "visibility", "shade", "post"}
     assert ran == [whole, set(), {"post"}, {"visibility", "shade", "post"}, lit | {"shade", "post"}]
     keeping.draw(brighter, settings_of(exposure=2.0), anew=True)
     assert set(keeping.graph.ran) == whole

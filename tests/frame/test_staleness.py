@@ -175,7 +175,7 @@ RUNS: dict[str, tuple[Callable[[], tuple[Scene, Settings]], tuple[str, ...]]] = 
     "exposure": (lambda: (BASE, SETTINGS.model_copy(update={"exposure": 2.0})), ("post",)),
     "profile": (
         lambda: (replace(BASE, skin=Skin(profile="dj3")), SETTINGS),
-        (*SPREAD, *SEEN),
+        ("pairs", *SPREAD, *SEEN),
     ),
     "roughness": (
         lambda: (replace(BASE, skin=Skin(roughness=0.4)), SETTINGS),
@@ -210,7 +210,17 @@ def test_the_frame_can_be_written_down(renderer: Renderer) -> None:
     listing = renderer.graph.listing = Listing()
     renderer.draw(replace(BASE, camera=SCENES["camera"]), SETTINGS)
     stages = list(dict.fromkeys(one.stage for one in listing.passes))
-    assert stages == ["shape", "shadows", "stretch", "surface", "irradiance", *SPREAD, "visibility", *SEEN]
+    assert stages == [
+        "shape",
+        "shadows",
+        "stretch",
+        "surface",
+        "irradiance",
+        "pairs",
+        *SPREAD,
+        "visibility",
+        *SEEN,
+    ]
     ran = {one.stage for one in listing.passes if one.ran}
     assert ran == {"visibility", "shade", "post"}
     shade = next(one for one in listing.passes if one.stage == "shade")

@@ -2,24 +2,38 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pytest
-import translucency_twins
 from numpy.typing import NDArray
 from setups import head_of, run_frame, scene_of
-from tolerances import SLAB_THROUGH
+from tolerances import SLAB_THROUGH, TWIN
 from translucency_truth import hook, straight
+from translucency_twins import (
+    Lie,
+    Points,
+    along,
+    decoded,
+    far_of,
+    giving,
+    lie,
+    passed,
+    passes,
+    surface_of,
+    taking,
+)
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.atlas.translucency.pairs import TranslucentPairs, _in_cells, find_pairs
-from dermis.atlas.translucency.samples import Samples, giving, surface, taking, texels
-from dermis.frame.passes.translucency_weights import upload_pairs, weigh
+from dermis.atlas.translucency.cells import Cells
+from dermis.frame.atlas_layout import PairBuffers, Translucency
+from dermis.frame.passes import translucency_weights
+from dermis.frame.passes.pair_search.search import search
 from dermis.frame.renderer import Renderer
-from dermis.gpu import Device, download
+from dermis.frame.translucency import find_pairs, pairs_from, translucency_from
+from dermis.gpu import Device, Frame, download
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import uv_sphere, wedge
 from dermis.optics.diffusion.models import through_gaussians
@@ -28,115 +42,220 @@ from dermis.optics.profiles import load_profile
 from dermis.scene.lights import DirectionalLight
 
 Floats = NDArray[np.float64]
-Found = tuple[Mesh, Atlas, TranslucentPairs]
+Index = NDArray[np.int64]
 PROFILE = load_profile("gpu-gems-3")
 BLURRED = GaussianSum("blurred levels", PROFILE.variance_mm2[1:], PROFILE.weight[1:])
 SIGMA = float(np.sqrt(PROFILE.variance_mm2[-1]))
 BEHIND = DirectionalLight(direction=(0, 0, 1), irradiance=(1.0, 1.0, 1.0), shadows=False)
 
 
+@dataclass(frozen=True)
+class Thin:
+    """Thin parts with their pairs on a device, and the same in NumPy.
+
+    lie : of all receivers and sources of the twin
+    receiver, source : (l,) of each pair, in the twin's numbers
+    """
+
+    mesh: Mesh
+    atlas: Atlas
+    pairs: PairBuffers
+    taken: Points
+    given: Points
+    lie: Lie
+    receiver: Index
+    source: Index
+    translucency: Translucency
+    offset: NDArray[np.int64]
+
+    @property
+    def cells(self) -> Cells:
+        return self.pairs.cells
+
+    def of_pairs(self) -> Lie:
+        return Lie(*(part[self.receiver, self.source] for part in vars(self.lie).values()))
+
+
 @pytest.fixture(scope="module")
-def found() -> Found:
+def thin(device: Device) -> Thin:
     """The translucent pairs of a small wedge."""
     mesh = wedge(12.0, 1.0, 4.0, cells=2)
     atlas = build_atlas(mesh, 64, "stitched")
-    return mesh, atlas, find_pairs(mesh, atlas, SIGMA)
+    surface = surface_of(device, mesh, atlas)
+    pairs = find_pairs(device, surface, atlas, SIGMA)
+    found = weighed(device, pairs, surface)
+    side = pairs.cells.side
+    taken, given = taking(mesh, atlas, side), giving(mesh, atlas, side)
+    receiver_cell = read(device, pairs.receivers[0]).reshape(-1, 4)[:, 2]
+    number = np.full((side, side), -1)
+    number[taken.cell[:, 1], taken.cell[:, 0]] = np.arange(len(taken.cell))
+    source_number = np.full((side, side), -1)
+    source_number[given.cell[:, 1], given.cell[:, 0]] = np.arange(len(given.cell))
+    source_cell = read(device, pairs.sources[0])
+    words = read(device, pairs.pairs).reshape(-1, 3)
+    return Thin(
+        mesh,
+        atlas,
+        pairs,
+        taken,
+        given,
+        lie(taken, given),
+        number[receiver_cell >> 16, receiver_cell & 0xFFFF][words[:, 1]],
+        source_number[source_cell >> 16, source_cell & 0xFFFF][words[:, 0]],
+        found,
+        words[:, 2].astype(np.int64),
+    )
 
 
-def given_by(mesh: Mesh, atlas: Atlas, side: int) -> Samples:
-    """All places that give light, paired or not."""
-    return giving(mesh, atlas, texels(atlas), side, np.ones(len(mesh.triangles), bool))
+def weighed(device: Device, pairs: PairBuffers, surface: dict[str, Any]) -> Translucency:
+    """What the blurred levels let pass between pairs, on a surface."""
+    made = translucency_from(device, surface, pairs, BLURRED.variance_mm2, BLURRED.weight)
+    frame = Frame(device)
+    translucency_weights.draw(frame, made)
+    frame.submit()
+    return made
 
 
-def test_the_places_stand_for_all_of_the_surface(found: Found) -> None:
-    mesh, atlas, table = found
-    given = given_by(mesh, atlas, len(table.receiver))
-    corners = mesh.positions[mesh.triangles].astype(float)
+def read(device: Device, buffer: Any) -> NDArray[np.uint32]:
+    return np.frombuffer(device.handle.queue.read_buffer(buffer), np.uint32)
+
+
+def test_the_places_stand_for_all_of_the_surface(device: Device, thin: Thin) -> None:
+    corners = thin.mesh.positions[thin.mesh.triangles].astype(float)
     area = np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
     ).sum()
-    assert abs(given.area_mm2.sum() / (area / 2) - 1) < 0.05
-    assert atlas.own[given.texel[:, 1], given.texel[:, 0]].all()
-    assert len(np.unique(given.cell, axis=0)) == len(given.cell)
+    assert abs(thin.given.area_mm2.sum() / (area / 2) - 1) < 0.05
+    assert (thin.receiver >= 0).all() and (thin.source >= 0).all()
+    for count, kind in ((thin.pairs.receivers[1], thin.receiver), (thin.pairs.sources[1], thin.source)):
+        assert len(np.unique(kind)) == count > 100
 
 
-def test_twin_of_the_pairs(found: Found) -> None:
-    mesh, atlas, table = found
-    given = given_by(mesh, atlas, len(table.receiver))
-    held = surface(atlas, texels(atlas), given.side)
-    taken = taking(mesh, atlas, held, np.ones(len(mesh.triangles), bool))
-    radius = float(table.radius_mm)
-    shape = translucency_twins.lie(taken, given, radius)
-    far = np.stack([translucency_twins.along(atlas, taken, given, radius, same) for same in (1.6, 0.4)])
-    far[1] += 2.0 / atlas.stretch[atlas.own].min()  # what nine texels' mean may add
-    receiver = table.receiver[taken.cell[:, 1], taken.cell[:, 0]]
-    assert (receiver > 0).all()
-    texel = {tuple(t): j for j, t in enumerate(given.texel)}
-    names = np.array([texel[tuple(t)] for t in table.texel])
-    unit = np.array([radius, radius, radius, 1.0]) / 65535.0
-    wrong = 0
-    for i, r in enumerate(receiver):
-        part = slice(table.first[r], table.first[r + 1])
-        j = names[table.source[part]]
-        assert abs(len(j) - np.count_nonzero(shape[i, :, 2])) <= 2  # at the very edge of a ball
-        made, (low, high) = table.geometry[part] * unit, np.minimum(far[:, i, j], radius)
-        wrong += np.count_nonzero(np.abs(made[:, [0, 1, 3]] - shape[i, j]) > 2e-3)
-        wrong += np.count_nonzero((made[:, 2] < low - 2e-3) | (made[:, 2] > high + 2e-3))
-    assert wrong == 0
+def test_twin_of_the_places(device: Device, thin: Thin) -> None:
+    """Middles, areas and normals of cells, and how the map lies on the surface there."""
+    words = read(device, thin.pairs.pairs).reshape(-1, 3)
+    taken, given = (np.zeros(count, np.int64) for count in (thin.pairs.receivers[1], thin.pairs.sources[1]))
+    taken[words[:, 1]], given[words[:, 0]] = thin.receiver, thin.source
+    receivers = read(device, thin.translucency.receiver_points).reshape(-1, 12)
+    sources = read(device, thin.translucency.source_points).reshape(-1, 8)
+    for made, twin in ((receivers, thin.taken.chosen(taken)), (sources, thin.given.chosen(given))):
+        assert np.abs(made[:, :3].view(np.float32) - twin.position).max() < TWIN * 12
+        assert np.abs(made[:, 4:7].view(np.float32) - twin.normal).max() < TWIN
+    x, y = thin.taken.texel[taken].T
+    assert (receivers[:, 3] == x | (y << 16)).all()
+    assert (sources[:, 7] == [x | (y << 16) for x, y in thin.given.texel[given].tolist()]).all()
+    area = thin.given.area_mm2[given]
+    assert np.abs(sources[:, 3].view(np.float32) - area).max() < TWIN * area.max()
+    by = np.random.default_rng(3).normal(size=(2, len(taken)))
+    e, g, f = receivers[:, 8:11].view(np.float32).astype(float).T
+    square = e * by[0] ** 2 + g * by[1] ** 2 + 2 * f * by[0] * by[1]
+    twin = far_of(thin.atlas, thin.taken.chosen(taken), *by) ** 2
+    assert np.abs(square / twin - 1).max() < 5e-3  # halves in the stretch map
 
 
-def test_a_narrow_profile_asks_for_no_more_cells_than_memory_holds() -> None:
+def test_twin_of_the_pairs(thin: Thin) -> None:
+    """By brute force: all that let light pass that counts, each once."""
+    light = passes(thin.lie, thin.given.area_mm2, thin.cells)
+    made = np.zeros(light.shape, np.int64)
+    np.add.at(made, (thin.receiver, thin.source), 1)
+    assert made.max() == 1
+    sure = np.abs(thin.lie.square / thin.cells.radius_mm**2 - 1) > 1e-5
+    assert made[(light > 1.001) & sure].all()
+    assert not made[(light < 0.999) & sure].any()
+    assert 1000 < made.sum() < 0.5 * made.size
+
+
+def test_twin_of_the_distances_along_the_surface(thin: Thin) -> None:
+    """The nearest copy in chart or gutter; nine texels around a place show it."""
+    by = (np.stack([thin.offset & 0xFFFF, thin.offset >> 16]).astype(np.uint16)).view(np.int16) / 8.0
+    made = far_of(thin.atlas, thin.taken.chosen(thin.receiver), *by)
+    nowhere = thin.offset == 0x80008000
+    low, high = (along(thin.atlas, thin.taken, thin.given, same) for same in (1.6, 0.4))
+    low, high = (far[thin.receiver, thin.source] for far in (low, high))
+    texel = 1.0 / thin.atlas.stretch[thin.atlas.own].astype(float).min()
+    near, radius = high < thin.cells.radius_mm - 2 * texel, thin.cells.radius_mm
+    assert near.mean() > 0.1 and (~near).mean() > 0.1
+    assert not nowhere[near].any()
+    assert (np.abs(made - high)[near & (low > high - texel)] < 1.5 * texel).mean() > 0.98
+    reached = ~nowhere & (made < radius)
+    closer = (low - made)[reached] / texel
+    assert closer.max() < 1.0 and (closer < 0.25).mean() > 0.995  # middles of patches, and not their edges
+
+
+def test_twin_of_what_passes(device: Device, thin: Thin) -> None:
+    words = read(device, thin.translucency.weights).reshape(-1, 2)
+    assert (words[:, 0] == read(device, thin.pairs.pairs).reshape(-1, 3)[:, 0]).all()
+    by = (np.stack([thin.offset & 0xFFFF, thin.offset >> 16]).astype(np.uint16)).view(np.int16) / 8.0
+    far = far_of(thin.atlas, thin.taken.chosen(thin.receiver), *by)
+    far[thin.offset == 0x80008000] = np.inf
+    area = thin.given.area_mm2[thin.source]
+    twin = passed(thin.of_pairs(), far, area, thin.cells, BLURRED.variance_mm2, BLURRED.weight)
+    error = np.abs(decoded(words[:, 1]) - twin)
+    assert twin.max() > 1e-3
+    near = np.abs(far / thin.cells.radius_mm - 1) > 1e-3
+    # nine bits of the brightest, and halves in the stretch map
+    assert (error <= twin.max(axis=1, keepdims=True) / 400 + 2e-5)[near].all()
+
+
+def test_the_same_search_finds_the_same(device: Device, thin: Thin) -> None:
+    surface = surface_of(device, thin.mesh, thin.atlas)
+    again = find_pairs(device, surface, thin.atlas, SIGMA)
+    for name in ("pairs", "sums"):
+        assert (read(device, getattr(again, name)) == read(device, getattr(thin.pairs, name))).all()
+    weights = read(device, weighed(device, again, surface).weights)
+    assert (weights == read(device, thin.translucency.weights)).all()
+
+
+def test_a_narrow_profile_has_no_pairs(device: Device) -> None:
     mesh = uv_sphere(100.0, 8)
     atlas = build_atlas(mesh, 64, "stitched")
-    sources = _in_cells(given_by(mesh, atlas, 64), 0.01)
-    assert sources.size.prod() < 2**22
-    assert len(find_pairs(mesh, atlas, 0.01).source) == 0
+    pairs = find_pairs(device, surface_of(device, mesh, atlas), atlas, 0.01)
+    assert pairs.count == 0 and pairs.cells.side == 64
 
 
 @pytest.mark.parametrize("layout", ["mesh", "stitched", "unwrapped"])
-def test_a_ball_smaller_than_the_profile_spreads_has_pairs(layout: str) -> None:
-    """Its blurs read nearly all texels, gutters included, which show more than nine times its places."""
+def test_a_ball_smaller_than_the_profile_spreads_has_pairs(device: Device, layout: str) -> None:
+    """Its blurs read nearly all texels, gutters included."""
     mesh = uv_sphere(3.0, 48, 24)
-    table = find_pairs(mesh, build_atlas(mesh, 64, layout), SIGMA)
-    assert len(table.source) == table.first[-1] > 1000
-    assert table.source.max() < len(table.texel)
+    atlas = build_atlas(mesh, 64, layout)
+    pairs = find_pairs(device, surface_of(device, mesh, atlas), atlas, SIGMA)
+    source, receiver, _ = read(device, pairs.pairs).reshape(-1, 3).T
+    assert len(source) == pairs.count > 1000
+    assert source.max() == pairs.sources[1] - 1 and receiver.max() == pairs.receivers[1] - 1
+    cell, first, end = read(device, pairs.sums).reshape(-1, 3).T
+    assert len(np.unique(cell)) == len(cell) and (end - first).sum() == pairs.count
 
 
-def test_twin_of_what_passes(device: Device, found: Found) -> None:
-    table = found[2]
-    pairs = upload_pairs(device, table)
-    words = read_buffer(device, weigh(device, pairs, BLURRED.variance_mm2, BLURRED.weight))
-    assert (words.reshape(-1, 2)[:, 0] == table.source).all()
-    radius, cell = pairs.radius_mm, pairs.spacing_mm
-    unit = np.array([radius, radius, radius, 1.0]) / 65535.0
-    depth, aside, far, share = (table.geometry * unit).T
-    far[table.geometry[:, 2] == 65535] = np.inf
-    shape, area = np.column_stack([depth, aside, share]), table.area_mm2.astype(float)[table.source]
-    twin = translucency_twins.passed(shape, far, area, radius, cell, BLURRED.variance_mm2, BLURRED.weight)
-    error = np.abs(translucency_twins.decoded(words.reshape(-1, 2)[:, 1]) - twin)
-    assert twin.max() > 1e-3
-    assert (error <= twin.max(axis=1, keepdims=True) / 400 + 1e-6).all()  # nine bits of the brightest
-
-
-def test_what_passes_is_the_same_from_disk(
-    device: Device,
-    found: Found,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+def test_cells_are_coarser_where_memory_does_not_hold_the_pairs(
+    device: Device, thin: Thin, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
-    variance, weight, made = BLURRED.variance_mm2, BLURRED.weight, 0
-    plain = read_buffer(device, weigh(device, upload_pairs(device, found[2]), variance, weight))
-    assert not list(tmp_path.rglob("*.arrays"))
-    for key, factor in (("a", 1.0), ("a", 1.0), ("b", 1.0), ("b", 0.5)):
-        words = weigh(device, upload_pairs(device, found[2], key), variance, factor * weight)
-        assert np.array_equal(read_buffer(device, words), plain) == (factor == 1.0)
-        made = len(list(tmp_path.rglob("*.arrays")))
-    assert made == (3 if device.adapter.kind == "CPU" else 0)
+    monkeypatch.setattr(device, "max_storage_bytes", 12 * thin.pairs.count - 1)
+    fewer = find_pairs(device, surface_of(device, thin.mesh, thin.atlas), thin.atlas, SIGMA)
+    assert 0 < fewer.count < thin.pairs.count
+    assert fewer.cells.spacing_mm == pytest.approx(1.5 * thin.cells.spacing_mm, rel=0.1)
+    assert fewer.cells.radius_mm == thin.cells.radius_mm
 
 
-def read_buffer(device: Device, buffer: Any) -> NDArray[np.uint32]:
-    return np.frombuffer(device.handle.queue.read_buffer(buffer), np.uint32)
+def test_pairs_follow_a_surface_that_moves(device: Device, thin: Thin) -> None:
+    """Those of the surface at rest let pass what those do that are found where it is now."""
+    head = head_of(thin.mesh)
+    x, y, z = head.positions_mm.T.astype(float)
+    moved = np.stack([1.1 * x, y + 0.02 * x * x, 0.8 * z + 0.1 * x], axis=-1).astype(np.float32)
+    surface = surface_of(device, thin.mesh, thin.atlas, moved)
+    there = search(device, surface, thin.cells)
+    assert there is not None
+    totals = []
+    for pairs in (thin.pairs, pairs_from(device, thin.cells, there)):
+        share = decoded(read(device, weighed(device, pairs, surface).weights).reshape(-1, 2)[:, 1])
+        cell, first, _ = read(device, pairs.sums).reshape(-1, 3).T
+        total = np.zeros((thin.cells.side, thin.cells.side, 3))
+        order = np.argsort(first)
+        total[cell[order] >> 16, cell[order] & 0xFFFF] = np.add.reduceat(share, first[order])
+        totals.append(total)
+    resting = decoded(read(device, thin.translucency.weights).reshape(-1, 2)[:, 1]).sum(axis=0)
+    follow, anew = totals
+    assert abs(anew.sum(axis=(0, 1)) / resting - 1).min() > 0.05
+    assert np.sqrt(((follow - anew) ** 2).mean() / (anew**2).mean()) < 0.01
 
 
 def scattered(

@@ -2,61 +2,107 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 import pytest
-import translucency_twins
 from numpy.typing import NDArray
 from tolerances import TWIN
+from translucency_twins import decoded, share_of, surface_of
 
 from dermis.atlas.build import build_atlas
-from dermis.atlas.translucency.pairs import TranslucentPairs, find_pairs
+from dermis.frame.atlas_layout import Translucency
 from dermis.frame.levels import FLOATS, Blur, make_levels
-from dermis.frame.passes import translucency
-from dermis.frame.passes.translucency_weights import upload_pairs
-from dermis.frame.translucency import translucency_from
-from dermis.gpu import Constants, Device, Frame, download, upload
+from dermis.frame.passes import translucency, translucency_weights
+from dermis.frame.translucency import find_pairs, translucency_from
+from dermis.gpu import Constants, Device, Frame, download, make_texture, upload
+from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import uv_sphere, wedge
-from dermis.viewer.views import thickness_mm
+from dermis.viewer.views import draw_thickness
 
 Floats = NDArray[np.float64]
+Index = NDArray[np.int64]
 VARIANCE, WEIGHT = np.array([0.5, 7.0]), np.array([[0.1, 0.3, 0.4], [0.5, 0.2, 0.1]])
 BLUR = Blur(VARIANCE, WEIGHT, (0, 0, 0))
 ALONE: Constants = (("TEAM", 1), ("ROUND", 1))
 
 
+@dataclass(frozen=True)
+class Weighed:
+    """Thin parts whose pairs have their weights, and what the sum reads.
+
+    source, texel : (l,) of each pair, and (n, 2) of the sources, x and y
+    share : (l, 3) of a source's light that passes
+    cell, first, end : (m,) packed x and y, and the pairs of each
+    """
+
+    thin: Translucency
+    source: Index
+    texel: Index
+    share: Floats
+    cell: Index
+    first: Index
+    end: Index
+
+
 @pytest.fixture(scope="module")
-def table() -> TranslucentPairs:
-    """The translucent pairs of a small wedge."""
-    mesh = wedge(12.0, 1.0, 4.0, cells=2)
-    return find_pairs(mesh, build_atlas(mesh, 64, "stitched"), float(np.sqrt(VARIANCE[-1])))
+def weighed(device: Device) -> Weighed:
+    """A small wedge's."""
+    return weighed_of(device, wedge(12.0, 1.0, 4.0, cells=2))
+
+
+def weighed_of(device: Device, mesh: Mesh) -> Weighed:
+    atlas = build_atlas(mesh, 64, "stitched")
+    surface = surface_of(device, mesh, atlas)
+    pairs = find_pairs(device, surface, atlas, float(np.sqrt(VARIANCE[-1])))
+    thin = translucency_from(device, surface, pairs, VARIANCE, WEIGHT)
+    frame = Frame(device)
+    translucency_weights.draw(frame, thin)
+    frame.submit()
+    words = read(device, thin.weights).reshape(-1, 2)[: pairs.count]
+    texel = read(device, thin.source_points).reshape(-1, 8)[:, 7]
+    sums = read(device, pairs.sums).reshape(-1, 3)[: pairs.receivers[1]].astype(np.int64).T
+    source = words[:, 0].astype(np.int64)
+    return Weighed(thin, source, unpacked(texel), decoded(words[:, 1]), *sums)
+
+
+def read(device: Device, buffer: Any) -> NDArray[np.uint32]:
+    return np.frombuffer(device.handle.queue.read_buffer(buffer), np.uint32)
+
+
+def unpacked(words: NDArray[Any]) -> Index:
+    return np.stack([words & 0xFFFF, words >> 16], axis=-1).astype(np.int64)
 
 
 def summed(
-    device: Device, table: TranslucentPairs, levels: NDArray[np.float32], constants: Constants
+    device: Device, weighed: Weighed, levels: NDArray[np.float32], constants: Constants
 ) -> tuple[Floats, Floats]:
     """(n, n, 3) and (n, n, 4) the twin's light, and the shader's with 1 where there is surface.
 
     levels : (2, 64, 64, 3) blurred light
     """
+    thin, side = weighed.thin, weighed.thin.pairs.cells.side
     space = make_levels(device, 64, 2, FLOATS)
     for layer, level in enumerate(levels, start=1):
         upload(device, space.stack, np.dstack([level, np.ones((64, 64))]), layer=layer)
-    thin = translucency_from(device, upload_pairs(device, table), VARIANCE, WEIGHT)
-    words = np.frombuffer(device.handle.queue.read_buffer(thin.weights), np.uint32).reshape(-1, 2)
     frame = Frame(device)
     translucency.draw(frame, space, BLUR, thin, constants)
     frame.submit()
-    x, y = table.texel[table.source].astype(int).T
-    light = translucency_twins.decoded(words[:, 1]) * levels[thin.layer, y, x]
-    sums = np.stack([part.sum(axis=0) for part in np.split(light, table.first[1:-1].astype(int))])
-    return sums[table.receiver], download(device, thin.light).astype(float)
+    x, y = weighed.texel[weighed.source].T
+    light = weighed.share * levels[thin.layer, y, x]
+    sums = np.zeros((side, side, 3))
+    column, row = unpacked(weighed.cell).T
+    for k in range(len(weighed.cell)):
+        sums[row[k], column[k]] = light[weighed.first[k] : weighed.end[k]].sum(axis=0)
+    return sums, download(device, thin.light).astype(float)
 
 
 @pytest.mark.parametrize("row", [1, 1024])
 @pytest.mark.parametrize(("team", "at_once"), [(1, 1), (1, 4), (8, 2), (32, 4), (128, 1)])
 def test_twin_of_what_comes_through(
     device: Device,
-    table: TranslucentPairs,
+    weighed: Weighed,
     team: int,
     at_once: int,
     row: int,
@@ -64,40 +110,52 @@ def test_twin_of_what_comes_through(
 ) -> None:
     monkeypatch.setattr(translucency, "_ROW", row)
     levels = np.random.default_rng(8).random((2, 64, 64, 3)).astype(np.float32)
-    twin, made = summed(device, table, levels, (("SIZE", 128), ("TEAM", team), ("ROUND", at_once)))
+    twin, made = summed(device, weighed, levels, (("SIZE", 128), ("TEAM", team), ("ROUND", at_once)))
     assert twin.max() > 0.1
     assert np.abs(made[..., :3] - twin).max() < TWIN * twin.max()
-    assert ((made[..., 3] == 1) == (table.receiver > 0)).all()
+    assert ((made[..., 3] == 1) == weighed.thin.pairs.cells.surface).all()
 
 
-def test_bright_and_dim_light_are_kept_alike(device: Device, table: TranslucentPairs) -> None:
+def test_bright_and_dim_light_are_kept_alike(device: Device, weighed: Weighed) -> None:
     """Sources from a millionth to a million: 14 bits of each, over the whole range of floats."""
     powers = np.random.default_rng(9).uniform(-6, 6, (2, 64, 64, 3))
-    twin, made = summed(device, table, (10**powers).astype(np.float32), ALONE)
+    twin, made = summed(device, weighed, (10**powers).astype(np.float32), ALONE)
     assert twin.max() > 1e4
     assert (np.abs(made[..., :3] - twin) <= 2.0**-14 * twin * 1.01).all()
 
 
 def test_a_head_without_thin_parts_gets_nothing(device: Device) -> None:
-    mesh = uv_sphere(30.0, 24, 12)
-    table = find_pairs(mesh, build_atlas(mesh, 64, "stitched"), float(np.sqrt(VARIANCE[-1])))
-    pairs = upload_pairs(device, table)
-    thin = translucency_from(device, pairs, VARIANCE, WEIGHT)
+    ball = weighed_of(device, uv_sphere(30.0, 24, 12))
+    assert ball.thin.pairs.count == 0
     frame = Frame(device)
-    translucency.draw(frame, make_levels(device, 64, 2, FLOATS), BLUR, thin)
+    translucency.draw(frame, make_levels(device, 64, 2, FLOATS), BLUR, ball.thin)
     frame.submit()
-    light = download(device, thin.light)
-    assert len(table.source) == 0
+    light = download(device, ball.thin.light)
     assert (light[..., :3] == 0).all()
-    assert ((light[..., 3] == 1) == (table.receiver > 0)).all()
+    assert ((light[..., 3] == 1) == ball.thin.pairs.cells.surface).all()
     assert light[..., 3].any()
 
 
-def test_the_view_of_thickness_shows_the_least_depth(device: Device, table: TranslucentPairs) -> None:
-    pairs = upload_pairs(device, table)
-    depth = table.geometry[:, 0] * pairs.radius_mm / 65535
-    least = [min(part, default=pairs.radius_mm) for part in np.split(depth, table.first[1:-1].astype(int))]
-    assert (
-        np.abs(thickness_mm(device, pairs) - np.array(least)[table.receiver]).max() < 1e-6 * pairs.radius_mm
-    )
-    assert min(least) < 0.5 * pairs.radius_mm
+def test_the_view_of_thickness_shows_the_least_depth(device: Device, weighed: Weighed) -> None:
+    thin = weighed.thin
+    side, radius = thin.pairs.cells.side, thin.pairs.cells.radius_mm
+    into = make_texture(device, (side, side), "r32float")
+    upload(device, into, np.full((side, side), radius, np.float32))
+    made = download(device, draw_thickness(device, thin, into)).astype(float)
+    receiver = read(device, thin.pairs.pairs).reshape(-1, 3)[:, 1]
+    points = [
+        read(device, buffer).reshape(-1, words).view(np.float32).astype(float)
+        for buffer, words in ((thin.receiver_points, 12), (thin.source_points, 8))
+    ]
+    one, other = points[0][receiver], points[1][weighed.source]
+    to, normal, its_normal = other[:, :3] - one[:, :3], one[:, 4:7], other[:, 4:7]
+    depth, apart = (to * its_normal).sum(axis=1), np.linalg.norm(to, axis=1)
+    inward = 0.5 * (depth - (to * normal).sum(axis=1)) / apart
+    share = share_of((normal * its_normal).sum(axis=1), inward)
+    depth = np.where((share > 0) & (apart < radius), np.abs(depth), radius)
+    expected = np.full((side, side), radius)
+    column, row = unpacked(weighed.cell).T
+    for k in range(len(weighed.cell)):
+        expected[row[k], column[k]] = depth[weighed.first[k] : weighed.end[k]].min()
+    assert np.abs(made - expected).max() < 1e-5 * radius
+    assert made.min() < 0.5 * radius

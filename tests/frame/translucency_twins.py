@@ -1,15 +1,112 @@
-"""Translucency once more in numpy float64: the pairs, and how much light passes between them."""
+"""Translucency once more in numpy float64: places, pairs by brute force, and what passes between them."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
-from dermis.atlas.translucency.samples import Samples
+from dermis.atlas.translucency.cells import Cells
+from dermis.frame.atlas_textures import upload_atlas
+from dermis.frame.geometry import upload_geometry
+from dermis.frame.passes import stretch
+from dermis.frame.passes.shape import rest_shape
+from dermis.frame.shape import shape_tables
+from dermis.gpu import Device, Frame
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
+Index = NDArray[np.int64]
 GRAIN, LEAST_DISC = 0.72, 0.3
+TURN, LEAST = 0.05, 4e-5
+INSIDE = 0.1
+
+
+@dataclass(frozen=True)
+class Points:
+    """Places in the cells of an atlas.
+
+    cell, texel : (n, 2) x, y
+    position, normal : (n, 3) [mm]
+    area_mm2 : (n,) of the surface that each stands for; 0 where light is only taken
+    """
+
+    cell: Index
+    texel: Index
+    position: Floats
+    normal: Floats
+    area_mm2: Floats
+
+    def chosen(self, which: Any) -> Points:
+        parts = self.cell, self.texel, self.position, self.normal, self.area_mm2
+        return Points(*(part[which] for part in parts))
+
+
+def surface_of(device: Device, mesh: Mesh, atlas: Atlas, positions_mm: Any = None) -> dict[str, Any]:
+    """What shaders read of a mesh and its atlas, also where its points are elsewhere."""
+    head, textures = Head("test", mesh, Maps()), upload_atlas(device, atlas)
+    tables = shape_tables(device, head)
+    shape = rest_shape(device, tables, head.positions_mm if positions_mm is None else positions_mm)
+    held, frame = upload_geometry(device, mesh, atlas, shape), Frame(device)
+    stretch.draw(frame, held, textures)
+    frame.submit()
+    return held.resources | textures.resources
+
+
+def interpolated(mesh: Mesh, atlas: Atlas, x: Index, y: Index, values: NDArray[Any]) -> Floats:
+    """(n, k) of a (v, k) corner attribute at texels."""
+    b = atlas.barycentric[y, x] / 65535.0
+    weights = np.column_stack([1.0 - b.sum(axis=1), b])
+    corners = values[mesh.triangles[atlas.triangle[y, x]]].astype(np.float64)
+    return np.asarray(np.einsum("nk,nkc->nc", weights, corners))
+
+
+def unit(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
+
+
+def taking(mesh: Mesh, atlas: Atlas, side: int) -> Points:
+    """The middles of the cells that hold texels of their own, or lie beside such, in order."""
+    own = np.zeros((side + 2, side + 2), bool)
+    y, x = np.stack(np.nonzero(atlas.own)) * side // atlas.size
+    for row, column in np.ndindex(3, 3):
+        own[y + row, x + column] = True
+    middle = ((np.arange(side) + 0.5) * atlas.size / side).astype(np.int64)
+    row, column = np.nonzero(own[1:-1, 1:-1] & (atlas.triangle[np.ix_(middle, middle)] >= 0))
+    cell = np.stack([column, row], axis=-1)
+    x, y = middle[cell].T
+    position, normal = (interpolated(mesh, atlas, x, y, a) for a in (mesh.positions, mesh.normals))
+    return Points(cell, middle[cell], position, unit(normal), np.zeros(len(cell)))
+
+
+def giving(mesh: Mesh, atlas: Atlas, side: int) -> Points:
+    """The cells with surface of their own: its middle and area, and the normal at their middle texel."""
+    y, x = np.nonzero(atlas.own)
+    corners = atlas.place[atlas.triangle[y, x]].astype(float) * atlas.size
+    b = atlas.barycentric[y, x] / 65535.0
+    place = np.einsum("nk,nkc->nc", np.column_stack([1 - b.sum(axis=1), b]), corners) - 0.5
+    inside = np.abs(place - np.stack([x, y], axis=-1)).max(axis=1) < INSIDE
+    x, y = x[inside], y[inside]
+    p, q = mesh.positions[mesh.triangles].astype(float), atlas.place.astype(float) * atlas.size
+    surface = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+    flat = np.abs(np.linalg.det(np.stack([q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]], axis=1)))
+    mm2 = (surface / np.maximum(flat, 1e-9))[atlas.triangle[y, x]]
+    column, row, ratio = x * side // atlas.size, y * side // atlas.size, atlas.size / side
+    off = np.hypot(x + 0.5 - (column + 0.5) * ratio, y + 0.5 - (row + 0.5) * ratio)
+    cell = row * side + column
+    order = np.lexsort((off, cell))
+    kept = order[np.flatnonzero(np.diff(cell[order], prepend=-1))]
+    at = interpolated(mesh, atlas, x, y, mesh.positions)
+    area, *moment = (np.bincount(cell, w)[cell[kept]] for w in (mm2, *(mm2 * c for c in at.T)))
+    texel = np.stack([x, y], axis=-1)[kept]
+    normal = unit(interpolated(mesh, atlas, *texel.T, mesh.normals))
+    centre = np.stack(moment, axis=-1) / area[:, None]
+    return Points(np.stack([column, row], axis=-1)[kept], texel, centre, normal, area)
 
 
 def rise(start: float, end: float, x: Floats) -> Floats:
@@ -18,19 +115,39 @@ def rise(start: float, end: float, x: Floats) -> Floats:
     return np.asarray(t * t * (3 - 2 * t))
 
 
-def lie(taken: Samples, given: Samples, radius: float) -> Floats:
-    """(m, n, 3) of receivers and sources: depth, distance beside, share that counts."""
+def share_of(cosine: Floats, inward: Floats) -> Floats:
+    return rise(0.5, -0.2, cosine) * rise(-0.5, 0.0, inward)
+
+
+@dataclass(frozen=True)
+class Lie:
+    """How sources lie to receivers, (m, n) each: cosine of normals, mean one to the inward ones, and [mm]."""
+
+    cosine: Floats
+    inward: Floats
+    square: Floats
+    depth: Floats
+
+    def share(self, radius_mm: float) -> Floats:
+        return np.where(self.square < radius_mm**2, share_of(self.cosine, self.inward), 0.0)
+
+
+def lie(taken: Points, given: Points) -> Lie:
+    """Of all receivers and sources."""
     to = given.position[None] - taken.position[:, None]
-    square = (to**2).sum(-1)
-    depth = np.einsum("mnk,nk->mn", to, given.normal)
-    below = -np.einsum("mnk,mk->mn", to, taken.normal)
-    share = rise(0.5, -0.2, taken.normal @ given.normal.T)
-    share *= rise(-0.5, 0.0, 0.5 * (below + depth) / np.sqrt(np.maximum(square, 1e-12)))
-    share[square >= radius**2] = 0.0
-    return np.stack([np.abs(depth), np.sqrt(np.maximum(square - depth**2, 0)), share], axis=-1)
+    square, depth = (to**2).sum(-1), np.einsum("mnk,nk->mn", to, given.normal)
+    inward = 0.5 * (depth - np.einsum("mnk,mk->mn", to, taken.normal)) / np.sqrt(np.maximum(square, 1e-12))
+    return Lie(taken.normal @ given.normal.T, inward, square, np.abs(depth))
 
 
-def along(atlas: Atlas, taken: Samples, given: Samples, radius: float, same: float) -> Floats:
+def passes(found: Lie, area: Floats, cells: Cells) -> Floats:
+    """(m, n) light that passes at most, over the least that counts; 0 out of reach."""
+    share, v = share_of(found.cosine - TURN, found.inward + TURN), cells.widest_mm**2
+    light = share * area * np.exp(-0.5 * found.square / v) / (LEAST * 2 * np.pi * v)
+    return np.where(found.square < cells.radius_mm**2, light, 0.0)
+
+
+def along(atlas: Atlas, taken: Points, given: Points, same: float) -> Floats:
     """(m, n) distance in the map, infinite where no blur leads; places `same` texels apart are one."""
     corners = atlas.place[np.maximum(atlas.triangle, 0)].astype(float)
     place = np.einsum("yxk,yxkc->yxc", atlas.weights(), corners) * atlas.size - 0.5
@@ -44,31 +161,37 @@ def along(atlas: Atlas, taken: Samples, given: Samples, radius: float, same: flo
             up = atlas.reach[ry, rx].astype(int)
             across = atlas.reach[ty, rx].astype(int)
             fits = (dv >= -up[:, 2]) & (dv <= up[:, 3]) & (du >= -across[:, 0]) & (du <= across[:, 1])
-            su, sv = np.moveaxis(atlas.stretch[ry, rx].astype(float), -1, 0)
-            a, b = du / su, dv / sv
-            far = np.sqrt(a * a + b * b + 2 * atlas.shear[ry, rx].astype(float) * a * b)
+            far = far_of(atlas, taken, du, dv)
             away[:, j] = np.where(fits, np.minimum(away[:, j], far), away[:, j])
-    return np.where(away < radius, away, np.inf)
+    return away
 
 
-def passed(
-    shape: Floats, far: Floats, area: Floats, radius: float, cell: float, variance: Floats, weight: Floats
-) -> Floats:
+def far_of(atlas: Atlas, taken: Points, du: NDArray[Any], dv: NDArray[Any]) -> Floats:
+    """(m,) distances along the surface from receivers to places in the map [mm]."""
+    rx, ry = taken.texel.T
+    su, sv = np.moveaxis(atlas.stretch[ry, rx].astype(float), -1, 0)
+    a, b = du / su, dv / sv
+    return np.asarray(np.sqrt(a * a + b * b + 2 * atlas.shear[ry, rx].astype(float) * a * b))
+
+
+def passed(found: Lie, far: Floats, area: Floats, cells: Cells, variance: Floats, weight: Floats) -> Floats:
     """(..., 3) share of a source's light: straight through, less what the blur along the surface brings.
 
-    shape : (..., 3) as `lie` has it; far, area : (...,) along the surface [mm], of the source [mm2]
+    far, area : (...,) along the surface [mm], of the source [mm2]
     variance : of the blurred levels, the first smooth one of which the source shows
     """
-    depth, aside, share = np.moveaxis(shape, -1, 0)
+    radius, cell = cells.radius_mm, cells.spacing_mm
     smooth = np.flatnonzero(variance >= (0.45 * cell) ** 2)
     before = variance[smooth[0]] if len(smooth) else variance[-1]
-    total = np.zeros((*depth.shape, 3))
+    far = np.where(far < radius, np.sqrt(far**2 + area / 6.0), np.inf)
+    aside2 = np.maximum(found.square - found.depth**2, 0.0)
+    total = np.zeros((*found.depth.shape, 3))
     for v, colour in zip(variance, weight, strict=True):
         w = np.maximum(v - before, GRAIN * np.maximum(area, cell**2))
-        disc = np.maximum(1 - np.exp(-np.maximum(radius**2 - depth**2, 0) / (2 * w)), LEAST_DISC)
-        straight = np.exp(-(depth**2) / (2 * v) - aside**2 / (2 * w)) / disc
+        disc = np.maximum(1 - np.exp(-np.maximum(radius**2 - found.depth**2, 0) / (2 * w)), LEAST_DISC)
+        straight = np.exp(-(found.depth**2) / (2 * v) - aside2 / (2 * w)) / disc
         total += (np.maximum(0, straight - np.exp(-(far**2) / (2 * w))) / w)[..., None] * colour
-    return np.asarray((share * area / (2 * np.pi))[..., None] * total)
+    return np.asarray((found.share(radius) * area / (2 * np.pi))[..., None] * total)
 
 
 def decoded(words: NDArray[np.uint32]) -> Floats:

@@ -1,12 +1,10 @@
-"""What is kept from frame to frame, and what stands in for what takes long."""
+"""What is kept from frame to frame."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from threading import Event
-from time import sleep
 from typing import Any
 
 import numpy as np
@@ -61,7 +59,6 @@ def test_what_nobody_asks_for_goes_after_some_rounds(depth: int, rounds: int) ->
     for more, expected in ((0, ""), (rounds, "a")):
         log.asked(memo, "a")
         for _ in range(more + 1):
-            memo.begin()
             memo.end()
         assert log.asked(memo, "a") == expected
 
@@ -74,7 +71,6 @@ def test_parts_of_what_is_asked_for_stay() -> None:
         return memo.keep(log.make, "a")
 
     for _ in range(5):
-        memo.begin()
         assert memo.keep(whole) == "A"
         memo.end()
     assert log.asked(memo, "a") == ""
@@ -155,88 +151,6 @@ def test_arguments_are_the_same_by_what_they_say() -> None:
 def executor() -> Iterator[ThreadPoolExecutor]:
     with ThreadPoolExecutor(2) as made:
         yield made
-
-
-class Slow:
-    """Something that takes long: as long as it is told to."""
-
-    def __init__(self) -> None:
-        self.go = Event()
-        self.made: list[str] = []
-
-    def make(self, head: str, width: int) -> str:
-        if width > 1:
-            assert self.go.wait(20.0)
-        self.made.append(f"{head}{width}")
-        return self.made[-1]
-
-
-def found(memo: Memo, executor: ThreadPoolExecutor, slow: Slow, head: str, width: int) -> str:
-    """What a round gets."""
-    memo.begin()
-    made = memo.meanwhile(executor, slow.make, head, width, alike=(head,))
-    memo.end()
-    return made
-
-
-def wait(memo: Memo) -> None:
-    """Until what the last round would have had is there."""
-    for _ in range(2000):
-        if not memo.searching:
-            return
-        sleep(0.01)
-    raise TimeoutError
-
-
-def test_the_last_result_stands_in_meanwhile(executor: ThreadPoolExecutor) -> None:
-    memo, slow = Memo(), Slow()
-    memo.patient = False
-    assert found(memo, executor, slow, "a", 1) == "a1" and not memo.provisional
-    assert [found(memo, executor, slow, "a", 2) for _ in range(2)] == ["a1", "a1"]
-    assert memo.provisional and memo.searching
-    slow.go.set()
-    wait(memo)
-    assert memo.provisional  # as the last round had it
-    assert found(memo, executor, slow, "a", 2) == "a2"
-    assert not memo.provisional and not memo.searching
-    assert slow.made == ["a1", "a2"]
-
-
-def test_who_is_patient_waits(executor: ThreadPoolExecutor) -> None:
-    memo, slow = Memo(), Slow()
-    slow.go.set()
-    assert [found(memo, executor, slow, "a", width) for width in (1, 2, 3)] == ["a1", "a2", "a3"]
-    assert not memo.provisional
-
-
-def test_what_stands_in_shares_what_it_must(executor: ThreadPoolExecutor) -> None:
-    """Another head's is waited for."""
-    memo, slow = Memo(), Slow()
-    memo.patient = False
-    assert [found(memo, executor, slow, head, 1) for head in "ab"] == ["a1", "b1"]
-    assert not memo.provisional
-
-
-def test_what_is_made_of_a_stand_in_is_made_again(executor: ThreadPoolExecutor) -> None:
-    memo, slow, log = Memo(), Slow(), Log()
-    memo.patient = False
-
-    def whole(width: int) -> str:
-        log.made += str(width)
-        return "whole " + memo.meanwhile(executor, slow.make, "a", width, alike=("a",))
-
-    def asked(width: int) -> str:
-        memo.begin()
-        made = memo.keep(whole, width)
-        memo.end()
-        return made
-
-    assert [asked(width) for width in (1, 1, 2, 2)] == ["whole a1"] * 4
-    assert log.made == "122" and memo.provisional
-    slow.go.set()
-    wait(memo)
-    assert [asked(2), asked(2)] == ["whole a2"] * 2
-    assert log.made == "1222" and not memo.provisional
 
 
 def test_what_failed_is_not_found_again(executor: ThreadPoolExecutor) -> None:

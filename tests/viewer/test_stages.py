@@ -21,6 +21,7 @@ from dermis.viewer.studio import Studio
 SIZE = (96, 96)
 SPREAD = {"diffuse", "translucency", "combine"}
 PICTURE = {"shade", "post"}
+WEIGHED = {"pairs"}
 
 
 @pytest.fixture(scope="module")
@@ -61,15 +62,15 @@ CHANGES: dict[str, tuple[Callable[[ViewerState], ViewerState], set[str]]] = {
         {"surface", "irradiance"} | SPREAD | PICTURE,
     ),
     "mix": (lambda state: state.with_skin(mix=1.0), {"irradiance"} | SPREAD | PICTURE),
-    "profile": (lambda state: state.with_skin(profile="dark"), SPREAD | PICTURE),
+    "profile": (lambda state: state.with_skin(profile="dark"), WEIGHED | SPREAD | PICTURE),
     "fewer Gaussians": (  # which have another space for their levels
         lambda state: state.with_skin(profile="skin1"),
-        {"irradiance"} | SPREAD | PICTURE,
+        {"irradiance"} | WEIGHED | SPREAD | PICTURE,
     ),
-    "pigments": (skin_of(0.05), SPREAD | PICTURE),
+    "pigments": (skin_of(0.05), WEIGHED | SPREAD | PICTURE),
     "stretch": (
         lambda state: state.with_settings(stretch="none"),
-        {"stretch", "surface", "irradiance"} | SPREAD | PICTURE,
+        {"stretch", "surface", "irradiance"} | WEIGHED | SPREAD | PICTURE,
     ),
     "part": (lambda state: state.in_view("specular"), PICTURE),
     "background": (lambda state: state.with_settings(background=(0.1, 0.2, 0.3)), PICTURE),

@@ -107,6 +107,21 @@ def test_pigments_fit_again_and_load_nothing(studio: Studio, state: ViewerState)
     assert before.layouts[0].translucency.pairs is after.layouts[0].translucency.pairs
 
 
+def test_pigments_that_spread_light_farther_get_their_own_pairs(
+    studio: Studio, fresh: Renderer, state: ViewerState
+) -> None:
+    pale, dark = (
+        state.with_skin(profile="light", albedo="profile").with_pigments(melanin=melanin)
+        for melanin in (0.01, 0.2)
+    )
+    pairs = [prepared(studio, one).layouts[0].translucency.pairs for one in (pale, dark)]
+    assert pairs[0].cells.radius_mm != pairs[1].cells.radius_mm
+    image(studio, pale)
+    fresh.forget()
+    expected = fresh.draw(dark.scene, dark.settings.model_copy(update={"size": SIZE})).srgb8().astype(int)
+    assert np.abs(image(studio, dark) - expected).max() <= 1  # whose fit begins elsewhere
+
+
 def prepared(studio: Studio, state: ViewerState) -> Any:
     return studio.renderer.prepare(state.scene, state.settings.model_copy(update={"size": SIZE}))
 

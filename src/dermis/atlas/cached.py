@@ -10,8 +10,6 @@ import numpy as np
 
 from dermis.atlas.atlas import GUTTER, REACH_MM, Atlas
 from dermis.atlas.build import build_atlas
-from dermis.atlas.translucency.pairs import FORM as PAIRS_FORM
-from dermis.atlas.translucency.pairs import TranslucentPairs, find_pairs
 from dermis.disk import Array, Arrays, stored
 from dermis.mesh.mesh import Mesh
 
@@ -35,22 +33,6 @@ def cached_occlusion(mesh: Mesh, atlas: Atlas, form: str, bake: Callable[[], Arr
     form : everything else that the result depends on
     """
     return _baked("occlusion", mesh, atlas, form, bake)
-
-
-def cached_pairs(mesh: Mesh, atlas: Atlas, widest_mm: float) -> TranslucentPairs:
-    """`find_pairs`, kept on disk in the same way."""
-    names = [field.name for field in fields(TranslucentPairs)]
-
-    def make() -> Arrays:
-        pairs = find_pairs(mesh, atlas, widest_mm)
-        return {name: getattr(pairs, name) for name in names}
-
-    return TranslucentPairs(**stored("pairs", pairs_key(mesh, atlas, widest_mm), names, make))
-
-
-def pairs_key(mesh: Mesh, atlas: Atlas, widest_mm: float) -> str:
-    """Key that identifies the result of `find_pairs`."""
-    return _baked_key(mesh, atlas, f"{PAIRS_FORM} {widest_mm!r}")
 
 
 def _baked(folder: str, mesh: Mesh, atlas: Atlas, form: str, bake: Callable[[], Array]) -> Array:

@@ -22,6 +22,7 @@ from dermis.gpu.textures import texel_bytes
 _MAPS = ("colour_map", "slope_map", "relief_map", "specular_map", "roughness_map")
 _CORNERS, _PLACE = 16, 16  # bytes of a triangle's corners and of a vertex' position in the tables
 _LISTED = 16  # bytes of a texel in the list of a gutter
+_TEXEL = 4  # bytes of where a source is
 _BILINEAR = 4  # texels that a lookup between texels reads
 _SIDE, _SIDE_ON_CPU = 4096, 1024  # beyond what caches hold
 _COPIES, _REPEATS, _WARMING = 8, 5, 20
@@ -114,10 +115,11 @@ def _surface_of_blurs(inputs: Inputs, texels: int) -> float:
 def _through(thin: Translucency, levels: Levels, blur: Blur) -> float:
     """Bytes of translucency: pairs and their texels, the light of the sources, and the light that leaves."""
     pairs, halved = thin.pairs, blur.halvings[1 + thin.layer]
-    lists = sum(buffer.size for buffer in (thin.weights, pairs.sources, pairs.receivers))
+    receivers, sources = pairs.receivers[1], pairs.sources[1]
+    lists = thin.weights.size + pairs.sums.size + _TEXEL * sources
     level = (levels.size >> halved) ** 2
-    read = min(_BILINEAR * pairs.source_count, level) * texel_bytes(levels.stack)
-    return float(lists + read + pairs.receiver_count * texel_bytes(thin.light))
+    read = min(_BILINEAR * sources, level) * texel_bytes(levels.stack)
+    return float(lists + read + receivers * texel_bytes(thin.light))
 
 
 def _maps(inputs: Inputs, most: int) -> int:

@@ -10,7 +10,15 @@ import numpy as np
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.inputs import Inputs
 from dermis.frame.levels import FLOATS, HALVES, Blur, Levels
-from dermis.frame.passes import registered, shader_folders, stretch, suited, surface_texels, translucency
+from dermis.frame.passes import (
+    registered,
+    shader_folders,
+    stretch,
+    suited,
+    surface_texels,
+    translucency,
+    translucency_weights,
+)
 from dermis.frame.passes.combine import nothing
 from dermis.frame.techniques.gpu_gems_3 import GpuGems3, Pair, StretchedLevels
 from dermis.gpu import Constants, Device, FragmentProgram, Graph, compiled, make_texture
@@ -42,6 +50,8 @@ class Fragments(GpuGems3):
             self._light(graph, layout, inputs.light_constants, made.levels.layer(0), blur.scale)
             self.fill(graph, made.levels, layout.atlas, blur)
             thin = layout.translucency
+            if thin:
+                translucency_weights.draw(graph, thin)
             through = translucency.draw(graph, made.levels, blur, thin) if thin else None
             self._add_up(graph, made.levels, blur, layout.scattered, through)
         return made.scattered

@@ -1,57 +1,64 @@
-"""An atlas of the head on the device, over which light spreads."""
+"""An atlas of the head that light is spread on, as textures."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
+from dermis.atlas.translucency.cells import Cells
 from dermis.frame.atlas_textures import AtlasTextures
 from dermis.frame.geometry import HeadResources
+from dermis.gpu.program import Resources
 
 
 @dataclass(frozen=True, eq=False)
 class PairBuffers:
-    """Translucent pairs on a device, and their geometry.
+    """Pairs of places of a surface on a device.
 
-    side : of the coarse atlas
-    receivers : buffer of cells that receive light, as translucency.wgsl reads them
-    pairs, sources : buffers of words, as translucency_weights.wgsl reads them
-    count, source_count, receiver_count : of pairs, sources and receivers
-    light : texture of the coarse atlas for the transmitted light, none yet; alpha is 1 where there is surface
-    key : identifies the pairs, so that a profile's weights can be kept on disk; empty to keep none
+    cells : of the coarse atlas
+    receivers, sources : buffers of those with pairs, as translucency_receivers.wgsl and
+        translucency_sources.wgsl read them, and how many there are
+    pairs : buffer of source, receiver and offset in the map, as translucency_weights.wgsl reads them
+    count : of pairs
+    sums : buffer of cells and their pairs, as translucency.wgsl reads them
+    light : texture of the coarse atlas for what comes through, none yet, and 1 where there is surface
     """
 
-    side: int
-    radius_mm: float
-    spacing_mm: float
-    receivers: Any
+    cells: Cells
+    receivers: tuple[Any, int]
+    sources: tuple[Any, int]
     pairs: Any
-    sources: Any
     count: int
-    source_count: int
-    receiver_count: int
+    sums: Any
     light: Any
-    key: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class Translucency:
-    """Light through the thin parts of an atlas.
+    """Thin parts of an atlas.
 
     pairs : translucent pairs
-    weights : buffer from `weigh`
-    layer : blurred level, counted from 0, that the sources read
+    surface : resources of geometry.wgsl and of the atlas, for where they are now
+    weighing, gaussians : record of translucency_weights.wgsl for a profile, and how many it has
+    receiver_points, source_points : buffers of where the pairs' places are
+    weights : buffer of the share of light that each pair lets pass
+    layer : blurred level, counted from 0, whose light passes
     gathered : buffer for the light of the sources
     """
 
     pairs: PairBuffers
+    surface: Resources
+    weighing: Any
+    gaussians: int
+    receiver_points: Any
+    source_points: Any
     weights: Any
     layer: int
     gathered: Any
 
     @property
     def light(self) -> Any:
-        """Texture of the coarse atlas for the transmitted light."""
+        """Texture of the coarse atlas for what comes through."""
         return self.pairs.light
 
 

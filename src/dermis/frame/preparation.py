@@ -55,7 +55,6 @@ class Preparation:
 
         Raises DermisError for sizes over the device's limits.
         """
-        self.memo.begin()
         inputs = self._inputs(scene, settings, TECHNIQUES[settings.technique], view)
         self.memo.end()
         return inputs

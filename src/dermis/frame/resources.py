@@ -13,7 +13,7 @@ from dermis.atlas.cached import cached_atlas
 from dermis.frame import surface, surroundings
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.atlas_textures import AtlasTextures, upload_atlas
-from dermis.frame.geometry import upload_geometry
+from dermis.frame.geometry import HeadResources, upload_geometry
 from dermis.frame.gutters import make_walks
 from dermis.frame.inputs import Resources, Split, view_record
 from dermis.frame.levels import Blur, Levels
@@ -184,8 +184,8 @@ def _layout(
     held = keep(upload_geometry, device, head.mesh, atlas, shape, of=number)
     lit = held.resources | shared
     if asked.person is not None:
-        resting = held.shaped(keep(rest_shape, device, shape.tables, asked.person, of="person"))
         walks = keep(make_walks, device, head.mesh, atlas, textures, of=number)
+        resting = _resting(memo, device, asked, held, shape, number)
         textures = keep(gutters.walked, device, textures, walks, resting, of=number)
     if asked.occluded:
         bound = lit, textures.resources["atlas"]
@@ -197,12 +197,24 @@ def _layout(
         lit["occlusion_map"], follows = keep(make_map, device, lit["occlusion_map"], of=number)
     translucency = None
     if asked.count and asked.settings.transmission == "thin" and asked.technique.transmits:
+        heads = held, _resting(memo, device, asked, held, shape, number)
+        now, at_rest = (one.resources | textures.resources for one in heads)
         blurred = asked.split.blurred_mm2, asked.split.weight, asked.skin.has_own_tissue
-        translucency = translucency_of(memo, device, head, atlas, *blurred, of=number)
+        translucency = translucency_of(memo, device, now, at_rest, atlas, *blurred, of=number)
     side = asked.settings.atlas if asked.count else 1
     surfaces = keep(surface_texels.make_surfaces, device, side, of=number)
     scattered = _sum(memo, device, asked, side, number)
     return AtlasLayout(textures, held, lit, surfaces, scattered, translucency, follows)
+
+
+def _resting(
+    memo: Memo, device: Device, asked: Asked, held: HeadResources, shape: Shape, of: str
+) -> HeadResources:
+    """The head as the person rests."""
+    person = asked.head.positions_mm if asked.person is None else asked.person
+    return memo.keep(
+        HeadResources.shaped, held, memo.keep(rest_shape, device, shape.tables, person, of="person"), of=of
+    )
 
 
 def _sum(memo: Memo, device: Device, asked: Asked, side: int, role: str) -> Any:

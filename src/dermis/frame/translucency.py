@@ -2,64 +2,116 @@
 
 from __future__ import annotations
 
+from itertools import count
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
-from dermis.atlas.cached import cached_pairs, pairs_key
+from dermis.atlas.translucency.cells import Cells, divide
 from dermis.frame.atlas_layout import PairBuffers, Translucency
-from dermis.frame.passes.translucency_weights import source_level, upload_pairs, weigh
-from dermis.gpu import Device, Memo, scratch
-from dermis.mesh.head import Head
-from dermis.mesh.mesh import Mesh
+from dermis.frame.passes.pair_search.places import upload_receivers, upload_sources
+from dermis.frame.passes.pair_search.search import Found, search
+from dermis.frame.passes.translucency_points import RECEIVER_BYTES, SOURCE_BYTES, space
+from dermis.frame.passes.translucency_weights import source_level, weighing
+from dermis.gpu import Device, Memo, make_texture, scratch, upload
+from dermis.gpu.program import Resources
 
 Floats = NDArray[np.float64]
 _WIDTHS_TO_DOUBLE, _LEAST_SHARED_MM = 2, 0.5
+_COARSER = 1.5  # times the side of cells whose pairs memory does not hold
 
 
 def translucency_of(
     memo: Memo,
     device: Device,
-    head: Head,
+    surface: Resources,
+    at_rest: Resources,
     atlas: Atlas,
     variance_mm2: Floats,
     weight: Floats,
     changing: bool,
     of: str,
 ) -> Translucency:
-    """Light through a head's thin parts, on an atlas.
+    """What comes through a head's thin parts, on an atlas.
 
+    surface, at_rest : resources of geometry.wgsl and of the atlas, as the head is now and for the search
     variance_mm2, weight : (k,) and (k, 3) of the blurred levels
-    changing : whether profiles change too often for their weights to be worth keeping on disk
+    changing : whether profiles come and go, so that similar ones should share their pairs
     of : name of the atlas among several
     """
     widest = float(np.sqrt(variance_mm2[-1]))
     widest = shared_width(widest) if changing else widest
-    pairs = memo.meanwhile(
-        device.executor, pairs_of, device, head.mesh, atlas, widest, changing, alike=(head, atlas), of=of
-    )
-    return memo.keep(translucency_from, device, pairs, variance_mm2, weight, of=of)
+    pairs = memo.keep(find_pairs, device, at_rest, atlas, widest, of=of)
+    return memo.keep(translucency_from, device, surface, pairs, variance_mm2, weight, of=of)
 
 
 def shared_width(widest_mm: float) -> float:
-    """The width rounded to one of a few [mm], so that similar skins share their pairs."""
+    """The nearest of a few widths [mm]: similar skins share their pairs."""
     step = round(_WIDTHS_TO_DOUBLE * float(np.log2(max(widest_mm, _LEAST_SHARED_MM))))
     return float(2.0 ** (step / _WIDTHS_TO_DOUBLE))
 
 
-def pairs_of(device: Device, mesh: Mesh, atlas: Atlas, widest_mm: float, changing: bool) -> PairBuffers:
-    """The translucent pairs of a mesh, searched for or read from disk.
+def find_pairs(device: Device, surface: Resources, atlas: Atlas, widest_mm: float) -> PairBuffers:
+    """The translucent pairs of a surface, with cells so coarse that memory holds them.
 
     widest_mm : standard deviation of the widest Gaussian [mm]
     """
-    key = "" if changing else pairs_key(mesh, atlas, widest_mm)
-    return upload_pairs(device, cached_pairs(mesh, atlas, widest_mm), key)
+    for number in count():
+        cells = divide(atlas, widest_mm, _COARSER**number)
+        found = search(device, surface, cells)
+        if found is not None:
+            return pairs_from(device, cells, found)
+    raise AssertionError
+
+
+def pairs_from(device: Device, cells: Cells, found: Found) -> PairBuffers:
+    """Pairs that were found, as the frame's passes read them."""
+    return PairBuffers(
+        cells=cells,
+        receivers=upload_receivers(device, cells, found.receiver),
+        sources=upload_sources(device, cells, found.source),
+        pairs=found.pairs,
+        count=int(found.first[-1]),
+        sums=device.buffer(_sums(cells, found), "STORAGE"),
+        light=_unlit(device, cells.surface),
+    )
+
+
+def _sums(cells: Cells, found: Found) -> NDArray[np.uint32]:
+    """(m, 3) cell, x and y packed, where its pairs begin, and where they end; one without pairs for none.
+
+    Those with most pairs come first: invocations that run side by side, and workgroups that are left for the
+    end, then have little to wait for.
+    """
+    first, end = found.first[:-1], found.first[1:]
+    order = np.argsort(first - end, kind="stable")
+    listed = np.stack([cells.taking[found.receiver], first, end], axis=-1)[order].astype(np.uint32)
+    return listed if len(listed) else np.zeros((1, 3), np.uint32)
+
+
+def _unlit(device: Device, surface: NDArray[np.bool_]) -> Any:
+    light = np.zeros((*surface.shape, 4), np.float32)
+    light[..., 3] = surface
+    texture = make_texture(device, surface.shape, "rgba32float")
+    upload(device, texture, light)
+    return scratch(device, texture)
 
 
 def translucency_from(
-    device: Device, pairs: PairBuffers, variance_mm2: Floats, weight: Floats
+    device: Device, surface: Resources, pairs: PairBuffers, variance_mm2: Floats, weight: Floats
 ) -> Translucency:
-    """A profile's weights of the pairs, and buffers for the light."""
-    gathered = scratch(device, device.buffer(np.zeros((pairs.source_count, 2), np.uint32), "STORAGE"))
-    weights = weigh(device, pairs, variance_mm2, weight)
-    return Translucency(pairs, weights, source_level(pairs, variance_mm2), gathered)
+    """What a profile lets pass between pairs, and space for it."""
+    receivers, sources = pairs.receivers[1], pairs.sources[1]
+    return Translucency(
+        pairs=pairs,
+        surface=surface,
+        weighing=weighing(device, pairs, variance_mm2, weight),
+        gaussians=len(weight),
+        receiver_points=scratch(device, space(device, receivers, RECEIVER_BYTES)),
+        source_points=space(device, sources, SOURCE_BYTES),
+        weights=space(device, pairs.count, 8),
+        layer=source_level(pairs.cells.spacing_mm, variance_mm2),
+        gathered=scratch(device, space(device, sources, 8)),
+    )

@@ -184,6 +184,13 @@ class Device:
         flags = getattr(wgpu.BufferUsage, usage) | wgpu.BufferUsage.COPY_DST | wgpu.BufferUsage.COPY_SRC
         return self.handle.create_buffer_with_data(data=np.ascontiguousarray(data), usage=flags)
 
+    def space(self, size: int) -> Any:
+        """A new buffer that shaders write [byte]."""
+        import wgpu
+
+        flags = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_DST | wgpu.BufferUsage.COPY_SRC
+        return self.handle.create_buffer(size=size, usage=flags)
+
     def sampler(self, **options: str) -> Any:
         """A sampler with wgpu's options; made once for each set of them."""
         key = tuple(sorted(options.items()))

@@ -21,23 +21,12 @@ class Made:
 
     parts : what was kept while it was made, which is in use as long as this is
     roles : its own and those of all its parts
-    provisional : whether something in it stands in for what is still being made
     """
 
     args: tuple[Any, ...]
     value: Any = None
     parts: list[tuple[Role, Made]] = field(default_factory=list)
     roles: set[Role] = field(default_factory=set)
-    provisional: bool = False
-
-
-@dataclass(eq=False)
-class _Search:
-    """The last result of a function that takes long, and what it is looking for now."""
-
-    value: Any = None
-    found: bool = False
-    running: Future[Any] | None = None
 
 
 class Memo:
@@ -45,17 +34,14 @@ class Memo:
 
     depth : how many results of each function are kept, for callers that alternate between a few; a function
         that is not asked for during depth squared rounds is forgotten
-    patient : whether `meanwhile` waits
     """
 
     def __init__(self, depth: int = 1) -> None:
-        self.patient = True
         self._depth = depth
         self._kept: dict[Role, list[Made]] = {}
         self._asked: deque[set[Role]] = deque([set()], maxlen=depth * depth)
         self._making: list[Made] = []
         self._found: list[tuple[Role, Made]] = []  # in this round, parts not among them
-        self._awaited: Future[Any] | None = None
 
     def keep(self, make: Callable[..., T], *args: Any, using: tuple[Any, ...] = (), of: str = "") -> T:
         """What `make(*args, *using)` returned, made unless these are among the arguments used last.
@@ -70,10 +56,9 @@ class Memo:
             if same(one.args, args):
                 found = one
                 break
-        if found is None or found.provisional:
+        if found is None:
             self._settle(role)
-            others = [one for one in kept if one is not found]
-            kept[:] = others[: self._depth - 1]  # before making, which may need the space
+            kept[:] = kept[: self._depth - 1]  # before making, which may need the space
             found = self._made(make, args, using)
             found.roles.add(role)
             self._touch(role, found)
@@ -86,29 +71,6 @@ class Memo:
         value: T = found.value
         return value
 
-    def meanwhile(
-        self, executor: Executor, make: Callable[..., T], *args: Any, alike: tuple[Any, ...], of: str = ""
-    ) -> T:
-        """What `make(*args)` returns, made by another thread; unless the memo is patient, the last result
-        stands in until it is there.
-
-        alike : arguments that what stands in must share
-        """
-        search = self.keep(_search, make, *alike, of=of)
-        running = search.running
-        if not search.found or running is None or self.patient or running.done():
-            running = search.running = self.soon(executor, make, *args, of=of)
-            if not search.found or self.patient or running.done():
-                search.value, search.found = self.wait(running), True
-                found: T = search.value
-                return found
-        self._awaited = running
-        self._asked[-1].add((_begin, of))  # or it would go before it is found
-        for one in self._making:
-            one.provisional = True
-        standing_in: T = search.value
-        return standing_in
-
     def soon(self, executor: Executor, make: Callable[..., T], *args: Any, of: str = "") -> Future[T]:
         """What `make(*args)` returns, begun on another thread unless it is kept; for `wait`."""
         return self.keep(_begin, executor, make, args, of=of)
@@ -120,20 +82,6 @@ class Memo:
         except Exception:
             self.forget()  # what failed must not be found again
             raise
-
-    @property
-    def provisional(self) -> bool:
-        """Whether something stood in for what is still being made in this round."""
-        return self._awaited is not None
-
-    @property
-    def searching(self) -> bool:
-        """Whether that is still being made."""
-        return self._awaited is not None and not self._awaited.done()
-
-    def begin(self) -> None:
-        """Begin a round."""
-        self._awaited = None
 
     def end(self) -> None:
         """End a round: let go of what nobody has asked for in the last rounds."""
@@ -158,8 +106,6 @@ class Memo:
             made.value = make(*args, *using)
         finally:
             self._making.pop()
-        if made.provisional and self._making:
-            self._making[-1].provisional = True
         return made
 
     def _settle(self, among: Role | None = None) -> None:
@@ -176,10 +122,6 @@ class Memo:
             kept[:] = [made, *(one for one in kept if one is not made)][: self._depth]
         for part in made.parts:
             self._touch(*part)
-
-
-def _search(*_: Any) -> _Search:
-    return _Search()
 
 
 def _begin(executor: Executor, make: Callable[..., T], args: tuple[Any, ...]) -> Future[T]:

@@ -28,16 +28,12 @@ _BEFORE = "before"  # the frozen state's own light, so that a camera that moves 
 
 @dataclass(frozen=True)
 class Frozen:
-    """The image of a state that does not change, as the camera saw it.
-
-    provisional : whether something stands in for what is still looked for
-    """
+    """The image of a state that does not change, as the camera saw it."""
 
     state: ViewerState
     camera: Camera
     settings: Settings
     image: Any
-    provisional: bool
 
 
 class Studio:
@@ -52,8 +48,6 @@ class Studio:
         self.rendered: Rendered | None = None
         self.settings: Settings | None = None
         self._views = Views(self.renderer)
-        self._thin_parts = self.renderer.memo
-        self._provisional = False  # whether something stood in for what is still looked for
         self._shown: tuple[ViewerState, Camera, Settings] | None = None
         self.last_image: Any = None
         self._size = (0, 0)
@@ -87,12 +81,11 @@ class Studio:
         self._size = size
         settings = self._settings(state, size, moving)
         known = self._shown and self._shown[0] is state and self._shown[1:] == (camera, settings)
-        if known and (moving or not self._provisional):
+        if known:
             return self.last_image
         before = self.rendered
-        self._thin_parts.patient = not moving
         self.last_image = self._draw(replace(state, settings=settings).with_camera(camera))
-        self._shown, self._provisional = (state, camera, settings), self._thin_parts.provisional
+        self._shown = state, camera, settings
         if self.rendered and self.rendered is not before:
             self.times.append(self.rendered.gpu_ms or {})
             if moving and "shade" in (
@@ -106,13 +99,12 @@ class Studio:
         settings, frozen = self._settings(before, size, moving), self._frozen
         finest = self._settings(before, size, moving=False)
         known = frozen and frozen.state is before and frozen.camera == camera
-        if frozen and known and frozen.settings in (settings, finest) and (moving or not frozen.provisional):
+        if frozen and known and frozen.settings in (settings, finest):
             return frozen.image
-        self._thin_parts.patient = not moving
         drawn = self._draw(replace(before, settings=settings).with_camera(camera), _BEFORE)
         self._shown = None  # the picture was the live state's
         copy = copied(self.renderer.device, drawn, frozen.image if frozen else None)
-        self._frozen = Frozen(before, camera, settings, copy, self._thin_parts.provisional)
+        self._frozen = Frozen(before, camera, settings, copy)
         return copy
 
     def _settings(self, state: ViewerState, size: tuple[int, int], moving: bool) -> Settings:
@@ -122,22 +114,16 @@ class Studio:
     @property
     def is_current(self) -> bool:
         """Whether the last image is a still one, with all that its settings ask for."""
-        if not self._shown or self._provisional or (self._frozen and self._frozen.provisional):
+        if not self._shown:
             return False
         state, _, settings = self._shown
         return self._settings(state, self._size, moving=False) == settings
-
-    @property
-    def is_searching(self) -> bool:
-        """Whether a still image would have to wait for what stands in now."""
-        return self._provisional and self._thin_parts.searching
 
     def screenshot(self, path: Path, state: ViewerState, size: tuple[int, int]) -> None:
         """Write what the state shows at any size: .png with the tone curve, or .exr, linear.
 
         Raises DermisError when that is not possible.
         """
-        self._thin_parts.patient = True
         image = self._draw(state.with_settings(size=size))
         self._shown = None
         if path.suffix.lower() == ".exr" and self.rendered and state.view in (PICTURE, *PARTS):
@@ -156,7 +142,7 @@ class Studio:
             return self._views.draw_chart(state.scene, settings, state.chart, side)
         self._lit = None
         self.rendered = self.renderer.draw(state.scene, settings, view=side)
-        self._lit = None if self._thin_parts.provisional else (state, side)
+        self._lit = state, side
         if state.view in (PICTURE, *PARTS):
             return self.rendered.picture.bytes
         if state.view == ATLAS:

@@ -101,8 +101,7 @@ class Viewer:
         if state is not self._last_state or camera != before or size != self._last_size:
             self._last_change, self._last_state, self._last_size = now, state, size
         self._last_draw = now
-        moving = self._is_moving(now) or session.studio.is_searching
-        images = self._images(state, camera, size, moving)
+        images = self._images(state, camera, size, self._is_moving(now))
         session.status = self._status(size)
         target = self._context.get_current_texture().create_view()
         self._blit.draw(self._patches(*images, size), target)

@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dermis.errors import refuse
-from dermis.frame.atlas_layout import PairBuffers
+from dermis.frame.atlas_layout import PairBuffers, Translucency
 from dermis.frame.inputs import Inputs
-from dermis.frame.passes import program
+from dermis.frame.passes import each, program
 from dermis.frame.renderer import Renderer
-from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture
+from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture, upload
 from dermis.gpu.device import gpu_failures
 from dermis.gpu.textures import texture_from
 from dermis.scene.model import Scene
@@ -107,9 +106,12 @@ class Views:
         if thin is None:
             refuse("view thickness", "light through thin parts", "there is none", "Set transmission to thin")
         if thin.pairs not in self._thick:
-            device = self._renderer.device
-            self._thick[thin.pairs] = texture_from(device, thickness_mm(device, thin.pairs), "r32float")
-        return self._thick[thin.pairs]
+            side, radius_mm = thin.pairs.cells.side, thin.pairs.cells.radius_mm
+            everywhere = np.full((side, side), radius_mm, np.float32)
+            texture = make_texture(self._renderer.device, (side, side), "r32float")
+            upload(self._renderer.device, texture, everywhere)
+            self._thick[thin.pairs] = texture
+        return draw_thickness(self._renderer.device, thin, self._thick[thin.pairs])
 
     def _mean_density(self, stretch: Any) -> float:
         """Geometric mean of the texels per mm."""
@@ -125,15 +127,22 @@ class Views:
         return self._image
 
 
-def thickness_mm(device: Device, pairs: PairBuffers) -> NDArray[np.float32]:
-    """(n, n) least depth of the flesh behind each cell of the atlas, at most the search radius [mm]."""
-    receivers, words = (
-        np.frombuffer(device.handle.queue.read_buffer(buffer), np.uint32).reshape(-1, 3)
-        for buffer in (pairs.receivers, pairs.pairs)
-    )
-    depth = (words[:, 1] & 0xFFFF) * (pairs.radius_mm / 0xFFFF)
-    cell, first, end = receivers[np.argsort(receivers[:, 1])].T  # in the order of their pairs
-    least = np.full((pairs.side, pairs.side), pairs.radius_mm, np.float32)
-    at = np.repeat(cell, end - first)
-    np.minimum.at(least, (at >> 16, at & 0xFFFF), depth[: len(at)])
-    return least
+def draw_thickness(device: Device, thin: Translucency, into: Any) -> Any:
+    """Least depth of the flesh behind each cell of the atlas that has pairs, at most their radius [mm].
+
+    into : texture of the cells; those without pairs stay as they are
+    """
+    pairs, shader = thin.pairs, program(device, Path(__file__).parent / "thickness.wgsl")
+    count = pairs.receivers[1]
+    bound = {
+        "reach": shader.record("Reach", radius_mm=pairs.cells.radius_mm, count=count),
+        "sums": pairs.sums,
+        "pairs": pairs.pairs,
+        "receiver_points": thin.receiver_points,
+        "source_points": thin.source_points,
+        "thickness": into,
+    }
+    frame = Frame(device, timed=False)
+    frame.dispatch("view", shader, bound, each(count))
+    frame.submit()
+    return into

@@ -27,27 +27,31 @@ def draw(graph: Recorder, levels: Levels, blur: Blur, thin: Translucency, consta
     record = gather.record(
         "Entering",
         layer=layer,
-        sources=pairs.source_count,
+        sources=pairs.sources[1],
         mip=blur.halvings[layer],
         scale=1.0 / blur.scale,
     )
-    sources = {"entering": record, "levels": levels.stack, "sources": pairs.sources}
-    entering = {**sources, "gathered": thin.gathered}
+    entering = {
+        "entering": record,
+        "levels": levels.stack,
+        "source_points": thin.source_points,
+        "gathered": thin.gathered,
+    }
     leaving = {
-        "receivers": pairs.receivers,
+        "receivers": pairs.sums,
         "weights": thin.weights,
         "gathered": thin.gathered,
         "transmitted": pairs.light,
     }
     chosen = dict((_ALONE if device.adapter.kind == "CPU" else _TEAMS) + constants)
     add_up = program(device, "translucency.wgsl", tuple(chosen.items()))
-    graph.dispatch("translucency", gather, entering, _rows(pairs.source_count, _GATHERING))
+    graph.dispatch("translucency", gather, entering, _rows(pairs.sources[1], _GATHERING))
     receivers = int(chosen["SIZE"]) // int(chosen["TEAM"])  # of a workgroup
-    graph.dispatch("translucency", add_up, leaving, _rows(pairs.receiver_count, receivers))
+    graph.dispatch("translucency", add_up, leaving, _rows(pairs.receivers[1], receivers))
     return pairs.light
 
 
 def _rows(count: int, each: int) -> tuple[int, int, int]:
     """Workgroups along each axis for `count` items, `each` in a workgroup."""
-    groups = -(-count // each)
+    groups = max(1, -(-count // each))
     return min(groups, _ROW), -(-groups // _ROW), 1

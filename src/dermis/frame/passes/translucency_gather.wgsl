@@ -1,6 +1,7 @@
 // Light that comes through thin parts, gathered where it enters.
 //#include "bilinear.wgsl"
 //#include "light_words.wgsl"
+//#include "translucent_pair.wgsl"
 
 struct Entering {
     layer: u32, // blurred level that the sources read
@@ -11,7 +12,7 @@ struct Entering {
 
 @group(0) @binding(0) var<uniform> entering: Entering;
 @group(0) @binding(1) var levels: texture_2d_array<f32>;
-@group(0) @binding(2) var<storage, read> sources: array<vec2u>; // texel, x and y packed; area
+@group(0) @binding(2) var<storage, read> source_points: array<Source>;
 @group(0) @binding(3) var<storage, read_write> gathered: array<vec2u>; // as in light_words.wgsl
 
 const SIZE: u32 = 64u; // of a workgroup
@@ -31,7 +32,7 @@ fn main(
     if (index >= entering.sources) {
         return;
     }
-    let texel = sources[index].x;
+    let texel = source_points[index].texel;
     let place = (vec2f(f32(texel & 0xffffu), f32(texel >> 16u)) + 0.5) / f32(1u << entering.mip) - 0.5;
     let a = vec2i(floor(place));
     let w = entering.scale * bilinear_weights(place);

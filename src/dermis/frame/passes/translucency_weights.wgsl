@@ -1,23 +1,27 @@
-// How much light passes through the flesh between translucent pairs, beyond what blurs carry along the surface.
+// How much light passes through the flesh between translucent pairs, beyond what the blurs carry round.
+//#include "translucent_pair.wgsl"
+
+override COUNT: u32 = 8u; // Gaussians; as a constant, so that software adapters unroll the loop
 
 struct Weighing {
-    radius_mm: f32, // pairs are nearer than this
+    radius_mm: f32, // pairs are nearer
     before_mm2: f32, // variance that the sources' light has already
-    cell_mm2: f32, // usual area of a source
-    grain: f32, // least variance added, over the larger of that and the source's own area: it hides the sources' pattern
-    count: u32,
+    cell_mm2: f32, // that a source usually stands for
+    grain: f32, // least variance that is added, over that or the source's own area: it hides their pattern
     gaussian: array<vec4f, 24>, // weight per channel, variance [mm^2]
 }
 
 @group(0) @binding(0) var<uniform> weighing: Weighing;
-@group(0) @binding(1) var<storage, read> pairs: array<u32>; // three words: source; depth, aside; along, share
-@group(0) @binding(2) var<storage, read> sources: array<vec2u>; // texel; area [mm^2]
-@group(0) @binding(3) var<storage, read_write> weights: array<vec2u>; // source; share of its light, as `encoded` packs it
+@group(0) @binding(1) var<storage, read> pairs: array<u32>; // three words: source, receiver, offset in the map [1/8 texel]
+@group(0) @binding(2) var<storage, read> receiver_points: array<Receiver>;
+@group(0) @binding(3) var<storage, read> source_points: array<Source>;
+@group(0) @binding(4) var<storage, read_write> weights: array<vec2u>; // source; share of its light, as encoded says
 
-const ROW: u32 = 1024u; // pairs in a row of invocations
+const ROW: u32 = 1024u; // of the pairs, as they are spread over invocations
 const PI: f32 = 3.14159265358979;
-const FAR_MM: f32 = 1e6; // as good as infinite
-const LEAST_DISC: f32 = 0.3; // least share of a Gaussian within the radius that is scaled up to all of it
+const FINE: f32 = 8.0; // parts of a texel
+const FAR_MM2: f32 = 1e12; // as good as without end
+const LEAST_DISC: f32 = 0.3; // share of a Gaussian that the ball around a place must hold to stand for all of it
 
 // Three shares with one exponent: nine bits each and five.
 fn encoded(c: vec3f) -> u32 {
@@ -30,34 +34,42 @@ fn encoded(c: vec3f) -> u32 {
     return m.r | (m.g << 9u) | (m.b << 18u) | (u32(e) << 27u);
 }
 
-// A Gaussian of the distance sqrt(t^2 + r^2) is exp(-t^2 / 2v) G(v, r) [dEonLuebke2007]; variance that the sources' light
-// already has is not added again. The share that the blur along the surface carries is subtracted.
-fn passed(depth: f32, aside: f32, along: f32, area: f32) -> vec3f {
-    let edge2 = max(weighing.radius_mm * weighing.radius_mm - depth * depth, 0.0);
+// The square of the distance along the surface to a place in the map [mm^2].
+fn along2_of(offset: u32, metric: vec3f, area: f32) -> f32 {
+    let by = vec2f(f32(bitcast<i32>(offset << 16u) >> 16u), f32(bitcast<i32>(offset) >> 16u));
+    let square = dot(metric, vec3f(by * by, 2.0 * by.x * by.y)) / (FINE * FINE);
+    return select(square + area / 6.0, FAR_MM2, offset == NOWHERE || square >= weighing.radius_mm * weighing.radius_mm);
+}
+
+// A Gaussian of the distance sqrt(t^2 + r^2) is exp(-t^2 / 2v) G(v, r) [dEonLuebke2007]; what is already in the sources'
+// light need not be added. The blur along the surface has brought its own share: that is taken off.
+fn passed(depth2: f32, aside2: f32, along2: f32, area: f32) -> vec3f {
+    let edge2 = max(weighing.radius_mm * weighing.radius_mm - depth2, 0.0);
     var sum = vec3f(0.0);
-    for (var k = 0u; k < weighing.count; k++) {
+    for (var k = 0u; k < COUNT; k++) {
         let gaussian = weighing.gaussian[k];
         let w = max(gaussian.w - weighing.before_mm2, weighing.grain * max(area, weighing.cell_mm2));
         let disc = max(1.0 - exp(-0.5 * edge2 / w), LEAST_DISC);
-        let straight = exp(-0.5 * (depth * depth / gaussian.w + aside * aside / w)) / disc;
-        sum += gaussian.rgb * max(0.0, straight - exp(-0.5 * along * along / w)) / w;
+        let straight = exp(-0.5 * (depth2 / gaussian.w + aside2 / w)) / disc;
+        sum += gaussian.rgb * max(0.0, straight - exp(-0.5 * along2 / w)) / w;
     }
     return area / (2.0 * PI) * sum;
 }
 
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let index = id.y * ROW + id.x;
-    if (id.x >= ROW || index >= arrayLength(&weights)) {
+    if (index >= arrayLength(&weights)) {
         return;
     }
-    let source = pairs[3u * index];
-    let across = unpack2x16unorm(pairs[3u * index + 1u]) * weighing.radius_mm;
-    let rest = unpack2x16unorm(pairs[3u * index + 2u]);
-    var along = weighing.radius_mm * rest.x;
-    if (rest.x == 1.0) {
-        along = FAR_MM; // no blur gets there
-    }
-    let share = rest.y * passed(across.x, across.y, along, bitcast<f32>(sources[source].y));
-    weights[index] = vec2u(source, encoded(share));
+    let number = pairs[3u * index];
+    let receiver = receiver_points[pairs[3u * index + 1u]];
+    let source = source_points[number];
+    let lie = lie_of(receiver.position, receiver.normal, source);
+    let near = lie.square < weighing.radius_mm * weighing.radius_mm;
+    let share = select(0.0, share_of(lie.cosine, lie.inward), near);
+    let depth2 = lie.depth * lie.depth;
+    let along2 = along2_of(pairs[3u * index + 2u], receiver.metric, source.area);
+    let light = passed(depth2, max(lie.square - depth2, 0.0), along2, source.area);
+    weights[index] = vec2u(number, encoded(share * light));
 }

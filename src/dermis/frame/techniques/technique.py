@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 from dermis.frame.atlas_textures import AtlasTextures
 from dermis.frame.inputs import Inputs, Split
 from dermis.frame.levels import FLOATS, MOST_HALVINGS, Blur, Levels, halvings_of, make_levels, usual_texel
-from dermis.frame.passes import blend, combine, irradiance, stretch, surface_texels, translucency
+from dermis.frame.passes import (
+    blend,
+    combine,
+    irradiance,
+    stretch,
+    surface_texels,
+    translucency,
+    translucency_weights,
+)
 from dermis.gpu import Constants, Device, Graph, Memo
 from dermis.gpu.textures import FORMAT_BYTES
 from dermis.optics.gaussians import GaussianSum
@@ -134,6 +142,8 @@ class AtlasTechnique(Technique):
             graph.repeat(stretch.draw, layout.head, layout.atlas)
             surface_texels.draw(graph, layout)
             irradiance.draw(graph, layout, inputs.light_constants, *into)
+            if layout.translucency:
+                graph.repeat(translucency_weights.draw, layout.translucency)
             graph.repeat(self.spread, levels, layout.atlas, blur, layout.translucency, layout.scattered)
         if len(layouts) > 1:
             blend.draw(graph, layouts[0], layouts[1], resources.scattered)

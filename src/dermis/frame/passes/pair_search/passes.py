@@ -1,0 +1,66 @@
+"""Takes the passes of a search for translucent pairs, and reads what they count."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.atlas.translucency.cells import BESIDE, TILE, Cells
+from dermis.frame.passes import each, program
+from dermis.gpu import Constants, Device, Frame
+
+Words = NDArray[np.uint32]
+Index = NDArray[np.int64]
+_MOST_BLOCKS = 40  # along a side
+
+
+class SearchPasses:
+    """Passes that run at once, for what they count decides the next ones.
+
+    frame : that they are recorded in
+    blocks : of tiles, along a side of the atlas
+    """
+
+    def __init__(self, device: Device, cells: Cells) -> None:
+        block = -(-cells.tiles // _MOST_BLOCKS)
+        self.device, self.frame = device, Frame(device, timed=False)
+        self.blocks = -(-cells.tiles // block)
+        self._told = {
+            "radius_mm": cells.radius_mm,
+            "variance_mm2": cells.widest_mm**2,
+            "tile": TILE / cells.side,
+            "beside": BESIDE / cells.size,
+            "tiles": cells.tiles,
+            "blocks": self.blocks,
+            "block": block,
+        }
+
+    def add(self, name: str, count: int, bound: dict[str, Any], constants: Constants = ()) -> None:
+        """A pass of a number of invocations; its shader is told of the search."""
+        shader = program(self.device, f"pair_search/{name}.wgsl", constants)
+        record = shader.record("Search", **self._told, count=count)
+        self.frame.dispatch("pair search", shader, {**bound, "search": record}, each(count))
+
+    def read(self, buffer: Any, count: int) -> Index:
+        """The first words that the passes so far leave there."""
+        self.frame.submit()
+        self.frame = Frame(self.device, timed=False)
+        words = np.frombuffer(self.device.handle.queue.read_buffer(buffer), np.uint32)
+        return words[:count].astype(np.int64)
+
+    def upload(self, *columns: NDArray[np.integer]) -> Any:
+        """Buffer of a table of words, with zeros where there are no rows."""
+        return upload_words(self.device, *columns)
+
+
+def upload_words(device: Device, *columns: NDArray[np.integer]) -> Any:
+    """Buffer of a table of words, given by its columns; one row of zeros where there are none."""
+    table = np.stack(columns, axis=-1).astype(np.uint32)
+    return device.buffer(table if len(table) else np.zeros((1, len(columns)), np.uint32), "STORAGE")
+
+
+def starts(counts: Index) -> Index:
+    """(n + 1,) where each of some lists begins in all of them, and where the last one ends."""
+    return np.concatenate([[0], np.cumsum(counts)])
