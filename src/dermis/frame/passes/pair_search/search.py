@@ -1,4 +1,4 @@
-"""Translucent pairs of a surface, found on the device: facing tiles, then cells in them, then their places."""
+"""Translucent pairs of a surface, found on the device: facing tiles, cells in them, places in the map."""
 
 from __future__ import annotations
 
