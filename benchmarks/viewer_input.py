@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from viewer_clock import Clock
 
+from dermis.benchmark.rigged import pose_at, rigged
 from dermis.scene.heads import load_head
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
@@ -23,6 +24,7 @@ from dermis.viewer.viewer import Viewer
 Change = Callable[[ViewerState, int], ViewerState]
 _SETTLING = 2  # frames before any is counted
 PIGMENTED = "light"  # a profile that sliders of pigments move
+_TARGETS = 52
 STEP = 0.02  # of turns [rad]
 _REST_S = 30.0  # at most, which some tenths of a second are enough for
 FEWEST = 3  # that a median is made of, however little time is left
@@ -141,6 +143,11 @@ def _unmapped(state: ViewerState) -> ViewerState:
     return replace(state, scene=replace(state.scene, head=head))
 
 
+def _with_targets(state: ViewerState) -> ViewerState:
+    """With as many morph targets as faces have, and bones."""
+    return replace(state, scene=replace(state.scene, head=rigged(state.scene.head, _TARGETS)))
+
+
 def _to_and_fro(k: int) -> float:
     return 0.5 + 0.5 * math.sin(0.2 * k)
 
@@ -157,6 +164,7 @@ MOTIONS: dict[str, Motion] = {
         lambda state: state.with_skin(profile=PIGMENTED).with_pigments(melanin=0.05),
         lambda state, k: state.with_pigments(melanin=0.05 + 0.01 * _to_and_fro(k)),
     ),
+    "expression": Motion(_with_targets, lambda state, k: state.with_pose(pose_at(state.scene.head, k))),
     "exposure": Motion(_same, lambda state, k: state.with_settings(exposure=1.0 + 0.2 * _to_and_fro(k))),
 }
 

@@ -17,7 +17,7 @@ from dermis import disk
 from dermis.atlas import cached
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.cached import cached_atlas
-from dermis.disk import cached_array, cached_mips
+from dermis.disk import cached_array
 from dermis.mesh.cached import Rigged, cached_rigged
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import plane, uv_sphere
@@ -230,10 +230,9 @@ def test_what_a_killed_process_left_goes_after_a_day(folder: Path) -> None:
     assert not old.exists() and new.exists()
 
 
-def test_mips_and_arrays_come_back_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_arrays_come_back_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
     source = np.random.default_rng(1).random((6, 9)).astype(np.float32)
-    chain = [source, source[:3, :4], source[:1, :2], source[:1, :1]]
     made: list[str] = []
 
     def note(what: str, result: Any) -> Any:
@@ -241,13 +240,11 @@ def test_mips_and_arrays_come_back_from_disk(tmp_path: Path, monkeypatch: pytest
         return result
 
     for _ in range(2):
-        levels = cached_mips(source, "a", lambda: note("mips", chain))
-        assert all(np.array_equal(one, other) for one, other in zip(levels, chain, strict=True))
         assert np.array_equal(cached_array(source, "a", lambda: note("picture", 2 * source)), 2 * source)
-    assert made == ["mips", "picture"]
+    assert made == ["picture"]
     for other, form in ((source, "b"), (source + 1, "a"), (source.reshape(9, 6), "a")):
         assert np.array_equal(cached_array(other, form, lambda: note("again", source)), source)
-    assert made[2:] == ["again"] * 3
+    assert made[1:] == ["again"] * 3
 
 
 def test_the_order_of_sources_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -89,6 +89,12 @@ SLAB_THROUGH = 0.003
 OCCLUSION = 0.04
 """Open share of the sky by 128 directions against closed forms: one direction stands for up to 0.03 of it."""
 
+FOLLOWED = 0.03
+"""Open share that follows a shape against one baked anew, root mean square: by 64 directions at vertices."""
+
+STILL = 1e-3
+"""What the open share of a head that does not change may change by: its points move within their texels."""
+
 SEAM = 0.01
 """Jump of the scattered light across a seam, of the light there."""
 

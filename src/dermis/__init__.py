@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from dermis.frame.renderer import Renderer, render
     from dermis.human.regions.apply import with_regions
     from dermis.images.io import write_image
+    from dermis.images.movie import MovieWriter
     from dermis.mesh.head import Head
     from dermis.optics.profiles import load_profile
     from dermis.optics.tissue import Tissue, load_tissue
@@ -44,6 +45,7 @@ _HOME = {
     "with_regions": "human.regions.apply",
     "DermisError": "errors",
     "write_image": "images.io",
+    "MovieWriter": "images.movie",
     "load_profile": "optics.profiles",
     "Tissue": "optics.tissue",
     "load_tissue": "optics.tissue",
@@ -78,6 +80,7 @@ __all__ = [
     "DirectionalLight",
     "Environment",
     "Head",
+    "MovieWriter",
     "PointLight",
     "Pose",
     "RectangleLight",

@@ -41,21 +41,6 @@ def cache_folder() -> Path:
     return Path(os.environ.get("DERMIS_CACHE") or platformdirs.user_cache_dir("dermis"))
 
 
-def cached_mips(source: Array, form: str, make: Callable[[], list[Array]]) -> list[Array]:
-    """The mip levels that `make` returns for a picture, kept on disk in the same way.
-
-    source : all that they are made of
-    form : how
-    """
-    names = [f"level {k}" for k in range(max(source.shape[:2]).bit_length())]
-
-    def levels() -> Arrays:
-        return dict(zip(names, make(), strict=True))
-
-    made = stored("mips", _array_key([source], form), names, levels)
-    return [made[name] for name in names]
-
-
 def cached_array(sources: Array | Sequence[Array], form: str, make: Callable[[], Array]) -> Array:
     """The array that `make` returns for one or more others, kept on disk in the same way.
 

@@ -91,7 +91,7 @@ def test_help_of_the_whole_names_each_command(run: Run) -> None:
         assert len(line.split()) > 5  # with a sentence of what it does
 
 
-@pytest.mark.parametrize("command", ["render", "compare", "doctor", "cite"])
+@pytest.mark.parametrize("command", ["render", "animate", "compare", "doctor", "cite"])
 def test_help_of_each_command_shows_examples(run: Run, command: str) -> None:
     ended = run(command, "--help")
     assert (ended.code, ended.stderr) == (0, "")

@@ -13,6 +13,7 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+from rigged_head import write_rigged_head, write_take
 
 from dermis.scene import Scene
 from dermis.viewer.state import ViewerState
@@ -32,6 +33,8 @@ Run = Callable[..., Any]
         (("--samples", "0"), "--samples"),
         (("--lights", "none"), "--lights"),
         (("--camera", "nowhere"), "nowhere"),
+        (("--motion", "nowhere.csv"), "nowhere.csv"),
+        (("--motion-fps", "25"), "--motion-fps"),
     ],
 )
 def test_what_cannot_be_is_refused(run: Run, folder: Path, words: tuple[str, ...], culprit: str) -> None:
@@ -113,7 +116,7 @@ def test_one_ctrl_c_ends_the_page(folder: Path) -> None:
 
 def test_the_options_make_the_state(run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[Any] = []
-    monkeypatch.setattr("dermis.viewer.windows.show_window", lambda *given: seen.append(given))
+    monkeypatch.setattr("dermis.viewer.windows.show_window", lambda *given, **_: seen.append(given))
     words = ("--lights", "window", "--camera", "ear", "--samples", "2", "--size", "300x200")
     assert run("view", "head.obj", *words, "--adapter", "cpu").code == 0
     state, adapter, size = seen[0]
@@ -121,6 +124,31 @@ def test_the_options_make_the_state(run: Run, folder: Path, monkeypatch: pytest.
     assert (state.settings.atlas, state.settings.samples) == (1024, 2)  # less on a software adapter
     assert state.head == {"name": str(folder / "head.obj")}
     assert state.scene.camera.frame_mm == 120.0
+
+
+def test_a_scene_keeps_its_pose_and_a_motion_comes_with_it(
+    run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, seen = write_rigged_head(folder / "rigged.glb"), list[Any]()
+    (folder / "posed.toml").write_text(
+        f"[head]\nname = {str(file)!r}\n[pose.weights]\njawOpen = 0.5\n[pose.bones]\nneck = [0, 20, 0]\n"
+    )
+    monkeypatch.setattr(
+        "dermis.viewer.windows.show_window", lambda *given, **more: seen.append((given, more))
+    )
+    take = write_take(folder / "take.csv", 0.0, 0.5, 1.0)
+    words = ("--motion", take.name, "--motion-fps", "10", "--adapter", "cpu")
+    ended = run("view", "posed.toml", *words)
+    assert ended.code == 0
+    (state, _, _), more = seen[0]
+    assert dict(state.scene.pose.weights) == {"jawOpen": 0.5}
+    assert more["motion"].clip(state.scene.head).duration_s == pytest.approx(0.2)
+
+
+def test_a_motion_without_a_name_of_the_heads_is_refused(run: Run, folder: Path) -> None:
+    take = write_take(folder / "take.csv", 0.0, 0.5, 1.0)
+    ended = run("view", "head.obj", "--motion", take.name, "--adapter", "cpu")
+    assert ended.code == 2 and "JawOpen" in ended.stderr
 
 
 def test_a_notebook_displays_the_same_viewer(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,43 +7,26 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hinged import corner, open_beside
 from numpy.typing import NDArray
-from setups import front_camera, head_of, joined, run_frame, scene_of, settings_of
+from setups import front_camera, head_of, run_frame, scene_of, settings_of
 from tolerances import LIT, OCCLUSION
 from twins import surface
 
 from dermis.atlas.build import build_atlas
 from dermis.atlas.cached import cached_atlas
 from dermis.frame import surroundings
-from dermis.frame.passes.occlusion import bake_occlusion, fibonacci_sphere, whole_map
+from dermis.frame.passes.occlusion import bake_occlusion, whole_map
 from dermis.frame.renderer import Renderer
+from dermis.frame.sky import fibonacci_sphere
 from dermis.gpu import download
 from dermis.mesh.head import Head
-from dermis.mesh.mesh import Mesh
-from dermis.mesh.primitives import plane, uv_sphere
+from dermis.mesh.primitives import uv_sphere
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
 
 Floats = NDArray[np.float64]
 SIDE = 64
-
-
-def upright(mesh: Mesh, face: float) -> Mesh:
-    """A plane turned to stand along y, facing +x (1) or -x (-1)."""
-    turned = {
-        name: np.ascontiguousarray(getattr(mesh, name)[:, [2, 1, 0]] * [face, 1, -face], dtype=np.float32)
-        for name in ("positions", "normals")
-    }
-    return Mesh(**(vars(mesh) | turned))
-
-
-def corner() -> Head:
-    """A floor 200 x 200 at z = 0 and a wall 40 high that rises at x = -100, over all of its length."""
-    wall = upright(plane(200.0, 20), 1.0)
-    low = replace(wall, positions=(wall.positions * [1, 1, 0.2]).astype(np.float32))
-    return head_of(
-        joined((plane(200.0, 20), (0, 0, 0), (0, 0, 0.6)), (low, (-100, 0, 20), (0.65, 0.65, 0.3)))
-    )
 
 
 def baked(renderer: Renderer, head: Head, side: int = SIDE, **options: Any) -> NDArray[np.float32]:
@@ -76,7 +59,7 @@ def test_a_floor_beside_a_wall(renderer: Renderer) -> None:
     points, normals = surface(cached_atlas(head.mesh, SIDE), head)
     middle = (normals[..., 2] > 0.9) & (np.abs(points[..., 1]) < 20) & (points[..., 0] < 20)
     d = points[..., 0][middle] + 100.0
-    exact = 1.0 - 0.5 * (1.0 - d / np.sqrt(d**2 + 40.0**2))
+    exact = open_beside(d)
     near = (d > 5) & (d < 80)  # so that 200 mm is long
     assert near.sum() > 10
     assert np.abs(made[middle] - exact)[near].max() < OCCLUSION
@@ -118,8 +101,7 @@ def test_corners_are_darker_and_can_be_left_bright(renderer: Renderer) -> None:
     dark, bright = (seen(renderer, scene, occlusion=which) for which in ("baked", "none"))
     assert np.allclose(bright[20:44, 10:60], bright[32, 32], rtol=0.01)
     x = (np.arange(64) + 0.5 - 32) / 64 * 180.0
-    d = x + 100.0
-    open_ = 1.0 - 0.5 * (1.0 - d / np.sqrt(d**2 + 40.0**2))
+    open_ = open_beside(x + 100.0)
     # light between the walls makes the shade brighter than the open share alone [Jimenez2016]
     a, b, c = 2.0404 * 0.8 - 0.3324, -4.7951 * 0.8 + 0.6417, 2.7552 * 0.8 + 0.6903
     exact = ((open_ * a + b) * open_ + c) * open_

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dermis.errors import DermisError
-from dermis.images.filters import derivatives, mip_chain, without_steps
+from dermis.images.filters import mip_chain, without_steps
 from dermis.images.io import read_image, write_exr, write_png
 from dermis.mesh import maps
 from dermis.mesh.maps import Maps, load_maps
@@ -82,7 +82,7 @@ def test_a_large_file_is_decoded_once(tmp_path: Path, monkeypatch: pytest.Monkey
         {"normal": up, "normal_y": "down", "region": tmp_path / "h.png"},
     ]
     first, second = ([load_maps(**one) for one in given] for _ in range(2))
-    assert decoded == ["c.png", "n.png", "h.png", "h.png", "h.png", "n.png", "h.png"]
+    assert sorted(decoded) == ["c.png", *4 * ["h.png"], *2 * ["n.png"]]
     for one, other in zip(first, second, strict=True):
         for a, b in zip(vars(one).values(), vars(other).values(), strict=True):
             assert (a is None and b is None) or (a.dtype == b.dtype and np.array_equal(a, b))
@@ -201,7 +201,7 @@ def test_head_scan_normals_lean_as_its_heights_do() -> None:
     maps = load_maps(normal=files["normal"], height=files["height"], height_mm=height_mm)
     assert maps.height is not None
     assert maps.normal is not None
-    dx, dy = derivatives(mip_chain(maps.height)[2])
+    dy, dx = np.gradient(mip_chain(maps.height)[2])
     assert np.corrcoef(maps.normal[..., 0].ravel(), dx.ravel())[0, 1] > 0.2
     # Rows go down, slopes go up.
     assert np.corrcoef(maps.normal[..., 1].ravel(), -dy.ravel())[0, 1] > 0.2

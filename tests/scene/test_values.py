@@ -67,3 +67,10 @@ def test_edges_of_the_ranges_are_allowed() -> None:
 def test_scene_data_are_frozen() -> None:
     with pytest.raises(ValueError, match="frozen"):
         Skin().mix = 0.1  # type: ignore[misc]
+
+
+def test_equal_values_are_those_that_say_the_same() -> None:
+    assert Skin(mix=0.3) == Skin(mix=0.3) and hash(Skin(mix=0.3)) == hash(Skin(mix=0.3))
+    assert Skin(mix=0.3) != Skin(mix=0.4)
+    assert PointLight(position=(0, 0, 9)) != SpotLight(position=(0, 0, 9))
+    assert Skin() != "skin"

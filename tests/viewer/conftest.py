@@ -7,11 +7,13 @@ from pathlib import Path
 
 import pytest
 from offscreen_input import ADAPTER, SETTINGS, InputDriver
+from rigged_head import write_rigged_head
 from small_head import write_head
 
 from dermis.mesh.head import Head
 from dermis.scene.heads import load_head
 from dermis.scene.model import Scene
+from dermis.viewer.player import MotionFile
 from dermis.viewer.state import ViewerState
 
 
@@ -30,19 +32,35 @@ def state(head: Head, head_file: Path) -> ViewerState:
     return ViewerState(Scene(head), SETTINGS, {"name": str(head_file)})
 
 
+@pytest.fixture(scope="session")
+def rigged_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_rigged_head(tmp_path_factory.mktemp("viewer") / "rigged.glb")
+
+
+@pytest.fixture(scope="session")
+def rigged_head(rigged_file: Path) -> Head:
+    return load_head(rigged_file)
+
+
+@pytest.fixture
+def rigged(rigged_head: Head, rigged_file: Path) -> ViewerState:
+    """A head with expressions and bones."""
+    return ViewerState(Scene(rigged_head), SETTINGS, {"name": str(rigged_file)})
+
+
 @pytest.fixture(scope="module")
-def make_driver(head: Head, head_file: Path) -> Callable[[], InputDriver]:
-    """A viewer of 400 x 480 pixels."""
+def make_driver(head: Head, head_file: Path) -> Callable[..., InputDriver]:
+    """A viewer of 400 x 480 pixels, of the small head or of another state."""
     pytest.importorskip("imgui_bundle", reason="the extra `viewer` is not installed")
     from rendercanvas.offscreen import OffscreenRenderCanvas
 
     from dermis.viewer.viewer import Viewer
 
-    def make() -> InputDriver:
+    def make(state: ViewerState | None = None, motion: MotionFile | None = None) -> InputDriver:
         canvas = OffscreenRenderCanvas(size=(400, 480))
-        first = ViewerState(Scene(head), SETTINGS, {"name": str(head_file)})
+        first = state or ViewerState(Scene(head), SETTINGS, {"name": str(head_file)})
         driver = InputDriver(None, canvas)
-        driver.viewer = Viewer(first, canvas, ADAPTER, clock=lambda: driver.now)
+        driver.viewer = Viewer(first, canvas, ADAPTER, clock=lambda: driver.now, motion=motion)
         return driver
 
     return make

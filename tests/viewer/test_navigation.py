@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from dermis.mesh.head import Head
-from dermis.scene import Camera, Environment
+from dermis.mesh.turns import angles_matrix
+from dermis.scene import Camera, Environment, Scene
 from dermis.scene.camera import PRESETS, preset
 from dermis.scene.lights import DirectionalLight, SpotLight
+from dermis.scene.pose import Pose
 from dermis.viewer.navigation import (
     Easing,
     axes,
@@ -77,11 +79,11 @@ def test_focus_keeps_direction_and_distance() -> None:
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_presets_look_at_the_head(name: str, head: Head) -> None:
-    assert pick(head, preset(name, head), 0.0, 0.0, 1.0) is not None
+    assert pick(Scene(head), preset(name, head), 0.0, 0.0, 1.0) is not None
 
 
 def test_the_middle_of_the_picture_is_the_front_of_the_head(head: Head) -> None:
-    place = pick(head, CAMERA, 0.0, 0.0, 1.0)
+    place = pick(Scene(head), CAMERA, 0.0, 0.0, 1.0)
     p = head.mesh.positions - np.array(head.centre_mm)
     assert place is not None
     assert abs(place[0]) < 1e-6 and abs(place[1]) < 1e-6
@@ -90,7 +92,7 @@ def test_the_middle_of_the_picture_is_the_front_of_the_head(head: Head) -> None:
 
 def test_a_picked_place_is_where_its_pixel_looks(head: Head) -> None:
     x, y, aspect = 0.2, -0.3, 1.5
-    place = pick(head, CAMERA, x, y, aspect)
+    place = pick(Scene(head), CAMERA, x, y, aspect)
     assert place is not None
     right, up, forward = axes(CAMERA)
     ray = place - np.array(CAMERA.position)
@@ -99,8 +101,20 @@ def test_a_picked_place_is_where_its_pixel_looks(head: Head) -> None:
     assert ray @ up / (ray @ forward) == pytest.approx(y * half)
 
 
+def test_a_picked_place_follows_the_pose(rigged_head: Head) -> None:
+    """A camera that goes around the head with it sees the place that it saw."""
+    degrees = 40.0
+    turned = Scene(rigged_head, pose=Pose({"jawOpen": 0.8}, {"neck": (0.0, degrees, 0.0)}))
+    open_jaw = pick(Scene(rigged_head, pose={"jawOpen": 0.8}), CAMERA, 0.1, -0.3, 1.0)
+    at_rest = pick(Scene(rigged_head), CAMERA, 0.1, -0.3, 1.0)
+    found = pick(turned, orbit(CAMERA, math.radians(degrees), 0.0), 0.1, -0.3, 1.0)
+    assert open_jaw is not None and at_rest is not None and found is not None
+    assert abs(open_jaw - at_rest).max() > 1.0
+    assert np.allclose(found, np.array(angles_matrix((0.0, degrees, 0.0))) @ open_jaw, atol=0.01)
+
+
 def test_beside_the_head_there_is_nothing(head: Head) -> None:
-    assert pick(head, CAMERA, 0.99, 0.99, 1.0) is None
+    assert pick(Scene(head), CAMERA, 0.99, 0.99, 1.0) is None
 
 
 def test_easing_is_alike_at_every_frame_rate() -> None:

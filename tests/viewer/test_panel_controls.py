@@ -14,12 +14,14 @@ from pydantic import Field
 
 from dermis.scene.environment import Environment
 from dermis.scene.plain import Plain, help_of, slider
+from dermis.scene.pose import Pose
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments, Skin, TissueLayer
 from dermis.viewer.panel.sections import SECTIONS
 from dermis.viewer.state import ViewerState, same
 
 BUTTONS = {"undo", "redo", "help", "hide", "save", "load", "screenshot", "reset", "freeze"}
+BUTTONS |= {"open", "search", "bones"}
 CAMERAS = {f"{name}##camera" for name in ("portrait", "three-quarter", "profile", "ear", "cheek")}
 NO_STATE = BUTTONS | CAMERAS | {section.title for section in SECTIONS} | {"regions"}
 STARTS: dict[str, Callable[[ViewerState], ViewerState]] = {
@@ -36,6 +38,7 @@ EXPECTED = {
     "pigments": "layers, melanin, eumelanin, thickness, blood##epidermis, blood, oxygen",
     "layers": "thickness##1, absorption##1, scattering##1, add above##1, remove##1, seam colour",
     "window": "width, height",
+    "faces": "rest, jawOpen##target, mouthSmileLeft##target, browInnerUp##target, neck##bone, head##bone",
 }
 
 
@@ -49,7 +52,7 @@ def tall(make_driver: Callable[[], InputDriver]) -> InputDriver:
     studio.pictures = lambda *_: (image, None)
     driver.canvas.set_logical_size(400, 1500)
     for section in SECTIONS:
-        if not section.is_open and section.title != "Timing":
+        if section.applies(driver.viewer.session) and not section.is_open and section.title != "Timing":
             driver.press(section.title)
     return driver
 
@@ -82,14 +85,19 @@ def move(driver: InputDriver, label: str) -> None:
         del session.positions[key]
 
 
-@pytest.mark.parametrize("start", STARTS)
-def test_every_control_is_a_step_that_undo_takes_back(start: str, tall: InputDriver) -> None:
+@pytest.mark.parametrize("start", [*STARTS, "faces"])
+def test_every_control_is_a_step_that_undo_takes_back(
+    start: str, tall: InputDriver, rigged: ViewerState
+) -> None:
     session = tall.viewer.session
-    session.change(STARTS[start](session.history.states[0]))
+    smiling = rigged.with_pose(Pose({"mouthSmileLeft": 0.5}, {"neck": (10.0, 0.0, 5.0)}))
+    session.change(smiling if start == "faces" else STARTS[start](session.history.states[0]))
     session.controls.light = 0
     tall.frame()
     if start == "layers":
         tall.press("layer 1")
+    if start == "faces":
+        tall.press("bones")
     session.positions.clear()
     tall.frame()
     labels = [

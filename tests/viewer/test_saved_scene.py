@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from offscreen_input import ADAPTER
 from PIL import Image
+from rigged_head import write_rigged_head
 
 from dermis.cli import main
 from dermis.human.bust.regions import REGIONS
 from dermis.images.io import read_image
-from dermis.scene import Environment
+from dermis.scene import Environment, Scene
+from dermis.scene.heads import load_head
+from dermis.scene.pose import Pose
 from dermis.scene.skin import TissueLayer
 from dermis.viewer.navigation import orbit
 from dermis.viewer.session import apply_regions
@@ -61,6 +65,12 @@ def with_settings(state: ViewerState, folder: Path) -> ViewerState:
     return state.with_settings(technique="one-blur", transmission="none", **chosen, **encoded)
 
 
+def with_expression(state: ViewerState, folder: Path) -> ViewerState:
+    file = write_rigged_head(folder / "rigged.glb")
+    posed = Scene(load_head(file), pose=Pose({"jawOpen": 0.7}, {"neck": (0.0, 25.0, 5.0)}))
+    return replace(state, scene=posed, head={"name": str(file)})
+
+
 STATES: dict[str, Change] = {
     "surface": with_surface,
     "light": with_light,
@@ -71,6 +81,7 @@ STATES: dict[str, Change] = {
         structure="donner2008", epidermal_blood=0.02, melanin=0.03
     ),
     "part": lambda state, _: state.in_view("specular"),
+    "pose": with_expression,
 }
 
 

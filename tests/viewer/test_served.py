@@ -7,6 +7,7 @@ import json
 import threading
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from offscreen_input import ADAPTER, SETTINGS
 
 from dermis.mesh.head import Head
 from dermis.scene.model import Scene
+from dermis.viewer.player import MotionFile
 from dermis.viewer.state import ViewerState
 
 pytest.importorskip("imgui_bundle", reason="the extra `viewer` is not installed")
@@ -213,6 +215,30 @@ def test_who_watches_takes_over_with_a_size_of_its_own(viewer: Any) -> None:
         watcher.wait(lambda: watcher.active, confirming=True)
         watcher.show((320, 200))
         assert watcher.still().shape == (200, 320, 3)
+
+
+def test_a_motion_plays_in_the_page_until_a_key_pauses_it(
+    viewer: Any, rigged: ViewerState, rigged_file: Path
+) -> None:
+    session = viewer.session
+    with visit(viewer) as socket:
+        page = Page(socket)
+        page.show()
+        page.still()
+        session.change(rigged)
+        session.player.open(MotionFile(rigged_file))
+        session.player.stop()
+        page.drag(300, 299)
+        before = page.still()
+        page.frames.clear()
+        page.tell("key_down", key=" ", modifiers=[])
+        page.wait(lambda: session.player.seconds > 0.2, 0.005, confirming=True)
+        assert {kind for _, kind, _ in page.frames} == {"image/jpeg"}
+        page.tell("key_down", key=" ", modifiers=[])
+        after = page.still()
+        assert not session.player.is_playing and difference(before, after) > 0.2
+        while session.history.can_undo:
+            session.history.undo()
 
 
 def test_a_lost_device_is_told_in_the_page_and_the_head_turns_on(viewer: Any) -> None:

@@ -12,6 +12,7 @@ from offscreen_input import ADAPTER
 
 from dermis.gpu.recording import Recording
 from dermis.scene.environment import Environment
+from dermis.scene.pose import Pose
 from dermis.viewer.navigation import orbit
 from dermis.viewer.pace import QUALITY_LEVELS
 from dermis.viewer.state import ViewerState
@@ -85,6 +86,36 @@ def test_a_change_runs_only_what_depends_on_it(name: str, studio: Studio, state:
     change, expected = CHANGES[name]
     stages(studio, state)
     assert stages(studio, change(state)) == expected
+
+
+SHAPE = {"shape", "stretch", "surface", "shadows", "irradiance", "visibility"} | SPREAD | PICTURE
+
+
+def jaw_open(state: ViewerState, weight: float) -> ViewerState:
+    return state.with_pose(Pose({"jawOpen": weight}, {"neck": (0.0, 10.0, 0.0)}))
+
+
+def test_a_pose_runs_what_depends_on_the_shape(studio: Studio, rigged: ViewerState) -> None:
+    stages(studio, jaw_open(rigged, 0.1))
+    assert stages(studio, jaw_open(rigged, 0.2)) == SHAPE
+    assert stages(studio, jaw_open(rigged, 0.2)) == set()
+    assert stages(studio, turned(jaw_open(rigged, 0.2))) == {"visibility"} | PICTURE
+    assert stages(studio, turned(rigged)) == SHAPE
+
+
+def test_a_pose_loads_nothing(studio: Studio, rigged: ViewerState, made: list[str]) -> None:
+    for weight in (0.1, 0.2):
+        stages(studio, jaw_open(rigged, weight), moving=True)
+    made.clear()
+    stages(studio, jaw_open(rigged, 0.3), moving=True)
+    assert [one for one in made if one != "create_buffer_with_data"] == []
+    assert len(made) <= 1
+
+
+def test_the_atlas_view_follows_the_pose(studio: Studio, rigged: ViewerState) -> None:
+    flat = jaw_open(rigged, 0.2).in_view("atlas")
+    stages(studio, flat)
+    assert stages(studio, flat.with_pose(Pose({"jawOpen": 0.9}))) >= {"shape", "irradiance"}
 
 
 def test_light_all_around_is_told_the_profile_and_lights_anew(studio: Studio, state: ViewerState) -> None:

@@ -12,6 +12,7 @@ from dermis.mesh.uv import charts, usable
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
+_EDGE = 1e-6  # texels this near outside an edge count as on it
 _LEAST_TEXELS = 4.0  # a chart with less uv area than this holds nothing that could be blurred
 
 
@@ -22,42 +23,53 @@ def texel_corners(mesh: Mesh, size: int, triangle: NDArray[np.integer]) -> Float
 
 def rasterise(mesh: Mesh, size: int, triangle: NDArray[np.integer]) -> tuple[Index, Index]:
     """Texels whose centre lies in a triangle, as (flat texel index, triangle), by spans of rows."""
-    p = texel_corners(mesh, size, triangle)
-    top, bottom = _inside(p[:, :, 1].min(axis=1), p[:, :, 1].max(axis=1), size)
-    which, y = _expand(top, np.maximum(bottom - top + 1, 0))
-    left, right = _inside(*_span(p[which], y), size)
-    span, x = _expand(left, np.maximum(right - left + 1, 0))
-    return y[span] * size + x, triangle[which[span]].astype(np.int64)
+    texel, which = texels_in(texel_corners(mesh, size, triangle), (size, size))
+    return texel, triangle[which].astype(np.int64)
 
 
-def _inside(low: Floats, high: Floats, size: int) -> tuple[Index, Index]:
+def texels_in(p: Floats, shape: tuple[int, int], margin: float = -_EDGE) -> tuple[Index, Index]:
+    """Texels of a grid (h, w) whose centre lies in a triangle: flat index, and which triangle (t,).
+
+    p : (t, 3, 2) corners [texel], whole numbers at texel centres
+    margin : how far inside its edges along rows and columns they have to be [texel]
+    """
+    height, width = shape
+    low, high = (least(least(p[:, 0, 1], p[:, 1, 1]), p[:, 2, 1]) for least in (np.minimum, np.maximum))
+    top, bottom = _inside(low, high, height, margin)
+    which, y = expand(top, np.maximum(bottom - top + 1, 0))
+    left, right = _inside(*_span(p, which, y), width, margin)
+    span, x = expand(left, np.maximum(right - left + 1, 0))
+    return y[span] * width + x, which[span]
+
+
+def _inside(low: Floats, high: Floats, size: int, margin: float) -> tuple[Index, Index]:
     """First and last whole number between two bounds, within 0 .. size - 1."""
-    first = np.clip(np.ceil(low - 1e-6), 0, size).astype(np.int64)
-    return first, np.clip(np.floor(high + 1e-6), -1, size - 1).astype(np.int64)
+    first = np.clip(np.ceil(low + margin), 0, size).astype(np.int64)
+    return first, np.clip(np.floor(high - margin), -1, size - 1).astype(np.int64)
 
 
-def _expand(first: Index, count: Index) -> tuple[Index, Index]:
+def expand(first: Index, count: Index) -> tuple[Index, Index]:
     """Each run first, first + 1, ... of `count` numbers, with the index of the run it belongs to."""
     which = np.repeat(np.arange(len(count)), count)
     start = np.repeat(np.cumsum(count) - count, count)
     return which, np.arange(len(which)) - start + first[which]
 
 
-def _span(p: Floats, y: Index) -> tuple[Floats, Floats]:
-    """Where row y enters and leaves each triangle."""
+def _span(p: Floats, which: Index, y: Index) -> tuple[Floats, Floats]:
+    """Where each row y enters and leaves its triangle."""
     lowest = np.full(len(y), -np.inf)
     highest = np.full(len(y), np.inf)
-    area = cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    sign = np.where(area >= 0, 1.0, -1.0)
+    sign = np.where(cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) >= 0, 1.0, -1.0)[:, None]
+    edge = np.roll(p, -1, axis=1) - p
+    # inside: cross(edge, q - a) * sign >= 0, linear in q.x with slope -edge.y * sign
+    slopes, across = -edge[..., 1] * sign, edge[..., 0] * sign
+    levels = edge[..., 1] * p[..., 0] * sign - across * p[..., 1]
     for k in range(3):
-        a, edge = p[:, k], p[:, (k + 1) % 3] - p[:, k]
-        # inside: cross(edge, q - a) * sign >= 0, linear in q.x with slope -edge.y * sign
-        slope = -edge[:, 1] * sign
-        level = (edge[:, 0] * (y - a[:, 1]) + edge[:, 1] * a[:, 0]) * sign
+        slope, level = slopes[which, k], levels[which, k] + across[which, k] * y
         crossing = -level / np.where(slope == 0, 1.0, slope)
-        lowest = np.where(slope > 0, np.maximum(lowest, crossing), lowest)
-        highest = np.where(slope < 0, np.minimum(highest, crossing), highest)
-        highest = np.where((slope == 0) & (level < 0), -np.inf, highest)
+        np.maximum(lowest, crossing, out=lowest, where=slope > 0)
+        np.minimum(highest, crossing, out=highest, where=slope < 0)
+        highest[(slope == 0) & (level < 0)] = -np.inf
     return np.where(np.isfinite(lowest), lowest, 1.0), np.where(np.isfinite(highest), highest, 0.0)
 
 

@@ -6,6 +6,7 @@ import sys
 
 COMMANDS = {
     "render": "Render a head to a PNG (sRGB) or EXR (linear float) image.",
+    "animate": "Draw a head that moves, as a movie or as numbered pictures.",
     "view": "Turn a head, its skin and its light in a window or a web page.",
     "profile": "Compute how light spreads below a skin, and fit Gaussians to it.",
     "head": "Make a head with its maps and write it as glTF.",

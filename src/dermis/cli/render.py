@@ -35,6 +35,8 @@ def render(
 
         dermis render head.obj --unit-mm 100 --colour skin.png --subdivide 1
 
+        dermis render face.glb --pose jawOpen=0.6,mouthSmileLeft=1 --bone head=0,25,0 -o smile.png
+
         dermis render scene.toml --size 1920x1080 --json
 
     Parameters

@@ -1,14 +1,15 @@
-"""The options of a scene, as `dermis render` and `dermis view` take them, and the scene they make."""
+"""The options of a scene, as `dermis render`, `animate` and `view` take them, and the scene they make."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from dermis.cli.options import check, option_name, options_of, refuse_options
+from dermis.cli.pose_options import Turns, Weights, laid_over, parse_turns, parse_weights, pose_given
 from dermis.errors import refuse
 from dermis.scene.environment import Environment
 from dermis.scene.head_table import HeadTable
@@ -53,6 +54,8 @@ class SceneOptions:
         Parameter(help="portrait, three-quarter, profile, ear, cheek, or a TOML file with [camera]."),
     ] = None
     head: HeadOptions = field(default_factory=dict)
+    pose: Weights = None
+    bone: Turns = None
 
 
 DEFAULTS = SceneOptions()
@@ -62,8 +65,11 @@ def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     """The scene and its settings: those of a head or of a scene's file, with the options given on top."""
     from dermis.scene import Scene, load_camera
 
+    weights, turns = parse_weights(given.pose or ()), parse_turns(given.bone or ())
     _check(name, given)
     scene, settings = _begin(name, given)
+    if weights or turns:
+        scene = replace(scene, pose=laid_over(pose_given(weights, turns, scene.head, name), scene.pose))
     environment = _environment(scene.environment, given.around)
     return Scene(
         scene.head,

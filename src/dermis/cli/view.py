@@ -13,6 +13,7 @@ from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble
 from dermis.errors import refuse
 
 if TYPE_CHECKING:
+    from dermis.viewer.player import MotionFile
     from dermis.viewer.state import ViewerState
 
 _HOST, _PORT, _WINDOW = "127.0.0.1", 8765, (1280, 800)
@@ -27,21 +28,26 @@ def view(
     port: Whole = None,
     host: str | None = None,
     token: Annotated[bool, Parameter(negative="")] = False,
+    motion: str | None = None,
+    motion_fps: float | None = None,
     scene: SceneOptions = DEFAULTS,
     adapter: Adapter = "auto",
 ) -> int:
     """Turn a head, its skin and its light in a window or in a web page.
 
     Drag to turn, right drag to pan, wheel to come nearer, double click to turn around a place, Shift and
-    drag to carry the light. Keys 1 to 5 are the camera presets, Tab hides the panel, ? shows all keys, Ctrl+Z
-    and Ctrl+Y undo and redo. The panel saves the scene as a TOML file that `dermis render` takes. The options
-    are those of `dermis render`; --size is the window's, 1280x800 when left out.
+    drag to carry the light. Keys 1 to 5 are the camera presets, Space plays and pauses a motion, Tab hides
+    the panel, ? shows all keys, Ctrl+Z and Ctrl+Y undo and redo. The panel saves the scene as a TOML file
+    that `dermis render` takes. The options are those of `dermis render`; --size is the window's, 1280x800
+    when left out.
 
     Examples
     --------
         dermis view lee_perry_smith --env royal_esplanade
 
         dermis view scene.toml --browser --port 8080
+
+        dermis view person.glb --motion take.csv
 
     Parameters
     ----------
@@ -55,6 +61,11 @@ def view(
         Address to listen at; others than this machine's own need the token in the printed URL [127.0.0.1].
     token:
         Ask for a token in the URL on this machine too: for one with other users, and behind a proxy.
+    motion:
+        Play a motion: a glTF file's clip (file.glb, or file.glb#clip), a CSV of Live Link Face, lines of JSON
+        of MediaPipe, or meshes of one topology (a folder, face_%05d.obj).
+    motion_fps:
+        Frames a second of the motion, where its file does not tell.
     """
     if not browser:
         for option, value in {"port": port, "host": host, "token": token or None}.items():
@@ -62,16 +73,19 @@ def view(
                 refuse(f"--{option}", "a web page with it", "there is none", "Add --browser")
     if port is not None and not 0 <= port < 1 << 16:
         refuse("--port", "a number from 0 to 65535", f"{port} came", "Choose another")
+    if motion_fps is not None and motion is None:
+        refuse("--motion-fps", "a motion with it", "there is none", "Add --motion")
     from dermis.viewer.windows import serve, show_window
 
     window = scene.settings.get("size", _WINDOW)
     with working_on("loading"):
         state = _state(head, scene, adapter)
+        played = _motion(motion, motion_fps, state)
     if browser:
         where = host or _HOST, _PORT if port is None else port
-        serve(state, adapter, window, *where, _announce, secret=token)
+        serve(state, adapter, window, *where, _announce, secret=token, motion=played)
     else:
-        show_window(state, adapter, window)
+        show_window(state, adapter, window, motion=played)
     return 0
 
 
@@ -88,6 +102,18 @@ def _state(name: str, given: SceneOptions, adapter: str) -> ViewerState:
     table = head_table(Path(name)) if is_scene else with_whole_names({"name": name} | given.head, Path())
     usual = "" if is_scene else "none" if "name" in given.around else "studio"
     return opened(scene, settings, table, usual if given.lights is None else given.lights)
+
+
+def _motion(file: str | None, fps: float | None, state: ViewerState) -> MotionFile | None:
+    """The motion for the head, read before a window opens."""
+    if file is None:
+        return None
+    from dermis.viewer.player import MotionFile
+
+    motion = MotionFile(file, fps)
+    if text := motion.clip(state.scene.head).note:
+        note(text)
+    return motion
 
 
 def _announce(url: str, exposed: bool) -> None:

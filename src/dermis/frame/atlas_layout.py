@@ -63,6 +63,18 @@ class Translucency:
 
 
 @dataclass(frozen=True, eq=False)
+class MovingOcclusion:
+    """What an occlusion map is made from that follows the head's shape.
+
+    resting : texture of the open sky as the head rests
+    corners : texture of the vertices between which each texel lies, as moving_occlusion_corners.wgsl fills it
+    """
+
+    resting: Any
+    corners: Any
+
+
+@dataclass(frozen=True, eq=False)
 class AtlasLayout:
     """An atlas of the head with the resources that light its texels.
 
@@ -71,6 +83,7 @@ class AtlasLayout:
     surfaces : texture of the surface at each texel, as surface_texels.wgsl packs it
     scattered : texture of the light that leaves below the surface
     translucency : light through thin parts, None without any
+    occlusion : what the map of occlusion follows the head's shape by, None where it does not
     """
 
     atlas: AtlasTextures
@@ -79,3 +92,4 @@ class AtlasLayout:
     surfaces: Any
     scattered: Any
     translucency: Translucency | None = None
+    occlusion: MovingOcclusion | None = None

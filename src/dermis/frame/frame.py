@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dermis.frame.inputs import Inputs
-from dermis.frame.passes import bloom, post, shade, shadows, shape, visibility_buffer
+from dermis.frame.passes import bloom, moving_occlusion, post, shade, shadows, shape, visibility_buffer
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Graph
 
@@ -14,6 +14,8 @@ def draw_frame(graph: Graph, inputs: Inputs, technique: Technique) -> None:
     shape.draw(graph, made.shape, inputs.motion)
     bounded = ("SHAPES", 1) in inputs.light_constants
     shadows.draw(graph, made.shadow_maps, inputs.shadow_views, made.head, bounded)
+    if made.sky and inputs.around:
+        moving_occlusion.draw(graph, made.sky, *inputs.around, inputs.layouts)
     below = technique.scatter(graph, inputs)
     visibility_buffer.draw(graph, made.visibility, inputs.camera, made.head)
     look, apart = (inputs.lit, inputs.view, inputs.constants), technique.apart(made.own)

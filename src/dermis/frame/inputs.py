@@ -14,6 +14,7 @@ from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.geometry import HeadResources
 from dermis.frame.levels import Blur, Levels
 from dermis.frame.passes.bloom import Glow
+from dermis.frame.passes.moving_occlusion import Sky
 from dermis.frame.passes.post import Picture
 from dermis.frame.passes.shadows import ShadowMaps
 from dermis.frame.passes.shape import Motion
@@ -31,6 +32,7 @@ from dermis.frame.projection import (
 )
 from dermis.frame.samples import pixel_samples
 from dermis.frame.shape import Shape
+from dermis.frame.sky import Look
 from dermis.gpu import ComputeProgram, Constants
 from dermis.mesh.head import Head
 from dermis.mesh.outline import Outline
@@ -54,6 +56,7 @@ class Resources:
     own : what the technique made for itself
     view, constants : record of the shading pass without the camera, and its pipeline constants
     suns : lights that the environment adds
+    sky : the open sky at the head's vertices, None where occlusion does not follow its shape
     gaussians : terms of the profile
     glow : space for the bloom, None without one
     unscattered : share of the skin's triangles that the atlas cannot hold
@@ -72,6 +75,7 @@ class Resources:
     view: Any
     constants: Constants
     suns: int
+    sky: Sky | None
     gaussians: int
     picture: Picture
     glow: Glow | None
@@ -88,6 +92,7 @@ class Inputs:
     light_constants : pipeline constants of what is lit
     camera : how the picture's samples see the head
     half : tangents of the half angles of view, across and up
+    around : how the sky sees the head, and the shader's record of it; None where occlusion does not move
     view, constants : record of the shading pass, and its pipeline constants
     """
 
@@ -100,6 +105,7 @@ class Inputs:
     light_constants: Constants
     camera: Views
     half: tuple[float, float]
+    around: tuple[Look, Any] | None
     view: Any
     constants: Constants
 
@@ -176,8 +182,8 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Sp
 def seen_by(view: Any, pinhole: Pinhole) -> Any:
     """A shading pass' record with the rays of a camera."""
     eye, (right, up, forward), half = pinhole
-    record = np.zeros((), view.dtype)  # a copy would hold anything between the members
-    record[...] = view
+    # Its bytes: numpy's own copy takes the members one by one, and has anything between them.
+    record: Any = np.ndarray((), view.dtype, bytearray(view.tobytes()))
     record["eye"], record["forward"] = eye, forward
     record["right"], record["up"] = tuple(half[0] * c for c in right), tuple(half[1] * c for c in up)
     return record

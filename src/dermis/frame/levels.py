@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -92,7 +93,7 @@ def scale_of(texel: str, brightest: float) -> float:
     """
     if texel == FLOATS or brightest == 0.0:
         return 1.0
-    return float(2.0 ** np.floor(np.log2(min(_BRIGHT / brightest, _MOST_SCALED))))
+    return math.ldexp(0.5, math.frexp(min(_BRIGHT / brightest, _MOST_SCALED))[1])
 
 
 def halvings_of(variance_mm2: NDArray[np.float64], texels_per_mm: float, most: int) -> tuple[int, ...]:
@@ -106,6 +107,7 @@ def halvings_of(variance_mm2: NDArray[np.float64], texels_per_mm: float, most: i
     """
     found = [0]
     for before in (0.0, *variance_mm2[:-1]):
-        smooth = texels_per_mm * np.sqrt(np.sqrt(before) / SHARP)
-        found.append(int(np.clip(np.log2(max(smooth, 1.0)), found[-1], min(most, found[-1] + 1))))
+        smooth = texels_per_mm * math.sqrt(math.sqrt(before) / SHARP)
+        finest, coarsest = found[-1], min(most, found[-1] + 1)
+        found.append(int(min(max(math.log2(max(smooth, 1.0)), finest), coarsest)))
     return tuple(found)

@@ -2,33 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.raster import rasterise
-from dermis.disk import cached_mips
+from dermis.frame.passes import map_mips
+from dermis.frame.surface import DEFAULT_COLOUR
 from dermis.gpu import Device, make_texture, upload
 from dermis.gpu.textures import texture_from
 from dermis.images.colour import encode_srgb
-from dermis.images.filters import derivatives, mip_chain
+from dermis.images.filters import mip_chain
 from dermis.mesh.geometry import triangle_areas
 from dermis.mesh.head import Head
-from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.uv import triangle_uv_area
 from dermis.specular.beckmann import beckmann_table
 
-DEFAULT_COLOUR = 0.8
-"""Albedo of heads without a colour map."""
-
 _MEAN_TEXELS = 512  # a side of the grid that a map's mean is taken on
-_NO_BAND = -1.0
-_FOUR = "rgba16float"
-_LARGE = 1 << 20  # numbers in a map whose mips are kept on disk
-_FORM = "1"  # increment when a map's mips change
 
 
 def upload_maps(device: Device, head: Head, use_colour: bool, decoded: bool = True) -> dict[str, Any]:
@@ -47,13 +39,11 @@ def upload_maps(device: Device, head: Head, use_colour: bool, decoded: bool = Tr
     colour = colour if decoded else encode_srgb(colour)
     return {
         "map_sampler": device.sampler(mag_filter="linear", min_filter="linear", mipmap_filter="linear"),
-        "colour_map": _mipped(
-            device, lambda: np.dstack([colour, np.ones(colour.shape[:2], np.float32)]), _FOUR, colour
-        ),
-        "slope_map": _mipped(device, lambda: _moments(maps.normal), _FOUR, maps.normal),
-        "relief_map": _mipped(device, lambda: _moments(_relief(maps)), _FOUR, maps.height),
-        "specular_map": _mipped(device, lambda: _factor(maps.specular, head.mesh), "r16float"),
-        "roughness_map": _mipped(device, lambda: _plain(maps.roughness), "r16float"),
+        "relief_map": map_mips.relief(device, maps.height),
+        "slope_map": map_mips.slopes(device, maps.normal),
+        "colour_map": map_mips.colours(device, colour),
+        "specular_map": _grey(device, _factor(maps.specular, head.mesh)),
+        "roughness_map": _grey(device, _plain(maps.roughness)),
         "beckmann_table": texture_from(device, beckmann_table(), "r32float"),
     }
 
@@ -76,44 +66,11 @@ def _factor(values: NDArray[np.float32] | None, mesh: Mesh) -> NDArray[np.float3
     return _plain(values / mean if mean > 0 else np.ones_like(values))
 
 
-def _relief(maps: Maps) -> NDArray[np.float32] | None:
-    if maps.height is None:
-        return None
-    return np.stack(derivatives(maps.height), axis=-1)
-
-
-def _moments(slopes: NDArray[np.float32] | None) -> NDArray[np.float32]:
-    """Slopes and their squares: a footprint's means give its normal and roughness [OlanoBaker2010]."""
-    if slopes is None:
-        return np.zeros((1, 1, 4), np.float32)
-    return np.concatenate([slopes, slopes**2], axis=-1)
-
-
-def relief_band(maps: Maps) -> float:
-    """Mip of a larger height map that matches the normal map: it adds only finer relief. -1: it adds all."""
-    if maps.normal is None or maps.height is None:
-        return _NO_BAND
-    finer = max(maps.height.shape[:2]) / max(maps.normal.shape[:2])
-    return float(np.log2(finer)) if finer > 1 else _NO_BAND
-
-
-def _mipped(
-    device: Device,
-    make: Callable[[], NDArray[np.float32]],
-    texel: str,
-    source: NDArray[np.float32] | None = None,
-) -> Any:
-    """A half-float texture with all its mips.
-
-    source : the data that the picture is made from, by which large ones are kept on disk
-    """
-
-    def chain() -> list[NDArray[Any]]:
-        return [level.astype(np.float16) for level in mip_chain(make())]
-
-    levels = chain() if source is None or source.size < _LARGE else cached_mips(source, _FORM, chain)
-    height, width = levels[0].shape[:2]
-    texture = make_texture(device, (width, height), texel, mips=len(levels), use="map")
+def _grey(device: Device, values: NDArray[np.float32]) -> Any:
+    """A texture of halves with all its mips: devices need not store to one channel of them."""
+    levels = mip_chain(values)
+    height, width = values.shape[:2]
+    texture = make_texture(device, (width, height), "r16float", mips=len(levels), use="map")
     for index, level in enumerate(levels):
         upload(device, texture, level, mip=index)
     return texture

@@ -9,11 +9,13 @@ from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.inputs import Inputs, camera_views, pinhole, seen_by
 from dermis.frame.levels import Blur, scale_of
 from dermis.frame.lights import light_constants, light_records, light_views
+from dermis.frame.passes.moving_occlusion import sky_record
 from dermis.frame.passes.shade import shade_program
 from dermis.frame.passes.shape import Motion, resting
-from dermis.frame.projection import ShadowView, shadow_layers
+from dermis.frame.projection import Views, shadow_layers
 from dermis.frame.resources import Asked, make_resources
 from dermis.frame.skin_profiles import SkinProfiles
+from dermis.frame.sky import Anchors, Look, anchors_of, look_around, turn_of
 from dermis.frame.surroundings import brightest, load_surroundings, with_suns
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Device, Memo
@@ -27,7 +29,6 @@ from dermis.scene.techniques import TECHNIQUES
 
 _SLACK_MM = 10.0  # that a rig's outermost points may miss of a pose
 Lights = tuple[Light, ...]
-Views = list[ShadowView | None]
 
 
 class Moved(NamedTuple):
@@ -63,23 +64,12 @@ class Preparation:
         profile = self.profile_of(scene.skin)
         surroundings = keep(load_surroundings, device, around.name if around else None)
         scene = with_suns(self.memo, scene, surroundings)
-        lights, moved = (head, tuple(scene.lights)), self._moved(head, scene.motion)
-        views = keep(_views, *lights, moved.outline, settings.shadow_size, using=(scene,))
-        record = keep(_record, *lights, views, using=(device, scene))
-        layers = shadow_layers(views)
-        counts = len(views), len(layers.clips)
-        asked = Asked(
-            head,
-            scene.skin,
-            profile,
-            _person(scene),
-            settings,
-            around,
-            surroundings,
-            technique,
-            *counts,
-            view,
-        )
+        moved = self._moved(head, scene.motion)
+        lit_by = head, tuple(scene.lights), moved.outline, settings.shadow_size
+        record, layers, parts = keep(_lights, *lit_by, using=(device, scene))
+        who = head, scene.skin, profile, _person(scene)
+        counts = parts, len(layers.clips), scene.motion is not None
+        asked = Asked(*who, settings, around, surroundings, technique, *counts, view)
         resources = keep(make_resources, self.memo, device, asked)
         seen_from, shone_on = pinhole(scene.camera, head, settings), light_constants(scene)
         scale = scale_of(resources.levels.texel, brightest(scene, surroundings))
@@ -93,9 +83,15 @@ class Preparation:
             light_constants=shone_on,
             camera=camera_views(seen_from, moved.outline, settings.samples),
             half=seen_from.half,
+            around=self._around(head, scene.motion, moved.outline) if resources.sky else None,
             view=seen_by(resources.view, seen_from),
             constants=resources.constants + shone_on,
         )
+
+    def _around(self, head: Head, motion: RigMotion | None, outline: Outline) -> tuple[Look, Any]:
+        """How the sky sees the head as it is posed, and the shader's record of it."""
+        anchors = self.memo.keep(anchors_of, head)
+        return self.memo.keep(_looked, outline, using=(motion, self.device, head, anchors))
 
     def _moved(self, head: Head, motion: RigMotion | None) -> Moved:
         """The head as it is posed, or at rest where no motion came."""
@@ -120,6 +116,13 @@ def _posed(head: Head, motion: RigMotion, at_rest: Motion) -> Moved:
     return Moved(Motion(positions, weights, matrices), Outline(rig.outline_mm(motion), _SLACK_MM))
 
 
+def _looked(
+    outline: Outline, motion: RigMotion, device: Device, head: Head, anchors: Anchors
+) -> tuple[Look, Any]:
+    look = look_around(outline, turn_of(anchors, motion))
+    return look, sky_record(device, look, len(head.mesh.positions))
+
+
 def under(layout: AtlasLayout, lights: Any) -> AtlasLayout:
     """The layout under lights.
 
@@ -132,9 +135,9 @@ def _scaled(blurs: tuple[Blur, ...], scale: float) -> tuple[Blur, ...]:
     return tuple(replace(blur, scale=scale) for blur in blurs)
 
 
-def _views(_: Head, __: Lights, outline: Outline, size: int, scene: Scene) -> Views:
-    return light_views(scene, outline, size)
-
-
-def _record(_: Head, __: Lights, views: Views, device: Device, scene: Scene) -> Any:
-    return light_records(shade_program(device), scene, views)
+def _lights(
+    _: Head, __: Lights, outline: Outline, size: int, device: Device, scene: Scene
+) -> tuple[Any, Views, int]:
+    """The shader's array of lights, how shadow maps see the head, and how many parts the lights have."""
+    views = light_views(scene, outline, size)
+    return light_records(shade_program(device), scene, views), shadow_layers(views), len(views)

@@ -23,7 +23,8 @@ _WIDEST_LIGHT = math.tan(math.radians(80.0))
 _STEP_MM, _STEPS_TO_DOUBLE = 4.0, 16  # of shadow maps: where they look, and how wide they are
 _NEAREST_MM = 1.0
 _UP = 0.0, 1.0, 0.0
-_MIDDLE = np.full((1, 2), 0.5)
+MIDDLE = np.full((1, 2), 0.5)
+"""The one place of a sample in the pixel: its middle."""
 
 
 class Views(NamedTuple):
@@ -68,7 +69,7 @@ class ShadowView(NamedTuple):
 
 def shadow_layers(views: Sequence[ShadowView | None]) -> Views:
     """A layer for each view but None, sampled at the middles of its pixels."""
-    return Views(np.array([view.clip for view in views if view]).reshape(-1, 4, 4), _MIDDLE)
+    return Views(np.array([view.clip for view in views if view]).reshape(-1, 4, 4), MIDDLE)
 
 
 def frame_of(forward: Vec, up: Vec) -> tuple[Vec, Vec, Vec]:

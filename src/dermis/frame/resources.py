@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -20,9 +20,10 @@ from dermis.frame.levels import Blur, Levels
 from dermis.frame.limits import check_limits
 from dermis.frame.maps import upload_maps
 from dermis.frame.passes import bloom, gutters, post, shade, shadows, surface_texels, visibility_buffer
-from dermis.frame.passes.shape import rest_shape
+from dermis.frame.passes.moving_occlusion import Sky, make_map, make_sky
+from dermis.frame.resting import resting
 from dermis.frame.seams import LaidOut, Remedy, laid_out, remedy_of
-from dermis.frame.shape import Shape, make_shape, shape_tables
+from dermis.frame.shape import Shape, ShapeTables, make_shape, shape_tables
 from dermis.frame.surroundings import Surroundings
 from dermis.frame.techniques.technique import AtlasTechnique, Technique
 from dermis.frame.translucency import translucency_of
@@ -35,6 +36,8 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.specular.albedo import albedo_table
 
+Laid = tuple[Atlas, AtlasTextures]
+
 
 @dataclass(frozen=True)
 class Asked:
@@ -42,6 +45,7 @@ class Asked:
 
     person : (p, 3) places of the head's control points where another person rests, None for the head's own
     lights, shadow_layers : how many parts of lights there are, and how many of them cast shadows
+    posed : whether the scene has a pose
     view : name of a scene among several that are drawn in turn
     """
 
@@ -55,6 +59,7 @@ class Asked:
     technique: Technique
     lights: int
     shadow_layers: int
+    posed: bool
     view: str
 
     @property
@@ -76,6 +81,11 @@ class Asked:
     def occluded(self) -> bool:
         """Whether the head hides some of its environment from itself."""
         return surroundings.is_occluded(self.environment, self.settings)
+
+    @property
+    def occlusion_moves(self) -> bool:
+        """Whether that follows the head's shape."""
+        return self.occluded and self.posed and self.settings.occlusion == "baked"
 
     @cached_property
     def remedy(self) -> Remedy:
@@ -107,11 +117,10 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     tables = keep(shape_tables, device, asked.head)
     shape = keep(make_shape, device, tables)
     shared = _shared(memo, device, asked, shadow_maps)
-    named = list(enumerate(asked.atlases.layouts))
-    atlases = [_atlas(memo, device, asked, name, index) for index, name in named]
+    atlases = [_atlas(memo, device, asked, name, k) for k, name in enumerate(asked.atlases.layouts)]
     uploaded: dict[str, Any] = memo.wait(maps)
     shared |= uploaded
-    layouts = [_layout(memo, device, asked, *atlases[index], shape, shared, index) for index, _ in named]
+    layouts = [_layout(memo, device, asked, one, shape, shared, k) for k, one in enumerate(atlases)]
     own = technique.make(memo, device, settings, asked.profile)
     program = shade.shade_program(device)
     view = view_record(program, asked.head, settings, asked.split)
@@ -132,6 +141,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         view=view,
         constants=surface.constants(asked.skin) + technique.shade_constants,
         suns=len(asked.surroundings.suns),
+        sky=_sky(memo, device, asked, layouts[0], tables) if asked.occlusion_moves else None,
         gaussians=len(asked.profile.variance_mm2),
         picture=keep(post.make_picture, device, settings.size),
         glow=keep(bloom.make_glow, device, settings.size) if settings.bloom else None,
@@ -154,52 +164,46 @@ def _shared(memo: Memo, device: Device, asked: Asked, shadow_maps: shadows.Shado
     }
 
 
-def _atlas(memo: Memo, device: Device, asked: Asked, name: str, index: int) -> tuple[Atlas, AtlasTextures]:
+def _sky(memo: Memo, device: Device, asked: Asked, layout: AtlasLayout, tables: ShapeTables) -> Sky:
+    """The open sky at the head's vertices, known as it rests."""
+    at_rest = resting(memo, device, layout.head, tables, asked.head, None, 0)
+    return memo.keep(make_sky, device, asked.head, using=(at_rest,))
+
+
+def _atlas(memo: Memo, device: Device, asked: Asked, name: str, index: int) -> Laid:
     stretch = asked.technique.stretch(asked.settings)
     atlas = memo.keep(_cached_atlas, asked.head, asked.atlases.side, name, of=str(index))
     return atlas, memo.keep(upload_atlas, device, atlas, stretch, asked.remedy, of=str(index))
 
 
 def _layout(
-    memo: Memo,
-    device: Device,
-    asked: Asked,
-    atlas: Atlas,
-    textures: AtlasTextures,
-    shape: Shape,
-    shared: dict[str, Any],
-    index: int,
+    memo: Memo, device: Device, asked: Asked, laid: Laid, shape: Shape, shared: dict[str, Any], index: int
 ) -> AtlasLayout:
     """An atlas that light is spread on, without lights."""
-    keep, number, head = memo.keep, str(index), asked.head
+    keep, number, head, (atlas, textures) = memo.keep, str(index), asked.head, laid
     held = keep(upload_geometry, device, head.mesh, atlas, shape, of=number)
+    at_rest = partial(resting, memo, device, held, shape.tables, head, asked.person, index)
     lit = held.resources | shared
     if asked.person is not None:
         walks = keep(make_walks, device, head.mesh, atlas, textures, of=number)
-        resting = _resting(memo, device, asked, held, shape, number)
-        textures = keep(gutters.walked, device, textures, walks, resting, of=number)
+        textures = keep(gutters.walked, device, textures, walks, at_rest(), of=number)
     if asked.occluded:
         bound = lit, textures.resources["atlas"]
         lit["occlusion_map"] = keep(surroundings.occlusion_map, device, head, atlas, using=bound, of=number)
     else:
         lit["occlusion_map"] = surroundings.no_occlusion(device)
+    follows = None
+    if asked.occlusion_moves:
+        lit["occlusion_map"], follows = keep(make_map, device, lit["occlusion_map"], of=number)
     translucency = None
     if asked.count and asked.settings.transmission == "thin" and asked.technique.transmits:
-        heads = held, _resting(memo, device, asked, held, shape, number)
-        now, at_rest = (one.resources | textures.resources for one in heads)
+        surfaces = (one.resources | textures.resources for one in (held, at_rest()))
         blurred = asked.split.blurred_mm2, asked.split.weight, asked.skin.has_own_tissue
-        translucency = translucency_of(memo, device, now, at_rest, atlas, *blurred, of=number)
+        translucency = translucency_of(memo, device, *surfaces, atlas, *blurred, of=number)
     side = asked.settings.atlas if asked.count else 1
-    surfaces = keep(surface_texels.make_surfaces, device, side, of=number)
-    return AtlasLayout(textures, held, lit, surfaces, _sum(memo, device, asked, side, number), translucency)
-
-
-def _resting(
-    memo: Memo, device: Device, asked: Asked, held: HeadResources, shape: Shape, of: str
-) -> HeadResources:
-    """The head as the person rests."""
-    person = asked.head.positions_mm if asked.person is None else asked.person
-    return memo.keep(HeadResources.shaped, held, memo.keep(rest_shape, device, shape.tables, person), of=of)
+    texels = keep(surface_texels.make_surfaces, device, side, of=number)
+    scattered = _sum(memo, device, asked, side, number)
+    return AtlasLayout(textures, held, lit, texels, scattered, translucency, follows)
 
 
 def _sum(memo: Memo, device: Device, asked: Asked, side: int, role: str) -> Any:

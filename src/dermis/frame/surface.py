@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from dermis.frame.maps import DEFAULT_COLOUR, relief_band
 from dermis.gpu import ComputeProgram
 from dermis.gpu.shader_types import struct_dtype
 from dermis.gpu.wgsl_source import Member
@@ -18,6 +17,10 @@ from dermis.specular.albedo import ROOT_OF_FIRST_ROW
 from dermis.specular.energy import ENERGY
 from dermis.specular.fresnel import SKIN_ETA, SKIN_F0
 from dermis.specular.models import MODELS
+
+DEFAULT_COLOUR = 0.8
+"""Albedo of heads without a colour map."""
+_NO_BAND = -1.0
 
 
 def model_of(skin: Skin) -> str:
@@ -64,7 +67,7 @@ def _derived(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any]:
         "loss": energy.loss,
         "returned": energy.returned,
         "tint": skin.specular_colour == "wrong",
-        "relief_band": relief_band(maps),
+        "relief_band": _relief_band(maps),
         **(_by_direction(skin, maps, profile) if skin.direction == "half-space" else {}),
     }
 
@@ -81,3 +84,11 @@ def _by_direction(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any
         "back_from_everywhere": law.from_everywhere,
         "back": np.pad(law.returned, ((0, 0), (0, 1))),
     }
+
+
+def _relief_band(maps: Maps) -> float:
+    """Mip of a larger height map that matches the normal map: it adds only finer relief. -1: it adds all."""
+    if maps.normal is None or maps.height is None:
+        return _NO_BAND
+    finer = max(maps.height.shape[:2]) / max(maps.normal.shape[:2])
+    return float(np.log2(finer)) if finer > 1 else _NO_BAND

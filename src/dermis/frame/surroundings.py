@@ -123,7 +123,7 @@ def occlusion_map(device: Device, head: Head, atlas: Atlas, lit: Resources, texe
 
 def is_occluded(environment: Environment | None, settings: Settings) -> bool:
     """Whether the head occludes its environment."""
-    return environment is not None and settings.occlusion == "baked"
+    return environment is not None and settings.occlusion != "none"
 
 
 def no_occlusion(device: Device) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass, field
 from itertools import count
 from typing import TYPE_CHECKING, Any
@@ -17,62 +18,32 @@ class Slot:
     """The content of a texture, a buffer or a view of one layer.
 
     Contents have version numbers: equal for what the same pass made from equal inputs, 0 when unknown.
-    `value` is the version that the passes declared so far will leave, `held` the one that is there now.
 
     parent : of a view, the texture's slot
     parts : of a texture, the slots of its views
-    frame : the one in which `value`, `writer` and `writers` hold
-    writer : the pass that writes it last
-    writers : all that do, and those that write what contains it or is contained
+    held : the version that is there now
     scratch : whether it only carries data between passes, so that its content after a frame does not matter
-    active : whether any pass has ever written it
     """
 
     parent: Slot | None = None
     parts: list[Slot] = field(default_factory=list)
     held: int = 0
-    value: int = 0
-    frame: int = 0
-    writer: int = 0
-    writers: list[int] = field(default_factory=list)
     scratch: bool = False
-    active: bool = False
 
-    @property
-    def changes(self) -> bool:
-        """Whether what is read of it may be another's from frame to frame."""
-        around = (self, *self.parts) if self.parent is None else (self, self.parent, *self.parts)
-        return any(slot.active for slot in around)
-
-    def sources(self, frame: int) -> list[Slot]:
-        """The slots from which it gets what it holds in the frame: itself, its views, or its texture."""
-        if self.frame == frame and not self.parts:
-            return [self]
-        found = [part for part in self.parts if part.frame == frame]
-        if self.frame == frame:
+    def sources(self, written: Container[Slot]) -> list[Slot]:
+        """Of the slots that passes wrote, those with what it holds: itself, its views, or its texture."""
+        found = [part for part in self.parts if part in written]
+        if self in written:
             found.append(self)
-        elif self.parent is not None and self.parent.frame == frame:
+        elif self.parent is not None and self.parent in written:
             found.append(self.parent)
         return found
 
-    def write(self, frame: int, index: int, value: int) -> None:
-        """Let the pass of that index leave a value."""
-        if self.frame != frame:
-            self.writers = []
-        self.frame, self.value, self.writer = frame, value, index
-        self.writers.append(index)
-        for part in self.parts:
-            if part.frame == frame:
-                part.writers.append(index)
-                part.frame = 0  # what is read of it now is the texture's
-        if self.parent is not None and self.parent.frame == frame:
-            self.parent.writers.append(index)
-
     def hold(self, value: int) -> None:
-        """Note what is there now; what overlaps it is no longer what it was."""
+        """Note what is there now, in its views too; what it is a view of is no longer what it was."""
         self.held = value
         for part in self.parts:
-            part.held = 0
+            part.held = value
         if self.parent is not None:
             self.parent.held = 0
 
@@ -83,24 +54,13 @@ class Access:
 
     number : of this program with these resources, never given twice
     reads, writes : slots; what is both stands in both
-    groups : bind groups with the buffers of a device's frames, by these
+    steps : dispatches of a device's frames with their bind groups, by stage, workgroups and places of records
     """
 
     number: int
     reads: tuple[Slot, ...]
     writes: tuple[Slot, ...]
-    groups: dict[tuple[int, ...], Any] = field(default_factory=dict)
-    _changing: list[Slot] = field(default_factory=list)
-    _of: int = -1
-
-    def changing(self, active: int) -> list[Slot]:
-        """Of what it reads that which passes write.
-
-        active : how many slots passes have written; while there are no more, the answer is the same
-        """
-        if self._of != active:
-            self._changing, self._of = [slot for slot in self.reads if slot.changes], active
-        return self._changing
+    steps: dict[Any, tuple[Any, Any]] = field(default_factory=dict)
 
 
 def new_number() -> int:
@@ -122,5 +82,5 @@ def slot_of(device: Device, resource: Any) -> Slot:
         found = device.slots[resource] = Slot(slot_of(device, texture) if texture is not None else None)
         if found.parent is not None:
             found.parent.parts.append(found)
-            found.scratch = found.parent.scratch
+            found.scratch, found.held = found.parent.scratch, found.parent.held
     return found

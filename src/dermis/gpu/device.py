@@ -82,16 +82,15 @@ class Device:
     ffi, lib, checked : the native library, called directly in each frame to save the overhead of wgpu's
         Python; calls of `checked` raise the library's errors, for passes when their encoder is submitted
     slots : what textures, buffers and views hold, see access.py
-    active_slots : how many of them passes have written
     programs : compiled shaders, see program.py
     spare_records : memory for records that no frame uses at the moment; allocating it takes longer
     """
 
     def __init__(self, adapter: Adapter, reason: str, *, bare: bool = False) -> None:
-        from wgpu.backends.wgpu_native import ffi, lib
+        from wgpu.backends.wgpu_native import GPUCommandEncoder, ffi, lib
         from wgpu.backends.wgpu_native._api import libf
 
-        self.ffi, self.lib, self.checked = ffi, lib, libf
+        self.ffi, self.lib, self.checked, self._encoder = ffi, lib, libf, GPUCommandEncoder
         self.adapter = adapter
         self.reason = reason
         features = [] if bare else list(adapter.features)
@@ -113,10 +112,8 @@ class Device:
         self._uniform_chunks: list[Any] = []
         self.spare_records: list[bytearray] = []
         self.slots: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
-        self.active_slots = 0
         self.programs: dict[Any, Any] = {}
         self._shared: dict[str, Any] = {}
-        self._frames = 0
         self._staging: dict[int, list[Any]] = {}
         self.fetching: set[Any] = set()
         self._samplers: dict[tuple[tuple[str, str], ...], Any] = {}
@@ -127,15 +124,15 @@ class Device:
             self._shared[name] = make()
         return self._shared[name]
 
-    def next_frame(self) -> int:
-        """The number of a new frame."""
-        self._frames += 1
-        return self._frames
-
     def write(self, buffer: Any, data: bytearray | bytes, size: int) -> None:
         """Put the first `size` bytes of the data into a buffer before the next submit."""
         start = self.ffi.from_buffer(data)
         self.checked.wgpuQueueWriteBuffer(self.handle.queue._internal, buffer._internal, 0, start, size)
+
+    def command_encoder(self) -> Any:
+        """wgpu's encoder, without the description that it would make of no label."""
+        made = self.checked.wgpuDeviceCreateCommandEncoder(self.handle._internal, self.ffi.NULL)
+        return self._encoder("", made, self.handle)
 
     def submit(self, encoder: Any) -> int:
         """Submit what an encoder has recorded; returns the number of the submission, for `wait`."""

@@ -18,6 +18,7 @@ from dermis.gpu.uniforms import Uniforms
 
 Timed = bool | Literal["whole"]
 """Whether stages are timed, each in a pass of its own, or the frame as it is when nobody asks, as a whole."""
+_MOST_STEPS = 16  # of a pass: its records lie elsewhere when other passes before it run
 
 
 class Frame(Recorder):
@@ -28,13 +29,14 @@ class Frame(Recorder):
     timed : False leaves the stages' times out; dispatches then share passes across stages, as they do in
         frames that are timed as a "whole", from the start of their first pass to the end of the last one.
         Software adapters can only time stages
+    uniforms : for the passes' records, its own when left out
     submitted : number of the last submit, for `Device.wait`
     """
 
-    def __init__(self, device: Device, *, timed: Timed = True) -> None:
+    def __init__(self, device: Device, *, timed: Timed = True, uniforms: Uniforms | None = None) -> None:
         self.device = device
         self._open: Any = None
-        self._uniforms = Uniforms(device)
+        self._uniforms = uniforms or Uniforms(device)
         self._fetched: list[Fetched] = []
         self.submitted = 0
         self._stage = ""
@@ -59,8 +61,15 @@ class Frame(Recorder):
         completes : of account where passes are declared, see `Recorder.dispatch`
         access : of these resources, for who has it
         """
-        bound = program.bind_group(resources, self._uniforms, access)
-        self.run([step_of(stage, program, *bound, groups)])
+        key = stage, groups, program.places(resources, self._uniforms)
+        known = access.steps if access else {}
+        found = known.get(key)
+        if found is None:
+            if len(known) == _MOST_STEPS:
+                known.clear()
+            group, offsets = program.bind_group(resources, self._uniforms)
+            found = known[key] = [step_of(stage, program, group, offsets, groups)], group
+        self.run(found[0])
 
     def run(self, steps: Sequence[Step]) -> None:
         """Run dispatches whose bind groups are known."""
@@ -184,7 +193,7 @@ class Frame(Recorder):
     def _encoder(self) -> Any:
         """Takes commands; made for the first one after each submit."""
         if self._open is None:
-            self._open = self.device.handle.create_command_encoder()
+            self._open = self.device.command_encoder()
         return self._open
 
     def _compute_pass(self, stage: str) -> ComputePass:
@@ -227,4 +236,6 @@ def step_of(
     stage: str, program: ComputeProgram, group: Any, offsets: Sequence[int], groups: tuple[int, int, int]
 ) -> Step:
     """A dispatch of a bind group with the offsets of its uniforms."""
-    return Step(stage, program.pipeline._internal, group._internal, len(offsets), offsets, groups)
+    # as the native library takes them, so that no frame needs to convert them
+    kept = program.device.ffi.new("uint32_t[]", offsets)
+    return Step(stage, program.pipeline._internal, group._internal, len(offsets), kept, groups)

@@ -146,18 +146,20 @@ def same(a: Any, b: Any) -> bool:
     if not is_value(a):
         return False
     kind: Any = type(a)
-    if is_dataclass(a):
-        for name in _field_names(kind):
-            x, y = getattr(a, name), getattr(b, name)
-            if x is not y and not same(x, y):
-                return False
-        return True
-    return bool(a == b)
+    names = _field_names(kind)
+    if names is None:
+        return bool(a == b)
+    for name in names:
+        x, y = getattr(a, name), getattr(b, name)
+        if x is not y and not same(x, y):
+            return False
+    return True
 
 
 @cache
-def _field_names(kind: Any) -> tuple[str, ...]:
-    return tuple(one.name for one in fields(kind))
+def _field_names(kind: Any) -> tuple[str, ...] | None:
+    """Of a dataclass; kept by kind, as others are slow to say that they are none."""
+    return tuple(one.name for one in fields(kind)) if is_dataclass(kind) else None
 
 
 def is_value(thing: Any) -> bool:

@@ -73,7 +73,7 @@ class Program:
         self._uniforms = [b for b in self.bindings if _is_uniform(b)]
         self._others = [b for b in self.bindings if not _is_uniform(b)]
         self._read = _reader([b.name for b in self._others])
-        self._read_of = {one.name: members_read(self.source.text, one.name) for one in self._uniforms}
+        self._numbers_of = [(one.name, members_read(self.source.text, one.name)) for one in self._uniforms]
         self.kept_groups: ByResources[Any] = ByResources()
         self._accesses: ByResources[Access] = ByResources()
         self._group_layout = device.handle.create_bind_group_layout(entries=self._layout_entries())
@@ -86,34 +86,27 @@ class Program:
             record[member] = value
         return record
 
-    def bind_group(
-        self, resources: Resources, uniforms: Uniforms, access: Access | None = None
-    ) -> tuple[Any, list[int]]:
+    def places(self, resources: Resources, uniforms: Uniforms) -> tuple[int, ...]:
+        """Where the records are among the uniforms."""
+        try:
+            return tuple([uniforms.place(resources[name]) for name, _ in self._numbers_of])
+        except KeyError as missing:
+            raise self._unbound(missing) from None
+
+    def bind_group(self, resources: Resources, uniforms: Uniforms) -> tuple[Any, list[int]]:
         """A bind group of resources by their name in the shader, and the offsets of its uniforms.
 
         A resource is a buffer, a texture, a texture view, a sampler, or a numpy record, which finds a place
         among the uniforms.
-
-        access : of these resources, for who has it and uses the uniforms' buffers of all frames
         """
-        try:
-            placed = [uniforms.place(resources[one.name]) for one in self._uniforms]
-        except KeyError as missing:
-            raise self._unbound(missing) from None
-        offsets = [offset for _, offset in placed]
-        buffers = tuple([id(buffer) for buffer, _ in placed]) if access else ()
-        group = access.groups.get(buffers) if access else None
-        if group is not None:
-            return group, offsets
-        bound = [*self._bound(resources), *(buffer for buffer, _ in placed)]
+        found = [uniforms.at(place) for place in self.places(resources, uniforms)]
+        bound = [*self._bound(resources), *(buffer for buffer, _ in found)]
         key = key_of(bound)
         group = self.kept_groups.find(key)
         if group is None:
             group = self._make_group(bound, resources)
             self.kept_groups.keep(key, bound, group)
-        if access:
-            access.groups[buffers] = group
-        return group, offsets
+        return group, [offset for _, offset in found]
 
     def access(self, resources: Resources) -> Access:
         """What a pass of this program with these resources reads and writes, records aside."""
@@ -128,21 +121,13 @@ class Program:
             self._accesses.keep(key, bound, found)
         return found
 
-    def numbers(self, resources: Resources, known: dict[int, int]) -> tuple[bytes | int, ...]:
-        """What the shader reads of the records; of large ones, which several passes read, a hash of it all.
-
-        known : the hashes by the records' identity
-        """
-        found: list[bytes | int] = []
+    def numbers(self, resources: Resources, uniforms: Uniforms) -> tuple[Hashable, ...]:
+        """What the shader reads of the records; all of large ones, whose hash several passes share."""
+        found: list[Hashable] = []
         try:
-            for name, read in self._read_of.items():
-                record = resources[name]
-                if record.nbytes <= _LARGE_RECORD:
-                    found.append(read(record))
-                    continue
-                if id(record) not in known:
-                    known[id(record)] = hash(record.tobytes())
-                found.append(known[id(record)])
+            for name, read in self._numbers_of:
+                raw = uniforms.bytes_of(resources[name])
+                found.append(raw if len(raw) > _LARGE_RECORD else read(raw))
         except KeyError as missing:
             raise self._unbound(missing) from None
         return tuple(found)

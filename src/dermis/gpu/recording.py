@@ -75,9 +75,7 @@ class Recording(Recorder):
         group, offsets = program.bind_group(resources, self._uniforms)
         self._bound.append(weakref.ref(group, void))
         self._pipelines.append(program.pipeline)
-        # as the native library takes them, so that no frame needs to convert them
-        kept = program.device.ffi.new("uint32_t[]", offsets)
-        steps.append(step_of(stage, program, group, kept, groups))
+        steps.append(step_of(stage, program, group, offsets, groups))
         self._note(program, resources, completes)
 
     def _note(self, program: ComputeProgram, resources: Resources, completes: str) -> None:
@@ -111,14 +109,15 @@ class Recordings:
     def find(self, device: Device, record: Callable[..., T], args: tuple[Any, ...]) -> tuple[Recording, T]:
         """What `record` did for these arguments and what it returned; it is called when that is not known."""
         known = self._known.setdefault(record, [])
-        found = next((one for one in known if _alike(one[0], args) and not one[1].is_void), None)
+        found = next((one for one in known if not one[1].is_void and _alike(one[0], args)), None)
         if found is None:
             recording = Recording(device)
             result = record(recording, *args)
             recording.finish()
             assert not recording.is_void, "what was just bound is gone"
             found = _held_weakly(args), recording, result
-        self._known[record] = [found, *(one for one in known if one is not found)][:_MOST]
+        if not known or known[0] is not found:
+            known[:] = [found, *(one for one in known if one is not found)][:_MOST]
         return found[1], found[2]
 
 

@@ -7,9 +7,11 @@ so the two cannot drift apart. Alignment rules: WGSL specification, section "Mem
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Iterator, Set
 from dataclasses import dataclass
 from functools import cache
+from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -72,27 +74,27 @@ def struct_dtype(text: str, name: str) -> np.dtype[np.void]:
     return dtype
 
 
-def members_read(text: str, name: str) -> Callable[[np.ndarray[Any, Any]], bytes]:
-    """A function that takes from the record bound as `name` the bytes of the members that the shader uses.
+def members_read(text: str, name: str) -> Callable[[bytes], Hashable]:
+    """Takes out of the bytes of a record bound by that name the members that the shader's text names.
 
-    It takes all of them where the shader passes the record on as a whole.
+    All of it where the text hands the record on as a whole, or it is no struct.
     """
     code = _COMMENT.sub("", text)
-    code = re.sub(rf"var<uniform>\s*{name}\b", "", code)
-    used = re.findall(rf"(?<![.\w]){name}\b(?:\.(\w+))?", code)
-    if "" in used:
-        return lambda record: record.tobytes()
-    members, places = sorted(set(used)), list[slice]()
+    declared = re.compile(rf"var<uniform>\s*{name}\s*:\s*(\w+)")
+    used = re.findall(rf"(?<![.\w]){name}\b(?:\.(\w+))?", declared.sub("", code))
+    (struct,) = declared.findall(code)
+    if not used or "" in used or struct not in dict(_STRUCT.findall(code)):
+        return lambda raw: raw
+    return itemgetter(*_runs(struct_dtype(text, struct), set(used)))
 
-    def read(record: np.ndarray[Any, Any]) -> bytes:
-        if not places:  # the same for all records of that name
-            fields = dict(record.dtype.fields or {})
-            ends = ((fields[member][1], fields[member][0].itemsize) for member in members)
-            places.extend(slice(start, start + size) for start, size in ends)
-        raw = record.tobytes()
-        return b"".join([raw[place] for place in places])
 
-    return read
+def _runs(dtype: np.dtype[np.void], members: Set[str]) -> Iterator[slice]:
+    """Where members that follow each other lie."""
+    fields = dict(dtype.fields or {})
+    for used, names in groupby(fields, members.__contains__):
+        if used:
+            lie = [(fields[name][1], fields[name][0].itemsize) for name in names]
+            yield slice(lie[0][0], sum(lie[-1]))
 
 
 def _struct(bodies: dict[str, str], name: str) -> tuple[np.dtype[np.void], int]:

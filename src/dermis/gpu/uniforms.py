@@ -26,18 +26,28 @@ class Uniforms:
         self._device = device
         self._chunk = chunk or partial(device.uniform_chunk, size=CHUNK_BYTES)
         self._staged: list[bytearray] = []
-        self._end, self._buffer = CHUNK_BYTES, None
-        self._placed: dict[int, tuple[tuple[Any, int], NDArray[Any]]] = {}  # which keeps the records' names
+        self._end = CHUNK_BYTES
+        self._taken: dict[int, tuple[bytes, NDArray[Any]]] = {}  # which keeps the records' names
+        self._placed: dict[int, int] = {}
 
-    def place(self, record: NDArray[Any]) -> tuple[Any, int]:
-        """The buffer and the offset [byte] at which the record will be.
+    def bytes_of(self, record: NDArray[Any]) -> bytes:
+        """A record as it is when it comes first; it must not be changed until the frame is submitted."""
+        found = self._taken.get(id(record))
+        if found is None:
+            found = self._taken[id(record)] = record.tobytes(), record
+        return found[0]
 
-        A record is taken as it is when it comes first, and must not be changed until the frame is submitted.
-        """
+    def place(self, record: NDArray[Any]) -> int:
+        """Where the record will be, counted through all buffers [byte]."""
         found = self._placed.get(id(record))
         if found is None:
-            found = self._placed[id(record)] = self._add(record), record
-        return found[0]
+            found = self._placed[id(record)] = self._add(self.bytes_of(record))
+        return found
+
+    def at(self, place: int) -> tuple[Any, int]:
+        """The buffer of a place, and the offset in it."""
+        number, offset = divmod(place, CHUNK_BYTES)
+        return self._chunk(number), offset
 
     def upload(self) -> None:
         """Write all records for the next submit."""
@@ -48,16 +58,21 @@ class Uniforms:
     def finish(self) -> None:
         """Begin anew after the last submit."""
         self._device.spare_records.extend(self._staged)
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all records."""
         self._staged, self._end = [], CHUNK_BYTES
+        self._taken.clear()
         self._placed.clear()
 
-    def _add(self, record: NDArray[Any]) -> tuple[Any, int]:
-        size = record.nbytes
+    def _add(self, record: bytes) -> int:
+        size = len(record)
         if self._end + size > CHUNK_BYTES:
             spare = self._device.spare_records
             self._staged.append(spare.pop() if spare else bytearray(CHUNK_BYTES))
-            self._end, self._buffer = 0, self._chunk(len(self._staged) - 1)
+            self._end = 0
         start = self._end
-        self._staged[-1][start : start + size] = record.tobytes()
+        self._staged[-1][start : start + size] = record
         self._end += -(-size // _STEP) * _STEP
-        return self._buffer, start
+        return (len(self._staged) - 1) * CHUNK_BYTES + start

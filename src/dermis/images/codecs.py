@@ -126,6 +126,26 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
+def png_size(data: bytes) -> tuple[int, int]:
+    """Width and height of a PNG file whose bytes are all there, by its checksums; pixels are not decoded.
+
+    ValueError : it is another file, cut off or damaged
+    """
+    if not data.startswith(_PNG_START):
+        raise ValueError("its first bytes are not those of PNG")
+    view, place, kind = memoryview(data), len(_PNG_START), b""
+    while kind != b"IEND":
+        if place + 12 > len(data):
+            raise ValueError("it is cut off")
+        (length,), kind = struct.unpack_from(">I", data, place), data[place + 4 : place + 8]
+        end = place + 8 + length
+        if data[end : end + 4] != struct.pack(">I", zlib.crc32(view[place + 4 : end])):
+            raise ValueError(f"its part {kind!r} is damaged")
+        place = end + 4
+    width, height = struct.unpack_from(">II", data, 16)
+    return width, height
+
+
 def encode_png16(levels: NDArray[Any]) -> bytes:
     """A PNG file of (H, W, 1, 3 or 4) uint16, by FFmpeg: Pillow writes no 16-bit colour."""
     from fractions import Fraction

@@ -1,15 +1,15 @@
-"""Filters over whole pictures: mip levels, slopes of a height map, and filling of empty space."""
+"""Filters over whole pictures: mip levels, smoothing, and filling of empty space."""
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float32]
 
-_STRIP = 32  # rows filtered at a time; they stay in the cache, which halves the time of a 4096² map
+_STRIP = 16  # rows filtered at a time, which stay in the cache
 
 
 def mip_chain(image: NDArray[np.floating[Any]]) -> list[Floats]:
@@ -41,51 +41,22 @@ def _halve(image: Floats, axis: int) -> Floats:
     return np.ascontiguousarray(np.moveaxis(halved, 0, axis), np.float32)
 
 
-def derivatives(
-    height: NDArray[np.floating[Any]], border: Literal["clamp", "wrap"] = "clamp"
-) -> tuple[Floats, Floats]:
-    """(dh/dx, dh/dy): change of height per texel to the right and per texel DOWN, each (H, W).
-
-    height : (H, W) in any unit, which the result carries per texel
-    border : "clamp" extrapolates linearly, so that a tilted plane keeps its slope up to the edge; "wrap"
-        takes the texels of the other side, for a map that tiles
-
-    Central differences smoothed across with Scharr's 3, 10, 3 weights: they keep a slope's direction
-    to about a degree and take a third off the noise that 8-bit steps put on a slope.
-    """
-    plain = np.asarray(height, np.float32)
-    padded = np.pad(plain, 1, "wrap") if border == "wrap" else np.pad(plain, 1, "reflect", reflect_type="odd")
-    rows, columns = height.shape
-    dx, dy = np.empty((rows, columns), np.float32), np.empty((rows, columns), np.float32)
-    for top in range(0, rows, _STRIP):
-        bottom = min(top + _STRIP, rows)
-        _scharr(padded[top : bottom + 2], dx[top:bottom], dy[top:bottom])
-    return dx, dy
-
-
-def _scharr(padded: Floats, dx: Floats, dy: Floats) -> None:
-    """Write the slopes of the inner texels of a padded strip into dx and dy."""
-    across = (3 / 32) * (padded[:-2] + padded[2:])
-    across += (10 / 32) * padded[1:-1]
-    np.subtract(across[:, 2:], across[:, :-2], out=dx)
-    down = padded[2:] - padded[:-2]
-    np.add(down[:, :-2], down[:, 2:], out=dy)
-    dy *= 3 / 32
-    down[:, 1:-1] *= 10 / 32
-    dy += down[:, 1:-1]
-
-
 def without_steps(height: NDArray[np.floating[Any]]) -> Floats:
     """A height map smoothed by 1.2 texels, since 8-bit steps would show as contour lines.
 
     height : (H, W) in any unit
-    """
-    from scipy.ndimage import correlate1d
 
-    binomial = np.array([1, 6, 15, 20, 15, 6, 1], np.float32) / 64
-    smooth: Floats = np.asarray(height, np.float32)
-    for axis in (0, 1):
-        smooth = correlate1d(smooth, binomial, axis=axis, mode="nearest")
+    Six sums of two neighbours along each axis: binomial weights of seven texels.
+    """
+    plain = np.asarray(height, np.float32)
+    padded, smooth = np.pad(plain, 3, "edge"), np.empty_like(plain)
+    for top in range(0, len(plain), _STRIP):
+        rows = padded[top : top + _STRIP + 6]
+        for _ in range(6):
+            rows = rows[1:] + rows[:-1]
+        for _ in range(6):
+            rows = rows[:, 1:] + rows[:, :-1]
+        np.multiply(rows, np.float32(1 / 4096), out=smooth[top : top + _STRIP])
     return smooth
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -18,6 +20,7 @@ from dermis.images.io import Picture, read_bytes, read_image
 
 Floats = NDArray[np.float32]
 PathLike = str | Path | Picture
+Load = Callable[[PathLike], NDArray[Any]]
 
 MIN_SIZE, MAX_SIZE = 16, 16384
 _MIN_NORMAL_Z = 0.05  # slopes steeper than 87 degrees are capped; nothing real leans further
@@ -85,14 +88,16 @@ def load_maps(
         refuse(height, "a height map with height_mm, the mm per grey level, above 0", came, remedy)
     if normal is not None and normal_y not in ("up", "down"):
         refuse("normal_y", '"up" or "down"', f"it is {normal_y!r}", "Try the other if bumps look like dents")
-    return Maps(
-        colour=_kept(colour, "colour", _colour),
-        normal=_kept(normal, f"normal {normal_y}", partial(_slopes, normal_y=normal_y)),
-        height=_kept(height, f"height {relief_mm!r}", lambda path: _height(path) * relief_mm),
-        specular=_kept(specular, "grey", partial(_plain_grey, role="a specular map")),
-        roughness=_kept(roughness, "grey", partial(_plain_grey, role="a roughness map")),
-        region=None if region is None else load_labels(region),
-    )
+    roles: dict[str, tuple[PathLike | None, str, Load]] = {  # the largest first
+        "height": (height, f"height {relief_mm!r}", lambda path: _height(path) * relief_mm),
+        "colour": (colour, "colour", _colour),
+        "normal": (normal, f"normal {normal_y}", partial(_slopes, normal_y=normal_y)),
+        "specular": (specular, "grey", partial(_plain_grey, role="a specular map")),
+        "roughness": (roughness, "grey", partial(_plain_grey, role="a roughness map")),
+        "region": (region, "labels", _labels),
+    }
+    with ThreadPoolExecutor(os.cpu_count()) as pool:  # decoders do not hold other threads up
+        return Maps(**dict(zip(roles, pool.map(lambda role: _kept(*role), roles.values()), strict=True)))
 
 
 def _colour(path: PathLike) -> Floats:
@@ -158,7 +163,7 @@ def _check_normals(path: PathLike, normals: Floats) -> None:
         refuse(path, "a tangent-space normal map, which looks light blue", came, "Check which map this is")
 
 
-def _kept(path: PathLike | None, how: str, load: Callable[[PathLike], NDArray[Any]]) -> Any:
+def _kept(path: PathLike | None, how: str, load: Load) -> Any:
     """The map that `load` returns for a picture file, kept on disk when the file is large; None for no file.
 
     how : all that the map depends on besides the file

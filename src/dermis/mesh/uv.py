@@ -5,15 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.mesh.components import components
 from dermis.mesh.geometry import MIN_UV_CROSS, Doubles, edges, uv_cross, weld
 from dermis.mesh.mesh import Ints, Mesh
 
 
 def charts(mesh: Mesh) -> Ints:
     """Chart of each triangle (f,), counted from 0: triangles that share an edge in space and in uv."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     # by place and uv, not by corner vertex: a vertex split for its normal only does not cut a chart
     corner = weld(np.hstack((mesh.positions, mesh.uv)))
     _, of_side, _ = edges(corner[mesh.triangles])
@@ -21,9 +19,7 @@ def charts(mesh: Mesh) -> Ints:
     order = np.argsort(of_side, kind="stable")
     shared = of_side[order][1:] == of_side[order][:-1]
     a, b = faces[order][:-1][shared], faces[order][1:][shared]
-    graph = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(len(mesh.triangles),) * 2)
-    _, chart = connected_components(graph, directed=False)
-    return np.asarray(chart, dtype=np.int32)
+    return components(len(mesh.triangles), a, b).astype(np.int32)
 
 
 def triangle_uv_area(mesh: Mesh) -> Doubles:

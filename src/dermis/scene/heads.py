@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -76,8 +77,6 @@ def load_head(
         refuse(name or "head", f"a mesh file or a sample ({known})", f"{name!r} is neither", "Check the name")
     if sample is None and is_gltf(path):
         files = embedded_maps(path)
-    rigged = load_rigged(path, unit_mm=unit_mm, v_origin=v_origin, up=up, opaque=tuple(opaque))
-    check_head_height(rigged.mesh, name, unit_mm)
     own = {"colour": colour, "normal": normal, "height": height}
     own |= {"specular": specular, "roughness": roughness}
     chosen = _chosen(own, files)
@@ -86,7 +85,11 @@ def load_head(
     if height_mm is not None and chosen["height"] is None:
         came = f"{height_mm} came without a height map"
         refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
-    maps = load_maps(**chosen, height_mm=height_mm, normal_y=normal_y)
+    with ThreadPoolExecutor(1) as beside:
+        reading = beside.submit(load_maps, **chosen, height_mm=height_mm, normal_y=normal_y)
+        rigged = load_rigged(path, unit_mm=unit_mm, v_origin=v_origin, up=up, opaque=tuple(opaque))
+        check_head_height(rigged.mesh, name, unit_mm)
+        maps = reading.result()
     thanks = f"{sample.attribution}, {sample.licence}" if sample else ""
     made = subdivide_head(Head(name, rigged.mesh, maps, thanks, rigged.rig), subdivide)
     if subdivide and made.rig is not None:  # sequences of files have places for the file's own vertices

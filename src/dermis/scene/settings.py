@@ -38,8 +38,9 @@ class Settings(Plain):
     """Light through the head: "thin" for thin parts such as ears and nostrils, "none" for no part."""
     shadow_size: Annotated[int, Field(ge=64, le=8192)] = 2048
     """Side of each shadow map [texel]."""
-    occlusion: Literal["baked", "none"] = "baked"
-    """Ambient occlusion: "baked" dims the environment's light where the head is in its way."""
+    occlusion: Literal["baked", "rest", "none"] = "baked"
+    """Ambient occlusion, which dims the environment's light where the head is in its way: "baked" follows a
+    head that moves, "rest" leaves it as the head rests, "none" for none."""
     exposure: Annotated[float, Field(ge=1e-6, le=1e6, json_schema_extra=slider(0.05, 20, log=True))] = 1.0
     """Factor from radiance to the picture."""
     bloom: Annotated[float, Field(ge=0, le=1, json_schema_extra=slider(0, 0.5))] = 0.0

@@ -40,7 +40,7 @@ def sources_of(
     keys += _RELIEF * relief
     keys += _light(lights)
     if environment is not None:
-        keys += _AROUND + _OCCLUSION * (settings.occlusion == "baked")
+        keys += _AROUND + _OCCLUSION * (settings.occlusion != "none")
     keys += _TONES[settings.tone]
     keys += ("BurtAdelson1983",) * (settings.bloom > 0)
     return tuple(dict.fromkeys(keys))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from dermis.scene.camera import preset
@@ -24,11 +24,14 @@ _GRAB = 8.0  # logical pixels to either side of the divider within which a point
 class Controls:
     """Turns input events into steps of the undo history.
 
+    shown : what is seen, where that is another state than the history's
+
     light : index of the light that Shift and drag moves; an index past the last one means the environment
     """
 
-    def __init__(self, history: History) -> None:
+    def __init__(self, history: History, shown: Callable[[], ViewerState] | None = None) -> None:
         self.history = history
+        self._shown = shown or (lambda: history.state)
         self.light = 0
         self._gesture = 0
         self._button = 0
@@ -111,7 +114,7 @@ class Controls:
             self.history.change(state.with_chart(Chart(state.chart.layer)))
             return
         x, y = 2.0 * event["x"] / width - 1.0, 1.0 - 2.0 * event["y"] / height
-        point = pick(state.scene.head, state.scene.camera, x, y, width / height)
+        point = pick(self._shown().scene, state.scene.camera, x, y, width / height)
         if point is not None:
             self.history.change(state.with_camera(focus(state.scene.camera, point)))
 

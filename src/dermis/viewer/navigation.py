@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.mesh.head import Head
 from dermis.scene.camera import Camera
 from dermis.scene.lights import DirectionalLight, Light
+from dermis.scene.model import Scene
 from dermis.scene.plain import FARTHEST_MM
+from dermis.viewer.posing import posed_positions
 from dermis.viewer.state import ViewerState, changed
 
 Floats = NDArray[np.float64]
@@ -99,9 +100,11 @@ def between(a: Camera, b: Camera, t: float) -> Camera:
     return b if _same(mixed, b) else mixed
 
 
-def pick(head: Head, camera: Camera, x: float, y: float, aspect: float) -> Floats | None:
+def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Floats | None:
     """The surface point under a pixel, relative to the head's centre [mm]; None beside the head.
 
+    scene : whose head, as it is posed
+    camera : instead of the scene's
     x, y : in the image, from -1 (left, bottom) to 1
     aspect : image width over height
 
@@ -110,8 +113,9 @@ def pick(head: Head, camera: Camera, x: float, y: float, aspect: float) -> Float
     right, up, forward = axes(camera)
     half = 0.5 * camera.frame_mm / float(np.linalg.norm(np.subtract(camera.target, camera.position)))
     ray = forward + half * (aspect * x * right + y * up)
+    head, places = scene.head, posed_positions(scene)
     eye = np.array(camera.position) + head.centre_mm
-    a, b, c = (head.mesh.positions[head.mesh.triangles[:, k]].astype(np.float64) for k in range(3))
+    a, b, c = (places[head.mesh.triangles[:, k]].astype(np.float64) for k in range(3))
     e1, e2, s = b - a, c - a, eye - a
     p, q = np.cross(ray, e2), np.cross(s, e1)
     det = (e1 * p).sum(axis=1)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import time
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from dermis.errors import refuse
@@ -10,6 +11,7 @@ from dermis.human.regions.apply import with_regions
 from dermis.scene.heads import load_head
 from dermis.scene.skin import Skin
 from dermis.viewer.controls import Controls, Split
+from dermis.viewer.player import MotionFile, Player
 from dermis.viewer.state import PARTS, PICTURE, History, ViewerState, load_state, save_state
 from dermis.viewer.studio import Studio
 
@@ -17,27 +19,44 @@ NO_REGIONS = "none"
 
 
 class Session:
-    """The undo history, the input controls that change it, and the studio that draws its state.
+    """The undo history, the controls and the player that change it, and the studio that draws its state.
+
+    motion : what the player plays, None for nothing
+    clock : time [s]
 
     split : the before/after comparison
     status, message : text over the picture: the adapter's state, and the result of the last action
     scene_file, picture_file, picture_size : what the panel's buttons write [pixel]
+    motion_file, search : what is opened, and which expressions the panel shows
     positions : of the panel's controls in the window, by label
     """
 
-    def __init__(self, state: ViewerState, studio: Studio) -> None:
+    def __init__(
+        self,
+        state: ViewerState,
+        studio: Studio,
+        motion: MotionFile | None = None,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
         self.history = History(state)
-        self.controls = Controls(self.history)
+        self.player = Player(self.history, motion, clock)
+        self.controls = Controls(self.history, lambda: self.shown)
         self.studio = studio
         self.split = Split()
         self.status = self.message = ""
         self.scene_file, self.picture_file, self.picture_size = "scene.toml", "dermis.png", (1920, 1080)
+        self.motion_file, self.search = motion.path if motion else "", ""
         self.positions: dict[str, tuple[float, float]] = {}
 
     @property
     def state(self) -> ViewerState:
         """The current state."""
         return self.history.state
+
+    @property
+    def shown(self) -> ViewerState:
+        """The current state, moved while a motion plays: what is seen, saved and frozen."""
+        return self.player.shown
 
     def change(self, state: ViewerState, gesture: str = "") -> None:
         """Go to a new state; changes with the same gesture are undone together."""
@@ -49,7 +68,7 @@ class Session:
 
         Raises DermisError when that is not possible.
         """
-        save_state(path, self.state)
+        save_state(path, self.shown)
         self.message = f"saved {path}"
 
     def load(self, path: Path) -> None:
@@ -57,20 +76,30 @@ class Session:
 
         Raises DermisError for a file that is not a scene.
         """
-        self.change(load_state(path, self.state))
+        state = load_state(path, self.state)
+        self.player.stop()
+        self.change(state)
         self.message = f"loaded {path}"
+
+    def open_motion(self, path: str) -> None:
+        """Play the motion of a file.
+
+        Raises DermisError for one that cannot be read and for one of which the head has no name.
+        """
+        self.player.open(MotionFile(path))
+        self.message = f"opened {path}"
 
     def screenshot(self, path: Path, size: tuple[int, int]) -> None:
         """Write the picture at any size: .png with the tone curve or .exr, linear.
 
         Raises DermisError when that is not possible.
         """
-        kind, view = path.suffix.lower(), self.state.view
+        kind, view = path.suffix.lower(), self.shown.view
         if kind not in (".png", ".exr"):
             refuse(f"picture {path}", "a name that ends in .png or .exr", f"{path.name!r} came", "Change it")
         if kind == ".exr" and view not in (PICTURE, *PARTS):
             refuse(f"view {view} as .exr", "a view of linear light", "its numbers are colours", "Take .png")
-        self.studio.screenshot(path, self.state, size)
+        self.studio.screenshot(path, self.shown, size)
         self.message = f"wrote {path}, {size[0]} x {size[1]}"
 
 

@@ -10,16 +10,19 @@ from typing import Any, TypeVar
 from dermis.errors import refuse
 from dermis.mesh.head import Head
 from dermis.scene.camera import Camera
+from dermis.scene.clips.clip import Clip
 from dermis.scene.environment import Environment
 from dermis.scene.files import NO_LIGHTS, head_table, load_lights, load_scene
 from dermis.scene.heads import load_head
 from dermis.scene.lights import Light
 from dermis.scene.model import Scene
 from dermis.scene.plain import Plain
+from dermis.scene.pose import Pose
 from dermis.scene.saving import save_scene
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Pigments
 from dermis.viewer.chart import Chart
+from dermis.viewer.posing import same_pose, with_moves
 
 P = TypeVar("P", bound=Plain)
 PICTURE = "picture"
@@ -37,6 +40,7 @@ class ViewerState:
     view : one of `views.VIEWS`: the picture or an intermediate result
     rig : the lights' preset, empty for custom lights
     chart : the part of the atlas that the view "atlas" shows
+    seconds : where in the motion the pose is [s]
     """
 
     scene: Scene
@@ -45,6 +49,7 @@ class ViewerState:
     view: str = PICTURE
     rig: str = "studio"
     chart: Chart = field(default_factory=Chart)
+    seconds: float = 0.0
 
     def with_skin(self, **fields: Any) -> ViewerState:
         """Change fields of the skin.
@@ -92,6 +97,18 @@ class ViewerState:
         """Show another part of the atlas."""
         return replace(self, chart=chart)
 
+    def with_pose(self, pose: Pose | None) -> ViewerState:
+        """Move the head otherwise; None for at rest."""
+        return self._with_scene(pose=pose)
+
+    def at(self, clip: Clip, seconds: float) -> ViewerState:
+        """Take the pose that a motion has at a time [s]; what it does not move stays.
+
+        Raises DermisError for a frame that cannot be read.
+        """
+        pose = with_moves(Pose.of(self.scene.pose), clip.pose_at(seconds))
+        return replace(self.with_pose(pose), seconds=seconds)
+
     def with_head(self, head: Head, table: Mapping[str, Any], rho_s: float) -> ViewerState:
         """Replace the head or its maps.
 
@@ -111,9 +128,10 @@ def same(a: ViewerState, b: ViewerState) -> bool:
     def rest(state: ViewerState) -> tuple[Any, ...]:
         scene = state.scene
         seen = tuple(scene.lights), scene.camera, scene.skin, scene.environment
-        return (*seen, state.settings, state.head, state.view, state.rig, state.chart)
+        return (*seen, state.settings, state.head, state.view, state.rig, state.chart, state.seconds)
 
-    return a.scene.head is b.scene.head and rest(a) == rest(b)
+    one, other = a.scene, b.scene
+    return one.head is other.head and same_pose(one.pose, other.pose) and rest(a) == rest(b)
 
 
 def changed(values: P, **fields: Any) -> P:

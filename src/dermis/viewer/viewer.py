@@ -12,6 +12,7 @@ from dermis.scene.camera import Camera
 from dermis.viewer.blit import Blit, Patch
 from dermis.viewer.controls import shifted
 from dermis.viewer.navigation import Easing
+from dermis.viewer.player import MotionFile
 from dermis.viewer.session import Session
 from dermis.viewer.state import ViewerState
 from dermis.viewer.studio import Studio
@@ -31,6 +32,7 @@ class Viewer:
     canvas : of any backend of rendercanvas
     adapter : "auto", "cpu" or part of an adapter's name
     clock : time [s]
+    motion : played from the beginning
 
     `failure` is the error that closed the canvas when the device could not be opened again.
 
@@ -43,13 +45,15 @@ class Viewer:
         canvas: Any,
         adapter: str = "auto",
         clock: Callable[[], float] = time.perf_counter,
+        motion: MotionFile | None = None,
     ) -> None:
         from dermis.viewer.panel.panel import Panel  # whose packages are in the extra `viewer`
 
         self.canvas = canvas
         self._adapter, self._clock = adapter, clock
         self._context = canvas.get_wgpu_context()
-        self.session = Session(state, Studio(adapter))
+        self.session = Session(state, Studio(adapter), motion, clock)
+        self.session.player.play()
         self.panel = Panel(self.session)
         self._easing = Easing(state.scene.camera)
         self._last_draw = self._last_change = clock()
@@ -79,7 +83,7 @@ class Viewer:
     @property
     def is_still(self) -> bool:
         """Whether the last picture is final until something changes."""
-        state, studio = self.session.state, self.session.studio
+        state, studio = self.session.shown, self.session.studio
         arrived = self._last_state is state and self._easing.camera == state.scene.camera
         final = studio.is_current or self._refused is state
         return arrived and final and not self._is_moving(self._clock())
@@ -90,7 +94,8 @@ class Viewer:
 
     def _draw(self, now: float) -> None:
         session, size = self.session, self._picture_size()
-        state, elapsed = session.state, min(now - self._last_draw, _LONGEST_STEP_S)
+        session.player.advance()
+        state, elapsed = session.shown, min(now - self._last_draw, _LONGEST_STEP_S)
         before = self._easing.camera
         camera = self._easing.advance(state.scene.camera, elapsed)
         if state is not self._last_state or camera != before or size != self._last_size:
@@ -143,7 +148,7 @@ class Viewer:
         return session.studio.last_image, None
 
     def _is_moving(self, now: float) -> bool:
-        return now - self._last_change < _QUIET_S
+        return self.session.player.is_playing or now - self._last_change < _QUIET_S
 
     def _status(self, size: tuple[int, int]) -> str:
         studio = self.session.studio

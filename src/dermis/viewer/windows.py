@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any, NoReturn
 
 from dermis.errors import refuse
+from dermis.viewer.player import MotionFile
 from dermis.viewer.state import ViewerState, named_state
 from dermis.viewer.viewer import Viewer
 
@@ -16,8 +17,10 @@ _TITLE = "dermis"
 _MOST_FPS = 60
 
 
-def show_window(state: ViewerState, adapter: str, size: Size) -> None:
+def show_window(state: ViewerState, adapter: str, size: Size, *, motion: MotionFile | None = None) -> None:
     """Open a desktop window and return when it is closed.
+
+    motion : played in it
 
     Raises DermisError without a display, a device or the extra `viewer`.
     """
@@ -30,7 +33,7 @@ def show_window(state: ViewerState, adapter: str, size: Size) -> None:
         canvas = backend.RenderCanvas(size=size, title=_TITLE, max_fps=_MOST_FPS)
     except Exception as error:  # glfw has no class of its own for a missing display
         _refuse_display(error)
-    viewer = Viewer(state, canvas, adapter)
+    viewer = Viewer(state, canvas, adapter, motion=motion)
     backend.loop.run()
     _raise_failure(viewer)
 
@@ -44,6 +47,7 @@ def serve(
     announce: Callable[[str, bool], None],
     *,
     secret: bool = False,
+    motion: MotionFile | None = None,
 ) -> None:
     """Serve web pages until interrupted.
 
@@ -51,6 +55,7 @@ def serve(
     port : 0 for any free one
     announce : called with the page's URL and whether other machines can reach it
     secret : whether the URL has a token even when only this machine can reach it
+    motion : played in the pages
 
     Raises DermisError when the address cannot be used, without a device or the extra `viewer`.
     """
@@ -60,7 +65,8 @@ def serve(
 
     listener, address = bind(host, port, secret=secret)
     with listener:
-        viewer = Viewer(state, PageCanvas(size=size, title=_TITLE, max_fps=_MOST_FPS), adapter)
+        canvas = PageCanvas(size=size, title=_TITLE, max_fps=_MOST_FPS)
+        viewer = Viewer(state, canvas, adapter, motion=motion)
         viewer.canvas._size_info.set_physical_size(*size, 1.0)
         announce(address.url, not is_local(host))
         pages = server(address)
@@ -71,17 +77,19 @@ def serve(
 
 
 def notebook_viewer(
-    shown: ViewerState | str = "bust", adapter: str = "auto", size: Size = (720, 540)
+    shown: ViewerState | str = "bust", adapter: str = "auto", size: Size = (720, 540), motion: str = ""
 ) -> Viewer:
     """A viewer for a notebook cell to display.
 
     shown : a state, or what `dermis view` takes: the built-in bust, a sample, a mesh file, a TOML scene
+    motion : a file that `load_motion` takes, empty for none
 
     Raises DermisError for anything else, and without the extra `notebook`.
     """
     canvas = _notebook_canvas(_backend("anywidget", ("anywidget",), "notebook"))
     state = shown if isinstance(shown, ViewerState) else named_state(shown)
-    return Viewer(state, canvas(size=size, max_fps=_MOST_FPS), adapter)
+    played = MotionFile(motion) if motion else None
+    return Viewer(state, canvas(size=size, max_fps=_MOST_FPS), adapter, motion=played)
 
 
 def _notebook_canvas(backend: Any) -> Any:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import MOST_SHEAR, Atlas
-from dermis.atlas.stitched.cover import Cover, cover, metric_of, roots_of, runs_of
+from dermis.atlas.stitched.cover import Cover, cover, hidden, metric_of, runs_of
 from dermis.atlas.stitched.gutter import GutterWidth, Packing, find_border
 from dermis.atlas.stitched.overlap_cuts import cut_overlaps
 from dermis.atlas.stitched.pack import pack_pieces
@@ -75,33 +75,17 @@ def build_stitched(mesh: Mesh, size: int, reach_mm: float) -> Atlas | None:
     packing = pack_pieces(surface, piece, scale, size, width)
     if packing is None:
         return None
-    made = _cover(surface, piece, packing, width, size)
     # where a piece overlaps itself only one layer has light: gutters must not read the other
-    lost = _lost(piece, packing, made)
-    if lost.any():
-        piece = np.where(lost, -1, piece)
-        made = _cover(surface, piece, packing, width, size)
-    return _atlas(surface, packing, made, piece >= 0)
-
-
-def _cover(surface: FlatSurface, piece: Index, packing: Packing, width: GutterWidth, size: int) -> Cover:
+    piece = np.where(hidden(surface, piece, packing, size), -1, piece)
     own = np.flatnonzero(piece >= 0)
-    return cover(surface, piece, own, find_border(surface, piece, own), packing, width, (size, size))
-
-
-def _lost(piece: Index, packing: Packing, made: Cover) -> NDArray[np.bool_]:
-    """Triangles (f,) most of whose texels are owned by others."""
-    from dermis.atlas.stitched.kernels.fill import count
-
-    inside, owned = np.zeros((2, len(piece)), np.int64)
-    count(packing.places, np.flatnonzero(piece >= 0), made.rooted, inside, owned)
-    return np.asarray(owned < 0.5 * inside)
+    made = cover(surface, piece, own, find_border(surface, piece, own), packing, width, (size, size))
+    return _atlas(surface, packing, made, piece >= 0)
 
 
 def _atlas(surface: FlatSurface, packing: Packing, made: Cover, mapped: NDArray[np.bool_]) -> Atlas:
     size = len(made.triangle)
     metric = metric_of(surface, packing, made)
-    reach = runs_of(surface, made, made.piece, metric, roots_of(packing, made))
+    reach = runs_of(surface, packing, made)
     y, x = np.nonzero(made.gutter)
     second = made.weights[y, x].astype(np.float64)
     weights = np.column_stack((1 - second.sum(axis=1), second))

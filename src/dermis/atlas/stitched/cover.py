@@ -8,10 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.stitched.gutter import Border, GutterTexels, GutterWidth, Packing, walk_gutter
-from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
+from dermis.atlas.stitched.surface import Flags, FlatSurface, Index, read
+from dermis.atlas.stitched.texels import (
+    Rooted,
+    gap_mm,
+    lengths,
+    lost,
+    opposed,
+    owners,
+    unsure,
+    weights_at,
+)
 
 Singles = NDArray[np.float32]
-_STEPS, _SLACK_MM = 2.0, 0.5  # neighbours farther apart than so many steps plus the slack have a gap
 
 
 @dataclass(frozen=True)
@@ -47,13 +56,8 @@ def cover(
 
     piece, own : (f,) and numbers of triangles, as for `find_border`
     """
-    from dermis.atlas.stitched.kernels.fill import fill, weigh
-
-    # triangles that are mirrored within their piece are drawn first, so that others win
-    drawn = own[np.argsort(~_mirrored(surface, piece[own], own), kind="stable")]
-    owner, weights = np.full(shape, -1, np.int32), np.zeros((*shape, 2), np.float32)
-    fill(packing.places, drawn, owner)
-    weigh(packing.places, owner, weights)
+    owner = owners(packing.places, _drawn(surface, piece, own), shape)
+    weights = weights_at(packing.places, owner)
     made = Cover(
         owner,
         weights,
@@ -86,6 +90,18 @@ def _add_gutters(made: Cover, piece: Index, found: GutterTexels) -> None:
     made.gutter[gone] = False
 
 
+def hidden(surface: FlatSurface, piece: Index, packing: Packing, size: int) -> Flags:
+    """Triangles (f,) most of whose texels others of their piece own."""
+    own = np.flatnonzero(piece >= 0)
+    owner = owners(packing.places, _drawn(surface, piece, own), (size, size))
+    return lost(packing.places, own, owner)
+
+
+def _drawn(surface: FlatSurface, piece: Index, own: Index) -> Index:
+    """Triangles that are mirrored within their piece first, so that others win."""
+    return own[np.argsort(~_mirrored(surface, piece[own], own), kind="stable")]
+
+
 def _mirrored(surface: FlatSurface, piece: Index, own: Index) -> Flags:
     """Which of the triangles `own` face the other way than most of their piece."""
     whole = np.bincount(piece, surface.area_uv[own])
@@ -112,38 +128,47 @@ def _repeat_edge(made: Cover, piece: Index, ended: Flags, y: Index, x: Index) ->
 
 def metric_of(surface: FlatSurface, packing: Packing, made: Cover) -> Singles:
     """(h, w, 3) texels per mm along u and v and the cosine between them; in gutters those at the border."""
-    metric = _read(made.rooted, made.roots, surface.lengths)
-    covered = made.rooted >= 0
-    per_uv = packing.per_uv[made.rooted[covered]].astype(np.float32)
-    metric[covered, :2] = per_uv[:, None] / np.maximum(metric[covered, :2], 1e-3)
+    metric, there = np.zeros((*made.rooted.shape, 3), np.float32), made.rooted >= 0
+    found = read(surface.lengths.astype(np.float32), made.rooted[there], made.roots[there])
+    per_uv = packing.per_uv[made.rooted[there]].astype(np.float32)
+    found[:, :2] = per_uv[:, None] / np.maximum(found[:, :2], 1e-3)
+    metric[there] = found
     return metric
 
 
-def roots_of(packing: Packing, made: Cover) -> Singles:
-    """(h, w, 2) nearest place on its own piece [texel] of each texel."""
-    return _read(made.rooted, made.roots, packing.places)
+def runs_of(surface: FlatSurface, packing: Packing, made: Cover) -> NDArray[np.uint16]:
+    """(h, w, 4) texels to the left, right, up and down of the same piece, while the surface continues.
 
-
-def runs_of(
-    surface: FlatSurface, made: Cover, chart: NDArray[np.int32], metric: Singles, roots: Singles
-) -> NDArray[np.uint16]:
-    """(h, w, 4) texels to the left, right, up and down of the same chart, while the surface continues.
-
-    chart : (h, w) -1 where nothing is
-    metric, roots : of `metric_of` and `roots_of`
+    It ends between texels whose points are farther apart than `gap_mm`, and whose roots are farther apart
+    than either texel is from its root.
     """
-    from dermis.atlas.stitched.kernels.texels import runs
-
-    points = _read(made.triangle, made.weights, surface.corners)
-    reach = np.zeros((*chart.shape, 4), np.uint16)
-    runs(chart, points, roots, metric, _STEPS, _SLACK_MM, reach)
+    owner = np.where(made.rooted >= 0, np.where(made.away_mm > 0, -1, made.rooted), -2)
+    reach = np.empty((*owner.shape, 4), np.uint16)
+    for axis in (0, 1):
+        joined = np.zeros(owner.shape, np.bool_)
+        here, before = np.moveaxis(joined, 1 - axis, 0)[1:], np.moveaxis(made.piece, 1 - axis, 0)
+        here[:] = (before[1:] >= 0) & (before[1:] == before[:-1])
+        first, second = unsure(surface, owner, axis)
+        same = joined.ravel()[second]
+        joined.ravel()[second[same]] = ~_parted(surface, packing, made, first[same], second[same], axis)
+        found = lengths(np.moveaxis(joined, 1 - axis, 1))
+        reach[..., 2 * axis], reach[..., 2 * axis + 1] = (np.moveaxis(one, 1, 1 - axis) for one in found)
     return reach
 
 
-def _read(triangle: NDArray[np.int32], weights: Singles, corners: Doubles) -> Singles:
-    """(h, w, c) of (f, 3, c) at corners, 0 where there is no triangle."""
-    from dermis.atlas.stitched.kernels.texels import read
+def _parted(
+    surface: FlatSurface, packing: Packing, made: Cover, first: Index, second: Index, axis: int
+) -> Flags:
+    """Whether there is a gap between texels, by their flat indices."""
+    one, other = (_rooted(surface, packing, made, texel) for texel in (first, second))
+    triangle, weights = made.triangle.ravel(), made.weights.reshape(-1, 2)
+    points = [surface.at(triangle[texel], weights[texel]) for texel in (first, second)]
+    apart_mm = np.linalg.norm(points[0] - points[1], axis=1)
+    return np.asarray(opposed(one, other) & (apart_mm > gap_mm(one, other, axis)))
 
-    values = np.zeros((*triangle.shape, corners.shape[2]), np.float32)
-    read(triangle, weights, corners, values)
-    return values
+
+def _rooted(surface: FlatSurface, packing: Packing, made: Cover, texel: Index) -> Rooted:
+    root, weights = made.rooted.ravel()[texel], made.roots.reshape(-1, 2)[texel]
+    texels = np.column_stack(np.divmod(texel, made.rooted.shape[1])[::-1]).astype(np.float64)
+    steps = surface.lengths[root, 0, :2] / packing.per_uv[root, None]
+    return Rooted(texels, read(packing.places, root, weights), steps)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.atlas.raster import texels_in
+from dermis.atlas.stitched.nearest import Nearest, Sides, nearest_sides
 from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
+from dermis.atlas.stitched.walk import Ends, walk
 
 _MOST_STRETCH = 2.0  # largest texels per mm of a border over its piece's mean, for gutter widths
 
@@ -57,21 +60,6 @@ def find_border(surface: FlatSurface, piece: Index, own: Index) -> Border:
     return Border(triangle, index, (beyond >= 0) & surface.adjacency.free[beyond])
 
 
-class Sides(NamedTuple):
-    """The sides of a border on a grid.
-
-    ends : (k, 2, 2) [texel]
-    steps : (k, 2, 2, 2) on the surface, at both ends, for a texel to the right and for one down [mm]
-    reach_mm : (k,) how far texels beyond it belong to it
-    widest : (k,) and how far at most [texel]
-    """
-
-    ends: Doubles
-    steps: Doubles
-    reach_mm: Doubles
-    widest: Doubles
-
-
 def sides_of(surface: FlatSurface, border: Border, packing: Packing, width: GutterWidth) -> Sides:
     """The sides of a border as they are placed."""
     triangle, both = border.triangle, (border.side, (border.side + 1) % 3)
@@ -83,35 +71,6 @@ def sides_of(surface: FlatSurface, border: Border, packing: Packing, width: Gutt
     return Sides(ends, steps, np.where(border.seam, width.reach_mm, 0.0), widest)
 
 
-class NearestSides(NamedTuple):
-    """For each texel of a grid (h, w) outside of pieces, the nearest place on a border.
-
-    side, share : number of the side, -1 without one; how far along it, 0 to 1
-    away_mm2 : squared distance by the metric that the surface has there
-    rim : texels that interpolation at some place on a border reads
-    """
-
-    side: NDArray[np.int32]
-    share: NDArray[np.float32]
-    away_mm2: NDArray[np.float32]
-    rim: Flags
-
-
-def nearest_sides(sides: Sides, owner: NDArray[np.int32]) -> NearestSides:
-    """The nearest side of each texel within reach.
-
-    owner : (h, w) triangles of the pieces, -1 outside
-    """
-    from dermis.atlas.stitched.kernels.fill import nearest_side
-
-    shape = owner.shape
-    side, rim = np.full(shape, -1, np.int32), np.zeros(shape, np.bool_)
-    share, away = np.zeros(shape, np.float32), np.full(shape, np.inf, np.float32)
-    u, v = (np.ascontiguousarray(sides.steps[:, :, k]) for k in (0, 1))
-    nearest_side(sides.ends, u, v, sides.reach_mm, sides.widest, owner, side, share, away, rim)
-    return NearestSides(side, share, away, rim)
-
-
 def needed(
     surface: FlatSurface,
     own: Index,
@@ -121,11 +80,10 @@ def needed(
     shape: tuple[int, int],
 ) -> Flags:
     """(h, w) texels that pieces, rims and gutters may need."""
-    from dermis.atlas.stitched.kernels.fill import fill
-
-    owner = np.full(shape, -1, np.int32)
-    fill(packing.places, own, owner)
-    return (owner >= 0) | (nearest_sides(sides_of(surface, border, packing, width), owner).side >= 0)
+    found = np.zeros(shape, np.bool_)
+    found.ravel()[texels_in(packing.places[own], shape)[0]] = True
+    found.ravel()[nearest_sides(sides_of(surface, border, packing, width), found).texel] = True
+    return found
 
 
 class GutterTexels(NamedTuple):
@@ -157,26 +115,39 @@ def walk_gutter(
 
     owner : (h, w) triangles of the pieces, -1 outside
     """
-    from dermis.atlas.stitched.kernels.walk import walk
+    nearest = nearest_sides(sides := sides_of(surface, border, packing, width), owner >= 0)
+    texels = np.column_stack(np.divmod(nearest.texel, owner.shape[1])[::-1])
+    ends, weights = walk_from(surface, border, sides, nearest, texels)
+    y, x = texels.T[::-1]
+    root = border.triangle[nearest.side].astype(np.int32)
+    return GutterTexels(y, x, nearest.rim, nearest.away_mm, root, weights, *ends)
 
-    triangle, first = border.triangle, border.side
+
+def walk_from(
+    surface: FlatSurface, border: Border, sides: Sides, nearest: Nearest, texels: NDArray[Any]
+) -> tuple[Ends, Doubles]:
+    """Where straight walks to texels (n, 2) from the nearest places on a border end, and weights of these."""
+    t, root = nearest.share[:, None], border.triangle[nearest.side]
+    first, rows = border.side[nearest.side], np.arange(len(root))
     second = (first + 1) % 3
-    sides = sides_of(surface, border, packing, width)
-    side, share, away, rim = nearest_sides(sides, owner)
-    y, x = np.nonzero(side >= 0)
-    k, t = side[y, x], share[y, x].astype(np.float64)[:, None]
-    root = triangle[k].astype(np.int32)
-    start = _between(surface.adjacency.flat[root, first[k]], surface.adjacency.flat[root, second[k]], t)
-    off = np.column_stack((x, y)) - _between(sides.ends[k, 0], sides.ends[k, 1], t)
-    target = start + np.einsum(
-        "ns,nsa->na", off, _between(sides.steps[k, 0], sides.steps[k, 1], t[..., None])
-    )
-    found, weights, whole = np.empty(len(k), np.int32), np.empty((len(k), 2)), np.empty(len(k), np.bool_)
-    walk(surface.adjacency, root, start, target, found, weights, whole)
-    corner = np.zeros((len(k), 3))
-    rows = np.arange(len(k))
-    corner[rows, first[k]], corner[rows, second[k]] = 1 - t[:, 0], t[:, 0]
-    return GutterTexels(y, x, rim[y, x], np.sqrt(away[y, x]), root, corner[:, 1:], found, weights, whole)
+    start = _between(surface.adjacency.flat[root, first], surface.adjacency.flat[root, second], t)
+    off = texels - places_on(sides, nearest)
+    step = np.einsum("ns,nsa->na", off, steps_at(sides, nearest))
+    corner = np.zeros((len(root), 3))
+    corner[rows, first], corner[rows, second] = 1 - t[:, 0], t[:, 0]
+    return walk(surface.adjacency, root, start, start + step), corner[:, 1:]
+
+
+def places_on(sides: Sides, nearest: Nearest) -> Doubles:
+    """(n, 2) the nearest places [texel]."""
+    first, second = np.moveaxis(sides.ends[nearest.side], 1, 0)
+    return _between(first, second, nearest.share[:, None])
+
+
+def steps_at(sides: Sides, nearest: Nearest) -> Doubles:
+    """(n, 2, 2) steps on the surface there, for a texel to the right and for one down [mm]."""
+    first, second = np.moveaxis(sides.steps[nearest.side], 1, 0)
+    return _between(first, second, nearest.share[:, None, None])
 
 
 def _between(a: Doubles, b: Doubles, t: Doubles) -> Doubles:

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from dermis.atlas.stitched.cover import Cover, cover, metric_of, roots_of, runs_of
-from dermis.atlas.stitched.gutter import GutterWidth, Packing, find_border
+from dermis.atlas.stitched.conflicts import Conflicts, find_conflicts
 from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
 from dermis.atlas.unwrap.charts import pieces as connected
+from dermis.mesh.components import components
 
-_FINEST_MM = 0.5  # texels of the grids on which overlaps are looked for
-_MOST_TEXELS = 300_000  # of a piece on such a grid
-_MOST_CELLS = 2_000_000  # of the grid
-_NEAR = 0.6  # of the reach: conflicts farther out hardly matter
+_CELL, _FINE = 0.7, 8  # of the reach, conflicts in cells beside each other are near; cells in a reach
 _LEAST = 1.0  # length of conflicts, in reaches, that is worth a cut
 _WORTH = 0.2  # fewest conflicts that a cut separates per texel of its length
 _ANGLES, _OFFSETS = 8, 16
@@ -22,27 +17,6 @@ _FRESH = 1.0  # of the conflicts' number: added to lengths, so that short cuts d
 _CRUMB = 0.1  # area in squares of the reach
 _DEEPEST = 4
 _GROWTH = 0.25  # of all pieces by gutters along cuts, at most
-
-
-class Conflicts(NamedTuple):
-    """Texels at which a piece's gutters overlap.
-
-    one, other : (n, 2) the two places of the piece that these gutters belong to [texel]
-    inside : (m, 2) texels of the piece
-    per_uv : texels in a unit of uv
-    texel_mm : their side on the surface
-    """
-
-    one: Doubles
-    other: Doubles
-    inside: Doubles
-    per_uv: float
-    texel_mm: float
-
-    @property
-    def length_mm(self) -> float:
-        """Length along which the gutters overlap."""
-        return len(self.one) * self.texel_mm
 
 
 def cut_overlaps(surface: FlatSurface, piece: Index, reach_mm: float) -> Index:
@@ -100,90 +74,51 @@ def _cut(surface: FlatSurface, placed: Flags, own: Index, reach_mm: float) -> In
 
 def _clusters(found: Conflicts, reach: float) -> list[Index]:
     """Clusters of conflicts near each other, as their indices."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import KDTree
+    cells = np.floor((found.one + found.other) / 2 / (_CELL * reach)).astype(np.int64)
+    cells, of = np.unique(cells, axis=0, return_inverse=True)
+    beside = np.abs(cells[:, None] - cells).max(axis=2) <= 1
+    label = components(len(cells), *np.nonzero(beside))[of.reshape(-1)]
+    return [np.flatnonzero(label == k) for k in range(label.max(initial=-1) + 1)]
 
-    middle = (found.one + found.other) / 2
-    if not len(middle):
-        return []
-    a, b = KDTree(middle).query_pairs(reach, output_type="ndarray").T
-    graph = coo_array((np.ones(len(a)), (a, b)), shape=(len(middle),) * 2)
-    count, label = connected_components(graph, directed=False)
-    return [np.flatnonzero(label == k) for k in range(count)]
+
+def _near(places: Doubles, others: Doubles, reach: float) -> Flags:
+    """Which of the places (..., 2) are about within reach of any of the others (n, 2)."""
+    cell = reach / _FINE
+    low = np.floor(others.min(axis=0) / cell) - _FINE - 1
+    disc = np.argwhere(np.hypot(*(np.indices((2 * _FINE + 1,) * 2) - _FINE)) <= _FINE)
+    at = np.floor(others / cell - low).astype(np.int64) - _FINE
+    found = np.zeros(at.max(axis=0) + 2 * _FINE + 2, np.bool_)
+    found[tuple(np.moveaxis(at[:, None] + disc, 2, 0))] = True
+    where = np.floor(places / cell - low).astype(np.int64)
+    where = np.where(((where >= 0) & (where < found.shape)).all(axis=-1, keepdims=True), where, 0)
+    return np.asarray(found[where[..., 0], where[..., 1]])  # at 0 there is nothing
 
 
 def _strip(surface: FlatSurface, own: Index, overlap: Conflicts, half: Flags, reach: float) -> Flags:
     """Triangles along that side of an overlap where they have less area."""
-    from scipy.spatial import KDTree
-
     corners = surface.uv[own] * overlap.per_uv
     places = np.concatenate((corners, corners.mean(axis=1, keepdims=True)), axis=1)
-    tree = KDTree(np.concatenate((overlap.one, overlap.other)))
-    about = np.logical_and(places >= tree.mins - reach, places <= tree.maxes + reach)
-    near = np.asarray(np.any(np.all(about, axis=2), axis=1))  # the others need no search
-    near[near] = np.isfinite(tree.query(places[near], distance_upper_bound=reach)[0]).any(axis=1)
+    near = np.asarray(_near(places, np.concatenate((overlap.one, overlap.other)), reach).any(axis=1))
     area = surface.area_mm2[own]
     return near & (half if area[near & half].sum() < area[near & ~half].sum() else ~half)
 
 
-def find_conflicts(surface: FlatSurface, placed: Flags, own: Index, reach_mm: float) -> Conflicts:
-    """Conflicts of the piece that consists of the triangles `own`, on a grid of its own.
-
-    placed : (f,) triangles of any piece
-    """
-    piece = np.where(placed, 1, -1)
-    piece[own] = 0
-    mm2, area_uv = surface.area_mm2[own].sum(), np.abs(surface.area_uv[own]).sum()
-    low, high = surface.uv[own].min(axis=(0, 1)), surface.uv[own].max(axis=(0, 1))
-    box_mm2 = float((high - low).prod()) * mm2 / area_uv
-    texel_mm = max(_FINEST_MM, np.sqrt(mm2 / _MOST_TEXELS), np.sqrt(box_mm2 / _MOST_CELLS))
-    per_uv = float(np.sqrt(mm2 / area_uv) / texel_mm)
-    widest = np.ceil(2 * reach_mm / texel_mm)
-    places = np.zeros(surface.uv.shape)
-    places[own] = (surface.uv[own] - low) * per_uv + widest + 2
-    every = np.ones(len(piece))
-    packing = Packing(places, per_uv * every, every / texel_mm)
-    width, height = np.ceil((high - low) * per_uv + 2 * widest + 5).astype(int)
-    border = find_border(surface, piece, own)
-    made = cover(
-        surface, piece, own, border, packing, GutterWidth(reach_mm, widest), (int(height), int(width))
-    )
-    origin = low * per_uv - widest - 2
-    one, other = _meetings(surface, packing, made, _NEAR * reach_mm)
-    y, x = np.nonzero((made.rooted >= 0) & (made.away_mm == 0))
-    return Conflicts(one + origin, other + origin, np.column_stack((x, y)) + origin, per_uv, float(texel_mm))
-
-
-def _meetings(surface: FlatSurface, packing: Packing, made: Cover, near_mm: float) -> tuple[Doubles, Doubles]:
-    """Roots (n, 2) of the texels on both sides of gaps [texel]."""
-    near = np.where(made.away_mm < near_mm, made.piece, -1)
-    roots = roots_of(packing, made)
-    reach = runs_of(surface, made, near, metric_of(surface, packing, made), roots)
-    left = (near[:, 1:] >= 0) & (near[:, :-1] >= 0) & (reach[:, 1:, 0] == 0)
-    up = (near[1:] >= 0) & (near[:-1] >= 0) & (reach[1:, :, 2] == 0)
-    one = np.concatenate((roots[:, 1:][left], roots[1:][up])).astype(np.float64)
-    return one, np.concatenate((roots[:, :-1][left], roots[:-1][up])).astype(np.float64)
-
-
 def _best_line(overlap: Conflicts, reach: float) -> tuple[Doubles, float, int]:
     """Normal and offset of the line that separates most conflicts for its length near them; their number."""
-    from scipy.spatial import KDTree
-
-    tree = KDTree(np.concatenate((overlap.one, overlap.other)))
-    close = overlap.inside[np.isfinite(tree.query(overlap.inside, distance_upper_bound=reach)[0])]
+    close = overlap.inside[_near(overlap.inside, np.concatenate((overlap.one, overlap.other)), reach)]
     best, line = -1.0, (np.array([1.0, 0.0]), 0.0, 0)
     for angle in np.arange(_ANGLES) * np.pi / _ANGLES:
         normal = np.array([np.cos(angle), np.sin(angle)])
         one, other, inside = (places @ normal for places in (overlap.one, overlap.other, close))
         low, high = np.minimum(one, other), np.maximum(one, other)
         first, last = low.min(), high.max()
-        for offset in first + (last - first) * (np.arange(_OFFSETS) + 0.5) / _OFFSETS:
-            parted = np.count_nonzero((low < offset) & (offset < high))
-            length = np.count_nonzero(np.abs(inside - offset) < 0.5)
-            score = parted / (length + _FRESH * len(one))
-            if score > best:
-                best, line = score, (normal, float(offset), int(parted))
+        offsets = first + (last - first) * (np.arange(_OFFSETS)[:, None] + 0.5) / _OFFSETS
+        parted = np.count_nonzero((low < offsets) & (offsets < high), axis=1)
+        length = np.count_nonzero(np.abs(inside - offsets) < 0.5, axis=1)
+        score = parted / (length + _FRESH * len(one))
+        found = int(score.argmax())
+        if score[found] > best:
+            best, line = score[found], (normal, float(offsets[found, 0]), int(parted[found]))
     return line
 
 

@@ -5,15 +5,20 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dermis.atlas.stitched.gutter import Border, GutterWidth, Packing, find_border, needed
+from dermis.atlas.stitched.lay import lay_shapes
 from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
 
 _CELLS = 512  # along the square at most
-_HALVINGS = 9  # in the search for the scale
-_ATTEMPTS = 6  # by size, height, width; each by rows and by columns
-_GAIN = 1.003  # of the scale, for another attempt to be worth a search
+_COARSE = 4  # of them in one of those with which the best order is looked for, along each axis
+_HALVINGS = 8  # in the search for the scale
+_FINE_HALVINGS, _MORE = 4, 1.12  # in that with all cells, in which at most so much more is found
+_ORDERS = 6  # by size, height, width; each by rows and by columns
+_GAIN = 1.003  # least gain of the scale for which an order is searched
+_MASKS = 4  # times at most that masks are made
+_CLOSE = 0.65  # share of the scale of masks below which they are made again,
+_ABOVE = 1.15  # so much above the one that was found
 
 
 class _Piece(NamedTuple):
@@ -35,17 +40,28 @@ class _Piece(NamedTuple):
     border: Border
 
 
-class _Shape(NamedTuple):
-    """Cells that a piece needs at some scale.
+class _Mask(NamedTuple):
+    """Cells that a piece needs, whatever its scale.
 
     spans : (m, 3) row, first and last column of runs of cells
-    extent : columns and rows
     margin : (2,) from the first cell to where the piece's uv is 0 [cell]
+    scale : [cell per unit of scaled uv]
     """
 
-    spans: NDArray[np.int32]
-    extent: tuple[int, int]
+    spans: Index
     margin: Doubles
+    scale: float
+
+
+class _Layout(NamedTuple):
+    """Where pieces fit.
+
+    scale : cells of the square in a unit of scaled uv
+    corners : (p, 2) where each piece's uv is 0 [cell]
+    """
+
+    scale: float
+    corners: Doubles
 
 
 def pack_pieces(
@@ -66,14 +82,14 @@ def pack_pieces(
     packing = Packing(np.zeros(surface.uv.shape), *np.zeros((2, len(piece))))
     if not pieces:
         return packing
-    best, corner = _search(pieces, cells, width._replace(widest=width.widest * cells / size))
-    if corner is None:
+    found = _search(pieces, cells, width._replace(widest=width.widest * cells / size))
+    if found is None:
         return None
     per_cell = size / cells
-    for own, one, low in zip(groups, pieces, corner, strict=True):
-        packing.places[own] = (one.uv * best + low) * per_cell - 0.5
-        packing.per_uv[own] = one.scale * best * per_cell
-        packing.per_mm[own] = one.per_mm * best * per_cell
+    for own, one, low in zip(groups, pieces, found.corners, strict=True):
+        packing.places[own] = (one.uv * found.scale + low) * per_cell - 0.5
+        packing.per_uv[own] = one.scale * found.scale * per_cell
+        packing.per_mm[own] = one.per_mm * found.scale * per_cell
     return packing
 
 
@@ -88,56 +104,83 @@ def _apart(surface: FlatSurface, piece: Index, own: Index, scale: float) -> _Pie
     return _Piece(part, uv, uv.max(axis=(0, 1)), scale, per_mm, border)
 
 
-def _search(pieces: list[_Piece], cells: int, width: GutterWidth) -> tuple[float, list[Doubles] | None]:
-    """Largest scale [cell per unit of scaled uv] at which all fit, and where each piece's uv is 0 [cell]."""
+def _search(pieces: list[_Piece], cells: int, width: GutterWidth) -> _Layout | None:
+    """The layout of the largest scale that is found."""
     area = sum(float(np.abs(one.part.area_uv).sum()) * one.scale**2 for one in pieces)
-    best, corner = 0.0, None
-    for attempt in range(_ATTEMPTS):
-        if attempt > 0 and (corner is None or _pack(pieces, best * _GAIN, cells, width, attempt) is None):
-            continue
-        low, high = best, cells / np.sqrt(area)
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2
-            found = _pack(pieces, middle, cells, width, attempt)
-            if found is None:
-                high = middle
-            else:
-                low, best, corner = middle, middle, found
-    return best, corner
+    top = cells / float(np.sqrt(area))
+    for _ in range(_MASKS):
+        found = _largest([_mask(one, top, width) for one in pieces], cells, top)
+        if found is None or found.scale > _CLOSE * top:
+            return found
+        top = _ABOVE * found.scale
+    return None
 
 
-def _pack(
-    pieces: list[_Piece], scale: float, cells: int, width: GutterWidth, attempt: int
-) -> list[Doubles] | None:
-    """Where each piece's uv is 0 [cell] when they are laid side by side; None if they do not fit.
+def _largest(masks: list[_Mask], cells: int, top: float) -> _Layout | None:
+    """The largest scale below `top` that fits, in the order that is best with coarse cells."""
+    coarse, best = None, 0
+    for order in range(_ORDERS):
+        least = coarse.scale if coarse else 0.0
+        if order == 0 or (coarse and _pack(masks, least * _GAIN, cells // _COARSE, order)):
+            found = _bisect(masks, (least, top / _COARSE), cells // _COARSE, order, _HALVINGS)
+            coarse, best = (found, order) if found else (coarse, best)
+    if coarse is None:
+        return _bisect(masks, (0.0, top), cells, 0, _HALVINGS)
+    same = _Layout(_COARSE * coarse.scale, _COARSE * coarse.corners)
+    return _bisect(masks, (same.scale, same.scale * _MORE), cells, best, _FINE_HALVINGS) or same
 
-    attempt : chooses which comes first, and whether by rows or by columns
+
+def _bisect(
+    masks: list[_Mask], bounds: tuple[float, float], cells: int, order: int, halvings: int
+) -> _Layout | None:
+    """The layout of the largest scale between two bounds that is found, None for none."""
+    (low, high), best = bounds, None
+    for _ in range(halvings):
+        middle = (low + high) / 2
+        found = _pack(masks, middle, cells, order)
+        if found is None:
+            high = middle
+        else:
+            low, best = middle, found
+    return best
+
+
+def _pack(masks: list[_Mask], scale: float, cells: int, order: int) -> _Layout | None:
+    """Pieces side by side at a scale [cell per unit of scaled uv], None if they do not fit.
+
+    order : chooses which comes first, and whether by rows or by columns
     """
-    from dermis.atlas.stitched.kernels.pack import pack
-
-    if any((one.most * scale > cells).any() for one in pieces):
+    shapes, low = zip(*(_scaled(one, scale / one.scale) for one in masks), strict=True)
+    if order % 2 == 1:
+        shapes = tuple(shape.T for shape in shapes)
+    size = [(np.count_nonzero(shape), *shape.shape) for shape in shapes]
+    if sum(area for area, _, _ in size) > cells**2:
         return None
-    shapes: list[_Shape] = []
-    area: list[int] = []
-    for one in pieces:
-        shapes.append(_shape(one, scale, width, by_columns=attempt % 2 == 1))
-        area.append(int((shapes[-1].spans[:, 2] - shapes[-1].spans[:, 1] + 1).sum()))
-        if sum(area) > cells**2 or max(shapes[-1].extent) > cells:
-            return None
-    extent = np.array([shape.extent for shape in shapes], np.int32)
-    order = np.argsort(-np.array((area, *extent.T))[attempt // 2], kind="stable")
-    spans = np.concatenate([shape.spans for shape in shapes])
-    first = np.cumsum([0, *(len(shape.spans) for shape in shapes)])
-    corner = np.zeros((len(shapes), 2), np.int32)
-    if not pack(spans, first, extent, order, cells, corner):
+    first = np.argsort([-one[order // 2] for one in size], kind="stable")
+    found = lay_shapes([_spans(shapes[k]).tolist() for k in first], cells)
+    if found is None:
         return None
-    if attempt % 2 == 1:
-        corner = corner[:, ::-1]
-    return [shape.margin + low for shape, low in zip(shapes, corner, strict=True)]
+    corners = np.empty((len(masks), 2))
+    corners[first] = np.array(found)[:, ::-1] if order % 2 == 1 else found
+    return _Layout(scale, corners + low)
 
 
-def _shape(one: _Piece, scale: float, width: GutterWidth, by_columns: bool) -> _Shape:
-    """All cells in which a texel might be needed; `by_columns` swaps rows and columns."""
+def _scaled(mask: _Mask, scale: float) -> tuple[Flags, Doubles]:
+    """(h, w) all cells that a mask touches at another scale, and its margin there."""
+    row, first, last = (mask.spans.T - mask.margin[[1, 0, 0], None]) * scale
+    top, bottom = np.floor(row).astype(int), np.ceil(row + scale).astype(int) - 1
+    left, right = np.floor(first).astype(int), np.ceil(last + scale).astype(int) - 1
+    low = np.array([left.min(), top.min()])
+    height, width = bottom.max() - low[1] + 1, right.max() - low[0] + 1
+    steps = np.zeros((height, width + 1), np.int32)
+    for rows in (top, bottom):
+        np.add.at(steps, (rows - low[1], left - low[0]), 1)
+        np.add.at(steps, (rows - low[1], right - low[0] + 1), -1)
+    return np.cumsum(steps, axis=1)[:, :-1] > 0, -low.astype(np.float64)
+
+
+def _mask(one: _Piece, scale: float, width: GutterWidth) -> _Mask:
+    """All cells in which a texel might be needed."""
     margin = np.ceil(_half_extent(one, scale, width)) + 2
     across, down = np.ceil(one.most * scale + 2 * margin).astype(int) + 1
     every = np.ones(len(one.uv))
@@ -149,20 +192,14 @@ def _shape(one: _Piece, scale: float, width: GutterWidth, by_columns: bool) -> _
     mask[:-1] |= mask[1:].copy()
     mask[:, 1:] |= mask[:, :-1].copy()
     mask[:, :-1] |= mask[:, 1:].copy()
-    y, x = np.nonzero(mask)
-    low = np.array([x.min(), y.min()])
-    mask = mask[low[1] : y.max() + 1, low[0] : x.max() + 1]
-    spans, extent = _spans(mask.T if by_columns else mask)
-    return _Shape(spans, extent, margin - low)
+    return _Mask(_spans(mask), margin, scale)
 
 
-def _spans(mask: Flags) -> tuple[NDArray[np.int32], tuple[int, int]]:
-    """Runs (m, 3) of true cells, long ones first, as they collide most often; columns and rows."""
+def _spans(mask: Flags) -> Index:
+    """(m, 3) row, first and last column of runs of true cells."""
     step = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     row, begin = np.nonzero(step > 0)
-    end = np.nonzero(step < 0)[1] - 1
-    spans = np.column_stack((row, begin, end))[np.argsort(begin - end, kind="stable")]
-    return np.ascontiguousarray(spans, np.int32), (mask.shape[1], mask.shape[0])
+    return np.column_stack((row, begin, np.nonzero(step < 0)[1] - 1))
 
 
 def _half_extent(one: _Piece, scale: float, width: GutterWidth) -> Doubles:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,10 +63,28 @@ class FlatSurface:
     along: Doubles
     lengths: Doubles
 
+    def at(self, triangle: NDArray[np.integer], weights: NDArray[np.floating]) -> Doubles:
+        """Points (n, 3) in triangles, by the weights (n, 2) of their second and third corner [mm]."""
+        return read(self.corners, triangle, weights.astype(np.float64))
+
     def part(self, own: Index) -> FlatSurface:
         """Some of its triangles, not to be walked on: their neighbours keep their old numbers."""
         names = [field.name for field in fields(self) if field.name != "adjacency"]
         return replace(self, **{name: getattr(self, name)[own] for name in names})
+
+
+def read(
+    corners: NDArray[np.floating], triangle: NDArray[np.integer], weights: NDArray[np.floating]
+) -> NDArray[Any]:
+    """(n, c) in triangles of what their corners (f, 3, c) have.
+
+    weights : (n, 2) of the second and third corner
+    """
+    second, third = weights[:, :1], weights[:, 1:]
+    found = (1.0 - second - third) * corners[:, 0][triangle]
+    found += second * corners[:, 1][triangle]
+    found += third * corners[:, 2][triangle]
+    return np.asarray(found)
 
 
 def survey(mesh: Mesh) -> FlatSurface:

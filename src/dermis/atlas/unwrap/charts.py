@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.mesh.components import components
 from dermis.mesh.geometry import edges, sum_at, triangle_areas
 
 Index = NDArray[np.int64]
@@ -66,13 +67,9 @@ def _smooth(chart: Index, triangles: Index) -> Index:
 
 def pieces(chart: Index, beside: Index) -> Index:
     """Number (f,) of the connected piece of one chart that each triangle belongs to."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     here, there = np.repeat(np.arange(len(chart)), 3), beside.ravel()
-    same = chart[here] == chart[there]
-    links = coo_array((np.ones(int(same.sum())), (here[same], there[same])), shape=(len(chart),) * 2)
-    return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
+    same = (chart[here] == chart[there]) & (here < there)
+    return components(len(chart), here[same], there[same])
 
 
 def _strays(chart: Index, beside: Index) -> NDArray[np.bool_]:

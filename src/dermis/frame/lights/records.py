@@ -61,10 +61,11 @@ def sun_lights(suns: tuple[Sun, ...], environment: Environment) -> tuple[Directi
 
 def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
     """Values of the `override`s of lighting.wgsl that the scene needs."""
-    kinds = {light.kind: KINDS[light.kind] for light in scene.lights}
+    each = [(KINDS[light.kind], light) for light in scene.lights]
+    called = sorted({light.kind for kind, light in each if not kind.always})
     named = {
-        "SHAPES": any(kinds[light.kind].has_size(light) for light in scene.lights),
-        **{override_of(name): not kind.always for name, kind in sorted(kinds.items())},
+        "SHAPES": any(kind.has_size(light) for kind, light in each),
+        **dict.fromkeys(map(override_of, called), True),
         "ENVIRONMENT": scene.environment,
         "HALF_SPACE": scene.skin.direction != "lambertian",
     }
@@ -113,8 +114,8 @@ def light_records(program: ComputeProgram, scene: Scene, views: list[ShadowView 
     none, layers = dict.fromkeys(lights.dtype.names or (), 0), count()
     made = []
     for (light, siblings), view in zip(divided, views, strict=True):
-        layer = next(layers) if view else -1
-        one = {**none, **_members(light, scene.head.centre_mm, view, siblings), "layer": layer}
+        members = _members(light, scene.head.centre_mm, view, siblings)
+        one = {**none, **members, "layer": next(layers) if view else -1}
         made.append(tuple(one.values()))
     lights[: len(made)] = made  # at once: each access to a record takes as long as a light's arithmetic
     return record
@@ -146,7 +147,7 @@ def _members(light: Light, centre: Triple, view: ShadowView | None, siblings: in
         clip, texel, place, right, up, near, far = view
         seen = {"to_map": clip.T, "map_right": right, "map_up": up, "map_near": near, "map_far": far}
     half_width = round(0.5 * light.softness_mm / (texel * distance))
-    plain = {
+    return {
         "kind": KINDS.names.index(light.kind),
         "parallel": parallel,
         "round": kind.round,
@@ -161,5 +162,6 @@ def _members(light: Light, centre: Triple, view: ShadowView | None, siblings: in
         "half_width": min(max(half_width, 1), _WIDEST_SHADOW_FILTER),
         "lines": _SUN_LINES if parallel else max(_LEAST_LINES, _LINES // siblings),
         "side": 1 if kind.narrow else _PART_SIDE if siblings > 1 else _SIDE,
+        **seen,
+        **kind.members(light, centre, distance),
     }
-    return plain | seen | kind.members(light, centre, distance)

@@ -14,11 +14,11 @@ from dermis.frame.passes.shape import rest_shape
 from dermis.frame.passes.visibility_buffer import draw_layers, make_layers
 from dermis.frame.projection import ShadowView, parallel_view, shadow_layers
 from dermis.frame.shape import shape_tables
+from dermis.frame.sky import fibonacci_sphere
 from dermis.gpu import ComputeProgram, Device, Frame
 from dermis.gpu.program import Resources
 from dermis.mesh.head import Head
 
-Floats = NDArray[np.float64]
 DIRECTIONS = 128
 MAP_SIZE = 512
 FORM = f"1 {DIRECTIONS} {MAP_SIZE}"
@@ -71,15 +71,6 @@ def _lights(shader: ComputeProgram, views: list[ShadowView]) -> Any:
         light["direction"] = np.cross(view.up, view.right)
         light["to_map"], light["texel"] = view.clip.T, view.texel
     return record
-
-
-def fibonacci_sphere(count: int) -> Floats:
-    """(count, 3) unit vectors, each for an equal share of the sphere [Keinert2015]."""
-    index = np.arange(count) + 0.5
-    y = 1.0 - 2.0 * index / count
-    phi = np.pi * (1.0 + np.sqrt(5.0)) * index
-    r = np.sqrt(1.0 - y**2)
-    return np.stack([r * np.cos(phi), y, r * np.sin(phi)], axis=-1)
 
 
 def whole_map(baked: NDArray[np.float32], side: int) -> NDArray[np.float32]:

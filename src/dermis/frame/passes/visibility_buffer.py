@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -175,6 +176,7 @@ def _depth_range_mm(clip: Matrix) -> float:
     return rise / (slope * slope) / math.sqrt(scale)
 
 
+@cache
 def _shared_out(triangles: int, views: int, samples: int) -> tuple[Constants, int]:
     """Pipeline constants for so many triangles, tuned on an H200, and the number of workgroups."""
     fewest, most = _TAKEN

@@ -20,6 +20,7 @@ _HDR = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.hdr)
 _FORMS = {"_per_mm": "%.3g", "_mm": "%.4g mm", "_degrees": "%.4g°"}  # by the unit that a name ends in
 _ALL_NAMES = int(imgui.ComboFlags_.height_largest)
 _TOOLTIP_WIDTH = 260.0
+_MOST_ROWS = 14  # that are seen of many like controls
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ def _draw_field(session: Session, values: Plain, name: str, apply: Apply, style:
         return apply(**{name: found})
 
     if isinstance(value, bool):
-        _hold(session, label, imgui.checkbox(label, value), put)
+        hold(session, label, imgui.checkbox(label, value), put)
     elif style.options:
         combo(session, label, str(value), map(str, style.options), lambda text: put(int(text)))
     elif isinstance(value, (int, float)):
@@ -81,15 +82,15 @@ def _draw_field(session: Session, values: Plain, name: str, apply: Apply, style:
         slider(session, label, value / unit, lambda found: put(exact(unit * found)), shown, form)
     elif kind.model_fields[name].annotation == _COLOUR:
         result = imgui.color_edit3(label, list(value), _HDR)
-        _hold(session, label, result, lambda found: put(tuple(max(0.0, c) for c in found)))
+        hold(session, label, result, lambda found: put(tuple(max(0.0, c) for c in found)))
     elif isinstance(value, tuple) and span.logarithmic:
         result = imgui.slider_float3(label, list(value), span.low, span.high, "%.3g", _LOG)
-        _hold(session, label, result, lambda found: put(tuple(_clamped(one, span) for one in found)))
+        hold(session, label, result, lambda found: put(tuple(clamped(one, span) for one in found)))
     elif len(words := choices_of(kind, name)) > 1:
         combo(session, label, str(value), words, put)
     else:
         return
-    _explain(help_of(kind, name))
+    explain(help_of(kind, name))
 
 
 def _label_of(name: str) -> str:
@@ -99,7 +100,7 @@ def _label_of(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _explain(text: str) -> None:
+def explain(text: str) -> None:
     """A tooltip for the control drawn last."""
     if not text or not imgui.is_item_hovered() or imgui.is_any_mouse_down():
         return
@@ -110,19 +111,33 @@ def _explain(text: str) -> None:
     imgui.end_tooltip()
 
 
+def draw_rows(label: str, count: int, draw: Callable[[int], None]) -> None:
+    """Many like controls one below the other, in a part that scrolls; only those that are seen are drawn."""
+    width, line = imgui.calc_item_width(), imgui.get_frame_height_with_spacing()
+    imgui.begin_child(label, imgui.ImVec2(0.0, min(count, _MOST_ROWS) * line))
+    imgui.push_item_width(width)
+    clipper = imgui.ListClipper()
+    clipper.begin(count, line)
+    while clipper.step():
+        for row in range(clipper.display_start, clipper.display_end):
+            draw(row)
+    imgui.pop_item_width()
+    imgui.end_child()
+
+
 def slider(session: Session, label: str, value: float, put: Put, span: Range, form: str) -> None:
     """A number on a scale."""
     flags = _LOG if span.logarithmic else 0
     result = imgui.slider_float(label, value, span.low, span.high, form, flags)
-    _hold(session, label, result, lambda found: put(_clamped(found, span)))
+    hold(session, label, result, lambda found: put(clamped(found, span)))
 
 
-def _clamped(value: float, span: Range) -> float:
+def clamped(value: float, span: Range) -> float:
     """Within the range, which typing and single precision can leave."""
     return min(span.high, max(span.low, value))
 
 
-def _hold(session: Session, label: str, result: tuple[bool, Any], put: Put) -> None:
+def hold(session: Session, label: str, result: tuple[bool, Any], put: Put) -> None:
     """Apply the new value of a control; all values while it is held are one step of the undo history."""
     record_position(session, label)
     moved, found = result

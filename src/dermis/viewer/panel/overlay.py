@@ -11,6 +11,9 @@ from dermis.viewer.controls import Split
 HELP_KEYS = ("?", "h", "H", "F1")
 """Keys that show and hide the list of shortcuts."""
 
+PLAY_KEY = " "
+"""Key that plays and pauses the motion."""
+
 SHORTCUTS = (
     ("drag", "orbit the head"),
     ("right drag, two fingers", "pan"),
@@ -18,6 +21,7 @@ SHORTCUTS = (
     ("double click", "orbit around that point"),
     ("Shift and drag", "move the selected light or the environment"),
     ("1 2 3 4 5", "portrait, three-quarter, profile, ear, cheek"),
+    ("space", "play or pause the motion"),
     ("Ctrl+Z, Ctrl+Y", "undo, redo"),
     ("Ctrl and click", "type a slider's value"),
     ("Ctrl+S", "save the scene"),

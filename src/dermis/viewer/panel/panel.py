@@ -12,7 +12,7 @@ from wgpu.utils.imgui import ImguiRenderer, ImguiWgpuBackend
 
 from dermis.gpu import Device
 from dermis.viewer.panel.fields import attempt, button, record_position
-from dermis.viewer.panel.overlay import HELP_KEYS, draw_divider, draw_help, draw_messages
+from dermis.viewer.panel.overlay import HELP_KEYS, PLAY_KEY, draw_divider, draw_help, draw_messages
 from dermis.viewer.panel.sections import SECTIONS
 from dermis.viewer.session import Session
 
@@ -120,6 +120,8 @@ class Panel:
             self.visible = not self.visible
         elif key in HELP_KEYS or (key == "Escape" and self.shows_help):
             self.shows_help = not self.shows_help
+        elif key == PLAY_KEY and session.player.clip is not None:
+            session.player.toggle()
         else:
             return False
         return True
@@ -167,7 +169,7 @@ class Panel:
         imgui.begin("dermis", None, int(fixed | imgui.WindowFlags_.no_title_bar))
         self._draw_toolbar()
         imgui.push_item_width(0.58 * width)
-        for section in SECTIONS:
+        for section in (one for one in SECTIONS if one.applies(session)):
             flags = int(imgui.TreeNodeFlags_.default_open) if section.is_open else 0
             is_open = imgui.collapsing_header(section.title, flags)
             record_position(session, section.title)

@@ -17,6 +17,7 @@ from dermis.viewer.chart import ATLAS
 from dermis.viewer.controls import CAMERAS
 from dermis.viewer.panel.fields import Style, attempt, button, combo, draw_fields
 from dermis.viewer.panel.light import draw_lights
+from dermis.viewer.panel.movement import can_move, draw_expressions, draw_motion, has_expressions
 from dermis.viewer.panel.plots import draw_timing
 from dermis.viewer.panel.skin import draw_profile, draw_surface
 from dermis.viewer.session import Session
@@ -34,11 +35,15 @@ _NOWHERE = ("size", "parts")  # the window's, and a view
 
 
 class Section(NamedTuple):
-    """A part of the panel that can be opened and closed."""
+    """A part of the panel that can be opened and closed.
+
+    applies : whether there is what it is about; it is left out otherwise
+    """
 
     title: str
     draw: Callable[[Session], None]
     is_open: bool = False
+    applies: Callable[[Session], bool] = lambda session: True
 
 
 def draw_view(session: Session) -> None:
@@ -60,13 +65,15 @@ def draw_comparison(session: Session) -> None:
     """Freeze the state for the left side of the divider, swap the sides, release it."""
     split, state = session.split, session.state
     if button(session, "freeze"):
-        split.freeze(state)
+        split.freeze(session.shown)
     if split.before is None:
         return
     imgui.same_line()
     if button(session, "swap"):
+        shown = session.shown
+        session.player.stop()
         session.change(split.before.with_camera(state.scene.camera))
-        split.freeze(state)
+        split.freeze(shown)
     imgui.same_line()
     if button(session, "release"):
         split.release()
@@ -108,6 +115,8 @@ def draw_files(session: Session) -> None:
 SECTIONS = (
     Section("View", draw_view, is_open=True),
     Section("Before and after", draw_comparison),
+    Section("Expressions", draw_expressions, is_open=True, applies=has_expressions),
+    Section("Motion", draw_motion, is_open=True, applies=can_move),
     Section("Profile", draw_profile, is_open=True),
     Section("Surface", draw_surface, is_open=True),
     Section("Light", draw_lights),

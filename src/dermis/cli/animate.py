@@ -1,0 +1,193 @@
+"""`dermis animate`: a movie of a head that moves."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from dermis.cli.console import interruptible, note, print_json, print_lines, progress, working_on
+from dermis.cli.motion import clip_of, motion_file, names_of, parse_span
+from dermis.cli.moving_output import MovingOutput
+from dermis.cli.options import Adapter, Json, Whole
+from dermis.cli.pose_options import laid_over
+from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble
+
+if TYPE_CHECKING:
+    from dermis.scene.clips.clip import Clip
+    from dermis.scene.model import Scene
+    from dermis.scene.settings import Settings
+
+
+@dataclass(frozen=True)
+class _Take:
+    """What is drawn: a scene moved by a clip, frame k at k / rate."""
+
+    scene: Scene
+    settings: Settings
+    clip: Clip
+    rate: Fraction
+
+    def scenes(self, numbers: Iterable[int], check: Callable[[], None]) -> Iterator[Scene]:
+        """The scene of each frame; what the clip does not move keeps the scene's own pose.
+
+        check : called before each
+        """
+        for number in numbers:
+            check()
+            pose = self.clip.pose_at(float(number / self.rate))
+            yield replace(self.scene, pose=laid_over(pose, self.scene.pose))
+
+
+def animate(
+    head: str,
+    /,
+    *,
+    motion: str | None = None,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("dermis.mp4"),
+    clip: str | None = None,
+    fps: str | None = None,
+    motion_fps: float | None = None,
+    begin: Annotated[float | None, Parameter(name="--from")] = None,
+    end: Annotated[float | None, Parameter(name="--to")] = None,
+    crf: Whole = None,
+    anew: Annotated[bool, Parameter(negative="", show_default=False)] = False,
+    names: Annotated[bool, Parameter(negative="", show_default=False)] = False,
+    scene: SceneOptions = DEFAULTS,
+    adapter: Adapter = "auto",
+    as_json: Json = False,
+) -> int:
+    """Draw a head that moves, as a movie (H.264 in MP4) or as numbered pictures.
+
+    Numbered pictures that are there already are kept if they are whole and show the same; an interrupted
+    command goes on where it was when it is given again. The other options are those of `dermis render`.
+
+    Examples:
+
+        dermis animate face.glb -o talk.mp4
+
+        dermis animate face.glb --motion take.csv --fps 24 --size 1280x720 -o talk.mp4
+
+        dermis animate scene.toml --motion take.csv --from 2 --to 4.5 -o frames/%05d.exr
+
+        dermis animate face.glb --names
+
+    Parameters
+    ----------
+    head:
+        A mesh (.glb .gltf .obj .ply), a sample, or a scene (.toml).
+    motion:
+        What moves it: a .glb or .gltf with clips, a .csv of Live Link Face, a .jsonl of MediaPipe, or a
+        sequence as face_%05d.obj [the head's own file].
+    output:
+        Movie (.mp4), or pictures such as frames/%05d.png or .exr, whose folder is made.
+    clip:
+        The clip of a glTF file that has several.
+    fps:
+        Frames a second, as 30, 23.976 or 24000/1001 [the motion's own rate, else 30].
+    motion_fps:
+        Frames a second of the motion itself, where its file does not tell: of a sequence [--fps, else 30], of
+        a timecode.
+    begin:
+        Seconds of the motion at which to begin [0].
+    end:
+        Seconds before which to end [the motion's end].
+    crf:
+        Quality of a movie, from 0 (without loss) to 51 [18].
+    anew:
+        Draw numbered pictures again that are there.
+    names:
+        List the names of morph targets, bones and clips of the head, and draw nothing.
+    as_json:
+        Print one JSON object with the number of frames and the time they took.
+    """
+    if names:
+        return _list_names(head, scene, as_json)
+    started = time.perf_counter()
+    span, target = parse_span(begin, end, fps, motion_fps), MovingOutput(output, crf, anew)
+    target.check(scene.settings.get("size", (2, 2)))
+    moving = motion_file(head, motion)
+    with working_on("loading"):
+        described, settings = assemble(head, scene)
+        target.check(settings.size)
+        moved = clip_of(head, described.head, moving, clip, scene.head, span)
+        numbers, rate = span.frames(moved)
+    if moved.note:
+        note(f"note: {moved.note}")
+    take = _Take(described, settings, moved, rate)
+    missing = target.missing(numbers, settings.size, _made_of(take, scene, head, moving))
+    began = time.perf_counter()
+    used = _draw(take, missing, target, adapter) if missing else None
+    now = time.perf_counter()
+    report = {
+        "file": str(output),
+        "adapter": used,
+        "size": list(settings.size),
+        "fps": float(rate),
+        "frames": len(numbers),
+        "drawn": len(missing),
+        "seconds": round(now - started, 3),
+        "frames_per_s": round(len(missing) / (now - began), 3),
+    }
+    if as_json:
+        print_json(report)
+    else:
+        print_lines(_in_words(report), *filter(None, [described.head.attribution]))
+    return 0
+
+
+def _draw(take: _Take, numbers: Sequence[int], target: MovingOutput, adapter: str) -> str:
+    """Draw and write frames; the adapter's name."""
+    from dermis.frame.renderer import Renderer
+
+    renderer, size = Renderer(adapter), take.settings.size
+    options: dict[str, Any] = {**take.settings.model_dump(), "linear": target.linear}
+    writing, bar = target.writing(size, take.rate), progress("drawing frames")
+    with interruptible() as check, writing as write, bar as report:
+        pictures = renderer.render_many(take.scenes(numbers, check), **options)
+        for done, (number, picture) in enumerate(zip(numbers, pictures, strict=True), 1):
+            write(number, picture)
+            report(done, len(numbers))
+    return str(renderer.device.adapter.name)
+
+
+def _made_of(take: _Take, given: SceneOptions, *files: str) -> str:
+    """A text that two frames of one number share if they look the same.
+
+    files : head and motion as they were typed; files count with their size and time
+    """
+    scene = take.scene
+    named = [*files, scene.head.name, *map(str, given.head.values()), take.clip.name]
+    seen = (scene.lights, scene.camera, scene.skin, scene.environment, take.settings, take.rate)
+    parts = [*map(_as_it_is, named), repr(given.head), repr(given.pose), repr(given.bone), repr(seen)]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+def _as_it_is(name: str) -> str:
+    path = Path(name.partition("#")[0])
+    told = path.stat() if path.exists() else None
+    return name if told is None else f"{path.resolve()} {name} {told.st_size} {told.st_mtime_ns}"
+
+
+def _in_words(report: dict[str, Any]) -> str:
+    count, drawn = report["frames"], report["drawn"]
+    kept = f" ({count - drawn} were there)" if drawn < count else ""
+    place = f" on {report['adapter']}" if report["adapter"] else ""
+    frames = f"{count} frame{'s' * (count != 1)}"
+    return f"{report['file']}  {frames}{kept} at {report['fps']:g}/s  {report['seconds']:.1f} s{place}"
+
+
+def _list_names(name: str, given: SceneOptions, as_json: bool) -> int:
+    with working_on("loading"):
+        found = names_of(name, assemble(name, given)[0].head)
+    if as_json:
+        print_json(found)
+    else:
+        print_lines(*(f"{kind}: {', '.join(each) or 'none'}" for kind, each in found.items()))
+    return 0

@@ -1,0 +1,100 @@
+"""--pose and --bone: how a head is moved, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from dermis.errors import DermisError, refuse
+
+if TYPE_CHECKING:
+    from dermis.mesh.head import Head
+    from dermis.scene.pose import Pose
+
+POSE, BONE = "--pose", "--bone"
+Weights = Annotated[
+    list[str] | None,
+    Parameter(
+        name=POSE,
+        negative="",
+        metavar="NAME=WEIGHT,...",
+        help="Weights of morph targets, as jawOpen=0.6,mouthSmileLeft=1, beside those of a scene's [pose]. "
+        "dermis animate HEAD --names lists them.",
+    ),
+]
+Turns = Annotated[
+    list[str] | None,
+    Parameter(
+        name=BONE,
+        negative="",
+        metavar="NAME=X,Y,Z",
+        help="A bone turned by degrees about the head's x (nod), y (turn) and z (tilt), as head=0,25,0; once "
+        "for each bone.",
+    ),
+]
+
+
+def parse_weights(words: Sequence[str]) -> dict[str, float]:
+    """Weights by name of "jawOpen=0.6,mouthSmileLeft=1"."""
+    weights = {}
+    for word in (part for text in words for part in text.split(",")):
+        name, sign, number = word.rpartition("=")
+        weight = _numbers(number)
+        if not sign or not name.strip() or weight is None or len(weight) != 1:
+            expected = "NAME=WEIGHT with commas between, such as jawOpen=0.6,mouthSmileLeft=1"
+            refuse(POSE, expected, f"{word!r} came", "Correct it")
+        weights[name.strip()] = weight[0]
+    return weights
+
+
+def parse_turns(words: Sequence[str]) -> dict[str, list[float]]:
+    """Angles [degrees] by name of the bone of "head=0,25,0"."""
+    turns = {}
+    for word in words:
+        name, sign, numbers = word.rpartition("=")
+        angles = _numbers(numbers)
+        if not sign or not name.strip() or angles is None or len(angles) != 3:
+            expected = "NAME=X,Y,Z with three angles in degrees, such as head=0,25,0"
+            refuse(BONE, expected, f"{word!r} came", "Correct it")
+        turns[name.strip()] = angles
+    return turns
+
+
+def laid_over(pose: Pose, base: Pose | Mapping[str, float] | None) -> Pose:
+    """A pose that keeps from another one what it says nothing of."""
+    from dermis.scene.pose import Pose
+
+    under = Pose.of(base) or Pose()
+    places = under.positions_mm if pose.positions_mm is None else pose.positions_mm
+    return Pose({**under.weights, **pose.weights}, {**under.bones, **pose.bones}, places)
+
+
+def pose_given(
+    weights: Mapping[str, float], turns: Mapping[str, Sequence[float]], head: Head, name: str
+) -> Pose:
+    """The pose of what was typed.
+
+    name : of the head as it was typed, for messages
+
+    Raises DermisError for names that the head lacks, and says where all are listed.
+    """
+    from dermis.scene.pose import Pose
+
+    parts: dict[str, Any] = {POSE: Pose(weights), BONE: Pose(bones=turns)}
+    for option, part in parts.items():
+        try:
+            part.motion(head.control, option)
+        except DermisError as fault:
+            if not (head.targets or head.bones):
+                raise
+            raise DermisError(f"{fault} All names: dermis animate {name} --names.") from None
+    return Pose(weights, turns)
+
+
+def _numbers(text: str) -> list[float] | None:
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        return None

@@ -1,0 +1,176 @@
+"""Movies written on another thread, so that rendering need not wait: H.264 in MP4."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis import outputs
+from dermis.errors import refuse
+
+SUFFIX = ".mp4"
+DEFAULT_CRF = 18
+"""Constant rate factor at which rendered skin shows no blocks."""
+_WORST_CRF, _ENCODER, _EFFORT = 51, "libx264", "medium"
+_BT709, _LIMITED = 1, 1  # H.264's numbers for primaries, transfer and matrix; for levels from 16 to 235
+_WAITING = 8
+_NTSC = tuple(Fraction(1000 * whole, 1001) for whole in (24, 30, 48, 60, 120))
+_NEAR_NTSC = Fraction(5, 1000)
+_FASTEST, _FINEST = 1000, 1001
+
+
+def exact_rate(given: str | float | Fraction, culprit: object = "rate") -> Fraction:
+    """Frames a second as a ratio, since sums of rounded steps would drift.
+
+    given : 30, 12.5, "24000/1001"; 23.976, 29.97, 59.94 and the like mean 24000/1001 and so on
+
+    Raises DermisError for what is no rate up to 1000.
+    """
+    try:
+        rate = Fraction(str(given).strip())
+    except (ValueError, ZeroDivisionError):
+        rate = Fraction(0)
+    if not 0 < rate <= _FASTEST:
+        expected = f"frames a second up to {_FASTEST}, such as 30, 23.976 or 24000/1001"
+        refuse(culprit, expected, f"{str(given)!r} came", "Correct it")
+    near = min(_NTSC, key=lambda ntsc: abs(ntsc - rate))
+    rate = near if abs(near - rate) < _NEAR_NTSC else rate.limit_denominator(_FINEST)
+    return max(rate, Fraction(1, _FINEST))
+
+
+def check_movie(path: str | Path, size: tuple[int, int], crf: int = DEFAULT_CRF) -> Path:
+    """The path, once it is clear that such a movie can be written there: call it before a long rendering.
+
+    DermisError : the path cannot be written to, a side is odd, the factor is none, or there is no encoder
+    """
+    target = outputs.check_output(path, (SUFFIX,), f"Name it something{SUFFIX}")
+    if size[0] % 2 or size[1] % 2:
+        even = f"{size[0] + size[0] % 2}x{size[1] + size[1] % 2}"
+        came = f"{size[0]}x{size[1]} came"
+        refuse("--size", f"even sides, which {SUFFIX} needs", came, f"Take {even}, or write frames/%05d.png")
+    if not 0 <= crf <= _WORST_CRF:
+        refuse("--crf", f"0 (without loss) to {_WORST_CRF}", f"{crf} came", f"Take {DEFAULT_CRF}")
+    _check_encoder(path)
+    return target
+
+
+def _check_encoder(path: str | Path) -> None:
+    import av
+
+    try:
+        av.codec.Codec(_ENCODER, "w")
+    except ValueError:
+        remedy = "Install av from PyPI (pip install av), or write frames/%05d.png"
+        refuse(path, f"FFmpeg with the encoder {_ENCODER}", "PyAV's here has none", remedy)
+
+
+class MovieWriter:
+    """Encodes pictures in turn on another thread; the file is there at the end, whole, or not at all.
+
+    Frame k lies at exactly k / rate. Levels are stored with BT.709's primaries and matrix, and tagged so.
+
+    path : to write, .mp4
+    size : width and height of the pictures [pixel], even
+    rate : frames a second, see `exact_rate`
+    crf : constant rate factor, 0 without loss to 51
+
+    with MovieWriter("smile.mp4", (1024, 1024)) as movie:
+        for image in renderer.render_many(scenes):
+            movie.write(image)
+
+    Raises DermisError as `check_movie` does.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        size: tuple[int, int],
+        rate: str | float | Fraction = 30,
+        crf: int = DEFAULT_CRF,
+    ) -> None:
+        self.path, self.size, self.rate = check_movie(path, size, crf), size, exact_rate(rate)
+        self._crf, self._count = crf, 0
+        self._waiting: deque[Future[None]] = deque()
+        self._context = self._writing()
+
+    def __enter__(self) -> Self:
+        self._context.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._context.__exit__(kind, error, trace)
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        with outputs.replacing(self.path) as temporary:
+            self._open(temporary)
+            try:
+                yield
+                self._finish()
+            finally:
+                self._pool.shutdown(cancel_futures=True)
+                self._container.close()
+
+    def _open(self, path: Path) -> None:
+        import av
+        from av.video.reformatter import VideoReformatter
+
+        self._container = av.open(str(path), "w", format="mp4", options={"movflags": "faststart"})
+        options = {"crf": str(self._crf), "preset": _EFFORT}
+        self._stream = self._container.add_stream(_ENCODER, rate=self.rate, options=options)
+        self._stream.width, self._stream.height = self.size
+        self._stream.pix_fmt = "yuv420p"
+        codec = self._stream.codec_context
+        codec.time_base, codec.color_range = 1 / self.rate, _LIMITED
+        codec.colorspace = codec.color_primaries = codec.color_trc = _BT709
+        self._reformatter = VideoReformatter()
+        self._pool = ThreadPoolExecutor(1, thread_name_prefix="dermis-movie")
+
+    def write(self, picture: NDArray[Any]) -> None:
+        """Queue the next frame; waits only while the queue is full.
+
+        picture : (H, W, 3) uint8 sRGB; do not change it afterwards
+
+        Raises DermisError when an earlier frame could not be written.
+        """
+        width, height = self.size
+        if picture.shape != (height, width, 3) or picture.dtype != np.uint8:
+            came = f"they have shape {picture.shape} and type {picture.dtype}"
+            refuse(self.path, f"pixels ({height}, {width}, 3) of uint8", came, "Take the renderer's bytes")
+        self._waiting.append(self._pool.submit(self._encode, self._count, picture))
+        self._count += 1
+        while len(self._waiting) > _WAITING or (self._waiting and self._waiting[0].done()):
+            self._waiting.popleft().result()
+
+    def _encode(self, number: int, picture: NDArray[np.uint8]) -> None:
+        import av
+        from av.video.reformatter import ColorRange, Colorspace
+
+        frame = self._reformatter.reformat(
+            av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24"),
+            format="yuv420p",
+            dst_colorspace=Colorspace.ITU709,
+            src_color_range=ColorRange.JPEG,
+            dst_color_range=ColorRange.MPEG,
+        )
+        frame.pts, frame.time_base = number, 1 / self.rate
+        self._container.mux(self._stream.encode(frame))
+
+    def _finish(self) -> None:
+        """Wait for all frames, and write what the encoder still holds."""
+        while self._waiting:
+            self._waiting.popleft().result()
+        if self._count == 0:
+            refuse(self.path, "a movie of at least one frame", "none came", "Write one")
+        self._container.mux(self._stream.encode(None))

@@ -1,0 +1,54 @@
+"""A floor and a wall that turns about its foot, and how much of the sky the floor sees."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from setups import head_of, joined
+
+from dermis.mesh.head import Head
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.primitives import plane
+
+Floats = NDArray[np.float64]
+FOOT_MM = -100.0
+HEIGHT_MM = 40.0
+
+
+def upright(mesh: Mesh, face: float) -> Mesh:
+    """A plane turned to stand along y, facing +x (1) or -x (-1)."""
+    turned = {
+        name: np.ascontiguousarray(getattr(mesh, name)[:, [2, 1, 0]] * [face, 1, -face], dtype=np.float32)
+        for name in ("positions", "normals")
+    }
+    return Mesh(**(vars(mesh) | turned))
+
+
+def corner() -> Head:
+    """A floor 200 x 200 at z = 0 and a wall 40 high that rises at x = -100, over all of its length.
+
+    They share no points, so that each has normals of its own.
+    """
+    wall = upright(plane(200.0, 20), 1.0)
+    low = replace(wall, positions=(wall.positions * [1, 1, 0.2]).astype(np.float32))
+    return head_of(
+        joined((plane(200.0, 20), (0, 0, 0), (0, 0, 0.6)), (low, (-100, 0, 20.01), (0.65, 0.65, 0.3)))
+    )
+
+
+def hinged(head: Head, degrees: float) -> NDArray[np.float32]:
+    """The points of the corner with its wall turned to an angle from the floor: 90 leaves it where it is."""
+    points = head.positions_mm.copy()
+    wall, angle = points[:, 2] > 0, np.radians(degrees)
+    height = points[wall, 2]
+    points[wall, 0], points[wall, 2] = FOOT_MM + height * np.cos(angle), height * np.sin(angle)
+    return points
+
+
+def open_beside(d_mm: Floats, degrees: float = 90.0) -> Floats:
+    """Open share of the sky, weighted by the cosine, of a floor at distances from the foot of a long wall."""
+    angle = np.radians(degrees)
+    across, above = d_mm - HEIGHT_MM * np.cos(angle), HEIGHT_MM * np.sin(angle)
+    return np.asarray(0.5 + 0.5 * across / np.hypot(across, above))

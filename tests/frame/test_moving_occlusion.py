@@ -1,0 +1,200 @@
+"""Occlusion that follows a head: closed forms, meshes baked anew, and what makes it run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hinged import FOOT_MM, corner, hinged, open_beside
+from numpy.typing import NDArray
+from setups import front_camera, run_frame, scene_of, settings_of
+from tolerances import FOLLOWED, OCCLUSION, STILL
+from twins import surface
+
+from dermis.atlas.cached import cached_atlas
+from dermis.frame.passes import moving_occlusion
+from dermis.frame.passes.occlusion import bake_occlusion
+from dermis.frame.passes.visibility_buffer import make_layers
+from dermis.frame.renderer import Renderer
+from dermis.frame.sky import SIDE as MAP_SIDE
+from dermis.frame.sky import anchors_of, look_around, turn_of
+from dermis.gpu import download
+from dermis.human.hm08 import hm08
+from dermis.mesh.geometry import build_mesh
+from dermis.mesh.head import Head
+from dermis.mesh.outline import Outline
+from dermis.mesh.turns import angles_matrix
+from dermis.scene.environment import Environment
+from dermis.scene.model import Scene
+from dermis.scene.pose import Pose
+
+Floats = NDArray[np.float64]
+SIDE = 64
+SKY = Environment(name="uniform")
+TURN = np.array(angles_matrix((20.0, 60.0, -10.0)))
+
+
+@pytest.fixture(scope="module")
+def head() -> Head:
+    return corner()
+
+
+def posed(head: Head, points: NDArray[np.floating] | None = None, **given: Any) -> Scene:
+    """The head under an even sky, its points elsewhere."""
+    pose = Pose(positions_mm=points, **given) if points is not None or given else None
+    scene = scene_of(head, camera=front_camera(head, frame_mm=180.0), rho_s=0.0)
+    return replace(scene, environment=SKY, pose=pose)
+
+
+def open_maps(renderer: Renderer, scene: Scene, **settings: Any) -> list[Floats]:
+    """The open share of the sky as the shading reads it, of each layout."""
+    layouts = run_frame(renderer, scene, **({"atlas": SIDE} | settings)).layouts
+    return [download(renderer.device, layout.lit["occlusion_map"]).astype(float) for layout in layouts]
+
+
+def on_floor(head: Head) -> tuple[NDArray[np.bool_], Floats]:
+    """Texels in the middle of the floor, and their distance from the wall's foot."""
+    points, normals = surface(cached_atlas(head.mesh, SIDE), head)
+    d = points[..., 0] - FOOT_MM
+    middle = (normals[..., 2] > 0.9) & (np.abs(points[..., 1]) < 20) & (d > 15) & (d < 80)
+    return middle, d[middle]
+
+
+@pytest.mark.parametrize("seams", ["alpha", "stitch", "multi-uv"])
+def test_a_head_that_does_not_move_keeps_its_occlusion(renderer: Renderer, head: Head, seams: str) -> None:
+    rest = open_maps(renderer, posed(head), seams=seams)
+    moved = open_maps(renderer, posed(head, head.positions_mm.copy()), seams=seams)
+    assert len(rest) == len(moved) == 1 + (seams == "multi-uv")
+    for before, after in zip(rest, moved, strict=True):
+        assert np.abs(after - before).max() < STILL
+
+
+@pytest.mark.parametrize("degrees", [30.0, 60.0, 135.0, 179.0])
+def test_a_wall_that_turns_about_its_foot(renderer: Renderer, head: Head, degrees: float) -> None:
+    middle, d = on_floor(head)
+    (made,) = open_maps(renderer, posed(head, hinged(head, degrees)))
+    error = np.abs(made[:SIDE][middle] - open_beside(d, degrees))
+    assert error.max() < 1.5 * OCCLUSION and error.mean() < OCCLUSION / 2  # directions count twice
+    (left,) = open_maps(renderer, posed(head, hinged(head, degrees)), occlusion="rest")
+    assert np.abs(left[:SIDE][middle] - open_beside(d)).max() < OCCLUSION
+
+
+def baked_anew(renderer: Renderer, head: Head, points: Floats, side: int) -> NDArray[np.float32]:
+    """Rows of a bake for the mesh at other places: the atlas and the vertices."""
+    mesh = head.mesh
+    places = points[mesh.point].astype(np.float32)
+    moved = build_mesh(places, mesh.uv, mesh.triangles, mesh.material, mesh.materials, point=mesh.point)
+    anew = replace(head, mesh=moved, rig=None)
+    inputs = renderer.prepare(scene_of(anew), settings_of(atlas=side))
+    texels, atlas = inputs.layouts[0].atlas.resources["atlas"], cached_atlas(anew.mesh, side)
+    return bake_occlusion(renderer.device, anew, atlas, inputs.lit, texels, side)
+
+
+def errors(renderer: Renderer, head: Head, scene: Scene, points: Floats, side: int, away: Any) -> Any:
+    """Root mean squares from a bake anew, of each setting, over the texels of which `away` says so."""
+    anew = baked_anew(renderer, head, points, side)[:side]
+    own, found = np.isfinite(anew) & away, {}
+    for which in ("baked", "rest"):
+        (made,) = open_maps(renderer, scene, atlas=side, occlusion=which)
+        found[which] = float(np.sqrt(np.mean((made[:side][own] - anew[own]) ** 2)))
+    return found
+
+
+def test_a_moved_wall_occludes_as_one_baked_anew(renderer: Renderer, head: Head) -> None:
+    """But for triangles with a corner in the crease, which sees both sides of the wall."""
+    points, (places, _) = hinged(head, 45.0), surface(cached_atlas(head.mesh, SIDE), head)
+    away = (places[..., 0] > FOOT_MM + 10) | (places[..., 2] > 4)
+    found = errors(renderer, head, posed(head, points), points.astype(float), SIDE, away)
+    assert found["baked"] < FOLLOWED < found["rest"] / 2
+
+
+@pytest.mark.samples
+def test_an_open_mouth_occludes_as_one_baked_anew(renderer: Renderer, sample_folder: Path) -> None:
+    human = hm08(sample_folder / "heads" / "human")
+    scene = replace(scene_of(human), environment=SKY, pose=Pose(weights={"jawOpen": 1.0}))
+    assert scene.motion is not None
+    points = human.control.posed(scene.motion.weights.astype(float), scene.motion.matrices.astype(float))
+    found = errors(renderer, human, scene, points, 256, away=True)
+    assert found["baked"] < FOLLOWED / 1.5 < FOLLOWED < found["rest"]
+
+
+def test_vertices_follow_too(renderer: Renderer, head: Head) -> None:
+    """Row by row after the texels, for surfaces that have none."""
+    points = hinged(head, 45.0)
+    anew, (made,) = (
+        baked_anew(renderer, head, points.astype(float), SIDE),
+        open_maps(renderer, posed(head, points)),
+    )
+    count = len(head.mesh.positions)
+    made_at, anew_at = made[SIDE + 1 :].ravel()[:count], anew[SIDE:].ravel()[:count]
+    floor = (head.mesh.normals[:, 2] > 0.9) & (head.mesh.positions[:, 0] > FOOT_MM)
+    assert np.sqrt(np.mean((made_at - anew_at)[floor] ** 2)) < FOLLOWED
+
+
+def test_a_head_that_turns_as_a_whole_keeps_its_occlusion(renderer: Renderer, head: Head) -> None:
+    (rest,) = open_maps(renderer, posed(head))
+    (turned,) = open_maps(renderer, posed(head, head.positions_mm @ TURN.T))
+    assert np.sqrt(np.mean((turned - rest) ** 2)) < STILL and np.abs(turned - rest).max() < OCCLUSION / 2
+
+
+def test_both_ways_to_depth_maps_agree(
+    renderer: Renderer, head: Head, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = posed(head, hinged(head, 60.0))
+    (usual,) = open_maps(renderer, scene)
+    renderer.forget()
+    monkeypatch.setattr(moving_occlusion, "make_layers", partial(make_layers, compute=True))
+    (computed,) = open_maps(renderer, scene)
+    renderer.forget()
+    assert np.sqrt(np.mean((computed - usual) ** 2)) < 2 * STILL
+
+
+def test_it_runs_when_the_shape_moves_and_never_else(renderer: Renderer, head: Head) -> None:
+    settings, first = settings_of(), hinged(head, 60.0)
+    scene = posed(head, first)
+
+    def ran(scene: Scene, **changed: Any) -> bool:
+        renderer.draw(scene, settings.model_copy(update=changed))
+        return "occlusion" in renderer.graph.ran
+
+    renderer.draw(posed(head), settings)
+    assert ran(scene) and not ran(scene) and not ran(posed(head, first.copy()))
+    assert not ran(replace(scene, camera=front_camera(head, frame_mm=150.0)))
+    assert not ran(replace(scene, environment=Environment(name="uniform", exposure=2.0)))
+    assert ran(posed(head, hinged(head, 70.0)))
+    assert not ran(posed(head)) and not ran(scene, occlusion="rest") and not ran(scene, occlusion="none")
+    assert not ran(replace(scene, environment=None))
+
+
+def test_a_turn_is_found_from_points_and_bones(sample_folder: Path) -> None:
+    human = hm08(sample_folder / "heads" / "human")
+    anchors, rig = anchors_of(human), human.control
+    assert np.abs(turn_of(anchors, rig.rest) - np.eye(3)).max() < 1e-6
+    given = Pose(positions_mm=rig.positions_mm @ TURN.T).motion(rig)
+    assert np.abs(turn_of(anchors, given) - TURN).max() < 1e-5
+    spine = Pose(bones={"spine": (20.0, 60.0, -10.0)}, weights={"jawOpen": 1.0}).motion(rig)
+    assert np.abs(turn_of(anchors, spine) - TURN).max() < 1e-5
+    neck = turn_of(anchors, Pose(bones={"neck01": (0.0, 50.0, 0.0)}).motion(rig))
+    assert 30.0 < np.degrees(np.arccos((np.trace(neck) - 1) / 2)) < 50.0
+
+
+def test_views_hold_the_whole_shape(head: Head) -> None:
+    points = np.random.default_rng(3).normal(scale=(80.0, 120.0, 60.0), size=(500, 3))
+    look = look_around(Outline(points), TURN)
+    whole = np.concatenate([points, np.ones((500, 1))], axis=1)
+    column, row, depth = np.einsum("kij,nj->ikn", look.to_map, whole)
+    for place in (column, row):
+        assert place.min() > 0.5 and place.max() < MAP_SIDE - 1.5
+        assert (np.ptp(place, axis=1) > 0.9 * MAP_SIDE).all()
+    assert depth.min() > 0 and depth.max() < 1
+    seen = np.einsum("kij,nj->ikn", look.views.clips, whole)
+    assert np.allclose(0.5 * MAP_SIDE * (1 + seen[0]) - 0.5, column) and np.allclose(seen[2], depth)
+    assert np.allclose(0.5 * MAP_SIDE * (1 - seen[1]) - 0.5, row)
+    step = look.steps_mm[:, 0]  # one texel to the right
+    assert np.allclose(np.einsum("kj,kj->k", look.to_map[:, 0, :3], step), 1)
+    assert np.allclose(np.einsum("kj,kj->k", look.to_map[:, 1, :3], look.steps_mm[:, 1]), -1)
+    assert (np.einsum("kj,kj->k", look.to_map[:, 2, :3], look.towards) > 0).all()

@@ -1,0 +1,80 @@
+"""Which frames of a folder need not be drawn again."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dermis.errors import DermisError
+from dermis.images.codecs import encode_png8, png_size
+from dermis.images.frame_files import FrameFiles
+from dermis.images.io import write_exr, write_png
+
+SIZE = (6, 4)
+PICTURE = np.random.default_rng(0).integers(0, 256, (4, 6, 3), dtype=np.uint8)
+
+
+def _files(folder: Path, name: str = "%03d.png") -> FrameFiles:
+    files = FrameFiles(folder / "frames" / name)
+    files.prepare()
+    return files
+
+
+def test_names() -> None:
+    assert FrameFiles(Path("a/%05d.png")).path(7) == Path("a/00007.png")
+    assert FrameFiles(Path("a%b/face-%d.exr")).path(12) == Path("a%b/face-12.exr")
+
+
+@pytest.mark.parametrize("name", ["%s.png", "%02d-%02d.png", "%5d.png", "100%-%d.png", "%d.jpg", "%d"])
+def test_patterns_that_are_none(tmp_path: Path, name: str) -> None:
+    with pytest.raises(DermisError):
+        FrameFiles(tmp_path / "new" / name).prepare()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["%03d.png", "%d.exr"])
+def test_whole_frames_of_the_same_are_kept(tmp_path: Path, name: str) -> None:
+    files = _files(tmp_path, name)
+    files.claim("a smile")
+    assert files.missing(range(4), SIZE) == [0, 1, 2, 3]
+    for k in range(4):
+        if name.endswith("png"):
+            write_png(files.path(k), PICTURE)
+        else:
+            write_exr(files.path(k), PICTURE.astype(np.float32))
+    data = files.path(2).read_bytes()
+    files.path(2).write_bytes(data[: 3 * len(data) // 4])
+    files.path(0).write_bytes(b"")
+    files.claim("a smile")
+    assert files.missing(range(5), SIZE) == [0, 2, 4]
+    assert files.missing([1, 3], (4, 6)) == [1, 3]
+
+
+def test_frames_of_something_else_are_drawn_again(tmp_path: Path) -> None:
+    files = _files(tmp_path)
+    files.claim("a smile")
+    for k in range(2):
+        write_png(files.path(k), PICTURE)
+        os.utime(files.path(k), (1e9, 1e9 + k))
+    os.utime(files.pattern.with_name(".%03d.png.made-of"), (1e9, 1e9))
+    assert files.missing(range(2), SIZE) == []
+    files.claim("a frown")
+    write_png(files.path(1), PICTURE)
+    files.claim("a frown")
+    assert files.missing(range(2), SIZE) == [0]
+    os.utime(files.path(1), (1e9, 1e9))
+    files.claim("a frown", anew=True)
+    assert files.missing(range(2), SIZE) == [0, 1]
+
+
+def test_png_is_checked_without_decoding() -> None:
+    data = encode_png8(PICTURE)
+    assert png_size(data) == SIZE
+    damaged = bytearray(data)
+    damaged[len(data) // 2] ^= 1
+    for bad in (data[:-1], data[:40], data[:8], b"", b"GIF89a", bytes(damaged)):
+        with pytest.raises(ValueError):
+            png_size(bad)

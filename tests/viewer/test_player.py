@@ -1,0 +1,181 @@
+"""Motions that play, pause and are scrubbed, by a clock that only the test moves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from rigged_head import write_take
+
+from dermis.errors import DermisError
+from dermis.viewer.navigation import orbit
+from dermis.viewer.player import MotionFile, Player
+from dermis.viewer.posing import weight_of, with_weight
+from dermis.viewer.state import History, ViewerState
+
+JAW = 0.0, 0.2, 0.4, 0.6, 0.8, 1.0
+
+
+class Clock:
+    now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def take(tmp_path: Path) -> MotionFile:
+    """Half a second in which the jaw opens."""
+    return MotionFile(write_take(tmp_path / "take.csv", *JAW), fps=10.0)
+
+
+@pytest.fixture
+def history(rigged: ViewerState) -> History:
+    return History(rigged)
+
+
+@pytest.fixture
+def player(history: History, take: MotionFile, clock: Clock) -> Player:
+    return Player(history, take, clock)
+
+
+def jaw(player: Player) -> float:
+    return weight_of(player.shown.scene, "jawOpen")
+
+
+def after(player: Player, clock: Clock, seconds: float) -> float:
+    clock.now += seconds
+    player.advance()
+    return jaw(player)
+
+
+def start(player: Player, clock: Clock) -> None:
+    """Play, up to the picture from which the clock counts."""
+    player.play()
+    player.advance()
+    after(player, clock, 0.0)
+
+
+def test_it_rests_until_it_is_played(player: Player, rigged: ViewerState, clock: Clock) -> None:
+    assert after(player, clock, 1.0) == 0.0 and player.shown is rigged and not player.is_playing
+
+
+def test_it_runs_by_the_clock_however_long_frames_take(player: Player, clock: Clock) -> None:
+    player.play()
+    assert after(player, clock, 5.0) == 0.0
+    assert after(player, clock, 5.0) == 0.0  # the first picture took so long
+    assert after(player, clock, 0.1) == pytest.approx(0.2)
+    assert after(player, clock, 0.35) == pytest.approx(0.9)
+    assert player.seconds == pytest.approx(0.45)
+
+
+def test_it_begins_again(player: Player, clock: Clock) -> None:
+    start(player, clock)
+    assert after(player, clock, 0.6) == pytest.approx(0.2)
+    assert after(player, clock, 50.1) == pytest.approx(0.4)
+
+
+def test_without_loop_it_stops_at_its_end_and_plays_from_the_beginning(player: Player, clock: Clock) -> None:
+    player.loops = False
+    start(player, clock)
+    assert after(player, clock, 0.7) == 1.0 and not player.is_playing and player.seconds == 0.5
+    player.toggle()
+    assert player.is_playing and after(player, clock, 0.1) == 0.0
+
+
+def test_a_run_is_one_step(player: Player, history: History, rigged: ViewerState, clock: Clock) -> None:
+    start(player, clock)
+    for _ in range(3):
+        after(player, clock, 0.1)
+    assert not history.can_undo
+    player.toggle()
+    assert jaw(player) == pytest.approx(0.6) and player.seconds == pytest.approx(0.3)
+    history.undo()
+    assert history.state is rigged and player.seconds == 0.0 and not history.can_undo
+    history.redo()
+    start(player, clock)
+    assert after(player, clock, 0.1) == pytest.approx(0.8)
+
+
+def test_what_changes_meanwhile_is_a_step_of_its_own(player: Player, history: History, clock: Clock) -> None:
+    start(player, clock)
+    camera = history.state.scene.camera
+    for k in range(3):
+        turned = history.state.with_camera(orbit(camera, 0.1 * (k + 1), 0.0))
+        history.change(turned, "drag 1")
+        after(player, clock, 0.1)
+    assert len(history.states) == 2
+    assert player.shown.scene.camera == history.state.scene.camera != camera
+    assert jaw(player) == pytest.approx(0.6)
+    history.undo()
+    assert player.shown.scene.camera == camera and jaw(player) == pytest.approx(0.6)
+
+
+def test_a_slider_keeps_what_the_motion_does_not_move(player: Player, history: History, clock: Clock) -> None:
+    start(player, clock)
+    brow = with_weight(history.state.scene, "browInnerUp", 0.5)
+    history.change(history.state.with_pose(brow))
+    after(player, clock, 0.2)
+    assert weight_of(player.shown.scene, "browInnerUp") == 0.5 and jaw(player) == pytest.approx(0.4)
+
+
+def test_scrubbing_stops_and_stays_there(player: Player, history: History, clock: Clock) -> None:
+    start(player, clock)
+    for seconds in (0.1, 0.25, 0.35):
+        history.change(player.scrubbed(seconds), "hold time")
+    assert after(player, clock, 1.0) == pytest.approx(0.7) and player.seconds == 0.35
+    assert len(history.states) == 2
+    start(player, clock)
+    assert after(player, clock, 0.1) == pytest.approx(0.9)
+
+
+def test_a_head_without_its_names_is_told_and_the_first_one_plays_on(
+    player: Player, history: History, state: ViewerState, rigged: ViewerState, clock: Clock
+) -> None:
+    start(player, clock)
+    history.change(state)
+    assert player.clip is None and player.shown is state and "JawOpen" in player.note
+    after(player, clock, 0.1)
+    assert not player.is_playing
+    player.toggle()
+    assert not player.is_playing
+    history.undo()
+    assert player.clip is not None and player.note == ""
+
+
+def test_another_motion_plays_from_its_beginning(player: Player, clock: Clock, rigged_file: Path) -> None:
+    start(player, clock)
+    after(player, clock, 0.3)
+    player.open(MotionFile(rigged_file))
+    assert player.is_playing and player.seconds == 0.0
+    player.advance()
+    after(player, clock, 0.0)
+    assert after(player, clock, 0.25) == pytest.approx(0.25)
+    with pytest.raises(DermisError, match="no such file"):
+        player.open(MotionFile("nowhere.csv"))
+    assert player.is_playing and player.clip is not None and player.clip.name == "talk"
+
+
+def test_a_frame_that_cannot_be_read_stops_it(
+    player: Player, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(seconds: float) -> None:
+        raise DermisError("frame 3 is broken")
+
+    clip = player.clip
+    assert clip is not None
+    start(player, clock)
+    monkeypatch.setattr(type(clip), "pose_at", lambda _, seconds: broken(seconds))
+    assert after(player, clock, 0.1) == 0.0
+    assert not player.is_playing and "frame 3" in player.note
+
+
+def test_a_motion_of_one_frame_stands(rigged: ViewerState, clock: Clock, tmp_path: Path) -> None:
+    player = Player(History(rigged), MotionFile(write_take(tmp_path / "one.csv", 0.5)), clock)
+    start(player, clock)
+    assert after(player, clock, 0.1) == 0.5 and not player.is_playing
