@@ -13,7 +13,7 @@ from dermis.atlas.cached import cached_atlas
 from dermis.frame import surface, surroundings
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.atlas_textures import AtlasTextures, upload_atlas
-from dermis.frame.geometry import HeadResources, upload_geometry
+from dermis.frame.geometry import upload_geometry
 from dermis.frame.gutters import make_walks
 from dermis.frame.inputs import Resources, Split, view_record
 from dermis.frame.levels import Blur, Levels

@@ -1,4 +1,4 @@
-"""An atlas in coarse cells: those that give light to thin parts and take it, and copies in gutters."""
+"""An atlas in coarse cells: those that give light to thin parts, those that take it, copies in gutters."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TILE = 4
 """Cells along the side of a tile."""
 
 BESIDE = 0.7
-"""Texels by which a tile may show more than it covers: cells have whole ones, and triangles reach on."""
+"""Texels by which a tile may show more than it covers: cells are whole ones, and triangles reach farther."""
 
 _REACH = 3.2  # standard deviations of the widest Gaussian that two places are apart at most
 _SPACING = 0.36  # of the cells, in the same unit: what is read between them is smooth
@@ -41,8 +41,8 @@ class Cells:
     middle : (m, 2) uint32 of these: triangle at the middle texel, and its packed weights
     tile : (m,) the tile that this place of the surface belongs to
     triangle_first, triangle : (t + 1,) and (k,) uint32 triangles that tiles show
-    copy_first, copy : (side * side + 1,) and (c, 2) uint32 texels of gutters that show something of each
-        cell, and texels that they show, x and y packed
+    copy_first, copy : (side * side + 1,) and (c, 2) uint32 texels of gutters that show something of cells,
+        and texels that they show, x and y packed
     """
 
     size: int

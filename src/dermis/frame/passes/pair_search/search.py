@@ -1,4 +1,4 @@
-"""Translucent pairs of a surface, found on the device: facing tiles, cells in them, places in the map."""
+"""Translucent pairs of a surface, found on the device: tiles that face each other, cells, then places."""
 
 from __future__ import annotations
 
