@@ -197,13 +197,13 @@ def _layout(
         lit["occlusion_map"], follows = keep(make_map, device, lit["occlusion_map"], of=number)
     translucency = None
     if asked.count and asked.settings.transmission == "thin" and asked.technique.transmits:
-        surfaces = (one.resources | textures.resources for one in (held, at_rest()))
+        now, then = (one.resources | textures.resources for one in (held, at_rest()))
         blurred = asked.split.blurred_mm2, asked.split.weight, asked.skin.has_own_tissue
-        translucency = translucency_of(memo, device, *surfaces, atlas, *blurred, of=number)
+        translucency = translucency_of(memo, device, now, then, atlas, *blurred, of=number)
     side = asked.settings.atlas if asked.count else 1
-    texels = keep(surface_texels.make_surfaces, device, side, of=number)
+    surfaces = keep(surface_texels.make_surfaces, device, side, of=number)
     scattered = _sum(memo, device, asked, side, number)
-    return AtlasLayout(textures, held, lit, texels, scattered, translucency, follows)
+    return AtlasLayout(textures, held, lit, surfaces, scattered, translucency, follows)
 
 
 def _sum(memo: Memo, device: Device, asked: Asked, side: int, role: str) -> Any:
