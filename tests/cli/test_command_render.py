@@ -16,8 +16,8 @@ from dermis.images.io import read_image, write_png
 Run = Callable[..., Any]
 STAGES = {
     "shape",
-    "shadows",
     "stretch",
+    "shadows",
     "irradiance",
     "diffuse",
     "surface",

@@ -179,7 +179,7 @@ def test_twin_of_the_distances_along_the_surface(thin: Thin) -> None:
     assert (np.abs(made - high)[near & (low > high - texel)] < 1.5 * texel).mean() > 0.98
     reached = ~nowhere & (made < radius)
     closer = (low - made)[reached] / texel
-    assert closer.max() < 1.0 and (closer < 0.25).mean() > 0.995  # middles of patches, and not their edges
+    assert closer.max() < 2.0 and (closer < 0.25).mean() > 0.995  # middles of patches, and not their edges
 
 
 def test_twin_of_what_passes(device: Device, thin: Thin) -> None:

@@ -88,7 +88,7 @@ def test_a_change_runs_only_what_depends_on_it(name: str, studio: Studio, state:
     assert stages(studio, change(state)) == expected
 
 
-SHAPE = {"shape", "stretch", "surface", "shadows", "irradiance", "visibility"} | SPREAD | PICTURE
+SHAPE = {"shape", "stretch", "surface", "shadows", "irradiance", "pairs", "visibility"} | SPREAD | PICTURE
 
 
 def jaw_open(state: ViewerState, weight: float) -> ViewerState:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from dermis.frame import surface, surroundings
 from dermis.frame.asked import Asked
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.atlas_textures import AtlasTextures, upload_atlas
-from dermis.frame.geometry import HeadResources, upload_geometry
+from dermis.frame.geometry import upload_geometry
 from dermis.frame.gutters import make_walks
 from dermis.frame.inputs import Resources, view_record
 from dermis.frame.levels import Blur, Levels
@@ -20,7 +21,7 @@ from dermis.frame.limits import check_limits
 from dermis.frame.maps import upload_maps
 from dermis.frame.passes import bloom, gutters, post, shade, shadows, surface_texels, visibility_buffer
 from dermis.frame.passes.moving_occlusion import Sky, make_map, make_sky
-from dermis.frame.passes.shape import rest_shape
+from dermis.frame.resting import resting
 from dermis.frame.shape import Shape, ShapeTables, make_shape, shape_tables
 from dermis.frame.techniques.technique import AtlasTechnique, Technique
 from dermis.frame.translucency import translucency_of
@@ -95,8 +96,8 @@ def _shared(memo: Memo, device: Device, asked: Asked, shadow_maps: shadows.Shado
 
 def _sky(memo: Memo, device: Device, asked: Asked, layout: AtlasLayout, tables: ShapeTables) -> Sky:
     """The open sky at the head's vertices, known as it rests."""
-    resting = layout.head.shaped(memo.keep(rest_shape, device, tables, asked.head.positions_mm, of="head"))
-    return memo.keep(make_sky, device, asked.head, using=(resting,))
+    at_rest = resting(memo, device, layout.head, tables, asked.head, None, 0)
+    return memo.keep(make_sky, device, asked.head, using=(at_rest,))
 
 
 def _atlas(memo: Memo, device: Device, asked: Asked, name: str, index: int) -> Laid:
@@ -111,11 +112,11 @@ def _layout(
     """An atlas that light is spread on, without lights."""
     keep, number, head, (atlas, textures) = memo.keep, str(index), asked.head, laid
     held = keep(upload_geometry, device, head.mesh, atlas, shape, of=number)
+    at_rest = partial(resting, memo, device, held, shape.tables, head, asked.person, index)
     lit = held.resources | shared
     if asked.person is not None:
         walks = keep(make_walks, device, head.mesh, atlas, textures, of=number)
-        resting = _resting(memo, device, asked, held, shape, number)
-        textures = keep(gutters.walked, device, textures, walks, resting, of=number)
+        textures = keep(gutters.walked, device, textures, walks, at_rest(), of=number)
     if asked.occluded:
         bound = lit, textures.resources["atlas"]
         lit["occlusion_map"] = keep(surroundings.occlusion_map, device, head, atlas, using=bound, of=number)
@@ -126,24 +127,13 @@ def _layout(
         lit["occlusion_map"], follows = keep(make_map, device, lit["occlusion_map"], of=number)
     translucency = None
     if asked.count and asked.settings.transmission == "thin" and asked.technique.transmits:
-        heads = held, _resting(memo, device, asked, held, shape, number)
-        now, at_rest = (one.resources | textures.resources for one in heads)
+        now, then = (one.resources | textures.resources for one in (held, at_rest()))
         blurred = asked.split.blurred_mm2, asked.split.weight, asked.skin.has_own_tissue
-        translucency = translucency_of(memo, device, now, at_rest, atlas, *blurred, of=number)
+        translucency = translucency_of(memo, device, now, then, atlas, *blurred, of=number)
     side = asked.settings.atlas if asked.count else 1
     surfaces = keep(surface_texels.make_surfaces, device, side, of=number)
     scattered = _sum(memo, device, asked, side, number)
     return AtlasLayout(textures, held, lit, surfaces, scattered, translucency, follows)
-
-
-def _resting(
-    memo: Memo, device: Device, asked: Asked, held: HeadResources, shape: Shape, of: str
-) -> HeadResources:
-    """The head as the person rests."""
-    person = asked.head.positions_mm if asked.person is None else asked.person
-    return memo.keep(
-        HeadResources.shaped, held, memo.keep(rest_shape, device, shape.tables, person, of="person"), of=of
-    )
 
 
 def _sum(memo: Memo, device: Device, asked: Asked, side: int, role: str) -> Any:
