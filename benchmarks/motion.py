@@ -17,7 +17,6 @@ from typing import Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter, run
-from viewer_page import resident_mb
 
 from dermis.benchmark.cases import Case, scenes_of, settings_of
 from dermis.benchmark.measure import ON_CPU, Effort, row_ms, stage_ms
@@ -136,6 +135,8 @@ def people(renderer: Renderer, case: Case, head: Head) -> list[float]:
 
 def memory(renderer: Renderer, case: Case, head: Head, folder: Path, frames: int) -> dict[str, Any]:
     """Memory of the process and of the device over frames of a motion that never repeats [MB]."""
+    from viewer_page import resident_mb
+
     scene, settings = scenes_of(case, head, folder, 1)[0], settings_of(case)
     moving, taken = rigged(head, case.targets), list[tuple[int, float, float]]()
     for number in range(frames):

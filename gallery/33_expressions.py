@@ -25,8 +25,8 @@ POSES = {
     "a smile": dermis.Pose(SMILE),
     "wonder": dermis.Pose({"jawOpen": 0.4, "browInnerUp": 1.0, "eyeWideLeft": 0.8, "eyeWideRight": 0.8}),
     "pursed lips": dermis.Pose({"mouthPucker": 0.9, "mouthFunnel": 0.3, "browDownLeft": 0.5}),
-    "closed eyes": dermis.Pose({"eyeBlinkLeft": 1, "eyeBlinkRight": 1}, {bone: (5, 0, 2) for bone in NECK}),
-    "turned by 40 degrees": dermis.Pose(SMILE, {bone: (0, 10, 0) for bone in NECK}),
+    "closed eyes": dermis.Pose({"eyeBlinkLeft": 1, "eyeBlinkRight": 1}, dict.fromkeys(NECK, (5, 0, 2))),
+    "turned by 40 degrees": dermis.Pose(SMILE, dict.fromkeys(NECK, (0, 10, 0))),
 }
 
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+import accuracy_occlusion as occlusion
 import accuracy_surface as surface
 import numpy as np
 from numpy.typing import NDArray
@@ -117,6 +118,18 @@ def _jumps(renderer: Renderer, name: str, head: Head, shape: Head, pose: Pose | 
     return f"| {name} | {' | '.join(cells)} |"
 
 
+def occlusions(renderer: Renderer, head: Head) -> Iterator[str]:
+    """Lines of the table of ambient occlusion."""
+    neck = dict.fromkeys(("neck01", "neck02", "neck03", "head"), (0.0, 15.0, 0.0))
+    poses = {name: Pose(EXPRESSIONS[name]) for name in ("open jaw", "smile", "blink", "pucker", "surprise")}
+    poses["head turned by 60 degrees"] = Pose(bones=neck)
+    shapes = {
+        name: (pose, anew(head, head.control.points_mm(pose.motion(head.control)).astype(np.float32)))
+        for name, pose in poses.items()
+    }
+    yield from occlusion.lines(renderer, head, shapes)
+
+
 def main() -> None:
     """Measure and write the page."""
     renderer = dermis.Renderer(sys.argv[1] if len(sys.argv) > 1 else "auto")
@@ -126,6 +139,7 @@ def main() -> None:
     tables = {
         "expressions": "\n".join(expressions(renderer, head, people)),
         "seams": "\n".join(seams(renderer, head, people)),
+        "occlusions": "\n".join(occlusions(renderer, head)),
     }
     PAGE.write_text(text.format(adapter=renderer.device.adapter.name, **tables), encoding="utf-8")
 

@@ -2,8 +2,8 @@
 
 python tools/movie.py OUTPUT.mp4 [SIDE [FPS]]
 
-Writes the motion beside the movie, as a CSV like those of Live Link Face. Needs DERMIS_DATA with heads/human and
-heads/makehuman.
+Writes the motion beside the movie, as a CSV like those of Live Link Face. Needs DERMIS_DATA with heads/human
+and heads/makehuman.
 """
 
 from __future__ import annotations
@@ -79,9 +79,8 @@ def main() -> None:
 
 def scenes(head: Head, clip: dermis.Clip, times: Sequence[float]) -> Iterator[dermis.Scene]:
     """The head at each time [s]."""
-    camera = dermis.portrait(head).model_copy(update={"frame_mm": 290.0})
     for seconds in times:
-        yield dermis.Scene(head, camera=camera, pose=clip.pose_at(seconds))
+        yield dermis.Scene(head, pose=clip.pose_at(seconds))
 
 
 def capture() -> str:

@@ -15,6 +15,8 @@ from dermis.images.io import read_image, write_png
 
 Run = Callable[..., Any]
 STAGES = {
+    "shape",
+    "stretch",
     "shadows",
     "irradiance",
     "diffuse",

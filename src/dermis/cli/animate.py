@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from dermis.cli.console import note, print_json, print_lines, progress, working_on
+from dermis.cli.console import interruptible, note, print_json, print_lines, progress, working_on
 from dermis.cli.motion import clip_of, motion_file, names_of, parse_span
 from dermis.cli.moving_output import MovingOutput
 from dermis.cli.options import Adapter, Json, Whole
@@ -34,9 +34,13 @@ class _Take:
     clip: Clip
     rate: Fraction
 
-    def scenes(self, numbers: Iterable[int]) -> Iterator[Scene]:
-        """The scene of each frame; what the clip does not move keeps the scene's own pose."""
+    def scenes(self, numbers: Iterable[int], check: Callable[[], None]) -> Iterator[Scene]:
+        """The scene of each frame; what the clip does not move keeps the scene's own pose.
+
+        check : called before each
+        """
         for number in numbers:
+            check()
             pose = self.clip.pose_at(float(number / self.rate))
             yield replace(self.scene, pose=laid_over(pose, self.scene.pose))
 
@@ -144,8 +148,9 @@ def _draw(take: _Take, numbers: Sequence[int], target: MovingOutput, adapter: st
 
     renderer, size = Renderer(adapter), take.settings.size
     options: dict[str, Any] = {**take.settings.model_dump(), "linear": target.linear}
-    with target.writing(size, take.rate) as write, progress("drawing frames") as report:
-        pictures = renderer.render_many(take.scenes(numbers), **options)
+    writing, bar = target.writing(size, take.rate), progress("drawing frames")
+    with interruptible() as check, writing as write, bar as report:
+        pictures = renderer.render_many(take.scenes(numbers, check), **options)
         for done, (number, picture) in enumerate(zip(numbers, pictures, strict=True), 1):
             write(number, picture)
             report(done, len(numbers))
@@ -174,7 +179,8 @@ def _in_words(report: dict[str, Any]) -> str:
     count, drawn = report["frames"], report["drawn"]
     kept = f" ({count - drawn} were there)" if drawn < count else ""
     place = f" on {report['adapter']}" if report["adapter"] else ""
-    return f"{report['file']}  {count} frames{kept} at {report['fps']:g}/s  {report['seconds']:.1f} s{place}"
+    frames = f"{count} frame{'s' * (count != 1)}"
+    return f"{report['file']}  {frames}{kept} at {report['fps']:g}/s  {report['seconds']:.1f} s{place}"
 
 
 def _list_names(name: str, given: SceneOptions, as_json: bool) -> int:

@@ -40,10 +40,10 @@ class Slot:
         return found
 
     def hold(self, value: int) -> None:
-        """Note what is there now; what overlaps it is no longer what it was."""
+        """Note what is there now, in its views too; what it is a view of is no longer what it was."""
         self.held = value
         for part in self.parts:
-            part.held = 0
+            part.held = value
         if self.parent is not None:
             self.parent.held = 0
 
@@ -82,5 +82,5 @@ def slot_of(device: Device, resource: Any) -> Slot:
         found = device.slots[resource] = Slot(slot_of(device, texture) if texture is not None else None)
         if found.parent is not None:
             found.parent.parts.append(found)
-            found.scratch = found.parent.scratch
+            found.scratch, found.held = found.parent.scratch, found.parent.held
     return found

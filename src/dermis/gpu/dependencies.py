@@ -22,18 +22,15 @@ class Dependencies:
 
     def __init__(self, declared: list[Declared]) -> None:
         self.declared = declared
-        # Of each pass: passes before it with the slots in which they leave what it reads, and what it finds.
-        self._needs: list[list[tuple[int, Slot]]] = []
-        self._finds: list[list[Slot]] = []
+        # What each pass reads, with the pass before it that left it there, if one did.
+        self._reads: list[list[tuple[int | None, Slot]]] = []
         self._last: dict[Slot, int] = {}  # the pass that writes it last, or what overlaps it
         self._due_of = lru_cache(_MOST)(self._find_due)
         writers: dict[Slot, int] = {}
         for index, (_, reads, writes) in enumerate(declared):
-            sources = [slot.sources(writers) for slot in reads]
-            self._needs.append([(writers[one], one) for several in sources for one in several])
-            unwritten = [slot for slot, found in zip(reads, sources, strict=True) if not found]
-            found = [slot for slot in unwritten if slot not in writes]
-            self._finds.append([*found, *(slot.parent for slot in found if slot.parent)])
+            found = [one for slot in reads for one in slot.sources(writers) or [slot, *slot.parts]]
+            former = set(found).difference(writers, writes)
+            self._reads.append([(writers.get(one), one) for one in found if one in writers or one in former])
             for slot in writes:
                 self._write(slot, index, writers)
 
@@ -43,9 +40,8 @@ class Dependencies:
         keys : what that follows from besides the content that it reads
         """
         made: list[int] = []
-        for key, needs, finds in zip(keys, self._needs, self._finds, strict=True):
-            found = [made[index] for index, _ in needs]
-            found += [slot.held for slot in finds]
+        for key, reads in zip(keys, self._reads, strict=True):
+            found = [slot.held if index is None else made[index] for index, slot in reads]
             made.append(hash((epoch, key, *found)))
         return made
 
@@ -65,13 +61,13 @@ class Dependencies:
             kept -= spoilt
 
     def _due_with(self, kept: set[Slot]) -> list[bool]:
-        due, wanted = [False] * len(self.declared), set[tuple[int, Slot]]()
+        due, wanted = [False] * len(self.declared), set[tuple[int | None, Slot]]()
         for index in range(len(due) - 1, -1, -1):
             for slot in self.declared[index][-1]:
                 last = self._last[slot] == index
                 if not (last and slot in kept) and ((last and not slot.scratch) or (index, slot) in wanted):
                     due[index] = True
-                    wanted.update(self._needs[index])
+                    wanted.update(self._reads[index])
                     break
         return due
 
