@@ -167,3 +167,21 @@ def test_what_failed_is_not_found_again(executor: ThreadPoolExecutor) -> None:
             memo.wait(memo.soon(executor, fail))
     assert [memo.wait(memo.soon(executor, fail)) for _ in range(2)] == [7, 7]
     assert len(tries) == 3
+
+
+def test_equal_arguments_are_compared_by_what_they_say_only_once() -> None:
+    """Another head with the same arrays must not cost their comparison in every frame."""
+
+    class Counted:
+        compared = 0
+
+        def __eq__(self, other: object) -> bool:
+            Counted.compared += 1
+            return isinstance(other, Counted)
+
+        __hash__ = None  # type: ignore[assignment]
+
+    memo, one, other = Memo(), Counted(), Counted()
+    assert memo.keep(id, one) == memo.keep(id, other) == id(one)
+    assert Counted.compared == 1
+    assert memo.keep(id, other) == id(one) and Counted.compared == 1

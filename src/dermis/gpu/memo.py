@@ -56,7 +56,9 @@ class Memo:
             if same(one.args, args):
                 found = one
                 break
-        if found is None:
+        if found is not None:
+            found.args = args  # equal ones may be others: from now on these are recognised at once
+        else:
             self._settle(role)
             kept[:] = kept[: self._depth - 1]  # before making, which may need the space
             found = self._made(make, args, using)
