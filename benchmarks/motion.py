@@ -133,10 +133,14 @@ def people(renderer: Renderer, case: Case, head: Head) -> list[float]:
     return found
 
 
+def resident_mb() -> float:
+    """Memory of this process that is in use [MB]."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * 4096 / 1e6
+
+
 def memory(renderer: Renderer, case: Case, head: Head, folder: Path, frames: int) -> dict[str, Any]:
     """Memory of the process and of the device over frames of a motion that never repeats [MB]."""
-    from viewer_page import resident_mb
-
     scene, settings = scenes_of(case, head, folder, 1)[0], settings_of(case)
     moving, taken = rigged(head, case.targets), list[tuple[int, float, float]]()
     for number in range(frames):

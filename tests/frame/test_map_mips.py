@@ -57,6 +57,21 @@ def test_rows_and_columns_are_alike(device: Device) -> None:
     np.testing.assert_allclose(slopes_of(device, height), turned, atol=HALVES)
 
 
+def test_bands_do_not_show(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Large maps go to the device a few rows at a time."""
+    height = noise((150, 42)).astype(float)
+    at_once = slopes_of(device, height)
+    monkeypatch.setattr(map_mips, "_BAND_BYTES", 64 * 4 * 44)
+    np.testing.assert_array_equal(slopes_of(device, height), at_once)
+
+
+@pytest.mark.parametrize("shape", [(16, 16), (70, 44), (71, 44), (2, 6)])
+def test_mips_of_relief_are_means(device: Device, shape: tuple[int, int]) -> None:
+    made = all_mips(device, map_mips.relief(device, noise(shape)))
+    for level, mean in zip(made, mip_chain(made[0]), strict=True):
+        np.testing.assert_allclose(level, mean, atol=HALVES)
+
+
 @pytest.mark.parametrize("shape", SHAPES)
 def test_mips_of_colours_are_their_means(device: Device, shape: tuple[int, int]) -> None:
     image = noise((*shape, 3))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+from dermis.frame.asked import Asked
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.inputs import Inputs, camera_views, pinhole, seen_by
 from dermis.frame.levels import Blur, scale_of
@@ -13,7 +14,7 @@ from dermis.frame.passes.moving_occlusion import sky_record
 from dermis.frame.passes.shade import shade_program
 from dermis.frame.passes.shape import Motion, resting
 from dermis.frame.projection import Views, shadow_layers
-from dermis.frame.resources import Asked, make_resources
+from dermis.frame.resources import make_resources
 from dermis.frame.skin_profiles import SkinProfiles
 from dermis.frame.sky import Anchors, Look, anchors_of, look_around, turn_of
 from dermis.frame.surroundings import brightest, load_surroundings, with_suns

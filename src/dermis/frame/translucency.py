@@ -43,7 +43,8 @@ def translucency_of(
     """
     widest = float(np.sqrt(variance_mm2[-1]))
     widest = shared_width(widest) if changing else widest
-    pairs = memo.keep(find_pairs, device, at_rest, atlas, widest, of=of)
+    cells = memo.keep(divide, atlas, widest, of=of)
+    pairs = memo.keep(find_pairs, device, at_rest, atlas, cells, of=of)
     return memo.keep(translucency_from, device, surface, pairs, variance_mm2, weight, of=of)
 
 
@@ -53,17 +54,13 @@ def shared_width(widest_mm: float) -> float:
     return float(2.0 ** (step / _WIDTHS_TO_DOUBLE))
 
 
-def find_pairs(device: Device, surface: Resources, atlas: Atlas, widest_mm: float) -> PairBuffers:
-    """The translucent pairs of a surface, with cells so coarse that memory holds them.
-
-    widest_mm : standard deviation of the widest Gaussian [mm]
-    """
-    for number in count():
-        cells = divide(atlas, widest_mm, _COARSER**number)
+def find_pairs(device: Device, surface: Resources, atlas: Atlas, cells: Cells) -> PairBuffers:
+    """The translucent pairs of a surface; of coarser cells where memory does not hold those of these."""
+    found, times = search(device, surface, cells), count(1)
+    while found is None:
+        cells = divide(atlas, cells.widest_mm, _COARSER ** next(times))
         found = search(device, surface, cells)
-        if found is not None:
-            return pairs_from(device, cells, found)
-    raise AssertionError
+    return pairs_from(device, cells, found)
 
 
 def pairs_from(device: Device, cells: Cells, found: Found) -> PairBuffers:

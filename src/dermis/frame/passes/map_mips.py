@@ -13,7 +13,8 @@ from dermis.gpu import Device, Frame, make_texture, upload
 from dermis.gpu.textures import texture_from
 
 Floats = NDArray[np.float32]
-_COLUMNS, _ROWS = 2, 32  # of an invocation, as in relief.wgsl
+_ROWS = 32  # of an invocation, as in relief.wgsl
+_BAND_BYTES = 96 << 20  # of heights at a time: every device can bind so many
 
 
 def colours(device: Device, image: Floats) -> Any:
@@ -30,16 +31,36 @@ def slopes(device: Device, image: Floats | None) -> Any:
     """A texture of (h, w, 2) slopes and their squares; flat without any."""
     if image is None:
         return _flat(device)
-    given = texture_from(device, image, "rg32float")
-    return _computed(device, "map_moments.wgsl", {"slopes": given}, image.shape, (1, 1))
+    texture, frame = _empty(device, image.shape), Frame(device, timed=False)
+    bound = {"slopes": texture_from(device, image, "rg32float"), "stored": _level(texture, 0)}
+    shader = program(device, "map_moments.wgsl", store=HALVES)
+    frame.compute("maps", shader, bound, image.shape[1::-1])
+    _halve(frame, texture)
+    frame.submit()
+    return texture
 
 
 def relief(device: Device, height: Floats | None) -> Any:
-    """A texture of the slopes of an (h, w) height map [mm per texel] and their squares; flat without any."""
-    if height is None:
+    """A texture of the slopes of an (h, w) height map [mm per texel] and their squares; flat without any.
+
+    Beyond the edge a plane goes on.
+    """
+    if height is None or height.size == 1:
         return _flat(device)
-    given = texture_from(device, height, "r32float")
-    return _computed(device, "relief.wgsl", {"height_map": given}, height.shape, (_ROWS, _COLUMNS))
+    texture, frame = _empty(device, height.shape), Frame(device, timed=False)
+    shader = program(device, "relief.wgsl", store=HALVES)
+    padded = np.pad(height, 1, "reflect", reflect_type="odd")
+    rows, columns = height.shape
+    band = max(_BAND_BYTES // padded[:1].nbytes // _ROWS, 1) * _ROWS
+    for top in range(0, rows, band):
+        heights = device.buffer(padded[top : top + band + 2], "STORAGE")
+        bound = {"top": device.buffer(np.array([top], np.uint32), "STORAGE"), "heights": heights}
+        bound |= {"stored": _level(texture, 0), "halved": _level(texture, 1)}
+        size = -(-columns // 2), -(-min(band, rows - top) // _ROWS)
+        frame.compute("maps", shader, bound, size)
+    _halve(frame, texture, 1 if rows % 2 or columns % 2 else 2)
+    frame.submit()
+    return texture
 
 
 def _flat(device: Device) -> Any:
@@ -50,27 +71,11 @@ def _empty(device: Device, shape: tuple[int, ...]) -> Any:
     return make_texture(device, (shape[1], shape[0]), HALVES, mips=max(shape[:2]).bit_length())
 
 
-def _computed(
-    device: Device, name: str, given: dict[str, Any], shape: tuple[int, ...], block: tuple[int, int]
-) -> Any:
-    """What a shader stores, with mips.
-
-    block : rows and columns that each invocation takes
-    """
-    texture, frame = _empty(device, shape), Frame(device, timed=False)
-    rows, columns = (-(-side // one) for side, one in zip(shape, block, strict=False))
-    bound = given | {"stored": _level(texture, 0)}
-    frame.compute("maps", program(device, name, store=HALVES), bound, (columns, rows))
-    _halve(frame, texture)
-    frame.submit()
-    return texture
-
-
-def _halve(frame: Frame, texture: Any) -> None:
-    """Fill the mips of a texture whose first level is there."""
+def _halve(frame: Frame, texture: Any, first: int = 1) -> None:
+    """Fill the mips of a texture from the first one that is not there."""
     shader = program(frame.device, "map_halve.wgsl", store=HALVES)
     width, height = texture.size[:2]
-    for mip in range(1, texture.mip_level_count):
+    for mip in range(first, texture.mip_level_count):
         bound = {"finer": _level(texture, mip - 1), "stored": _level(texture, mip)}
         frame.compute("maps", shader, bound, (max(width >> mip, 1), max(height >> mip, 1)))
 

@@ -1,9 +1,11 @@
-// Slopes of a height map along +u and down [mm per texel], Scharr's, and their squares; a plane goes on beyond the edge.
+// Slopes of a height map along +u and down [mm per texel], Scharr's, and their squares, with the first mip.
 //#include "store.wgsl"
 
-@group(0) @binding(0) var height_map: texture_2d<f32>; // [mm]
+@group(0) @binding(0) var<storage, read> top: array<u32>; // the first row of a band of the map
+@group(0) @binding(1) var<storage, read> heights: array<f32>; // of the band [mm], with a texel more on all sides
+@group(0) @binding(33) var halved: texture_storage_2d<rgba16float, write>;
 
-const ROWS: i32 = 32; // of an invocation, which takes two columns: what it has read it keeps
+const ROWS: u32 = 32u; // of an invocation, which takes two columns: what it has read it keeps
 
 // At two columns of a row: what is right of each less what is left, and the three by 3, 10, 3.
 struct Row {
@@ -11,49 +13,44 @@ struct Row {
     sum: vec2f,
 }
 
-fn height_at(x: i32, y: i32) -> f32 {
-    return textureLoad(height_map, vec2i(x, y), 0).r;
+fn row(first: u32) -> Row {
+    let a = vec2f(heights[first], heights[first + 1u]);
+    let b = vec2f(heights[first + 2u], heights[first + 3u]);
+    return Row(b - a, 3.0 * (a + b) + 10.0 * vec2f(a.y, b.x));
 }
 
-fn row_within(x: i32, y: i32) -> Row {
-    let last = i32(textureDimensions(height_map).x) - 1;
-    let a = height_at(x, y);
-    var before = height_at(select(x - 1, min(1, last), x == 0), y);
-    before = select(before, 2.0 * a - before, x == 0);
-    let b = select(height_at(min(x + 1, last), y), 2.0 * a - before, x == last);
-    let after = select(height_at(min(x + 2, last), y), 2.0 * b - a, x + 1 >= last);
-    return Row(vec2f(b, after) - vec2f(before, a), 3.0 * (vec2f(b, after) + vec2f(before, a)) + 10.0 * vec2f(a, b));
-}
-
-fn row(x: i32, y: i32) -> Row {
-    let last = i32(textureDimensions(height_map).y) - 1;
-    let edge = clamp(y, 0, last);
-    let found = row_within(x, edge);
-    if (edge == y) {
-        return found;
-    }
-    let inner = row_within(x, clamp(2 * edge - y, 0, last));
-    return Row(2.0 * found.change - inner.change, 2.0 * found.sum - inner.sum);
+fn with_squares(slope: vec2f) -> vec4f {
+    return vec4f(slope, slope * slope);
 }
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let size = vec2i(textureDimensions(height_map));
-    let x = 2 * i32(id.x);
-    let top = i32(id.y) * ROWS;
-    if (x >= size.x) {
+    let size = textureDimensions(stored);
+    let pitch = size.x + 2u;
+    let x = 2u * id.x;
+    let low = top[0] + ROWS * id.y;
+    if (x >= size.x || ROWS * id.y * pitch >= arrayLength(&heights)) {
         return;
     }
-    var above = row(x, top - 1);
-    var centre = row(x, top);
-    for (var y = top; y < min(top + ROWS, size.y); y++) {
-        let below = row(x, y + 1);
+    var at = ROWS * id.y * pitch + x;
+    var above = row(at);
+    var centre = row(at + pitch);
+    var quad = vec4f(0.0);
+    for (var y = low; y < min(low + ROWS, size.y); y++) {
+        let below = row(at + 2u * pitch);
         let across = (3.0 * (above.change + below.change) + 10.0 * centre.change) / 32.0;
         let down = (below.sum - above.sum) / 32.0;
-        let slopes = vec4f(across.x, down.x, across.y, down.y);
-        store(vec2u(vec2i(x, y)), vec4f(slopes.xy, slopes.xy * slopes.xy));
-        store(vec2u(vec2i(x + 1, y)), vec4f(slopes.zw, slopes.zw * slopes.zw));
+        let left = with_squares(vec2f(across.x, down.x));
+        let right = with_squares(vec2f(across.y, down.y));
+        store(vec2u(x, y), left);
+        store(vec2u(x + 1u, y), right);
+        quad += left + right;
+        if (y % 2u == 1u) {
+            textureStore(halved, vec2u(x, y) / 2u, rounded_to_halves(0.25 * quad));
+            quad = vec4f(0.0);
+        }
         above = centre;
         centre = below;
+        at += pitch;
     }
 }

@@ -73,7 +73,7 @@ def _listed(
     numbers = {
         "number_of_receiver": passes.upload(np.cumsum(taken) - taken),
         "number_of_source": passes.upload(np.cumsum(given) - given),
-        "copies": draw_copies(passes, cells, places.source, bound["source_points"]),
+        "copies": draw_copies(passes, cells, places, np.flatnonzero(given), bound["source_points"]),
     }
     passes.add("offsets", count, {**bound, **numbers, "pairs": pairs})
     passes.frame.submit()

@@ -1,0 +1,82 @@
+"""What the resources of a frame are made for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from dermis.frame import surroundings
+from dermis.frame.inputs import Split
+from dermis.frame.seams import LaidOut, Remedy, laid_out, remedy_of
+from dermis.frame.surroundings import Surroundings
+from dermis.frame.techniques.technique import Technique
+from dermis.mesh.head import Head
+from dermis.optics.gaussians import GaussianSum
+from dermis.scene.environment import Environment
+from dermis.scene.settings import Settings
+from dermis.scene.skin import Skin
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What resources are made for.
+
+    person : (p, 3) places of the head's control points where another person rests, None for the head's own
+    lights, shadow_layers : how many parts of lights there are, and how many of them cast shadows
+    posed : whether the scene has a pose
+    view : name of a scene among several that are drawn in turn
+    """
+
+    head: Head
+    skin: Skin
+    profile: GaussianSum
+    person: Any
+    settings: Settings
+    environment: Environment | None
+    surroundings: Surroundings
+    technique: Technique
+    lights: int
+    shadow_layers: int
+    posed: bool
+    view: str
+
+    @property
+    def white(self) -> bool:
+        """Whether the colour map alone gives the colour."""
+        return self.skin.albedo == "map"
+
+    @property
+    def light_of(self) -> str:
+        """Whose light it is: each view and each size of shadow maps keeps its own."""
+        return f"{self.view} {self.settings.shadow_size}"
+
+    @cached_property
+    def split(self) -> Split:
+        """The profile as the technique uses it."""
+        return self.technique.split(self.profile, self.white)
+
+    @cached_property
+    def occluded(self) -> bool:
+        """Whether the head hides some of its environment from itself."""
+        return surroundings.is_occluded(self.environment, self.settings)
+
+    @property
+    def occlusion_moves(self) -> bool:
+        """Whether that follows the head's shape."""
+        return self.occluded and self.posed and self.settings.occlusion == "baked"
+
+    @cached_property
+    def remedy(self) -> Remedy:
+        """What is done at the seams."""
+        return remedy_of(self.settings.seams, self.technique.stitches)
+
+    @property
+    def count(self) -> int:
+        """Gaussians that light is blurred by over the atlas."""
+        return len(self.split.blurred_mm2)
+
+    @cached_property
+    def atlases(self) -> LaidOut:
+        """Names and size of the atlases."""
+        return laid_out(self.remedy, self.settings, self.count, self.occluded)
