@@ -86,27 +86,22 @@ def looks(passes: SearchPasses, places: Places) -> tuple[Resources, int]:
     return bound, int(word[-1])
 
 
-def draw_copies(passes: SearchPasses, cells: Cells, places: Places, asked: Index, points: Any) -> Any:
-    """Buffer of the places in gutters that show some of the sources, as copies.wgsl writes it.
+def draw_copies(passes: SearchPasses, cells: Cells, source: Index, bound: Resources) -> Any:
+    """Buffer of the places in gutters that show sources, as copies.wgsl writes it.
 
-    asked : (n,) these sources
-    points : buffer of where all of them lie
+    source : (n,) cells
+    bound : what copies.wgsl reads besides
     """
     side, ranges = cells.side, list[Index]()
-    y, x = np.divmod(places.source[asked], side)
+    y, x = np.divmod(source, side)
     for row in (y - 1, y, y + 1):
         within = (row >= 0) & (row < side)
         begin = np.clip(row, 0, side - 1) * side
         first = cells.copy_first[begin + np.maximum(x - 1, 0)]
         end = cells.copy_first[begin + np.minimum(x + 1, side - 1) + 1]
         ranges += [first, np.where(within, end, first)]
-    copies = space(passes.device, _COPIES * len(asked))
-    bound = {
-        "asked": passes.upload(asked),
-        "rows": passes.upload(*ranges),
-        "gutters": passes.upload(*cells.copy.T),
-    }
-    passes.add("copies", len(asked), {**bound, "source_points": points, "copies": copies})
+    copies = space(passes.device, _COPIES * len(source))
+    passes.add("copies", len(source), {**bound, "rows": passes.upload(*ranges), "copies": copies})
     return copies
 
 
