@@ -36,14 +36,17 @@ def test_cells_are_as_large_as_the_widest_gaussian_allows(divided: Divided) -> N
 def test_all_texels_of_their_own_lie_in_cells_that_give_and_take(divided: Divided) -> None:
     _, atlas, cells = divided
     y, x = (axis * cells.side // atlas.size for axis in np.nonzero(atlas.own))
-    expected = np.zeros_like(cells.own)
+    expected = np.zeros_like(cells.surface)
     expected[y, x] = True
-    assert (cells.own == expected).all()
-    assert cells.own.sum() > 100
-    shown = cells.own & cells.surface
-    assert shown.sum() > 0.98 * cells.own.sum()  # at edges the middle may show nothing
+    own = np.zeros_like(expected)
+    own.ravel()[cells.giving] = True
+    assert (own == expected).all() and own.sum() == len(cells.giving) > 100
+    assert (own & cells.surface).sum() > 0.98 * own.sum()  # at edges the middle may show nothing
+    row, column = np.nonzero(cells.surface)
+    assert (np.sort(cells.taking) == np.sort(column | (row << 16))).all()
+    tile = np.repeat(np.arange(cells.tiles**2), np.diff(cells.giving_first))
     assert (
-        cells.taking == np.flatnonzero(cells.surface) % cells.side + (np.nonzero(cells.surface)[0] << 16)
+        tile == cells.giving // cells.side // TILE * cells.tiles + cells.giving % cells.side // TILE
     ).all()
 
 
@@ -65,7 +68,8 @@ def test_receivers_belong_to_the_tile_of_their_place(divided: Divided) -> None:
     b = np.stack([cells.middle[:, 1] & 0xFFFF, cells.middle[:, 1] >> 16], axis=-1) / 65535.0
     weights = np.column_stack([1.0 - b.sum(axis=1), b])
     place = np.einsum("nk,nkc->nc", weights, atlas.place[cells.middle[:, 0]].astype(float)) * cells.side
-    at = np.stack([cells.tile % cells.tiles, cells.tile // cells.tiles], axis=-1)
+    tile = np.repeat(np.arange(cells.tiles**2), np.diff(cells.taking_first))
+    at = np.stack([tile % cells.tiles, tile // cells.tiles], axis=-1)
     assert (np.abs(place - TILE * (at + 0.5)) < TILE / 2 + 1e-2).all()
 
 

@@ -19,6 +19,7 @@ from translucency_twins import (
     far_of,
     giving,
     lie,
+    pairs_on,
     passed,
     passes,
     surface_of,
@@ -30,9 +31,10 @@ from dermis.atlas.build import build_atlas
 from dermis.atlas.translucency.cells import Cells, divide
 from dermis.frame.atlas_layout import PairBuffers, Translucency
 from dermis.frame.passes import translucency_weights
+from dermis.frame.passes.pair_search.passes import cell_tables
 from dermis.frame.passes.pair_search.search import search
 from dermis.frame.renderer import Renderer
-from dermis.frame.translucency import find_pairs, pairs_from, translucency_from
+from dermis.frame.translucency import pairs_from, translucency_from
 from dermis.gpu import Device, Frame, download
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import uv_sphere, wedge
@@ -82,7 +84,7 @@ def thin(device: Device) -> Thin:
     mesh = wedge(12.0, 1.0, 4.0, cells=2)
     atlas = build_atlas(mesh, 64, "stitched")
     surface = surface_of(device, mesh, atlas)
-    pairs = find_pairs(device, surface, atlas, divide(atlas, SIGMA))
+    pairs = pairs_on(device, surface, atlas, divide(atlas, SIGMA))
     found = weighed(device, pairs, surface)
     side = pairs.cells.side
     taken, given = taking(mesh, atlas, side), giving(mesh, atlas, side)
@@ -199,7 +201,7 @@ def test_twin_of_what_passes(device: Device, thin: Thin) -> None:
 
 def test_the_same_search_finds_the_same(device: Device, thin: Thin) -> None:
     surface = surface_of(device, thin.mesh, thin.atlas)
-    again = find_pairs(device, surface, thin.atlas, divide(thin.atlas, SIGMA))
+    again = pairs_on(device, surface, thin.atlas, divide(thin.atlas, SIGMA))
     for name in ("pairs", "sums"):
         assert (read(device, getattr(again, name)) == read(device, getattr(thin.pairs, name))).all()
     weights = read(device, weighed(device, again, surface).weights)
@@ -209,7 +211,7 @@ def test_the_same_search_finds_the_same(device: Device, thin: Thin) -> None:
 def test_a_narrow_profile_has_no_pairs(device: Device) -> None:
     mesh = uv_sphere(100.0, 8)
     atlas = build_atlas(mesh, 64, "stitched")
-    pairs = find_pairs(device, surface_of(device, mesh, atlas), atlas, divide(atlas, 0.01))
+    pairs = pairs_on(device, surface_of(device, mesh, atlas), atlas, divide(atlas, 0.01))
     assert pairs.count == 0 and pairs.cells.side == 64
 
 
@@ -218,7 +220,7 @@ def test_a_ball_smaller_than_the_profile_spreads_has_pairs(device: Device, layou
     """Its blurs read nearly all texels, gutters included."""
     mesh = uv_sphere(3.0, 48, 24)
     atlas = build_atlas(mesh, 64, layout)
-    pairs = find_pairs(device, surface_of(device, mesh, atlas), atlas, divide(atlas, SIGMA))
+    pairs = pairs_on(device, surface_of(device, mesh, atlas), atlas, divide(atlas, SIGMA))
     source, receiver, _ = read(device, pairs.pairs).reshape(-1, 3).T
     assert len(source) == pairs.count > 1000
     assert source.max() == pairs.sources[1] - 1 and receiver.max() == pairs.receivers[1] - 1
@@ -230,7 +232,7 @@ def test_cells_are_coarser_where_memory_does_not_hold_the_pairs(
     device: Device, thin: Thin, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(device, "max_storage_bytes", 12 * thin.pairs.count - 1)
-    fewer = find_pairs(device, surface_of(device, thin.mesh, thin.atlas), thin.atlas, thin.cells)
+    fewer = pairs_on(device, surface_of(device, thin.mesh, thin.atlas), thin.atlas, thin.cells)
     assert 0 < fewer.count < thin.pairs.count
     assert fewer.cells.spacing_mm == pytest.approx(1.5 * thin.cells.spacing_mm, rel=0.1)
     assert fewer.cells.radius_mm == thin.cells.radius_mm
@@ -242,7 +244,7 @@ def test_pairs_follow_a_surface_that_moves(device: Device, thin: Thin) -> None:
     x, y, z = head.positions_mm.T.astype(float)
     moved = np.stack([1.1 * x, y + 0.02 * x * x, 0.8 * z + 0.1 * x], axis=-1).astype(np.float32)
     surface = surface_of(device, thin.mesh, thin.atlas, moved)
-    there = search(device, surface, thin.cells)
+    there = search(device, surface, thin.cells, cell_tables(device, thin.cells))
     assert there is not None
     totals = []
     for pairs in (thin.pairs, pairs_from(device, thin.cells, there)):

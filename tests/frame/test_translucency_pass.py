@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tolerances import TWIN
-from translucency_twins import decoded, share_of, surface_of
+from translucency_twins import decoded, pairs_on, share_of, surface_of
 
 from dermis.atlas.build import build_atlas
 from dermis.atlas.translucency.cells import divide
 from dermis.frame.atlas_layout import Translucency
 from dermis.frame.levels import FLOATS, Blur, make_levels
 from dermis.frame.passes import translucency, translucency_weights
-from dermis.frame.translucency import find_pairs, translucency_from
+from dermis.frame.translucency import translucency_from
 from dermis.gpu import Constants, Device, Frame, download, make_texture, upload
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import uv_sphere, wedge
@@ -56,7 +56,7 @@ def weighed(device: Device) -> Weighed:
 def weighed_of(device: Device, mesh: Mesh) -> Weighed:
     atlas = build_atlas(mesh, 64, "stitched")
     surface = surface_of(device, mesh, atlas)
-    pairs = find_pairs(device, surface, atlas, divide(atlas, float(np.sqrt(VARIANCE[-1]))))
+    pairs = pairs_on(device, surface, atlas, divide(atlas, float(np.sqrt(VARIANCE[-1]))))
     thin = translucency_from(device, surface, pairs, VARIANCE, WEIGHT)
     frame = Frame(device)
     translucency_weights.draw(frame, thin)

@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.translucency.cells import Cells
+from dermis.frame.atlas_layout import PairBuffers
 from dermis.frame.atlas_textures import upload_atlas
 from dermis.frame.geometry import upload_geometry
 from dermis.frame.passes import stretch
+from dermis.frame.passes.pair_search.passes import cell_tables
 from dermis.frame.passes.shape import rest_shape
 from dermis.frame.shape import shape_tables
+from dermis.frame.translucency import find_pairs
 from dermis.gpu import Device, Frame
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -56,6 +59,11 @@ def surface_of(device: Device, mesh: Mesh, atlas: Atlas, positions_mm: Any = Non
     stretch.draw(frame, held, textures)
     frame.submit()
     return held.resources | textures.resources
+
+
+def pairs_on(device: Device, surface: dict[str, Any], atlas: Atlas, cells: Cells) -> PairBuffers:
+    """The translucent pairs of a surface."""
+    return find_pairs(device, surface, atlas, cells, cell_tables(device, cells))
 
 
 def interpolated(mesh: Mesh, atlas: Atlas, x: Index, y: Index, values: NDArray[Any]) -> Floats:

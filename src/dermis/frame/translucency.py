@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.translucency.cells import Cells, divide
 from dermis.frame.atlas_layout import PairBuffers, Translucency
+from dermis.frame.passes.pair_search.passes import CellTables, cell_tables
 from dermis.frame.passes.pair_search.places import upload_receivers, upload_sources
 from dermis.frame.passes.pair_search.search import Found, search
 from dermis.frame.passes.translucency_points import RECEIVER_BYTES, SOURCE_BYTES, space
@@ -44,7 +45,8 @@ def translucency_of(
     widest = float(np.sqrt(variance_mm2[-1]))
     widest = shared_width(widest) if changing else widest
     cells = memo.keep(divide, atlas, widest, of=of)
-    pairs = memo.keep(find_pairs, device, at_rest, atlas, cells, of=of)
+    tables = memo.keep(cell_tables, device, cells, of=of)
+    pairs = memo.keep(find_pairs, device, at_rest, atlas, cells, tables, of=of)
     return memo.keep(translucency_from, device, surface, pairs, variance_mm2, weight, of=of)
 
 
@@ -54,12 +56,14 @@ def shared_width(widest_mm: float) -> float:
     return float(2.0 ** (step / _WIDTHS_TO_DOUBLE))
 
 
-def find_pairs(device: Device, surface: Resources, atlas: Atlas, cells: Cells) -> PairBuffers:
+def find_pairs(
+    device: Device, surface: Resources, atlas: Atlas, cells: Cells, tables: CellTables
+) -> PairBuffers:
     """The translucent pairs of a surface; of coarser cells where memory does not hold those of these."""
-    found, times = search(device, surface, cells), count(1)
+    found, times = search(device, surface, cells, tables), count(1)
     while found is None:
         cells = divide(atlas, cells.widest_mm, _COARSER ** next(times))
-        found = search(device, surface, cells)
+        found = search(device, surface, cells, cell_tables(device, cells))
     return pairs_from(device, cells, found)
 
 

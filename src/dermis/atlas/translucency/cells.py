@@ -36,10 +36,11 @@ class Cells:
     spacing_mm : between cells, usually
     stride : texels between those that sources are made of
     surface : (side, side) cells that take light: with texels of their own, or beside such
-    own : (side, side) cells with texels of their own, which give light
-    taking : (m,) uint32 x and y of the first ones, packed
+    taking : (m,) uint32 x and y of these, packed, by the tile that the place at their middle belongs to
     middle : (m, 2) uint32 of these: triangle at the middle texel, and its packed weights
-    tile : (m,) the tile that this place of the surface belongs to
+    taking_first : (t + 1,) where those of each tile begin
+    giving, giving_first : (n,) and (t + 1,) cells with texels of their own, which give light, and where those
+        of each tile begin
     triangle_first, triangle : (t + 1,) and (k,) uint32 triangles that tiles show
     copy_first, copy : (side * side + 1,) and (c, 2) uint32 texels of gutters that show something of cells,
         and texels that they show, x and y packed
@@ -51,10 +52,11 @@ class Cells:
     spacing_mm: float
     stride: int
     surface: Flags
-    own: Flags
     taking: Words
     middle: Words
-    tile: Index
+    taking_first: Index
+    giving: Index
+    giving_first: Index
     triangle_first: Words
     triangle: Words
     copy_first: Index
@@ -84,8 +86,8 @@ def divide(atlas: Atlas, widest_mm: float, coarser: float = 1.0) -> Cells:
     shown = atlas.triangle[np.ix_(middle, middle)]
     surface = _widened(own) & (shown >= 0)
     weights = atlas.barycentric[np.ix_(middle, middle)][surface]
-    places = np.column_stack([shown[surface].astype(np.uint32), _packed(*weights.T)])
-    tiles = -(-side // TILE)
+    places, tiles = np.column_stack([shown[surface].astype(np.uint32), _packed(*weights.T)]), -(-side // TILE)
+    order, first = _by_tile(_tile_of(atlas, places, side, tiles), tiles)
     return Cells(
         atlas.size,
         side,
@@ -93,10 +95,10 @@ def divide(atlas: Atlas, widest_mm: float, coarser: float = 1.0) -> Cells:
         fine * atlas.size / side,
         stride,
         surface,
-        own,
-        _packed(*np.nonzero(surface)[::-1]),
-        places,
-        _tile_of(atlas, places, side, tiles),
+        _packed(*np.nonzero(surface)[::-1])[order],
+        places[order],
+        first,
+        *_giving(own, tiles),
         *_triangles(atlas, side, tiles),
         *_copies(atlas, side),
     )
@@ -129,13 +131,26 @@ def _widened(cells: Flags) -> Flags:
     return np.asarray(rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:])
 
 
-def _tile_of(atlas: Atlas, middle: Words, side: int, tiles: int) -> Index:
+def _by_tile(tile: NDArray[np.integer], tiles: int) -> tuple[Index, Index]:
+    """An order of things by their tile, and (t + 1,) where those of each begin."""
+    order = np.argsort(tile, kind="stable")
+    return order, np.concatenate([[0], np.cumsum(np.bincount(tile, minlength=tiles * tiles))])
+
+
+def _giving(own: Flags, tiles: int) -> tuple[Index, Index]:
+    """The numbers of cells by tile, and where those of each tile begin."""
+    y, x = np.nonzero(own)
+    order, first = _by_tile((y // TILE * tiles + x // TILE).astype(np.int32), tiles)
+    return (y * len(own) + x)[order], first
+
+
+def _tile_of(atlas: Atlas, middle: Words, side: int, tiles: int) -> NDArray[np.int32]:
     """(m,) tiles of places on triangles; where gutters show them they are elsewhere."""
     column, row = (
         np.clip(at * np.float32(side), 0, side - 1).astype(np.int32) // TILE
         for at in _places(atlas, middle[:, 0], middle[:, 1])
     )
-    return np.asarray(row * tiles + column)
+    return np.asarray(row * tiles + column, np.int32)
 
 
 def _packed(low: NDArray[np.integer], high: NDArray[np.integer]) -> Words:
@@ -154,9 +169,7 @@ def _triangles(atlas: Atlas, side: int, tiles: int) -> tuple[Words, Words]:
     which = np.repeat(np.arange(len(count)), count)
     number = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
     x, y = first[which].T + np.stack([number % wide[which], number // wide[which]])
-    tile = y * tiles + x
-    order = np.argsort(tile, kind="stable")
-    begin = np.searchsorted(tile[order], np.arange(tiles * tiles + 1))
+    order, begin = _by_tile(y * tiles + x, tiles)
     return begin.astype(np.uint32), index[which[order]].astype(np.uint32)
 
 

@@ -7,7 +7,8 @@
 @group(0) @binding(3) var<storage, read> source_points: array<Source>;
 @group(0) @binding(4) var<storage, read> rows: array<vec2u>; // first and end of the texels that show three rows of cells
 @group(0) @binding(5) var<storage, read> gutters: array<vec2u>; // texel, and the texel that it shows
-@group(0) @binding(6) var<storage, read_write> copies: array<u32>; // places, COPIES of each source [1/8 texel]
+@group(0) @binding(6) var<storage, read> asked: array<u32>; // sources
+@group(0) @binding(7) var<storage, read_write> copies: array<u32>; // places, COPIES of each that is asked for [1/8 texel]
 
 const APART: i32 = 4; // texels between the middles of two patches
 
@@ -46,7 +47,7 @@ fn main(
     if (index >= search.count) {
         return;
     }
-    let texel = unpacked(source_points[index].texel);
+    let texel = unpacked(source_points[asked[index]].texel);
     for (var row = 0u; row < 3u; row++) {
         let listed = rows[3u * index + row];
         for (var k = listed.x; k < listed.y; k++) {

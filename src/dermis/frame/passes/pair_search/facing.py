@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dermis.atlas.translucency.cells import Cells
-from dermis.frame.passes.pair_search.passes import Index, SearchPasses, starts
+from dermis.frame.passes.pair_search.passes import CellTables, Index, SearchPasses, starts
 from dermis.frame.passes.translucency_points import space
 from dermis.gpu import Constants
 from dermis.gpu.program import Resources
@@ -33,16 +33,15 @@ class Facing:
     listed: Any
 
 
-def find_facing(passes: SearchPasses, surface: Resources, cells: Cells) -> Facing:
+def find_facing(passes: SearchPasses, surface: Resources, cells: Cells, tables: CellTables) -> Facing:
     """Which tiles may have pairs with which.
 
     surface : resources of geometry.wgsl
     """
-    device, count, blocks = passes.device, cells.tiles**2, passes.blocks**2
+    device, count = passes.device, cells.tiles**2
     tiles, counts = space(device, count, _BOUNDS_BYTES), space(device, count)
-    bound = {"tiles": tiles, "near": _near(passes, surface, cells, tiles, blocks)}
-    every = passes.upload(np.arange(count), np.zeros(count, np.int64))
-    passes.add("facing", count, {**bound, "asked": every, "facing": counts})
+    bound = {"tiles": tiles, "near": _near(passes, surface, tables, tiles, count)}
+    passes.add("facing", count, {**bound, "asked": tables.every, "facing": counts})
     number = passes.read(counts, count)
     tile = np.flatnonzero(number)
     first = starts(number[tile])
@@ -51,18 +50,16 @@ def find_facing(passes: SearchPasses, surface: Resources, cells: Cells) -> Facin
     return Facing(tiles, tile, first, listed)
 
 
-def _near(passes: SearchPasses, surface: Resources, cells: Cells, tiles: Any, blocks: int) -> Any:
+def _near(passes: SearchPasses, surface: Resources, tables: CellTables, tiles: Any, count: int) -> Any:
     """Buffer of the blocks of tiles that may have pairs with each other.
 
-    tiles : buffer to fill with the bounds of tiles
+    tiles, count : buffer to fill with the bounds of tiles, and how many there are
     """
+    blocks = passes.blocks**2
     words = blocks * -(-blocks // 32)
     boxes, near = space(passes.device, blocks, _BOUNDS_BYTES), space(passes.device, words)
-    shown = {
-        "triangle_first": passes.upload(cells.triangle_first),
-        "triangles": passes.upload(cells.triangle),
-    }
-    passes.add("tiles", cells.tiles**2, {**surface, **shown, "tiles": tiles})
+    shown = {"triangle_first": tables.triangle_first, "triangles": tables.triangles}
+    passes.add("tiles", count, {**surface, **shown, "tiles": tiles})
     passes.add("blocks", blocks, {"tiles": tiles, "blocks": boxes})
     passes.add("near", words, {"blocks": boxes, "near": near})
     return near

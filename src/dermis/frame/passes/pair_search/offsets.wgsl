@@ -7,7 +7,7 @@
 
 @group(0) @binding(3) var<storage, read> receiver_points: array<Receiver>;
 @group(0) @binding(4) var<storage, read> source_points: array<Source>;
-@group(0) @binding(5) var<storage, read> copies: array<u32>; // as copies.wgsl has them
+@group(0) @binding(5) var<storage, read> copies: array<u32>; // of sources with pairs, as copies.wgsl has them
 @group(0) @binding(7) var<storage, read> number_of_source: array<u32>; // among those with pairs
 @group(0) @binding(8) var<storage, read> number_of_receiver: array<u32>;
 @group(0) @binding(9) var<storage, read_write> pairs: array<u32>; // three words: source, receiver, offset [1/8 texel]
@@ -57,10 +57,11 @@ fn main(
     nearest = 1e30;
     offset = NOWHERE;
     try_place(FINE * unpacked(source_points[source].texel));
-    for (var k = COPIES * source; k < COPIES * (source + 1u) && copies[k] != NOWHERE; k++) {
+    let number = number_of_source[source];
+    for (var k = COPIES * number; k < COPIES * (number + 1u) && copies[k] != NOWHERE; k++) {
         try_place(unpacked(copies[k]));
     }
-    pairs[3u * index] = number_of_source[source];
+    pairs[3u * index] = number;
     pairs[3u * index + 1u] = number_of_receiver[receiver];
     pairs[3u * index + 2u] = offset;
 }

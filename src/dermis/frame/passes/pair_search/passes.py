@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,28 @@ from dermis.gpu import Constants, Device, Frame
 Words = NDArray[np.uint32]
 Index = NDArray[np.int64]
 _MOST_BLOCKS = 40  # along a side
+
+
+@dataclass(frozen=True, eq=False)
+class CellTables:
+    """What all searches on an atlas read of its cells, as buffers.
+
+    every : all tiles, as facing.wgsl reads them
+    triangle_first, triangles : as tiles.wgsl reads them
+    gutters : as copies.wgsl reads it
+    """
+
+    every: Any
+    triangle_first: Any
+    triangles: Any
+    gutters: Any
+
+
+def cell_tables(device: Device, cells: Cells) -> CellTables:
+    """The tables of an atlas' cells."""
+    count = cells.tiles**2
+    lists = (np.arange(count), np.zeros(count, np.int64)), (cells.triangle_first,), (cells.triangle,)
+    return CellTables(*(upload_words(device, *columns) for columns in (*lists, cells.copy.T)))
 
 
 class SearchPasses:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dermis.atlas.translucency.cells import TILE, Cells
+from dermis.atlas.translucency.cells import Cells
 from dermis.frame.passes.pair_search.facing import Facing
 from dermis.frame.passes.pair_search.passes import Index, SearchPasses, starts, upload_words
 from dermis.frame.passes.translucency_points import (
@@ -30,7 +30,7 @@ class Places:
     receiver : (r,) among the cells that take light
     source : (s,) cells that give it
     first, end : (r,) where each receiver's tile begins and ends in the list of the tiles that it faces
-    sources_first : (t + 1,) where the sources of each tile of the atlas begin
+    sources_first, sources_end : (t,) those of each tile of the atlas
     """
 
     receiver: Index
@@ -38,27 +38,26 @@ class Places:
     first: Index
     end: Index
     sources_first: Index
+    sources_end: Index
 
 
 def places_of(cells: Cells, facing: Facing) -> Places:
     """The cells of tiles that face others."""
-    row = np.full(cells.tiles**2, -1)
-    row[facing.tile] = np.arange(len(facing.tile))
-    receiver = np.flatnonzero(row[cells.tile] >= 0)
-    receiver = receiver[np.argsort(cells.tile[receiver], kind="stable")]
-    y, x = np.nonzero(cells.own)
-    tile = y // TILE * cells.tiles + x // TILE
-    source = np.flatnonzero(row[tile] >= 0)
-    source = source[np.argsort(tile[source], kind="stable")]
-    first = np.searchsorted(tile[source], np.arange(cells.tiles**2 + 1))
-    of = row[cells.tile[receiver]]
-    return Places(
-        receiver,
-        y[source] * cells.side + x[source],
-        facing.first[:-1][of],
-        facing.first[1:][of],
-        first,
-    )
+    tile = facing.tile
+    receiver, of = _runs(cells.taking_first, tile)
+    source, _ = _runs(cells.giving_first, tile)
+    count = np.zeros(cells.tiles**2, np.int64)
+    count[tile] = cells.giving_first[tile + 1] - cells.giving_first[tile]
+    end = np.cumsum(count)
+    ranges = facing.first[:-1][of], facing.first[1:][of]
+    return Places(receiver, cells.giving[source], *ranges, end - count, end)
+
+
+def _runs(first: Index, chosen: Index) -> tuple[Index, Index]:
+    """All numbers of some of the runs that begin and end there, and which of those each belongs to."""
+    count = first[chosen + 1] - first[chosen]
+    of = np.repeat(np.arange(len(chosen)), count)
+    return np.arange(len(of)) + np.repeat(first[chosen] - starts(count)[:-1], count), of
 
 
 def draw_places(passes: SearchPasses, surface: Resources, cells: Cells, places: Places) -> Resources:
@@ -79,7 +78,7 @@ def looks(passes: SearchPasses, places: Places) -> tuple[Resources, int]:
     """Buffers of what each receiver looks at, as hits.wgsl reads them, and how many words its hits take."""
     word = starts(places.end - places.first)
     none = np.zeros(len(places.receiver), np.int64)
-    ranges = places.sources_first[:-1], places.sources_first[1:]
+    ranges = places.sources_first, places.sources_end
     bound = {
         "looks": passes.upload(places.first, places.end, word[:-1], none),
         "sources_of": passes.upload(*ranges),
@@ -87,14 +86,14 @@ def looks(passes: SearchPasses, places: Places) -> tuple[Resources, int]:
     return bound, int(word[-1])
 
 
-def draw_copies(passes: SearchPasses, cells: Cells, source: Index, points: Any) -> Any:
+def draw_copies(passes: SearchPasses, cells: Cells, source: Index, bound: Resources) -> Any:
     """Buffer of the places in gutters that show sources, as copies.wgsl writes it.
 
-    source : (s,) cells
-    points : buffer of where they lie
+    source : (n,) cells
+    bound : what copies.wgsl reads besides
     """
     side, ranges = cells.side, list[Index]()
-    y, x = source // side, source % side
+    y, x = np.divmod(source, side)
     for row in (y - 1, y, y + 1):
         within = (row >= 0) & (row < side)
         begin = np.clip(row, 0, side - 1) * side
@@ -102,8 +101,7 @@ def draw_copies(passes: SearchPasses, cells: Cells, source: Index, points: Any) 
         end = cells.copy_first[begin + np.minimum(x + 1, side - 1) + 1]
         ranges += [first, np.where(within, end, first)]
     copies = space(passes.device, _COPIES * len(source))
-    bound = {"rows": passes.upload(*ranges), "gutters": passes.upload(*cells.copy.T)}
-    passes.add("copies", len(source), {**bound, "source_points": points, "copies": copies})
+    passes.add("copies", len(source), {**bound, "rows": passes.upload(*ranges), "copies": copies})
     return copies
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from dermis.atlas.translucency.cells import Cells
 from dermis.frame.passes.pair_search.facing import find_facing
-from dermis.frame.passes.pair_search.passes import Index, SearchPasses, starts
+from dermis.frame.passes.pair_search.passes import CellTables, Index, SearchPasses, starts
 from dermis.frame.passes.pair_search.places import Places, draw_copies, draw_places, looks, places_of
 from dermis.frame.passes.translucency_points import RECEIVER_BYTES, space
 from dermis.gpu import Device
@@ -34,13 +34,13 @@ class Found:
     pairs: Any
 
 
-def search(device: Device, surface: Resources, cells: Cells) -> Found | None:
+def search(device: Device, surface: Resources, cells: Cells, tables: CellTables) -> Found | None:
     """All pairs that let light pass that counts; None where a buffer cannot hold them.
 
     surface : resources of geometry.wgsl, for the shape to search on, and of the atlas
     """
     passes = SearchPasses(device, cells)
-    facing = find_facing(passes, surface, cells)
+    facing = find_facing(passes, surface, cells, tables)
     places = places_of(cells, facing)
     seen, words = looks(passes, places)
     count = len(places.receiver)
@@ -53,7 +53,8 @@ def search(device: Device, surface: Resources, cells: Cells) -> Found | None:
     number = passes.read(counts, count)
     if _PAIR_BYTES * number.sum() > device.max_storage_bytes:
         return None
-    return _listed(passes, cells, places, number, seen, {**points, "reach_map": surface["reach_map"]})
+    bound = {**points, "reach_map": surface["reach_map"], "gutters": tables.gutters}
+    return _listed(passes, cells, places, number, seen, bound)
 
 
 def _listed(
@@ -63,18 +64,20 @@ def _listed(
 
     number : (r,) pairs of each receiver
     seen : what hits.wgsl has read and written
-    bound : what offsets.wgsl reads besides
+    bound : what copies.wgsl and offsets.wgsl read besides
     """
     device, sources, first = passes.device, len(places.source), starts(number)
     count, begins = int(first[-1]), passes.upload(first)
     pairs, used = space(device, count, _PAIR_BYTES), space(device, sources)
     passes.add("pairs", len(number), {**seen, "first": begins, "pairs": pairs, "used": used})
     taken, given = number > 0, passes.read(used, sources) > 0
+    asked = np.flatnonzero(given)
+    looked_up = {**bound, "asked": passes.upload(asked)}
     numbers = {
         "number_of_receiver": passes.upload(np.cumsum(taken) - taken),
         "number_of_source": passes.upload(np.cumsum(given) - given),
-        "copies": draw_copies(passes, cells, places.source, bound["source_points"]),
+        "copies": draw_copies(passes, cells, places.source[asked], looked_up),
     }
     passes.add("offsets", count, {**bound, **numbers, "pairs": pairs})
     passes.frame.submit()
-    return Found(places.receiver[taken], starts(number[taken]), places.source[given], pairs)
+    return Found(places.receiver[taken], starts(number[taken]), places.source[asked], pairs)
