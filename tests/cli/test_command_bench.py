@@ -23,7 +23,14 @@ def bench(run: Run, folder: Path, opened: None, device: Any, monkeypatch: pytest
     """`dermis bench` with presets of two tiny frames."""
     usual = Case((32, 32), atlas=64, gaussians=2, lights=1, samples=1)
     tiny = Preset(
-        usual, image=((32, 32),), atlas=(64,), gaussians=(2,), lights=(1,), subdivide=(0,), environment=()
+        usual,
+        image=((32, 32),),
+        atlas=(64,),
+        gaussians=(2,),
+        lights=(1,),
+        subdivide=(0,),
+        targets=(),
+        environment=(),
     )
     for name in cases.PRESETS:
         monkeypatch.setitem(cases.PRESETS, name, tiny)

@@ -12,6 +12,8 @@ import dermis
 from dermis.errors import DermisError
 from dermis.mesh.frames import FrameReader
 from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.primitives import uv_sphere
 from dermis.scene.clips.sequence import frame_files
 
 
@@ -155,8 +157,16 @@ def test_a_frame_that_breaks_later_names_its_file(folder: Path) -> None:
 
 
 def test_a_sequence_of_another_head_is_refused(folder: Path) -> None:
+    other = Head("ball", uv_sphere(100.0, 8, 6), Maps())
     with pytest.raises(DermisError, match=r"face_8\.obj: expected the head's topology"):
-        dermis.load_motion(folder, dermis.load_head(folder / "face_8.obj", subdivide=1))
+        dermis.load_motion(folder, other)
+
+
+def test_a_subdivided_head_moves_by_its_control_points(folder: Path) -> None:
+    head = dermis.load_head(folder / "face_8.obj", subdivide=1)
+    pose = dermis.load_motion(folder, head, fps=1).pose_at(1.0)
+    assert pose.positions_mm is not None and pose.positions_mm.shape == head.positions_mm.shape
+    assert len(head.positions_mm) < len(np.unique(head.mesh.point))
 
 
 def test_places_that_part_are_refused(tmp_path: Path) -> None:
