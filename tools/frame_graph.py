@@ -8,11 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import dermis
+from dermis.benchmark.rigged import pose_at, rigged
 from dermis.gpu.listing import Listed, Listing
 from dermis.mesh.samples import cached
 
 PAGE = Path(__file__).parent.parent / "docs" / "frame_graph.md"
-SETTINGS = dermis.Settings(size=(1920, 1080), atlas=2048)
+SETTINGS, TARGETS = dermis.Settings(size=(1920, 1080), atlas=2048), 52
 
 
 def changes(scene: dermis.Scene) -> dict[str, tuple[dermis.Scene, dermis.Settings]]:
@@ -21,6 +22,7 @@ def changes(scene: dermis.Scene) -> dict[str, tuple[dermis.Scene, dermis.Setting
     moved = key.model_copy(update={"position": tuple(c + 20.0 for c in key.position)})  # type: ignore[union-attr]
     rough = scene.skin.model_copy(update={"roughness": 0.4})
     return {
+        "a pose": (replace(scene, pose=pose_at(scene.head, 1)), SETTINGS),
         "camera": (replace(scene, camera=dermis.three_quarter(scene.head)), SETTINGS),
         "a light": (replace(scene, lights=(moved, *others)), SETTINGS),
         "exposure": (scene, SETTINGS.model_copy(update={"exposure": 2.0})),
@@ -59,7 +61,7 @@ def main() -> None:
     adapter, page = (*sys.argv[1:], *("auto", str(PAGE))[len(sys.argv) - 1 :])[:2]
     renderer = dermis.Renderer(adapter)
     name = "lee_perry_smith" if cached("lee_perry_smith") else "bust"
-    scene = dermis.Scene(dermis.load_head(name))
+    scene = dermis.Scene(rigged(dermis.load_head(name), TARGETS))
     renderer.draw(scene, SETTINGS)
     ms = renderer.draw_warm(scene, SETTINGS).gpu_ms or {}
     listing, marks = listed(renderer, scene), dict[str, set[str]]()
