@@ -20,7 +20,6 @@ Axes = tuple[Triple, Triple, Triple]
 Row = tuple[float, float, float, float]
 Rows = tuple[Row, Row, Row]
 _WIDEST_LIGHT = math.tan(math.radians(80.0))
-_STEP_MM, _STEPS_TO_DOUBLE = 4.0, 16  # of shadow maps: where they look, and how wide they are
 _NEAREST_MM = 1.0
 _UP = 0.0, 1.0, 0.0
 MIDDLE = np.full((1, 2), 0.5)
@@ -153,7 +152,7 @@ def point_views(
     if not lights:
         return []
     eyes = [place_of(light.position, centre) for _, light in lights]
-    axes = [axes_of(between(eye, _steady(outline.middle_mm))) for eye in eyes]
+    axes = [axes_of(between(eye, outline.middle_mm)) for eye in eyes]
     rows = [rows_of(*one) for one in zip(eyes, axes, strict=True)]
     stacked = np.array(list(zip(*rows, strict=True)), np.float32).reshape(-1, 4)
     seen = (stacked @ outline.columns).reshape(3, len(rows), -1)
@@ -164,7 +163,7 @@ def point_views(
     _check_outside(lights, [one <= _WIDEST_LIGHT for one in steepest])
     slack = outline.slack_mm
     bounds = [
-        (_widened(h), max(0.98 * n - slack, 0.1 * n), 1.02 * f + slack)
+        (1.02 * h, max(0.98 * n - slack, 0.1 * n), 1.02 * f + slack)
         for h, n, f in zip(steepest, near, far, strict=True)
     ]
     clips = [perspective(r, (h, h), n, f) for r, (h, n, f) in zip(rows, bounds, strict=True)]
@@ -172,17 +171,6 @@ def point_views(
         ShadowView(clip, 2.0 * h / size, eye, right, up, n, f)
         for clip, eye, (right, up, _), (h, n, f) in zip(np.array(clips), eyes, axes, bounds, strict=True)
     ]
-
-
-def _steady(middle: Triple) -> Triple:
-    """Where maps look: in steps, so that their texels stay where they are while a head moves a little."""
-    x, y, z = (_STEP_MM * round(c / _STEP_MM) for c in middle)
-    return x, y, z
-
-
-def _widened(half: float) -> float:
-    """Half the extent of a map, a little wider, in steps for the same reason."""
-    return float(2.0 ** (math.ceil(_STEPS_TO_DOUBLE * math.log2(1.005 * half)) / _STEPS_TO_DOUBLE))
 
 
 def _check_outside(lights: Sequence[tuple[str, PointLight]], outside: Sequence[bool]) -> None:
@@ -207,14 +195,12 @@ def parallel_view(direction: Vec, outline: Outline, size: int) -> ShadowView:
     local = points @ np.stack(axes, axis=1)
     room = 1.0 + np.array([0.0, 0.0, outline.slack_mm])
     low, high = local.min(axis=0) - room, local.max(axis=0) + room
-    middle_x, middle_y = (_STEP_MM * round(0.5 * float(low[k] + high[k]) / _STEP_MM) for k in (0, 1))
-    reach = max(high[0] - middle_x, middle_x - low[0], high[1] - middle_y, middle_y - low[1])
-    half = _widened(float(reach))
+    half = 0.51 * float(max(high[0] - low[0], high[1] - low[1]))
     clip = np.eye(4)
     clip[0, :3], clip[1, :3] = axes[0] / half, axes[1] / half
     clip[2, :3] = -axes[2] / (high[2] - low[2])
-    clip[0, 3], clip[1, 3] = -middle_x / half, -middle_y / half
+    clip[0, 3], clip[1, 3] = -0.5 * (low[0] + high[0]) / half, -0.5 * (low[1] + high[1]) / half
     clip[2, 3] = high[2] / (high[2] - low[2])
-    middle = middle_x * axes[0] + middle_y * axes[1]
+    middle = 0.5 * (low[0] + high[0]) * axes[0] + 0.5 * (low[1] + high[1]) * axes[1]
     origin, right, up = ((float(x), float(y), float(z)) for x, y, z in (middle, axes[0], axes[1]))
     return ShadowView(clip, 2.0 * half / size, origin, right, up, float(low[2]), float(high[2]))

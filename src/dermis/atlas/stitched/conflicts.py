@@ -21,7 +21,7 @@ from dermis.atlas.stitched.nearest import Nearest, Sides, nearest_sides
 from dermis.atlas.stitched.surface import Doubles, Flags, FlatSurface, Index
 from dermis.atlas.stitched.texels import Rooted, gap_mm, opposed, owners, unsure, weights_in
 
-_FINEST_MM = 1.0  # texels of the grids on which overlaps are looked for
+_FINEST_MM = 0.9  # texels of the grids on which overlaps are looked for
 _MOST_TEXELS = 100_000  # of a piece on such a grid
 _MOST_CELLS = 600_000  # of the grid
 _NEAR = 0.6  # of the reach: conflicts farther out hardly matter
