@@ -13,6 +13,7 @@ from translucency_twins import decoded, pairs_on, share_of, surface_of
 
 from dermis.atlas.build import build_atlas
 from dermis.atlas.translucency.cells import divide
+from dermis.frame import passes
 from dermis.frame.atlas_layout import Translucency
 from dermis.frame.levels import FLOATS, Blur, make_levels
 from dermis.frame.passes import translucency, translucency_weights
@@ -109,7 +110,7 @@ def test_twin_of_what_comes_through(
     row: int,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(translucency, "_ROW", row)
+    monkeypatch.setattr(passes, "_ROW", row)
     levels = np.random.default_rng(8).random((2, 64, 64, 3)).astype(np.float32)
     twin, made = summed(device, weighed, levels, (("SIZE", 128), ("TEAM", team), ("ROUND", at_once)))
     assert twin.max() > 0.1

@@ -18,8 +18,8 @@ from dermis.mesh.rig import MorphTargets, Rig, Skeleton
 
 _FORM = 3  # raise when `load_rigged` gives other results for the same file
 _MESH = [field.name for field in fields(Mesh) if field.name != "materials"]
-_TARGETS = ["first", "point", "delta_mm", "rest"]
-_SKELETON = ["parent", "local", "inverse_bind", "to_head", "bone", "weight"]
+_TARGETS = [field.name for field in fields(MorphTargets) if field.name != "names"]
+_SKELETON = [field.name for field in fields(Skeleton) if field.name != "names"]
 _NAMES = [
     *_MESH,
     "outline",

@@ -64,9 +64,12 @@ def suited(
     return declared(path, folders, device_constants(device)) | dict(constants)
 
 
-def each(count: int) -> tuple[int, int, int]:
-    """Workgroups of shaders that have an invocation for each of a list, see each.wgsl."""
-    groups = max(1, -(-count // _EACH))
+def each(count: int, workgroup: int = _EACH) -> tuple[int, int, int]:
+    """Workgroups of shaders that have an invocation for each of a list, see each.wgsl.
+
+    workgroup : how many of the list a workgroup does
+    """
+    groups = max(1, -(-count // workgroup))
     return min(groups, _ROW), -(-groups // _ROW), 1
 
 

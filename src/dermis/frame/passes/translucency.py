@@ -6,13 +6,12 @@ from typing import Any
 
 from dermis.frame.atlas_layout import Translucency
 from dermis.frame.levels import Blur, Levels
-from dermis.frame.passes import program
+from dermis.frame.passes import each, program
 from dermis.gpu import Constants, Recorder
 
 _TEAMS: Constants = (("SIZE", 128), ("TEAM", 16), ("ROUND", 4))
 _ALONE: Constants = (("SIZE", 128), ("TEAM", 1), ("ROUND", 1))  # software adapters pay for barriers
 _GATHERING = 64  # invocations of a workgroup, as in translucency_gather.wgsl
-_ROW = 1024  # workgroups in a row, of 65535 at most
 
 
 def draw(graph: Recorder, levels: Levels, blur: Blur, thin: Translucency, constants: Constants = ()) -> Any:
@@ -45,13 +44,7 @@ def draw(graph: Recorder, levels: Levels, blur: Blur, thin: Translucency, consta
     }
     chosen = dict((_ALONE if device.adapter.kind == "CPU" else _TEAMS) + constants)
     add_up = program(device, "translucency.wgsl", tuple(chosen.items()))
-    graph.dispatch("translucency", gather, entering, _rows(pairs.sources[1], _GATHERING))
+    graph.dispatch("translucency", gather, entering, each(pairs.sources[1], _GATHERING))
     receivers = int(chosen["SIZE"]) // int(chosen["TEAM"])  # of a workgroup
-    graph.dispatch("translucency", add_up, leaving, _rows(pairs.receivers[1], receivers))
+    graph.dispatch("translucency", add_up, leaving, each(pairs.receivers[1], receivers))
     return pairs.light
-
-
-def _rows(count: int, each: int) -> tuple[int, int, int]:
-    """Workgroups along each axis for `count` items, `each` in a workgroup."""
-    groups = max(1, -(-count // each))
-    return min(groups, _ROW), -(-groups // _ROW), 1
