@@ -114,7 +114,10 @@ def _posed(head: Head, motion: RigMotion, at_rest: Motion) -> Moved:
     rig, weights, matrices = head.control, motion.weights.tobytes(), motion.matrices.tobytes()
     same = motion.positions_mm is rig.positions_mm
     positions = at_rest.positions if same else motion.positions_mm.tobytes()
-    return Moved(Motion(positions, weights, matrices), Outline(rig.outline_mm(motion), _SLACK_MM))
+    moved = Motion(positions, weights, matrices)
+    if moved == at_rest:  # where the mesh's own outline is exact
+        return Moved(moved, head.mesh.outline)
+    return Moved(moved, Outline(rig.outline_mm(motion), _SLACK_MM))
 
 
 def _looked(
