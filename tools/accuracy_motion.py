@@ -107,12 +107,11 @@ def seams(renderer: Renderer, head: Head, people: Mapping[str, Points]) -> Itera
 
 def _jumps(renderer: Renderer, name: str, head: Head, shape: Head, pose: Pose | None) -> str:
     """Jump of the light across seams of a head in a pose; `shape` has the places of its seams."""
-    here = replace(head)
-    vars(here)["centre_mm"] = shape.centre_mm
     cells = []
     for where in (surface.at_neck, surface.behind):
         sides = surface.judged(shape, where)
-        scene = replace(surface.banded(here), pose=pose)
+        scene = replace(surface.banded(head), pose=pose)
+        vars(scene.head)["centre_mm"] = shape.centre_mm  # which the bands of light stand around
         found = surface.jumps(renderer, scene, "stitch", surface.HEAD_SIDE, *sides)
         cells.append(f"{100 * found.mean():.1f} / {100 * np.percentile(found, 95):.1f}")
     return f"| {name} | {' | '.join(cells)} |"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.errors import refuse
 from dermis.frame.atlas_layout import AtlasLayout
+from dermis.frame.curvature import Curvature
 from dermis.frame.geometry import HeadResources
 from dermis.frame.levels import Blur, Levels
 from dermis.frame.passes.bloom import Glow
@@ -53,6 +54,7 @@ class Resources:
     scatters : whether light spreads over them
     blurs : how, on each, where light is as bright as it was given
     scattered : texture of the light that leaves below the surface
+    curvature : the surface's, None where nothing reads it
     own : what the technique made for itself
     view, constants : record of the shading pass without the camera, and its pipeline constants
     suns : lights that the environment adds
@@ -70,6 +72,7 @@ class Resources:
     levels: Levels
     blurs: tuple[Blur, ...]
     scattered: Any
+    curvature: Curvature | None
     own: Any
     visibility: Layers
     view: Any

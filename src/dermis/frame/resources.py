@@ -13,6 +13,7 @@ from dermis.frame import surface, surroundings
 from dermis.frame.asked import Asked
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.atlas_textures import AtlasTextures, upload_atlas
+from dermis.frame.curvature import Curvature, make_curvature, no_curvature
 from dermis.frame.geometry import upload_geometry
 from dermis.frame.gutters import make_walks
 from dermis.frame.inputs import Resources, view_record
@@ -46,7 +47,9 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     shadow_maps = keep(_shadow_maps, device, asked.head, asked.shadow_layers, size, of=asked.view)
     tables = keep(shape_tables, device, asked.head)
     shape = keep(make_shape, device, tables)
+    curvature = keep(_curvature, device, asked.head) if technique.curved else None
     shared = _shared(memo, device, asked, shadow_maps)
+    shared["curvatures"] = curvature.smoothed if curvature else no_curvature(device)
     atlases = [_atlas(memo, device, asked, name, k) for k, name in enumerate(asked.atlases.layouts)]
     uploaded: dict[str, Any] = memo.wait(maps)
     shared |= uploaded
@@ -66,6 +69,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         levels=_levels(memo, device, asked),
         blurs=tuple(_blur(asked, textures) for _, textures in atlases) if asked.count else (),
         scattered=_sum(memo, device, asked, side, "both") if several else layouts[0].scattered,
+        curvature=curvature,
         own=own,
         visibility=keep(_visibility, device, settings.size, settings.samples),
         view=view,
@@ -164,6 +168,10 @@ def _shadow_maps(device: Device, _: Head, layers: int, size: int) -> shadows.Sha
 
 def _visibility(device: Device, size: tuple[int, int], samples: int) -> visibility_buffer.Layers:
     return visibility_buffer.make_layers(device, size, samples, triangles=True)
+
+
+def _curvature(device: Device, head: Head) -> Curvature:
+    return make_curvature(device, head.mesh)
 
 
 def _albedo(device: Device, model: str, fresnel: str) -> Any:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.gpu import Device, make_texture
-from dermis.mesh.curvature import vertex_curvature
 from dermis.mesh.geometry import vertex_normals
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
@@ -21,7 +20,7 @@ VERTICES_PER_ROW = 512
 """Of the texture of vertices, four texels each."""
 VERTICES = ("vertex_table", "vertex_buffer", "vertex_lengths")
 """Names of the vertices in geometry.wgsl and stretch_of.wgsl."""
-_PARTS = ("uv", "f4", 2), ("point", "u4"), ("curvature", "f4"), ("normal", "f4", 3), ("pad", "u4")
+_PARTS = ("uv", "f4", 2), ("point", "u4"), ("pad", "u4"), ("normal", "f4", 3), ("last", "u4")
 _VERTEX = np.dtype(list(_PARTS))  # as shape_vertices.wgsl reads it
 LEAST_ACROSS = 1e-3
 """Share of dpdu across the normal, below which any other direction serves as well."""
@@ -163,7 +162,7 @@ def _surface_tables(mesh: Mesh) -> dict[str, NDArray[Any]]:
     """The vertices, the corners of triangles around them, and which of these are each one's own."""
     count, corner = len(mesh.positions), mesh.triangles.ravel().astype(np.int64)
     table = np.zeros(count, _VERTEX)
-    table["uv"], table["point"], table["curvature"] = mesh.uv, mesh.point, vertex_curvature(mesh)
+    table["uv"], table["point"] = mesh.uv, mesh.point
     table["normal"] = own_normals(mesh)
     # by point, then by vertex: those of a vertex lie within those of its point
     point, key = mesh.point[corner], mesh.point[corner] * np.int64(count) + corner

@@ -37,10 +37,15 @@ class Outline:
 
 def hull(positions: NDArray[np.floating]) -> Outline:
     """The corners of the convex hull of (n, 3) positions [mm]."""
+    points = positions.astype(np.float64)
+    return Outline(points[hull_points(points)])
+
+
+def hull_points(positions: NDArray[np.floating]) -> NDArray[np.intp]:
+    """Numbers of the positions (n, 3) that are corners of the convex hull of all."""
     from scipy.spatial import ConvexHull, QhullError
 
-    points = positions.astype(np.float64)
     try:
-        return Outline(np.asarray(points[ConvexHull(points).vertices]))
+        return np.sort(ConvexHull(positions.astype(np.float64)).vertices).astype(np.intp)
     except QhullError:  # it is flat
-        return Outline(points)
+        return np.arange(len(positions))

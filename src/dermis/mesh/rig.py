@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from dermis.disk import cached_array
 from dermis.mesh.morph_targets import MorphTargets, no_targets
-from dermis.mesh.rig_outline import RigOutline, outermost, outline_of, outline_points
+from dermis.mesh.outline import hull_points
+from dermis.mesh.rig_outline import RigOutline, outline_of, outline_points
 from dermis.mesh.skeleton import INFLUENCES, Skeleton
 
 Floats = NDArray[np.float32]
@@ -90,7 +91,7 @@ class Rig:
     def outline_mm(self, motion: Motion) -> Floats:
         """(s, 3) points that lie as far out as any other in each direction, to a millimetre or so [mm].
 
-        Of a rig that rests elsewhere, its outermost ones there are among them.
+        Of a rig that rests elsewhere, the corners of its convex hull there are among them.
         """
         if motion.positions_mm is self.positions_mm:
             return self.outline.posed(motion.weights, motion.matrices)
@@ -100,7 +101,7 @@ class Rig:
         """The outline of a rig that rests elsewhere; the last one is kept, and checked by its own points."""
         points, outline = self._elsewhere
         if not np.array_equal(places[points].T, outline.rest_mm[:3]):
-            points = np.union1d(self._outline_points, outermost(places))
+            points = np.union1d(self._outline_points, hull_points(places))
             outline = outline_of(places, self.targets, self.skeleton, points)
             vars(self)["_elsewhere"] = points, outline
         return outline

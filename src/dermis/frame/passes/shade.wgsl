@@ -102,6 +102,7 @@ fn shaded(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Shaded {
     let inside = clamped / (clamped.x + clamped.y + clamped.z);
     var point = interpolate(a, b, c, inside, t.w);
     point.place = place_of_point(triangle, inside);
+    point.curvature = curvature_at(t, inside);
     let open = open_sky(point, t, inside);
     let v = normalize(shade.eye - point.position);
     let opaque = (t.w & OPAQUE) != 0u;

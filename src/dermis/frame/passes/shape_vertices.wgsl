@@ -10,7 +10,6 @@ const LEAST_MM: f32 = 1e-6; // of dpdu and dpdv, per unit of uv
 struct Vertex {
     uv: vec2f,
     point: u32,
-    curvature: f32, // at rest [1/mm]
     normal: vec3f, // its own, seen from the smooth one: along that, along u and beside u
 }
 
@@ -122,7 +121,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let normal = own_normal(vertex.normal, n, along.u);
     put(index, 0u, vec4f(p, vertex.uv.x));
     put(index, 1u, vec4f(normal, vertex.uv.y));
-    put(index, 2u, vec4f(along.u, vertex.curvature));
+    put(index, 2u, vec4f(along.u, 0.0));
     put(index, 3u, vec4f(along.v, 0.0));
     let lengths = vec2f(length(along.u), length(along.v));
     vertex_lengths[index] = vec4f(lengths, dot(along.u, along.v) / max(lengths.x * lengths.y, 1e-12), 0.0);

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.frame.inputs import Inputs
+from dermis.frame.passes import curvature
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import ComputeProgram, Device, Graph, Memo
 from dermis.gpu.textures import texture_from
@@ -45,6 +46,7 @@ class PreIntegratedSkin(Technique):
     """Light by tables over curvature, and across the edges of shadows."""
 
     sources = ("Penner2011",)
+    curved = True
     shade_constants = (("PRE_INTEGRATED", 1),)
 
     def make(self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum) -> PreIntegrated:
@@ -58,7 +60,10 @@ class PreIntegratedSkin(Technique):
 
     def scatter(self, graph: Graph, inputs: Inputs) -> Any:
         """The tables in place of light on the atlas."""
-        return inputs.resources.own.table
+        resources = inputs.resources
+        assert resources.curvature is not None
+        graph.repeat(curvature.draw, resources.head, resources.curvature)
+        return resources.own.table
 
 
 TECHNIQUE = PreIntegratedSkin()
@@ -83,8 +88,8 @@ def lit_spheres(profile: GaussianSum) -> Floats:
     cosines = np.linspace(-1.0, 1.0, _COSINES)
     rows = [np.repeat(np.maximum(cosines, 0.0)[:, None], len(profile.albedo), axis=1)]
     share = profile.weight / profile.albedo
-    for curvature in np.linspace(0.0, MOST_CURVED, _CURVATURES)[1:]:
-        concentration = 1.0 / (curvature**2 * profile.variance_mm2)
+    for bent in np.linspace(0.0, MOST_CURVED, _CURVATURES)[1:]:
+        concentration = 1.0 / (bent**2 * profile.variance_mm2)
         rows.append(np.stack([spread_cosine(cosines, k) for k in concentration], axis=1) @ share)
     return np.stack(rows)
 

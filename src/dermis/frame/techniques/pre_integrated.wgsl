@@ -13,10 +13,20 @@ const HIGHEST: f32 = 3.0; // most that a point beyond the light's horizon is lif
 const WAYS: u32 = 16u; // probes of the curvature towards the horizon
 const WAYS_MM: f32 = 2.0; // radius in which they lie around the line to the light
 
+@group(0) @binding(35) var<storage, read> curvatures: array<f32>; // of the vertices [1/mm]
+
 struct PreIntegrated {
     most_curved: f32, // curvature of the table's last row [1/mm]
     penumbra: f32, // radius around a point in which a shadow's edge is looked for [mm]
     relief: vec3f, // standard deviation of the Gaussian that smooths the relief [mm]
+}
+
+// t: corners of the triangle, w: barycentric weights
+fn curvature_at(t: vec4u, w: vec3f) -> f32 {
+    if (!PRE_INTEGRATED) {
+        return 0.0;
+    }
+    return dot(w, vec3f(curvatures[t.x], curvatures[t.y], curvatures[t.z]));
 }
 
 // Looks up the tables: rows of spheres, then of shadow edges.

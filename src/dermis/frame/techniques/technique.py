@@ -37,6 +37,7 @@ class Technique:
     on_atlas : whether light spreads over the atlas
     stitches : whether it can carry light across the map's seams
     transmits : whether light comes through thin parts
+    curved : whether the shading reads the surface's curvature
     shade_constants : pipeline constants of the shading pass
     pixel_bytes : of memory for each pixel, besides the picture
     """
@@ -45,6 +46,7 @@ class Technique:
     on_atlas: ClassVar[bool] = False
     stitches: ClassVar[bool] = True
     transmits: ClassVar[bool] = False
+    curved: ClassVar[bool] = False
     shade_constants: ClassVar[Constants] = ()
     pixel_bytes: ClassVar[int] = 0
 

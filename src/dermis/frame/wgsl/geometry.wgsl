@@ -15,7 +15,6 @@ struct Corner {
     uv: vec2f,
     dpdu: vec3f,
     dpdv: vec3f,
-    curvature: f32,
 }
 
 struct Point {
@@ -26,7 +25,7 @@ struct Point {
     place: vec2f, // in the atlas, set only by the shading
     dpdu: vec3f, // [mm per unit of uv]
     dpdv: vec3f,
-    curvature: f32, // root mean square over directions [1/mm]
+    curvature: f32, // root mean square over directions [1/mm], set only by the shading of pre-integrated skin
     flags: u32,
 }
 
@@ -75,7 +74,7 @@ fn corner_at(index: u32) -> Corner {
 }
 
 fn corner_of(p: vec4f, n: vec4f, du: vec4f, dv: vec4f) -> Corner {
-    return Corner(p.xyz, n.xyz, vec2f(p.w, n.w), du.xyz, dv.xyz, du.w);
+    return Corner(p.xyz, n.xyz, vec2f(p.w, n.w), du.xyz, dv.xyz);
 }
 
 // Side of a triangle in the maps over its side in the atlas.
@@ -102,7 +101,6 @@ fn interpolate(a: Corner, b: Corner, c: Corner, w: vec3f, flags: u32) -> Point {
     point.uv = w.x * a.uv + w.y * b.uv + w.z * c.uv;
     point.dpdu = w.x * a.dpdu + w.y * b.dpdu + w.z * c.dpdu;
     point.dpdv = w.x * a.dpdv + w.y * b.dpdv + w.z * c.dpdv;
-    point.curvature = w.x * a.curvature + w.y * b.curvature + w.z * c.curvature;
     point.flags = flags;
     return point;
 }

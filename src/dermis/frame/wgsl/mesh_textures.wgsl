@@ -1,7 +1,7 @@
 // The mesh as two textures: rows of its triangles and of its vertices.
 
 @group(0) @binding(0) var triangle_table: texture_2d<u32>; // three tables one over the other
-@group(0) @binding(1) var vertex_table: texture_2d<f32>; // four texels: position u, normal v, dpdu curvature, dpdv
+@group(0) @binding(1) var vertex_table: texture_2d<f32>; // four texels: position u, normal v, dpdu, dpdv
 
 // Of the tables: corners a, b, c and flags | material << 8; atlas places of a and b; that of c, texels per uv.
 fn triangle_texel(index: u32, table: u32) -> vec4u {
