@@ -127,3 +127,16 @@ def test_a_pose_runs_the_shape_and_what_follows_and_coming_back_is_exact(
     assert np.array_equal(picture(renderer, moving, pose_at(moving, 1)), first)
     picture(renderer, moving, pose_at(moving, 1))
     assert renderer.graph.ran == []
+
+
+def test_people_in_turn_each_keep_their_gutters(head: Head) -> None:
+    """Their pairs are kept side by side; what they share on the device is written anew for each."""
+    alone, together = Renderer("cpu"), Renderer("cpu", depth=2)
+    poses = [
+        Pose(positions_mm=head.positions_mm * np.array(by, np.float32)) for by in ((1.2, 1, 1), (1, 0.8, 1))
+    ]
+    expected = [picture(alone, head, pose) for pose in poses]
+    for turn in range(4):
+        assert np.array_equal(picture(together, head, poses[turn % 2]), expected[turn % 2])
+    assert "gutters" in together.graph.ran
+    assert apart(*expected) > POSED

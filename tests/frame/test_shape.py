@@ -16,7 +16,7 @@ from dermis.atlas.build import build_atlas
 from dermis.frame.atlas_textures import upload_atlas
 from dermis.frame.coarser import Sheet, halved
 from dermis.frame.geometry import upload_geometry
-from dermis.frame.gutters import make_walks
+from dermis.frame.gutters import make_walks, with_lists
 from dermis.frame.passes import gutters, shape, stretch
 from dermis.frame.passes.shape import Motion
 from dermis.frame.shape import Shape, make_shape, shape_tables
@@ -166,10 +166,10 @@ def sources(device: Device, head: Head, atlas: Atlas, points: Floats) -> list[Fl
     """(a, 2) where each texel of the gutters has its light, at each resolution, walked on the device."""
     textures, frame = upload_atlas(device, atlas), Frame(device)
     made = make_shape(device, shape_tables(device, head))
-    walks = make_walks(device, head.mesh, atlas, textures)
+    walks, walked = make_walks(device, head.mesh, atlas, textures), with_lists(device, textures)
     shape.draw(frame, made, Motion(words(points)))
+    gutters.draw(frame, walked, walks, upload_geometry(device, head.mesh, atlas, made))
     frame.submit()
-    walked = gutters.walked(device, textures, walks, upload_geometry(device, head.mesh, atlas, made))
     lists = [one for one in (walked, *walked.coarser) if one.gutter]
     found = [np.frombuffer(device.handle.queue.read_buffer(one.gutter), np.uint32) for one in lists]
     for one, listed in zip(lists, found, strict=True):

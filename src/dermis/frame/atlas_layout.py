@@ -8,6 +8,7 @@ from typing import Any
 from dermis.atlas.translucency.cells import Cells
 from dermis.frame.atlas_textures import AtlasTextures
 from dermis.frame.geometry import HeadResources
+from dermis.frame.gutters import Walks
 from dermis.gpu.program import Resources
 
 
@@ -75,6 +76,18 @@ class MovingOcclusion:
 
 
 @dataclass(frozen=True, eq=False)
+class Walked:
+    """What gutters continue by that are walked anew for other people.
+
+    walks : what they begin with
+    head : the person's surface at rest
+    """
+
+    walks: Walks
+    head: HeadResources
+
+
+@dataclass(frozen=True, eq=False)
 class AtlasLayout:
     """An atlas of the head with the resources that light its texels.
 
@@ -83,6 +96,7 @@ class AtlasLayout:
     surfaces : texture of the surface at each texel, as surface_texels.wgsl packs it
     scattered : texture of the light that leaves below the surface
     translucency : light through thin parts, None without any
+    walked : what its gutters follow the person by, None where they are the head's own or there are none
     occlusion : what the map of occlusion follows the head's shape by, None where it does not
     """
 
@@ -92,4 +106,5 @@ class AtlasLayout:
     surfaces: Any
     scattered: Any
     translucency: Translucency | None = None
+    walked: Walked | None = None
     occlusion: MovingOcclusion | None = None

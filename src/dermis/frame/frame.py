@@ -12,6 +12,8 @@ def draw_frame(graph: Graph, inputs: Inputs, technique: Technique) -> None:
     """Light the skin, scatter the light below it, shade the image; only stale passes run."""
     made = inputs.resources
     shape.draw(graph, made.shape, inputs.motion)
+    if made.person:
+        shape.draw(graph, made.person, inputs.motion.at_rest)
     bounded = ("SHAPES", 1) in inputs.light_constants
     shadows.draw(graph, made.shadow_maps, inputs.shadow_views, made.head, bounded)
     if made.sky and inputs.around:

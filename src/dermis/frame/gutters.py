@@ -32,10 +32,8 @@ class Walks:
     halvings: tuple[dict[str, Any], ...]
 
 
-def make_walks(device: Device, mesh: Mesh, atlas: Atlas, textures: AtlasTextures) -> Walks | None:
-    """What the passes read; None where the atlas has no gutters."""
-    if textures.gutter is None:
-        return None
+def make_walks(device: Device, mesh: Mesh, atlas: Atlas, textures: AtlasTextures) -> Walks:
+    """What the passes read, of an atlas that has gutters."""
     walks, sides = (device.buffer(words, "STORAGE") for words in (_walks(atlas), _side_words(mesh)))
     sheets = (textures, *textures.coarser)
     return Walks(walks, sides, tuple(_halving(device, *pair) for pair in pairwise(sheets) if pair[1].gutter))

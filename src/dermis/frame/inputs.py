@@ -50,6 +50,7 @@ class Resources:
     """What cameras and lights leave as it is.
 
     shape : the head's, which the motion of each frame moves
+    person : the shape of another person at rest, None for the head's own
     layouts : atlases that light is spread on; the first is the one that is looked at
     scatters : whether light spreads over them
     blurs : how, on each, where light is as bright as it was given
@@ -65,6 +66,7 @@ class Resources:
     """
 
     shape: Shape
+    person: Shape | None
     head: HeadResources
     layouts: tuple[AtlasLayout, ...]
     shadow_maps: ShadowMaps

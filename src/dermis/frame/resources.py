@@ -11,17 +11,18 @@ from dermis.atlas.atlas import Atlas
 from dermis.atlas.cached import cached_atlas
 from dermis.frame import surface, surroundings
 from dermis.frame.asked import Asked
-from dermis.frame.atlas_layout import AtlasLayout
+from dermis.frame.atlas_layout import AtlasLayout, Walked
 from dermis.frame.atlas_textures import AtlasTextures, upload_atlas
 from dermis.frame.curvature import Curvature, make_curvature, no_curvature
-from dermis.frame.geometry import upload_geometry
-from dermis.frame.gutters import make_walks
+from dermis.frame.geometry import HeadResources, upload_geometry
+from dermis.frame.gutters import Walks, make_walks, with_lists
 from dermis.frame.inputs import Resources, view_record
 from dermis.frame.levels import Blur, Levels
 from dermis.frame.limits import check_limits
 from dermis.frame.maps import upload_maps
-from dermis.frame.passes import bloom, gutters, post, shade, shadows, surface_texels, visibility_buffer
+from dermis.frame.passes import bloom, post, shade, shadows, surface_texels, visibility_buffer
 from dermis.frame.passes.moving_occlusion import Sky, make_map, make_sky
+from dermis.frame.passes.shape import still_shape
 from dermis.frame.resting import resting
 from dermis.frame.shape import Shape, ShapeTables, make_shape, shape_tables
 from dermis.frame.techniques.technique import AtlasTechnique, Technique
@@ -47,13 +48,14 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     shadow_maps = keep(_shadow_maps, device, asked.head, asked.shadow_layers, size, of=asked.view)
     tables = keep(shape_tables, device, asked.head)
     shape = keep(make_shape, device, tables)
+    person = keep(still_shape, device, tables) if asked.person is not None else None
     curvature = keep(_curvature, device, asked.head) if technique.curved else None
     shared = _shared(memo, device, asked, shadow_maps)
     shared["curvatures"] = curvature.smoothed if curvature else no_curvature(device)
     atlases = [_atlas(memo, device, asked, name, k) for k, name in enumerate(asked.atlases.layouts)]
     uploaded: dict[str, Any] = memo.wait(maps)
     shared |= uploaded
-    layouts = [_layout(memo, device, asked, one, shape, shared, k) for k, one in enumerate(atlases)]
+    layouts = [_layout(memo, device, asked, one, shape, person, shared, k) for k, one in enumerate(atlases)]
     own = technique.make(memo, device, settings, asked.profile)
     program = shade.shade_program(device)
     view = view_record(program, asked.head, settings, asked.split)
@@ -62,6 +64,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     side, several = settings.atlas, len(layouts) > 1
     return Resources(
         shape=shape,
+        person=person,
         head=layouts[0].head,
         layouts=tuple(layouts),
         shadow_maps=shadow_maps,
@@ -111,16 +114,28 @@ def _atlas(memo: Memo, device: Device, asked: Asked, name: str, index: int) -> L
 
 
 def _layout(
-    memo: Memo, device: Device, asked: Asked, laid: Laid, shape: Shape, shared: dict[str, Any], index: int
+    memo: Memo,
+    device: Device,
+    asked: Asked,
+    laid: Laid,
+    shape: Shape,
+    person: Shape | None,
+    shared: dict[str, Any],
+    index: int,
 ) -> AtlasLayout:
-    """An atlas that light is spread on, without lights."""
+    """An atlas that light is spread on, without lights.
+
+    person : the shape of another person at rest
+    """
     keep, number, head, (atlas, textures) = memo.keep, str(index), asked.head, laid
     held = keep(upload_geometry, device, head.mesh, atlas, shape, of=number)
     at_rest = partial(resting, memo, device, held, shape.tables, head, asked.person, index)
     lit = held.resources | shared
-    if asked.person is not None:
+    walked = None
+    if person and textures.gutter:
         walks = keep(make_walks, device, head.mesh, atlas, textures, of=number)
-        textures = keep(gutters.walked, device, textures, walks, at_rest(), of=number)
+        textures = keep(with_lists, device, textures, of=number)
+        walked = keep(_walked, walks, held, person, of=number)
     if asked.occluded:
         bound = lit, textures.resources["atlas"]
         lit["occlusion_map"] = keep(surroundings.occlusion_map, device, head, atlas, using=bound, of=number)
@@ -137,7 +152,11 @@ def _layout(
     side = asked.settings.atlas if asked.count else 1
     surfaces = keep(surface_texels.make_surfaces, device, side, of=number)
     scattered = _sum(memo, device, asked, side, number)
-    return AtlasLayout(textures, held, lit, surfaces, scattered, translucency, follows)
+    return AtlasLayout(textures, held, lit, surfaces, scattered, translucency, walked, follows)
+
+
+def _walked(walks: Walks, held: HeadResources, person: Shape) -> Walked:
+    return Walked(walks, held.shaped(person))
 
 
 def _sum(memo: Memo, device: Device, asked: Asked, side: int, role: str) -> Any:

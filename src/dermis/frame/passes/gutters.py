@@ -6,28 +6,17 @@ from itertools import pairwise
 
 from dermis.frame.atlas_textures import AtlasTextures
 from dermis.frame.geometry import HeadResources
-from dermis.frame.gutters import Walks, with_lists
+from dermis.frame.gutters import Walks
 from dermis.frame.passes import each, program
-from dermis.gpu import Device, Frame, Recorder
-
-
-def walked(
-    device: Device, textures: AtlasTextures, walks: Walks | None, head: HeadResources
-) -> AtlasTextures:
-    """The atlas with gutters that continue as a person's surface at rest does.
-
-    walks : None where the atlas has no gutters
-    """
-    if walks is None:
-        return textures
-    made, frame = with_lists(device, textures), Frame(device, timed=False)
-    draw(frame, made, walks, head)
-    frame.submit()
-    return made
+from dermis.gpu import Recorder
 
 
 def draw(graph: Recorder, atlas: AtlasTextures, walks: Walks, head: HeadResources) -> None:
-    """Find where each texel beyond a chart's edge has its light."""
+    """Find where each texel beyond a chart's edge has its light.
+
+    atlas : with lists of its own, see `frame.gutters.with_lists`
+    head : at rest
+    """
     device, size = graph.device, (("SIZE", atlas.resources["atlas"].size[0]),)
     begun = {"walks": walks.walks, "sides": walks.sides, "gutter": atlas.gutter}
     walk, halve = program(device, "gutter_walk.wgsl", size), program(device, "gutter_halve.wgsl")

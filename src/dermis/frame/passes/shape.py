@@ -27,6 +27,11 @@ class Motion(NamedTuple):
     weights: bytes = b""
     matrices: bytes = b""
 
+    @property
+    def at_rest(self) -> Motion:
+        """That of a shape which nothing moves."""
+        return Motion(self.positions)
+
 
 def draw(graph: Frame | Graph, shape: Shape, motion: Motion) -> None:
     """Put the shape where the motion has it."""
@@ -38,12 +43,17 @@ def draw(graph: Frame | Graph, shape: Shape, motion: Motion) -> None:
     graph.repeat(_evaluate, shape)
 
 
+def still_shape(device: Device, tables: ShapeTables) -> Shape:
+    """Space for the shape of a person at rest."""
+    return make_shape(device, tables, moves=False)
+
+
 def rest_shape(device: Device, tables: ShapeTables, positions_mm: NDArray[np.float32]) -> Shape:
     """The shape of a person at rest, evaluated at once.
 
     positions_mm : (p, 3) of the control points
     """
-    made, frame = make_shape(device, tables, moves=False), Frame(device, timed=False)
+    made, frame = still_shape(device, tables), Frame(device, timed=False)
     draw(frame, made, Motion(positions_mm.tobytes()))
     frame.submit()
     return made

@@ -13,6 +13,7 @@ from dermis.frame.levels import FLOATS, MOST_HALVINGS, Blur, Levels, halvings_of
 from dermis.frame.passes import (
     blend,
     combine,
+    gutters,
     irradiance,
     stretch,
     surface_texels,
@@ -134,7 +135,7 @@ class AtlasTechnique(Technique):
         return halvings_of(split.blurred_mm2, atlas.usual_per_mm, most)
 
     def scatter(self, graph: Graph, inputs: Inputs) -> Any:
-        """Light each layout, let the light spread, blend two layouts; see `spread`."""
+        """Light each layout, let the light spread, blend two layouts."""
         resources = inputs.resources
         if not resources.scatters:
             return resources.scattered
@@ -142,26 +143,26 @@ class AtlasTechnique(Technique):
         for layout, blur in zip(layouts, inputs.blurs, strict=True):
             into = levels.layer(0), levels.size, levels.texel, blur.scale
             graph.repeat(stretch.draw, layout.head, layout.atlas)
+            if layout.walked:
+                graph.repeat(gutters.draw, layout.atlas, layout.walked.walks, layout.walked.head)
             surface_texels.draw(graph, layout)
             irradiance.draw(graph, layout, inputs.light_constants, *into)
             if layout.translucency:
                 graph.repeat(translucency_weights.draw, layout.translucency)
-            graph.repeat(self.spread, levels, layout.atlas, blur, layout.translucency, layout.scattered)
+            graph.repeat(self.fill, levels, layout.atlas, blur)
+            graph.repeat(self.leave, levels, blur, layout.translucency, layout.scattered)
         if len(layouts) > 1:
             blend.draw(graph, layouts[0], layouts[1], resources.scattered)
         return resources.scattered
 
-    def spread(
-        self, graph: Any, levels: Levels, atlas: AtlasTextures, blur: Blur, thin: Any, into: Any
-    ) -> None:
-        """Blur the light of layer 0, let it through thin parts, and add up what leaves."""
-        self.fill(graph, levels, atlas, blur)
-        through = translucency.draw(graph, levels, blur, thin) if thin else None
-        combine.draw(graph, levels, blur, into, through)
-
     def fill(self, graph: Any, levels: Levels, atlas: AtlasTextures, blur: Blur) -> None:
         """Fill layer k with the light of layer 0 spread by the k-th Gaussian."""
         raise NotImplementedError
+
+    def leave(self, graph: Any, levels: Levels, blur: Blur, thin: Any, into: Any) -> None:
+        """Let the blurred light through thin parts, and add up what leaves."""
+        through = translucency.draw(graph, levels, blur, thin) if thin else None
+        combine.draw(graph, levels, blur, into, through)
 
 
 def _weights(profile: GaussianSum, white: bool) -> NDArray[np.float64]:

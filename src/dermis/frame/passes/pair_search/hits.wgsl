@@ -42,8 +42,12 @@ fn main(
         var bits = 0u;
         for (var j = listed.x; j < end; j++) {
             let source = source_points[j];
-            let counted = counts_ever(lie_of(place, normal, source), source.area);
-            bits |= select(0u, 1u, counted) << (j - listed.x);
+            let to = source.centre - place;
+            // the rest takes longer, and most are out of reach
+            if (dot(to, to) < search.radius_mm * search.radius_mm && dot(normal, source.normal) < ASKEW + TURN) {
+                let counted = counts_ever(lie_of(place, normal, source), source.area);
+                bits |= select(0u, 1u, counted) << (j - listed.x);
+            }
         }
         hits[look.z + k - look.x] = bits;
         count += countOneBits(bits);

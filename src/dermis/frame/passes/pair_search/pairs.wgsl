@@ -22,6 +22,9 @@ fn main(
     }
     let look = looks[index];
     var at = first[index];
+    if (at == first[index + 1u]) {
+        return;
+    }
     for (var k = look.x; k < look.y; k++) {
         let begin = sources_of[facing[k]].x;
         var bits = hits[look.z + k - look.x];

@@ -80,8 +80,10 @@ class SearchPasses:
 
 def upload_words(device: Device, *columns: NDArray[np.integer]) -> Any:
     """Buffer of a table of words, given by its columns; one row of zeros where there are none."""
-    table = np.stack(columns, axis=-1).astype(np.uint32)
-    return device.buffer(table if len(table) else np.zeros((1, len(columns)), np.uint32), "STORAGE")
+    table = np.zeros((max(1, len(columns[0])), len(columns)), np.uint32)
+    for k, column in enumerate(columns):
+        table[: len(column), k] = column
+    return device.buffer(table, "STORAGE")
 
 
 def starts(counts: Index) -> Index:
