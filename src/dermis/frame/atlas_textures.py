@@ -70,9 +70,7 @@ def upload_atlas(
     resources = {"atlas": texture_from(device, texels, "rg32uint")}
     if remedy.feathered or len(remedy.layouts) > 1:
         resources["edge_map"] = texture_from(device, edge_texels(atlas), "r32float")
-    held = atlas.stretch[own].astype(np.float32)
-    usual = float(np.median(held.min(axis=-1))) if len(held) else 0.0
-    even = float(np.sqrt((held.astype(np.float64) ** 2).mean())) if stretch == "none" and len(held) else 0.0
+    even = _even(atlas.stretch[own]) if stretch == "none" else 0.0
     feather = FEATHER_MM if remedy.feathered else 0.0
     sheet = Sheet(atlas.coverage, own, atlas.reach, atlas.gutter, atlas.source)
     return _uploaded(
@@ -83,8 +81,28 @@ def upload_atlas(
         stretching=(("SHEAR", stretch == "full"), ("EVEN", even), ("FEATHER_MM", feather)),
         rooted=device.buffer(_rooted(atlas), "STORAGE") if len(atlas.beyond) else None,
         coarser=_coarser(device, sheet) if len(atlas.gutter) else (),
-        usual_per_mm=usual,
+        usual_per_mm=_usual(atlas.stretch, own),
     )
+
+
+def _even(stretch: NDArray[np.float16]) -> float:
+    """One density for all texels (n, 2) [1/mm]."""
+    return float(np.sqrt((stretch.astype(np.float64) ** 2).mean())) if len(stretch) else 0.0
+
+
+def _usual(stretch: NDArray[np.float16], own: NDArray[np.bool_]) -> float:
+    """Median of the density along the axis that has less [1/mm].
+
+    Halves that are not negative are in order as numbers of 16 bits are, and few: counting takes a tenth of
+    sorting.
+    """
+    words = stretch.view(np.uint16)
+    counts = np.bincount(np.minimum(words[..., 0], words[..., 1])[own], minlength=1 << 16)
+    total = int(counts.sum())
+    if total == 0:
+        return 0.0
+    middle = np.searchsorted(np.cumsum(counts), [(total - 1) // 2, total // 2], side="right")
+    return float(middle.astype(np.uint16).view(np.float16).astype(np.float64).mean())
 
 
 def _uploaded(device: Device, sheet: Sheet, resources: dict[str, Any], **more: Any) -> AtlasTextures:
