@@ -21,7 +21,7 @@ from dermis.frame.atlas_textures import upload_atlas
 from dermis.frame.geometry import upload_geometry
 from dermis.frame.levels import FLOATS, Blur, halvings_of, make_levels
 from dermis.frame.passes import diffuse, shape, stretch
-from dermis.frame.passes.shape import Motion
+from dermis.frame.passes.shape import MotionBytes
 from dermis.frame.renderer import Renderer
 from dermis.frame.shape import make_shape, shape_tables
 from dermis.gpu import Device, Frame, download, upload
@@ -44,7 +44,7 @@ def atlas(head: Head) -> Atlas:
     return build_atlas(head.mesh, SIDE, "stitched")
 
 
-def spread(device: Device, head: Head, atlas: Atlas, motion: Motion, light: Floats) -> list[Floats]:
+def spread(device: Device, head: Head, atlas: Atlas, motion: MotionBytes, light: Floats) -> list[Floats]:
     """The levels of (n, n, 1) light on a head in motion, each at its resolution."""
     made, textures = make_shape(device, shape_tables(device, head)), upload_atlas(device, atlas)
     most = len(textures.sheets("repeated")) - 1
@@ -66,7 +66,7 @@ def spread(device: Device, head: Head, atlas: Atlas, motion: Motion, light: Floa
 def test_even_light_stays_even_in_every_pose(device: Device, head: Head, atlas: Atlas, moment: int) -> None:
     moving = rigged(head, 12)
     motion = pose_at(moving, moment).motion(moving.control)
-    held = Motion(words(motion.positions_mm), words(40 * motion.weights), words(motion.matrices))
+    held = MotionBytes(words(motion.positions_mm), words(40 * motion.weights), words(motion.matrices))
     light = np.ones((SIDE, SIDE, 1)) * atlas.own[..., None]
     for level in spread(device, moving, atlas, held, light):
         covered = level[..., 0] > 0
@@ -79,7 +79,7 @@ def test_light_on_a_scaled_ball_widens_as_on_a_ball_of_that_size(
 ) -> None:
     """Of light in proportion to x a Gaussian of variance v leaves exp(-v / r^2)."""
     light = np.nan_to_num(shown(atlas, head.mesh, own=True))[..., :1] / RADIUS
-    levels = spread(device, head, atlas, Motion(words(scale * head.positions_mm)), light)
+    levels = spread(device, head, atlas, MotionBytes(words(scale * head.positions_mm)), light)
     area = atlas.own[..., None] / np.maximum(atlas.stretch.astype(float).prod(axis=-1, keepdims=True), 1e-6)
     for variance, level in zip(BLURRED, levels, strict=True):
         if len(level) == SIDE:  # the others are read between their texels

@@ -18,7 +18,7 @@ from dermis.frame.coarser import Sheet, halved
 from dermis.frame.geometry import upload_geometry
 from dermis.frame.gutters import make_walks, with_lists
 from dermis.frame.passes import gutters, shape, stretch
-from dermis.frame.passes.shape import Motion
+from dermis.frame.passes.shape import MotionBytes
 from dermis.frame.shape import Shape, make_shape, shape_tables
 from dermis.gpu import Device, Frame, download
 from dermis.mesh.geometry import build_mesh
@@ -44,7 +44,7 @@ def anew(mesh: Mesh, points: Floats) -> Mesh:
     return build_mesh(places, mesh.uv, mesh.triangles, mesh.material, mesh.materials, point=mesh.point)
 
 
-def evaluated(device: Device, head: Head, motion: Motion) -> tuple[Shape, NDArray[np.float32]]:
+def evaluated(device: Device, head: Head, motion: MotionBytes) -> tuple[Shape, NDArray[np.float32]]:
     """The shape in motion, and (v, 16) its vertices."""
     made, frame = make_shape(device, shape_tables(device, head)), Frame(device)
     shape.draw(frame, made, motion)
@@ -69,7 +69,7 @@ def head() -> Head:
 def test_vertices_are_those_of_a_mesh_built_anew(device: Device, head: Head) -> None:
     """Normals and tangents follow the surface."""
     moved = bent(head.positions_mm.astype(float))
-    _, table = evaluated(device, head, Motion(words(moved)))
+    _, table = evaluated(device, head, MotionBytes(words(moved)))
     mesh = anew(head.mesh, moved.astype(np.float32).astype(float))
     assert np.array_equal(table[:, :3], mesh.positions) and np.array_equal(table[:, 3], mesh.uv[:, 0])
     assert np.abs(table[:, 4:7] - mesh.normals).max() < SHAPE_NORMAL
@@ -81,10 +81,10 @@ def test_a_files_own_normals_rest_and_turn_with_the_surface(device: Device, head
     tilted = head.mesh.normals + RNG.uniform(-0.4, 0.4, head.mesh.normals.shape)
     tilted /= np.linalg.norm(tilted, axis=1, keepdims=True)
     own = replace(head, mesh=replace(head.mesh, normals=tilted.astype(np.float32)))
-    _, table = evaluated(device, own, Motion(words(own.positions_mm)))
+    _, table = evaluated(device, own, MotionBytes(words(own.positions_mm)))
     assert np.abs(table[:, 4:7] - tilted).max() < SHAPE_NORMAL
     turn = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]], float)
-    _, table = evaluated(device, own, Motion(words(own.positions_mm @ turn.T)))
+    _, table = evaluated(device, own, MotionBytes(words(own.positions_mm @ turn.T)))
     assert np.abs(table[:, 4:7] - tilted @ turn.T).max() < SHAPE_NORMAL
 
 
@@ -118,7 +118,9 @@ def test_targets_bones_and_stencils_are_those_of_the_rig(device: Device, head: H
     local = rig.skeleton.local.copy()
     local[1, :3, :3] = [[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]]
     matrices = rig.skeleton.matrices(local)
-    made, table = evaluated(device, moving, Motion(words(rig.positions_mm), words(weights), words(matrices)))
+    made, table = evaluated(
+        device, moving, MotionBytes(words(rig.positions_mm), words(weights), words(matrices))
+    )
     posed = rig.posed(weights, matrices)
     assert np.abs(points_of(device, made.stencils["control"]) - posed).max() < SHAPE * 30
     refined = rig.stencils.points(posed)
@@ -129,7 +131,7 @@ def test_targets_bones_and_stencils_are_those_of_the_rig(device: Device, head: H
 def stretched(device: Device, head: Head, atlas: Atlas, points: Floats) -> NDArray[np.float16]:
     textures, frame = upload_atlas(device, atlas), Frame(device)
     made = make_shape(device, shape_tables(device, head))
-    shape.draw(frame, made, Motion(words(points)))
+    shape.draw(frame, made, MotionBytes(words(points)))
     stretch.draw(frame, upload_geometry(device, head.mesh, atlas, made), textures)
     frame.submit()
     return download(device, textures.resources["stretch_map"])
@@ -167,7 +169,7 @@ def sources(device: Device, head: Head, atlas: Atlas, points: Floats) -> list[Fl
     textures, frame = upload_atlas(device, atlas), Frame(device)
     made = make_shape(device, shape_tables(device, head))
     walks, walked = make_walks(device, head.mesh, atlas, textures), with_lists(device, textures)
-    shape.draw(frame, made, Motion(words(points)))
+    shape.draw(frame, made, MotionBytes(words(points)))
     gutters.draw(frame, walked, walks, upload_geometry(device, head.mesh, atlas, made))
     frame.submit()
     lists = [one for one in (walked, *walked.coarser) if one.gutter]

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import GUTTER, MOST_SHEAR, Atlas
+from dermis.atlas.stitched.walk import INNER, INWARD
 from dermis.disk import cached_arrays
-from dermis.frame.coarser import Sheet, halved
+from dermis.frame.coarser import SAME_PLACE, Sheet, halved
 from dermis.frame.levels import MOST_HALVINGS
 from dermis.frame.seams import FEATHER_MM, REMEDIES, Remedy
 from dermis.gpu import Constants, Device, make_texture, scratch
@@ -24,7 +25,9 @@ _GUTTER_BIT = 1 << 15  # of the first number of a texel's reach, see reach.wgsl
 
 def atlas_numbers() -> dict[str, int | float]:
     """What shaders that read the atlas fill in."""
-    return {"gutter_bit": _GUTTER_BIT, "most_shear": MOST_SHEAR}
+    _, inner_b, inner_c = INNER
+    walks = {"inward": INWARD, "inner_b": inner_b, "inner_c": inner_c, "same_place": SAME_PLACE}
+    return {"gutter_bit": _GUTTER_BIT, "most_shear": MOST_SHEAR, **walks}
 
 
 @dataclass(frozen=True, eq=False)

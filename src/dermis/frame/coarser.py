@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_SAME_PLACE = 4.0  # texels: sources of four gutter neighbours nearer than this are averaged
+SAME_PLACE = 4.0
+"""Texels within which the sources of four gutter neighbours are averaged."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ def _gutter(sheet: Sheet, stitched: NDArray[np.bool_]) -> tuple[NDArray[np.uint1
     squares, first, of = np.unique(
         y[kept] * stitched.shape[1] + x[kept], return_index=True, return_inverse=True
     )
-    near = np.abs(source - source[first][of]).max(axis=1) < _SAME_PLACE
+    near = np.abs(source - source[first][of]).max(axis=1) < SAME_PLACE
     count = np.bincount(of[near], minlength=len(squares))
     mean = np.stack(
         [np.bincount(of[near], source[near, k], minlength=len(squares)) / count for k in (0, 1)], axis=-1

@@ -18,7 +18,7 @@ from dermis.frame.passes.bloom import Glow
 from dermis.frame.passes.moving_occlusion import Sky
 from dermis.frame.passes.post import Picture
 from dermis.frame.passes.shadows import ShadowMaps
-from dermis.frame.passes.shape import Motion
+from dermis.frame.passes.shape import MotionBytes
 from dermis.frame.passes.visibility_buffer import Layers
 from dermis.frame.projection import (
     Axes,
@@ -103,7 +103,7 @@ class Inputs:
 
     resources: Resources
     settings: Settings
-    motion: Motion
+    motion: MotionBytes
     layouts: tuple[AtlasLayout, ...]
     blurs: tuple[Blur, ...]
     shadow_views: Views

@@ -12,7 +12,7 @@ from dermis.frame.levels import Blur, scale_of
 from dermis.frame.lights import light_constants, light_records, light_views
 from dermis.frame.passes.moving_occlusion import sky_record
 from dermis.frame.passes.shade import shade_program
-from dermis.frame.passes.shape import Motion, resting
+from dermis.frame.passes.shape import MotionBytes, resting
 from dermis.frame.projection import Views, shadow_layers
 from dermis.frame.resources import make_resources
 from dermis.frame.skin_profiles import SkinProfiles
@@ -22,7 +22,7 @@ from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Device, Memo
 from dermis.mesh.head import Head
 from dermis.mesh.outline import Outline
-from dermis.mesh.rig import Motion as RigMotion
+from dermis.mesh.rig import Motion
 from dermis.scene.lights import Light
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
@@ -35,7 +35,7 @@ Lights = tuple[Light, ...]
 class Moved(NamedTuple):
     """A head's motion and how far out its shape reaches."""
 
-    motion: Motion
+    motion: MotionBytes
     outline: Outline
 
 
@@ -89,12 +89,12 @@ class Preparation:
             constants=resources.constants + shone_on,
         )
 
-    def _around(self, head: Head, motion: RigMotion | None, outline: Outline) -> tuple[Look, Any]:
+    def _around(self, head: Head, motion: Motion | None, outline: Outline) -> tuple[Look, Any]:
         """How the sky sees the head as it is posed, and the shader's record of it."""
         anchors = self.memo.keep(anchors_of, head)
         return self.memo.keep(_looked, outline, using=(motion, self.device, head, anchors))
 
-    def _moved(self, head: Head, motion: RigMotion | None) -> Moved:
+    def _moved(self, head: Head, motion: Motion | None) -> Moved:
         """The head as it is posed, or at rest where no motion came."""
         resting = self.memo.keep(_resting, head)
         return self.memo.keep(_posed, head, motion, resting.motion) if motion else resting
@@ -110,18 +110,18 @@ def _resting(head: Head) -> Moved:
     return Moved(resting(head.control), head.mesh.outline)
 
 
-def _posed(head: Head, motion: RigMotion, at_rest: Motion) -> Moved:
+def _posed(head: Head, motion: Motion, at_rest: MotionBytes) -> Moved:
     rig, weights, matrices = head.control, motion.weights.tobytes(), motion.matrices.tobytes()
     same = motion.positions_mm is rig.positions_mm
     positions = at_rest.positions if same else motion.positions_mm.tobytes()
-    moved = Motion(positions, weights, matrices)
+    moved = MotionBytes(positions, weights, matrices)
     if moved == at_rest:  # where the mesh's own outline is exact
         return Moved(moved, head.mesh.outline)
     return Moved(moved, Outline(rig.outline_mm(motion), _SLACK_MM))
 
 
 def _looked(
-    outline: Outline, motion: RigMotion, device: Device, head: Head, anchors: Anchors
+    outline: Outline, motion: Motion, device: Device, head: Head, anchors: Anchors
 ) -> tuple[Look, Any]:
     look = look_around(outline, turn_of(anchors, motion))
     return look, sky_record(device, look, len(head.mesh.positions))

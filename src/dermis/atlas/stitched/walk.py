@@ -14,12 +14,12 @@ Complex = NDArray[np.complex128]
 Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-_INWARD = 1e-3  # of the way to a place inside the triangle: so that a walk from a corner starts inside
-_INNER = (
-    0.3547,
-    0.3141,
-    0.3312,
-)  # weights of that place: from the very middle, walks meet corners more often
+INWARD = 1e-3
+"""Of the way to a place inside the triangle: so that a walk from a corner starts inside."""
+
+INNER = 0.3547, 0.3141, 0.3312
+"""Weights of that place: from the very middle, walks meet corners more often."""
+
 _MOST_STEPS = 4096
 
 
@@ -88,7 +88,7 @@ def walk(adjacency: Adjacency, triangle: NDArray[np.integer], start: Doubles, ta
 def _begin(adjacency: Adjacency, triangle: Index, start: Complex, target: Complex, ends: Ends) -> Walkers:
     """Those who leave their first triangle, and the ends of the others."""
     corners = _complex(adjacency.flat[triangle])
-    start = start + _INWARD * (corners @ np.array(_INNER) - start)
+    start = start + INWARD * (corners @ np.array(INNER) - start)
     corners, way = corners - start[:, None], target - start
     after = np.roll(corners, -1, axis=1)
     passes = (_cross(way[:, None], corners) <= 0.0) & (_cross(way[:, None], after) >= 0.0)

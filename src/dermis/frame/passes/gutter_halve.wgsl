@@ -1,7 +1,7 @@
 // The list of texels beyond the charts' edges at half the resolution: each has its light where its four have theirs.
 //#include "each.wgsl"
 
-const SAME_PLACE: f32 = 4.0; // texels within which the four show one part of the surface
+//#fill const SAME_PLACE: f32 = {same_place}; // texels within which the four show one part of the surface
 
 struct Beyond {
     source: vec2f, // where the light is [texel], whole numbers at texel centres

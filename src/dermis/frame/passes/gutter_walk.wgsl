@@ -5,8 +5,8 @@
 override SIZE: u32; // texels along a side of the atlas
 
 const NO_TRIANGLE: u32 = 0xffffffffu;
-const INWARD: f32 = 1e-3; // of the way to a place inside the triangle: so that a walk from a corner starts inside
-const INNER: vec3f = vec3f(0.3141, 0.3312, 0.3547); // that place: from the very middle, walks meet corners more often
+//#fill const INWARD: f32 = {inward}; // of the way to a place inside the triangle: so that a walk from a corner starts inside
+//#fill const INNER: vec2f = vec2f({inner_b}, {inner_c}); // weights of its corners b and c: from the very middle, walks meet corners more often
 const MOST_STEPS: u32 = 1024u;
 const LEAST: f32 = 1e-12;
 const LEAST_TURN: f32 = 0.05; // sine between the steps of u and v under which their mean means nothing
@@ -193,7 +193,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let w = vec3f(1.0 - second.x - second.y, second);
     let flat = flattened(walk.triangle);
     let root = w.y * flat.b + w.z * flat.c;
-    let start = root + INWARD * (INNER.y * flat.b + INNER.z * flat.c - root);
+    let start = root + INWARD * (INNER.x * flat.b + INNER.y * flat.c - root);
     let found = walked(walk.triangle, flat, start, root + way_to(walk, flat, w));
     var source = vec2f(walk.source[0], walk.source[1]);
     if (found.triangle != NO_TRIANGLE && (triangle_at(found.triangle).w & MAPPED) != 0u) {

@@ -15,7 +15,7 @@ from dermis.mesh.geometry import MIN_UV_CROSS
 from dermis.mesh.rig import Rig
 
 
-class Motion(NamedTuple):
+class MotionBytes(NamedTuple):
     """What moves a shape, as the shaders read it.
 
     positions : three floats for each control point at rest [mm]
@@ -28,12 +28,12 @@ class Motion(NamedTuple):
     matrices: bytes = b""
 
     @property
-    def at_rest(self) -> Motion:
+    def at_rest(self) -> MotionBytes:
         """That of a shape which nothing moves."""
-        return Motion(self.positions)
+        return MotionBytes(self.positions)
 
 
-def draw(graph: Frame | Graph, shape: Shape, motion: Motion) -> None:
+def draw(graph: Frame | Graph, shape: Shape, motion: MotionBytes) -> None:
     """Put the shape where the motion has it."""
     graph.write("shape", shape.rest, motion.positions)
     if motion.weights:
@@ -54,15 +54,15 @@ def rest_shape(device: Device, tables: ShapeTables, positions_mm: NDArray[np.flo
     positions_mm : (p, 3) of the control points
     """
     made, frame = still_shape(device, tables), Frame(device, timed=False)
-    draw(frame, made, Motion(positions_mm.tobytes()))
+    draw(frame, made, MotionBytes(positions_mm.tobytes()))
     frame.submit()
     return made
 
 
-def resting(rig: Rig) -> Motion:
+def resting(rig: Rig) -> MotionBytes:
     """The motion that leaves a rig where it is."""
     weights, matrices, positions = (array.tobytes() for array in rig.rest)
-    return Motion(positions, weights, matrices)
+    return MotionBytes(positions, weights, matrices)
 
 
 def _evaluate(graph: Recorder, shape: Shape) -> None:

@@ -1,0 +1,84 @@
+"""Times `dermis render` from the shell to the picture: python benchmarks/first_picture.py -o result.json
+
+Each cold run begins with empty caches, the package's and the driver's; warm ones follow it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter, run
+
+from dermis.cli.console import print_json
+from dermis.outputs import check_output, replacing
+
+_WARM = 2  # runs after each cold one
+
+
+def main(
+    *,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    head: str = "lee_perry_smith",
+    atlas: tuple[int, ...] = (1024, 2048),
+    adapter: str = "auto",
+    runs: int = 3,
+) -> int:
+    """Measure and print, and write the figures where a file is named.
+
+    Parameters
+    ----------
+    output:
+        JSON to write.
+    head:
+        A sample (its files under DERMIS_DATA: nothing is downloaded in a timed run) or a file.
+    atlas:
+        Texels along the atlas' side.
+    adapter:
+        auto (the best), cpu (software), or a part of an adapter's name.
+    runs:
+        How often with empty caches.
+    """
+    if output is not None:
+        check_output(output, (".json",))
+    found = {f"atlas {side}": pictures(head, side, adapter, runs) for side in atlas}
+    print_json({"head": head, "seconds": found})
+    if output is not None:
+        with replacing(output) as trial:
+            trial.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+    return 0
+
+
+def pictures(head: str, side: int, adapter: str, runs: int) -> dict[str, dict[str, float]]:
+    """Least and median time of the whole process with empty caches, and with full ones [s]."""
+    cold, warm = list[float](), list[float]()
+    for _ in range(runs):
+        with tempfile.TemporaryDirectory() as folder:
+            caches = os.environ | {"XDG_CACHE_HOME": folder, "DERMIS_CACHE": f"{folder}/dermis"}
+            cold.append(seconds(head, side, adapter, Path(folder), caches))
+            warm += [seconds(head, side, adapter, Path(folder), caches) for _ in range(_WARM)]
+    return {
+        name: {"least": min(times), "median": statistics.median(times)}
+        for name, times in (("cold", cold), ("warm", warm))
+    }
+
+
+def seconds(head: str, side: int, adapter: str, folder: Path, environment: Mapping[str, str]) -> float:
+    """Time of one process [s]."""
+    command = [sys.executable, "-m", "dermis", "render", head, "-o", str(folder / "picture.png")]
+    options = ["--atlas", str(side), "--adapter", adapter]
+    started = time.perf_counter()
+    subprocess.run([*command, *options], check=True, stdout=subprocess.DEVNULL, env=dict(environment))
+    return time.perf_counter() - started
+
+
+if __name__ == "__main__":
+    run(main)
