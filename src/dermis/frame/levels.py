@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.gpu import Device, join, make_texture, scratch
+from dermis.gpu import Device, make_texture, scratch
 
 FLOATS = "rgba32float"
 """Format of light in full precision."""
@@ -33,30 +33,22 @@ class Levels:
     scratch: Any
     size: int
     texel: str
-    _views: dict[tuple[int, int, int], Any] = field(default_factory=dict)
+    _views: dict[tuple[int, int], Any] = field(default_factory=dict)
 
     def layer(self, k: int, halvings: int = 0) -> Any:
         """A view of one layer."""
         return self._view(self.stack, k, halvings)
 
-    def layers(self, device: Device, first: int, count: int, halvings: int) -> Any:
-        """A view of some layers that are halved as often, to read; what nobody writes is not touched."""
-        if (first, halvings, count) not in self._views:
-            single = [self.layer(first + k, halvings) for k in range(count)]
-            join(device, self._view(self.stack, first, halvings, count), single)
-        return self._view(self.stack, first, halvings, count)
-
     def spare(self, halvings: int = 0) -> Any:
         """A view of the texture between two passes."""
         return self._view(self.scratch, -1, halvings)
 
-    def _view(self, texture: Any, k: int, mip: int, count: int = 0) -> Any:
-        """A view of one layer, or of a count of them as an array."""
-        if (k, mip, count) not in self._views:
-            options = {"dimension": "2d-array" if count else "2d", "mip_level_count": 1}
-            chosen = {"base_array_layer": max(0, k), "array_layer_count": max(1, count)}
-            self._views[k, mip, count] = texture.create_view(base_mip_level=mip, **chosen, **options)
-        return self._views[k, mip, count]
+    def _view(self, texture: Any, k: int, mip: int) -> Any:
+        if (k, mip) not in self._views:
+            options = {"dimension": "2d", "array_layer_count": 1, "mip_level_count": 1}
+            view = texture.create_view(base_array_layer=max(0, k), base_mip_level=mip, **options)
+            self._views[k, mip] = view
+        return self._views[k, mip]
 
 
 @dataclass(frozen=True)

@@ -44,22 +44,17 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     check_limits(device, technique, settings, asked.atlases, asked.count)
     reading = device, asked.head, asked.white, settings.gamma == "right"
     maps = memo.soon(device.executor, upload_maps, *reading)  # which take long to read
-    size = settings.shadow_size if asked.shadow_layers else 1
-    shadow_maps = keep(_shadow_maps, device, asked.head, asked.shadow_layers, size, of=asked.view)
+    shadow_maps = _shadows(memo, device, asked)
     tables = keep(shape_tables, device, asked.head)
     shape = keep(make_shape, device, tables)
     person = keep(still_shape, device, tables) if asked.person is not None else None
     curvature = keep(_curvature, device, asked.head) if technique.curved else None
-    shared = _shared(memo, device, asked, shadow_maps)
-    shared["curvatures"] = curvature.smoothed if curvature else no_curvature(device)
+    shared = _shared(memo, device, asked, shadow_maps, curvature)
     atlases = [_atlas(memo, device, asked, name, k) for k, name in enumerate(asked.atlases.layouts)]
     uploaded: dict[str, Any] = memo.wait(maps)
     shared |= uploaded
     layouts = [_layout(memo, device, asked, one, shape, person, shared, k) for k, one in enumerate(atlases)]
-    own = technique.make(memo, device, settings, asked.profile)
-    program = shade.shade_program(device)
-    view = view_record(program, asked.head, settings, asked.split)
-    technique.describe(view, program, own)
+    own, view = _shading(memo, device, asked)
     first, _ = atlases[0]
     side, several = settings.atlas, len(layouts) > 1
     return Resources(
@@ -86,7 +81,24 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     )
 
 
-def _shared(memo: Memo, device: Device, asked: Asked, shadow_maps: shadows.ShadowMaps) -> dict[str, Any]:
+def _shading(memo: Memo, device: Device, asked: Asked) -> tuple[Any, Any]:
+    """What the technique made for itself, and the record of the shading pass without the camera."""
+    technique, program = asked.technique, shade.shade_program(device)
+    own = technique.make(memo, device, asked.settings, asked.profile)
+    view = view_record(program, asked.head, asked.settings, asked.split)
+    technique.describe(view, program, own)
+    return own, view
+
+
+def _shadows(memo: Memo, device: Device, asked: Asked) -> shadows.ShadowMaps:
+    layers = asked.shadow_layers
+    size = asked.settings.shadow_size if layers else 1
+    return memo.keep(_shadow_maps, device, asked.head, layers, size, of=asked.view)
+
+
+def _shared(
+    memo: Memo, device: Device, asked: Asked, shadow_maps: shadows.ShadowMaps, curvature: Curvature | None
+) -> dict[str, Any]:
     """What all layouts are lit with, lights aside."""
     skin, program = asked.skin, shade.shade_program(device)
     around, total = asked.environment, asked.split.total
@@ -95,6 +107,7 @@ def _shared(memo: Memo, device: Device, asked: Asked, shadow_maps: shadows.Shado
         "environment": surroundings.environment_record(program, around, skin, total, asked.occluded),
         "shadow_maps": shadow_maps.texture,
         "shadow_bounds": shadow_maps.bounds,
+        "curvatures": curvature.smoothed if curvature else no_curvature(device),
         "nearest_sampler": device.sampler(),
         "panorama": asked.surroundings.panorama,
         "albedo_table": memo.keep(_albedo, device, surface.model_of(skin), skin.fresnel),

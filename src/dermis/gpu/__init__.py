@@ -1,6 +1,6 @@
 """A small toolkit over wgpu: it knows adapters, shaders, textures and passes, and nothing of skin."""
 
-from dermis.gpu.access import join, scratch
+from dermis.gpu.access import scratch
 from dermis.gpu.adapters import Adapter, list_adapters
 from dermis.gpu.device import Device, open_device
 from dermis.gpu.frame import Frame
@@ -24,7 +24,6 @@ __all__ = [
     "Recorder",
     "compiled",
     "download",
-    "join",
     "list_adapters",
     "make_texture",
     "open_device",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Container
 from dataclasses import dataclass, field
 from itertools import count
 from typing import TYPE_CHECKING, Any
@@ -20,7 +20,7 @@ class Slot:
     Contents have version numbers: equal for what the same pass made from equal inputs, 0 when unknown.
 
     parent : of a view, the texture's slot
-    parts : of a texture, the slots of its views; of a view of several layers, those of views of each
+    parts : of a texture, the slots of its views
     held : the version that is there now
     scratch : whether it only carries data between passes, so that its content after a frame does not matter
     """
@@ -84,12 +84,3 @@ def slot_of(device: Device, resource: Any) -> Slot:
             found.parent.parts.append(found)
             found.scratch, found.held = found.parent.scratch, found.parent.held
     return found
-
-
-def join(device: Device, view: Any, layers: Sequence[Any]) -> None:
-    """Let a view of several layers of a texture, which passes read and never write, hold what these do.
-
-    layers : a view of each, through which they are written
-    """
-    texture = slot_of(device, view.texture)
-    device.slots[view] = Slot(texture, [slot_of(device, one) for one in layers], scratch=texture.scratch)

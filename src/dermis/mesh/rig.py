@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.disk import cached_array
 from dermis.mesh.morph_targets import MorphTargets, no_targets
-from dermis.mesh.outline import hull_points
-from dermis.mesh.rig_outline import RigOutline, outline_of, outline_points
+from dermis.mesh.rig_outline import RigOutline, corners_of, outline_of, outline_points
 from dermis.mesh.skeleton import INFLUENCES, Skeleton
 
 Floats = NDArray[np.float32]
@@ -101,7 +100,7 @@ class Rig:
         """The outline of a rig that rests elsewhere; the last one is kept, and checked by its own points."""
         points, outline = self._elsewhere
         if not np.array_equal(places[points].T, outline.rest_mm[:3]):
-            points = np.union1d(self._outline_points, hull_points(places))
+            points = np.union1d(self._outline_points, corners_of(places))
             outline = outline_of(places, self.targets, self.skeleton, points)
             vars(self)["_elsewhere"] = points, outline
         return outline

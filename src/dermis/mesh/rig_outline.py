@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.mesh.morph_targets import MorphTargets
+from dermis.mesh.outline import hull_points
 from dermis.mesh.skeleton import Floats, Skeleton
 
 Index = NDArray[np.intp]
@@ -22,6 +23,7 @@ Index = NDArray[np.intp]
 _DIRECTIONS, _FEW = 512, 256
 _FINER = 64, 512, 2048  # one after the other: points beside one that is taken already are left out
 _CLOSE_MM = 0.5
+_MOST_CORNERS = 512
 _PRODUCT = 80_000  # heights at a time
 _LAYERS = 16  # points beneath the outermost ones that a pose may bring out
 _POSES, _SEED = 128, 0
@@ -75,6 +77,12 @@ def outline_of(places: Floats, targets: MorphTargets, skeleton: Skeleton | None,
     shares = np.zeros((len(bones), len(points)), np.float32)
     np.add.at(shares, (number.reshape(bone.shape), np.arange(len(points))[:, None]), weight)
     return RigOutline(rest, delta, shares, bones.astype(np.intp))
+
+
+def corners_of(places: Floats) -> Index:
+    """Numbers of the corners of the convex hull of points (p, 3): all, or the outermost of too many."""
+    corners = hull_points(places)
+    return corners if len(corners) <= _MOST_CORNERS else corners[outermost(places[corners], _MOST_CORNERS)]
 
 
 def outermost(places: Floats, count: int = _FEW) -> Index:

@@ -7,27 +7,29 @@ override COARSER: bool = false; // whether there are levels of less resolution
 override TRANSMITTED: bool = false; // whether light comes through thin parts
 
 struct Weights {
-    count: u32, // of the layers
+    first: u32, // first layer
+    count: u32,
+    mip: i32, // of these layers
     scale: f32, // factor from the layers to what is stored
     through: f32, // factor of the transmitted light
     weight: array<vec4f, 24>,
 }
 
 @group(0) @binding(0) var<uniform> weights: Weights;
-@group(0) @binding(1) var levels: texture_2d_array<f32>; // those of this resolution
+@group(0) @binding(1) var levels: texture_2d_array<f32>;
 @group(0) @binding(2) var transmitted: texture_2d<f32>; // light, and 1 where there is surface; maybe at less resolution
 // source: the sum of the coarser levels, and 1 where there is surface
 
 @compute @workgroup_size(16, 16)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let size = textureDimensions(levels);
+    let size = textureDimensions(levels, weights.mip);
     if (any(id.xy >= size)) {
         return;
     }
     var sum = vec4f(0.0);
     var k = 0u;
     loop { // with its test at the end, as in lighting.wgsl
-        sum += weights.weight[k] * textureLoad(levels, id.xy, k, 0);
+        sum += weights.weight[k] * textureLoad(levels, id.xy, weights.first + k, weights.mip);
         k++;
         if (k >= weights.count) {
             break;

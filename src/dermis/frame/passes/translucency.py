@@ -22,17 +22,17 @@ def draw(graph: Recorder, levels: Levels, blur: Blur, thin: Translucency, consta
     Source: [JensenBuhler2002; dEonLuebke2007].
     """
     device, pairs, layer = graph.device, thin.pairs, 1 + thin.layer
-    halvings = blur.halvings[layer]
     gather = program(device, "translucency_gather.wgsl")
     record = gather.record(
         "Entering",
+        layer=layer,
         sources=pairs.sources[1],
-        halvings=halvings,
+        mip=blur.halvings[layer],
         scale=1.0 / blur.scale,
     )
     entering = {
         "entering": record,
-        "level": levels.layer(layer, halvings),
+        "levels": levels.stack,
         "source_points": thin.source_points,
         "gathered": thin.gathered,
     }

@@ -4,21 +4,22 @@
 //#include "translucent_pair.wgsl"
 
 struct Entering {
+    layer: u32, // blurred level that the sources read
     sources: u32,
-    halvings: u32, // of the level's resolution
+    mip: u32, // that holds the level
     scale: f32, // factor from what the level holds to light
 }
 
 @group(0) @binding(0) var<uniform> entering: Entering;
-@group(0) @binding(1) var level: texture_2d<f32>; // blurred light that the sources read
+@group(0) @binding(1) var levels: texture_2d_array<f32>;
 @group(0) @binding(2) var<storage, read> source_points: array<Source>;
 @group(0) @binding(3) var<storage, read_write> gathered: array<vec2u>; // as in light_words.wgsl
 
 const SIZE: u32 = 64u; // of a workgroup
 
 fn level_at(at: vec2i) -> vec4f {
-    let most = vec2i(textureDimensions(level)) - 1;
-    return textureLoad(level, clamp(at, vec2i(0), most), 0);
+    let most = vec2i(textureDimensions(levels, entering.mip)) - 1;
+    return textureLoad(levels, clamp(at, vec2i(0), most), entering.layer, entering.mip);
 }
 
 @compute @workgroup_size(SIZE)
@@ -32,7 +33,7 @@ fn main(
         return;
     }
     let texel = source_points[index].texel;
-    let place = (vec2f(f32(texel & 0xffffu), f32(texel >> 16u)) + 0.5) / f32(1u << entering.halvings) - 0.5;
+    let place = (vec2f(f32(texel & 0xffffu), f32(texel >> 16u)) + 0.5) / f32(1u << entering.mip) - 0.5;
     let a = vec2i(floor(place));
     let w = entering.scale * bilinear_weights(place);
     let light = w.x * level_at(a) + w.y * level_at(a + vec2i(1, 0)) + w.z * level_at(a + vec2i(0, 1))
