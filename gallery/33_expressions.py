@@ -1,7 +1,7 @@
 """A face that moves.
 
 One head under studio light, moved by weights of its targets and turns of its bones. Shape, shadows and what
-scatters below the skin follow each pose on the device. It needs the parametric human of the sample data.
+scatters below the skin follow each pose on the device. Its skin is one of MakeHuman's, from the sample data.
 
 Deck: +
 Columns: 3
@@ -12,12 +12,11 @@ from pathlib import Path
 
 import dermis
 from dermis.gallery.picture import main
-from dermis.human.hm08 import hm08
-from dermis.mesh.subdivide import subdivide_head
+from dermis.mesh.maps import load_maps
 
 DATA = Path(os.environ.get("DERMIS_DATA", ".")) / "heads"
 COLOUR = DATA / "makehuman" / "skins" / "young_lightskinned_male_diffuse.png"
-MAN = {f"macrodetails/{name}-male-young": 1 / 3 for name in ("african", "asian", "caucasian")}
+MAN = dermis.Human(sex=1, age=25)
 NECK = ("neck01", "neck02", "neck03", "head")
 SMILE = dict.fromkeys(("mouthSmileLeft", "mouthSmileRight", "cheekSquintLeft", "cheekSquintRight"), 0.8)
 POSES = {
@@ -31,7 +30,7 @@ POSES = {
 
 
 def draw(studio):
-    head = subdivide_head(hm08(DATA / "human", MAN, COLOUR), 1)
+    head = MAN.head(load_maps(colour=COLOUR), layout="hm08")
     return {name: studio.render(dermis.Scene(head, pose=pose)) for name, pose in POSES.items()}
 
 

@@ -1,6 +1,6 @@
 """Heads that move against heads built anew in the same shape: writes docs/motion.md from docs/motion.in.md.
 
-Needs DERMIS_DATA with heads/human; takes some minutes on two cores.
+Needs DERMIS_DATA with heads/makehuman; takes some minutes on two cores.
 """
 
 from __future__ import annotations
@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 import dermis
 from dermis.frame.renderer import Renderer
-from dermis.human.hm08 import hm08
+from dermis.human.person import Human
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
+from dermis.mesh.maps import load_maps
 from dermis.scene import Pose, Scene, Settings
 from dermis.scene.files import load_camera, load_lights
 
@@ -28,13 +29,10 @@ Points = NDArray[np.float32]
 PAGE = Path(__file__).parent.parent / "docs" / "motion.md"
 DATA = Path(os.environ.get("DERMIS_DATA", "../shared"))
 SKIN = DATA / "heads" / "makehuman" / "skins" / "young_lightskinned_male_diffuse.png"
-PEOPLE: dict[str, dict[str, float]] = {
-    "old man": {"macrodetails/african-male-old": 1.0},
-    "young woman": {"macrodetails/asian-female-young": 1.0},
-    "heavy man": {
-        "macrodetails/caucasian-male-young": 1.0,
-        "macrodetails/universal-male-young-averagemuscle-maxweight": 1.0,
-    },
+PEOPLE = {
+    "old man": Human(1, 0, 0, sex=1, age=90),
+    "young woman": Human(0, 1, 0, age=25),
+    "heavy man": Human(0, 0, 1, sex=1, age=25, weight=1),
 }
 EXPRESSIONS: dict[str, dict[str, float]] = {
     "open jaw": {"jawOpen": 0.8},
@@ -132,8 +130,8 @@ def occlusions(renderer: Renderer, head: Head) -> Iterator[str]:
 def main() -> None:
     """Measure and write the page."""
     renderer = dermis.Renderer(sys.argv[1] if len(sys.argv) > 1 else "auto")
-    head = hm08(DATA / "heads" / "human", colour=SKIN)
-    people = {name: hm08(DATA / "heads" / "human", person).positions_mm for name, person in PEOPLE.items()}
+    head = Human(age=25).head(load_maps(colour=SKIN), "hm08", 0)
+    people = {name: person.positions_mm for name, person in PEOPLE.items()}
     text = PAGE.with_suffix(".in.md").read_text(encoding="utf-8")
     tables = {
         "expressions": "\n".join(expressions(renderer, head, people)),

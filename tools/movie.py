@@ -2,8 +2,8 @@
 
 python tools/movie.py OUTPUT.mp4 [SIDE [FPS]]
 
-Writes the motion beside the movie, as a CSV like those of Live Link Face. Needs DERMIS_DATA with heads/human
-and heads/makehuman.
+Writes the motion beside the movie, as a CSV like those of Live Link Face. Needs DERMIS_DATA with
+heads/makehuman.
 """
 
 from __future__ import annotations
@@ -16,14 +16,13 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import dermis
-from dermis.human.hm08 import hm08
 from dermis.images.movie import exact_rate
 from dermis.mesh.head import Head
-from dermis.mesh.subdivide import subdivide_head
+from dermis.mesh.maps import load_maps
 
 DATA = Path(os.environ.get("DERMIS_DATA", "../shared")) / "heads"
 SKIN = DATA / "makehuman" / "skins" / "young_lightskinned_male_diffuse.png"
-MAN = {f"macrodetails/{name}-male-young": 1 / 3 for name in ("african", "asian", "caucasian")}
+MAN = dermis.Human(sex=1, age=25)
 SIDE, FPS, ATLAS = 1024, "30", 1024
 SECONDS, CAPTURED = 6.0, 60
 Keys = Sequence[tuple[float, float]]
@@ -66,7 +65,7 @@ def main() -> None:
     rate = exact_rate(sys.argv[3] if len(sys.argv) > 3 else FPS)
     take = output.with_suffix(".csv")
     take.write_text(capture(), encoding="utf-8")
-    head = subdivide_head(hm08(DATA / "human", MAN, SKIN), 1)
+    head = MAN.head(load_maps(colour=SKIN), layout="hm08")
     clip = dermis.load_motion(take, head)
     count, started = clip.frame_count(float(rate)), time.perf_counter()
     times = [float(number / rate) for number in range(count)]

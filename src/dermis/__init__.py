@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from dermis.errors import DermisError
     from dermis.frame.renderer import Renderer, render
+    from dermis.human.model import human_targets
+    from dermis.human.person import Human
     from dermis.human.regions.apply import with_regions
     from dermis.images.io import write_image
     from dermis.images.movie import MovieWriter
@@ -42,6 +44,8 @@ if TYPE_CHECKING:
 _HOME = {
     "Head": "mesh.head",
     "load_head": "scene.heads",
+    "Human": "human.person",
+    "human_targets": "human.model",
     "with_regions": "human.regions.apply",
     "DermisError": "errors",
     "write_image": "images.io",
@@ -80,6 +84,7 @@ __all__ = [
     "DirectionalLight",
     "Environment",
     "Head",
+    "Human",
     "MovieWriter",
     "PointLight",
     "Pose",
@@ -92,6 +97,7 @@ __all__ = [
     "SpotLight",
     "StripeLight",
     "Tissue",
+    "human_targets",
     "load_head",
     "load_lights",
     "load_motion",

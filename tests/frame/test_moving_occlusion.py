@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,7 @@ from dermis.frame.renderer import Renderer
 from dermis.frame.sky import SIDE as MAP_SIDE
 from dermis.frame.sky import anchors_of, look_around, turn_of
 from dermis.gpu import download
-from dermis.human.hm08 import hm08
+from dermis.human.person import Human
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.outline import Outline
@@ -112,9 +111,8 @@ def test_a_moved_wall_occludes_as_one_baked_anew(renderer: Renderer, head: Head)
     assert found["baked"] < FOLLOWED < found["rest"] / 2
 
 
-@pytest.mark.samples
-def test_an_open_mouth_occludes_as_one_baked_anew(renderer: Renderer, sample_folder: Path) -> None:
-    human = hm08(sample_folder / "heads" / "human")
+def test_an_open_mouth_occludes_as_one_baked_anew(renderer: Renderer) -> None:
+    human = Human().head(subdivide=0)
     scene = replace(scene_of(human), environment=SKY, pose=Pose(weights={"jawOpen": 1.0}))
     assert scene.motion is not None
     points = human.control.posed(scene.motion.weights.astype(float), scene.motion.matrices.astype(float))
@@ -170,8 +168,8 @@ def test_it_runs_when_the_shape_moves_and_never_else(renderer: Renderer, head: H
     assert not ran(replace(scene, environment=None))
 
 
-def test_a_turn_is_found_from_points_and_bones(sample_folder: Path) -> None:
-    human = hm08(sample_folder / "heads" / "human")
+def test_a_turn_is_found_from_points_and_bones() -> None:
+    human = Human().head(subdivide=0)
     anchors, rig = anchors_of(human), human.control
     assert np.abs(turn_of(anchors, rig.rest) - np.eye(3)).max() < 1e-6
     given = Pose(positions_mm=rig.positions_mm @ TURN.T).motion(rig)

@@ -11,17 +11,19 @@ from typing import Any
 
 from dermis.errors import refuse
 from dermis.human.bust import BUSTS
+from dermis.human.person import Human
 from dermis.mesh.check import check_head_height
 from dermis.mesh.formats import is_gltf
 from dermis.mesh.gltf.pictures import embedded_maps
 from dermis.mesh.head import Head
 from dermis.mesh.load import load_rigged
 from dermis.mesh.maps import load_maps
-from dermis.mesh.samples import SAMPLES, fetch
+from dermis.mesh.samples import SAMPLES, Sample, fetch
 from dermis.mesh.subdivide import subdivide_head
 from dermis.scene.head_table import NormalY, Up, VOrigin
 
 MapFile = str | os.PathLike[str] | None
+HUMAN = "human"
 
 
 def load_head(
@@ -40,7 +42,7 @@ def load_head(
     opaque: Sequence[str] = (),
     subdivide: int = 0,
 ) -> Head:
-    """The built-in "bust", a sample ("lee_perry_smith") or a mesh file (.glb, .gltf, .obj, .ply) with maps.
+    """A built-in head ("human", "bust"), a sample ("lee_perry_smith") or a file (.glb, .gltf, .obj, .ply).
 
     Options replace what a sample or a glTF file has of its own. Morph targets and bones of a glTF file move
     the head (`Pose`); it rests as the file has it, at the default weights of its targets.
@@ -52,21 +54,24 @@ def load_head(
     up : the file's upward axis
     normal_y : way in which green points in the normal map: "up" (OpenGL) or "down" (DirectX)
     opaque : groups of the file that are not skin, whatever they are called
-    subdivide : levels of subdivision, 0 to 3: Catmull-Clark for a file of quads, else Loop
+    subdivide : levels of subdivision, 0 to 3: Catmull-Clark for a file of quads, else Loop; the human has one
+        at least
 
     Raises DermisError for files that cannot be rendered as a head.
     """
     name, path = str(head), Path(head)
+    own = {"colour": colour, "normal": normal, "height": height}
+    own |= {"specular": specular, "roughness": roughness}
+    if name == HUMAN:
+        told = {"unit_mm": unit_mm, "v_origin": v_origin, "up": up, "opaque": opaque}
+        return _human(own, height_mm, normal_y, told, subdivide)
     sample, files = SAMPLES.get(name), dict[str, Any]()
     if name in BUSTS:
         from dermis.human.bust_file import cached_bust
 
         path = cached_bust(name)
     elif sample is not None:
-        if sample.kind != "head":
-            refuse(
-                name, "a head", f"this sample is an {sample.kind}", f"Use one of {', '.join(_head_names())}"
-            )
+        _check_kind(sample)
         files = fetch(name)
         path = files["mesh"]
         unit_mm = sample.unit_mm if unit_mm is None else unit_mm
@@ -77,8 +82,6 @@ def load_head(
         refuse(name or "head", f"a mesh file or a sample ({known})", f"{name!r} is neither", "Check the name")
     if sample is None and is_gltf(path):
         files = embedded_maps(path)
-    own = {"colour": colour, "normal": normal, "height": height}
-    own |= {"specular": specular, "roughness": roughness}
     chosen = _chosen(own, files)
     if height is None and height_mm is None:
         height_mm = files.get("height_mm")
@@ -97,6 +100,32 @@ def load_head(
     return made
 
 
+def _check_kind(sample: Sample) -> None:
+    if sample.kind != "head":
+        hint = f"Use one of {', '.join(_head_names())}"
+        refuse(sample.name, "a head", f"this sample is an {sample.kind}", hint)
+
+
+def _human(
+    maps: dict[str, MapFile], height_mm: float | None, normal_y: NormalY, told: dict[str, Any], subdivide: int
+) -> Head:
+    """The parametric human, in its own layout.
+
+    told : what is told of files alone
+    """
+    for option, usual in (("unit_mm", None), ("v_origin", "auto"), ("up", "y"), ("opaque", ())):
+        if told[option] not in (usual, list(usual or ())):
+            refuse(option, "a file that it tells of", f"it came with {HUMAN!r}", "Leave it out")
+    if height_mm is not None and maps["height"] is None:
+        came = f"{height_mm} came without a height map"
+        refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
+    chosen = _chosen(maps, {})
+    del chosen["region"]  # which is the files' own
+    given = any(file is not None for file in chosen.values())
+    loaded = load_maps(**chosen, height_mm=height_mm, normal_y=normal_y) if given else None
+    return Human().head(loaded, subdivide=max(1, subdivide))
+
+
 def _chosen(given: dict[str, MapFile], files: dict[str, Any]) -> dict[str, Any]:
     """For each role the file given, else the head's own; a normal map that is given replaces its relief."""
     chosen = {role: files.get(role) if file is None else file for role, file in given.items()}
@@ -104,4 +133,4 @@ def _chosen(given: dict[str, MapFile], files: dict[str, Any]) -> dict[str, Any]:
 
 
 def _head_names() -> list[str]:
-    return [*BUSTS, *(name for name, sample in SAMPLES.items() if sample.kind == "head")]
+    return [HUMAN, *BUSTS, *(name for name, sample in SAMPLES.items() if sample.kind == "head")]

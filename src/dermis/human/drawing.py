@@ -1,0 +1,87 @@
+"""People at random: macro weights that go together, and small differences of every part of the face."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from numbers import Integral
+from typing import Any
+
+import numpy as np
+
+from dermis.errors import refuse
+from dermis.human.model import OLD, YOUNG, human_targets
+
+_MOST_SEED = 2**32 - 1
+_ALIKE = 0.35  # of the Dirichlet distribution of ancestries: most people have mostly one
+_BETWEEN = 0.08  # standard deviation of the sex from its ends
+_WAYS = (("decr", "incr"), ("down", "up"), ("in", "out"), ("backward", "forward"), ("concave", "convex"))
+"""Ends of the names of two targets that are each other's opposite."""
+_SPREAD = {  # standard deviation of the weights of a folder's targets
+    "head": 0.1,
+    "forehead": 0.25,
+    "eyebrows": 0.25,
+    "eyes": 0.15,
+    "nose": 0.22,
+    "mouth": 0.18,
+    "cheek": 0.25,
+    "chin": 0.22,
+    "ears": 0.25,
+    "neck": 0.12,
+}
+_LEFT_OUT = ("trans", "age", "fat", "measure", "push")  # what macro weights say, and what moves a whole part
+_SIDES = 0.2  # of the spread, by which left and right differ
+_ASYMMETRY = 0.1
+_SHAPES = ("diamond", "invertedtriangular", "oval", "rectangular", "round", "square", "triangular")
+_MOST_SHAPE = 0.3
+
+
+def drawn(seed: int) -> dict[str, Any]:
+    """The fields of `Human`, see `Human.drawn`."""
+    if not isinstance(seed, Integral) or not 0 <= seed <= _MOST_SEED:
+        refuse("seed", f"a whole number from 0 to {_MOST_SEED}", f"{seed!r} came", "Choose within")
+    rng = np.random.default_rng(int(seed))
+    african, asian, caucasian = rng.dirichlet((_ALIKE,) * 3)
+    sex = min(abs(rng.normal(0.0, _BETWEEN)), 0.3)
+    sex = 1.0 - sex if rng.random() < 0.5 else sex
+    share = rng.beta(1.2, 2.2)
+    weight = rng.normal(0.3 * share - 0.1, 0.25)
+    muscle = rng.normal(0.2 * sex - 0.1 - 0.3 * share, 0.2)
+    return {
+        "african": float(african),
+        "asian": float(asian),
+        "caucasian": float(caucasian),
+        "sex": float(sex),
+        "age": float(YOUNG + (OLD - YOUNG) * share),
+        "weight": float(np.clip(weight, -0.7, 0.8)),
+        "muscle": float(np.clip(muscle, -0.6, 0.6)),
+        "targets": dict(_details(rng)),
+    }
+
+
+def _details(rng: np.random.Generator) -> Iterator[tuple[str, float]]:
+    """Weights of targets, always drawn in the same order."""
+    known = human_targets()
+    common: dict[str, float] = {}
+    for name in known:
+        folder, rest = name.split("/")
+        if folder == "asym" and name.endswith("-l"):
+            value = rng.normal(0.0, _ASYMMETRY)
+            yield (name if value > 0 else f"{name[:-1]}r"), abs(float(value))
+        if folder not in _SPREAD or any(word in rest for word in _LEFT_OUT):
+            continue
+        for low, high in _WAYS:
+            stem = name.removesuffix(low)
+            if stem != name and f"{stem}{high}" in known:
+                value = _value(rng, stem, _SPREAD[folder], common)
+                yield f"{stem}{high if value > 0 else low}", abs(value)
+    yield f"head/head-{rng.choice(_SHAPES)}", float(rng.uniform(0.0, _MOST_SHAPE))
+
+
+def _value(rng: np.random.Generator, stem: str, spread: float, common: dict[str, float]) -> float:
+    """A weight within two standard deviations; left and right are nearly alike."""
+    folder, rest = stem.split("/")
+    value = float(np.clip(rng.normal(0.0, spread), -2 * spread, 2 * spread))
+    if rest[:2] not in ("l-", "r-"):
+        return value
+    shared = common.setdefault(f"{folder}/{rest[2:]}", value)
+    return shared + float(rng.normal(0.0, _SIDES * spread))

@@ -1,0 +1,139 @@
+"""People of the parametric human: what makes one differ from another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.errors import refuse
+from dermis.human.drawing import drawn
+from dermis.human.model import OLD, YOUNG, Layout, control_mm, human_head
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.subdivide import subdivide_head
+
+_RANGES = {
+    "african": (0.0, 1.0),
+    "asian": (0.0, 1.0),
+    "caucasian": (0.0, 1.0),
+    "sex": (0.0, 1.0),
+    "age": (YOUNG, OLD),
+    "weight": (-1.0, 1.0),
+    "muscle": (-1.0, 1.0),
+}
+_MOST_WEIGHT = 2.0  # of a published target: what lies beyond is no face
+_NONE: Mapping[str, float] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Human:
+    """A person: macro targets by ancestry, sex, age, weight and muscle, and any published target by name.
+
+    african, asian, caucasian : shares of the ancestries, 0 to 1; their ratios count
+    sex : from 0, female, to 1, male [-]
+    age : 25 to 90 [years]
+    weight, muscle : from -1, least, to 1, most; 0 is the average [-]
+    targets : weights of published targets, such as {"nose/nose-hump-incr": 0.5}; mostly 0 to 1
+
+    Raises DermisError for values out of range; names of targets are checked when the head is made.
+    """
+
+    african: float = 1 / 3
+    asian: float = 1 / 3
+    caucasian: float = 1 / 3
+    sex: float = 0.0
+    age: float = 30.0
+    weight: float = 0.0
+    muscle: float = 0.0
+    targets: Mapping[str, float] = field(default_factory=lambda: _NONE)
+
+    def __post_init__(self) -> None:
+        for one in fields(self):
+            if one.name in _RANGES:
+                low, high = _RANGES[one.name]
+                value = getattr(self, one.name)
+                if not low <= value <= high:
+                    refuse(one.name, f"a number from {low:g} to {high:g}", f"{value!r} came", "Choose within")
+        if not self.african + self.asian + self.caucasian > 0:
+            refuse("ancestry", "a share of african, asian or caucasian", "all are 0", "Raise one")
+        for name, weight in self.targets.items():
+            if not (math.isfinite(weight) and abs(weight) <= _MOST_WEIGHT):
+                expected = f"a weight from {-_MOST_WEIGHT:g} to {_MOST_WEIGHT:g}"
+                refuse(f"target {name!r}", expected, f"{weight!r} came", "Choose within")
+
+    @classmethod
+    def drawn(cls, seed: int) -> Human:
+        """A plausible adult, the same for the same seed: mostly of one ancestry, a little asymmetric.
+
+        seed : 0 to 2**32 - 1
+
+        Raises DermisError for other seeds.
+        """
+        return cls(**drawn(seed))
+
+    def head(self, maps: Maps | None = None, layout: Layout = "own", subdivide: int = 1) -> Head:
+        """The person at rest, with expressions and bones to move by.
+
+        maps : those of the skin; one colour, of usual pigments, when left out
+        layout : "own" has most room for the face; "hm08" is the published one, which MakeHuman's skins fit
+        subdivide : levels of Catmull and Clark's subdivision, 0 to 3
+
+        Raises DermisError for targets that nobody knows.
+        """
+        return subdivide_head(human_head(self.weights(), maps, layout), subdivide)
+
+    @property
+    def positions_mm(self) -> NDArray[np.float32]:
+        """(p, 3) where the person's control points rest, from the middle between the eyes [mm].
+
+        Any head of the parametric human, which all have these points, is this person by
+        `Pose(positions_mm=...)`.
+
+        Raises DermisError for targets that nobody knows.
+        """
+        return control_mm(self.weights())
+
+    def weights(self) -> dict[str, float]:
+        """Weights of published targets by name, those of 0 left out."""
+        found = {**self._ancestry(), **self._build()}
+        for name, weight in self.targets.items():
+            found[name] = found.get(name, 0.0) + weight
+        return {name: weight for name, weight in found.items() if weight}
+
+    def _ancestry(self) -> dict[str, float]:
+        total = self.african + self.asian + self.caucasian
+        return {
+            f"macrodetails/{people}-{kind}": getattr(self, people) / total * share
+            for people in ("african", "asian", "caucasian")
+            for kind, share in self._kinds().items()
+        }
+
+    def _build(self) -> dict[str, float]:
+        """Of weight and muscle; the average of both needs no target."""
+        found = {}
+        for kind, share in self._kinds().items():
+            for muscle, much in _steps(self.muscle).items():
+                for weight, more in _steps(self.weight).items():
+                    if (muscle, weight) != ("average", "average"):
+                        name = f"macrodetails/universal-{kind}-{muscle}muscle-{weight}weight"
+                        found[name] = share * much * more
+        return found
+
+    def _kinds(self) -> dict[str, float]:
+        """Shares of the four published kinds of adults."""
+        old = (self.age - YOUNG) / (OLD - YOUNG)
+        return {
+            f"{sex}-{age}": share * part
+            for sex, share in (("female", 1.0 - self.sex), ("male", self.sex))
+            for age, part in (("young", 1.0 - old), ("old", old))
+        }
+
+
+def _steps(value: float) -> dict[str, float]:
+    """Shares of the least, the average and the most, for a value from -1 to 1."""
+    return {"min": max(-value, 0.0), "average": 1.0 - abs(value), "max": max(value, 0.0)}

@@ -1,0 +1,266 @@
+"""Makes src/dermis/human/data/human.npz: MakeHuman's parametric human as a bust with a layout of its own.
+
+python tools/human_data.py FOLDER, where FOLDER holds human.npz, bones.json and masks (CC0).
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from human_layout import human_layout
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, diags_array, eye_array, vstack
+
+Doubles = NDArray[np.float64]
+Index = NDArray[np.int64]
+Arrays = dict[str, NDArray[Any]]
+
+OUT = Path(__file__).parent.parent / "src" / "dermis" / "human" / "data" / "human.npz"
+MM = 100.0  # in a unit of the published positions
+DELTA_MM = 0.01  # in a unit of the published displacements
+MEAN = {
+    f"macrodetails/{people}-{sex}-young": 1 / 6
+    for people in ("african", "asian", "caucasian")
+    for sex in ("female", "male")
+}
+"""Weights of the targets of the person that edges, seams and densities are chosen on."""
+BONES = {  # what each stands for: bones of the file by the beginning of their names
+    "spine": ("spine", "breast"),
+    "clavicle.L": ("clavicle.L", "shoulder01.L", "upperarm01.L", "upperarm02.L", "lowerarm01.L"),
+    "clavicle.R": ("clavicle.R", "shoulder01.R", "upperarm01.R", "upperarm02.R", "lowerarm01.R"),
+    "neck01": ("neck01",),
+    "neck02": ("neck02",),
+    "neck03": ("neck03",),
+    "head": (),  # all others
+    "jaw": ("jaw", "tongue", "special04", "oris05", "oris07"),
+    "eye.L": ("eye.L",),
+    "eye.R": ("eye.R",),
+}
+INFLUENCES = 4
+CORNER_MM = 25.0  # radius, roughly, of the cut's corners
+RELAXING = 40  # rounds of smoothing along the edge of the cut: it crosses the folds of the armpits
+ACROSS = 4  # quads of the cap from front to back
+
+
+def main() -> None:
+    """Make the file."""
+    folder = Path(sys.argv[1])
+    with np.load(folder / "human.npz") as found:
+        data = {name: found[name] for name in found}
+    mean = MM * data["positions_dm"].astype(np.float64) + person(data, MEAN)
+    data = without(data, "eyelashes")
+    quads, kept, mix = cut(data, mean)
+    shape = capped(quads, data["quad_group"][kept].astype(np.int64), mix, mean)
+    published, uv = data["quads_uv"][kept].astype(np.int64), data["uv"].astype(np.float64)
+    own, corner = human_layout(shape.places(mean), shape.quads, published, uv, shape.group)
+    made = bust(data, shape) | {"uv": own.astype(np.float32), "quads_uv": corner.astype(np.uint16)}
+    made |= {"uv1": data["uv"], "quads_uv1": data["quads_uv"][kept]}
+    OUT.parent.mkdir(exist_ok=True)
+    np.savez_compressed(OUT, **cast(Any, made))
+    sys.stdout.write(f"{OUT}  {OUT.stat().st_size / 1e6:.2f} MB, {len(made['quads'])} quads\n")
+
+
+class Shape(NamedTuple):
+    """A mesh whose points are mixtures of published ones.
+
+    quads, group : (q, 4) and (q,), the last group is that of caps
+    mix : (n, p) sparse
+    """
+
+    quads: Index
+    group: Index
+    mix: Any
+
+    def places(self, published: Doubles) -> Doubles:
+        """(n, 3) where its points are, given the published ones [mm]."""
+        return np.asarray(self.mix @ published)
+
+
+def displacements(data: Arrays, index: int) -> tuple[Index, Doubles]:
+    """Points that a target moves, and by how much [mm]."""
+    part = slice(*data["target_offset"][index : index + 2])
+    return data["target_vertex"][part].astype(np.int64), DELTA_MM * data["target_delta_um10"][part]
+
+
+def person(data: Arrays, weights: dict[str, float]) -> Doubles:
+    """(p, 3) what targets add to the base [mm]."""
+    names, added = list(map(str, data["target_names"])), np.zeros(data["positions_dm"].shape)
+    for name, weight in weights.items():
+        point, delta = displacements(data, names.index(name))
+        added[point] += weight * delta
+    return added
+
+
+def beyond(places: Doubles) -> Doubles:
+    """How far places (n, 3) of the mean person lie outside of the bust (n,), negative inside [mm].
+
+    A sculptor's cut: level above the breasts, and rising outwards through the shoulders.
+    """
+    x, y = np.abs(places[:, 0]), places[:, 1]
+    below, beside = 385.0 - y, 0.93 * (x - 118.0) - 0.37 * (y - 385.0)
+    return np.asarray(CORNER_MM * np.logaddexp(below / CORNER_MM, beside / CORNER_MM))
+
+
+def without(data: Arrays, kind: str) -> Arrays:
+    """The same without the groups of a kind."""
+    names = list(map(str, data["group_names"]))
+    stays = [index for index, name in enumerate(names) if kind not in name]
+    kept = np.isin(data["quad_group"], stays)
+    group = np.searchsorted(stays, data["quad_group"][kept])
+    named = {"group_names": np.array([names[index] for index in stays]), "quad_group": group}
+    return data | named | {name: data[name][kept] for name in ("quads", "quads_uv")}
+
+
+def cut(data: Arrays, places: Doubles) -> tuple[Index, NDArray[np.bool_], Any]:
+    """Quads of the bust's points, which of the file's they are, and the points as mixtures of the file's.
+
+    Points beyond the edge come back onto it along the shortest way into the bust.
+    """
+    quads, group = data["quads"].astype(np.int64), data["quad_group"].astype(np.int64)
+    away = beyond(places)
+    inside = away <= 0
+    kept = inside[quads].any(axis=1) | (group > 0)
+    quads = quads[kept]
+    into, share, least = np.arange(len(places)), np.zeros(len(places)), np.full(len(places), np.inf)
+    for steps in (1, 2, 3):  # along sides; across quads for corners that have no side into the bust
+        pairs = np.stack([quads, np.roll(quads, -steps, axis=1)], axis=-1).reshape(-1, 2)
+        for outer, inner in pairs[inside[pairs[:, 1]] & ~inside[pairs[:, 0]]].tolist():
+            part = crossing(places[outer], places[inner])
+            way = part * np.linalg.norm(places[outer] - places[inner]) + (1e6 if steps == 2 else 0.0)
+            if way < least[outer]:
+                into[outer], share[outer], least[outer] = inner, part, way
+    used = np.unique(quads)
+    rows = np.arange(len(used))
+    values = np.concatenate([1 - share[used], share[used]])
+    columns = np.concatenate([used, into[used]])
+    mix = coo_array((values, (np.tile(rows, 2), columns)), shape=(len(used), len(places))).tocsr()
+    number = np.full(len(places), -1, np.int64)
+    number[used] = rows
+    return number[quads], kept, mix
+
+
+def crossing(outer: Doubles, inner: Doubles) -> float:
+    """Where on the way from one place to another the bust's edge is, from 0 to 1."""
+    low, high = 0.0, 1.0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        inside = beyond((outer + middle * (inner - outer))[None])[0] <= 0
+        low, high = (low, middle) if inside else (middle, high)
+    return high
+
+
+def capped(quads: Index, group: Index, mix: Any, places: Doubles) -> Shape:
+    """The bust closed where it was cut: a ribbon from its front to its back."""
+    loop = border(quads[group == 0])
+    where = mix[loop] @ places
+    top = int(np.argmax(np.where(where[:, 0] > 0, where[:, 1], -np.inf)))  # where front and back part
+    loop = np.roll(loop, -top)
+    mix, half = relaxed(mix, loop), len(loop) // 2
+    # points of its own: normals are not smooth around the edge
+    copies = np.arange(mix.shape[0], mix.shape[0] + len(loop))
+    mix, loop = vstack([mix, mix[loop]]).tocsr(), copies
+    front, back = loop[: half + 1], np.r_[loop[0], loop[: half - 1 : -1]]
+    columns, mixes, count = [front[1:-1]], [mix], mix.shape[0]
+    for k in range(1, ACROSS):
+        mixes.append((1 - k / ACROSS) * mix[front[1:-1]] + (k / ACROSS) * mix[back[1:-1]])
+        columns.append(count + np.arange(half - 1))
+        count += half - 1
+    columns.append(back[1:-1])
+    rows = np.stack(columns, axis=1)
+    tips = [[loop[0], *rows[0, k : k + 3][::-1]] for k in range(0, ACROSS, 2)]
+    tips += [[loop[half], *rows[-1, k : k + 3]] for k in range(0, ACROSS, 2)]
+    between = np.stack([rows[:-1, :-1], rows[1:, :-1], rows[1:, 1:], rows[:-1, 1:]], axis=-1).reshape(-1, 4)
+    caps = np.concatenate([np.array(tips), between[:, ::-1]])
+    group = np.concatenate([group, np.full(len(caps), group.max() + 1)])
+    return Shape(np.concatenate([quads, caps]), group, vstack(mixes).tocsr())
+
+
+def relaxed(mix: Any, loop: Index) -> Any:
+    """The mixture with the points of a loop drawn towards their neighbours there, which takes spikes away."""
+    n = len(loop)
+    around: Any = (0.5 * eye_array(n) + 0.25 * (eye_array(n, k=1) + eye_array(n, k=-1))).tolil()
+    around[0, n - 1] = around[n - 1, 0] = 0.25
+    rows = mix[loop]
+    for _ in range(RELAXING):
+        rows = around.tocsr() @ rows
+    held = np.ones(mix.shape[0])
+    held[loop] = 0.0
+    put = coo_array((np.ones(n), (loop, np.arange(n))), (mix.shape[0], n)).tocsr()
+    return (diags_array(held) @ mix + put @ rows).tocsr()
+
+
+def border(quads: Index) -> Index:
+    """The one loop of points that has the mesh on its left side as it runs."""
+    sides = np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2)
+    there = set(map(tuple, sides.tolist()))
+    after = {a: b for a, b in there if (b, a) not in there}
+    start, point = after.popitem()
+    loop = [start]
+    while point != start:
+        loop.append(point)
+        point = after.pop(point)
+    assert not after and len(loop) % 2 == 0, "one border, with a point opposite to each"
+    return np.array(loop)
+
+
+def bust(data: Arrays, shape: Shape) -> Arrays:
+    """The bust's arrays, all but its layout. Joints are points too, after those of the mesh."""
+    joints, published = data["joint_vertices"].astype(np.int64), len(data["positions_dm"])
+    rows = np.repeat(np.arange(len(joints)), joints.shape[1])
+    means = coo_array(
+        (np.full(joints.size, 1 / joints.shape[1]), (rows, joints.ravel())), (len(joints), published)
+    )
+    mix = vstack([shape.mix, means.tocsr()]).tocsr()
+    first, points, deltas = [0], list[Index](), list[Doubles]()
+    for index in range(len(data["target_names"])):
+        point, delta = displacements(data, index)
+        dense = np.zeros((published, 3))
+        dense[point] = delta
+        moved = np.rint((mix @ dense) / DELTA_MM)
+        which = np.flatnonzero(moved.any(axis=1))
+        points.append(which)
+        deltas.append(moved[which])
+        first.append(first[-1] + len(which))
+    bone, weight = influences(data, shape.mix)
+    places = mix @ (MM * data["positions_dm"].astype(np.float64))
+    return {
+        "positions_mm": places.astype(np.float32),
+        "quads": shape.quads.astype(np.uint16),
+        "group": shape.group.astype(np.uint8),
+        "group_names": np.append(data["group_names"], "cap"),
+        "target_names": data["target_names"],
+        "target_first": np.array(first, np.int32),
+        "target_point": np.concatenate(points).astype(np.uint16),
+        "target_delta": np.concatenate(deltas).astype(np.int16),
+        "bone_names": np.array(list(BONES)),
+        "bone": bone.astype(np.uint8),
+        "weight": np.rint(255 * weight).astype(np.uint8),
+        "joint_names": data["joint_names"],
+    }
+
+
+def influences(data: Arrays, mix: Any) -> tuple[Index, Doubles]:
+    """(n, 4) bones of BONES and their weights."""
+    standing = np.array([stands_for(str(name)) for name in data["bone_names"]])
+    table = np.zeros((len(data["positions_dm"]), len(BONES)))
+    np.add.at(table, (data["weight_vertex"].astype(int), standing[data["weight_bone"]]), data["weight"])
+    table = np.asarray(mix @ table)
+    order = np.argsort(-table, axis=1, kind="stable")[:, :INFLUENCES]
+    weight = np.take_along_axis(table, order, axis=1)
+    weight[weight.sum(axis=1) <= 0, 0] = 1.0
+    return order, weight / weight.sum(axis=1, keepdims=True)
+
+
+def stands_for(name: str) -> int:
+    """Number of the bone that moves what a published one does."""
+    for index, kinds in enumerate(BONES.values()):
+        if kinds and name.startswith(kinds):
+            return index
+    return list(BONES).index("head")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,151 @@
+"""The uv layout of the human bust: the published cuts, laid flat anew with most room for the face."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from dermis.atlas.unwrap.charts import tidy
+from dermis.atlas.unwrap.flatten import flatten
+from dermis.atlas.unwrap.pack import pack
+from dermis.atlas.unwrap.seams import border_sides
+from dermis.atlas.unwrap.stretch import singular_values
+from dermis.mesh.quads import halves
+
+Doubles = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+PADDING = 1 / 256
+_CROWN_Z, _CROWN_SLOPE, _EAR_Y = 15.0, 0.25, 715.0  # of the seam over the crown, on the mean person [mm]
+_LOOSE = 0.05  # weight of what fills holes while a sheet is laid flat
+FACE, SCALP, EARS, TRUNK, HIDDEN, PLAIN = 1.0, 0.35, 0.7, 0.26, 0.14, 0.06
+"""Texels per mm relative to the face: of the back of the head, ears, neck and chest, mouth and sockets, and
+what is no skin."""
+
+
+def human_layout(
+    places: Doubles, quads: Index, published: Index, uv: Doubles, group: Index
+) -> tuple[Doubles, Index]:
+    """uv (m, 2), v down, and the corners (q, 4) of the quads among these.
+
+    places : (n, 3) points of the mean person [mm]
+    quads : (q, 4) points, the caps last
+    published : (k, 4) corners of all but the caps in the published layout
+    uv : (v, 2) that layout, v up
+    group : (q,) what each quad belongs to, 0 is the skin
+    """
+    published, uv = _parted(places, quads[: len(published)], published, uv)
+    corner = np.concatenate([published, len(uv) + _strip(quads[len(published) :])])
+    flat = np.zeros((int(corner.max()) + 1, 2))
+    island = _islands(corner)
+    pieces = list[Index]()
+    for k in np.unique(island[corner[:, 0]]):
+        own = np.flatnonzero(island[corner[:, 0]] == k)
+        pieces.append(own)
+        points = np.unique(corner[own])
+        flat[points] = _laid(places, quads[own], corner[own], uv, int(group[own[0]]))[points]
+    outlines = [flat[border_sides(halves(corner[own]))[0]] for own in pieces]
+    scale, offset = pack(outlines, PADDING)
+    for own, move in zip(pieces, offset, strict=True):
+        points = np.unique(corner[own])
+        flat[points] = scale * flat[points] + move
+    used, again = np.unique(corner, return_inverse=True)
+    return flat[used] * [1, -1] + [0, 1], again.reshape(-1, 4)
+
+
+def _laid(places: Doubles, quads: Index, corner: Index, uv: Doubles, group: int) -> Doubles:
+    """Places (v, 2) of one island's corners in the plane, y up, in mm times density."""
+    made = np.zeros((int(corner.max()) + 1, 2))
+    used, local = np.unique(corner, return_inverse=True)
+    triangles = halves(local.reshape(-1, 4))
+    points = np.zeros((len(used), 3))
+    points[local.ravel()] = places[quads.ravel()]
+    middle = points[triangles].mean(axis=1)
+    if group or middle[:, 2].min() > 40.0:  # plain things; mouth and sockets
+        is_cap = used.max() >= len(uv)
+        flat = _unrolled(points) if is_cap else uv[used]
+        stretch = np.median(singular_values(points[triangles], flat[triangles] * [1, -1]).prod(axis=1))
+        made[used] = flat * (PLAIN if group else HIDDEN) / np.sqrt(abs(stretch))
+        return made
+    density = _head_density(middle) if middle[:, 1].max() > 800 else np.full(len(middle), TRUNK)
+    filled, more = _filled(triangles, points)
+    rest = len(filled) - len(triangles)
+    weight = np.r_[np.ones(len(triangles)), np.full(rest, _LOOSE)]
+    dense = np.r_[density, np.full(rest, float(np.max(density)))]
+    made[used] = _upright(flatten(more, filled, dense, weight)[: len(used)], points)
+    return made
+
+
+def _parted(places: Doubles, quads: Index, corner: Index, uv: Doubles) -> tuple[Index, Doubles]:
+    """The published corners with a seam over the crown and behind the ears, and uv with its far side."""
+    island, middle = _islands(corner)[corner[:, 0]], places[quads].mean(axis=1)
+    head = np.flatnonzero(island == island[middle[:, 1].argmax()])
+    behind = middle[head, 2] < _CROWN_Z + _CROWN_SLOPE * (middle[head, 1] - _EAR_Y)
+    behind = tidy(np.repeat(behind, 2).astype(np.int64), halves(quads[head]))[::2] > 0
+    far, made = head[behind], corner.copy()
+    used, again = np.unique(made[far], return_inverse=True)
+    made[far] = len(uv) + again.reshape(-1, 4)
+    return made, np.vstack([uv, uv[used]])
+
+
+def _head_density(middle: Doubles) -> Doubles:
+    """Texels per mm (f,) of triangles of the head at places (f, 3) [mm]."""
+    x, y, z = np.abs(middle[:, 0]), middle[:, 1], middle[:, 2]
+    front = _rise(z, -10, 100) * _rise(y, 850, 790) * _rise(y, 600, 650)
+    density = SCALP + (FACE - SCALP) * front
+    ear = _rise(np.hypot(x - 75, (y - 715) / 1.6) + 0.5 * np.abs(z - 42), 45, 20)
+    return np.asarray(np.maximum(density, EARS * ear))
+
+
+def _rise(x: Doubles, start: float, end: float) -> Doubles:
+    t = np.clip((x - start) / (end - start), 0, 1)
+    return np.asarray(t * t * (3 - 2 * t))
+
+
+def _filled(triangles: Index, points: Doubles) -> tuple[Index, Doubles]:
+    """The sheet with a fan in each hole, and its points with the middles of these."""
+    sides, _ = border_sides(triangles)
+    _, loop = connected_components(
+        coo_array((np.ones(len(sides)), sides.T), shape=(len(points),) * 2), directed=False
+    )
+    owner = loop[sides[:, 0]]
+    length = np.linalg.norm(points[sides[:, 0]] - points[sides[:, 1]], axis=1)
+    outer = np.bincount(owner, length).argmax()
+    for k in np.setdiff1d(np.unique(owner), outer):
+        around = sides[owner == k]
+        middle = len(points)
+        points = np.vstack([points, points[around[:, 0]].mean(axis=0)])
+        fan = np.column_stack([around[:, ::-1], np.full(len(around), middle)])
+        triangles = np.vstack([triangles, fan])
+    return triangles, points
+
+
+def _upright(flat: Doubles, points: Doubles) -> Doubles:
+    """Turned so that up in space is up."""
+    z = (flat - flat.mean(axis=0)) @ [1, 1j]
+    slope = (np.conj(z) * (points[:, 1] - points[:, 1].mean())).sum()
+    z = z * slope / abs(slope) * 1j
+    return np.column_stack([z.real, z.imag])
+
+
+def _unrolled(points: Doubles) -> Doubles:
+    """A ribbon's points by their depth, and by the way along it."""
+    order = np.argsort(np.arctan2(points[:, 0], points[:, 1].max() + 1 - points[:, 1]), kind="stable")
+    along = np.zeros(len(points))
+    along[order] = np.r_[0, np.cumsum(np.linalg.norm(np.diff(points[order][:, :2], axis=0), axis=1))]
+    return np.column_stack([along, points[:, 2]])
+
+
+def _strip(caps: Index) -> Index:
+    """Corners of the caps, numbered by their points."""
+    return np.unique(caps, return_inverse=True)[1].reshape(-1, 4) if len(caps) else caps
+
+
+def _islands(corner: Index) -> Index:
+    ends = np.concatenate([corner[:, [0, k]] for k in (1, 2, 3)])
+    n = int(corner.max()) + 1
+    return np.asarray(
+        connected_components(coo_array((np.ones(len(ends)), ends.T), shape=(n, n)), directed=False)[1]
+    )
