@@ -52,7 +52,7 @@ def view(
     Parameters
     ----------
     head:
-        The built-in bust, a sample, a mesh file, or a scene in TOML.
+        bust or human, heads of the package, a sample, a mesh file, or a scene in TOML.
     browser:
         Serve a web page instead of opening a window, for machines without a screen.
     port:

@@ -151,7 +151,7 @@ def save_state(path: Path, state: ViewerState) -> None:
 
 
 def named_state(name: str) -> ViewerState:
-    """The built-in bust, a sample or a mesh file in studio light, or the scene of a TOML file.
+    """A built-in head, a sample or a mesh file in studio light, or the scene of a TOML file.
 
     Raises DermisError for anything else.
     """

@@ -81,7 +81,7 @@ def notebook_viewer(
 ) -> Viewer:
     """A viewer for a notebook cell to display.
 
-    shown : a state, or what `dermis view` takes: the built-in bust, a sample, a mesh file, a TOML scene
+    shown : a state, or what `dermis view` takes: a built-in head, a sample, a mesh file, a TOML scene
     motion : a file that `load_motion` takes, empty for none
 
     Raises DermisError for anything else, and without the extra `notebook`.
