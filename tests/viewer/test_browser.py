@@ -122,20 +122,26 @@ def test_a_reloaded_page_shows_the_head_again(page: Any) -> None:
     still(page, shows_head)
 
 
-def test_a_second_page_watches_and_does_not_touch(page: Any, browser: Any, url: str) -> None:
+@pytest.fixture
+def watcher(browser: Any) -> Iterator[Any]:
+    """A second page, closed whatever happens: it would watch the other tests, or be in command of them."""
+    one = browser.new_page(viewport=SIZE)
+    yield one
+    one.close()
+
+
+def test_a_second_page_watches_and_does_not_touch(page: Any, watcher: Any, url: str) -> None:
     before = still(page, shows_head)
-    watcher = browser.new_page(viewport=SIZE)
     watcher.goto(url)
     watcher.wait_for_function(_GET_IMAGE, timeout=1000 * PATIENCE_S)
     assert "watching" in watcher.inner_text("#notice")
     drag(watcher, (320, 240), (230, 240))
     watcher.wait_for_timeout(700)
-    assert looks_like(before)(pixels(page))
+    still(page, looks_like(before))
     drag(page, (320, 240), (230, 240))
     still(watcher, differs_from(before))
     page.close()
     watcher.wait_for_function("() => document.querySelector('#notice').innerText === ''")
-    watcher.close()
 
 
 def test_one_finger_turns_the_head_and_two_come_nearer_and_pan(browser: Any, url: str) -> None:
@@ -184,16 +190,15 @@ def test_a_window_that_changes_its_size_is_filled(page: Any) -> None:
     page.wait_for_function(_GET_IMAGE, timeout=1000 * PATIENCE_S)
 
 
-def test_a_watcher_of_another_size_takes_over_with_its_own(page: Any, browser: Any, url: str) -> None:
+def test_a_watcher_of_another_size_takes_over_with_its_own(page: Any, watcher: Any, url: str) -> None:
     still(page, shows_head)
-    watcher = browser.new_page(viewport={"width": 520, "height": 320})
+    watcher.set_viewport_size({"width": 520, "height": 320})
     watcher.goto(url)
     watcher.wait_for_function(_GET_IMAGE, timeout=1000 * PATIENCE_S)
     page.close()
     watcher.wait_for_function(
         "() => document.querySelector('img').naturalWidth === 520", timeout=1000 * PATIENCE_S
     )
-    watcher.close()
 
 
 _RECORD_SOCKETS = """
