@@ -1,6 +1,6 @@
 """Makes src/dermis/human/data/human.npz: MakeHuman's parametric human as a bust with a layout of its own.
 
-python tools/human_data.py FOLDER, where FOLDER holds human.npz, bones.json and masks (CC0).
+python tools/human_data.py FOLDER, where FOLDER holds the published human.npz (CC0).
 """
 
 from __future__ import annotations
@@ -14,13 +14,15 @@ from human_layout import human_layout
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, diags_array, eye_array, vstack
 
+from dermis.human.model import DELTA_MM
+from dermis.mesh.rig import INFLUENCES
+
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
 Arrays = dict[str, NDArray[Any]]
 
 OUT = Path(__file__).parent.parent / "src" / "dermis" / "human" / "data" / "human.npz"
 MM = 100.0  # in a unit of the published positions
-DELTA_MM = 0.01  # in a unit of the published displacements
 MEAN = {
     f"macrodetails/{people}-{sex}-young": 1 / 6
     for people in ("african", "asian", "caucasian")
@@ -39,7 +41,6 @@ BONES = {  # what each stands for: bones of the file by the beginning of their n
     "eye.L": ("eye.L",),
     "eye.R": ("eye.R",),
 }
-INFLUENCES = 4
 CORNER_MM = 25.0  # radius, roughly, of the cut's corners
 RELAXING = 40  # rounds of smoothing along the edge of the cut: it crosses the folds of the armpits
 ACROSS = 4  # quads of the cap from front to back

@@ -12,6 +12,7 @@ from dermis.atlas.unwrap.flatten import flatten
 from dermis.atlas.unwrap.pack import pack
 from dermis.atlas.unwrap.seams import border_sides
 from dermis.atlas.unwrap.stretch import singular_values
+from dermis.human.bust.fields import rise
 from dermis.mesh.quads import halves
 
 Doubles = NDArray[np.float64]
@@ -93,15 +94,10 @@ def _parted(places: Doubles, quads: Index, corner: Index, uv: Doubles) -> tuple[
 def _head_density(middle: Doubles) -> Doubles:
     """Texels per mm (f,) of triangles of the head at places (f, 3) [mm]."""
     x, y, z = np.abs(middle[:, 0]), middle[:, 1], middle[:, 2]
-    front = _rise(z, -10, 100) * _rise(y, 850, 790) * _rise(y, 600, 650)
+    front = rise(z, -10, 100) * rise(y, 850, 790) * rise(y, 600, 650)
     density = SCALP + (FACE - SCALP) * front
-    ear = _rise(np.hypot(x - 75, (y - 715) / 1.6) + 0.5 * np.abs(z - 42), 45, 20)
+    ear = rise(np.hypot(x - 75, (y - 715) / 1.6) + 0.5 * np.abs(z - 42), 45, 20)
     return np.asarray(np.maximum(density, EARS * ear))
-
-
-def _rise(x: Doubles, start: float, end: float) -> Doubles:
-    t = np.clip((x - start) / (end - start), 0, 1)
-    return np.asarray(t * t * (3 - 2 * t))
 
 
 def _filled(triangles: Index, points: Doubles) -> tuple[Index, Doubles]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.frame.shape import spans_of
 from dermis.gpu import Device
 from dermis.mesh.geometry import edges
 from dermis.mesh.mesh import Mesh
@@ -44,11 +45,11 @@ def make_curvature(device: Device, mesh: Mesh) -> Curvature:
     both = np.concatenate([pairs, pairs[:, ::-1]])
     both = both[np.argsort(both[:, 0], kind="stable")]
     order = np.argsort(corners.ravel(), kind="stable")
-    spans = _spans(corners.ravel()[order], mesh.point), _spans(both[:, 0], mesh.point)
+    spans = spans_of(corners.ravel()[order], mesh.point), spans_of(both[:, 0], mesh.point)
     a_vertex = np.zeros(int(mesh.point.max()) + 1, np.uint32)
     a_vertex[mesh.point] = np.arange(count)
     tables = {
-        "around": np.concatenate(spans, axis=1).astype(np.uint32),
+        "around": np.concatenate(spans, axis=1),
         "triangles": (order // 3).astype(np.uint32),
         "neighbours": a_vertex[both[:, 1]],
     }
@@ -60,12 +61,6 @@ def make_curvature(device: Device, mesh: Mesh) -> Curvature:
 def no_curvature(device: Device) -> Any:
     """Placeholder for its buffer where nothing reads it."""
     return device.shared("no curvature", lambda: device.buffer(np.zeros(1, np.float32), "STORAGE"))
-
-
-def _spans(ordered: Index, wanted: NDArray[np.integer]) -> Index:
-    """(n, 2) where the runs of some numbers begin and end among sorted ones."""
-    ends = [np.searchsorted(ordered, wanted, side) for side in ("left", "right")]
-    return np.stack(ends, axis=1).astype(np.int64)
 
 
 def _steps(mesh: Mesh, pairs: Index, both: Index) -> int:

@@ -168,14 +168,19 @@ def _surface_tables(mesh: Mesh) -> dict[str, NDArray[Any]]:
     point, key = mesh.point[corner], mesh.point[corner] * np.int64(count) + corner
     order = np.argsort(key, kind="stable")
     vertex = mesh.point * np.int64(count) + np.arange(count)
-    spans = [np.searchsorted(point[order], mesh.point, side) for side in ("left", "right")]
-    spans += [np.searchsorted(key[order], vertex, side) for side in ("left", "right")]
+    spans = spans_of(point[order], mesh.point), spans_of(key[order], vertex)
     others = np.stack([np.roll(mesh.triangles, -k, axis=1).ravel()[order] for k in (1, 2)], axis=1)
     return {
         "vertices": table.view(np.uint32),
-        "spans": np.stack(spans, axis=1).astype(np.uint32),
+        "spans": np.concatenate(spans, axis=1),
         "corners": others.astype(np.uint32),
     }
+
+
+def spans_of(ordered: NDArray[np.integer], wanted: NDArray[np.integer]) -> Words:
+    """(n, 2) where the runs of some numbers begin and end among sorted ones."""
+    ends = [np.searchsorted(ordered, wanted, side) for side in ("left", "right")]
+    return np.stack(ends, axis=1).astype(np.uint32)
 
 
 def own_normals(mesh: Mesh) -> Doubles:

@@ -12,15 +12,13 @@ from numpy.typing import NDArray
 
 from dermis.errors import refuse
 from dermis.human.skin_maps.look import SkinLook
-from dermis.human.skin_maps.reflection import EPIDERMIS_MM
+from dermis.human.skin_maps.reflection import face_colours
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Material
 from dermis.mesh.quads import halves
 from dermis.mesh.rig import MorphTargets, Rig, Skeleton
-from dermis.optics.pigments.skin import SkinParameters
-from dermis.optics.skin_colours import colour_table
 
 Layout = Literal["own", "hm08"]
 Points = NDArray[np.float64]
@@ -28,9 +26,11 @@ Points = NDArray[np.float64]
 YOUNG, OLD = 25.0, 90.0
 """Ages of the published people [years]."""
 
+DELTA_MM = 0.01
+"""Of a unit of displacements, here as in the published files."""
+
 THANKS = "MakeHuman community, CC0"
 _PLAIN_SIDE = 4  # texels of a map of one colour
-_DELTA_MM = 0.01  # in a unit of displacements
 _EXPRESSIONS = "faceunits/"
 _EYE, _TOOTH, _TONGUE = (0.85, 0.83, 0.8), (0.7, 0.66, 0.56), (0.45, 0.16, 0.14)
 MATERIALS = {
@@ -74,7 +74,7 @@ def human_head(weights: Mapping[str, float], maps: Maps | None, layout: Layout) 
 
     weights : of published targets
     """
-    places, data, count = people_mm(weights), _data(), _count()
+    places, data, count = places_mm(weights), _data(), _count()
     uv, corner = _layout(layout)
     points = data["quads"][: len(corner)].astype(np.int64)  # the published layout has no cut
     pairs, vertex = np.unique(np.stack([points, corner], axis=-1).reshape(-1, 2), axis=0, return_inverse=True)
@@ -94,7 +94,7 @@ def human_head(weights: Mapping[str, float], maps: Maps | None, layout: Layout) 
     return Head("human", mesh, maps or _plain(), THANKS, rig)
 
 
-def people_mm(weights: Mapping[str, float]) -> Points:
+def places_mm(weights: Mapping[str, float]) -> Points:
     """(n, 3) the points of a person, then the joints, from the middle between the eyes [mm].
 
     weights : of published targets
@@ -117,7 +117,7 @@ def people_mm(weights: Mapping[str, float]) -> Points:
 
 def control_mm(weights: Mapping[str, float]) -> NDArray[np.float32]:
     """(p, 3) where the control points of a person lie, see `Human.positions_mm` [mm]."""
-    return people_mm(weights)[: _count()].astype(np.float32)
+    return places_mm(weights)[: _count()].astype(np.float32)
 
 
 def human_targets() -> tuple[str, ...]:
@@ -129,8 +129,8 @@ def human_targets() -> tuple[str, ...]:
 def _plain() -> Maps:
     """Skin of one colour, of usual pigments."""
     look = SkinLook()
-    skin = SkinParameters(eumelanin=look.eumelanin, oxygen=look.oxygen, epidermis_mm=EPIDERMIS_MM)
-    colour = colour_table(skin).read(np.array([look.melanin]), np.array([look.blood]))
+    table = face_colours(look.eumelanin, look.oxygen)
+    colour = table.read(np.array([look.melanin]), np.array([look.blood]))
     return Maps(colour=np.tile(colour.astype(np.float32), (_PLAIN_SIDE, _PLAIN_SIDE, 1)))
 
 
@@ -150,7 +150,7 @@ def _count() -> int:
 @cache
 def _moves() -> Moves:
     data = _data()
-    delta = _DELTA_MM * data["target_delta"].astype(np.float32)
+    delta = DELTA_MM * data["target_delta"].astype(np.float32)
     first, point = (data[name].astype(np.int64) for name in ("target_first", "target_point"))
     return Moves(tuple(map(str, data["target_names"])), first, point, delta)
 

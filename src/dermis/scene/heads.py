@@ -11,7 +11,6 @@ from typing import Any
 
 from dermis.errors import refuse
 from dermis.human.bust import BUSTS
-from dermis.human.person import Human
 from dermis.mesh.check import check_head_height
 from dermis.mesh.formats import is_gltf
 from dermis.mesh.gltf.pictures import embedded_maps
@@ -113,6 +112,8 @@ def _human(
 
     told : what is told of files alone
     """
+    from dermis.human.person import Human
+
     for option, usual in (("unit_mm", None), ("v_origin", "auto"), ("up", "y"), ("opaque", ())):
         if told[option] not in (usual, list(usual or ())):
             refuse(option, "a file that it tells of", f"it came with {HUMAN!r}", "Leave it out")

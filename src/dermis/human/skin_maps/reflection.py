@@ -58,9 +58,14 @@ def _hair_colour(look: SkinLook) -> Doubles:
 
 @lru_cache(maxsize=4)
 def _tables(eumelanin: float, oxygen: float) -> tuple[ColourTable, ColourTable]:
-    face = SkinParameters(eumelanin=eumelanin, oxygen=oxygen, epidermis_mm=EPIDERMIS_MM)
     lips = SkinParameters(eumelanin=eumelanin, oxygen=oxygen, epidermis_mm=LIP_EPIDERMIS_MM)
-    return colour_table(face), colour_table(lips)
+    return face_colours(eumelanin, oxygen), colour_table(lips)
+
+
+@lru_cache(maxsize=4)
+def face_colours(eumelanin: float, oxygen: float) -> ColourTable:
+    """Colour of the skin of the face by its shares of melanin and of blood."""
+    return colour_table(SkinParameters(eumelanin=eumelanin, oxygen=oxygen, epidermis_mm=EPIDERMIS_MM))
 
 
 def gloss(look: SkinLook, place: Doubles, mark: Doubles) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -12,12 +12,11 @@
 
 const PI: f32 = 3.14159265358979;
 
-// Whether a pair lets light pass that counts, by the widest Gaussian.
+// Whether a pair within reach lets light pass that counts, by the widest Gaussian.
 fn counts_ever(lie: Lie, area: f32) -> bool {
     let share = share_of(lie.cosine - TURN, lie.inward + TURN);
     let v = search.variance_mm2;
-    let passes = share * area * exp(-0.5 * lie.square / v) > LEAST * 2.0 * PI * v;
-    return passes && lie.square < search.radius_mm * search.radius_mm;
+    return share * area * exp(-0.5 * lie.square / v) > LEAST * 2.0 * PI * v;
 }
 
 @compute @workgroup_size(EACH)
