@@ -19,7 +19,7 @@ from dermis.frame.gutters import Walks, make_walks, with_lists
 from dermis.frame.inputs import Resources, view_record
 from dermis.frame.levels import Blur, Levels
 from dermis.frame.limits import check_limits
-from dermis.frame.maps import upload_maps
+from dermis.frame.maps import fine_detail, upload_maps
 from dermis.frame.passes import bloom, post, shade, shadows, surface_texels, visibility_buffer
 from dermis.frame.passes.moving_occlusion import Sky, make_map, make_sky
 from dermis.frame.passes.shape import still_shape
@@ -27,7 +27,7 @@ from dermis.frame.resting import resting
 from dermis.frame.shape import Shape, ShapeTables, make_shape, shape_tables
 from dermis.frame.techniques.technique import AtlasTechnique, Technique
 from dermis.frame.translucency import translucency_of
-from dermis.gpu import Device, Memo
+from dermis.gpu import Constants, Device, Memo
 from dermis.gpu.textures import texture_from
 from dermis.mesh.head import Head
 from dermis.specular.albedo import albedo_table
@@ -42,7 +42,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     """
     settings, keep, technique = asked.settings, memo.keep, asked.technique
     check_limits(device, technique, settings, asked.atlases, asked.count)
-    reading = device, asked.head, asked.white, settings.gamma == "right"
+    reading = device, asked.head, asked.white, settings.gamma == "right", asked.painted_side
     maps = memo.soon(device.executor, upload_maps, *reading)  # which take long to read
     shadow_maps = _shadows(memo, device, asked)
     tables = keep(shape_tables, device, asked.head)
@@ -52,7 +52,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     shared = _shared(memo, device, asked, shadow_maps, curvature)
     atlases = [_atlas(memo, device, asked, name, k) for k, name in enumerate(asked.atlases.layouts)]
     uploaded: dict[str, Any] = memo.wait(maps)
-    shared |= uploaded
+    shared |= uploaded | keep(fine_detail, device, asked.painted_side > 0)
     layouts = [_layout(memo, device, asked, one, shape, person, shared, k) for k, one in enumerate(atlases)]
     own, view = _shading(memo, device, asked)
     first, _ = atlases[0]
@@ -71,7 +71,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         own=own,
         visibility=keep(_visibility, device, settings.size, settings.samples),
         view=view,
-        constants=surface.constants(asked.skin) + technique.shade_constants,
+        constants=surface.constants(asked.skin) + _detail(asked) + technique.shade_constants,
         suns=len(asked.surroundings.suns),
         sky=_sky(memo, device, asked, layouts[0], tables) if asked.occlusion_moves else None,
         gaussians=len(asked.profile.variance_mm2),
@@ -79,6 +79,11 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         glow=keep(bloom.make_glow, device, settings.size) if settings.bloom else None,
         unscattered=keep(first.unscattered, asked.head.mesh),
     )
+
+
+def _detail(asked: Asked) -> Constants:
+    """Whether there is relief finer than maps."""
+    return (("DETAIL", 1),) if asked.painted_side else ()
 
 
 def _shading(memo: Memo, device: Device, asked: Asked) -> tuple[Any, Any]:

@@ -59,7 +59,7 @@ def skin_record(
 
 def _derived(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any]:
     """Members that no field or property of the model holds; a roughness map replaces the model's number."""
-    energy, mapped = ENERGY[skin.energy], maps.roughness is not None
+    energy, mapped = ENERGY[skin.energy], maps.rough
     return {
         "m": skin.smoothing * (1.0 if mapped else skin.roughness),
         "f0": SKIN_F0,

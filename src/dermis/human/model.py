@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
-from dermis.human.skin_maps.look import SkinLook
-from dermis.human.skin_maps.reflection import face_colours
+from dermis.human.skin.painted import PaintedMaps
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -30,7 +29,6 @@ DELTA_MM = 0.01
 """Of a unit of displacements, here as in the published files."""
 
 THANKS = "MakeHuman community, CC0"
-_PLAIN_SIDE = 4  # texels of a map of one colour
 _EXPRESSIONS = "faceunits/"
 _EYE, _TOOTH, _TONGUE = (0.85, 0.83, 0.8), (0.7, 0.66, 0.56), (0.45, 0.16, 0.14)
 MATERIALS = {
@@ -91,7 +89,7 @@ def human_head(weights: Mapping[str, float], maps: Maps | None, layout: Layout) 
         quads=np.arange(2 * len(faces)).reshape(-1, 2),
     )
     rig = Rig(places[:count].astype(np.float32), _expressions(count), _skeleton(places, count))
-    return Head("human", mesh, maps or _plain(), THANKS, rig)
+    return Head("human", mesh, maps or PaintedMaps(), THANKS, rig)
 
 
 def places_mm(weights: Mapping[str, float]) -> Points:
@@ -123,15 +121,6 @@ def control_mm(weights: Mapping[str, float]) -> NDArray[np.float32]:
 def human_targets() -> tuple[str, ...]:
     """Names of the published targets by which people differ, for `Human(targets=...)`."""
     return tuple(name for name in _moves().names if not name.startswith((_EXPRESSIONS, "expression/")))
-
-
-@cache
-def _plain() -> Maps:
-    """Skin of one colour, of usual pigments."""
-    look = SkinLook()
-    table = face_colours(look.eumelanin, look.oxygen)
-    colour = table.read(np.array([look.melanin]), np.array([look.blood]))
-    return Maps(colour=np.tile(colour.astype(np.float32), (_PLAIN_SIDE, _PLAIN_SIDE, 1)))
 
 
 @cache

@@ -1,0 +1,79 @@
+"""Colour, gloss and relief of a human's skin, painted by the device."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dermis.frame.passes import each, map_mips, program
+from dermis.gpu import Device, Frame, make_texture, upload
+from dermis.gpu.program import Resources
+from dermis.gpu.shader_types import struct_dtype
+from dermis.human.skin import face, textures
+from dermis.human.skin.colours import colour_tables
+from dermis.human.skin.look import SkinLook
+from dermis.human.skin.surface import Painting
+from dermis.scene.skin import Skin
+
+_TEXEL = 4  # floats of a vector, which the tables' size is a multiple of
+LEAST, MOST = 256, 4096
+"""Sides of the maps [texels]."""
+
+
+class PaintedTextures(NamedTuple):
+    """Textures with all their mips, as skin.wgsl of the frame reads them."""
+
+    colour: Any
+    specular: Any
+    roughness: Any
+    relief: Any
+
+
+def draw(device: Device, painting: Painting, look: SkinLook, side: int) -> PaintedTextures:
+    """Paint the maps.
+
+    side : of the maps [texels]
+    """
+    shader = program(device, "painting/skin.wgsl")
+    bound = {**_surface(device, painting, look, side), **_tables(device, look)}
+    made = [map_mips.empty(device, (side, side)) for _ in range(3)]
+    heights = device.buffer(np.zeros((side + 2) ** 2, np.float32), "STORAGE")
+    stored = zip(("colour", "specular", "roughness"), map(map_mips.finest, made), strict=True)
+    frame = Frame(device, timed=False)
+    owner = {name: bound[name] for name in ("paint", "vertices", "triangles", "owners")}
+    frame.dispatch("maps", program(device, "painting/owner.wgsl"), owner, each(painting.count))
+    frame.compute("maps", shader, bound | dict(stored) | {"heights": heights}, (side, side))
+    for texture in made:
+        map_mips.halve(frame, texture)
+    frame.submit()
+    relief = map_mips.relief_of(device, [heights], (side, side), side)
+    colour, specular, roughness = made
+    return PaintedTextures(colour, specular, roughness, relief)
+
+
+def _surface(device: Device, painting: Painting, look: SkinLook, side: int) -> Resources:
+    shader = program(device, "painting/skin.wgsl")
+    names = set(struct_dtype(shader.source.text, "Paint").names or ()) & set(vars(look))
+    numbers = {name: getattr(look, name) for name in names}
+    usual = Skin.model_fields["rho_s"].default
+    return {
+        "paint": shader.record("Paint", side=side, usual_strength=usual, **numbers),
+        "vertices": device.buffer(painting.vertices, "STORAGE"),
+        "triangles": device.buffer(painting.triangles, "STORAGE"),
+        "owners": device.buffer(np.zeros(side * side, np.uint32), "STORAGE"),
+    }
+
+
+def _tables(device: Device, look: SkinLook) -> Resources:
+    folds = face.folds()
+    tables = [textures.noise_table(), textures.dot_table(), face.zones(), folds.curves, folds.knots]
+    tables += [folds.first.astype(np.float32), face.hairline()]
+    data = np.concatenate([table.ravel() for table in tables])
+    padded = np.pad(data, (0, -len(data) % _TEXEL))
+    colours = colour_tables(look)
+    nodes = colours.shape[1]
+    texture = make_texture(device, (nodes, nodes), "rgba32float", layers=len(colours), use="map")
+    for layer, table in enumerate(colours):
+        upload(device, texture, np.dstack([table, np.ones((nodes, nodes, 1), np.float32)]), layer=layer)
+    return {"tables": device.buffer(padded, "STORAGE"), "colour_tables": texture}
