@@ -10,6 +10,7 @@ import numpy as np
 
 from dermis.errors import refuse
 from dermis.human.model import OLD, YOUNG, human_targets
+from dermis.human.skin.usual import Origin, drawn_look
 
 _MOST_SEED = 2**32 - 1
 _ALIKE = 0.35  # of the Dirichlet distribution of ancestries: most people have mostly one
@@ -46,16 +47,18 @@ def drawn(seed: int) -> dict[str, Any]:
     share = rng.beta(1.2, 2.2)
     weight = rng.normal(0.3 * share - 0.1, 0.25)
     muscle = rng.normal(0.2 * sex - 0.1 - 0.3 * share, 0.2)
-    return {
+    age = float(YOUNG + (OLD - YOUNG) * share)
+    found = {
         "african": float(african),
         "asian": float(asian),
         "caucasian": float(caucasian),
         "sex": float(sex),
-        "age": float(YOUNG + (OLD - YOUNG) * share),
+        "age": age,
         "weight": float(np.clip(weight, -0.7, 0.8)),
         "muscle": float(np.clip(muscle, -0.6, 0.6)),
         "targets": dict(_details(rng)),
     }
+    return found | {"skin": drawn_look(rng, Origin(african, asian, caucasian, sex, age))}
 
 
 def _details(rng: np.random.Generator) -> Iterator[tuple[str, float]]:

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
-from dermis.human.skin.painted import PaintedMaps
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -67,7 +66,7 @@ class Moves(NamedTuple):
     delta_mm: NDArray[np.float32]
 
 
-def human_head(weights: Mapping[str, float], maps: Maps | None, layout: Layout) -> Head:
+def human_head(weights: Mapping[str, float], maps: Maps, layout: Layout) -> Head:
     """The head of a person, see `Human.head`.
 
     weights : of published targets
@@ -89,7 +88,7 @@ def human_head(weights: Mapping[str, float], maps: Maps | None, layout: Layout) 
         quads=np.arange(2 * len(faces)).reshape(-1, 2),
     )
     rig = Rig(places[:count].astype(np.float32), _expressions(count), _skeleton(places, count))
-    return Head("human", mesh, maps or PaintedMaps(), THANKS, rig)
+    return Head("human", mesh, maps, THANKS, rig)
 
 
 def places_mm(weights: Mapping[str, float]) -> Points:

@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from dermis.errors import refuse
 from dermis.human.drawing import drawn
 from dermis.human.model import OLD, YOUNG, Layout, control_mm, human_head
+from dermis.human.skin.look import SkinLook
+from dermis.human.skin.painted import PaintedMaps
+from dermis.human.skin.usual import Origin, usual_look
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.subdivide import subdivide_head
@@ -39,6 +42,7 @@ class Human:
     age : 25 to 90 [years]
     weight, muscle : from -1, least, to 1, most; 0 is the average [-]
     targets : weights of published targets, such as {"nose/nose-hump-incr": 0.5}; mostly 0 to 1
+    skin : what it looks like; what usually goes with the person when left out
 
     Raises DermisError for values out of range; names of targets are checked when the head is made.
     """
@@ -51,6 +55,7 @@ class Human:
     weight: float = 0.0
     muscle: float = 0.0
     targets: Mapping[str, float] = field(default_factory=lambda: _NONE)
+    skin: SkinLook | None = None
 
     def __post_init__(self) -> None:
         for one in fields(self):
@@ -79,13 +84,24 @@ class Human:
     def head(self, maps: Maps | None = None, layout: Layout = "own", subdivide: int = 1) -> Head:
         """The person at rest, with expressions and bones to move by.
 
-        maps : those of the skin; one colour, of usual pigments, when left out
+        maps : those of the skin; painted as `look` says when left out
         layout : "own" has most room for the face; "hm08" is the published one, which MakeHuman's skins fit
         subdivide : levels of Catmull and Clark's subdivision, 0 to 3
 
         Raises DermisError for targets that nobody knows.
         """
-        return subdivide_head(human_head(self.weights(), maps, layout), subdivide)
+        return subdivide_head(
+            human_head(self.weights(), maps or PaintedMaps(look=self.look), layout), subdivide
+        )
+
+    @property
+    def look(self) -> SkinLook:
+        """The person's skin: its own, or what usually goes with such a person."""
+        if self.skin is not None:
+            return self.skin
+        total = self.african + self.asian + self.caucasian
+        shares = self.african / total, self.asian / total, self.caucasian / total
+        return usual_look(Origin(*shares, self.sex, self.age))
 
     @property
     def positions_mm(self) -> NDArray[np.float32]:
