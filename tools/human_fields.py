@@ -17,8 +17,8 @@ from scipy.sparse import csr_array, vstack
 from scipy.sparse.linalg import lsqr
 from scipy.spatial import cKDTree
 
-from dermis.human.model import DELTA_MM
 from dermis.human.person import Human
+from dermis.human.published import DELTA_MM
 from dermis.human.skin.surface import FIELDS
 from dermis.mesh.mesh import Mesh
 

@@ -41,6 +41,7 @@ from dermis.scene.camera import Camera
 from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
+_EYE_SEEDS = 1000  # that look different
 _MOST_MATERIALS = 64
 _PARTS = {"all": (1.0, 1.0), "diffuse": (1.0, 0.0), "specular": (0.0, 1.0)}  # from below, off the surface
 
@@ -172,7 +173,7 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Sp
         refuse(head.name, f"at most {_MOST_MATERIALS} materials", count, "Join some groups")
     for index, material in enumerate(materials):
         colours[index, :3] = material.colour
-    return shade.record(
+    record = shade.record(
         "Shade",
         samples=settings.samples,
         relit=split.relit,
@@ -182,13 +183,24 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Sp
         material_colour=colours,
         jitter=jitter,
     )
+    if head.eyes is not None:
+        for name in ("eumelanin", "pupil_mm", "redness"):
+            record["eyes"][name] = getattr(head.eyes.look, name)
+        record["eyes"]["seed"] = head.eyes.look.seed % _EYE_SEEDS
+        record["eyes"]["material"] = head.eyes.material
+    return record
 
 
-def seen_by(view: Any, pinhole: Pinhole) -> Any:
-    """A shading pass' record with the rays of a camera."""
+def seen_by(view: Any, pinhole: Pinhole, eyes: NDArray[np.float64] | None) -> Any:
+    """A shading pass' record with the rays of a camera.
+
+    eyes : (2, 4, 4) from the head's space to that of each eye of true shape, if it has such
+    """
     eye, (right, up, forward), half = pinhole
     # Its bytes: numpy's own copy takes the members one by one, and has anything between them.
     record: Any = np.ndarray((), view.dtype, bytearray(view.tobytes()))
     record["eye"], record["forward"] = eye, forward
     record["right"], record["up"] = tuple(half[0] * c for c in right), tuple(half[1] * c for c in up)
+    if eyes is not None:
+        record["eyes"]["to_own"] = eyes.transpose(0, 2, 1)  # by columns
     return record

@@ -71,7 +71,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         own=own,
         visibility=keep(_visibility, device, settings.size, settings.samples),
         view=view,
-        constants=surface.constants(asked.skin) + _detail(asked) + technique.shade_constants,
+        constants=surface.constants(asked.skin) + _details(asked) + technique.shade_constants,
         suns=len(asked.surroundings.suns),
         sky=_sky(memo, device, asked, layouts[0], tables) if asked.occlusion_moves else None,
         gaussians=len(asked.profile.variance_mm2),
@@ -81,9 +81,10 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     )
 
 
-def _detail(asked: Asked) -> Constants:
-    """Whether there is relief finer than maps."""
-    return (("DETAIL", 1),) if asked.painted_side else ()
+def _details(asked: Asked) -> Constants:
+    """Whether there is relief finer than maps, and eyes of true shape."""
+    found = {"DETAIL": asked.painted_side > 0, "EYES": asked.head.eyes is not None}
+    return tuple((name, 1) for name, there in found.items() if there)
 
 
 def _shading(memo: Memo, device: Device, asked: Asked) -> tuple[Any, Any]:

@@ -9,6 +9,7 @@ import numpy as np
 from dermis.gpu import ComputeProgram
 from dermis.gpu.shader_types import struct_dtype
 from dermis.gpu.wgsl_source import Member
+from dermis.mesh.eyes import CORNEA_MM, LIMBUS_MM, SCLERA_MM, cornea_centre_mm, iris_mm
 from dermis.mesh.maps import Maps
 from dermis.optics.directions import directions
 from dermis.optics.gaussians import GaussianSum
@@ -37,6 +38,17 @@ def surface_numbers() -> dict[str, float]:
     """Numbers that lobe.wgsl and the models' shaders fill in."""
     of_models = {name: number for model in MODELS.values() for name, number in model.numbers.items()}
     return {"root_of_first_row": ROOT_OF_FIRST_ROW, **of_models}
+
+
+def eye_numbers() -> dict[str, float]:
+    """Numbers that eye.wgsl fills in."""
+    return {
+        "sclera_mm": SCLERA_MM,
+        "cornea_mm": CORNEA_MM,
+        "cornea_at": cornea_centre_mm(),
+        "limbus_mm": LIMBUS_MM,
+        "iris_at": iris_mm(),
+    }
 
 
 def constants(skin: Skin) -> tuple[tuple[str, int], ...]:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from dermis.errors import refuse
-from dermis.human.model import OLD, YOUNG, human_targets
-from dermis.human.skin.usual import Origin, drawn_look
+from dermis.human.published import OLD, YOUNG, human_targets
+from dermis.human.skin.usual import Origin, drawn_eyes, drawn_look
 
 _MOST_SEED = 2**32 - 1
 _ALIKE = 0.35  # of the Dirichlet distribution of ancestries: most people have mostly one
@@ -58,7 +58,8 @@ def drawn(seed: int) -> dict[str, Any]:
         "muscle": float(np.clip(muscle, -0.6, 0.6)),
         "targets": dict(_details(rng)),
     }
-    return found | {"skin": drawn_look(rng, Origin(african, asian, caucasian, sex, age))}
+    origin = Origin(african, asian, caucasian, sex, age)
+    return found | {"skin": drawn_look(rng, origin), "eyes": drawn_eyes(rng, origin)}
 
 
 def _details(rng: np.random.Generator) -> Iterator[tuple[str, float]]:

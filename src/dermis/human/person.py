@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from dermis.errors import refuse
 from dermis.human.drawing import drawn
-from dermis.human.model import OLD, YOUNG, Layout, control_mm, human_head
+from dermis.human.model import Layout, control_mm, human_head
+from dermis.human.published import OLD, YOUNG
 from dermis.human.skin.look import SkinLook
 from dermis.human.skin.painted import PaintedMaps
-from dermis.human.skin.usual import Origin, usual_look
+from dermis.human.skin.usual import Origin, usual_eyes, usual_look
+from dermis.mesh.eyes import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.subdivide import subdivide_head
@@ -42,7 +44,7 @@ class Human:
     age : 25 to 90 [years]
     weight, muscle : from -1, least, to 1, most; 0 is the average [-]
     targets : weights of published targets, such as {"nose/nose-hump-incr": 0.5}; mostly 0 to 1
-    skin : what it looks like; what usually goes with the person when left out
+    skin, eyes : what they look like; what usually goes with the person when left out
 
     Raises DermisError for values out of range; names of targets are checked when the head is made.
     """
@@ -56,6 +58,7 @@ class Human:
     muscle: float = 0.0
     targets: Mapping[str, float] = field(default_factory=lambda: _NONE)
     skin: SkinLook | None = None
+    eyes: EyeLook | None = None
 
     def __post_init__(self) -> None:
         for one in fields(self):
@@ -90,18 +93,24 @@ class Human:
 
         Raises DermisError for targets that nobody knows.
         """
-        return subdivide_head(
-            human_head(self.weights(), maps or PaintedMaps(look=self.look), layout), subdivide
-        )
+        painted = maps or PaintedMaps(look=self.look)
+        return subdivide_head(human_head(self.weights(), painted, layout, self.iris), subdivide)
 
     @property
     def look(self) -> SkinLook:
         """The person's skin: its own, or what usually goes with such a person."""
-        if self.skin is not None:
-            return self.skin
+        return usual_look(self._origin) if self.skin is None else self.skin
+
+    @property
+    def iris(self) -> EyeLook:
+        """The person's eyes: its own, or what usually goes with such a person."""
+        return usual_eyes(self._origin) if self.eyes is None else self.eyes
+
+    @property
+    def _origin(self) -> Origin:
         total = self.african + self.asian + self.caucasian
         shares = self.african / total, self.asian / total, self.caucasian / total
-        return usual_look(Origin(*shares, self.sex, self.age))
+        return Origin(*shares, self.sex, self.age)
 
     @property
     def positions_mm(self) -> NDArray[np.float32]:

@@ -56,7 +56,11 @@ def painting(mesh: Mesh, stencils: Stencils | None) -> Painting:
     stencils : which its points are refined by, if they are
     """
     places, fields = average()
-    control = np.hstack([places, fields]).astype(np.float64)
+    both = np.hstack([places, fields]).astype(np.float64)
+    others = np.zeros(
+        (int(mesh.point.max() if stencils is None else stencils.point.max()) + 1, both.shape[1])
+    )
+    control = np.concatenate([both, others[len(both) :]])  # of eyeballs, which are not painted
     points = control if stencils is None else stencils.points(control)
     found = points[mesh.point].astype(np.float32)
     kinds = np.array([material.kind == "skin" for material in mesh.materials])

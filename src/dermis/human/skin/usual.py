@@ -8,11 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from dermis.human.skin.look import SkinLook
+from dermis.mesh.eyes import EyeLook
 
 # Artist's values; that melanin differs so much between peoples, and how it is spread, is common knowledge.
 _MELANIN = {"african": 0.19, "asian": 0.024, "caucasian": 0.010}
 _EUMELANIN = {"african": 0.85, "asian": 0.7, "caucasian": 0.65}
 _FRECKLES = {"african": 0.02, "asian": 0.06, "caucasian": 0.16}
+_IRIS = {"african": 0.95, "asian": 0.85, "caucasian": 0.4}
 _SPREAD = 0.42  # standard deviation of the melanin's logarithm within a people
 _YOUNG, _OLD = 25.0, 90.0
 _SPOTS_FROM = 45.0
@@ -55,6 +57,20 @@ def usual_look(origin: Origin) -> SkinLook:
         oil=0.45 - 0.25 * old,
         age=0.04 + (_MOST_LINED - 0.04) * old**1.3,
     )
+
+
+def usual_eyes(origin: Origin) -> EyeLook:
+    """The eyes that go with a person: brown, lighter the more of the ancestry is European."""
+    return EyeLook(eumelanin=origin.mean(_IRIS), redness=0.15 + 0.2 * (origin.age - _YOUNG) / (_OLD - _YOUNG))
+
+
+def drawn_eyes(rng: np.random.Generator, origin: Origin) -> EyeLook:
+    """Eyes at random around the usual ones: among Europeans of all colours."""
+    usual = usual_eyes(origin)
+    spread = 0.08 + 0.28 * origin.caucasian
+    eumelanin = _within(usual.eumelanin + spread * rng.normal(), 0.0, 1.0)
+    pupil, seed = float(rng.uniform(1.4, 2.6)), int(rng.integers(2**31))
+    return EyeLook(eumelanin, pupil, _within(usual.redness + 0.1 * rng.normal(), 0.0, 1.0), seed)
 
 
 def drawn_look(rng: np.random.Generator, origin: Origin) -> SkinLook:
