@@ -13,7 +13,7 @@ from dermis.images.io import Picture
 from dermis.mesh.gltf.document import Document, read_document
 
 _READABLE = {"image/png", "image/jpeg"}
-ROLES = ("height", "specular", "roughness", "region")
+ROLES = ("normal", "height", "specular", "roughness", "region")
 
 
 def embedded_maps(path: Path) -> dict[str, Any]:
