@@ -27,6 +27,7 @@ class Binary:
     data: bytearray = field(default_factory=bytearray)
     views: list[dict[str, Any]] = field(default_factory=list)
     accessors: list[dict[str, Any]] = field(default_factory=list)
+    _still: dict[int, int] = field(default_factory=dict)
 
     def view(self, part: bytes, target: int | None = None) -> int:
         """The number of a new view of these bytes."""
@@ -49,16 +50,14 @@ class Binary:
         """An accessor of corners (f, 3) among so many vertices."""
         return self.array(index.reshape(-1, 1).astype(_whole(count)), INDICES)
 
-    def zeros(self, count: int) -> int:
-        """An accessor of so many rows of three zeros, which takes no room."""
-        return self._accessor(np.zeros((count, 3), "<f4"), {"min": [0.0] * 3, "max": [0.0] * 3})
-
     def displacements(self, row: NDArray[Any], columns: list[NDArray[Any]], count: int) -> list[int]:
         """Accessors of `count` rows of three of which most are 0, whichever form is the smaller.
 
         row : (m,) those that are not, in order
         columns : each (m, 3) their values
         """
+        if not len(row):
+            return [self._zeros(count)] * len(columns)
         index = row.astype(_whole(count))
         if len(row) * (12 + index.itemsize) >= 12 * count:
             return [self._dense(row, values, count) for values in columns]
@@ -73,6 +72,13 @@ class Binary:
             more = {"sparse": sparse, "min": low.tolist(), "max": high.tolist()}
             found.append(self._accessor(np.broadcast_to(np.zeros(1, "<f4"), (count, 3)), more))
         return found
+
+    def _zeros(self, count: int) -> int:
+        """One accessor for all of so many zeros; it takes no room."""
+        if count not in self._still:
+            none = np.broadcast_to(np.zeros(1, "<f4"), (count, 3))
+            self._still[count] = self._accessor(none, {"min": [0.0] * 3, "max": [0.0] * 3})
+        return self._still[count]
 
     def _dense(self, row: NDArray[Any], values: NDArray[Any], count: int) -> int:
         whole = np.zeros((count, 3), "<f4")

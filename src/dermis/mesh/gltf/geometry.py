@@ -15,6 +15,7 @@ from dermis.mesh.gltf.document import Document, Tree, read_document
 from dermis.mesh.gltf.nodes import Nodes, read_nodes
 from dermis.mesh.gltf.skins import Armature, Followed, read_armature, read_followed
 from dermis.mesh.gltf.targets import Displaced, displaced, read_targets, resting_weights
+from dermis.mesh.quads import find_pairs
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_mesh_quantization")
@@ -93,7 +94,8 @@ class _Reader:
         if moved is not positions:
             normals = None  # they belong to another shape
         triangles = self._triangles(primitive, len(positions))
-        return Part(self._group(mesh, primitive), moved, uv, normals, triangles), targets
+        group, quads = self._group(mesh, primitive), _quads(primitive, triangles)
+        return Part(group, moved, uv, normals, triangles, quads=quads), targets
 
     def _triangles(self, primitive: Tree, count: int) -> Index:
         """(f, 3) the corners of a primitive's triangles."""
@@ -115,6 +117,14 @@ class _Reader:
         names = tuple(str(thing["name"]) for thing in (material, mesh) if thing.get("name"))
         factor = material.get("pbrMetallicRoughness", {}).get("baseColorFactor")
         return Group(names, colour_of(factor) if factor else GREY)
+
+
+def _quads(primitive: Tree, triangles: Index) -> Index:
+    """(q, 2) triangles that are halves of quads, in a file of this package that says so."""
+    extras = primitive.get("extras")
+    own = extras.get("dermis") if isinstance(extras, dict) else None
+    told = isinstance(own, dict) and own.get("quads") is True
+    return find_pairs(np.full(len(triangles) // 2 if told else 0, 4), triangles)
 
 
 def _placed(part: Part, targets: dict[str, Displaced], matrix: Array) -> Part:

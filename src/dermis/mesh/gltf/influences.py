@@ -49,7 +49,7 @@ def _shares(skeleton: Skeleton) -> Doubles:
     count = len(skeleton.bone)
     shares = np.zeros((count, len(skeleton.names)))
     np.add.at(shares, (np.arange(count)[:, None], skeleton.bone), skeleton.weight)
-    return shares / shares.sum(axis=1, keepdims=True)
+    return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 
 
 def _fitted(places_mm: Doubles, skeleton: Skeleton, control: Doubles, finer: csr_array) -> Doubles:

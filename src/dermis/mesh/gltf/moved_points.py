@@ -1,4 +1,4 @@
-"""What moves the points of a mesh that is written: targets and bones of control points, carried to a finer mesh."""
+"""What moves a mesh that is written: targets and bones of its control points, carried to finer ones."""
 
 from __future__ import annotations
 

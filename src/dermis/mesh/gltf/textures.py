@@ -39,8 +39,9 @@ def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, b
         grey = np.rint((maps.height.astype(np.float64) - low) / span * 65535).astype(np.uint16)
         found["height"], roles["height_mm"] = encode_png16(_enlarged(grey[..., None])), span / 255
     if maps.roughness is not None:
-        rough = np.sqrt(np.clip(maps.roughness, 0.0, 1.0))
-        found["metallic roughness"] = encode_png8(_enlarged(_bytes(np.stack([rough * 0, rough, rough * 0], -1))))
+        perceptual = np.zeros((*maps.roughness.shape, 3), np.float32)
+        perceptual[..., 1] = np.sqrt(np.clip(maps.roughness, 0.0, 1.0))
+        found["metallic roughness"] = encode_png8(_enlarged(_bytes(perceptual)))
     for role in ("specular", "roughness"):
         if (grey_map := getattr(maps, role)) is not None:
             found[role] = encode_png8(_enlarged(_bytes(grey_map)[..., None]))

@@ -78,28 +78,24 @@ def _mesh(
     head: Head, points: MovedPoints, binary: Binary, used: NDArray[Any], weights: Mapping[str, float]
 ) -> Tree:
     """A primitive for each material, each with the vertices that it uses."""
-    corners = [head.mesh.triangles[head.mesh.material == kind] for kind in used]
-    vertices = [np.unique(triangles) for triangles in corners]
-    primitives = [
-        {
-            "attributes": _attributes(head, points, binary, own),
-            "indices": binary.triangles(np.searchsorted(own, triangles), len(own)),
-            "material": number,
-        }
-        for number, (own, triangles) in enumerate(zip(vertices, corners, strict=True))
-    ]
+    faces = [np.flatnonzero(head.mesh.material == kind) for kind in used]
+    vertices = [np.unique(head.mesh.triangles[those]) for those in faces]
+    primitives: list[Tree] = []
+    for number, (own, those) in enumerate(zip(vertices, faces, strict=True)):
+        index = binary.triangles(np.searchsorted(own, head.mesh.triangles[those]), len(own))
+        attributes = _attributes(head, points, binary, own)
+        primitives.append({"attributes": attributes, "indices": index, "material": number})
+        if _halves_of_quads(head, those):
+            primitives[-1]["extras"] = {"dermis": {"quads": True}}
     mesh: Tree = {"name": _name(head), "primitives": primitives}
-    names = points.rig.targets.names
+    names, rest = points.rig.targets.names, points.rig.targets.rest
     if not names:
         return mesh
-    still = [binary.zeros(len(own)) for own in vertices]
     for target in points.targets():
-        for primitive, own, none in zip(primitives, vertices, still, strict=True):
-            primitive.setdefault("targets", []).append(_target(binary, target, own, none))
-    rest = points.rig.targets.rest
-    own_rest = {} if rest is None else dict(zip(names, rest.tolist(), strict=True))
-    resting = {**own_rest, **weights}
-    told = [float(resting.get(name, 0.0)) for name in names]
+        for primitive, own in zip(primitives, vertices, strict=True):
+            primitive.setdefault("targets", []).append(_target(binary, target, own))
+    resting = {} if rest is None else dict(zip(names, rest.tolist(), strict=True))
+    told = [float({**resting, **weights}.get(name, 0.0)) for name in names]
     return mesh | {"weights": told, "extras": {"targetNames": list(names)}}
 
 
@@ -117,11 +113,16 @@ def _attributes(head: Head, points: MovedPoints, binary: Binary, own: NDArray[An
     return found
 
 
-def _target(binary: Binary, target: Target, own: NDArray[Any], none: int) -> dict[str, int]:
-    """Accessors of what a target does to some vertices; `none` is one of zeros."""
+def _halves_of_quads(head: Head, faces: NDArray[Any]) -> bool:
+    """Whether of some triangles each two are the halves of a quad."""
+    other = np.full(len(head.mesh.triangles), -1)
+    other[head.mesh.quads[:, 0]] = head.mesh.quads[:, 1]
+    return len(faces) % 2 == 0 and bool((other[faces[::2]] == faces[1::2]).all())
+
+
+def _target(binary: Binary, target: Target, own: NDArray[Any]) -> dict[str, int]:
+    """Accessors of what a target does to some vertices."""
     here = np.flatnonzero(np.isin(target.vertex, own, assume_unique=True))
-    if not len(here):
-        return {"POSITION": none, "NORMAL": none}
     row = np.searchsorted(own, target.vertex[here])
     columns = [_metres(target.delta_mm[here]), target.normal[here]]
     return dict(zip(("POSITION", "NORMAL"), binary.displacements(row, columns, len(own)), strict=True))
