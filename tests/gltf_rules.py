@@ -159,7 +159,7 @@ def _check_views(document: Document) -> None:
 
 def _check_use(document: Document) -> None:
     """Nothing is left over."""
-    tree = document.tree
+    tree = {key: value for key, value in document.tree.items() if key != "asset"}
     used = {number for kind, number in _references(tree) if kind == "accessor"}
     assert used == set(range(len(tree["accessors"])))
     views = {number for kind, number in _references(tree) if kind == "bufferView"}

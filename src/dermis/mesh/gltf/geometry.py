@@ -94,8 +94,19 @@ class _Reader:
         if moved is not positions:
             normals = None  # they belong to another shape
         triangles = self._triangles(primitive, len(positions))
-        group, quads = self._group(mesh, primitive), _quads(primitive, triangles)
-        return Part(group, moved, uv, normals, triangles, quads=quads), targets
+        extras = primitive.get("extras")
+        told = extras.get("dermis") if isinstance(extras, dict) else None
+        own = told if isinstance(told, dict) else {}
+        sides = np.full(len(triangles) // 2 if own.get("quads") is True else 0, 4)
+        return Part(
+            self._group(mesh, primitive),
+            moved,
+            uv,
+            normals,
+            triangles,
+            quads=find_pairs(sides, triangles),
+            alone=own.get("alone") is True,
+        ), targets
 
     def _triangles(self, primitive: Tree, count: int) -> Index:
         """(f, 3) the corners of a primitive's triangles."""
@@ -117,14 +128,6 @@ class _Reader:
         names = tuple(str(thing["name"]) for thing in (material, mesh) if thing.get("name"))
         factor = material.get("pbrMetallicRoughness", {}).get("baseColorFactor")
         return Group(names, colour_of(factor) if factor else GREY)
-
-
-def _quads(primitive: Tree, triangles: Index) -> Index:
-    """(q, 2) triangles that are halves of quads, in a file of this package that says so."""
-    extras = primitive.get("extras")
-    own = extras.get("dermis") if isinstance(extras, dict) else None
-    told = isinstance(own, dict) and own.get("quads") is True
-    return find_pairs(np.full(len(triangles) // 2 if told else 0, 4), triangles)
 
 
 def _placed(part: Part, targets: dict[str, Displaced], matrix: Array) -> Part:

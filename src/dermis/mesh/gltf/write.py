@@ -85,8 +85,9 @@ def _mesh(
         index = binary.triangles(np.searchsorted(own, head.mesh.triangles[those]), len(own))
         attributes = _attributes(head, points, binary, own)
         primitives.append({"attributes": attributes, "indices": index, "material": number})
-        if _halves_of_quads(head, those):
-            primitives[-1]["extras"] = {"dermis": {"quads": True}}
+        kept = {"quads": _halves_of_quads(head, those), "alone": _alone(head, those)}
+        if any(kept.values()):
+            primitives[-1]["extras"] = {"dermis": {key: True for key, value in kept.items() if value}}
     mesh: Tree = {"name": _name(head), "primitives": primitives}
     names, rest = points.rig.targets.names, points.rig.targets.rest
     if not names:
@@ -118,6 +119,13 @@ def _halves_of_quads(head: Head, faces: NDArray[Any]) -> bool:
     other = np.full(len(head.mesh.triangles), -1)
     other[head.mesh.quads[:, 0]] = head.mesh.quads[:, 1]
     return len(faces) % 2 == 0 and bool((other[faces[::2]] == faces[1::2]).all())
+
+
+def _alone(head: Head, faces: NDArray[Any]) -> bool:
+    """Whether no other triangles have points of these."""
+    others = np.delete(np.arange(len(head.mesh.triangles)), faces)
+    own, foreign = (head.mesh.point[head.mesh.triangles[part]] for part in (faces, others))
+    return len(others) > 0 and len(np.intersect1d(own, foreign)) == 0
 
 
 def _target(binary: Binary, target: Target, own: NDArray[Any]) -> dict[str, int]:
