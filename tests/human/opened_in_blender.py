@@ -60,7 +60,7 @@ def render(path: Path) -> None:
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     scene.collection.objects.link(camera)
     camera.location, camera.rotation_euler = (0.0, -1.0, 0.0), (math.pi / 2, 0.0, 0.0)
-    scene.camera = camera
+    scene.camera, camera.data.lens = camera, 85.0
     scene.world = bpy.data.worlds.new("world")
     scene.world.use_nodes = True
     scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
