@@ -16,7 +16,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 
 PERSON = Human.drawn(7)
-SAME_MM = 0.02
+SAME_MM = 0.02  # no eye sees it; displacements below a thousandth are left out
 EXPRESSIONS = (Pose({"jawOpen": 1.0}), Pose({"mouthSmileLeft": 1.0, "eyeBlinkRight": 0.5}))
 TURNS = (Pose(bones={"head": (0, 25, 0)}), Pose({"jawOpen": 0.5}, {"head": (15, 0, 10), "eye.L": (0, 20, 0)}))
 FACE_MM = -60.0  # points above it, from the eyes, follow the head alone or the jaw and the eyes

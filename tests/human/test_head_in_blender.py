@@ -25,7 +25,7 @@ MOVES = {
     "turned": Pose(bones={"head": (0, 25, 0)}),
 }
 """As the script makes them."""
-SAME_MM = 0.02
+SAME_MM = 0.02  # as for this package's own reading
 
 pytestmark = pytest.mark.skipif(not os.environ.get(PYTHON_VARIABLE), reason=f"{PYTHON_VARIABLE} is not set")
 

@@ -14,6 +14,7 @@ from rigged_head import write_rigged_head
 from dermis.human.person import Human
 from dermis.images.colour import decode_srgb_levels
 from dermis.images.io import Picture, read_image
+from dermis.mesh.geometry import vertex_normals
 from dermis.mesh.gltf.influences import influences
 from dermis.mesh.gltf.moved_points import MovedPoints
 from dermis.mesh.gltf.write import encode_head
@@ -31,7 +32,7 @@ POSES = (
     Pose(bones={"head": (10, 25, 0)}),
     Pose({"mouthSmileLeft": 1.0}, {"neck": (0, 0, 15)}),
 )
-SAME_MM = 1e-3
+SAME_MM = 1e-3  # metres in single precision, and displacements that are left out
 
 
 @pytest.fixture(scope="module")
@@ -119,6 +120,17 @@ def test_a_finer_mesh_moves_with_its_targets(rigged: Head, tmp_path: Path) -> No
     for pose in POSES[:2]:
         assert np.abs(posed_mm(back, pose) - posed_mm(fine, pose)).max() < 0.01
     assert np.abs(posed_mm(back, POSES[2]) - posed_mm(fine, POSES[2])).max() < 1.0
+
+
+def test_normals_turn_with_targets(rigged: Head, tmp_path: Path) -> None:
+    document = check_rules(written(rigged, tmp_path / "face.glb"))
+    (primitive,) = document.tree["meshes"][0]["primitives"]
+    target = primitive["targets"][rigged.targets.index("jawOpen")]
+    normals = document.real(primitive["attributes"]["NORMAL"]) + document.real(target["NORMAL"])
+    moved = posed_mm(rigged, Pose({"jawOpen": 1.0})).astype(np.float32)
+    meant = vertex_normals(moved, rigged.mesh.point, rigged.mesh.triangles)
+    assert np.abs(normals - meant).max() < 0.003
+    assert np.abs(document.real(target["NORMAL"])).max() > 0.2
 
 
 def test_four_bones_are_those_that_miss_least() -> None:

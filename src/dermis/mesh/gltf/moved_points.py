@@ -88,10 +88,26 @@ class MovedPoints:
             delta = self._carried(self._control_mm(number))
             delta[np.abs(delta).max(axis=1) < _LEAST_MM] = 0.0
             moved = delta[mesh.point].astype(np.float32)
-            turned = vertex_normals(self.positions_mm + moved, mesh.point, mesh.triangles) - self._smooth
-            turned[np.abs(turned).max(axis=1) < _LEAST_TURN] = 0.0
+            turned = self._turned(moved)
             vertex = np.flatnonzero(moved.any(axis=1) | turned.any(axis=1))
             yield Target(vertex, moved[vertex], turned[vertex])
+
+    def _turned(self, moved: Floats) -> Floats:
+        """(v, 3) what displacements [mm] add to the normals, by the triangles around them."""
+        mesh, found = self.head.mesh, np.zeros_like(moved)
+        moves = np.asarray(moved.any(axis=1))
+        changed = moves[mesh.triangles].any(axis=1)
+        touched = np.zeros(int(mesh.point.max()) + 1, bool)
+        touched[mesh.point[mesh.triangles[changed]]] = True
+        around = mesh.triangles[touched[mesh.point[mesh.triangles]].any(axis=1)]
+        if not len(around):
+            return found
+        vertex, corner = np.unique(around, return_inverse=True)
+        point = np.unique(mesh.point[vertex], return_inverse=True)[1].astype(np.int32)
+        places, triangles = self.positions_mm[vertex] + moved[vertex], corner.reshape(-1, 3).astype(np.int32)
+        found[vertex] = vertex_normals(places, point, triangles) - self._smooth[vertex]
+        found[~touched[mesh.point] | (np.abs(found).max(axis=1) < _LEAST_TURN)] = 0.0
+        return found
 
     @cached_property
     def bones(self) -> tuple[NDArray[Any], Floats]:
