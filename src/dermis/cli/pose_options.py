@@ -36,7 +36,7 @@ Turns = Annotated[
 ]
 
 
-def parse_weights(words: Sequence[str]) -> dict[str, float]:
+def parse_weights(words: Sequence[str], option: str = POSE) -> dict[str, float]:
     """Weights by name of "jawOpen=0.6,mouthSmileLeft=1"."""
     weights = {}
     for word in (part for text in words for part in text.split(",")):
@@ -44,7 +44,7 @@ def parse_weights(words: Sequence[str]) -> dict[str, float]:
         weight = _numbers(number)
         if not sign or not name.strip() or weight is None or len(weight) != 1:
             expected = "NAME=WEIGHT with commas between, such as jawOpen=0.6,mouthSmileLeft=1"
-            refuse(POSE, expected, f"{word!r} came", "Correct it")
+            refuse(option, expected, f"{word!r} came", "Correct it")
         weights[name.strip()] = weight[0]
     return weights
 

@@ -46,7 +46,7 @@ def places_mm(weights: Mapping[str, float]) -> Points:
     for name, weight in weights.items():
         if name not in known:
             close = [one for one in known if name.split("/")[-1] in one][:3]
-            hint = f"Did you mean {' or '.join(close)}?" if close else "See `dermis.human_targets()`"
+            hint = f"Did you mean {' or '.join(close)}?" if close else "List: dermis head --list-targets"
             refuse(f"target {name!r}", "a published target", "there is none of this name", hint)
         part = slice(*moved.first[known[name] : known[name] + 2])
         places[moved.point[part]] += weight * moved.delta_mm[part]

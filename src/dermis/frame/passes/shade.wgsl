@@ -75,19 +75,6 @@ fn shaded_plain(surface: Surface, lit: Lit, out: f32) -> Shaded {
     return Shaded(vec3f(0.0), vec3f(0.0), shade.shown.x * below + shade.shown.y * lit.reflected, 0.0);
 }
 
-// Barycentric weights of where a ray from the eye meets a triangle's plane are linear in the ray, up to scale.
-fn ray_to_weights(a: vec3f, b: vec3f, c: vec3f) -> mat3x3f {
-    let ea = a - shade.eye;
-    let eb = b - shade.eye;
-    let ec = c - shade.eye;
-    return transpose(mat3x3f(cross(eb, ec), cross(ec, ea), cross(ea, eb)));
-}
-
-fn meet(weights: mat3x3f, ray: vec3f) -> vec3f {
-    let w = weights * ray;
-    return w / (w.x + w.y + w.z);
-}
-
 fn ray_through(place: vec2f, size: vec2f) -> vec3f {
     let ndc = vec2f(2.0, -2.0) * place / size + vec2f(-1.0, 1.0);
     return shade.forward + ndc.x * shade.right + ndc.y * shade.up;
@@ -99,7 +86,7 @@ fn shaded(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Shaded {
     let a = corner_at(t.x);
     let b = corner_at(t.y);
     let c = corner_at(t.z);
-    let weights = ray_to_weights(a.position, b.position, c.position);
+    let weights = ray_to_weights(a.position - shade.eye, b.position - shade.eye, c.position - shade.eye);
     let w = meet(weights, ray_through(place, size));
     // A sample on an edge may lie a little outside: stay on the triangle.
     let clamped = max(w, vec3f(0.0));

@@ -76,7 +76,8 @@ def _density(uv: Floats, places: Floats, triangles: NDArray[np.int32]) -> NDArra
     """(v,) binary logarithm of the mm in a unit of uv around each vertex."""
     areas = triangle_areas(places[triangles].astype(np.float64))
     a, b, c = (uv[triangles[:, k]].astype(np.float64) for k in range(3))
-    flat = np.abs(np.cross(b - a, c - a)) / 2
+    ab, ac = b - a, c - a
+    flat = np.abs(ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]) / 2
     sums = [np.bincount(triangles.ravel(), np.repeat(each, 3), minlength=len(uv)) for each in (areas, flat)]
     return np.asarray(0.5 * np.log2(np.maximum(sums[0], 1e-9) / np.maximum(sums[1], 1e-12)))
 

@@ -10,10 +10,12 @@ from dermis.frame.passes import each, map_mips, program
 from dermis.gpu import Device, Frame, make_texture, upload
 from dermis.gpu.program import Resources
 from dermis.gpu.shader_types import struct_dtype
+from dermis.gpu.textures import download
 from dermis.human.skin import face, textures
 from dermis.human.skin.colours import colour_tables
 from dermis.human.skin.look import SkinLook
 from dermis.human.skin.surface import Painting
+from dermis.mesh.maps import Maps
 from dermis.scene.skin import Skin
 
 _TEXEL = 4  # floats of a vector, which the tables' size is a multiple of
@@ -35,6 +37,34 @@ def draw(device: Device, painting: Painting, look: SkinLook, side: int) -> Paint
 
     side : of the maps [texels]
     """
+    (colour, specular, roughness), heights = _paint(device, painting, look, side)
+    frame = Frame(device, timed=False)
+    for texture in (colour, specular, roughness):
+        map_mips.halve(frame, texture)
+    frame.submit()
+    relief = map_mips.relief_of(device, [heights], (side, side), side)
+    return PaintedTextures(colour, specular, roughness, relief)
+
+
+def painted_maps(device: Device, painting: Painting, look: SkinLook, side: int) -> Maps:
+    """The same as arrays, for what reads no textures; without the detail that is finer than maps.
+
+    Heights run out beside the charts, where nothing is drawn.
+    """
+    textures, heights = _paint(device, painting, look, side)
+    colour, specular, roughness = (download(device, one).astype(np.float32) for one in textures)
+    raw = np.frombuffer(device.handle.queue.read_buffer(heights), np.float32)
+    rho_s = _usual_strength() * specular[..., 0]
+    return Maps(
+        colour=np.ascontiguousarray(colour[..., :3]),
+        height=np.ascontiguousarray(raw.reshape(side + 2, side + 2)[1:-1, 1:-1]),
+        specular=np.clip(rho_s, 0.0, 1.0),
+        roughness=np.ascontiguousarray(roughness[..., 0]),
+    )
+
+
+def _paint(device: Device, painting: Painting, look: SkinLook, side: int) -> tuple[list[Any], Any]:
+    """Colour, specular and roughness without mips, and a buffer of heights."""
     shader = program(device, "painting/skin.wgsl")
     bound = {**_surface(device, painting, look, side), **_tables(device, look)}
     made = [map_mips.empty(device, (side, side)) for _ in range(3)]
@@ -44,21 +74,21 @@ def draw(device: Device, painting: Painting, look: SkinLook, side: int) -> Paint
     owner = {name: bound[name] for name in ("paint", "vertices", "triangles", "owners")}
     frame.dispatch("maps", program(device, "painting/owner.wgsl"), owner, each(painting.count))
     frame.compute("maps", shader, bound | dict(stored) | {"heights": heights}, (side, side))
-    for texture in made:
-        map_mips.halve(frame, texture)
     frame.submit()
-    relief = map_mips.relief_of(device, [heights], (side, side), side)
-    colour, specular, roughness = made
-    return PaintedTextures(colour, specular, roughness, relief)
+    return made, heights
+
+
+def _usual_strength() -> float:
+    """rho_s that a factor of 1 stands for."""
+    return float(Skin.model_fields["rho_s"].default)
 
 
 def _surface(device: Device, painting: Painting, look: SkinLook, side: int) -> Resources:
     shader = program(device, "painting/skin.wgsl")
     names = set(struct_dtype(shader.source.text, "Paint").names or ()) & set(vars(look))
     numbers = {name: getattr(look, name) for name in names}
-    usual = Skin.model_fields["rho_s"].default
     return {
-        "paint": shader.record("Paint", side=side, usual_strength=usual, **numbers),
+        "paint": shader.record("Paint", side=side, usual_strength=_usual_strength(), **numbers),
         "vertices": device.buffer(painting.vertices, "STORAGE"),
         "triangles": device.buffer(painting.triangles, "STORAGE"),
         "owners": device.buffer(np.zeros(side * side, np.uint32), "STORAGE"),
