@@ -82,6 +82,11 @@ class Asked:
         return min(max(side, paint.LEAST), paint.MOST)
 
     @property
+    def moving(self) -> bool:
+        """Whether expressions change the maps."""
+        return self.posed and self.painted_side > 0 and bool(self.head.targets)
+
+    @property
     def count(self) -> int:
         """Gaussians that light is blurred by over the atlas."""
         return len(self.split.blurred_mm2)

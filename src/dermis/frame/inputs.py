@@ -16,6 +16,7 @@ from dermis.frame.geometry import HeadResources
 from dermis.frame.levels import Blur, Levels
 from dermis.frame.passes.bloom import Glow
 from dermis.frame.passes.moving_occlusion import Sky
+from dermis.frame.passes.painting.expression import Face
 from dermis.frame.passes.post import Picture
 from dermis.frame.passes.shadows import ShadowMaps
 from dermis.frame.passes.shape import MotionBytes
@@ -52,6 +53,7 @@ class Resources:
 
     shape : the head's, which the motion of each frame moves
     person : the shape of another person at rest, None for the head's own
+    face : the painted maps as far as expressions change them, None where nothing does
     layouts : atlases that light is spread on; the first is the one that is looked at
     scatters : whether light spreads over them
     blurs : how, on each, where light is as bright as it was given
@@ -68,6 +70,7 @@ class Resources:
 
     shape: Shape
     person: Shape | None
+    face: Face | None
     head: HeadResources
     layouts: tuple[AtlasLayout, ...]
     shadow_maps: ShadowMaps
@@ -93,6 +96,7 @@ class Inputs:
     """Everything that a frame reads.
 
     motion : what moves the head's shape
+    movements : what changes the painted face, None where nothing does
     layouts, blurs : those of the resources in the light of now
     shadow_views : how the shadow maps see the head
     light_constants : pipeline constants of what is lit
@@ -105,6 +109,7 @@ class Inputs:
     resources: Resources
     settings: Settings
     motion: MotionBytes
+    movements: NDArray[np.float32] | None
     layouts: tuple[AtlasLayout, ...]
     blurs: tuple[Blur, ...]
     shadow_views: Views

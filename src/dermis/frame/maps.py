@@ -28,17 +28,20 @@ _MEAN_TEXELS = 512  # a side of the grid that a map's mean is taken on
 
 
 def upload_maps(
-    device: Device, head: Head, use_colour: bool, decoded: bool = True, side: int = 0
+    device: Device, head: Head, use_colour: bool, decoded: bool = True, side: int = 0, moving: bool = False
 ) -> dict[str, Any]:
     """The head's maps by their names in skin.wgsl, with a sampler and the lobe's table.
 
     use_colour : False leaves the colour map white, for profiles that carry the colour
     decoded : False takes the colour map's sRGB for linear, which is wrong
     side : of maps that are painted [texels]
+    moving : whether expressions change them; with what does, a `Face`, under "face"
     """
     maps = head.maps
     if isinstance(maps, PaintedMaps):
-        return _of_files(device, head, use_colour, decoded) | _painted(device, head, maps, use_colour, side)
+        return _of_files(device, head, use_colour, decoded) | _painted(
+            device, head, maps, use_colour, (side, moving)
+        )
     return _of_files(device, head, use_colour, decoded)
 
 
@@ -50,14 +53,17 @@ def fine_detail(device: Device, fine: bool) -> dict[str, Any]:
     return {"detail_map": map_mips.detail(device, slopes), "detail_sampler": sampler}
 
 
-def _painted(device: Device, head: Head, maps: PaintedMaps, use_colour: bool, side: int) -> dict[str, Any]:
+def _painted(
+    device: Device, head: Head, maps: PaintedMaps, use_colour: bool, how: tuple[int, bool]
+) -> dict[str, Any]:
     """Maps that no file gives, painted."""
     surface = painting(head.mesh, head.control.stencils)
-    found = paint.draw(device, surface, maps.look, side)._asdict()
+    found = paint.draw(device, surface, maps.look, *how)._asdict()
+    face = found.pop("face")
     given = {"relief": maps.height if maps.normal is None else maps.normal, "colour": maps.colour}
     given |= {"specular": maps.specular, "roughness": maps.roughness}
     kept = [role for role in found if given[role] is None and (use_colour or role != "colour")]
-    return {f"{role}_map": found[role] for role in kept}
+    return {f"{role}_map": found[role] for role in kept} | {"face": face}
 
 
 def _of_files(device: Device, head: Head, use_colour: bool, decoded: bool) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from dermis.gpu.wgsl_source import Member
 from dermis.human.skin.detail import TILE_MM
 from dermis.human.skin.face import AMOUNTS, DEGREES, folds, hairline, zones
+from dermis.human.skin.movements import FOLDING
 from dermis.human.skin.textures import DOTS, NOISES, noise_table
 
 _NAMES = {
@@ -36,6 +37,7 @@ def painting_numbers() -> dict[str, float]:
     return {
         "degrees": float(DEGREES),
         "tile_mm": TILE_MM,
+        "folding": FOLDING,
         **names,
         **{name: len(table) for name, table in rows.items()},
     }

@@ -23,6 +23,7 @@ from dermis.frame.sky import Anchors, Look, anchors_of, look_around, turn_of
 from dermis.frame.surroundings import brightest, load_surroundings, with_suns
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Device, Memo
+from dermis.human.skin.movements import movements
 from dermis.mesh.head import Head
 from dermis.mesh.outline import Outline
 from dermis.mesh.rig import Motion
@@ -82,6 +83,7 @@ class Preparation:
             resources=resources,
             settings=settings,
             motion=moved.motion,
+            movements=keep(_movements, head, scene.motion) if resources.face else None,
             layouts=tuple(under(layout, record) for layout in resources.layouts),
             blurs=keep(_scaled, resources.blurs, scale),
             shadow_views=layers,
@@ -108,6 +110,11 @@ def _person(scene: Scene) -> Any:
     """Where the control points rest, if not where the head's own do."""
     motion, own = scene.motion, scene.head.positions_mm
     return None if motion is None or motion.positions_mm is own else motion.positions_mm
+
+
+def _movements(head: Head, motion: Motion | None) -> NDArray[np.float32]:
+    assert motion is not None
+    return movements(head.targets, motion.weights)
 
 
 def _resting(head: Head) -> Moved:

@@ -42,7 +42,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     """
     settings, keep, technique = asked.settings, memo.keep, asked.technique
     check_limits(device, technique, settings, asked.atlases, asked.count)
-    reading = device, asked.head, asked.white, settings.gamma == "right", asked.painted_side
+    reading = device, asked.head, asked.white, settings.gamma == "right", asked.painted_side, asked.moving
     maps = memo.soon(device.executor, upload_maps, *reading)  # which take long to read
     shadow_maps = _shadows(memo, device, asked)
     tables = keep(shape_tables, device, asked.head)
@@ -52,6 +52,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     shared = _shared(memo, device, asked, shadow_maps, curvature)
     atlases = [_atlas(memo, device, asked, name, k) for k, name in enumerate(asked.atlases.layouts)]
     uploaded: dict[str, Any] = memo.wait(maps)
+    face = uploaded.get("face")
     shared |= uploaded | keep(fine_detail, device, asked.painted_side > 0)
     layouts = [_layout(memo, device, asked, one, shape, person, shared, k) for k, one in enumerate(atlases)]
     own, view = _shading(memo, device, asked)
@@ -60,6 +61,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     return Resources(
         shape=shape,
         person=person,
+        face=face,
         head=layouts[0].head,
         layouts=tuple(layouts),
         shadow_maps=shadow_maps,

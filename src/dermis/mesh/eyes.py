@@ -15,8 +15,8 @@ Doubles = NDArray[np.float64]
 SCLERA_MM, CORNEA_MM, LIMBUS_MM = 14.2, 7.8, 5.85
 """Radii of the ball, of the cornea's front, and of the circle where they meet [mm].
 
-Cornea and iris are those of an adult. A ball is 12 mm in truth; here it has the curve that the published lids are
-shaped for, so that none of them stands off it."""
+Cornea and iris are those of an adult. A ball is 12 mm in truth; here it has the curve that the published lids
+are shaped for, so that none of them stands off it."""
 IRIS_BEHIND_MM = 3.0
 """Depth of the plane of the iris behind the cornea's apex [mm]."""
 PUPIL_MM = 1.0, 4.0

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.human.skin.movements import MOVEMENTS
 from dermis.tables import numbers, read_rows
 
 Floats = NDArray[np.float32]
@@ -21,8 +22,6 @@ AMOUNTS = (
 DEGREES = 2
 """Angle between the heights of `hairline`."""
 _PIECES = 4
-MOVEMENTS = ("raised brows", "frown", "sneer", "squint", "smile", "sad mouth", "raised chin")
-"""Movements that deepen folds, see folds.csv."""
 
 
 @cache

@@ -2,6 +2,8 @@
 //#include "spot.wgsl"
 
 // Artist's values.
+const MOVED: f32 = 0.7; // depth that a full movement adds, over that of an old face
+const MOVED_OLD: f32 = 0.4;
 const GRAIN_MM: f32 = 0.040;
 const LINE_MM: f32 = 0.07;
 const LIP_MM: f32 = 0.16;
@@ -15,6 +17,8 @@ fn groove(n: f32, sharpness: f32, texel_mm: f32, blob_mm: f32) -> f32 {
     let side = max(1.0 - abs(n) * finest, 0.0);
     return side * side * finest / sharpness * visible(blob_mm, texel_mm);
 }
+
+var<private> deepened: array<f32, FOLDING>; // height that each full movement adds [mm]
 
 fn relief(spot: Spot, lip: f32) -> f32 {
     let texel = spot.texel_mm;
@@ -30,9 +34,12 @@ fn relief(spot: Spot, lip: f32) -> f32 {
     return height + MOLE_MM * smoothstep(0.1, 0.6, dotted[DOT_MOLES]) + folded(spot);
 }
 
-// Furrows along the face's own lines, with the skin a little raised beside them.
+// Furrows along the face's own lines, with the skin a little raised beside them; and what movements add to them.
 fn folded(spot: Spot) -> f32 {
     var height = 0.0;
+    for (var k = 0u; k < FOLDING; k++) {
+        deepened[k] = 0.0;
+    }
     let bend = vec3f(
         0.7 * noise[NOISE_FOLD_BEND_X] + 0.3 * noise[NOISE_FINE_FOLD_BEND],
         0.7 * noise[NOISE_FOLD_BEND_Y] - 0.3 * noise[NOISE_FINE_FOLD_BEND],
@@ -48,8 +55,11 @@ fn folded(spot: Spot) -> f32 {
             let square = near.x / (width * width);
             let shape = (0.35 * exp(-square / 7.0) - exp(-square)) * (1.0 - smoothstep(0.6 * 36.0, 36.0, square));
             let ends = 1.0 - pow(2.0 * near.y - 1.0, 4.0);
-            let depth = mix(fold.size.y, fold.size.z, paint.age) * own / width * max(0.8 + 0.6 * noise[NOISE_LINE_DEPTH], 0.0);
-            height += depth * ends * shape;
+            let part = ends * shape * own / width * max(0.8 + 0.6 * noise[NOISE_LINE_DEPTH], 0.0);
+            height += mix(fold.size.y, fold.size.z, paint.age) * part;
+            if (fold.size.w > 0.0) {
+                deepened[u32(fold.size.w) - 1u] += (MOVED + MOVED_OLD * paint.age) * fold.size.z * part;
+            }
         }
     }
     return height;

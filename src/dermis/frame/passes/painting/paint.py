@@ -6,7 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dermis.frame.levels import HALVES
 from dermis.frame.passes import each, map_mips, program
+from dermis.frame.passes.painting.expression import Face, make_face
 from dermis.gpu import Device, Frame, make_texture, upload
 from dermis.gpu.program import Resources
 from dermis.gpu.shader_types import struct_dtype
@@ -30,20 +32,30 @@ class PaintedTextures(NamedTuple):
     specular: Any
     roughness: Any
     relief: Any
+    face: Face | None
 
 
-def draw(device: Device, painting: Painting, look: SkinLook, side: int) -> PaintedTextures:
+def draw(
+    device: Device, painting: Painting, look: SkinLook, side: int, moving: bool = False
+) -> PaintedTextures:
     """Paint the maps.
 
     side : of the maps [texels]
+    moving : whether expressions change colour and relief: `expression.draw` fills these in then
     """
-    (colour, specular, roughness), heights = _paint(device, painting, look, side)
+    (resting, specular, roughness), heights, moved = _paint(device, painting, look, side)
+    colour = map_mips.empty(device, (side, side)) if moving else resting
     frame = Frame(device, timed=False)
-    for texture in (colour, specular, roughness):
-        map_mips.halve(frame, texture)
+    for one in (specular, roughness) if moving else (colour, specular, roughness):
+        map_mips.halve(frame, one)
     frame.submit()
-    relief = map_mips.relief_of(device, [heights], (side, side), side)
-    return PaintedTextures(colour, specular, roughness, relief)
+    gloss = specular.texture, roughness.texture
+    if not moving:
+        relief = map_mips.relief_of(device, [heights], (side, side), side)
+        return PaintedTextures(colour.texture, *gloss, relief, None)
+    raised = map_mips.empty(device, (side, side))
+    face = make_face(device, resting.texture, heights, moved, (colour, raised))
+    return PaintedTextures(colour.texture, *gloss, raised.texture, face)
 
 
 def painted_maps(device: Device, painting: Painting, look: SkinLook, side: int) -> Maps:
@@ -51,8 +63,8 @@ def painted_maps(device: Device, painting: Painting, look: SkinLook, side: int) 
 
     Heights run out beside the charts, where nothing is drawn.
     """
-    textures, heights = _paint(device, painting, look, side)
-    colour, specular, roughness = (download(device, one).astype(np.float32) for one in textures)
+    textures, heights, _ = _paint(device, painting, look, side)
+    colour, specular, roughness = (download(device, one.texture).astype(np.float32) for one in textures)
     raw = np.frombuffer(device.handle.queue.read_buffer(heights), np.float32)
     rho_s = _usual_strength() * specular[..., 0]
     return Maps(
@@ -63,19 +75,22 @@ def painted_maps(device: Device, painting: Painting, look: SkinLook, side: int) 
     )
 
 
-def _paint(device: Device, painting: Painting, look: SkinLook, side: int) -> tuple[list[Any], Any]:
-    """Colour, specular and roughness without mips, and a buffer of heights."""
+def _paint(
+    device: Device, painting: Painting, look: SkinLook, side: int
+) -> tuple[list[map_mips.Mipped], Any, Any]:
+    """Colour, specular and roughness without mips, a buffer of heights, and what movements add to them."""
     shader = program(device, "painting/skin.wgsl")
     bound = {**_surface(device, painting, look, side), **_tables(device, look)}
     made = [map_mips.empty(device, (side, side)) for _ in range(3)]
     heights = device.buffer(np.zeros((side + 2) ** 2, np.float32), "STORAGE")
-    stored = zip(("colour", "specular", "roughness"), map(map_mips.finest, made), strict=True)
+    moved = make_texture(device, (side, side), HALVES, layers=2)
+    stored = zip(("colour", "specular", "roughness"), (one.levels[0] for one in made), strict=True)
     frame = Frame(device, timed=False)
     owner = {name: bound[name] for name in ("paint", "vertices", "triangles", "owners")}
     frame.dispatch("maps", program(device, "painting/owner.wgsl"), owner, each(painting.count))
-    frame.compute("maps", shader, bound | dict(stored) | {"heights": heights}, (side, side))
+    frame.compute("maps", shader, bound | dict(stored) | {"heights": heights, "moved": moved}, (side, side))
     frame.submit()
-    return made, heights
+    return made, heights, moved
 
 
 def _usual_strength() -> float:

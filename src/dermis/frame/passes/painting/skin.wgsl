@@ -7,6 +7,7 @@
 @group(0) @binding(11) var colour: texture_storage_2d<rgba16float, write>;
 @group(0) @binding(12) var specular: texture_storage_2d<rgba16float, write>;
 @group(0) @binding(13) var roughness: texture_storage_2d<rgba16float, write>;
+@group(0) @binding(15) var moved: texture_storage_2d_array<rgba16float, write>; // what movements do, see movements.py
 @group(0) @binding(14) var<storage, read_write> heights: array<f32>; // with a texel more on all sides [mm]
 
 // Artist's values.
@@ -85,6 +86,12 @@ fn gloss(lip: f32, wet: f32, hair: f32) -> vec2f {
     return vec2f(clamp(rho_s, 0.05, 0.45), clamp(m, 0.15, 0.6));
 }
 
+// flush, pressed: where blood comes to, and where it is pressed out
+fn keep_moved(at: vec2u, share: f32, flush: f32, pressed: f32) {
+    textureStore(moved, at, 0, share * vec4f(deepened[0], deepened[1], deepened[2], deepened[3]));
+    textureStore(moved, at, 1, vec4f(share * vec3f(deepened[4], deepened[5], deepened[6]), flush - pressed));
+}
+
 fn keep(at: vec2u, rgb: vec3f, shine: vec2f, height: f32, amounts: vec3f) {
     textureStore(colour, at, vec4f(rgb, 1.0));
     textureStore(specular, at, vec4f(shine.x / paint.usual_strength, amounts.x, amounts.z, 0.0));
@@ -100,6 +107,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let owner = owners[id.y * paint.side + id.x];
     if (owner == 0u) {
         let shine = vec2f(STRENGTH + OILY_STRENGTH * paint.oil, ROUGHNESS + OILY_ROUGHNESS * paint.oil);
+        keep_moved(id.xy, 0.0, 0.0, 0.0);
         keep(id.xy, colour_of(0u, paint.melanin, paint.blood), shine, 0.0, vec3f(0.0));
         return;
     }
@@ -119,7 +127,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     rgb = over(rgb, BEARD_COLOUR, beard);
     let wet = max(mucosa, 1.0 - smoothstep(0.2, 1.2, spot.fields.z));
     let away = f32(NEAREST - (owner >> ID_BITS)) / STEPS;
-    let height = relief(spot, lip) * (1.0 - smoothstep(0.5 * MARGIN, MARGIN, away)); // runs out beside the charts
+    let runs_out = 1.0 - smoothstep(0.5 * MARGIN, MARGIN, away); // beside the charts
+    let height = relief(spot, lip) * runs_out;
+    keep_moved(id.xy, runs_out, saturate(zone[ZONE_BLOOD]) * (1.0 - lip), lip);
     let bare = (1.0 - lip) * (1.0 - mucosa);
     let pores = saturate(0.45 + zone[ZONE_PORES]) * bare;
     let furrows = max(1.0 + zone[ZONE_FURROWS], 0.2) * bare * (0.8 + 1.4 * paint.age * paint.age);

@@ -12,6 +12,7 @@
 //#fill const ZONES: u32 = {zones}u;
 //#fill const FOLDS: u32 = {folds}u;
 //#fill const KNOTS: u32 = {knots}u;
+//#fill const FOLDING: u32 = {folding}u;
 //#fill const EDGES: u32 = {edges}u;
 //#fill const DEGREES: f32 = {degrees};
 
