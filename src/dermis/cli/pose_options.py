@@ -11,9 +11,10 @@ from dermis.errors import DermisError, refuse
 
 if TYPE_CHECKING:
     from dermis.mesh.head import Head
+    from dermis.scene.model import Scene
     from dermis.scene.pose import Pose
 
-POSE, BONE = "--pose", "--bone"
+POSE, BONE, LOOK_AT = "--pose", "--bone", "--look-at"
 Weights = Annotated[
     list[str] | None,
     Parameter(
@@ -22,6 +23,14 @@ Weights = Annotated[
         metavar="NAME=WEIGHT,...",
         help="Weights of morph targets, as jawOpen=0.6,mouthSmileLeft=1, beside those of a scene's [pose]. "
         "dermis animate HEAD --names lists them.",
+    ),
+]
+LookAt = Annotated[
+    str | None,
+    Parameter(
+        name=LOOK_AT,
+        metavar="X,Y,Z",
+        help="Where the eyes of the parametric human look: a place in mm from the head's centre, or camera.",
     ),
 ]
 Turns = Annotated[
@@ -91,6 +100,16 @@ def pose_given(
                 raise
             raise DermisError(f"{fault} All names: dermis animate {name} --names.") from None
     return Pose(weights, turns)
+
+
+def gaze_given(words: str, scene: Scene) -> Pose:
+    """The scene's pose with eyes that look where it was typed."""
+    from dermis.scene.gaze import looking_at
+
+    place = scene.camera.position if words == "camera" else _numbers(words)
+    if place is None or len(place) != 3:
+        refuse(LOOK_AT, "camera, or X,Y,Z in mm from the head's centre", f"{words!r} came", "Correct it")
+    return looking_at(scene.head, place, scene.pose)
 
 
 def _numbers(text: str) -> list[float] | None:
