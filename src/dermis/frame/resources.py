@@ -52,7 +52,6 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     shared = _shared(memo, device, asked, shadow_maps, curvature)
     atlases = [_atlas(memo, device, asked, name, k) for k, name in enumerate(asked.atlases.layouts)]
     uploaded: dict[str, Any] = memo.wait(maps)
-    face = uploaded.get("face")
     shared |= uploaded | keep(fine_detail, device, asked.painted_side > 0)
     layouts = [_layout(memo, device, asked, one, shape, person, shared, k) for k, one in enumerate(atlases)]
     own, view = _shading(memo, device, asked)
@@ -61,7 +60,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     return Resources(
         shape=shape,
         person=person,
-        face=face,
+        face=uploaded.get("face"),
         head=layouts[0].head,
         layouts=tuple(layouts),
         shadow_maps=shadow_maps,
