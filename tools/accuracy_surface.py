@@ -99,7 +99,7 @@ def seams(renderer: Renderer) -> list[str]:
     """Jump of the scattered light across seams, of the light there [%]: mean and 95th percentile."""
     ball = cut_sphere(30.0, 20)
     rows = row(renderer, "sphere in six charts", Head("sphere", ball, Maps()), BALL_SIDE, everywhere)
-    rows += row(renderer, "bust", dermis.load_head("bust"), HEAD_SIDE, everywhere)
+    rows += row(renderer, "human", dermis.load_head("human"), HEAD_SIDE, everywhere)
     human = dermis.load_head(Path(os.environ["DERMIS_DATA"]) / HUMAN, unit_mm=100)
     rows += row(renderer, "MakeHuman, neck", human, HEAD_SIDE, at_neck)
     return rows + row(renderer, "MakeHuman, back of the head", human, HEAD_SIDE, behind)
