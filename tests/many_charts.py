@@ -7,10 +7,11 @@ import numpy as np
 from dermis.atlas.unwrap.charts import grow
 from dermis.atlas.unwrap.unwrap import unwrap
 from dermis.human.person import Human
-from dermis.mesh.geometry import triangle_areas
+from dermis.mesh.geometry import build_mesh, triangle_areas
 from dermis.mesh.mesh import Mesh
 
 LEAST_MM2 = 1e-6
+"""Triangles under it have no place on a layout."""
 
 
 def many_charts_mesh(charts: int, subdivide: int = 0) -> Mesh:
@@ -23,4 +24,6 @@ def many_charts_mesh(charts: int, subdivide: int = 0) -> Mesh:
     chart = grow(positions, triangles, charts)
     upright = np.random.default_rng(0).normal(size=(int(chart.max()) + 1, 3))
     layout = unwrap(positions, triangles, chart, upright=upright[chart])
-    return layout.mesh(positions, normals, mesh.materials[0])
+    places, smooth = positions[layout.point], normals[layout.point]
+    kind = np.zeros(len(triangles))
+    return build_mesh(places, layout.uv, layout.triangles, kind, mesh.materials[:1], smooth, layout.point)
