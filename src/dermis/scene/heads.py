@@ -22,8 +22,8 @@ from dermis.scene.head_table import NormalY, Up, VOrigin
 
 MapFile = str | os.PathLike[str] | None
 HUMAN = "human"
-REPLACED = {"bust": "", "bust_many_charts": "; its many seams are gone with it"}
-"""Heads that the package had before `HUMAN`, and what is to be said of each besides."""
+REPLACED = ("bust", "bust_many_charts")
+"""Heads that the package had before `HUMAN`."""
 
 
 def load_head(
@@ -66,8 +66,8 @@ def load_head(
         told = {"unit_mm": unit_mm, "v_origin": v_origin, "up": up, "opaque": opaque}
         return _human(own, height_mm, normal_y, told, subdivide)
     if name in REPLACED and not path.is_file():
-        came = f"this one was replaced by {HUMAN!r}{REPLACED[name]}"
-        refuse(name, "a head that the package has", came, f"Write {HUMAN} instead")
+        came = f"this mannequin was replaced by the parametric human, {HUMAN!r}"
+        refuse(name, f"one of {', '.join(_head_names())} or a mesh file", came, f"Write {HUMAN} instead")
     sample, files = SAMPLES.get(name), dict[str, Any]()
     if sample is not None:
         _check_kind(sample)
