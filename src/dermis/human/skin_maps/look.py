@@ -1,30 +1,13 @@
-"""What makes one skin look different from another, and the patches of it that are painted at once."""
+"""What makes one skin look different from another."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import NamedTuple
 
 from dermis.errors import refuse
-from dermis.human.bust.fields import Doubles
 
 RANGES = {"seed": (0, 2**32 - 1)}
 """Least and greatest values of fields that do not go from 0 to 1."""
-
-
-class Patch(NamedTuple):
-    """Places on the skin, as the kernels take them.
-
-    points : (n, 3) [mm]
-    normals : (n, 3) unit normals of the smooth surface
-    texel_mm : (n,) how far apart the places around each are [mm]
-    seed : where the random numbers of all textures begin
-    """
-
-    points: Doubles
-    normals: Doubles
-    texel_mm: Doubles
-    seed: int
 
 
 @dataclass(frozen=True)
