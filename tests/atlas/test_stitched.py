@@ -53,6 +53,10 @@ def texel_mm(atlas: Atlas) -> Floats:
     return np.asarray(1.0 / np.maximum(atlas.stretch.astype(np.float64).min(axis=-1), 1e-3))
 
 
+def test_many_charts_are_many() -> None:
+    assert charts(case("many charts")[0]).max() >= 300
+
+
 @pytest.mark.parametrize("name", MESHES)
 def test_all_triangles_have_texels(name: str) -> None:
     mesh, atlas = case(name)
