@@ -78,10 +78,11 @@ fn light_through(point: Point, surface: Surface, film: Film, v: vec3f, open: f32
             let cosine = dot(surface.normal, arriving.direction);
             if (cosine > 0.0) {
                 if (seen < 0.0) {
-                    seen = max(visibility(light, point, arriving.direction), film.scattered);
+                    seen = visibility(light, point, arriving.direction);
                 }
                 let e = arriving.irradiance * seen;
-                var entering = e * (cosine * enters(cosine, surface.roughness, surface.rho_s));
+                let filled = arriving.irradiance * max(seen, film.scattered);
+                var entering = filled * (cosine * enters(cosine, surface.roughness, surface.rho_s));
                 if (by_direction) {
                     lit.directional += entering * beyond_mean(cosine, facing);
                     entering *= coming_back(cosine);
