@@ -25,6 +25,14 @@ from dermis.frame.passes.moving_occlusion import Sky, make_map, make_sky
 from dermis.frame.passes.shape import still_shape
 from dermis.frame.resting import resting
 from dermis.frame.shape import Shape, ShapeTables, make_shape, shape_tables
+from dermis.frame.strands import (
+    StrandResources,
+    has_strands,
+    make_strand_picture,
+    make_strand_shadows,
+    make_tables,
+    no_strand_shadows,
+)
 from dermis.frame.techniques.technique import AtlasTechnique, Technique
 from dermis.frame.translucency import translucency_of
 from dermis.gpu import Device, Memo
@@ -49,7 +57,9 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     shape = keep(make_shape, device, tables)
     person = keep(still_shape, device, tables) if asked.person is not None else None
     curvature = keep(_curvature, device, asked.head) if technique.curved else None
+    strands = _strands(memo, device, asked) if has_strands(asked.head, asked.settings) else None
     shared = _shared(memo, device, asked, shadow_maps, curvature)
+    shared["strand_shadows"] = strands.shadows if strands else no_strand_shadows(device)
     atlases = [_atlas(memo, device, asked, name, k) for k, name in enumerate(asked.atlases.layouts)]
     uploaded: dict[str, Any] = memo.wait(maps)
     shared |= uploaded
@@ -75,6 +85,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         suns=len(asked.surroundings.suns),
         sky=_sky(memo, device, asked, layouts[0], tables) if asked.occlusion_moves else None,
         gaussians=len(asked.profile.variance_mm2),
+        strands=strands,
         picture=keep(post.make_picture, device, settings.size),
         glow=keep(bloom.make_glow, device, settings.size) if settings.bloom else None,
         unscattered=keep(first.unscattered, asked.head.mesh),
@@ -88,6 +99,13 @@ def _shading(memo: Memo, device: Device, asked: Asked) -> tuple[Any, Any]:
     view = view_record(program, asked.head, asked.settings, asked.split)
     technique.describe(view, program, own)
     return own, view
+
+
+def _strands(memo: Memo, device: Device, asked: Asked) -> StrandResources:
+    tables = memo.keep(make_tables, device, asked.head)
+    picture = memo.keep(make_strand_picture, device, tables, asked.settings.size)
+    shadows = memo.keep(make_strand_shadows, device, asked.shadow_layers, of=asked.view)
+    return StrandResources(tables, picture, shadows)
 
 
 def _shadows(memo: Memo, device: Device, asked: Asked) -> shadows.ShadowMaps:

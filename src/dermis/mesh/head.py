@@ -10,6 +10,7 @@ import numpy as np
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Floats, Mesh
 from dermis.mesh.rig import Rig
+from dermis.mesh.strands import Strands
 
 _CROWN_TO_CENTRE_MM = 120.0  # half the height of an adult head
 
@@ -21,6 +22,7 @@ class Head:
     name : sample or file
     attribution : whom to credit when a picture of it is shown, empty when that is not required
     rig : what moves it; None for a head whose points move only if all their places are given
+    strands : its hairs, None for none
     """
 
     name: str
@@ -28,6 +30,7 @@ class Head:
     maps: Maps
     attribution: str = ""
     rig: Rig | None = None
+    strands: Strands | None = None
 
     @cached_property
     def control(self) -> Rig:

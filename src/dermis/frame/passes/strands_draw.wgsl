@@ -1,0 +1,161 @@
+// Hairs over the picture: each pixel keeps the nearest pieces of hair that cover it and lays them over what it shows.
+//#include "geometry.wgsl"
+//#include "strand_view.wgsl"
+//#include "strand_tiles.wgsl"
+
+const NEAREST: u32 = 8u; // pieces that a pixel keeps; those behind them count by what they cover
+const MOST_DEPTHS: u32 = 8u; // samples of a pixel that hairs are compared with
+const FIXED: f32 = 65536.0; // so that sums do not depend on the order
+
+@group(0) @binding(30) var<storage, read> drawn: array<Drawn>;
+@group(0) @binding(31) var<storage, read> chains: array<u32>; // see strands_bin.wgsl
+@group(0) @binding(32) var<storage, read> links: array<vec2u>;
+@group(0) @binding(33) var visibility_buffer: texture_2d_array<u32>; // triangle + 1 of each sample
+@group(0) @binding(34) var behind: texture_2d<f32>; // radiance and coverage
+@group(0) @binding(35) var image: texture_storage_2d<rgba32float, write>;
+
+// A piece of hair over a pixel.
+struct Fragment {
+    depth: f32, // [mm]
+    piece: u32,
+    along: f32, // of the piece, 0 to 1
+    cover: f32, // of the pixel
+}
+
+// Depths of the surface at the samples of a pixel.
+struct Depths {
+    depth: array<f32, MOST_DEPTHS>,
+    count: u32,
+}
+
+fn depth_at(triangle: u32, place: vec2f) -> f32 {
+    let t = triangle_at(triangle);
+    let a = position_of(t.x);
+    let n = cross(position_of(t.y) - a, position_of(t.z) - a);
+    let ndc = vec2f(2.0, -2.0) * place / strand_view.size + vec2f(-1.0, 1.0);
+    let ray = strand_view.forward + ndc.x * strand_view.right + ndc.y * strand_view.up;
+    return dot(n, a - strand_view.eye) / dot(n, ray);
+}
+
+fn depths_at(pixel: vec2u) -> Depths {
+    var depths: Depths;
+    depths.count = min(strand_view.samples, MOST_DEPTHS);
+    for (var k = 0u; k < depths.count; k += 1u) {
+        let s = k * strand_view.samples / depths.count;
+        let found = textureLoad(visibility_buffer, pixel, s, 0).x;
+        depths.depth[k] = 1e30;
+        if (found > 0u) {
+            depths.depth[k] = depth_at(found - 1u, vec2f(pixel) + strand_view.jitter[s].xy);
+        }
+    }
+    return depths;
+}
+
+// Where a piece may cover the plane: pieces of a hair meet on the lines that halve their angles.
+fn between(place: vec2f, piece: u32, way: vec2f) -> bool {
+    let begin = piece_begin(piece);
+    let k = piece % (KNOTS - 1u);
+    let a = drawn[begin].place;
+    let b = drawn[begin + 1u].place;
+    var first = way;
+    var last = way;
+    if (k > 0u) {
+        let before = a - drawn[begin - 1u].place;
+        first += before / max(length(before), 1e-6);
+    }
+    if (k + 2u < KNOTS) {
+        let after = drawn[begin + 2u].place - b;
+        last += after / max(length(after), 1e-6);
+    }
+    return dot(place - a, first) >= 0.0 && dot(place - b, last) < 0.0;
+}
+
+// A hair narrower than a pixel is drawn a pixel wide and covers less of it.
+fn fragment_at(place: vec2f, piece: u32) -> Fragment {
+    let begin = piece_begin(piece);
+    let a = drawn[begin];
+    let b = drawn[begin + 1u];
+    let run = distance(a.place, b.place);
+    let none = Fragment(0.0, 0u, 0.0, 0.0);
+    if (run < 1e-4) {
+        return none;
+    }
+    let way = (b.place - a.place) / run;
+    let from_a = place - a.place;
+    let along = clamp(dot(from_a, way) / run, 0.0, 1.0);
+    let beside = abs(from_a.x * way.y - from_a.y * way.x);
+    let width = mix(a.width, b.width, along);
+    let shown = max(width, 1.0);
+    if (beside >= 0.5 * shown + 0.5 || !between(place, piece, way)) {
+        return none;
+    }
+    let cover = clamp(0.5 * shown + 0.5 - beside, 0.0, 1.0) * width / shown;
+    return Fragment(mix(a.depth, b.depth, along), piece, along, cover);
+}
+
+fn in_front(a: Fragment, b: Fragment) -> bool {
+    return a.depth < b.depth || (a.depth == b.depth && a.piece < b.piece);
+}
+
+fn radiance_at(one: Fragment) -> vec3f {
+    let begin = piece_begin(one.piece);
+    return mix(drawn[begin].radiance, drawn[begin + 1u].radiance, one.along);
+}
+
+fn covered(pixel: vec2u, first: u32, under: vec4f) -> vec4f {
+    var depths = depths_at(pixel);
+    var kept: array<Fragment, NEAREST>;
+    var count = 0u;
+    var farther = 0u; // logarithm of what pieces behind those kept let through
+    for (var link = first; link != 0u; link = links[link - 1u].y) {
+        var one = fragment_at(vec2f(pixel) + 0.5, links[link - 1u].x);
+        if (one.cover <= 0.0) {
+            continue;
+        }
+        var free = 0u;
+        for (var k = 0u; k < depths.count; k += 1u) {
+            free += u32(one.depth < depths.depth[k]);
+        }
+        one.cover *= f32(free) / f32(depths.count);
+        if (one.cover <= 0.0) {
+            continue;
+        }
+        for (var k = 0u; k < count; k += 1u) {
+            if (in_front(one, kept[k])) {
+                let other = kept[k];
+                kept[k] = one;
+                one = other;
+            }
+        }
+        if (count < NEAREST) {
+            kept[count] = one;
+            count += 1u;
+        } else {
+            farther += u32(-FIXED * log(max(1.0 - one.cover, 1e-4)));
+        }
+    }
+    var through = 1.0;
+    var sum = vec3f(0.0);
+    for (var k = 0u; k < count; k += 1u) {
+        var cover = kept[k].cover;
+        if (k == NEAREST - 1u) {
+            cover = 1.0 - (1.0 - cover) * exp(-f32(farther) / FIXED);
+        }
+        sum += through * cover * radiance_at(kept[k]);
+        through *= 1.0 - cover;
+    }
+    return vec4f(sum + through * under.rgb, 1.0 - through * (1.0 - under.a));
+}
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u, @builtin(workgroup_id) group: vec3u) {
+    if (any(id.xy >= textureDimensions(image))) {
+        return;
+    }
+    var colour = textureLoad(behind, id.xy, 0);
+    let first = chains[1u + group.y * tiles_across(strand_view.size) + group.x];
+    if (first != 0u) {
+        colour = covered(id.xy, first, colour);
+    }
+    textureStore(image, id.xy, colour);
+}
