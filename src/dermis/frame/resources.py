@@ -57,15 +57,13 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     shape = keep(make_shape, device, tables)
     person = keep(still_shape, device, tables) if asked.person is not None else None
     curvature = keep(_curvature, device, asked.head) if technique.curved else None
-    strands = _strands(memo, device, asked) if has_strands(asked.head, asked.settings) else None
-    shared = _shared(memo, device, asked, shadow_maps, curvature)
-    shared["strand_shadows"] = strands.shadows if strands else no_strand_shadows(device)
+    strands = _strands(memo, device, asked)
+    shared = _shared(memo, device, asked, shadow_maps, curvature, strands)
     atlases = [_atlas(memo, device, asked, name, k) for k, name in enumerate(asked.atlases.layouts)]
     uploaded: dict[str, Any] = memo.wait(maps)
     shared |= uploaded
     layouts = [_layout(memo, device, asked, one, shape, person, shared, k) for k, one in enumerate(atlases)]
     own, view = _shading(memo, device, asked)
-    first, _ = atlases[0]
     side, several = settings.atlas, len(layouts) > 1
     return Resources(
         shape=shape,
@@ -88,7 +86,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         strands=strands,
         picture=keep(post.make_picture, device, settings.size),
         glow=keep(bloom.make_glow, device, settings.size) if settings.bloom else None,
-        unscattered=keep(first.unscattered, asked.head.mesh),
+        unscattered=keep(atlases[0][0].unscattered, asked.head.mesh),
     )
 
 
@@ -101,7 +99,9 @@ def _shading(memo: Memo, device: Device, asked: Asked) -> tuple[Any, Any]:
     return own, view
 
 
-def _strands(memo: Memo, device: Device, asked: Asked) -> StrandResources:
+def _strands(memo: Memo, device: Device, asked: Asked) -> StrandResources | None:
+    if not has_strands(asked.head, asked.settings):
+        return None
     tables = memo.keep(make_tables, device, asked.head)
     picture = memo.keep(make_strand_picture, device, tables, asked.settings.size)
     shadows = memo.keep(make_strand_shadows, device, asked.shadow_layers, of=asked.view)
@@ -115,7 +115,12 @@ def _shadows(memo: Memo, device: Device, asked: Asked) -> shadows.ShadowMaps:
 
 
 def _shared(
-    memo: Memo, device: Device, asked: Asked, shadow_maps: shadows.ShadowMaps, curvature: Curvature | None
+    memo: Memo,
+    device: Device,
+    asked: Asked,
+    shadow_maps: shadows.ShadowMaps,
+    curvature: Curvature | None,
+    strands: StrandResources | None,
 ) -> dict[str, Any]:
     """What all layouts are lit with, lights aside."""
     skin, program = asked.skin, shade.shade_program(device)
@@ -125,6 +130,7 @@ def _shared(
         "environment": surroundings.environment_record(program, around, skin, total, asked.occluded),
         "shadow_maps": shadow_maps.texture,
         "shadow_bounds": shadow_maps.bounds,
+        "strand_shadows": strands.shadows if strands else no_strand_shadows(device),
         "curvatures": curvature.smoothed if curvature else no_curvature(device),
         "nearest_sampler": device.sampler(),
         "panorama": asked.surroundings.panorama,

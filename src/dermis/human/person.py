@@ -42,8 +42,8 @@ class Human:
     sex : from 0, female, to 1, male [-]
     age : 25 to 90 [years]
     weight, muscle : from -1, least, to 1, most; 0 is the average [-]
-    hair_eumelanin, hair_pheomelanin : in brows and lashes; 0.3 of the first is blond, 1.3 brown, 4 dark, 8 black;
-        red has 0.3 and 2
+    hair_eumelanin, hair_pheomelanin : of brows and lashes: 0.3 of the first is blond, 1.3 brown,
+        4 dark, 8 black; red has 0.3 and 2
     targets : weights of published targets, such as {"nose/nose-hump-incr": 0.5}; mostly 0 to 1
 
     Raises DermisError for values out of range; names of targets are checked when the head is made.

@@ -11,7 +11,7 @@ from dermis.mesh.strands import Doubles
 KNOTS = 9
 _MOST = 760  # hairs of the bushiest brow
 # Artist's values along the brow, from its inner to its outer end, on a head seen from the front [mm]: its
-# middle, half of its height, the direction of hairs from outwards to upwards, how dense and how long they are.
+# middle, half of its height, where its hairs point from outwards to upwards, how dense and long they are.
 _ALONG = np.array([0.0, 0.1, 0.25, 0.45, 0.65, 0.85, 1.0])
 _X = np.array([10.5, 14.5, 21.0, 30.0, 39.5, 48.5, 54.5])
 _Y = np.array([12.6, 13.2, 14.7, 17.0, 18.4, 16.4, 12.8])

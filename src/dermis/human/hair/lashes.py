@@ -60,7 +60,7 @@ def places(lid: Lid, rng: np.random.Generator) -> tuple[Doubles, Doubles]:
     """Along the lid's edge, evenly but for chance, and from the edge onto the skin, each (n,)."""
     u = (np.arange(lid.hairs) + rng.uniform(-0.3, 1.3, lid.hairs)) / lid.hairs
     across = 0.04 + 0.12 * rng.integers(0, 3, lid.hairs)
-    return lid.first + (lid.last - lid.first) * np.clip(u, 0, 1), across
+    return lid.first + (lid.last - lid.first) * np.clip(u, 0, 1), np.asarray(across, np.float64)
 
 
 def grown(
