@@ -28,7 +28,7 @@ def draw_frame(graph: Graph, inputs: Inputs, technique: Technique) -> None:
     if made.strands:
         strands.pose(graph, made.strands, made.shape)
         if len(inputs.shadow_views.clips):
-            strands.shadow(graph, made.strands, inputs.lit, inputs.light_constants)
+            strands.shadow(graph, made.strands, inputs.lit)
     if made.sky and inputs.around:
         moving_occlusion.draw(graph, made.sky, *inputs.around, inputs.layouts)
     below = technique.scatter(graph, inputs)

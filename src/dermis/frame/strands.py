@@ -15,8 +15,8 @@ from dermis.scene.settings import Settings
 from dermis.specular.hair import hair_numbers
 
 _TILE = 8  # pixels along a side of the tiles that hairs are listed in
-_WINDOW = 256  # texels along a side of what hairs hold back of a light
-_HEAD_WORDS = 4  # before them
+_WINDOW = 256  # texels across what hairs hold back of a light, half as many down
+_HEAD_WORDS = 8  # before them
 _LINKS_OF_PIECE = 4  # for hairs in no more than a few tiles
 _STRAND = np.dtype([("corner", "u4", 4), ("share", "f4", 4), ("absorption", "f4", 4)])  # in strands_pose.wgsl
 
@@ -117,7 +117,7 @@ def make_strand_picture(device: Device, tables: StrandTables, size: tuple[int, i
 
 def make_strand_shadows(device: Device, layers: int) -> Any:
     """Space for what hairs hold back of so many lights."""
-    return _words(device, _HEAD_WORDS + 2 * _WINDOW * _WINDOW * max(1, layers))
+    return _words(device, (_HEAD_WORDS + _WINDOW * _WINDOW) * max(1, layers))
 
 
 def no_strand_shadows(device: Device) -> Any:

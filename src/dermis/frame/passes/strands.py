@@ -13,7 +13,7 @@ from dermis.gpu.program import Resources
 
 Look = tuple[Resources, Any, Constants]
 
-_CLEARING = 256  # workgroups that empty the shadows of hairs
+_CLEARING = 64  # workgroups that empty the shadows of hairs, one for each light at least
 
 
 def pose(graph: Recorder, strands: StrandResources, shape: Shape) -> None:
@@ -24,16 +24,12 @@ def pose(graph: Recorder, strands: StrandResources, shape: Shape) -> None:
     _each(graph, "strands_pose.wgsl", bound | {"posed": made.posed}, count, made.constants)
 
 
-def shadow(graph: Recorder, strands: StrandResources, lit: Resources, lights: Constants) -> None:
-    """Find what the hairs hold back of each light that casts shadows.
-
-    lights : pipeline constants of what is lit
-    """
+def shadow(graph: Recorder, strands: StrandResources, lit: Resources) -> None:
+    """Find what the hairs hold back of each light that casts shadows."""
     made = strands.tables
-    window = {"posed": made.posed, "strand_shadows": strands.shadows}
+    bound = {**lit, "posed": made.posed, "windows": strands.shadows, "splatted": strands.shadows}
     shader = program(graph.device, "strands_window.wgsl", made.constants)
-    graph.dispatch("strands", shader, window, (1 + _CLEARING, 1, 1))
-    bound = {**lit, "posed": made.posed, "splatted": strands.shadows}
+    graph.dispatch("strands", shader, bound, (_CLEARING, 1, 1))
     _each(graph, "strands_shadow.wgsl", bound, made.pieces, made.constants)
 
 
@@ -57,8 +53,8 @@ def draw(
     _each(graph, "strands_bin.wgsl", seen | listed, made.pieces, made.constants)
     bound = head.resources | seen | listed
     bound |= {"visibility_buffer": visibility, "behind": radiance, "image": picture.result}
-    shader = program(graph.device, "strands_draw.wgsl", made.constants)
-    graph.compute("strands", shader, bound, picture.result.size[:2])
+    shader, (width, height) = program(graph.device, "strands_draw.wgsl", made.constants), picture.result.size[:2]
+    graph.compute("strands", shader, bound, (width, -(-height // int(shader.constants.get("STRIP", 1)))))
     return picture.result
 
 

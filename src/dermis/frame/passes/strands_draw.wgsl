@@ -3,6 +3,8 @@
 //#include "strand_view.wgsl"
 //#include "strand_tiles.wgsl"
 
+override STRIP: u32 = 1u; // pixels of an invocation, one below the other, see shade.wgsl
+
 const NEAREST: u32 = 8u; // pieces that a pixel keeps; those behind them count by what they cover
 const MOST_DEPTHS: u32 = 8u; // samples of a pixel that hairs are compared with
 const FIXED: f32 = 65536.0; // so that sums do not depend on the order
@@ -147,15 +149,40 @@ fn covered(pixel: vec2u, first: u32, under: vec4f) -> vec4f {
     return vec4f(sum + through * under.rgb, 1.0 - through * (1.0 - under.a));
 }
 
+fn chain_at(pixel: vec2u) -> u32 {
+    return chains[1u + pixel.y / STRAND_TILE * tiles_across(strand_view.size) + pixel.x / STRAND_TILE];
+}
+
+// The next pixel of a strip that hairs may cover; those before it stay as they are.
+fn next_covered(first: vec2u, end: u32) -> vec2u {
+    var at = first;
+    loop {
+        if (at.y >= end || chain_at(at) != 0u) {
+            break;
+        }
+        textureStore(image, at, textureLoad(behind, at, 0));
+        at.y += 1u;
+    }
+    return at;
+}
+
 @compute @workgroup_size(8, 8)
-fn main(@builtin(global_invocation_id) id: vec3u, @builtin(workgroup_id) group: vec3u) {
-    if (any(id.xy >= textureDimensions(image))) {
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    let size = textureDimensions(image);
+    let first = vec2u(id.x, id.y * STRIP);
+    if (any(first >= size)) {
         return;
     }
-    var colour = textureLoad(behind, id.xy, 0);
-    let first = chains[1u + group.y * tiles_across(strand_view.size) + group.x];
-    if (first != 0u) {
-        colour = covered(id.xy, first, colour);
+    let end = min(first.y + STRIP, size.y);
+    var at = next_covered(first, end);
+    if (at.y >= end) {
+        return;
     }
-    textureStore(image, id.xy, colour);
+    loop {
+        textureStore(image, at, covered(at, chain_at(at), textureLoad(behind, at, 0)));
+        at = next_covered(at + vec2u(0u, 1u), end);
+        if (at.y >= end) {
+            break;
+        }
+    }
 }

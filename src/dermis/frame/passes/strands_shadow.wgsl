@@ -9,10 +9,17 @@
 @group(0) @binding(30) var<storage, read> posed: array<vec4f>;
 @group(0) @binding(31) var<storage, read_write> splatted: array<atomic<u32>>; // see strand_window.wgsl
 
-const STEP: f32 = 0.7; // between places along a hair, at most [texel]
+const STEP: f32 = 1.0; // between places along a hair, at most [texel]
+
+fn window_at(layer: i32) -> Window {
+    let word = window_begin(layer);
+    let low = vec2u(atomicLoad(&splatted[word]), atomicLoad(&splatted[word + 1u]));
+    let size = vec2u(atomicLoad(&splatted[word + 2u]), atomicLoad(&splatted[word + 3u]));
+    return Window(bitcast<vec2f>(low), bitcast<vec2f>(size), bitcast<f32>(atomicLoad(&splatted[word + 4u])));
+}
 
 fn add(layer: i32, texel: vec2i, cover: f32, depth: f32) {
-    if (all(texel >= vec2i(0)) && all(texel < vec2i(i32(WINDOW)))) {
+    if (all(texel >= vec2i(0)) && all(texel < vec2i(WINDOW))) {
         let word = window_word(layer, vec2u(texel));
         let much = u32(cover * DENSE + 0.5);
         atomicAdd(&splatted[word], much);
@@ -20,14 +27,16 @@ fn add(layer: i32, texel: vec2i, cover: f32, depth: f32) {
     }
 }
 
-fn splat(light: Light, window: Window, a: vec4f, b: vec4f) {
-    let begin = in_window(light, window, a.xyz);
-    let end = in_window(light, window, b.xyz);
-    let beside = in_window(light, window, a.xyz + light.map_right);
-    let run = distance(begin.xy, end.xy);
-    let width = (a.w + b.w) * distance(begin.xy, beside.xy);
-    let count = max(1u, u32(ceil(run / STEP)));
-    let cover = width * run / f32(count);
+fn splat(light: Light, a: vec4f, b: vec4f) {
+    let window = window_at(light.layer);
+    let begin = in_window(window, on_map(light, a.xyz));
+    let end = in_window(window, on_map(light, b.xyz));
+    let right = in_window(window, on_map(light, a.xyz + light.map_right)).x - begin.x;
+    let up = in_window(window, on_map(light, a.xyz + light.map_up)).y - begin.y;
+    let way = b.xyz - a.xyz;
+    let across = length(vec2f(dot(way, light.map_right), dot(way, light.map_up)));
+    let count = max(1u, u32(ceil(distance(begin.xy, end.xy) / STEP)));
+    let cover = (a.w + b.w) * across * abs(right * up) / f32(count);
     for (var k = 0u; k < count; k += 1u) {
         let at = mix(begin, end, (f32(k) + 0.5) / f32(count));
         let place = at.xy - 0.5;
@@ -47,16 +56,10 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     if (strand >= arrayLength(&posed) / rows_of_strand()) {
         return;
     }
-    let ball = vec4f(
-        bitcast<f32>(atomicLoad(&splatted[0])),
-        bitcast<f32>(atomicLoad(&splatted[1])),
-        bitcast<f32>(atomicLoad(&splatted[2])),
-        bitcast<f32>(atomicLoad(&splatted[3])),
-    );
     let row = strand * rows_of_strand() + KNOTS_FROM + index % (KNOTS - 1u);
     for (var i = 0u; i < skin.light_count; i += 1u) {
         if (lights.light[i].layer >= 0) {
-            splat(lights.light[i], window_of(lights.light[i], ball), posed[row], posed[row + 1u]);
+            splat(lights.light[i], posed[row], posed[row + 1u]);
         }
     }
 }

@@ -1,30 +1,41 @@
-// Empties what hairs hold back of each light, and finds the ball that holds all of them.
+// Finds where hairs are on the shadow map of each light, a workgroup for each, and empties what they hold back there.
+//#include "geometry.wgsl"
+//#include "surface.wgsl"
 //#include "strand_knots.wgsl"
+//#include "strand_window.wgsl"
 
-@group(0) @binding(0) var<storage, read> posed: array<vec4f>;
-@group(0) @binding(1) var<storage, read_write> strand_shadows: array<u32>; // see strand_window.wgsl
+@group(0) @binding(30) var<storage, read> posed: array<vec4f>;
+@group(0) @binding(31) var<storage, read_write> windows: array<u32>; // see strand_window.wgsl
 
-//#fill const HEAD: u32 = {strand_window_words};
 const LANES: u32 = 256u;
+const BORDER: f32 = 3.0; // texels around all hairs that stay empty
 
 var<workgroup> lows: array<vec3f, LANES>;
 var<workgroup> highs: array<vec3f, LANES>;
 
+fn empty_texels(first: u32, step: u32) {
+    let words = WINDOW_HEAD + 2u * WINDOW.x * WINDOW.y;
+    for (var word = first; word < arrayLength(&windows); word += step) {
+        if (word % words >= WINDOW_HEAD) {
+            windows[word] = 0u;
+        }
+    }
+}
+
 @compute @workgroup_size(LANES)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
-    if (group.x > 0u) {
-        for (var word = HEAD + (group.x - 1u) * LANES + lane; word < arrayLength(&strand_shadows); word += (groups.x - 1u) * LANES) {
-            strand_shadows[word] = 0u;
-        }
+    empty_texels(group.x * LANES + lane, groups.x * LANES);
+    if (group.x >= skin.light_count || lights.light[group.x].layer < 0) {
         return;
     }
+    let light = lights.light[group.x];
     var low = vec3f(1e30);
     var high = vec3f(-1e30);
-    let count = arrayLength(&posed) / rows_of_strand();
-    for (var k = lane; k < 2u * count; k += LANES) { // the ends of each tell enough
-        let p = posed[k / 2u * rows_of_strand() + KNOTS_FROM + (k % 2u) * (KNOTS - 1u)].xyz;
-        low = min(low, p);
-        high = max(high, p);
+    let rows = rows_of_strand();
+    for (var k = lane; k < arrayLength(&posed) / rows * KNOTS; k += LANES) {
+        let at = on_map(light, posed[k / KNOTS * rows + KNOTS_FROM + k % KNOTS].xyz);
+        low = min(low, at);
+        high = max(high, at);
     }
     lows[lane] = low;
     highs[lane] = high;
@@ -36,10 +47,14 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
         }
     }
     if (lane == 0u) {
-        let middle = 0.5 * (lows[0] + highs[0]);
-        strand_shadows[0] = bitcast<u32>(middle.x);
-        strand_shadows[1] = bitcast<u32>(middle.y);
-        strand_shadows[2] = bitcast<u32>(middle.z);
-        strand_shadows[3] = bitcast<u32>(0.5 * length(highs[0] - lows[0]) + 1.0);
+        let border = BORDER / (vec2f(WINDOW) - 2.0 * BORDER) * (highs[0].xy - lows[0].xy);
+        let corner = bitcast<vec2u>(lows[0].xy - border);
+        let size = bitcast<vec2u>(highs[0].xy - lows[0].xy + 2.0 * border);
+        let word = window_begin(light.layer);
+        windows[word] = corner.x;
+        windows[word + 1u] = corner.y;
+        windows[word + 2u] = size.x;
+        windows[word + 3u] = size.y;
+        windows[word + 4u] = bitcast<u32>(lows[0].z);
     }
 }

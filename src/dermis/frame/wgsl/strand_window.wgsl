@@ -1,34 +1,34 @@
-// The part of each light's shadow map that hairs may lie in, and what they hold back there.
+// The part of each light's shadow map that hairs lie in, and what they hold back there.
 //#include "lights.wgsl"
 
-//#fill const WINDOW: u32 = {strand_window}; // texels a side
-//#fill const WINDOW_HEAD: u32 = {strand_window_words}; // words before the texels: middle of all hairs and their radius [mm], as bits of floats
-const DENSE: f32 = 4096.0; // a texel's word for hairs that cover it once
+//#fill const WINDOW: vec2u = vec2u({strand_window}, {strand_window} / 2); // texels across and down
+//#fill const WINDOW_HEAD: u32 = {strand_window_words}; // words of a light before its texels: a Window, as bits
+const DENSE: f32 = 4096.0; // a texel's first word for hairs that cover it once; its second has their depths
 const DEEP: f32 = 4.0; // steps of depth in a millimetre
 
-// Where hairs may be on a light's map.
+// Where hairs are on a light's map.
 struct Window {
-    middle: vec2f, // in its clip space
-    half: vec2f,
-    depth: f32, // of its near end [mm]
+    low: vec2f, // in its clip space
+    size: vec2f, // 0 for none
+    depth: f32, // of the nearest [mm]
 }
 
-fn window_of(light: Light, ball: vec4f) -> Window {
-    let middle = light.to_map * vec4f(ball.xyz, 1.0);
-    let right = light.to_map * vec4f(ball.xyz + ball.w * light.map_right, 1.0);
-    let up = light.to_map * vec4f(ball.xyz + ball.w * light.map_up, 1.0);
-    let place = middle.xy / middle.w;
-    let half = max(abs(right.xy / right.w - place), abs(up.xy / up.w - place));
-    return Window(place, 1.1 * half, depth_of(light, middle.z / middle.w) - ball.w);
-}
-
-// Place in a window [texel], and depth beyond its near end [mm].
-fn in_window(light: Light, window: Window, p: vec3f) -> vec3f {
-    let clip = light.to_map * vec4f(p, 1.0);
-    let place = 0.5 + 0.5 * (clip.xy / clip.w - window.middle) / window.half;
-    return vec3f(place * f32(WINDOW), depth_of(light, clip.z / clip.w) - window.depth);
+// Words before those of a light.
+fn window_begin(layer: i32) -> u32 {
+    return u32(layer) * (WINDOW_HEAD + 2u * WINDOW.x * WINDOW.y);
 }
 
 fn window_word(layer: i32, texel: vec2u) -> u32 {
-    return WINDOW_HEAD + 2u * ((u32(layer) * WINDOW + texel.y) * WINDOW + texel.x);
+    return window_begin(layer) + WINDOW_HEAD + 2u * (texel.y * WINDOW.x + texel.x);
+}
+
+// Place on a light's map, in its clip space, and depth [mm].
+fn on_map(light: Light, p: vec3f) -> vec3f {
+    let clip = light.to_map * vec4f(p, 1.0);
+    return vec3f(clip.xy / clip.w, depth_of(light, clip.z / clip.w));
+}
+
+// Place in a window [texel], and depth beyond its nearest [mm].
+fn in_window(window: Window, at: vec3f) -> vec3f {
+    return vec3f((at.xy - window.low) / window.size * vec2f(WINDOW), at.z - window.depth);
 }
