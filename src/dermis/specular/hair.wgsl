@@ -76,23 +76,32 @@ fn hair_albedo(sin_o: f32, depth: vec3f) -> Shares {
     return mean;
 }
 
+// Sine of an angle that scales of the cuticle turn.
+fn hair_tilted(sine: f32, scales: f32) -> f32 {
+    return sine * cos(scales * HAIR_TILT) + sqrt(max(1.0 - sine * sine, 0.0)) * sin(scales * HAIR_TILT);
+}
+
+// More precise than asin on some devices.
+fn hair_asin(sine: f32) -> f32 {
+    return atan2(sine, sqrt(1.0 - sine * sine));
+}
+
 // Radiance over the irradiance of a plane that faces the light [1/sr].
 // phi: angle between light and view around the fibre
 fn hair_scattered(sin_i: f32, sin_o: f32, phi: f32, depth: vec3f) -> vec3f {
     let cos_o = sqrt(max(1.0 - sin_o * sin_o, 1e-5));
-    let angle = asin(clamp(sin_o, -1.0, 1.0));
     let along = vec4f(
-        hair_along(sin_i, sin(angle - 2.0 * HAIR_TILT), HAIR_VARIANCE),
-        hair_along(sin_i, sin(angle + HAIR_TILT), 0.25 * HAIR_VARIANCE),
-        hair_along(sin_i, sin(angle + 4.0 * HAIR_TILT), 4.0 * HAIR_VARIANCE),
+        hair_along(sin_i, hair_tilted(sin_o, -2.0), HAIR_VARIANCE),
+        hair_along(sin_i, hair_tilted(sin_o, 1.0), 0.25 * HAIR_VARIANCE),
+        hair_along(sin_i, hair_tilted(sin_o, 4.0), 4.0 * HAIR_VARIANCE),
         hair_along(sin_i, sin_o, 4.0 * HAIR_VARIANCE),
     );
     var total = vec3f(0.0);
     for (var k = 0u; k < HAIR_PLACES; k += 1u) {
         let h = hair_place(k);
         let one = hair_shares(sin_o, depth, h);
-        let entry = asin(h);
-        let inner = asin(h * cos_o / sqrt(HAIR_ETA * HAIR_ETA - sin_o * sin_o));
+        let entry = hair_asin(h);
+        let inner = hair_asin(h * cos_o / sqrt(HAIR_ETA * HAIR_ETA - sin_o * sin_o));
         total += vec3f(one.reflected * along.x * hair_around(phi + 2.0 * entry));
         total += one.passed * (along.y * hair_around(phi - (2.0 * inner - 2.0 * entry + HAIR_PI)));
         total += one.inside * (along.z * hair_around(phi - (4.0 * inner - 2.0 * entry + 2.0 * HAIR_PI)));

@@ -53,7 +53,8 @@ def draw(
     _each(graph, "strands_bin.wgsl", seen | listed, made.pieces, made.constants)
     bound = head.resources | seen | listed
     bound |= {"visibility_buffer": visibility, "behind": radiance, "image": picture.result}
-    shader, (width, height) = program(graph.device, "strands_draw.wgsl", made.constants), picture.result.size[:2]
+    shader = program(graph.device, "strands_draw.wgsl", made.constants)
+    width, height = picture.result.size[:2]
     graph.compute("strands", shader, bound, (width, -(-height // int(shader.constants.get("STRIP", 1)))))
     return picture.result
 

@@ -8,6 +8,7 @@
 @group(0) @binding(31) var<storage, read_write> windows: array<u32>; // see strand_window.wgsl
 
 const LANES: u32 = 256u;
+const NARROWEST: f32 = 0.2; // width of a window over its length, at least
 const BORDER: f32 = 3.0; // texels around all hairs that stay empty
 
 var<workgroup> lows: array<vec3f, LANES>;
@@ -47,9 +48,10 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
         }
     }
     if (lane == 0u) {
-        let border = BORDER / (vec2f(WINDOW) - 2.0 * BORDER) * (highs[0].xy - lows[0].xy);
-        let corner = bitcast<vec2u>(lows[0].xy - border);
-        let size = bitcast<vec2u>(highs[0].xy - lows[0].xy + 2.0 * border);
+        let span = highs[0].xy - lows[0].xy;
+        let wide = max(span, vec2f(NARROWEST * max(span.x, span.y) + 1e-6)) * vec2f(WINDOW) / (vec2f(WINDOW) - 2.0 * BORDER);
+        let corner = bitcast<vec2u>(0.5 * (highs[0].xy + lows[0].xy - wide));
+        let size = bitcast<vec2u>(wide);
         let word = window_begin(light.layer);
         windows[word] = corner.x;
         windows[word + 1u] = corner.y;
