@@ -46,6 +46,7 @@ def hair_numbers() -> dict[str, float]:
     return {
         "hair_eta": ETA,
         "hair_width": usual.width,
+        "hair_cut": float(1.0 / np.tanh(np.pi / (2 * usual.width))),
         "hair_variance": usual.variance[0],
         "hair_tilt": float(TILT),
         "hair_places": PLACES,

@@ -2,6 +2,7 @@
 
 //#fill const HAIR_ETA: f32 = {hair_eta};
 //#fill const HAIR_WIDTH: f32 = {hair_width}; // of the distribution around the fibre [rad]
+//#fill const HAIR_CUT: f32 = {hair_cut}; // its factor, as it ends at half a turn
 //#fill const HAIR_VARIANCE: f32 = {hair_variance}; // along it, of reflected light
 //#fill const HAIR_TILT: f32 = {hair_tilt}; // of the cuticle's scales [rad]
 //#fill const HAIR_PLACES: u32 = {hair_places}; // across the fibre that light is followed through
@@ -37,7 +38,7 @@ fn hair_along(sin_i: f32, sin_o: f32, v: f32) -> f32 {
 fn hair_around(x: f32) -> f32 {
     let turned = abs(x - 2.0 * HAIR_PI * round(x / (2.0 * HAIR_PI)));
     let e = exp(-turned / HAIR_WIDTH);
-    return e / (HAIR_WIDTH * (1.0 + e) * (1.0 + e)) / tanh(HAIR_PI / (2.0 * HAIR_WIDTH));
+    return e / (HAIR_WIDTH * (1.0 + e) * (1.0 + e)) * HAIR_CUT;
 }
 
 fn hair_fresnel(c: f32) -> f32 {

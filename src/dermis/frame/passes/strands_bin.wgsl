@@ -7,11 +7,27 @@
 @group(0) @binding(31) var<storage, read_write> chains: array<atomic<u32>>; // links in use, then the first link + 1 of each tile
 @group(0) @binding(32) var<storage, read_write> links: array<vec2u>; // a piece, the next link + 1
 
-fn list(piece: u32, tile: u32) {
-    let link = atomicAdd(&chains[0], 1u);
-    if (link < arrayLength(&links)) {
-        links[link] = vec2u(piece, atomicExchange(&chains[1u + tile], link + 1u));
-    }
+// A piece on its way through the tiles.
+struct Piece {
+    begin: vec2f, // [pixel]
+    way: vec2f,
+    low: vec2f, // tiles that it may cover, first and last
+    high: vec2f,
+    far: f32, // distance from the middle of a tile within which it may cover some of that [pixel]
+}
+
+fn piece_of(a: Drawn, b: Drawn) -> Piece {
+    let side = f32(STRAND_TILE);
+    let reach = 0.5 * max(max(a.width, b.width), 1.0) + 1.0;
+    let low = max(floor((min(a.place, b.place) - reach) / side), vec2f(0.0));
+    let high = min(floor((max(a.place, b.place) + reach) / side), ceil(strand_view.size / side) - 1.0);
+    return Piece(a.place, b.place - a.place, low, high, reach + 0.7072 * side);
+}
+
+fn covers(piece: Piece, tile: vec2f) -> bool {
+    let middle = (tile + 0.5) * f32(STRAND_TILE) - piece.begin;
+    let t = clamp(dot(middle, piece.way) / max(dot(piece.way, piece.way), 1e-12), 0.0, 1.0);
+    return distance(middle, t * piece.way) <= piece.far;
 }
 
 @compute @workgroup_size(64)
@@ -26,19 +42,23 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     if (a.width < 0.0 || b.width < 0.0) {
         return;
     }
-    let side = f32(STRAND_TILE);
-    let reach = vec2f(0.5 * max(max(a.width, b.width), 1.0) + 1.0);
-    let low = max(floor((min(a.place, b.place) - reach) / side), vec2f(0.0));
-    let last = ceil(strand_view.size / side) - 1.0;
-    let high = min(floor((max(a.place, b.place) + reach) / side), last);
-    let way = b.place - a.place;
-    let far = reach.x + 0.7072 * side; // of a tile's middle that may be covered
-    for (var y = low.y; y <= high.y; y += 1.0) {
-        for (var x = low.x; x <= high.x; x += 1.0) {
-            let middle = (vec2f(x, y) + 0.5) * side - a.place;
-            let t = clamp(dot(middle, way) / max(dot(way, way), 1e-12), 0.0, 1.0);
-            if (distance(middle, t * way) <= far) {
-                list(piece, u32(y) * tiles_across(strand_view.size) + u32(x));
+    let one = piece_of(a, b);
+    var count = 0u; // first, so that there is one place that all pieces count at only once
+    for (var y = one.low.y; y <= one.high.y; y += 1.0) {
+        for (var x = one.low.x; x <= one.high.x; x += 1.0) {
+            count += u32(covers(one, vec2f(x, y)));
+        }
+    }
+    if (count == 0u) {
+        return;
+    }
+    var link = atomicAdd(&chains[0], count);
+    for (var y = one.low.y; y <= one.high.y; y += 1.0) {
+        for (var x = one.low.x; x <= one.high.x; x += 1.0) {
+            if (link < arrayLength(&links) && covers(one, vec2f(x, y))) {
+                let tile = u32(y) * tiles_across(strand_view.size) + u32(x);
+                links[link] = vec2u(piece, atomicExchange(&chains[1u + tile], link + 1u));
+                link += 1u;
             }
         }
     }

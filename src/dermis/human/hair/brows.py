@@ -15,10 +15,10 @@ _MOST = 760  # hairs of the bushiest brow
 _ALONG = np.array([0.0, 0.1, 0.25, 0.45, 0.65, 0.85, 1.0])
 _X = np.array([10.5, 14.5, 21.0, 30.0, 39.5, 48.5, 54.5])
 _Y = np.array([12.6, 13.2, 14.7, 17.0, 18.4, 16.4, 12.8])
-_HALF = np.array([3.4, 4.0, 4.2, 3.8, 3.0, 2.0, 1.0])
-_TURN = np.radians([84, 68, 44, 22, 4, -20, -32])
-_DENSITY = np.array([0.25, 0.6, 0.95, 1.0, 1.0, 0.9, 0.55])
-_LENGTH = np.array([5.0, 7.0, 9.0, 9.5, 9.0, 7.5, 5.5])
+_HALF = np.array([2.8, 3.4, 3.7, 3.5, 2.9, 2.0, 1.0])
+_TURN = np.radians([82, 66, 43, 21, 3, -20, -32])
+_DENSITY = np.array([0.3, 0.75, 1.0, 1.0, 1.0, 0.9, 0.55])
+_LENGTH = np.array([4.5, 6.3, 8.0, 9.0, 9.0, 7.5, 5.5])
 
 
 def places(rng: np.random.Generator) -> tuple[Doubles, Doubles, Doubles, Doubles]:
@@ -57,7 +57,7 @@ def grown(
     """
     n = len(u)
     # hairs from above and from below lean together
-    turn = np.interp(u, _ALONG, _TURN) - 0.5 * v * np.minimum(2.2 * u, 1.0) + rng.normal(0, 0.13, n)
+    turn = np.interp(u, _ALONG, _TURN) - 0.6 * v * np.minimum(2.5 * u, 1.0) + rng.normal(0, 0.13, n)
     bend = -0.5 * np.clip(turn - np.interp(np.minimum(u + 0.2, 1), _ALONG, _TURN), 0, 1) - 0.25 * v * u
     bend += rng.normal(0, 0.14, n)
     length = np.interp(u, _ALONG, _LENGTH) * rng.uniform(0.6, 1.1, n) * (0.85 + 0.3 * look.bushy)

@@ -36,23 +36,23 @@ class Lid(NamedTuple):
 
 UPPER = Lid(
     loop=(2625, 2664, 2622, 2619, 2616, 2563, 2562, 2568, 2571, 2574, 2577, 2580),
-    hairs=145,
+    hairs=165,
     first=0.14,
     last=0.96,
     length=np.array([5.0, 7.0, 8.6, 9.6, 10.0, 9.2, 7.2]),
     rise=(-0.3, 1.15),
     splay=(-0.35, 0.55),
-    radius=0.036,
+    radius=0.041,
 )
 LOWER = Lid(
     loop=(2634, 2615, 4280, 2612, 2609, 2606, 2603, 2598, 2595, 2592, 4278),
-    hairs=72,
+    hairs=84,
     first=0.2,
     last=0.95,
     length=np.array([2.8, 3.4, 4.0, 4.6, 5.2, 5.0, 4.0]),
     rise=(-0.25, -0.85),
     splay=(-0.3, 0.5),
-    radius=0.03,
+    radius=0.033,
 )
 
 
@@ -94,7 +94,7 @@ def grown(
         knots.append(place)
     made = _clumped(np.stack(knots, axis=1), u, t, rng)
     radius = lid.radius * rng.uniform(0.8, 1.15, n)
-    return made, radius[:, None] * np.maximum(1.0 - t, 0.0) ** 0.7 * np.minimum(1.0, 0.8 + t)
+    return made, radius[:, None] * np.maximum(1.0 - t, 0.0) ** 0.55 * np.minimum(1.0, 0.8 + t)
 
 
 def _clumped(knots: Doubles, u: Doubles, t: Doubles, rng: np.random.Generator) -> Doubles:
