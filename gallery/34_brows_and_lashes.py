@@ -16,7 +16,10 @@ BLINK = {"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0}
 PEOPLE = {
     "brown": (dermis.Human(), None),
     "closed": (dermis.Human(), BLINK),
-    "black, a man of 40": (dermis.Human(african=1, asian=0, caucasian=0, sex=1, age=40, hair_eumelanin=8), None),
+    "black, a man of 40": (
+        dermis.Human(african=1, asian=0, caucasian=0, sex=1, age=40, hair_eumelanin=8),
+        None,
+    ),
     "red": (dermis.Human(hair_eumelanin=0.6, hair_pheomelanin=2.0), None),
 }
 

@@ -174,5 +174,13 @@ def test_hairs_follow_the_skin(renderer: Renderer) -> None:
     assert np.abs(there - (still @ turn.T + [2.0, -3.0, 0.0])).max() < 1e-4
 
 
+def test_parts_of_the_picture_add_up(renderer: Renderer) -> None:
+    """What hairs scatter counts as reflected light; where the light from below is shown alone they only cover."""
+    scene = lit(tangle(40, absorption=2.0))
+    parts = ("all", "diffuse", "specular")
+    whole, below, over = (picture(renderer, scene, parts=part)[..., :3] for part in parts)
+    assert np.abs(below + over - whole).max() < TWIN * whole.max()
+
+
 def test_strands_are_a_setting() -> None:
     assert Settings().strands and not Settings(strands=False).strands

@@ -104,7 +104,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     var seen = seen_at(here.xyz, here.w);
     let inside = all(seen.place > vec2f(-BEYOND)) && all(seen.place < strand_view.size + BEYOND);
     if (inside && seen.width >= 0.0) {
-        seen.radiance = radiance_of(knot_at(strand, k));
+        seen.radiance = strand_view.shown.y * radiance_of(knot_at(strand, k));
     }
     drawn[index] = seen;
 }

@@ -7,6 +7,7 @@ struct StrandView {
     hairs: u32, // how many
     right: vec3f, // scaled as in shade.wgsl
     up: vec3f,
+    shown: vec2f, // factors of light from below the skin and of reflected light, which that of hairs counts as
     size: vec2f, // of the picture [pixel]
     skin: vec3f, // albedo of the skin under the hairs
     jitter: array<vec4f, 64>, // sample places in the pixel, 0..1
