@@ -94,6 +94,15 @@ def test_the_order_of_hairs_does_not_matter(renderer: Renderer) -> None:
     assert np.array_equal(first, picture(renderer, lit(head)))
 
 
+def test_any_number_of_hairs_may_share_a_tile(renderer: Renderer) -> None:
+    """Thousands of them, so thin that they hardly cover anything: no pixel is left out, none changes much."""
+    head = tangle(3000, radius_mm=1e-5)
+    scene = scene_of(head, frontal(), camera=front_camera(head, frame_mm=60.0))
+    made, bare = (picture(renderer, scene, size=(24, 24), strands=on)[..., :3] for on in (True, False))
+    assert (made != bare).any()
+    assert np.abs(made / bare - 1.0).max() < 0.05
+
+
 def test_without_hairs_nothing_changes(renderer: Renderer) -> None:
     """A head that has none and one whose hairs are left out: the same to the bit, by the same passes."""
     head = tangle(20)
@@ -175,7 +184,7 @@ def test_hairs_follow_the_skin(renderer: Renderer) -> None:
 
 
 def test_parts_of_the_picture_add_up(renderer: Renderer) -> None:
-    """What hairs scatter counts as reflected light; where the light from below is shown alone they only cover."""
+    """What hairs scatter counts as reflected light; in the light from below the skin they only cover."""
     scene = lit(tangle(40, absorption=2.0))
     parts = ("all", "diffuse", "specular")
     whole, below, over = (picture(renderer, scene, parts=part)[..., :3] for part in parts)

@@ -8,11 +8,12 @@ from dermis.frame.geometry import HeadResources
 from dermis.frame.passes import each, program
 from dermis.frame.shape import Shape
 from dermis.frame.strands import StrandResources
-from dermis.gpu import Constants, Recorder
+from dermis.gpu import Constants, Device, Recorder
 from dermis.gpu.program import Resources
 
 Look = tuple[Resources, Any, Constants]
 
+_ROWS, _ROUNDS = 8, 60_000
 _CLEARING = 64  # workgroups that empty the shadows of hairs, one for each light at least
 
 
@@ -53,10 +54,20 @@ def draw(
     _each(graph, "strands_bin.wgsl", seen | listed, made.pieces, made.constants)
     bound = head.resources | seen | listed
     bound |= {"visibility_buffer": visibility, "behind": radiance, "image": picture.result}
-    shader = program(graph.device, "strands_draw.wgsl", made.constants)
+    rows = rows_of(graph.device, made.pieces)
+    shader = program(graph.device, "strands_draw.wgsl", (*made.constants, ("ROWS", rows)))
     width, height = picture.result.size[:2]
-    graph.compute("strands", shader, bound, (width, -(-height // int(shader.constants.get("STRIP", 1)))))
+    graph.compute("strands", shader, bound, (width, -(-height // rows)))
     return picture.result
+
+
+def rows_of(device: Device, pieces: int) -> int:
+    """Pixels that an invocation draws one below the other.
+
+    Software adapters run the whole shader for pixels without hairs too, unless a loop skips these. They also
+    leave a shader's loops, all together, after 65,535 rounds, and all hairs may lie in one tile.
+    """
+    return max(1, min(_ROWS, _ROUNDS // max(1, pieces))) if device.adapter.kind == "CPU" else 1
 
 
 def _each(graph: Recorder, name: str, bound: Any, count: int, constants: Any = ()) -> None:

@@ -3,10 +3,11 @@
 //#include "strand_view.wgsl"
 //#include "strand_tiles.wgsl"
 
-override STRIP: u32 = 1u; // pixels of an invocation, one below the other, see shade.wgsl
+override ROWS: u32 = 1u; // pixels of an invocation, one below the other; see `rows_of`
 
 const NEAREST: u32 = 8u; // pieces that a pixel keeps; those behind them count by what they cover
 const MOST_DEPTHS: u32 = 8u; // samples of a pixel that hairs are compared with
+const FAR: f32 = 2e30; // depth of no piece, behind everything [mm]
 const FIXED: f32 = 65536.0; // so that sums do not depend on the order
 
 @group(0) @binding(30) var<storage, read> drawn: array<Drawn>;
@@ -24,10 +25,11 @@ struct Fragment {
     cover: f32, // of the pixel
 }
 
-// Depths of the surface at the samples of a pixel.
+// Depths of the surface at the samples of a pixel, up to eight.
 struct Depths {
-    depth: array<f32, MOST_DEPTHS>,
-    count: u32,
+    first: vec4f,
+    second: vec4f,
+    share: f32, // of the pixel that a sample stands for
 }
 
 fn depth_at(triangle: u32, place: vec2f) -> f32 {
@@ -40,17 +42,29 @@ fn depth_at(triangle: u32, place: vec2f) -> f32 {
 }
 
 fn depths_at(pixel: vec2u) -> Depths {
-    var depths: Depths;
-    depths.count = min(strand_view.samples, MOST_DEPTHS);
-    for (var k = 0u; k < depths.count; k += 1u) {
-        let s = k * strand_view.samples / depths.count;
+    let count = min(strand_view.samples, MOST_DEPTHS);
+    var depths = Depths(vec4f(-1.0), vec4f(-1.0), 1.0 / f32(count));
+    for (var k = 0u; k < count; k += 1u) {
+        let s = k * strand_view.samples / count;
         let found = textureLoad(visibility_buffer, pixel, s, 0).x;
-        depths.depth[k] = 1e30;
+        var depth = 1e30;
         if (found > 0u) {
-            depths.depth[k] = depth_at(found - 1u, vec2f(pixel) + strand_view.jitter[s].xy);
+            depth = depth_at(found - 1u, vec2f(pixel) + strand_view.jitter[s].xy);
+        }
+        if (k < 4u) {
+            depths.first[k] = depth;
+        } else {
+            depths.second[k - 4u] = depth;
         }
     }
     return depths;
+}
+
+// Share of a pixel at whose samples the surface is farther away.
+fn free_share(depth: f32, depths: Depths) -> f32 {
+    let first = select(vec4f(0.0), vec4f(1.0), vec4f(depth) < depths.first);
+    let second = select(vec4f(0.0), vec4f(1.0), vec4f(depth) < depths.second);
+    return depths.share * dot(first + second, vec4f(1.0));
 }
 
 // Where a piece may cover the plane: pieces of a hair meet on the lines that halve their angles.
@@ -104,41 +118,39 @@ fn radiance_at(one: Fragment) -> vec3f {
     return mix(drawn[begin].radiance, drawn[begin + 1u].radiance, one.along);
 }
 
+// Puts a fragment in the place of one behind it, which is handed on.
+fn settle(kept: ptr<function, array<Fragment, NEAREST>>, k: u32, one: Fragment) -> Fragment {
+    let other = (*kept)[k];
+    if (in_front(one, other)) {
+        (*kept)[k] = one;
+        return other;
+    }
+    return one;
+}
+
 fn covered(pixel: vec2u, first: u32, under: vec4f) -> vec4f {
-    var depths = depths_at(pixel);
-    var kept: array<Fragment, NEAREST>;
-    var count = 0u;
+    let depths = depths_at(pixel);
+    let none = Fragment(FAR, 0u, 0.0, 0.0);
+    var kept = array<Fragment, NEAREST>(none, none, none, none, none, none, none, none);
     var farther = 0u; // logarithm of what pieces behind those kept let through
     for (var link = first; link != 0u; link = links[link - 1u].y) {
         var one = fragment_at(vec2f(pixel) + 0.5, links[link - 1u].x);
-        if (one.cover <= 0.0) {
-            continue;
-        }
-        var free = 0u;
-        for (var k = 0u; k < depths.count; k += 1u) {
-            free += u32(one.depth < depths.depth[k]);
-        }
-        one.cover *= f32(free) / f32(depths.count);
-        if (one.cover <= 0.0) {
-            continue;
-        }
-        for (var k = 0u; k < count; k += 1u) {
-            if (in_front(one, kept[k])) {
-                let other = kept[k];
-                kept[k] = one;
-                one = other;
-            }
-        }
-        if (count < NEAREST) {
-            kept[count] = one;
-            count += 1u;
-        } else {
+        one.cover *= free_share(one.depth, depths);
+        if (one.cover > 0.0) { // without a loop, see `rows_of`
+            one = settle(&kept, 0u, one);
+            one = settle(&kept, 1u, one);
+            one = settle(&kept, 2u, one);
+            one = settle(&kept, 3u, one);
+            one = settle(&kept, 4u, one);
+            one = settle(&kept, 5u, one);
+            one = settle(&kept, 6u, one);
+            one = settle(&kept, 7u, one);
             farther += u32(-FIXED * log(max(1.0 - one.cover, 1e-4)));
         }
     }
     var through = 1.0;
     var sum = vec3f(0.0);
-    for (var k = 0u; k < count; k += 1u) {
+    for (var k = 0u; k < NEAREST; k += 1u) {
         var cover = kept[k].cover;
         if (k == NEAREST - 1u) {
             cover = 1.0 - (1.0 - cover) * exp(-f32(farther) / FIXED);
@@ -169,11 +181,11 @@ fn next_covered(first: vec2u, end: u32) -> vec2u {
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let size = textureDimensions(image);
-    let first = vec2u(id.x, id.y * STRIP);
+    let first = vec2u(id.x, id.y * ROWS);
     if (any(first >= size)) {
         return;
     }
-    let end = min(first.y + STRIP, size.y);
+    let end = min(first.y + ROWS, size.y);
     var at = next_covered(first, end);
     if (at.y >= end) {
         return;
