@@ -183,6 +183,17 @@ def test_hairs_follow_the_skin(renderer: Renderer) -> None:
     assert np.abs(there - (still @ turn.T + [2.0, -3.0, 0.0])).max() < 1e-4
 
 
+def test_hairs_are_drawn_again_only_when_they_change(renderer: Renderer) -> None:
+    head = one(0.3)
+    turned = replace(lit(head), camera=front_camera(head, (2.0, 0.0, 0.0), frame_mm=FRAME_MM))
+    ran = []
+    for scene, exposure in ((lit(head), 1.0), (lit(head), 1.0), (lit(head), 2.0), (turned, 2.0)):
+        picture(renderer, scene, exposure=exposure)
+        ran.append(set(renderer.graph.ran))
+    assert ran[1:3] == [set(), {"post"}]
+    assert "strands" in ran[3] and not ran[3] & {"shape", "shadows"}
+
+
 def test_parts_of_the_picture_add_up(renderer: Renderer) -> None:
     """What hairs scatter counts as reflected light; in the light from below the skin they only cover."""
     scene = lit(tangle(40, absorption=2.0))

@@ -107,6 +107,13 @@ def test_brows_rise_with_the_skin() -> None:
     assert np.median((raised - still)[outer][..., 1]) > 1.0
 
 
+def test_people_at_random_have_hair_of_their_ancestry() -> None:
+    people = [Human.drawn(seed) for seed in range(300)]
+    fair = [one.hair_eumelanin for one in people if one.caucasian > 0.8]
+    dark = [one.hair_eumelanin for one in people if one.caucasian < 0.2]
+    assert min(dark) > 3.0 and min(fair) < 0.6 and np.median(fair) < 2.5 < 6.0 < np.median(dark)
+
+
 def test_hairs_are_coloured_by_their_pigments() -> None:
     blond, black = (Human(hair_eumelanin=much).head(subdivide=0).strands for much in (0.3, 8.0))
     assert blond is not None and black is not None

@@ -26,7 +26,7 @@ def draw_frame(graph: Graph, inputs: Inputs, technique: Technique) -> None:
     bounded = ("SHAPES", 1) in inputs.light_constants
     shadows.draw(graph, made.shadow_maps, inputs.shadow_views, made.head, bounded)
     if made.strands:
-        graph.repeat(strands.pose, made.strands, made.shape)
+        graph.repeat(strands.pose, made.strands.tables, made.shape)
         if len(inputs.shadow_views.clips):
             strands.shadow(graph, made.strands, inputs.lit)
     if made.sky and inputs.around:

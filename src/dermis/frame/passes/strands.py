@@ -7,7 +7,7 @@ from typing import Any
 from dermis.frame.geometry import HeadResources
 from dermis.frame.passes import each, program
 from dermis.frame.shape import Shape
-from dermis.frame.strands import StrandResources
+from dermis.frame.strands import StrandResources, StrandTables
 from dermis.gpu import Constants, Device, Recorder
 from dermis.gpu.program import Resources
 
@@ -17,9 +17,8 @@ _ROWS, _ROUNDS = 8, 60_000
 _CLEARING = 64  # workgroups that empty the shadows of hairs, one for each light at least
 
 
-def pose(graph: Recorder, strands: StrandResources, shape: Shape) -> None:
+def pose(graph: Recorder, made: StrandTables, shape: Shape) -> None:
     """Put the hairs where the skin is."""
-    made = strands.tables
     bound = {"points": shape.surface["points"], "strands": made.strands, "knots": made.knots}
     count = made.hairs + made.pieces
     _each(graph, "strands_pose.wgsl", bound | {"posed": made.posed}, count, made.constants)
