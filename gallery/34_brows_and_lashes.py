@@ -1,7 +1,7 @@
 """Brows and lashes.
 
 Single hairs, grown by code on the package's human and drawn by compute: what a hair scatters follows from its
-pigments, and it shades the skin. Hairs go along with the skin. The eye is a white ball yet.
+pigments, and it shades the skin. Hairs go along with the skin.
 
 Deck: +
 Equation: L = Σ_lobes A M N E

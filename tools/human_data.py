@@ -14,7 +14,7 @@ from human_layout import human_layout
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, diags_array, eye_array, vstack
 
-from dermis.human.model import DELTA_MM
+from dermis.human.published import DELTA_MM
 from dermis.mesh.rig import INFLUENCES
 
 Doubles = NDArray[np.float64]

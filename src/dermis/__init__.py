@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from dermis.errors import DermisError
     from dermis.frame.renderer import Renderer, render
-    from dermis.human.model import human_targets
     from dermis.human.person import Human
+    from dermis.human.published import human_targets
     from dermis.human.regions.apply import with_regions
     from dermis.images.io import write_image
     from dermis.images.movie import MovieWriter
@@ -45,7 +45,7 @@ _HOME = {
     "Head": "mesh.head",
     "load_head": "scene.heads",
     "Human": "human.person",
-    "human_targets": "human.model",
+    "human_targets": "human.published",
     "with_regions": "human.regions.apply",
     "DermisError": "errors",
     "write_image": "images.io",

@@ -10,6 +10,7 @@ from dermis import DermisError, Human, Pose
 from dermis.atlas.build import build_atlas
 from dermis.atlas.unwrap.stretch import singular_values
 from dermis.human.model import MATERIALS
+from dermis.human.published import count
 from dermis.mesh.head import Head
 
 FACE_MM = 0.11  # a texel of a map of 4096 texels a side
@@ -41,7 +42,9 @@ def test_the_average_build_needs_no_target() -> None:
 def test_people_between_two_lie_between_them() -> None:
     """Seen from the middle between the eyes, as all of them are."""
     young, middle, old = (Human(age=age).positions_mm for age in (25, 57.5, 90))
-    assert np.abs(0.5 * (young + old) - middle).max() < 1e-3
+    off = np.abs(0.5 * (young + old) - middle)
+    assert off[: count()].max() < 1e-3
+    assert off.max() < 0.02  # eyeballs stay round, as large as the lids' own curve
     assert np.abs(old - young).max() > 3.0
 
 
@@ -138,8 +141,8 @@ def test_it_is_loaded_by_name(head: Head) -> None:
     loaded = dermis.load_head("human")
     assert loaded.name == "human" and np.array_equal(loaded.positions_mm, head.positions_mm)
     assert len(loaded.mesh.triangles) == 4 * len(head.mesh.triangles)
-    colour = loaded.maps.colour
-    assert colour is not None and (colour[0, 0, 0] > colour[0, 0, 1] > colour[0, 0, 2])
+    red, green, blue = loaded.maps.mean_colour
+    assert red > green > blue
     with pytest.raises(DermisError, match="unit_mm: expected a file"):
         dermis.load_head("human", unit_mm=10.0)
 

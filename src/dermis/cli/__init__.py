@@ -9,7 +9,7 @@ COMMANDS = {
     "animate": "Draw a head that moves, as a movie or as numbered pictures.",
     "view": "Turn a head, its skin and its light in a window or a web page.",
     "profile": "Compute how light spreads below a skin, and fit Gaussians to it.",
-    "head": "Make a head with its maps and write it as glTF.",
+    "head": "Make a person of the parametric human and write it as glTF.",
     "compare": "Compare techniques with the truth, or the models of the surface.",
     "gallery": "Draw every comparison of the talk, and a page that explains them.",
     "bench": "Measure how fast frames are on this machine.",

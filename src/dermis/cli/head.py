@@ -1,112 +1,196 @@
-"""`dermis head`: a head made from a few numbers, as a file that other programs open."""
+"""`dermis head`: a person of the parametric human, as a file that other programs open."""
 
 from __future__ import annotations
 
 import time
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 from cyclopts import Parameter
 
-from dermis.cli.console import print_json, print_lines, progress
-from dermis.cli.options import Json, Whole, given
+from dermis.cli.console import print_json, print_lines, working_on
+from dermis.cli.options import Adapter, Json, Whole, given
+from dermis.cli.pose_options import parse_weights
+from dermis.errors import refuse
+
+if TYPE_CHECKING:
+    from dermis.human.person import Human
+    from dermis.human.skin.look import SkinLook
+    from dermis.mesh.eyes import EyeLook
+    from dermis.mesh.head import Head
+
+L = TypeVar("L", "SkinLook", "EyeLook")
+TARGET, EXPRESSION = "--target", "--expression"
+_Pairs = Parameter(negative="", metavar="NAME=WEIGHT,...", show_default=False)
 
 
 def head(
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("head.glb"),
     seed: Whole = None,
-    width: float | None = None,
-    nose: float | None = None,
-    ears: float | None = None,
-    jaw: float | None = None,
-    fullness: float | None = None,
-    asymmetry: float | None = None,
-    melanin: float | None = None,
-    eumelanin: float | None = None,
-    blood: float | None = None,
-    oxygen: float | None = None,
-    freckles: float | None = None,
-    moles: float | None = None,
-    oil: float | None = None,
+    african: float | None = None,
+    asian: float | None = None,
+    caucasian: float | None = None,
+    sex: float | None = None,
     age: float | None = None,
-    stubble: float | None = None,
-    size: Whole = None,
-    layout: Literal["few", "many"] = "few",
+    weight: float | None = None,
+    muscle: float | None = None,
+    target: Annotated[list[str] | None, _Pairs] = None,
+    expression: Annotated[list[str] | None, _Pairs] = None,
+    skin: Annotated[list[str] | None, _Pairs] = None,
+    eye: Annotated[list[str] | None, _Pairs] = None,
+    colour: Path | None = None,
+    normal: Path | None = None,
+    roughness: Path | None = None,
+    size: int = 1024,
+    layout: Literal["own", "hm08"] = "own",
+    subdivide: Whole = None,
+    adapter: Adapter = "auto",
+    list_targets: Annotated[bool, Parameter(negative="", show_default=False)] = False,
     as_json: Json = False,
 ) -> int:
-    """Make a head with its maps and write it as glTF.
+    """Make a person of the parametric human and write it as glTF.
 
-    Other programs find a mesh with colour, roughness and normal maps; this package also reads height, surface
-    strength, roughness and face regions from it.
+    Other programs find a mesh in metres with materials and maps, 52 morph targets by ARKit's names and a
+    skeleton of neck, head, jaw and eyes; this package reads the same person back.
 
     Examples:
 
         dermis head -o head.glb
 
-        dermis head --seed 7 --jaw 1.08 --nose 1.1 --melanin 0.06 --freckles 0.5 -o other.glb
+        dermis head --seed 7 --age 60 --target nose/nose-hump-incr=0.5 -o other.glb
 
-        dermis render other.glb -o other.png
+        dermis head --asian 1 --african 0 --caucasian 0 --sex 1 --expression mouthSmileLeft=1,jawOpen=0.2
+
+        dermis head --african 1 --asian 0 --caucasian 0 --skin melanin=0.3,moles=0.6 --size 4096 -o dark.glb
+
+        dermis render other.glb --pose jawOpen=0.6 --bone head=0,20,0 -o other.png
 
     Parameters
     ----------
     output:
         File to write: .glb.
     seed:
-        Which small asymmetries, spots and folds [0].
-    width:
-        Breadth of the head over the average, 0.9 to 1.1.
-    nose:
-        Size of the nose, 0.8 to 1.25.
-    ears:
-        Size of the ears, 0.8 to 1.2.
-    jaw:
-        Breadth of the lower jaw, 0.88 to 1.12.
-    fullness:
-        Soft tissue, from -1 (lean, aged) to 1 (full, young).
-    asymmetry:
-        How much left and right differ, 0 to 2 times the usual.
-    melanin:
-        Share of melanosomes in the epidermis, 0 to 1.
-    eumelanin:
-        Share of them that is eumelanin.
-    blood:
-        Share of blood in the dermis.
-    oxygen:
-        Share of the haemoglobin that carries oxygen.
-    freckles:
-        Freckles, 0 to 1.
-    moles:
-        Moles, 0 to 1.
-    oil:
-        Oil on the skin, 0 to 1.
+        A person at random, the same for the same number [a person between all].
+    african:
+        Share of this ancestry, 0 to 1; only the ratios of the three count [1/3, or the seed's, as all below].
+    asian:
+        Share of this ancestry.
+    caucasian:
+        Share of this ancestry.
+    sex:
+        From 0, female, to 1, male [0].
     age:
-        Depth of the folds, 0 to 1.
-    stubble:
-        Shadow of the hair that was shaved off the head, 0 (bald) to 1.
+        25 to 90 years [30].
+    weight:
+        From -1, least, to 1, most [0].
+    muscle:
+        From -1, least, to 1, most [0].
+    target:
+        Weights of published targets, as nose/nose-hump-incr=0.5; may be given again.
+    expression:
+        Weights with which morph targets of the file rest, as jawOpen=0.2; may be given again.
+    skin:
+        Pigments and texture: melanin, eumelanin, blood, oxygen, redness, freckles, moles, spots, tan, veins,
+        stubble, beard, oil and age, all from 0 to 1, and seed; as melanin=0.1,freckles=0.4 [what goes with
+        the person].
+    eye:
+        eumelanin, 0 (blue) to 1 (dark brown), pupil_mm, redness, seed; as eumelanin=0.2 [what goes with it].
+    colour:
+        Picture of the skin's colour, sRGB [the head's own, as the next two].
+    normal:
+        Normal map, green up.
+    roughness:
+        Grey picture of the roughness.
     size:
-        Side of the maps in texels, a power of two from 256 to 4096 [2048].
+        Side of the maps that are painted, a power of two from 256 to 4096 [texels].
     layout:
-        few charts, or many: a layout with as many seams as can be, to test them.
+        own has most room for the face; hm08 is MakeHuman's, which its skins fit.
+    subdivide:
+        Levels of subdivision, 0 to 3; each takes four times the room [1].
+    adapter:
+        Which adapter paints: auto, cpu or part of a name.
+    list_targets:
+        Print the names of the published targets, and write nothing.
     """
-    started = time.perf_counter()
-    from dermis.human.bust.parameters import BustParameters
-    from dermis.human.bust_file import BustRecipe, write_bust
-    from dermis.human.skin_maps.look import SkinLook
+    from dermis.frame.painted import with_painted_maps
+    from dermis.gpu import open_device
     from dermis.outputs import check_output
 
+    if list_targets:
+        return _list_targets(as_json)
+    started = time.perf_counter()
     check_output(output, (".glb",), "Name it something.glb")
-    chosen = given(seed=seed)
-    proportions = given(width=width, nose=nose, ears=ears, jaw=jaw, fullness=fullness, asymmetry=asymmetry)
-    pigments = given(melanin=melanin, eumelanin=eumelanin, blood=blood, oxygen=oxygen)
-    marks = given(freckles=freckles, moles=moles, oil=oil, age=age, stubble=stubble)
-    shape, look = BustParameters(**chosen, **proportions), SkinLook(**chosen, **pigments, **marks)
-    recipe = BustRecipe(shape, look, layout=layout, **given(size=size))
-    with progress("making the head") as report:
-        write_bust(output, recipe, report)
-    seconds = time.perf_counter() - started
+    numbers = given(african=african, asian=asian, caucasian=caucasian, sex=sex, age=age)
+    numbers |= given(weight=weight, muscle=muscle)
+    person = _person(seed, numbers, parse_weights(target or [], TARGET))
+    own = _look(person.look, skin, "--skin"), _look(person.iris, eye, "--eye")
+    person = replace(person, skin=own[0], eyes=own[1])
+    with working_on("making the head"):
+        made = person.head(layout=layout, **given(subdivide=subdivide))
+        made = _with_maps(made, given(colour=colour, normal=normal, roughness=roughness))
+        made = with_painted_maps(open_device(adapter), made, size)
+        length = _write(output, person, made, parse_weights(expression or [], EXPRESSION))
+    _report(output, person, made, as_json, bytes=length, seconds=round(time.perf_counter() - started, 3))
+    return 0
+
+
+def _person(seed: int | None, numbers: dict[str, Any], targets: dict[str, float]) -> Human:
+    """The drawn or the usual person, with what was given in place of its own."""
+    from dermis.human.person import Human
+
+    base = Human() if seed is None else Human.drawn(seed)
+    return replace(base, **numbers, targets={**base.targets, **targets})
+
+
+def _look(usual: L, words: list[str] | None, option: str) -> L:
+    """A look with some of its numbers replaced."""
+    chosen = parse_weights(words or [], option)
+    known = [one.name for one in fields(usual)]
+    for name in chosen:
+        if name not in known:
+            refuse(option, f"names of {', '.join(known)}", f"{name!r} came", "Correct it")
+    numbers: dict[str, Any] = dict(chosen)
+    if "seed" in numbers and numbers["seed"] == int(numbers["seed"]):
+        numbers["seed"] = int(numbers["seed"])
+    return replace(usual, **numbers)
+
+
+def _with_maps(made: Head, files: dict[str, Any]) -> Head:
+    """The head with maps of files in place of its own; a normal map takes the place of its relief."""
+    from dermis.mesh.maps import load_maps
+
+    loaded = load_maps(**files)
+    chosen = {role: getattr(loaded, role) for role in files} | ({"height": None} if "normal" in files else {})
+    return replace(made, maps=replace(made.maps, **chosen))
+
+
+def _write(output: Path, person: Human, made: Head, expression: dict[str, float]) -> int:
+    from dermis.human.head_file import write_person
+    from dermis.scene.pose import Pose
+    from dermis.scene.skin import Skin
+
+    Pose(expression).motion(made.control, EXPRESSION)  # names and weights that can be
+    return write_person(output, person, made, roughness=Skin().roughness, weights=expression)
+
+
+def _report(output: Path, person: Human, made: Head, as_json: bool, **told: Any) -> None:
+    from dermis.human.head_file import numbers_of
+
     if as_json:
-        print_json({"head": str(output), "size": recipe.size, "layout": layout, "seconds": round(seconds, 3)})
+        size = {"vertices": len(made.mesh.positions), "triangles": len(made.mesh.triangles)}
+        print_json({"head": str(output), "person": numbers_of(person), **size, **told})
+        return
+    counted = f"{len(made.mesh.triangles):,} triangles  {told['bytes'] / 1e6:.1f} MB"
+    print_lines(f"{output}  {counted}  {told['seconds']:.1f} s", *filter(None, [made.attribution]))
+
+
+def _list_targets(as_json: bool) -> int:
+    from dermis.human.published import human_targets
+
+    if as_json:
+        print_json(list(human_targets()))
     else:
-        print_lines(f"{output}  {seconds:.1f} s")
+        print_lines(*human_targets())
     return 0

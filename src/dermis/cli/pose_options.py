@@ -11,9 +11,10 @@ from dermis.errors import DermisError, refuse
 
 if TYPE_CHECKING:
     from dermis.mesh.head import Head
+    from dermis.scene.model import Scene
     from dermis.scene.pose import Pose
 
-POSE, BONE = "--pose", "--bone"
+POSE, BONE, LOOK_AT = "--pose", "--bone", "--look-at"
 Weights = Annotated[
     list[str] | None,
     Parameter(
@@ -22,6 +23,14 @@ Weights = Annotated[
         metavar="NAME=WEIGHT,...",
         help="Weights of morph targets, as jawOpen=0.6,mouthSmileLeft=1, beside those of a scene's [pose]. "
         "dermis animate HEAD --names lists them.",
+    ),
+]
+LookAt = Annotated[
+    str | None,
+    Parameter(
+        name=LOOK_AT,
+        metavar="X,Y,Z",
+        help="Where the eyes of the parametric human look: a place in mm from the head's centre, or camera.",
     ),
 ]
 Turns = Annotated[
@@ -36,7 +45,7 @@ Turns = Annotated[
 ]
 
 
-def parse_weights(words: Sequence[str]) -> dict[str, float]:
+def parse_weights(words: Sequence[str], option: str = POSE) -> dict[str, float]:
     """Weights by name of "jawOpen=0.6,mouthSmileLeft=1"."""
     weights = {}
     for word in (part for text in words for part in text.split(",")):
@@ -44,7 +53,7 @@ def parse_weights(words: Sequence[str]) -> dict[str, float]:
         weight = _numbers(number)
         if not sign or not name.strip() or weight is None or len(weight) != 1:
             expected = "NAME=WEIGHT with commas between, such as jawOpen=0.6,mouthSmileLeft=1"
-            refuse(POSE, expected, f"{word!r} came", "Correct it")
+            refuse(option, expected, f"{word!r} came", "Correct it")
         weights[name.strip()] = weight[0]
     return weights
 
@@ -91,6 +100,16 @@ def pose_given(
                 raise
             raise DermisError(f"{fault} All names: dermis animate {name} --names.") from None
     return Pose(weights, turns)
+
+
+def gaze_given(words: str, scene: Scene) -> Pose:
+    """The scene's pose with eyes that look where it was typed."""
+    from dermis.scene.gaze import looking_at
+
+    place = scene.camera.position if words == "camera" else _numbers(words)
+    if place is None or len(place) != 3:
+        refuse(LOOK_AT, "camera, or X,Y,Z in mm from the head's centre", f"{words!r} came", "Correct it")
+    return looking_at(scene.head, place, scene.pose)
 
 
 def _numbers(text: str) -> list[float] | None:

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from dermis.cli.options import check, option_name, options_of, refuse_options
-from dermis.cli.pose_options import Turns, Weights, laid_over, parse_turns, parse_weights, pose_given
+from dermis.cli.pose_options import (
+    LookAt,
+    Turns,
+    Weights,
+    gaze_given,
+    laid_over,
+    parse_turns,
+    parse_weights,
+    pose_given,
+)
 from dermis.errors import refuse
 from dermis.scene.environment import Environment
 from dermis.scene.head_table import HeadTable
@@ -56,6 +65,7 @@ class SceneOptions:
     head: HeadOptions = field(default_factory=dict)
     pose: Weights = None
     bone: Turns = None
+    look_at: LookAt = None
 
 
 DEFAULTS = SceneOptions()
@@ -71,14 +81,17 @@ def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     if weights or turns:
         scene = replace(scene, pose=laid_over(pose_given(weights, turns, scene.head, name), scene.pose))
     environment = _environment(scene.environment, given.around)
-    return Scene(
+    made = Scene(
         scene.head,
         lights=_lights(scene, given.lights, environment, replaced="name" in given.around),
         camera=scene.camera if given.camera is None else load_camera(given.camera, scene.head),
         skin=Skin(**(scene.skin.model_dump() | given.skin)),
         environment=environment,
         pose=scene.pose,
-    ), Settings(**(settings.model_dump() | given.settings))
+    )
+    if given.look_at is not None:
+        made = replace(made, pose=gaze_given(given.look_at, made))
+    return made, Settings(**(settings.model_dump() | given.settings))
 
 
 def _check(name: str, given: SceneOptions) -> None:

@@ -8,9 +8,11 @@ from typing import Any
 
 from dermis.frame import surroundings
 from dermis.frame.inputs import Split
+from dermis.frame.passes.painting import paint
 from dermis.frame.seams import LaidOut, Remedy, laid_out, remedy_of
 from dermis.frame.surroundings import Surroundings
 from dermis.frame.techniques.technique import Technique
+from dermis.human.skin.painted import PaintedMaps
 from dermis.mesh.head import Head
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.environment import Environment
@@ -70,6 +72,19 @@ class Asked:
     def remedy(self) -> Remedy:
         """What is done at the seams."""
         return remedy_of(self.settings.seams, self.technique.stitches)
+
+    @property
+    def painted_side(self) -> int:
+        """Of maps that the device paints [texels]; 0 for a head that has all of its own."""
+        if not isinstance(self.head.maps, PaintedMaps):
+            return 0
+        side = 1 << (self.settings.atlas - 1).bit_length()
+        return min(max(side, paint.LEAST), paint.MOST)
+
+    @property
+    def moving(self) -> bool:
+        """Whether expressions change the maps."""
+        return self.posed and self.painted_side > 0 and bool(self.head.targets)
 
     @property
     def count(self) -> int:

@@ -13,6 +13,7 @@ from dermis.frame.passes import (
     strands,
     visibility_buffer,
 )
+from dermis.frame.passes.painting import expression
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Graph
 
@@ -23,6 +24,8 @@ def draw_frame(graph: Graph, inputs: Inputs, technique: Technique) -> None:
     shape.draw(graph, made.shape, inputs.motion)
     if made.person:
         shape.draw(graph, made.person, inputs.motion.at_rest)
+    if made.face and inputs.movements is not None:
+        expression.draw(graph, made.face, inputs.movements)
     bounded = ("SHAPES", 1) in inputs.light_constants
     shadows.draw(graph, made.shadow_maps, inputs.shadow_views, made.head, bounded)
     if made.strands:

@@ -16,6 +16,7 @@ from dermis.frame.geometry import HeadResources
 from dermis.frame.levels import Blur, Levels
 from dermis.frame.passes.bloom import Glow
 from dermis.frame.passes.moving_occlusion import Sky
+from dermis.frame.passes.painting.expression import Face
 from dermis.frame.passes.post import Picture
 from dermis.frame.passes.shadows import ShadowMaps
 from dermis.frame.passes.shape import MotionBytes
@@ -42,6 +43,7 @@ from dermis.scene.camera import Camera
 from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
+_EYE_SEEDS = 1000  # that look different
 _MOST_MATERIALS = 64
 _PARTS = {"all": (1.0, 1.0), "diffuse": (1.0, 0.0), "specular": (0.0, 1.0)}  # from below, off the surface
 
@@ -52,6 +54,7 @@ class Resources:
 
     shape : the head's, which the motion of each frame moves
     person : the shape of another person at rest, None for the head's own
+    face : the painted maps as far as expressions change them, None where nothing does
     layouts : atlases that light is spread on; the first is the one that is looked at
     scatters : whether light spreads over them
     blurs : how, on each, where light is as bright as it was given
@@ -69,6 +72,7 @@ class Resources:
 
     shape: Shape
     person: Shape | None
+    face: Face | None
     head: HeadResources
     layouts: tuple[AtlasLayout, ...]
     shadow_maps: ShadowMaps
@@ -95,6 +99,7 @@ class Inputs:
     """Everything that a frame reads.
 
     motion : what moves the head's shape
+    movements : what changes the painted face, None where nothing does
     layouts, blurs : those of the resources in the light of now
     shadow_views : how the shadow maps see the head
     light_constants : pipeline constants of what is lit
@@ -107,6 +112,7 @@ class Inputs:
     resources: Resources
     settings: Settings
     motion: MotionBytes
+    movements: NDArray[np.float32] | None
     layouts: tuple[AtlasLayout, ...]
     blurs: tuple[Blur, ...]
     shadow_views: Views
@@ -175,7 +181,7 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Sp
         refuse(head.name, f"at most {_MOST_MATERIALS} materials", count, "Join some groups")
     for index, material in enumerate(materials):
         colours[index, :3] = material.colour
-    return shade.record(
+    record = shade.record(
         "Shade",
         samples=settings.samples,
         relit=split.relit,
@@ -185,13 +191,24 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Sp
         material_colour=colours,
         jitter=jitter,
     )
+    if head.eyes is not None:
+        for name in ("eumelanin", "pupil_mm", "redness"):
+            record["eyes"][name] = getattr(head.eyes.look, name)
+        record["eyes"]["seed"] = head.eyes.look.seed % _EYE_SEEDS
+        record["eyes"]["material"] = head.eyes.material
+    return record
 
 
-def seen_by(view: Any, pinhole: Pinhole) -> Any:
-    """A shading pass' record with the rays of a camera."""
+def seen_by(view: Any, pinhole: Pinhole, eyes: NDArray[np.float64] | None) -> Any:
+    """A shading pass' record with the rays of a camera.
+
+    eyes : (2, 4, 4) from the head's space to that of each eye of true shape, if it has such
+    """
     eye, (right, up, forward), half = pinhole
     # Its bytes: numpy's own copy takes the members one by one, and has anything between them.
     record: Any = np.ndarray((), view.dtype, bytearray(view.tobytes()))
     record["eye"], record["forward"] = eye, forward
     record["right"], record["up"] = tuple(half[0] * c for c in right), tuple(half[1] * c for c in up)
+    if eyes is not None:
+        record["eyes"]["to_own"] = eyes.transpose(0, 2, 1)  # by columns
     return record

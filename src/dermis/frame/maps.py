@@ -9,9 +9,13 @@ from numpy.typing import NDArray
 
 from dermis.atlas.raster import rasterise
 from dermis.frame.passes import map_mips
+from dermis.frame.passes.painting import paint
 from dermis.frame.surface import DEFAULT_COLOUR
 from dermis.gpu import Device, make_texture, upload
 from dermis.gpu.textures import texture_from
+from dermis.human.skin.detail import detail_slopes
+from dermis.human.skin.painted import PaintedMaps
+from dermis.human.skin.surface import painting
 from dermis.images.colour import encode_srgb
 from dermis.images.filters import mip_chain
 from dermis.mesh.geometry import triangle_areas
@@ -23,12 +27,46 @@ from dermis.specular.beckmann import beckmann_table
 _MEAN_TEXELS = 512  # a side of the grid that a map's mean is taken on
 
 
-def upload_maps(device: Device, head: Head, use_colour: bool, decoded: bool = True) -> dict[str, Any]:
+def upload_maps(
+    device: Device, head: Head, use_colour: bool, decoded: bool = True, side: int = 0, moving: bool = False
+) -> dict[str, Any]:
     """The head's maps by their names in skin.wgsl, with a sampler and the lobe's table.
 
     use_colour : False leaves the colour map white, for profiles that carry the colour
     decoded : False takes the colour map's sRGB for linear, which is wrong
+    side : of maps that are painted [texels]
+    moving : whether expressions change them; with what does, a `Face`, under "face"
     """
+    maps = head.maps
+    if isinstance(maps, PaintedMaps):
+        return _of_files(device, head, use_colour, decoded) | _painted(
+            device, head, maps, use_colour, (side, moving)
+        )
+    return _of_files(device, head, use_colour, decoded)
+
+
+def fine_detail(device: Device, fine: bool) -> dict[str, Any]:
+    """What is finer than maps, by its names in skin.wgsl; flat unless the skin is painted."""
+    slopes = detail_slopes() if fine else np.zeros((1, 1, 4), np.float32)
+    around = {f"address_mode_{axis}": "repeat" for axis in "uv"}
+    sampler = device.sampler(mag_filter="linear", min_filter="linear", mipmap_filter="linear", **around)
+    return {"detail_map": map_mips.detail(device, slopes), "detail_sampler": sampler}
+
+
+def _painted(
+    device: Device, head: Head, maps: PaintedMaps, use_colour: bool, how: tuple[int, bool]
+) -> dict[str, Any]:
+    """Maps that no file gives, painted."""
+    surface = painting(head.mesh, head.control.stencils)
+    found = paint.draw(device, surface, maps.look, *how)._asdict()
+    face = found.pop("face")
+    given = {"relief": maps.height if maps.normal is None else maps.normal, "colour": maps.colour}
+    given |= {"specular": maps.specular, "roughness": maps.roughness}
+    kept = [role for role in found if given[role] is None and (use_colour or role != "colour")]
+    return {f"{role}_map": found[role] for role in kept} | {"face": face}
+
+
+def _of_files(device: Device, head: Head, use_colour: bool, decoded: bool) -> dict[str, Any]:
     maps = head.maps
     white = np.ones((1, 1, 3), np.float32)
     colour = (

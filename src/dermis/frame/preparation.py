@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from dermis.frame.asked import Asked
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.inputs import Inputs, camera_views, pinhole, seen_by
@@ -21,6 +24,7 @@ from dermis.frame.strands import strand_constants
 from dermis.frame.surroundings import brightest, load_surroundings, with_suns
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Device, Memo
+from dermis.human.skin.movements import movements
 from dermis.mesh.head import Head
 from dermis.mesh.outline import Outline
 from dermis.mesh.rig import Motion
@@ -34,10 +38,11 @@ Lights = tuple[Light, ...]
 
 
 class Moved(NamedTuple):
-    """A head's motion and how far out its shape reaches."""
+    """A head's motion, how far out its shape reaches, and how its eyes stand."""
 
     motion: MotionBytes
     outline: Outline
+    eyes: NDArray[np.float64] | None
 
 
 class Preparation:
@@ -80,6 +85,7 @@ class Preparation:
             resources=resources,
             settings=settings,
             motion=moved.motion,
+            movements=keep(_movements, head, scene.motion) if resources.face else None,
             layouts=tuple(under(layout, record) for layout in resources.layouts),
             blurs=keep(_scaled, resources.blurs, scale),
             shadow_views=layers,
@@ -87,7 +93,7 @@ class Preparation:
             camera=camera_views(seen_from, moved.outline, settings.samples),
             half=seen_from.half,
             around=self._around(head, scene.motion, moved.outline) if resources.sky else None,
-            view=seen_by(resources.view, seen_from),
+            view=seen_by(resources.view, seen_from, moved.eyes),
             constants=resources.constants + shone_on,
         )
 
@@ -108,8 +114,17 @@ def _person(scene: Scene) -> Any:
     return None if motion is None or motion.positions_mm is own else motion.positions_mm
 
 
+def _movements(head: Head, motion: Motion | None) -> NDArray[np.float32]:
+    assert motion is not None
+    return movements(head.targets, motion.weights)
+
+
 def _resting(head: Head) -> Moved:
-    return Moved(resting(head.control), head.mesh.outline)
+    return Moved(resting(head.control), head.mesh.outline, _eyes(head, head.control.rest))
+
+
+def _eyes(head: Head, motion: Motion) -> NDArray[np.float64] | None:
+    return None if head.eyes is None else head.eyes.frames(head.control, motion)
 
 
 def _posed(head: Head, motion: Motion, at_rest: MotionBytes) -> Moved:
@@ -118,8 +133,8 @@ def _posed(head: Head, motion: Motion, at_rest: MotionBytes) -> Moved:
     positions = at_rest.positions if same else motion.positions_mm.tobytes()
     moved = MotionBytes(positions, weights, matrices)
     if moved == at_rest:  # where the mesh's own outline is exact
-        return Moved(moved, head.mesh.outline)
-    return Moved(moved, Outline(rig.outline_mm(motion), _SLACK_MM))
+        return Moved(moved, head.mesh.outline, _eyes(head, motion))
+    return Moved(moved, Outline(rig.outline_mm(motion), _SLACK_MM), _eyes(head, motion))
 
 
 def _looked(

@@ -19,7 +19,7 @@ from dermis.frame.gutters import Walks, make_walks, with_lists
 from dermis.frame.inputs import Resources, view_record
 from dermis.frame.levels import Blur, Levels
 from dermis.frame.limits import check_limits
-from dermis.frame.maps import upload_maps
+from dermis.frame.maps import fine_detail, upload_maps
 from dermis.frame.passes import bloom, post, shade, shadows, surface_texels, visibility_buffer
 from dermis.frame.passes.moving_occlusion import Sky, make_map, make_sky
 from dermis.frame.passes.shape import still_shape
@@ -35,7 +35,7 @@ from dermis.frame.strands import (
 )
 from dermis.frame.techniques.technique import AtlasTechnique, Technique
 from dermis.frame.translucency import translucency_of
-from dermis.gpu import Device, Memo
+from dermis.gpu import Constants, Device, Memo
 from dermis.gpu.textures import texture_from
 from dermis.mesh.head import Head
 from dermis.specular.albedo import albedo_table
@@ -50,7 +50,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     """
     settings, keep, technique = asked.settings, memo.keep, asked.technique
     check_limits(device, technique, settings, asked.atlases, asked.count)
-    reading = device, asked.head, asked.white, settings.gamma == "right"
+    reading = device, asked.head, asked.white, settings.gamma == "right", asked.painted_side, asked.moving
     maps = memo.soon(device.executor, upload_maps, *reading)  # which take long to read
     shadow_maps = _shadows(memo, device, asked)
     tables = keep(shape_tables, device, asked.head)
@@ -61,25 +61,25 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     shared = _shared(memo, device, asked, shadow_maps, curvature, strands)
     atlases = [_atlas(memo, device, asked, name, k) for k, name in enumerate(asked.atlases.layouts)]
     uploaded: dict[str, Any] = memo.wait(maps)
-    shared |= uploaded
+    shared |= uploaded | keep(fine_detail, device, asked.painted_side > 0)
     layouts = [_layout(memo, device, asked, one, shape, person, shared, k) for k, one in enumerate(atlases)]
     own, view = _shading(memo, device, asked)
-    side, several = settings.atlas, len(layouts) > 1
     return Resources(
         shape=shape,
         person=person,
+        face=uploaded.get("face"),
         head=layouts[0].head,
         layouts=tuple(layouts),
         shadow_maps=shadow_maps,
         scatters=asked.count > 0,
         levels=_levels(memo, device, asked),
         blurs=tuple(_blur(asked, textures) for _, textures in atlases) if asked.count else (),
-        scattered=_sum(memo, device, asked, side, "both") if several else layouts[0].scattered,
+        scattered=_sum(memo, device, asked, settings.atlas, "both") if layouts[1:] else layouts[0].scattered,
         curvature=curvature,
         own=own,
         visibility=keep(_visibility, device, settings.size, settings.samples),
         view=view,
-        constants=surface.constants(asked.skin) + technique.shade_constants,
+        constants=surface.constants(asked.skin) + _details(asked) + technique.shade_constants,
         suns=len(asked.surroundings.suns),
         sky=_sky(memo, device, asked, layouts[0], tables) if asked.occlusion_moves else None,
         gaussians=len(asked.profile.variance_mm2),
@@ -88,6 +88,12 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         glow=keep(bloom.make_glow, device, settings.size) if settings.bloom else None,
         unscattered=keep(atlases[0][0].unscattered, asked.head.mesh),
     )
+
+
+def _details(asked: Asked) -> Constants:
+    """Whether there is relief finer than maps, and eyes of true shape."""
+    found = {"DETAIL": asked.painted_side > 0, "EYES": asked.head.eyes is not None}
+    return tuple((name, 1) for name, there in found.items() if there)
 
 
 def _shading(memo: Memo, device: Device, asked: Asked) -> tuple[Any, Any]:

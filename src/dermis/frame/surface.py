@@ -9,6 +9,7 @@ import numpy as np
 from dermis.gpu import ComputeProgram
 from dermis.gpu.shader_types import struct_dtype
 from dermis.gpu.wgsl_source import Member
+from dermis.mesh.eyes import CORNEA_MM, LIMBUS_MM, SCLERA_MM, cornea_centre_mm, iris_mm
 from dermis.mesh.maps import Maps
 from dermis.optics.directions import directions
 from dermis.optics.gaussians import GaussianSum
@@ -39,6 +40,17 @@ def surface_numbers() -> dict[str, float]:
     return {"root_of_first_row": ROOT_OF_FIRST_ROW, **of_models}
 
 
+def eye_numbers() -> dict[str, float]:
+    """Numbers that eye.wgsl fills in."""
+    return {
+        "sclera_mm": SCLERA_MM,
+        "cornea_mm": CORNEA_MM,
+        "cornea_at": cornea_centre_mm(),
+        "limbus_mm": LIMBUS_MM,
+        "iris_at": iris_mm(),
+    }
+
+
 def constants(skin: Skin) -> tuple[tuple[str, int], ...]:
     """Values of lobe.wgsl's `override`s where they are not the default 0."""
     numbers = {"MODEL": MODELS.names.index(model_of(skin)), "EXACT_FRESNEL": int(skin.fresnel == "exact")}
@@ -59,7 +71,7 @@ def skin_record(
 
 def _derived(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any]:
     """Members that no field or property of the model holds; a roughness map replaces the model's number."""
-    energy, mapped = ENERGY[skin.energy], maps.roughness is not None
+    energy, mapped = ENERGY[skin.energy], maps.rough
     return {
         "m": skin.smoothing * (1.0 if mapped else skin.roughness),
         "f0": SKIN_F0,

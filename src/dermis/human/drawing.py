@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
-from dermis.human.model import OLD, YOUNG, human_targets
+from dermis.human.published import OLD, YOUNG, human_targets
+from dermis.human.skin.usual import Origin, drawn_eyes, drawn_look
 
 _MOST_SEED = 2**32 - 1
 _ALIKE = 0.35  # of the Dirichlet distribution of ancestries: most people have mostly one
@@ -47,17 +48,20 @@ def drawn(seed: int) -> dict[str, Any]:
     share = rng.beta(1.2, 2.2)
     weight = rng.normal(0.3 * share - 0.1, 0.25)
     muscle = rng.normal(0.2 * sex - 0.1 - 0.3 * share, 0.2)
-    return {
+    age = float(YOUNG + (OLD - YOUNG) * share)
+    found = {
         "african": float(african),
         "asian": float(asian),
         "caucasian": float(caucasian),
         "sex": float(sex),
-        "age": float(YOUNG + (OLD - YOUNG) * share),
+        "age": age,
         "weight": float(np.clip(weight, -0.7, 0.8)),
         "muscle": float(np.clip(muscle, -0.6, 0.6)),
         "targets": dict(_details(rng)),
         **_hair(np.random.default_rng((int(seed), 1)), np.array([african, asian, caucasian])),
     }
+    origin = Origin(african, asian, caucasian, sex, age)
+    return found | {"skin": drawn_look(rng, origin), "eyes": drawn_eyes(rng, origin)}
 
 
 def _hair(rng: np.random.Generator, shares: NDArray[np.float64]) -> dict[str, float]:

@@ -14,7 +14,12 @@ from dermis.errors import refuse
 from dermis.human.drawing import drawn
 from dermis.human.hair.groom import groomed
 from dermis.human.hair.look import HairLook
-from dermis.human.model import OLD, YOUNG, Layout, control_mm, human_head
+from dermis.human.model import Layout, control_mm, human_head
+from dermis.human.published import OLD, YOUNG
+from dermis.human.skin.look import SkinLook
+from dermis.human.skin.painted import PaintedMaps
+from dermis.human.skin.usual import Origin, usual_eyes, usual_look
+from dermis.mesh.eyes import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.subdivide import subdivide_head
@@ -45,6 +50,7 @@ class Human:
     hair_eumelanin, hair_pheomelanin : of brows and lashes: 0.3 of the first is blond, 1.3 brown,
         4 dark, 8 black; red has 0.3 and 2
     targets : weights of published targets, such as {"nose/nose-hump-incr": 0.5}; mostly 0 to 1
+    skin, eyes : what they look like; what usually goes with the person when left out
 
     Raises DermisError for values out of range; names of targets are checked when the head is made.
     """
@@ -59,6 +65,8 @@ class Human:
     hair_eumelanin: float = 4.0
     hair_pheomelanin: float = 0.3
     targets: Mapping[str, float] = field(default_factory=lambda: _NONE)
+    skin: SkinLook | None = None
+    eyes: EyeLook | None = None
 
     def __post_init__(self) -> None:
         for one in fields(self):
@@ -87,15 +95,32 @@ class Human:
     def head(self, maps: Maps | None = None, layout: Layout = "own", subdivide: int = 1) -> Head:
         """The person at rest, with expressions and bones to move by.
 
-        maps : those of the skin; one colour, of usual pigments, when left out
+        maps : those of the skin; painted as `look` says when left out
         layout : "own" has most room for the face; "hm08" is the published one, which MakeHuman's skins fit
         subdivide : levels of Catmull and Clark's subdivision, 0 to 3
 
         Raises DermisError for targets that nobody knows.
         """
-        plain = human_head(self.weights(), maps, layout)
+        painted = maps or PaintedMaps(look=self.look)
+        plain = human_head(self.weights(), painted, layout, self.iris)
         head = subdivide_head(plain, subdivide)
         return groomed(head, plain, control_mm(_MEAN.weights()).astype(np.float64), subdivide, self._hair)
+
+    @property
+    def look(self) -> SkinLook:
+        """The person's skin: its own, or what usually goes with such a person."""
+        return usual_look(self._origin) if self.skin is None else self.skin
+
+    @property
+    def iris(self) -> EyeLook:
+        """The person's eyes: its own, or what usually goes with such a person."""
+        return usual_eyes(self._origin) if self.eyes is None else self.eyes
+
+    @property
+    def _origin(self) -> Origin:
+        total = self.african + self.asian + self.caucasian
+        shares = self.african / total, self.asian / total, self.caucasian / total
+        return Origin(*shares, self.sex, self.age)
 
     @property
     def positions_mm(self) -> NDArray[np.float32]:

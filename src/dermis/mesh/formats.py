@@ -51,6 +51,7 @@ class Part:
     targets : by name the vertices that a morph target moves (n,) and by how much at weight 1 (n, 3)
     bone, weight : (v, k) bones that each vertex follows, by shares that add up to 1; None for no bones
     quads : (q, 2) pairs of triangles that are the halves of one
+    alone : whether its points are no others' at the same places, as of a skin and of the lid on its cut
     """
 
     group: Group
@@ -62,6 +63,7 @@ class Part:
     bone: Index | None = None
     weight: Array | None = None
     quads: Index = field(default_factory=lambda: np.empty((0, 2), np.int64))
+    alone: bool = False
 
 
 @dataclass(frozen=True)

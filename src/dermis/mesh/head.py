@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from dermis.mesh.eyes import Eyes
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Floats, Mesh
 from dermis.mesh.rig import Rig
@@ -22,6 +23,7 @@ class Head:
     name : sample or file
     attribution : whom to credit when a picture of it is shown, empty when that is not required
     rig : what moves it; None for a head whose points move only if all their places are given
+    eyes : its eyeballs, where they are of true shape
     strands : its hairs, None for none
     """
 
@@ -30,6 +32,7 @@ class Head:
     maps: Maps
     attribution: str = ""
     rig: Rig | None = None
+    eyes: Eyes | None = None
     strands: Strands | None = None
 
     @cached_property

@@ -91,13 +91,19 @@ def _loaded(source: Path, unit: float, v_origin: Origin, up: Up, opaque: tuple[s
         check_arrays(place, flat, part.triangles, source)
         material, materials = _materials(model.parts, opaque, source)
         used, compact = np.unique(part.triangles, return_inverse=True)
-        kept, point = taken(part, used), weld(place[used])
+        kept, point = taken(part, used), weld(np.column_stack((place, _company(model.parts)))[used])
         if model.moves:
             point = part_points(point, kept, to_head[:3, :3])
     corners = compact.reshape(-1, 3)
     mesh = build_mesh(place[used], flat[used], corners, material, materials, normals[used], point, part.quads)
     check_mesh(mesh, source)
     return Rigged(mesh, build_rig(mesh.positions, point, kept, model.bones, model.weights, to_head, source))
+
+
+def _company(parts: list[Part]) -> NDArray[np.float32]:
+    """(v,) a number for each vertex; those at one place are one point only if they share it."""
+    numbers = [number if part.alone else 0 for number, part in enumerate(parts, start=1)]
+    return np.repeat(np.array(numbers, np.float32), [len(part.positions) for part in parts])
 
 
 def check_options(source: Path, unit: float, v_origin: str, up: str) -> None:

@@ -48,6 +48,11 @@ class Maps:
     roughness: Floats | None = None
     region: NDArray[np.uint8] | None = None
 
+    @property
+    def rough(self) -> bool:
+        """Whether the roughness comes from a map."""
+        return self.roughness is not None
+
     @cached_property
     def mean_colour(self) -> NDArray[np.float64] | None:
         """(3,) of the colour map, without the black texels of empty space [-]."""

@@ -18,7 +18,7 @@ Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-__all__ = ["INFLUENCES", "MorphTargets", "Motion", "Rig", "Skeleton", "Stencils", "no_targets"]
+__all__ = ["INFLUENCES", "MorphTargets", "Motion", "Rig", "Skeleton", "Stencils", "Turn", "no_targets"]
 
 _FORM = "outline 6"  # another number when other points are found
 
@@ -55,6 +55,17 @@ class Stencils:
         return np.asarray(np.add.reduceat(each, self.first[:-1], axis=0))
 
 
+class Turn(NamedTuple):
+    """What a target does by turning a bone, beside moving points.
+
+    degrees : about the head's x, y and z, at a weight of 1
+    """
+
+    target: str
+    bone: str
+    degrees: tuple[float, float, float]
+
+
 @dataclass(frozen=True, eq=False)
 class Rig:
     """The control points of a head and what moves them: morph targets first, then bones.
@@ -63,6 +74,7 @@ class Rig:
     targets, skeleton : what moves them; None for no bones
     stencils : from the control points to those of the mesh; None where they are the same
     corner : (v,) the control point of each vertex of the file's mesh; None where `Mesh.point` tells it
+    turns : of bones, by targets
     """
 
     positions_mm: Floats
@@ -70,6 +82,7 @@ class Rig:
     skeleton: Skeleton | None = None
     stencils: Stencils | None = None
     corner: Ints | None = None
+    turns: tuple[Turn, ...] = ()
 
     @cached_property
     def rest(self) -> Motion:
@@ -124,6 +137,15 @@ class Rig:
         resting = replace(self, positions_mm=motion.positions_mm)
         control = resting.posed(motion.weights.astype(np.float64), motion.matrices.astype(np.float64))
         return control if self.stencils is None else self.stencils.points(control)
+
+    def some_posed(self, points: Ints, motion: Motion) -> Doubles:
+        """(n, 3) some points, which no target moves, in a motion [mm]."""
+        places = motion.positions_mm[points].astype(np.float64)
+        if self.skeleton is None:
+            return places
+        whole = np.concatenate([places, np.ones((len(places), 1))], axis=1)
+        weight, matrices = self.skeleton.weight[points], motion.matrices[self.skeleton.bone[points]]
+        return np.asarray(np.einsum("pk,pkij,pj->pi", weight, matrices, whole))
 
     def posed(self, weights: Doubles, matrices: Doubles | None = None) -> Doubles:
         """(p, 3) the points in a pose, as the device computes them [mm].

@@ -61,9 +61,9 @@ def load_head(
     name, path = str(head), Path(head)
     own = {"colour": colour, "normal": normal, "height": height}
     own |= {"specular": specular, "roughness": roughness}
-    if name == HUMAN:
+    if name == HUMAN or name.startswith(f"{HUMAN}:"):
         told = {"unit_mm": unit_mm, "v_origin": v_origin, "up": up, "opaque": opaque}
-        return _human(own, height_mm, normal_y, told, subdivide)
+        return _human(name, own, height_mm, normal_y, told, subdivide)
     sample, files = SAMPLES.get(name), dict[str, Any]()
     if name in BUSTS:
         from dermis.human.bust_file import cached_bust
@@ -106,10 +106,16 @@ def _check_kind(sample: Sample) -> None:
 
 
 def _human(
-    maps: dict[str, MapFile], height_mm: float | None, normal_y: NormalY, told: dict[str, Any], subdivide: int
+    name: str,
+    maps: dict[str, MapFile],
+    height_mm: float | None,
+    normal_y: NormalY,
+    told: dict[str, Any],
+    subdivide: int,
 ) -> Head:
     """The parametric human, in its own layout.
 
+    name : "human", or with a seed: "human:7"
     told : what is told of files alone
     """
     from dermis.human.person import Human
@@ -124,7 +130,16 @@ def _human(
     del chosen["region"]  # which is the files' own
     given = any(file is not None for file in chosen.values())
     loaded = load_maps(**chosen, height_mm=height_mm, normal_y=normal_y) if given else None
-    return Human().head(loaded, subdivide=max(1, subdivide))
+    person = Human() if name == HUMAN else Human.drawn(_seed(name))
+    return replace(person.head(loaded, subdivide=max(1, subdivide)), name=name)
+
+
+def _seed(name: str) -> int:
+    """Of a person by its name."""
+    words = name.partition(":")[2]
+    if not words.isdecimal():
+        refuse(name, f"{HUMAN}, or {HUMAN}:SEED with a whole number", f"{words!r} came", f"Try {HUMAN}:7")
+    return int(words)
 
 
 def _chosen(given: dict[str, MapFile], files: dict[str, Any]) -> dict[str, Any]:

@@ -77,17 +77,30 @@ class Pose:
         return weights
 
     def _matrices(self, rig: Rig, culprit: object) -> NDArray[np.float32]:
-        if not self.bones:
+        given = self._turned(rig)
+        if not given:
             return rig.rest.matrices
         if rig.skeleton is None:
-            _refuse_name(f"{culprit}: bones", next(iter(self.bones)), (), "bone")
+            _refuse_name(f"{culprit}: bones", next(iter(given)), (), "bone")
         index = rig.skeleton.index
-        for name in self.bones:
+        for name in given:
             if name not in index:
                 _refuse_name(f"{culprit}: bones", name, index, "bone")
-        ordered = sorted((index[name], name) for name in self.bones)
+        ordered = sorted((index[name], name) for name in given)
         bones = [bone for bone, _ in ordered]
-        return rig.skeleton.moved(bones, _changes(rig.skeleton, ordered, self.bones, culprit))
+        return rig.skeleton.moved(bones, _changes(rig.skeleton, ordered, given, culprit))
+
+    def _turned(self, rig: Rig) -> Mapping[str, ArrayLike]:
+        """The bones with the turns that targets make; a bone that a matrix is given for keeps to it."""
+        turning = [turn for turn in rig.turns if self.weights.get(turn.target)]
+        if not turning:
+            return self.bones
+        found: dict[str, Any] = dict(self.bones)
+        for target, bone, degrees in turning:
+            before = found.get(bone, (0.0, 0.0, 0.0))
+            if np.shape(before) == (3,):
+                found[bone] = [a + self.weights[target] * b for a, b in zip(before, degrees, strict=True)]
+        return found
 
     def _positions(self, rig: Rig, culprit: object) -> NDArray[np.float32]:
         if self.positions_mm is None:

@@ -10,8 +10,9 @@ from dermis.frame.atlas_textures import atlas_numbers
 from dermis.frame.levels import FLOATS, HALVES, usual_texel
 from dermis.frame.lights import light_numbers
 from dermis.frame.lights.kind import light_shaders
+from dermis.frame.painting import painting_numbers, texture_names
 from dermis.frame.strands import strand_numbers
-from dermis.frame.surface import lobe_shaders, surface_numbers
+from dermis.frame.surface import eye_numbers, lobe_shaders, surface_numbers
 from dermis.gpu import ComputeProgram, Constants, Device, compiled
 from dermis.gpu.program import declared
 from dermis.gpu.wgsl_source import Folder, ShaderFolder
@@ -23,8 +24,15 @@ SPECULAR = Path(str(specular.__file__)).parent
 TECHNIQUES = PASSES.parent / "techniques"
 SHARED_SHADERS = ShaderFolder(
     PASSES.parent / "wgsl",
-    lists={"lights": light_shaders, "lobes": lobe_shaders},
-    numbers=lambda: {**light_numbers(), **surface_numbers(), **atlas_numbers(), **strand_numbers()},
+    lists={"lights": light_shaders, "lobes": lobe_shaders, **texture_names()},
+    numbers=lambda: {
+        **light_numbers(),
+        **surface_numbers(),
+        **atlas_numbers(),
+        **painting_numbers(),
+        **eye_numbers(),
+        **strand_numbers(),
+    },
 )
 TILE = 16
 """Side of workgroups that do little: smaller ones finish before the H200 has started the next."""

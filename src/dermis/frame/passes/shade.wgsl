@@ -1,5 +1,6 @@
 // The image: light scattered below the skin, relit at its finest level, under the white lobe of the surface.
 //#include "lighting.wgsl"
+//#include "eye.wgsl"
 //#include "pre_integrated.wgsl"
 //#include "sample_bits.wgsl"
 //#include "shaded.wgsl"
@@ -9,7 +10,9 @@ override SPLIT: bool = false; // whether light below the skin is kept apart, to 
 // them needs it: with a strip, each lane goes on to its next pixel that sees the head when it is done with one.
 override STRIP: u32 = 1u;
 
-const EYE_ROUGHNESS: f32 = 0.1; // plain materials are wet: eyeballs, teeth
+override EYES: bool = false; // whether there are eyes of true shape
+
+const WET_ROUGHNESS: f32 = 0.1; // of plain materials: teeth, tongues, eyeballs of files
 const FINEST_RATIO: f32 = 4.0; // longest over shortest side of a footprint that one map sample may cover
 
 struct Shade {
@@ -23,6 +26,7 @@ struct Shade {
     shown: vec2f, // factors of the light from below and of the reflected light
     pre: PreIntegrated,
     background: vec3f,
+    eyes: array<Eye, 2>,
     material_colour: array<vec4f, 64>,
     jitter: array<vec4f, 64>, // sample places in the pixel, 0..1
 }
@@ -71,19 +75,6 @@ fn shaded_plain(surface: Surface, lit: Lit, out: f32) -> Shaded {
     return Shaded(vec3f(0.0), vec3f(0.0), shade.shown.x * below + shade.shown.y * lit.reflected, 0.0);
 }
 
-// Barycentric weights of where a ray from the eye meets a triangle's plane are linear in the ray, up to scale.
-fn ray_to_weights(a: vec3f, b: vec3f, c: vec3f) -> mat3x3f {
-    let ea = a - shade.eye;
-    let eb = b - shade.eye;
-    let ec = c - shade.eye;
-    return transpose(mat3x3f(cross(eb, ec), cross(ec, ea), cross(ea, eb)));
-}
-
-fn meet(weights: mat3x3f, ray: vec3f) -> vec3f {
-    let w = weights * ray;
-    return w / (w.x + w.y + w.z);
-}
-
 fn ray_through(place: vec2f, size: vec2f) -> vec3f {
     let ndc = vec2f(2.0, -2.0) * place / size + vec2f(-1.0, 1.0);
     return shade.forward + ndc.x * shade.right + ndc.y * shade.up;
@@ -95,7 +86,7 @@ fn shaded(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Shaded {
     let a = corner_at(t.x);
     let b = corner_at(t.y);
     let c = corner_at(t.z);
-    let weights = ray_to_weights(a.position, b.position, c.position);
+    let weights = ray_to_weights(a.position - shade.eye, b.position - shade.eye, c.position - shade.eye);
     let w = meet(weights, ray_through(place, size));
     // A sample on an edge may lie a little outside: stay on the triangle.
     let clamped = max(w, vec3f(0.0));
@@ -114,13 +105,31 @@ fn shaded(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Shaded {
     let footprint = max(min(x, y), max(x, y) / FINEST_RATIO);
     var surface: Surface;
     if (opaque) {
-        surface = Surface(point.normal, shade.material_colour[point.flags >> 8u].rgb, EYE_ROUGHNESS, 1.0);
+        surface = Surface(point.normal, shade.material_colour[point.flags >> 8u].rgb, WET_ROUGHNESS, 1.0);
     } else {
         surface = surface_at(point, footprint);
     }
+    var film = Film(surface.normal, 0.0);
+    if (EYES) {
+        // A loop, because software adapters run both sides of a branch for all pixels, and a loop only while one needs it.
+        var k = 0u;
+        loop {
+            if (!opaque || k >= 2u) {
+                break;
+            }
+            if (shade.eyes[k].material == (point.flags >> 8u)) {
+                let eye = eye_at(shade.eyes[k], point, v);
+                surface = eye.surface;
+                film = eye.film;
+                point.lit_position += SCATTERED_MM * film.normal;
+                break;
+            }
+            k++;
+        }
+    }
     // Called once: software adapters run both sides of a branch for all pixels.
-    let lit = light_up(point, surface, v, open);
-    let out = leaves(dot(surface.normal, v), surface.roughness, surface.rho_s) / PI;
+    let lit = light_through(point, surface, film, v, open);
+    let out = leaves(dot(film.normal, v), surface.roughness, surface.rho_s) / PI;
     if (opaque) {
         return shaded_plain(surface, lit, out);
     }

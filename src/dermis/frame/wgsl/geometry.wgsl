@@ -104,3 +104,13 @@ fn interpolate(a: Corner, b: Corner, c: Corner, w: vec3f, flags: u32) -> Point {
     point.flags = flags;
     return point;
 }
+
+// Barycentric weights of where a ray from the origin meets a triangle's plane are linear in the ray, up to scale.
+fn ray_to_weights(a: vec3f, b: vec3f, c: vec3f) -> mat3x3f {
+    return transpose(mat3x3f(cross(b, c), cross(c, a), cross(a, b)));
+}
+
+fn meet(weights: mat3x3f, ray: vec3f) -> vec3f {
+    let w = weights * ray;
+    return w / (w.x + w.y + w.z);
+}

@@ -18,6 +18,12 @@ struct Lit {
     directional: vec3f, // part of `entered` that leaves towards the eye beyond the mean over all directions
 }
 
+// What lies over a surface and reflects.
+struct Film {
+    normal: vec3f,
+    scattered: f32, // share of a light that arrives in its shadow, by scattering in what is around
+}
+
 // The normal, turned back to the eye's horizon where the relief faces away: beyond it a lobe is undefined, and unbounded with
 // light from behind the head.
 fn seen_normal(normal: vec3f, v: vec3f) -> vec3f {
@@ -48,8 +54,12 @@ fn next_that_may_shine(first: u32, p: vec3f, n: vec3f) -> u32 {
 
 // open: share of the sky that the point sees
 fn light_up(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
+    return light_through(point, surface, Film(surface.normal, 0.0), v, open);
+}
+
+fn light_through(point: Point, surface: Surface, film: Film, v: vec3f, open: f32) -> Lit {
     var lit = Lit(vec3f(0.0), vec3f(0.0), vec3f(0.0));
-    let mirror = seen_normal(surface.normal, v);
+    let mirror = seen_normal(film.normal, v);
     let by_direction = HALF_SPACE && (point.flags & OPAQUE) == 0u;
     let facing = clamp(dot(surface.normal, v), 0.0, 1.0);
     // Loops have their test at the end: with it at the start, software adapters run them once more.
@@ -70,6 +80,7 @@ fn light_up(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
             if (cosine > 0.0) {
                 if (seen < 0.0) {
                     seen = visibility(light, point, arriving.direction) * past_strands(light, point.position);
+                    seen = max(seen, film.scattered);
                 }
                 let e = arriving.irradiance * seen;
                 var entering = e * (cosine * enters(cosine, surface.roughness, surface.rho_s));

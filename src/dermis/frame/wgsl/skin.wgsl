@@ -8,6 +8,12 @@
 @group(0) @binding(7) var specular_map: texture_2d<f32>; // filtered: factor of rho_s
 @group(0) @binding(8) var roughness_map: texture_2d<f32>; // filtered: factor of the roughness
 
+@group(0) @binding(14) var detail_map: texture_2d_array<f32>; // filtered: a tile, slopes of pores and of furrows; then their squares
+@group(0) @binding(15) var detail_sampler: sampler;
+
+override DETAIL: bool = false; // whether the skin has relief finer than its maps
+//#fill const TILE_MM: f32 = {tile_mm};
+
 struct Surface {
     normal: vec3f, // with the relief
     colour: vec3f,
@@ -38,13 +44,44 @@ fn surface_at(point: Point, footprint: f32) -> Surface {
     let gradient = (fine.xy - coarse.xy) * size + vec2f(s.x * length_u, -s.y * length_v);
     let per_mm = size / max(vec2f(length_u, length_v), vec2f(1e-3));
     let spread = max(s.zw - s.xy * s.xy, vec2f(0.0)) + max(fine.zw - fine.xy * fine.xy, vec2f(0.0)) * per_mm * per_mm;
-    let m = skin.m * textureSampleLevel(roughness_map, map_sampler, point.uv, mip_for(roughness_map, footprint)).x;
+    let rough = textureSampleLevel(roughness_map, map_sampler, point.uv, mip_for(roughness_map, footprint));
+    let gloss = textureSampleLevel(specular_map, map_sampler, point.uv, mip_for(specular_map, footprint));
+    var finest = vec3f(0.0);
+    if (DETAIL) {
+        finest = detail_at(point.uv, footprint, vec2f(gloss.y, rough.y), gloss.z);
+    }
+    let m = skin.m * rough.x;
     var out: Surface;
-    out.normal = bend(point, gradient);
+    out.normal = bend(point, gradient + finest.xy * vec2f(length_u, length_v));
     out.colour = textureSampleLevel(colour_map, map_sampler, point.uv, mip_for(colour_map, footprint)).rgb;
-    out.roughness = clamp(sqrt(m * m + spread.x + spread.y), 0.05, 1.0);
-    out.rho_s = skin.strength * textureSampleLevel(specular_map, map_sampler, point.uv, mip_for(specular_map, footprint)).x;
+    out.roughness = clamp(sqrt(m * m + spread.x + spread.y + finest.z), 0.05, 1.0);
+    out.rho_s = skin.strength * gloss.x;
     return out;
+}
+
+// Slopes along u and down of pores and furrows, and the variance of what the footprint does not show.
+// amounts: of both; density: binary logarithm of the mm in a unit of uv
+// The tile is laid at powers of two, so that charts of any density have pores of true size to a factor of 1.4.
+fn detail_at(uv: vec2f, footprint: f32, amounts: vec2f, density: f32) -> vec3f {
+    let level = density - log2(TILE_MM);
+    let whole = floor(level);
+    let part = smoothstep(0.4, 0.6, level - whole);
+    var found = vec3f(0.0);
+    if (part < 1.0) {
+        found = (1.0 - part) * tiled(uv, footprint, amounts, exp2(whole));
+    }
+    if (part > 0.0) {
+        found += part * tiled(uv, footprint, amounts, exp2(whole + 1.0));
+    }
+    return found;
+}
+
+fn tiled(uv: vec2f, footprint: f32, amounts: vec2f, tiles: f32) -> vec3f {
+    let mip = max(0.0, log2(footprint * tiles * f32(textureDimensions(detail_map).x)));
+    let slopes = textureSampleLevel(detail_map, detail_sampler, tiles * uv, 0, mip);
+    let squares = textureSampleLevel(detail_map, detail_sampler, tiles * uv, 1, mip).xy;
+    let hidden = max(squares - vec2f(dot(slopes.xy, slopes.xy), dot(slopes.zw, slopes.zw)), vec2f(0.0));
+    return vec3f(amounts.x * slopes.xy + amounts.y * slopes.zw, dot(amounts * amounts, hidden));
 }
 
 // The colour map's part before (mix) or after (1 - mix) scattering; pow(0, 0) is undefined, so black is nearly black.

@@ -15,6 +15,7 @@ from dermis.mesh.gltf.document import Document, Tree, read_document
 from dermis.mesh.gltf.nodes import Nodes, read_nodes
 from dermis.mesh.gltf.skins import Armature, Followed, read_armature, read_followed
 from dermis.mesh.gltf.targets import Displaced, displaced, read_targets, resting_weights
+from dermis.mesh.quads import find_pairs
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_mesh_quantization")
@@ -93,7 +94,19 @@ class _Reader:
         if moved is not positions:
             normals = None  # they belong to another shape
         triangles = self._triangles(primitive, len(positions))
-        return Part(self._group(mesh, primitive), moved, uv, normals, triangles), targets
+        extras = primitive.get("extras")
+        told = extras.get("dermis") if isinstance(extras, dict) else None
+        own = told if isinstance(told, dict) else {}
+        sides = np.full(len(triangles) // 2 if own.get("quads") is True else 0, 4)
+        return Part(
+            self._group(mesh, primitive),
+            moved,
+            uv,
+            normals,
+            triangles,
+            quads=find_pairs(sides, triangles),
+            alone=own.get("alone") is True,
+        ), targets
 
     def _triangles(self, primitive: Tree, count: int) -> Index:
         """(f, 3) the corners of a primitive's triangles."""

@@ -13,14 +13,14 @@ from dermis.images.io import Picture
 from dermis.mesh.gltf.document import Document, read_document
 
 _READABLE = {"image/png", "image/jpeg"}
-ROLES = ("height", "specular", "roughness", "region")
+ROLES = ("normal", "height", "specular", "roughness", "region")
 
 
 def embedded_maps(path: Path) -> dict[str, Any]:
     """Options of `load_maps` that a .glb or .gltf file gives itself, {} for one without pictures.
 
-    The skin's material gives its base colour and, when the package wrote the file, the height, specular,
-    roughness and region maps of its extras; any other file gives its normal map.
+    The skin's material gives its base colour and, when the package wrote the file, the maps that its extras
+    name: a normal map only where it is no picture of the height; any other file gives its normal map.
 
     Raises DermisError when the file is damaged.
     """

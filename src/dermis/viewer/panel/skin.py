@@ -62,7 +62,7 @@ def draw_surface(session: Session) -> None:
     """All that the section above leaves of the skin's fields: a new one appears here."""
     state, known = session.state, session.history.states
     replaced = {
-        "roughness": state.scene.head.maps.roughness is not None and "roughness comes from the head's map",
+        "roughness": state.scene.head.maps.rough and "roughness comes from the head's map",
         "rho_s": "regions" in state.head and "rho_s comes from the regions",
     }
     for name in type(state.scene.skin).model_fields:

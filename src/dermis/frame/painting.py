@@ -1,0 +1,47 @@
+"""What the shaders that paint a human's skin share with Python: names and numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from dermis.gpu.wgsl_source import Member
+from dermis.human.skin.detail import TILE_MM
+from dermis.human.skin.face import AMOUNTS, DEGREES, folds, hairline, zones
+from dermis.human.skin.movements import FOLDING
+from dermis.human.skin.textures import DOTS, NOISES, noise_table
+
+_NAMES = {
+    "noises": [noise.name for noise in NOISES],
+    "dots": [dots.name for dots in DOTS],
+    "amounts": list(AMOUNTS),
+}
+
+
+def texture_names() -> Mapping[str, Callable[[], Sequence[Member]]]:
+    """Lists of the names of noises, dots and amounts, numbered in order."""
+    return {name: _members(names) for name, names in _NAMES.items()}
+
+
+def painting_numbers() -> dict[str, float]:
+    """Numbers that the shaders fill in."""
+    found = folds()
+    rows = {
+        "noise_rows": noise_table(),
+        "zones": zones(),
+        "folds": found.curves,
+        "knots": found.knots,
+        "edges": hairline(),
+    }
+    names = {name: len(names) for name, names in _NAMES.items()}
+    return {
+        "degrees": float(DEGREES),
+        "tile_mm": TILE_MM,
+        "folding": FOLDING,
+        **names,
+        **{name: len(table) for name, table in rows.items()},
+    }
+
+
+def _members(names: Sequence[str]) -> Callable[[], Sequence[Member]]:
+    return lambda: [Member(name, Path()) for name in names]

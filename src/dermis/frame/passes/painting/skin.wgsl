@@ -1,0 +1,137 @@
+// Colour, relief and gloss of the skin at each texel of its maps, from pigments, marks and lines of the face.
+//#include "spot.wgsl"
+//#include "lines.wgsl"
+
+@group(0) @binding(3) var<storage, read> owners: array<u32>;
+@group(0) @binding(10) var colour_tables: texture_2d_array<f32>; // of skin and of lips, by roots of blood and of melanin
+@group(0) @binding(11) var colour: texture_storage_2d<rgba16float, write>;
+@group(0) @binding(12) var specular: texture_storage_2d<rgba16float, write>;
+@group(0) @binding(13) var roughness: texture_storage_2d<rgba16float, write>;
+@group(0) @binding(15) var moved: texture_storage_2d_array<rgba16float, write>; // what movements do, see movements.py
+@group(0) @binding(14) var<storage, read_write> heights: array<f32>; // with a texel more on all sides [mm]
+
+// Artist's values.
+const PATCHES: f32 = 0.22; // of melanin [doublings]
+const BLOTCHES: f32 = 0.40; // of blood
+const FRECKLE: f32 = 1.7;
+const AGE_SPOT: f32 = 1.3;
+const MOLE: f32 = 3.4;
+const TAN: f32 = 1.2; // from under clothes to where the sun shines most
+const LIP_BLOOD: f32 = 1.9;
+const LIP_MELANIN: f32 = 0.5;
+const MUCOSA_BLOOD: f32 = 3.2;
+const RED_LIDS: f32 = 0.8;
+const RED_SLIT: f32 = 1.0;
+const STUBBLE_COLOUR: vec3f = vec3f(0.095, 0.085, 0.08); // hair seen through skin, which makes it blueish
+const BEARD_COLOUR: vec3f = vec3f(0.11, 0.10, 0.095);
+const VEIN_COLOUR: vec3f = vec3f(0.80, 0.90, 1.0); // factor
+const STRENGTH: f32 = 0.155;
+const OILY_STRENGTH: f32 = 0.08;
+const ROUGHNESS: f32 = 0.36;
+const OILY_ROUGHNESS: f32 = -0.10;
+const LIP_STRENGTH: f32 = 0.05;
+const LIP_ROUGHNESS: f32 = -0.07;
+const WET_STRENGTH: f32 = 0.10; // of the inside of the mouth and the lids' edges
+const WET_ROUGHNESS: f32 = -0.12;
+const UNEVEN: f32 = 0.15; // of the oil
+
+// The table's colour for shares of melanin and blood, bilinear in their roots.
+fn colour_of(table: u32, melanin: f32, blood: f32) -> vec3f {
+    let nodes = f32(textureDimensions(colour_tables).x);
+    let place = sqrt(saturate(vec2f(blood, melanin))) * (nodes - 1.0);
+    let before = min(floor(place), vec2f(nodes - 2.0));
+    let part = place - before;
+    let at = vec2u(before);
+    let near = mix(entry(table, at), entry(table, at + vec2u(1u, 0u)), part.x);
+    let far = mix(entry(table, at + vec2u(0u, 1u)), entry(table, at + vec2u(1u, 1u)), part.x);
+    return mix(near, far, part.y);
+}
+
+fn entry(table: u32, at: vec2u) -> vec3f {
+    return textureLoad(colour_tables, at, table, 0).rgb;
+}
+
+// Thin branching lines, where noise is near zero.
+fn veins() -> f32 {
+    let near = 1.0 - smoothstep(0.0, 0.10, abs(noise[NOISE_VEINS] + 0.08 * noise[NOISE_SUN]));
+    return near * saturate(zone[ZONE_VEINS]) * paint.veins;
+}
+
+fn pigments(spot: Spot, lip: f32, mucosa: f32) -> vec2f {
+    var brown = zone[ZONE_MELANIN] * (1.0 - lip) + LIP_MELANIN * lip + PATCHES * noise[NOISE_PATCHES];
+    brown += FRECKLE * smoothstep(0.02, 0.3, dotted[DOT_FRECKLES] + 0.7 * dotted[DOT_SMALL_FRECKLES]);
+    brown += AGE_SPOT * smoothstep(0.05, 0.4, dotted[DOT_AGE_SPOTS]) + MOLE * smoothstep(0.1, 0.6, dotted[DOT_MOLES]);
+    let clothed = smoothstep(-165.0, -205.0, spot.body.y + 6.0 * noise[NOISE_WANDER_Y]);
+    brown += TAN * paint.tan * (0.35 * saturate(zone[ZONE_SUN]) - 0.5 * clothed);
+    var red = 2.0 * paint.redness * zone[ZONE_BLOOD] * (1.0 - lip) + BLOTCHES * noise[NOISE_BLOTCHES];
+    let slit = RED_SLIT * (1.0 - smoothstep(0.0, 2.2, spot.fields.y));
+    red += lip * (LIP_BLOOD + 0.3 * noise[NOISE_LIP_STREAKS] + slit) + mucosa * (MUCOSA_BLOOD - lip * (LIP_BLOOD + RED_SLIT));
+    red += RED_LIDS * (1.0 - smoothstep(0.3, 1.8, spot.fields.z));
+    brown -= 3.0 * mucosa;
+    return vec2f(paint.melanin, paint.blood) * exp2(vec2f(brown, red));
+}
+
+fn over(below: vec3f, above: vec3f, share: f32) -> vec3f {
+    return mix(below, min(above, below), share); // what is dark already does not turn lighter
+}
+
+// rho_s and roughness.
+fn gloss(lip: f32, wet: f32, hair: f32) -> vec2f {
+    let film = noise[NOISE_OIL_FILM] + 0.7 * noise[NOISE_FINE_FILM];
+    let zones = 0.5 + 1.25 * paint.oil;
+    var rho_s = STRENGTH + OILY_STRENGTH * paint.oil + zones * zone[ZONE_STRENGTH] + LIP_STRENGTH * lip + WET_STRENGTH * wet;
+    rho_s *= (1.0 + UNEVEN * film) * (1.0 - 0.4 * hair);
+    var m = ROUGHNESS + OILY_ROUGHNESS * paint.oil + zones * zone[ZONE_ROUGHNESS] + LIP_ROUGHNESS * lip + WET_ROUGHNESS * wet;
+    m *= 1.0 - 0.5 * UNEVEN * film;
+    return vec2f(clamp(rho_s, 0.05, 0.45), clamp(m, 0.15, 0.6));
+}
+
+// flush, pressed: where blood comes to, and where it is pressed out
+fn keep_moved(at: vec2u, share: f32, flush: f32, pressed: f32) {
+    textureStore(moved, at, 0, share * vec4f(deepened[0], deepened[1], deepened[2], deepened[3]));
+    textureStore(moved, at, 1, vec4f(share * vec3f(deepened[4], deepened[5], deepened[6]), flush - pressed));
+}
+
+fn keep(at: vec2u, rgb: vec3f, shine: vec2f, height: f32, amounts: vec3f) {
+    textureStore(colour, at, vec4f(rgb, 1.0));
+    textureStore(specular, at, vec4f(shine.x / paint.usual_strength, amounts.x, amounts.z, 0.0));
+    textureStore(roughness, at, vec4f(shine.y, amounts.y, 0.0, 0.0));
+    heights[(at.y + 1u) * (paint.side + 2u) + at.x + 1u] = height;
+}
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if (any(id.xy >= vec2u(paint.side))) {
+        return;
+    }
+    let owner = owners[id.y * paint.side + id.x];
+    if (owner == 0u) {
+        let shine = vec2f(STRENGTH + OILY_STRENGTH * paint.oil, ROUGHNESS + OILY_ROUGHNESS * paint.oil);
+        keep_moved(id.xy, 0.0, 0.0, 0.0);
+        keep(id.xy, colour_of(0u, paint.melanin, paint.blood), shine, 0.0, vec3f(0.0));
+        return;
+    }
+    let spot = spot_of(owner, id.xy);
+    make_noise(spot);
+    sum_zones(spot);
+    let lip = smoothstep(-1.1, 1.3, spot.fields.x + 0.45 * noise[NOISE_LIP_EDGE]);
+    let mucosa = smoothstep(0.5, -2.5, spot.fields.y);
+    let scalp = scalp_at(spot);
+    scatter_dots(spot, scalp, lip);
+    let p = pigments(spot, lip, mucosa);
+    var rgb = mix(colour_of(0u, p.x, p.y), colour_of(1u, p.x, p.y), lip);
+    rgb *= mix(vec3f(1.0), VEIN_COLOUR, veins());
+    let bristles = 0.6 + 0.4 * dotted[DOT_STUBBLE];
+    let beard = 0.55 * paint.beard * saturate(zone[ZONE_BEARD]) * (1.0 - lip) * (0.45 + 0.9 * dotted[DOT_STUBBLE]);
+    rgb = over(rgb, STUBBLE_COLOUR, paint.stubble * scalp * bristles);
+    rgb = over(rgb, BEARD_COLOUR, beard);
+    let wet = max(mucosa, 1.0 - smoothstep(0.2, 1.2, spot.fields.z));
+    let away = f32(NEAREST - (owner >> ID_BITS)) / STEPS;
+    let runs_out = 1.0 - smoothstep(0.5 * MARGIN, MARGIN, away); // beside the charts
+    let height = relief(spot, lip) * runs_out;
+    keep_moved(id.xy, runs_out, saturate(zone[ZONE_BLOOD]) * (1.0 - lip), lip);
+    let bare = (1.0 - lip) * (1.0 - mucosa);
+    let pores = saturate(0.45 + zone[ZONE_PORES]) * bare;
+    let furrows = max(1.0 + zone[ZONE_FURROWS], 0.2) * bare * (0.8 + 1.4 * paint.age * paint.age);
+    keep(id.xy, rgb, gloss(lip, wet, max(scalp * paint.stubble, beard)), height, vec3f(pores, furrows, spot.density));
+}

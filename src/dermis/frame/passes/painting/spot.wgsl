@@ -1,0 +1,168 @@
+// What is known of a texel of the skin's maps: its place on the average person, noise, zones and dots.
+//#include "painted_surface.wgsl"
+//#include "noise.wgsl"
+
+//#each noises: const NOISE_{NAME}: u32 = {number};
+//#each dots: const DOT_{NAME}: u32 = {number};
+//#each amounts: const ZONE_{NAME}: u32 = {number};
+//#fill const NOISES: u32 = {noises}u;
+//#fill const NOISE_ROWS: u32 = {noise_rows}u;
+//#fill const DOTS: u32 = {dots}u;
+//#fill const AMOUNTS: u32 = {amounts}u;
+//#fill const ZONES: u32 = {zones}u;
+//#fill const FOLDS: u32 = {folds}u;
+//#fill const KNOTS: u32 = {knots}u;
+//#fill const FOLDING: u32 = {folding}u;
+//#fill const EDGES: u32 = {edges}u;
+//#fill const DEGREES: f32 = {degrees};
+
+struct Noise {
+    x: vec4f, // rows of the matrix to the lattice; the size of texel that shows it [mm], 0 for always
+    y: vec4f, // strength
+    z: vec4f, // seed, as bits
+    which: vec4f, // noise and space, as bits
+}
+
+struct Zone {
+    centre: vec4f, // [mm]
+    reach: vec4f, // one over the radii
+    amounts: array<f32, AMOUNTS>,
+}
+
+struct Fold {
+    ball: vec4f, // centre and radius [mm]
+    size: vec4f, // width, depth in a young and in an old face [mm], movement
+}
+
+struct Tables {
+    noises: array<Noise, NOISE_ROWS>,
+    dot_kinds: array<Dots, DOTS>,
+    zones: array<Zone, ZONES>,
+    folds: array<Fold, FOLDS>,
+    knots: array<vec4f, KNOTS>, // places [mm], how far along
+    firsts: array<f32, FOLDS + 1u>, // where folds begin in the knots
+    hairline: array<f32, EDGES>, // heights [mm]
+}
+
+@group(0) @binding(4) var<storage, read> tables: Tables;
+
+// Artist's values.
+const WANDER_MM: f32 = 5.0; // of the zones' borders
+const EYE: vec2f = vec2f(29.5, -0.5); // that lines run around [mm]
+const HEAD_AXIS_Z: f32 = -72.0;
+
+// What is known of a texel.
+struct Spot {
+    body: vec3f, // place on the average person [mm]
+    left: vec3f, // the same on its left half
+    normal: vec3f,
+    fields: vec4f,
+    texel_mm: f32,
+    density: f32,
+}
+
+var<private> noise: array<f32, NOISES>;
+var<private> dotted: array<f32, DOTS>;
+var<private> zone: array<f32, AMOUNTS>;
+
+fn spot_of(owner: u32, at: vec2u) -> Spot {
+    let t = triangle_of((owner & ((1u << ID_BITS) - 1u)) - 1u);
+    let a = vertex_of(t.x);
+    let b = vertex_of(t.y);
+    let c = vertex_of(t.z);
+    let p = (vec2f(at) + 0.5) / f32(paint.side);
+    let ab = b.uv - a.uv;
+    let ac = c.uv - a.uv;
+    let ap = p - a.uv;
+    let w = vec2f(ap.x * ac.y - ap.y * ac.x, ab.x * ap.y - ab.y * ap.x) / (ab.x * ac.y - ab.y * ac.x);
+    let u = 1.0 - w.x - w.y;
+    let place = u * a.place + w.x * b.place + w.y * c.place;
+    let normal = normalize(u * a.normal + w.x * b.normal + w.y * c.normal);
+    let density = u * a.density + w.x * b.density + w.y * c.density;
+    let fields = u * a.fields + w.x * b.fields + w.y * c.fields;
+    return Spot(place, vec3f(abs(place.x), place.yz), normal, fields, exp2(density) / f32(paint.side), density);
+}
+
+// Where a noise is looked up; later ones are bent by those before.
+fn in_space(spot: Spot, space: u32) -> vec3f {
+    let p = spot.body;
+    switch (space) {
+        case 1u: {
+            return p + vec3f(0.9 * noise[NOISE_CREASE_BEND] + 0.02 * p.x * abs(spot.fields.y), 0.0, 0.0);
+        }
+        case 2u: {
+            return p + vec3f(0.0, 0.8 * noise[NOISE_LINE_BEND], 0.0);
+        }
+        case 3u: {
+            let off = (spot.left.xy - EYE) * vec2f(1.0, 1.25);
+            return vec3f(length(off) + 0.8 * noise[NOISE_LINE_BEND], p.xy);
+        }
+        default: {
+            return p;
+        }
+    }
+}
+
+fn make_noise(spot: Spot) {
+    for (var k = 0u; k < NOISES; k++) {
+        noise[k] = 0.0;
+    }
+    for (var k = 0u; k < NOISE_ROWS; k++) {
+        let one = tables.noises[k];
+        let shown = select(visible(one.x.w, spot.texel_mm), 1.0, one.x.w == 0.0);
+        if (shown > 0.0) {
+            let p = in_space(spot, bitcast<u32>(one.which.y));
+            let lattice = vec3f(dot(one.x.xyz, p), dot(one.y.xyz, p), dot(one.z.xyz, p));
+            let seed = bitcast<u32>(one.z.w) + 64u * paint.seed;
+            noise[bitcast<u32>(one.which.x)] += one.y.w * shown * gradient_noise(lattice, seed);
+        }
+    }
+}
+
+fn sum_zones(spot: Spot) {
+    for (var k = 0u; k < AMOUNTS; k++) {
+        zone[k] = 0.0;
+    }
+    let p = spot.left + WANDER_MM * vec3f(noise[NOISE_WANDER_X], noise[NOISE_WANDER_Y], 0.0);
+    for (var k = 0u; k < ZONES; k++) {
+        let off = (p - tables.zones[k].centre.xyz) * tables.zones[k].reach.xyz;
+        let away = dot(off, off);
+        if (away < 14.0) {
+            let weight = exp(-away);
+            for (var c = 0u; c < AMOUNTS; c++) {
+                zone[c] += weight * tables.zones[k].amounts[c];
+            }
+        }
+    }
+}
+
+fn scatter_dots(spot: Spot, scalp: f32, lip: f32) {
+    var kept: array<f32, DOTS>;
+    let sun = saturate(zone[ZONE_SUN]);
+    let freckled = paint.freckles * (0.12 + 0.88 * sun) * (0.75 + 0.75 * noise[NOISE_SUN]) * (1.0 - lip);
+    kept[DOT_FRECKLES] = 0.7 * freckled;
+    kept[DOT_SMALL_FRECKLES] = freckled;
+    kept[DOT_MOLES] = 0.3 * paint.moles * (1.0 - lip);
+    kept[DOT_AGE_SPOTS] = 0.8 * paint.spots * (0.1 + 0.9 * sun) * (1.0 - lip);
+    kept[DOT_STUBBLE] = select(0.0, 1.0, max(scalp * paint.stubble, saturate(zone[ZONE_BEARD]) * paint.beard) > 0.0);
+    for (var k = 0u; k < DOTS; k++) {
+        dotted[k] = 0.0;
+        if (kept[k] > 0.0) {
+            let kind = tables.dot_kinds[k];
+            let bent = spot.body + kind.ragged_mm * vec3f(noise[NOISE_RAGGED_X], noise[NOISE_RAGGED_Y], 0.0);
+            dotted[k] = dots(bent, spot.normal, kind, kept[k], spot.texel_mm, 64u * paint.seed + 40u + 2u * k);
+        }
+    }
+}
+
+fn scalp_at(spot: Spot) -> f32 {
+    let p = spot.left;
+    if (p.y < -80.0) {
+        return 0.0;
+    }
+    let angle = degrees(atan2(p.x, p.z - HEAD_AXIS_Z)) / DEGREES;
+    let before = min(u32(angle), EDGES - 2u);
+    let edge = mix(tables.hairline[before], tables.hairline[before + 1u], angle - f32(before));
+    let above = p.y - edge + 5.0 * noise[NOISE_HAIRLINE] + 4.0 * noise[NOISE_FINE_HAIRLINE];
+    return smoothstep(-9.0, 16.0, above) * saturate(1.0 + zone[ZONE_HAIR]);
+}

@@ -1,0 +1,51 @@
+"""A person as a file that other programs open."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.atlas.build import SMALLEST, build_atlas
+from dermis.human.person import Human
+from dermis.mesh.gltf.write import encode_head
+from dermis.mesh.head import Head
+from dermis.outputs import replacing
+
+
+def write_person(
+    path: Path, person: Human, head: Head, *, roughness: float, weights: Mapping[str, float] | None = None
+) -> int:
+    """Write a person's head as a .glb file, whole or not at all; its length [byte].
+
+    roughness : Beckmann's m of skin without a map of it [-]
+    weights : of expressions with which the file rests
+    """
+    notes = {"person": numbers_of(person)}
+    data = encode_head(head, roughness=roughness, weights=weights, slopes=_relief(head), notes=notes)
+    with replacing(path) as trial:
+        trial.write_bytes(data)
+    return len(data)
+
+
+def numbers_of(person: Human) -> dict[str, Any]:
+    """All that a person is made from, by name."""
+    found = {one.name: getattr(person, one.name) for one in fields(person)}
+    return found | {"targets": dict(person.targets), "skin": asdict(person.look), "eyes": asdict(person.iris)}
+
+
+def _relief(head: Head) -> NDArray[np.float32] | None:
+    """(n, n, 2) rise of a height map to the right and upwards, if other programs need it [-]."""
+    height = head.maps.height
+    if head.maps.normal is not None or height is None:
+        return None
+    side = len(height)
+    if side != height.shape[1] or side < SMALLEST:
+        return None
+    down, right = np.gradient(height)
+    stretch = build_atlas(head.mesh, side).stretch.astype(np.float32)
+    return np.asarray(np.stack([right, -down], axis=-1) * stretch, np.float32)

@@ -1,0 +1,102 @@
+"""What moves the parametric human: expressions, bones, and targets that turn the eyes."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.human.published import EXPRESSIONS, Points, data, moves
+from dermis.mesh.rig import MorphTargets, Skeleton, Turn
+
+_BEGINS: dict[str, tuple[str, str, float]] = {  # a joint, or how far on the way between two
+    "spine": ("neck", "neck", 0.0),
+    "clavicle.L": ("l-clavicle", "l-clavicle", 0.0),
+    "clavicle.R": ("r-clavicle", "r-clavicle", 0.0),
+    "neck01": ("neck", "head", 0.0),
+    "neck02": ("neck", "head", 1 / 3),
+    "neck03": ("neck", "head", 2 / 3),
+    "head": ("head", "head", 0.0),
+    "jaw": ("mouth", "mouth", 0.0),
+    "eye.L": ("l-eye", "l-eye", 0.0),
+    "eye.R": ("r-eye", "r-eye", 0.0),
+}
+_PARENTS = {"neck02": "neck01", "neck03": "neck02", "head": "neck03"}
+_PARENTS |= dict.fromkeys(("jaw", "eye.L", "eye.R"), "head")
+_PARENTS |= dict.fromkeys(("neck01", "clavicle.L", "clavicle.R"), "spine")
+_ACROSS, _UP, _DOWN = 28.0, 20.0, 22.0  # degrees that an eye turns by at a weight of 1
+_GAZE = {
+    "In": (0.0, -_ACROSS, 0.0),
+    "Out": (0.0, _ACROSS, 0.0),
+    "Up": (-_UP, 0.0, 0.0),
+    "Down": (_DOWN, 0.0, 0.0),
+}
+"""Of the left eye, which is on the side of +X; the right one turns across the other way."""
+
+
+def gaze() -> tuple[Turn, ...]:
+    """The turns of the eyes that ARKit's eyeLook targets make."""
+    return tuple(
+        Turn(f"eyeLook{way}{name}", f"eye.{name[0]}", (x, side * y, z))
+        for name, side in (("Left", 1.0), ("Right", -1.0))
+        for way, (x, y, z) in _GAZE.items()
+    )
+
+
+@cache
+def expressions() -> MorphTargets:
+    """The ARKit blend shapes of the skin, the teeth and the tongue; eyeballs turn by `gaze` instead."""
+    moved, chosen = moves(), list[tuple[str, slice]]()
+    for index, name in enumerate(moved.names):
+        if name.startswith(EXPRESSIONS):
+            chosen.append((name.removeprefix(EXPRESSIONS), slice(*moved.first[index : index + 2])))
+    kept = [_moving()[moved.point[part]] for _, part in chosen]
+    points = [moved.point[part][those] for (_, part), those in zip(chosen, kept, strict=True)]
+    deltas = [moved.delta_mm[part][those] for (_, part), those in zip(chosen, kept, strict=True)]
+    first = np.cumsum([0, *map(len, points)])
+    names = tuple(name for name, _ in chosen)
+    point = np.concatenate(points).astype(np.int32)
+    return MorphTargets(names, first.astype(np.int32), point, np.concatenate(deltas))
+
+
+@cache
+def _moving() -> NDArray[np.bool_]:
+    """(n,) whether expressions move a point: not joints and not eyeballs."""
+    found = data()
+    balls = [index for index, name in enumerate(found["group_names"]) if str(name).endswith("-eye")]
+    moving = np.ones(len(found["positions_mm"]), bool)
+    moving[len(moving) - len(found["joint_names"]) :] = False
+    moving[np.unique(found["quads"][np.isin(found["group"], balls)])] = False
+    return moving
+
+
+def skeleton(joint_mm: Points, centres: tuple[Points, Points], globe: int) -> Skeleton:
+    """Spine, clavicles, a neck of three bones, head, jaw and eyes.
+
+    joint_mm : (j, 3) the person's joints [mm]
+    centres : (3,) of the left and the right eyeball, which turn about them [mm]
+    globe : points of an eyeball; those of the left one come after the published ones, then those of the right
+    """
+    found = data()
+    names = tuple(map(str, found["bone_names"]))
+    joints = dict(zip(map(str, found["joint_names"]), joint_mm, strict=True))
+    joints |= dict(zip(("l-eye", "r-eye"), centres, strict=True))
+    begin = np.array([(1 - t) * joints[a] + t * joints[b] for a, b, t in (_BEGINS[name] for name in names)])
+    parent = np.array([names.index(_PARENTS[n]) if n in _PARENTS else -1 for n in names], np.int32)
+    local, bind = (np.tile(np.eye(4), (len(names), 1, 1)) for _ in range(2))
+    local[:, :3, 3] = begin - np.where(parent[:, None] >= 0, begin[parent], 0.0)
+    bind[:, :3, 3] = -begin
+    bone, weight = _influences([names.index(name) for name in ("eye.L", "eye.R")], globe)
+    return Skeleton(names, parent, local, bind, np.eye(4), bone, weight)
+
+
+def _influences(eyes: list[int], globe: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """(p, 4) bones of all points and their weights: an eyeball follows its own alone."""
+    found = data()
+    shares = found["weight"].astype(np.float32)
+    own = np.zeros((2 * globe, shares.shape[1]), np.float32)
+    own[:, 0] = 1.0
+    bone = np.concatenate([found["bone"], np.zeros_like(own)]).astype(np.int32)
+    bone[len(shares) :, 0] = np.repeat(eyes, globe)
+    return bone, np.concatenate([shares / shares.sum(axis=1, keepdims=True), own])

@@ -1,0 +1,82 @@
+"""The published data of the parametric human: points, targets, layouts, bones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.errors import refuse
+
+Points = NDArray[np.float64]
+
+YOUNG, OLD = 25.0, 90.0
+"""Ages of the published people [years]."""
+
+DELTA_MM = 0.01
+"""Of a unit of displacements, here as in the published files."""
+
+EXPRESSIONS = "faceunits/"
+"""How the names of the ARKit blend shapes begin."""
+
+
+class Moves(NamedTuple):
+    """What published targets move, one after the other: points, displacements [mm], and where each begins."""
+
+    names: tuple[str, ...]
+    first: NDArray[np.int64]
+    point: NDArray[np.int64]
+    delta_mm: NDArray[np.float32]
+
+
+def places_mm(weights: Mapping[str, float]) -> Points:
+    """(n, 3) the points of a person, then the joints, from the middle between the eyes [mm].
+
+    weights : of published targets
+
+    Raises DermisError for targets that nobody knows.
+    """
+    found, moved = data(), moves()
+    places = found["positions_mm"].astype(np.float64)
+    known = {name: index for index, name in enumerate(moved.names)}
+    for name, weight in weights.items():
+        if name not in known:
+            close = [one for one in known if name.split("/")[-1] in one][:3]
+            hint = f"Did you mean {' or '.join(close)}?" if close else "List: dermis head --list-targets"
+            refuse(f"target {name!r}", "a published target", "there is none of this name", hint)
+        part = slice(*moved.first[known[name] : known[name] + 2])
+        places[moved.point[part]] += weight * moved.delta_mm[part]
+    eyes = [list(map(str, found["joint_names"])).index(name) for name in ("l-eye", "r-eye")]
+    return np.asarray(places - places[count() :][eyes].mean(axis=0))
+
+
+def human_targets() -> tuple[str, ...]:
+    """Names of the published targets by which people differ, for `Human(targets=...)`."""
+    return tuple(name for name in moves().names if not name.startswith((EXPRESSIONS, "expression/")))
+
+
+@cache
+def data() -> Mapping[str, NDArray[Any]]:
+    """The package's file."""
+    file = resources.files(__package__).joinpath("data", "human.npz")
+    with resources.as_file(file) as path, np.load(path) as stored:
+        return {name: stored[name] for name in stored}
+
+
+def count() -> int:
+    """Of the points of the mesh, which joints come after."""
+    found = data()
+    return len(found["positions_mm"]) - len(found["joint_names"])
+
+
+@cache
+def moves() -> Moves:
+    """What all targets move."""
+    found = data()
+    delta = DELTA_MM * found["target_delta"].astype(np.float32)
+    first, point = (found[name].astype(np.int64) for name in ("target_first", "target_point"))
+    return Moves(tuple(map(str, found["target_names"])), first, point, delta)

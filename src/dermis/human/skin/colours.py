@@ -1,0 +1,35 @@
+"""Colours of skin from its pigments, of the face and of the lips."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.human.skin.look import SkinLook
+from dermis.optics.pigments.skin import SkinParameters
+from dermis.optics.skin_colours import ColourTable, colour_table
+
+EPIDERMIS_MM = 0.05
+"""Thickness of the epidermis of the face, an artist's value within what is measured, 0.05 to 0.1 [mm]."""
+LIP_EPIDERMIS_MM = 0.03
+"""What stands over the blood of the lips, which shows through more than elsewhere [mm]."""
+
+
+@lru_cache(maxsize=8)
+def colours(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
+    """Colour of skin by its shares of melanin and of blood."""
+    return colour_table(SkinParameters(eumelanin=eumelanin, oxygen=oxygen, epidermis_mm=epidermis_mm))
+
+
+def mean_colour(look: SkinLook) -> NDArray[np.float64]:
+    """(3,) colour of the skin of usual places, linear Rec. 709 [-]."""
+    table = colours(look.eumelanin, look.oxygen, EPIDERMIS_MM)
+    return np.asarray(table.read(np.array([look.melanin]), np.array([look.blood]))[0])
+
+
+def colour_tables(look: SkinLook) -> NDArray[np.float32]:
+    """(2, n, n, 3) colours of the face's skin and of the lips', as `ColourTable` has them."""
+    both = [colours(look.eumelanin, look.oxygen, mm).colours for mm in (EPIDERMIS_MM, LIP_EPIDERMIS_MM)]
+    return np.stack(both).astype(np.float32)

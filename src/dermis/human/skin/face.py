@@ -1,0 +1,86 @@
+"""Where on the average person the skin is what: zones, the edge of the hair, folds."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import groupby
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.human.skin.movements import MOVEMENTS
+from dermis.tables import numbers, read_rows
+
+Floats = NDArray[np.float32]
+
+AMOUNTS = (
+    "blood", "melanin", "strength", "roughness", "pores", "furrows",
+    "sun", "level", "around", "hair", "beard", "veins",
+)  # fmt: skip
+"""What zones change, see zones.csv."""
+DEGREES = 2
+"""Angle between the heights of `hairline`."""
+_PIECES = 4
+
+
+@cache
+def zones() -> Floats:
+    """(k, 20) of each zone its centre and 0, one over its radii and 0 [mm], and its amounts."""
+    rows = read_rows(__package__, "zones")
+    centres, radii, amounts = (numbers(rows, names) for names in ("x y z", "rx ry rz", " ".join(AMOUNTS)))
+    none = np.zeros((len(rows), 1))
+    return np.hstack([centres, none, 1.0 / radii, none, amounts]).astype(np.float32)
+
+
+@cache
+def hairline() -> Floats:
+    """(91,) height of the edge of the hair, by the angle from the front [mm]."""
+    from scipy.interpolate import PchipInterpolator
+
+    angle, height = numbers(read_rows(__package__, "hairline"), "angle height").T
+    return np.asarray(PchipInterpolator(angle, height)(np.arange(0, 181, DEGREES)), np.float32)
+
+
+class Folds(NamedTuple):
+    """Curves of straight pieces on the left half of the average person.
+
+    knots : (k, 4) of all curves [mm], and how far along their curve each is, from 0 to 1
+    curves : (c, 8) centre and radius of a ball around each, its width, its depth in a young and in an old
+        face [mm], and the number of the movement that deepens it, from 1; 0 for none
+    first : (c + 1,) where each curve begins
+    """
+
+    knots: Floats
+    curves: Floats
+    first: NDArray[np.uint32]
+
+
+@cache
+def folds() -> Folds:
+    """The folds of the face."""
+    knots, curves = list[NDArray[np.float64]](), list[NDArray[np.float64]]()
+    for _, group in groupby(read_rows(__package__, "folds"), key=lambda row: row["fold"]):
+        rows = list(group)
+        curve = _spline(numbers(rows, "x y z"))
+        knots.append(np.column_stack([curve, np.linspace(0.0, 1.0, len(curve))]))
+        sizes = [float(rows[0][name]) for name in ("width", "young", "old")]
+        movement = rows[0]["movement"]
+        curves.append(np.array([*_ball(curve), *sizes, 1 + MOVEMENTS.index(movement) if movement else 0]))
+    first = np.cumsum([0, *map(len, knots)]).astype(np.uint32)
+    return Folds(np.concatenate(knots).astype(np.float32), np.stack(curves).astype(np.float32), first)
+
+
+def _spline(knots: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places on the smooth curve through some, several from each to the next."""
+    from scipy.interpolate import CubicSpline
+
+    place = np.arange(len(knots))
+    return np.asarray(
+        CubicSpline(place, knots)(np.linspace(0, len(knots) - 1, _PIECES * (len(knots) - 1) + 1))
+    )
+
+
+def _ball(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    return np.append(centre, np.linalg.norm(points - centre, axis=1).max())

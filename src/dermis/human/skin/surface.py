@@ -1,0 +1,89 @@
+"""The surface that skin is painted on: the average person, on whom every place of the body is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.mesh.geometry import triangle_areas, vertex_normals
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.rig import Stencils
+
+Floats = NDArray[np.float32]
+
+FIELDS = ("lips", "mouth", "lids", "ears")
+"""Distances from borders [mm]: of the lips, positive inside; of the mouth, negative inside; from the edges of
+the lids; of the ears, positive on them."""
+_UNIT_MM = 0.01
+
+
+@cache
+def average() -> tuple[Floats, Floats]:
+    """(p, 3) the average person's control points, and (p, 4) the fields there, see `FIELDS` [mm]."""
+    file = resources.files("dermis.human").joinpath("data", "average.npz")
+    with resources.as_file(file) as path, np.load(path) as found:
+        places, fields = (
+            found[name].astype(np.float32) * np.float32(_UNIT_MM) for name in ("places", "fields")
+        )
+    return places, fields
+
+
+@dataclass(frozen=True, eq=False)
+class Painting:
+    """A human's triangles of skin, as painted_surface.wgsl reads them.
+
+    vertices : (v, 13) uv, place and normal on the average person, fields, and the binary logarithm of the mm
+        in a unit of uv
+    triangles : (t, 4) corners, and 1 where one of the sides is a chart's border
+    """
+
+    vertices: Floats
+    triangles: NDArray[np.uint32]
+
+    @property
+    def count(self) -> int:
+        """Of the triangles."""
+        return len(self.triangles)
+
+
+def painting(mesh: Mesh, stencils: Stencils | None) -> Painting:
+    """What is painted of a human's mesh.
+
+    stencils : which its points are refined by, if they are
+    """
+    places, fields = average()
+    both = np.hstack([places, fields]).astype(np.float64)
+    others = np.zeros(
+        (int(mesh.point.max() if stencils is None else stencils.point.max()) + 1, both.shape[1])
+    )
+    control = np.concatenate([both, others[len(both) :]])  # of eyeballs, which are not painted
+    points = control if stencils is None else stencils.points(control)
+    found = points[mesh.point].astype(np.float32)
+    kinds = np.array([material.kind == "skin" for material in mesh.materials])
+    triangles = mesh.triangles[kinds[mesh.material]]
+    normals = vertex_normals(found[:, :3], mesh.point, mesh.triangles)
+    density = _density(mesh.uv, found[:, :3], triangles)
+    vertices = np.column_stack([mesh.uv, found[:, :3], normals, found[:, 3:], density]).astype(np.float32)
+    flagged = np.column_stack([triangles, _at_border(triangles)]).astype(np.uint32)
+    return Painting(np.ascontiguousarray(vertices), np.ascontiguousarray(flagged))
+
+
+def _density(uv: Floats, places: Floats, triangles: NDArray[np.int32]) -> NDArray[np.float64]:
+    """(v,) binary logarithm of the mm in a unit of uv around each vertex."""
+    areas = triangle_areas(places[triangles].astype(np.float64))
+    a, b, c = (uv[triangles[:, k]].astype(np.float64) for k in range(3))
+    ab, ac = b - a, c - a
+    flat = np.abs(ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]) / 2
+    sums = [np.bincount(triangles.ravel(), np.repeat(each, 3), minlength=len(uv)) for each in (areas, flat)]
+    return np.asarray(0.5 * np.log2(np.maximum(sums[0], 1e-9) / np.maximum(sums[1], 1e-12)))
+
+
+def _at_border(triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
+    sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1), axis=-1).astype(np.int64)
+    key = (sides[..., 0] * (int(triangles.max()) + 1) + sides[..., 1]).ravel()
+    _, which, count = np.unique(key, return_inverse=True, return_counts=True)
+    return np.asarray((count[which] == 1).reshape(-1, 3).any(axis=1))

@@ -1,0 +1,113 @@
+"""Eyeballs of true shape in a head: which of its points tell where they are and where they look."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.errors import refuse
+from dermis.mesh.rig import Motion, Rig
+
+Doubles = NDArray[np.float64]
+
+SCLERA_MM, CORNEA_MM, LIMBUS_MM = 14.2, 7.8, 5.85
+"""Radii of the ball, of the cornea's front, and of the circle where they meet [mm].
+
+Cornea and iris are those of an adult. A ball is 12 mm in truth; here it has the curve that the published lids
+are shaped for, so that none of them stands off it."""
+IRIS_BEHIND_MM = 3.0
+"""Depth of the plane of the iris behind the cornea's apex [mm]."""
+PUPIL_MM = 1.0, 4.0
+
+
+@dataclass(frozen=True)
+class EyeLook:
+    """What makes eyes look different.
+
+    eumelanin : of the iris, from none, which leaves it blue, to the darkest brown, 0 to 1 [-]
+    pupil_mm : radius of the pupil, 1 to 4 [mm]
+    redness : of the white of the eye, 0 to 1 [-]
+    seed : which fibres and vessels, any integer from 0
+    """
+
+    eumelanin: float = 0.6
+    pupil_mm: float = 1.9
+    redness: float = 0.2
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        limits = {
+            "eumelanin": (0.0, 1.0),
+            "pupil_mm": PUPIL_MM,
+            "redness": (0.0, 1.0),
+            "seed": (0, 2**32 - 1),
+        }
+        for name, (low, high) in limits.items():
+            value = getattr(self, name)
+            if not low <= value <= high or (name == "seed" and value != int(value)):
+                refuse(
+                    f"eyes: {name}", f"a number from {low:g} to {high:g}", f"{value!r} came", "Choose within"
+                )
+
+
+@dataclass(frozen=True, eq=False)
+class Eyes:
+    """The eyeballs of a head, in their true shape: a ball with a cornea, see `profile_mm`.
+
+    apex, back, side : (k,) control points of each: the cornea's apex, the one opposite, one of the equator to
+        the right of who looks out of it
+    material : (k,) index of what its triangles are made of
+    look : of both
+    """
+
+    apex: NDArray[np.int32]
+    back: NDArray[np.int32]
+    side: NDArray[np.int32]
+    material: NDArray[np.int32]
+    look: EyeLook
+
+    def frames(self, rig: Rig, motion: Motion) -> Doubles:
+        """(k, 4, 4) from the head's space [mm] to each eye's own: in mm of a usual eye, z along its axis."""
+        count = len(self.apex)
+        points = rig.some_posed(np.concatenate([self.apex, self.back, self.side]), motion)
+        apex, back, side = points.reshape(3, count, 3)
+        length = np.linalg.norm(apex - back, axis=1, keepdims=True)
+        axis, scale = (apex - back) / length, (apex_mm() + SCLERA_MM) / length
+        middle = back + axis * SCLERA_MM / scale
+        across = side - middle
+        across -= (across * axis).sum(axis=1, keepdims=True) * axis
+        across /= np.linalg.norm(across, axis=1, keepdims=True)
+        turned = np.stack([across, np.cross(axis, across), axis], axis=1) * scale[:, :, None]
+        frames = np.zeros((count, 4, 4))
+        frames[:, :3, :3], frames[:, 3, 3] = turned, 1.0
+        frames[:, :3, 3] = -np.einsum("kij,kj->ki", turned, middle)
+        return frames
+
+    def with_look(self, look: EyeLook) -> Eyes:
+        """The same eyes of another look."""
+        return replace(self, look=look)
+
+
+def cornea_centre_mm() -> float:
+    """Where on the axis the centre of the cornea's front lies, from the ball's [mm]."""
+    return float(np.sqrt(SCLERA_MM**2 - LIMBUS_MM**2) - np.sqrt(CORNEA_MM**2 - LIMBUS_MM**2))
+
+
+def apex_mm() -> float:
+    """Where on the axis the cornea's apex lies [mm]."""
+    return cornea_centre_mm() + CORNEA_MM
+
+
+def iris_mm() -> float:
+    """Where on the axis the plane of the iris lies [mm]."""
+    return apex_mm() - IRIS_BEHIND_MM
+
+
+def profile_mm(angle: Doubles) -> Doubles:
+    """Distance from the ball's centre to its surface, by the angle from its axis [rad] [mm]."""
+    centre = cornea_centre_mm()
+    within = np.maximum(CORNEA_MM**2 - (centre * np.sin(angle)) ** 2, 0.0)
+    edge = np.arctan2(LIMBUS_MM, np.sqrt(SCLERA_MM**2 - LIMBUS_MM**2))
+    return np.where(angle < edge, centre * np.cos(angle) + np.sqrt(within), SCLERA_MM)

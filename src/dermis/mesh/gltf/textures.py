@@ -1,0 +1,96 @@
+"""Materials of a head that is written: what any program shows, and all maps for this package."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.images.codecs import encode_png8, encode_png16
+from dermis.images.colour import encode_srgb8
+from dermis.mesh.maps import MIN_SIZE, Maps
+from dermis.mesh.mesh import Material
+
+Floats = NDArray[np.float32]
+
+_IOR = {"KHR_materials_ior": {"ior": 1.4}}
+_ROUGH = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # perceptual roughness by a word in the name
+_ROUGH_ELSE = 0.8
+
+
+def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, bytes], dict[str, Any]]:
+    """PNG files by name, and what this package reads of them: {"index": name} by role.
+
+    slopes : (n, n, 2) of the relief for other programs, where `maps` has a height map and no normals
+    """
+    found: dict[str, bytes] = {}
+    roles: dict[str, Any] = {}
+    if maps.colour is not None:
+        found["colour"] = encode_png8(_enlarged(encode_srgb8(maps.colour)))
+    shown = slopes if maps.normal is None else maps.normal
+    if shown is not None:
+        found["normal"] = encode_png8(_enlarged(_normals(shown)))
+    if maps.normal is not None:
+        roles["normal"] = {"index": "normal"}
+    if maps.height is not None:
+        low, span = float(maps.height.min()), float(np.ptp(maps.height)) or 1.0
+        grey = np.rint((maps.height.astype(np.float64) - low) / span * 65535).astype(np.uint16)
+        found["height"], roles["height_mm"] = encode_png16(_enlarged(grey[..., None])), span / 255
+    if maps.roughness is not None:
+        perceptual = np.zeros((*maps.roughness.shape, 3), np.float32)
+        perceptual[..., 1] = np.sqrt(np.clip(maps.roughness, 0.0, 1.0))
+        found["metallic roughness"] = encode_png8(_enlarged(_bytes(perceptual)))
+    for role in ("specular", "roughness"):
+        if (grey_map := getattr(maps, role)) is not None:
+            found[role] = encode_png8(_enlarged(_bytes(grey_map)[..., None]))
+    if maps.region is not None:
+        found["region"] = encode_png8(_enlarged(maps.region[..., None]))
+    own = (role for role in ("height", "specular", "roughness", "region") if role in found)
+    return found, roles | {role: {"index": role} for role in own}
+
+
+def material_of(
+    one: Material, pictures: Mapping[str, bytes], roles: Mapping[str, Any], roughness: float
+) -> dict[str, Any]:
+    """A glTF material, in which a texture is named by its picture: {"index": name}.
+
+    roughness : Beckmann's m of skin without a map of it [-]
+    """
+    if one.kind != "skin":
+        rough = next((value for word, value in _ROUGH.items() if word in one.name.casefold()), _ROUGH_ELSE)
+        return {"name": one.name, "pbrMetallicRoughness": _plain(one, rough)}
+    surface = _plain(one, float(np.sqrt(roughness)))
+    if "colour" in pictures:
+        del surface["baseColorFactor"]
+        surface["baseColorTexture"] = {"index": "colour"}
+    if "metallic roughness" in pictures:
+        surface |= {"roughnessFactor": 1.0, "metallicRoughnessTexture": {"index": "metallic roughness"}}
+    name = one.name if "skin" in one.name.casefold() else f"{one.name} skin"
+    told: dict[str, Any] = {"name": name, "pbrMetallicRoughness": surface}
+    if "normal" in pictures:
+        told["normalTexture"] = {"index": "normal"}
+    return told | {"extensions": _IOR, "extras": {"dermis": dict(roles)}}
+
+
+def _plain(one: Material, roughness: float) -> dict[str, Any]:
+    factor = [*(float(value) for value in one.colour), 1.0]
+    return {"baseColorFactor": factor, "metallicFactor": 0.0, "roughnessFactor": round(roughness, 4)}
+
+
+def _enlarged(levels: NDArray[Any]) -> NDArray[Any]:
+    """A picture (h, w, c) with each texel repeated where it would be too small for a map."""
+    times = -(-MIN_SIZE // min(levels.shape[:2]))
+    return levels if times <= 1 else levels.repeat(times, axis=0).repeat(times, axis=1)
+
+
+def _normals(slopes: Floats) -> NDArray[np.uint8]:
+    """(h, w, 3) tangent-space normals as colours, green up."""
+    normal = np.concatenate([-slopes, np.ones_like(slopes[..., :1])], axis=-1)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    return _bytes(0.5 * normal + 0.5)
+
+
+def _bytes(values: NDArray[Any]) -> NDArray[np.uint8]:
+    return np.asarray(np.rint(np.clip(values, 0, 1) * 255), np.uint8)

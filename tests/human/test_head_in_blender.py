@@ -1,0 +1,78 @@
+"""Blender opens a person's file and moves it as this package does, where DERMIS_BLENDER_PYTHON names one."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dermis import Human, Pose, load_head
+from dermis.human.head_file import write_person
+from dermis.images.io import read_image
+from dermis.mesh.head import Head
+from dermis.reference.cycles import PYTHON_VARIABLE
+
+SCRIPT = Path(__file__).with_name("opened_in_blender.py")
+PERSON = Human.drawn(7)
+MOVES = {
+    "rest": Pose(),
+    "moved": Pose({"mouthSmileLeft": 1.0}),
+    "turned": Pose(bones={"head": (0, 25, 0)}),
+}
+"""As the script makes them."""
+SAME_MM = 0.02  # as for this package's own reading
+
+pytestmark = pytest.mark.skipif(not os.environ.get(PYTHON_VARIABLE), reason=f"{PYTHON_VARIABLE} is not set")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """With the file, and what Blender found in it."""
+    made = tmp_path_factory.mktemp("blender")
+    write_person(made / "person.glb", PERSON, PERSON.head(), roughness=0.3)
+    command = [os.environ[PYTHON_VARIABLE], str(SCRIPT), str(made / "person.glb"), str(made)]
+    apart = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    run = subprocess.run(command, capture_output=True, text=True, timeout=300, env=apart)
+    assert run.returncode == 0, run.stderr[-2000:]
+    return made
+
+
+@pytest.fixture(scope="module")
+def told(folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((folder / "told.json").read_text())
+    return found
+
+
+@pytest.fixture(scope="module")
+def head(folder: Path) -> Head:
+    return load_head(folder / "person.glb")
+
+
+def test_names_are_those_of_the_head(told: dict[str, Any], head: Head) -> None:
+    assert told["keys"] == ["Basis", *head.targets]
+    assert set(told["bones"]) == set(head.bones)
+    assert told["materials"] == [one.name for one in head.mesh.materials] and len(told["uv"]) == 1
+
+
+@pytest.mark.parametrize("move", MOVES)
+def test_vertices_move_as_a_pose_says(folder: Path, head: Head, move: str) -> None:
+    """Blender's Z is up and its front -Y."""
+    motion = MOVES[move].motion(head.control)
+    meant = head.control.points_mm(motion)[head.mesh.point]
+    with np.load(folder / "places.npz") as found:
+        x, y, z = 1e3 * found[move].T
+    assert np.abs(np.column_stack([x, z, -y]) - meant).max() < SAME_MM
+
+
+def test_the_picture_shows_skin(folder: Path) -> None:
+    picture = read_image(folder / "picture.png")
+    forehead = picture[24:29, 32:39]
+    assert picture.shape == (64, 64, 4) and (picture[:4, :4, 3] == 0).all()
+    assert (forehead[..., 3] > 250).all()
+    red, green, blue = (float(forehead[..., k].mean()) for k in range(3))
+    assert red > green + 10 and green > blue + 5 and red > 90

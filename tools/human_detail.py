@@ -1,0 +1,101 @@
+"""Makes src/dermis/human/data/detail.png: a tile of skin with pores, and one with its finest furrows.
+
+python tools/human_detail.py
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from scipy.ndimage import gaussian_filter
+from scipy.spatial import cKDTree
+
+from dermis.human.skin.detail import FULL_MM, SIDE, TILE_MM
+
+Doubles = NDArray[np.float64]
+
+OUT = Path(__file__).parent.parent / "src" / "dermis" / "human" / "data" / "detail.png"
+PORES_A_SIDE = 30
+PORE_MM = (0.06, 0.19)
+"""Radius of the smallest and the largest [mm], artist's values: 0.05 to 0.3 across, and a little over."""
+PORE_DEPTH_MM = (0.03, 0.085)
+CELLS_A_SIDE, FINE_CELLS_A_SIDE = 44, 92
+"""Of the two nets of furrows: cushions of 0.7 and of 0.35 mm."""
+FURROW_MM, FURROW_DEPTH_MM, CUSHION_MM = 0.11, 0.032, 0.016
+FINE_SHARE = 0.4
+SOFT = 0.6
+"""Standard deviation of the blur over all [texels]."""
+
+
+def main() -> None:
+    """Make the file."""
+    rng = np.random.default_rng(0)
+    across = (np.arange(SIDE) + 0.5) * TILE_MM / SIDE
+    places = np.stack(np.meshgrid(across, across), axis=-1).reshape(-1, 2)
+    layers = [pores(places, rng), furrows(places, rng), np.zeros(len(places))]
+    heights = gaussian_filter(np.stack(layers, axis=-1).reshape(SIDE, SIDE, 3), (SOFT, SOFT, 0), mode="wrap")
+    levels = np.clip(np.rint(255 * (heights / FULL_MM + 0.75)), 0, 255).astype(np.uint8)
+    Image.fromarray(levels).save(OUT, optimize=True)
+    sys.stdout.write(f"{OUT}  {OUT.stat().st_size / 1e3:.0f} kB\n")
+
+
+def scattered(count: int, rng: np.random.Generator, spread: float = 0.85) -> Doubles:
+    """(count², 2) places, one in each cell of a grid over the tile [mm]."""
+    cell = np.stack(np.meshgrid(np.arange(count), np.arange(count)), axis=-1).reshape(-1, 2)
+    return np.asarray((cell + 0.5 + spread * (rng.random(cell.shape) - 0.5)) * TILE_MM / count % TILE_MM)
+
+
+def pores(places: Doubles, rng: np.random.Generator) -> Doubles:
+    """Height (n,) of skin with pores, soft pits that lean all ways [mm]."""
+    middle = scattered(PORES_A_SIDE, rng)
+    share = rng.random(len(middle)) ** 1.3
+    radius, depth = (low + share * (high - low) for low, high in (PORE_MM, PORE_DEPTH_MM))
+    depth *= rng.random(len(middle)) < 0.85
+    turn, long = rng.uniform(0, np.pi, len(middle)), rng.uniform(1.0, 1.5, len(middle))
+    _, near = nearest(places, middle, 3)
+    height = np.zeros(len(places))
+    for which in near.T:
+        off = wrapped(places - middle[which])
+        c, s = np.cos(turn[which]), np.sin(turn[which])
+        along, beside = c * off[:, 0] + s * off[:, 1], c * off[:, 1] - s * off[:, 0]
+        square = (along / long[which]) ** 2 + beside**2
+        height -= depth[which] * np.exp(-square / (0.7 * radius[which]) ** 2)
+    return height
+
+
+def furrows(places: Doubles, rng: np.random.Generator) -> Doubles:
+    """Height (n,) of skin between a net of furrows and a finer one inside [mm]."""
+    coarse = net(places, CELLS_A_SIDE, 1.0, rng)
+    return np.asarray(coarse + FINE_SHARE * net(places, FINE_CELLS_A_SIDE, 0.55, rng))
+
+
+def net(places: Doubles, count: int, size: float, rng: np.random.Generator) -> Doubles:
+    """Furrows between cells, each cell a soft cushion [mm]."""
+    middle = scattered(count, rng, 0.8)
+    uneven = 0.5 + rng.random(len(middle))
+    distance, near = nearest(places, middle, 2)
+    between = distance[:, 1] - distance[:, 0]
+    depth = FURROW_DEPTH_MM * 0.5 * uneven[near].sum(axis=1)
+    cushion = CUSHION_MM * np.minimum(between / (TILE_MM / count), 1.0)
+    return np.asarray(cushion - depth * np.exp(-((between / (size * FURROW_MM)) ** 2)))
+
+
+def nearest(places: Doubles, middle: Doubles, k: int) -> tuple[Doubles, NDArray[np.intp]]:
+    """(n, k) distances to the nearest of some places on the tile, and which these are."""
+    box: Any = TILE_MM
+    distance, which = cKDTree(middle, boxsize=box).query(places, k=k)
+    return np.asarray(distance), np.asarray(which)
+
+
+def wrapped(off: Doubles) -> Doubles:
+    """Differences of places on the tile, the shortest way over its edges [mm]."""
+    return np.asarray((off + TILE_MM / 2) % TILE_MM - TILE_MM / 2)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,150 @@
+"""Makes src/dermis/human/data/average.npz: the average person, and how far skin is from lips, lids, ears.
+
+python tools/human_fields.py FOLDER, where FOLDER holds the published human.npz and its masks (CC0).
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from human_data import MM, Arrays, Doubles, Index, displacements
+from numpy.typing import NDArray
+from PIL import Image
+from scipy.ndimage import map_coordinates
+from scipy.sparse import csr_array, vstack
+from scipy.sparse.linalg import lsqr
+from scipy.spatial import cKDTree
+
+from dermis.human.person import Human
+from dermis.human.published import DELTA_MM
+from dermis.human.skin.surface import FIELDS
+from dermis.mesh.mesh import Mesh
+
+OUT = Path(__file__).parent.parent / "src" / "dermis" / "human" / "data" / "average.npz"
+AVERAGE = Human(sex=0.5, age=35.0)
+"""The person on whom skin is painted: left and right are alike."""
+LEVEL = 3
+"""Of the subdivision that distances are measured on."""
+FARTHEST_MM = 25.0
+"""Where fields end: nothing is painted so far from a border."""
+SMOOTH = 0.05
+"""Weight of a control point's own value in the fit, which leaves points that move nothing where they are."""
+ROOT_MM = 1.5
+"""How far the roots of the strips of lashes are from the skin at most."""
+
+
+def main() -> None:
+    """Make the file."""
+    folder = Path(sys.argv[1])
+    head = AVERAGE.head(layout="hm08", subdivide=LEVEL)
+    assert head.rig is not None and head.rig.stencils is not None
+    mesh, stencils = head.mesh, head.rig.stencils
+    skin = skin_vertices(mesh)
+    masks = {name: mask(folder, name, mesh.uv) for name in ("lips", "inside-mouth", "ears")}
+    inside = masks["inside-mouth"]
+    found = {
+        "lips": signed(mesh, skin, np.where(inside > 0.5, 1.0, masks["lips"]), ignored=inside > 0.5),
+        "mouth": -signed(mesh, skin, inside),
+        "lids": away(mesh, lash_roots(folder, mesh, skin)),
+        "ears": signed(mesh, skin, masks["ears"]),
+    }
+    assert tuple(found) == FIELDS
+    values = np.stack([np.clip(one, -FARTHEST_MM, FARTHEST_MM) for one in found.values()], axis=1)
+    first, point, weight = stencils.first, stencils.point, stencils.weight
+    matrix = csr_array((weight, point, first), shape=(len(first) - 1, len(head.positions_mm)))
+    fields = fit(matrix, mesh.point[skin].astype(np.int64), values[skin])
+    np.savez_compressed(OUT, places=hundredths(head.positions_mm), fields=hundredths(fields))
+    sys.stdout.write(f"{OUT}  {OUT.stat().st_size / 1e3:.0f} kB\n")
+
+
+def hundredths(values_mm: NDArray[np.floating]) -> NDArray[np.int16]:
+    """The same in units of the published displacements."""
+    return np.asarray(np.rint(values_mm / DELTA_MM), np.int16)
+
+
+def skin_vertices(mesh: Mesh) -> Index:
+    """Vertices of the skin."""
+    kinds = np.array([material.kind == "skin" for material in mesh.materials])
+    return np.unique(mesh.triangles[kinds[mesh.material]])
+
+
+def mask(folder: Path, name: str, uv: NDArray[np.float32]) -> Doubles:
+    """(v,) a published mask at the vertices, 0 to 1."""
+    picture = np.asarray(Image.open(folder / "masks" / f"mpfb_{name}.jpg").convert("L"), np.float64) / 255
+    place = uv[:, ::-1].T * np.array(picture.shape)[:, None] - 0.5
+    return np.asarray(map_coordinates(picture, place, order=1, mode="nearest"))
+
+
+def signed(mesh: Mesh, skin: Index, share: Doubles, ignored: NDArray[np.bool_] | None = None) -> Doubles:
+    """(v,) distance from where a share of the skin passes one half, positive inside [mm].
+
+    ignored : vertices whose edges are no border
+    """
+    held = np.zeros(len(share), bool)
+    held[skin] = True
+    if ignored is not None:
+        held &= ~ignored
+    edges = np.concatenate([mesh.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
+    a, b = edges[held[edges].all(axis=1)].T
+    crosses = (share[a] > 0.5) != (share[b] > 0.5)
+    a, b = a[crosses], b[crosses]
+    part = ((0.5 - share[a]) / (share[b] - share[a]))[:, None]
+    border = mesh.positions[a] + part * (mesh.positions[b] - mesh.positions[a])
+    return np.asarray(np.where(share > 0.5, 1.0, -1.0) * away(mesh, border))
+
+
+def away(mesh: Mesh, places: Doubles) -> Doubles:
+    """(v,) distance from the nearest of some places [mm]."""
+    return np.asarray(cKDTree(places).query(mesh.positions)[0])
+
+
+def lash_roots(folder: Path, mesh: Mesh, skin: Index) -> Doubles:
+    """(n, 3) where the published strips of lashes touch the lids, with points between [mm]."""
+    with np.load(folder / "human.npz") as found:
+        data: Arrays = {name: found[name] for name in found}
+    names = list(map(str, data["group_names"]))
+    strips = [k for k, name in enumerate(names) if "eyelashes" in name]
+    quads = data["quads"][np.isin(data["quad_group"], strips)].astype(np.int64)
+    places = published(data)
+    used = np.unique(quads)
+    distance = np.full(len(places), np.inf)
+    distance[used] = cKDTree(mesh.positions[skin]).query(places[used])[0]
+    sides = np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2)
+    sides = sides[(distance[sides] < ROOT_MM).all(axis=1)]
+    steps = np.linspace(0.0, 1.0, 8)[:, None, None]
+    return np.asarray(((1 - steps) * places[sides[:, 0]] + steps * places[sides[:, 1]]).reshape(-1, 3))
+
+
+def published(data: Arrays) -> Doubles:
+    """(p, 3) the published points of the average person, from the middle between the eyes [mm]."""
+    names = list(map(str, data["target_names"]))
+    places = MM * data["positions_dm"].astype(np.float64)
+    for name, weight in AVERAGE.weights().items():
+        point, delta = displacements(data, names.index(name))
+        places[point] += weight * delta
+    joints = list(map(str, data["joint_names"]))
+    eyes = data["joint_vertices"][[joints.index("l-eye"), joints.index("r-eye")]].astype(np.int64)
+    return np.asarray(places - places[eyes].mean(axis=(0, 1)))
+
+
+def fit(matrix: csr_array, point: Index, values: Doubles) -> Doubles:
+    """(p, k) values of control points whose smooth surface has those of the vertices (v, k).
+
+    point : (v,) row of the matrix of each vertex
+    """
+    rows = matrix[point]
+    near = np.asarray(rows.T @ values) / np.maximum(np.asarray(rows.sum(axis=0)).reshape(-1, 1), 1e-9)
+    near[np.asarray(rows.sum(axis=0)).ravel() < 1e-9] = -FARTHEST_MM
+    n = matrix.shape[1]
+    whole = vstack([rows, SMOOTH * csr_array((np.ones(n), (np.arange(n), np.arange(n))))]).tocsr()
+    columns = [
+        lsqr(whole, np.r_[values[:, k], SMOOTH * near[:, k]], x0=near[:, k], iter_lim=200)[0]
+        for k in range(values.shape[1])
+    ]
+    return np.stack(columns, axis=1)
+
+
+if __name__ == "__main__":
+    main()
