@@ -13,7 +13,7 @@ ETA = 1.55
 """Index of refraction of keratin [Marschner2003]."""
 TILT = np.radians(2.0)
 """Angle by which scales of the cuticle rise from the fibre towards its tip."""
-ROUGH_ALONG, ROUGH_AROUND = 0.3, 0.5
+ROUGH_ALONG, ROUGH_AROUND = 0.22, 0.5
 """Roughness along and around the fibre, 0 to 1, as artists are given it [Chiang2016]."""
 PLACES = 16
 """Places across the fibre that light is followed through, as in hair.wgsl."""
