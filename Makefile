@@ -12,7 +12,7 @@ help: ## this list
 setup: ## an environment in .venv from requirements.lock, and a Vulkan driver
 	@sh tools/setup.sh
 
-demo: setup ## make a head and render it into out/demo.png
+demo: setup ## render the package's head into out/demo.png
 	@mkdir -p out
 	@.venv/bin/dermis render -o out/demo.png
 

@@ -48,7 +48,7 @@ def main(
     output:
         JSON to write.
     head:
-        auto (the scan lee_perry_smith when it is here, else bust), a sample or a file.
+        auto (the scan lee_perry_smith when it is here, else human), a sample or a file.
     adapter:
         auto (the best), cpu (software), or a part of an adapter's name.
     parts:
@@ -60,7 +60,7 @@ def main(
     """
     try:
         target = check_output(output, (".json",), "Choose such a name")
-        name = ("lee_perry_smith" if cached("lee_perry_smith") else "bust") if head == "auto" else head
+        name = ("lee_perry_smith" if cached("lee_perry_smith") else "human") if head == "auto" else head
         plan = (quick_plan if quick else plan_of)(adapter, name)
         measure(plan, _chosen(parts), minutes, lambda told: _write(target, told))
     except DermisError as fault:

@@ -40,7 +40,7 @@ _SHARES = {"speed": 0.25, "delay": 0.2, "page": 1.0}  # of the time that is left
 
 def main(
     *,
-    head: str = "bust",
+    head: str = "human",
     adapter: str = "auto",
     size: str | None = None,
     atlas: int | None = None,
@@ -57,7 +57,7 @@ def main(
     Parameters
     ----------
     head:
-        The built-in bust, a sample, or a mesh file.
+        The built-in human, a sample, or a mesh file.
     adapter:
         auto (the best), cpu (software), or a part of an adapter's name.
     size:

@@ -18,7 +18,7 @@ REMEDIES = ("none", "clear-colour", "stretch-map", "alpha", "multi-uv", "stitch"
 
 
 def draw(studio):
-    head = studio.head("bust")
+    head = studio.head("human")
     light = dermis.PointLight(position=(900, 420, 420), irradiance=(4, 4, 4))
     behind = dermis.Camera(position=(900, -200, -500), target=(52, -62, -28), frame_mm=105)
     skin = dermis.Skin(profile="skin1", specular="none")

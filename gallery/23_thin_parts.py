@@ -15,7 +15,7 @@ from dermis.gallery.picture import main
 
 def draw(studio):
     panels = {}
-    for name in dict.fromkeys((studio.name, "bust")):
+    for name in dict.fromkeys((studio.name, "human")):
         head = studio.head(name)
         places = head.mesh.positions - head.centre_mm
         upper = places[abs(places[:, 1]) < 60]

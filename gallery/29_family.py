@@ -1,38 +1,32 @@
-"""Six heads of one generator.
+"""Six people of one model.
 
-Shape, age, melanin, blood, freckles and oil are parameters; each head is a mesh with maps that other programs
-can open.
+Ancestry, sex, age, weight and muscle are numbers, and so is each feature of the face. All have the same
+points: one head becomes another by where its points are.
 
 Columns: 3
 """
 
-import tempfile
-from pathlib import Path
-
 import dermis
 from dermis.gallery.picture import main
-from dermis.human.bust.parameters import BustParameters
-from dermis.human.bust_file import BustRecipe, write_bust
-from dermis.human.skin_maps.look import SkinLook
 
-FAMILY = [
-    (BustParameters(seed=1), SkinLook(seed=1)),
-    (BustParameters(seed=2, nose=1.15, jaw=1.08), SkinLook(seed=2, melanin=0.03, age=0.7)),
-    (BustParameters(seed=3, width=0.95, fullness=0.8), SkinLook(seed=3, melanin=0.008, freckles=0.9)),
-    (BustParameters(seed=4, ears=1.15, jaw=0.92), SkinLook(seed=4, melanin=0.06)),
-    (BustParameters(seed=5, width=1.06, fullness=0.5), SkinLook(seed=5, melanin=0.1, oil=0.7)),
-    (BustParameters(seed=6, fullness=-0.8, nose=1.2), SkinLook(seed=6, blood=0.025, age=1.0)),
-]
+AFRICAN = {"african": 1, "asian": 0, "caucasian": 0}
+ASIAN = {"african": 0, "asian": 1, "caucasian": 0}
+CAUCASIAN = {"african": 0, "asian": 0, "caucasian": 1}
+PEOPLE = {
+    "a woman of 28": dermis.Human(**AFRICAN, sex=0, age=28),
+    "a man of 35": dermis.Human(**ASIAN, sex=1, age=35, targets={"nose/nose-hump-incr": 0.3}),
+    "a woman of 45": dermis.Human(**CAUCASIAN, sex=0, age=45, weight=0.4),
+    "a man of 60": dermis.Human(**AFRICAN, sex=1, age=60, weight=0.3),
+    "a woman of 75": dermis.Human(**ASIAN, sex=0, age=75),
+    "a man of 85": dermis.Human(**CAUCASIAN, sex=1, age=85, weight=-0.3, muscle=-0.3),
+}
 
 
 def draw(studio):
     panels = {}
-    with tempfile.TemporaryDirectory() as folder:
-        for number, (shape, look) in enumerate(FAMILY, 1):
-            path = Path(folder) / f"head-{number}.glb"
-            write_bust(path, BustRecipe(shape, look, size=1024))
-            head = dermis.load_head(path)
-            panels[f"seed {number}"] = studio.render(dermis.Scene(head, camera=dermis.portrait(head)))
+    for name, person in PEOPLE.items():
+        head = person.head()
+        panels[name] = studio.render(dermis.Scene(head, camera=dermis.portrait(head)))
     return panels
 
 

@@ -70,6 +70,16 @@ def test_a_renderer_is_kept_for_many_frames(
     np.testing.assert_array_equal(first, again)
 
 
+@pytest.mark.parametrize("name", ["bust", "bust_many_charts"])
+def test_heads_that_are_gone_say_what_replaced_them(name: str, tmp_path: Path) -> None:
+    with pytest.raises(dermis.DermisError, match=rf"^{name}: .* replaced by .*'human'\. Write human instead"):
+        dermis.load_head(name)
+    scene = tmp_path / "scene.toml"
+    scene.write_text(f'[head]\nname = "{name}"\n')
+    with pytest.raises(dermis.DermisError, match="Write human instead"):
+        dermis.load_scene(scene)
+
+
 def test_errors_are_of_one_kind() -> None:
     with pytest.raises(dermis.DermisError, match=r"expected .* but .*\."):
         dermis.load_head("nobody.obj")

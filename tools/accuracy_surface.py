@@ -99,7 +99,9 @@ def seams(renderer: Renderer) -> list[str]:
     """Jump of the scattered light across seams, of the light there [%]: mean and 95th percentile."""
     ball = cut_sphere(30.0, 20)
     rows = row(renderer, "sphere in six charts", Head("sphere", ball, Maps()), BALL_SIDE, everywhere)
-    rows += row(renderer, "bust", dermis.load_head("bust"), HEAD_SIDE, everywhere)
+    own = dermis.load_head("human")
+    rows += row(renderer, "human, neck and back of the head", own, HEAD_SIDE, seen)
+    rows += row(renderer, "human, eye sockets and inside of the mouth", own, HEAD_SIDE, hidden)
     human = dermis.load_head(Path(os.environ["DERMIS_DATA"]) / HUMAN, unit_mm=100)
     rows += row(renderer, "MakeHuman, neck", human, HEAD_SIDE, at_neck)
     return rows + row(renderer, "MakeHuman, back of the head", human, HEAD_SIDE, behind)
@@ -118,6 +120,16 @@ def at_neck(places: np.ndarray) -> np.ndarray:
 def behind(places: np.ndarray) -> np.ndarray:
     """Places on the back of the head."""
     return (places[:, 1] > -90.0) & (places[:, 2] < -30.0)
+
+
+def seen(places: np.ndarray) -> np.ndarray:
+    """Places of the human's seams that can be seen."""
+    return np.asarray(at_neck(places) | behind(places))
+
+
+def hidden(places: np.ndarray) -> np.ndarray:
+    """Places of its other seams."""
+    return ~seen(places)
 
 
 def row(

@@ -148,7 +148,7 @@ def wedges(renderer: dermis.Renderer) -> str:
 def ears(renderer: dermis.Renderer) -> str:
     """Red light on the dark side of heads' ears, lit from behind and from the front."""
     rows = []
-    for name in ("lee_perry_smith", "bust"):
+    for name in ("lee_perry_smith", "human"):
         head = dermis.load_head(name)
         mesh, centre = head.mesh, np.array(head.centre_mm)
         for side, z in (("behind", 1.0), ("the front", -1.0)):

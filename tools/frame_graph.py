@@ -60,7 +60,7 @@ def main() -> None:
     """Draw and write."""
     adapter, page = (*sys.argv[1:], *("auto", str(PAGE))[len(sys.argv) - 1 :])[:2]
     renderer = dermis.Renderer(adapter)
-    name = "lee_perry_smith" if cached("lee_perry_smith") else "bust"
+    name = "lee_perry_smith" if cached("lee_perry_smith") else "human"
     scene = dermis.Scene(rigged(dermis.load_head(name), TARGETS))
     renderer.draw(scene, SETTINGS)
     ms = renderer.draw_warm(scene, SETTINGS).gpu_ms or {}

@@ -12,7 +12,6 @@ from dermis.atlas.unwrap.flatten import flatten
 from dermis.atlas.unwrap.pack import pack
 from dermis.atlas.unwrap.seams import border_sides
 from dermis.atlas.unwrap.stretch import singular_values
-from dermis.human.bust.fields import rise
 from dermis.mesh.quads import halves
 
 Doubles = NDArray[np.float64]
@@ -89,6 +88,12 @@ def _parted(places: Doubles, quads: Index, corner: Index, uv: Doubles) -> tuple[
     used, again = np.unique(made[far], return_inverse=True)
     made[far] = len(uv) + again.reshape(-1, 4)
     return made, np.vstack([uv, uv[used]])
+
+
+def rise(values: Doubles, low: float, high: float) -> Doubles:
+    """From 0 at `low` to 1 at `high` with level ends; downwards when `low` is the greater."""
+    t: Doubles = np.clip((values - low) / (high - low), 0, 1)
+    return t * t * (3 - 2 * t)
 
 
 def _head_density(middle: Doubles) -> Doubles:

@@ -16,14 +16,11 @@ from cut_meshes import (
     cut_sphere,
     folded_sheet,
 )
+from many_charts import many_charts_mesh
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.atlas.unwrap.charts import grow
-from dermis.atlas.unwrap.unwrap import unwrap
-from dermis.human.bust.mesh import build_bust
-from dermis.human.bust.parameters import BustParameters
 from dermis.mesh.geometry import build_mesh, triangle_areas, uv_cross
 from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.primitives import plane
@@ -35,18 +32,12 @@ READ = 0.3
 """A point read between texels against the true one, of a texel's side: surfaces bend and edges repeat."""
 
 
-def bust_in_many_charts() -> Mesh:
-    positions, triangles, normals = build_bust(BustParameters(), 6.0)
-    layout = unwrap(positions, triangles, grow(positions, triangles, 60))
-    return layout.mesh(positions, normals, Material("skin"))
-
-
 MESHES = {
     "sphere": (lambda: cut_sphere(30.0, 20), 200),
     "cylinder": (lambda: cut_cylinder(30.0, 80.0, 9), 200),
     "cone": (lambda: cut_cone(40.0, 50.0), 200),
     "fold": (lambda: folded_sheet(60.0, 6), 160),
-    "many charts": (bust_in_many_charts, 400),
+    "many charts": (lambda: many_charts_mesh(300), 1024),
 }
 
 
@@ -60,6 +51,10 @@ def case(name: str) -> tuple[Mesh, Atlas]:
 def texel_mm(atlas: Atlas) -> Floats:
     """(n, n) longer side of each texel on the surface [mm]."""
     return np.asarray(1.0 / np.maximum(atlas.stretch.astype(np.float64).min(axis=-1), 1e-3))
+
+
+def test_many_charts_are_many() -> None:
+    assert charts(case("many charts")[0]).max() >= 300
 
 
 @pytest.mark.parametrize("name", MESHES)

@@ -115,7 +115,7 @@ def test_a_section_that_fails_leaves_what_came_before_and_the_reason(tmp_path: P
         yield "camera", one | {"processor_ms": 10.0, "stages": ["post"]}
         raise RuntimeError("the page does not come to rest")
 
-    plan = {"head": "bust", "size": (240, 160), "atlas": 64, "samples": 1}
+    plan = {"head": "human", "size": (240, 160), "atlas": 64, "samples": 1}
     found = Found(
         {"plan": plan, "adapter": "none", "date": "2026-01-01"}, tmp_path / "told.json", Clock(10.0)
     )

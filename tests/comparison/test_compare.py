@@ -85,11 +85,11 @@ def test_scenes_have_no_colour_of_their_own(light: str, region: str) -> None:
     assert np.isfinite(scene.camera.position).all()
 
 
-@pytest.mark.parametrize("name", ["bust", pytest.param("lee_perry_smith", marks=pytest.mark.samples)])
+@pytest.mark.parametrize("name", ["human", pytest.param("lee_perry_smith", marks=pytest.mark.samples)])
 def test_the_back_light_shines_at_an_ear_and_not_at_a_shoulder(name: str) -> None:
     head = load_head(name)
     target = comparison_scene(head, "back", "ear", "gpu-gems-3").lights[0].target
-    assert 80.0 < target[0] < 95.0 and abs(target[1]) < 30.0 and -50.0 < target[2] < 0.0
+    assert 75.0 < target[0] < 95.0 and abs(target[1]) < 30.0 and -50.0 < target[2] < 0.0
 
 
 @pytest.mark.parametrize(

@@ -121,7 +121,7 @@ def test_no_field_here_has_its_default(plain: Plain) -> None:
     ],
 )
 def test_a_scene_comes_back(scene: Scene, tmp_path: Path) -> None:
-    save_scene(tmp_path / "scene.toml", scene, SETTINGS, {"name": "bust"})
+    save_scene(tmp_path / "scene.toml", scene, SETTINGS, {"name": "human"})
     made, settings = load_scene(tmp_path / "scene.toml", HEAD)
     assert (made.camera, made.skin, made.environment, settings) == (
         scene.camera,
@@ -139,7 +139,7 @@ def test_a_pose_comes_back(tmp_path: Path) -> None:
     matrix = np.diag([1.0, 2.0, 1.0, 1.0])
     bones = {"head": np.float32([1, 2, 3]), "jaw": (0.5, 0, 0), "neck": matrix}
     given = Pose({"mouth open": 0.1, "é": np.float32(-2), "target2": 1}, bones)
-    save_scene(tmp_path / "scene.toml", Scene(head, pose=given), SETTINGS, {"name": "bust"})
+    save_scene(tmp_path / "scene.toml", Scene(head, pose=given), SETTINGS, {"name": "human"})
     made, _ = load_scene(tmp_path / "scene.toml", head)
     assert isinstance(made.pose, Pose)
     assert made.pose.weights == {"mouth open": 0.1, "é": -2.0, "target2": 1.0}
@@ -149,7 +149,7 @@ def test_a_pose_comes_back(tmp_path: Path) -> None:
 
 
 def test_a_pose_of_nothing_comes_back(tmp_path: Path) -> None:
-    save_scene(tmp_path / "scene.toml", Scene(HEAD, pose=Pose()), SETTINGS, {"name": "bust"})
+    save_scene(tmp_path / "scene.toml", Scene(HEAD, pose=Pose()), SETTINGS, {"name": "human"})
     made, _ = load_scene(tmp_path / "scene.toml", HEAD)
     assert isinstance(made.pose, Pose) and not made.pose.weights and not made.pose.bones
 
@@ -157,7 +157,7 @@ def test_a_pose_of_nothing_comes_back(tmp_path: Path) -> None:
 def test_places_of_points_are_not_saved_as_text(tmp_path: Path) -> None:
     scene = Scene(HEAD, pose=Pose(positions_mm=HEAD.positions_mm))
     with pytest.raises(DermisError, match=r"weights and bones, .* but it has positions_mm"):
-        save_scene(tmp_path / "scene.toml", scene, SETTINGS, {"name": "bust"})
+        save_scene(tmp_path / "scene.toml", scene, SETTINGS, {"name": "human"})
     assert not list(tmp_path.iterdir())
 
 
@@ -174,7 +174,7 @@ def test_places_of_points_are_not_saved_as_text(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_a_pose_that_cannot_be_names_file_and_key(tmp_path: Path, table: str, words: str) -> None:
-    (tmp_path / "scene.toml").write_text(f'[head]\nname = "bust"\n[pose]\n{table}\n')
+    (tmp_path / "scene.toml").write_text(f'[head]\nname = "human"\n[pose]\n{table}\n')
     with pytest.raises(DermisError, match=words):
         load_scene(tmp_path / "scene.toml", replace(HEAD, rig=random_rig()))
 

@@ -9,7 +9,7 @@ import pytest
 from small_head import HEIGHT_MM, write_head
 
 from dermis.errors import DermisError
-from dermis.human.bust.regions import REGIONS
+from dermis.human.regions.zones import REGIONS
 from dermis.images.io import write_png
 from dermis.scene import (
     Camera,

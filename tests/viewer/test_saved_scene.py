@@ -14,7 +14,7 @@ from PIL import Image
 from rigged_head import write_rigged_head
 
 from dermis.cli import main
-from dermis.human.bust.regions import REGIONS
+from dermis.human.regions.zones import REGIONS
 from dermis.images.io import read_image
 from dermis.scene import Environment, Scene
 from dermis.scene.heads import load_head

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from dermis.errors import DermisError
-from dermis.human.bust.regions import REGIONS
+from dermis.human.regions.zones import REGIONS
 from dermis.scene.skin import Skin
 from dermis.viewer.session import NO_REGIONS, apply_regions
 from dermis.viewer.state import ViewerState

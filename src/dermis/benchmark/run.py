@@ -66,7 +66,7 @@ class Benchmark:
 
 
 def run(
-    cases: list[Case], head: str = "bust", adapter: str = "auto", progress: Progress | None = None
+    cases: list[Case], head: str = "human", adapter: str = "auto", progress: Progress | None = None
 ) -> Benchmark:
     """Measure the cases one after another.
 

@@ -42,7 +42,7 @@ def bench(
         interactive (around 1920x1080, atlas 2048), film (around 3840x2160, atlas 4096), or cpu (around
         1024x1024; some minutes on two cores) [by the adapter].
     head:
-        auto (the scan lee_perry_smith when it is here, else bust), or what `dermis render` takes.
+        auto (the scan lee_perry_smith when it is here, else human), or what `dermis render` takes.
     output:
         HTML report with plots.
     """
@@ -73,7 +73,7 @@ def _head(name: str) -> str:
 
     if name != "auto":
         return name
-    return "lee_perry_smith" if cached("lee_perry_smith") else "bust"
+    return "lee_perry_smith" if cached("lee_perry_smith") else "human"
 
 
 def _lines(made: Benchmark) -> list[str]:

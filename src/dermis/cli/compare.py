@@ -51,9 +51,9 @@ def compare(
 
         dermis compare lee_perry_smith -o report.html
 
-        dermis compare bust --against path-traced --light back --samples 256 --json
+        dermis compare human --against path-traced --light back --samples 256 --json
 
-        dermis compare bust --against heat --region ear --techniques gpu-gems-3,texture-space
+        dermis compare human --against heat --region ear --techniques gpu-gems-3,texture-space
 
         dermis compare specular -o plots
 

@@ -35,14 +35,14 @@ def gallery(
 
         dermis gallery --only seams stretch --size 320 -o out
 
-        dermis gallery --head bust -o out
+        dermis gallery --head human -o out
 
     Parameters
     ----------
     only:
         Some of the pictures, by number or a part of their names.
     head:
-        The head to show: a sample or a file [the scan where its files are at hand, else the bust].
+        The head to show: a sample or a file [the scan where its files are at hand, else human].
     size:
         Side of a panel in pixels, 32 to 2048 [448].
     output:

@@ -17,7 +17,7 @@ _MOST_UNSCATTERED = 0.05  # closed eyes and other collapsed charts of real scans
 
 
 def render(
-    head: str = "bust",
+    head: str = "human",
     /,
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("dermis.png"),
@@ -35,17 +35,17 @@ def render(
 
         dermis render head.obj --unit-mm 100 --colour skin.png --subdivide 1
 
-        dermis render human --pose mouthSmileLeft=1,mouthSmileRight=1 --bone head=0,20,0 -o human.png
+        dermis render --pose mouthSmileLeft=1,mouthSmileRight=1 --bone head=0,20,0 -o smile.png
 
-        dermis render face.glb --pose jawOpen=0.6,mouthSmileLeft=1 --bone head=0,25,0 -o smile.png
+        dermis render face.glb --pose jawOpen=0.6,mouthSmileLeft=1 --bone head=0,25,0 -o face.png
 
         dermis render scene.toml --size 1920x1080 --json
 
     Parameters
     ----------
     head:
-        bust or human, heads of the package, a sample (lee_perry_smith), a mesh (.glb .gltf .obj .ply) or a
-        scene (.toml).
+        human, the head of the package, a sample (lee_perry_smith), a mesh (.glb .gltf .obj .ply) or a scene
+        (.toml).
     output:
         Image to write: .png (sRGB, 8 bit) or .exr (linear Rec. 709, float).
     as_json:

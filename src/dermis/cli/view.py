@@ -21,7 +21,7 @@ _SOFTWARE_ATLAS = 1024  # a still frame of the usual one takes a processor sever
 
 
 def view(
-    head: str = "bust",
+    head: str = "human",
     /,
     *,
     browser: bool = False,
@@ -52,7 +52,7 @@ def view(
     Parameters
     ----------
     head:
-        bust or human, heads of the package, a sample, a mesh file, or a scene in TOML.
+        human, the head of the package, a sample, a mesh file, or a scene in TOML.
     browser:
         Serve a web page instead of opening a window, for machines without a screen.
     port:

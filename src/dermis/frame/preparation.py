@@ -67,14 +67,14 @@ class Preparation:
         return inputs
 
     def _inputs(self, scene: Scene, settings: Settings, technique: Technique, view: str) -> Inputs:
-        keep, device, head, around = self.memo.keep, self.device, scene.head, scene.environment
+        keep, device, head, around = self.memo.keep, self.device, scene.head.bare, scene.environment
         profile = self.profile_of(scene.skin)
         surroundings = keep(load_surroundings, device, around.name if around else None)
         scene = with_suns(self.memo, scene, surroundings)
         moved = self._moved(head, scene.motion)
         lit_by = head, tuple(scene.lights), moved.outline, settings.shadow_size
         record, layers, parts = keep(_lights, *lit_by, using=(device, scene))
-        who = head, scene.skin, profile, _person(scene)
+        who = scene.head, scene.skin, profile, _person(scene)
         counts = parts, len(layers.clips), scene.motion is not None
         asked = Asked(*who, settings, around, surroundings, technique, *counts, view)
         resources = keep(make_resources, self.memo, device, asked)

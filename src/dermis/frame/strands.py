@@ -28,7 +28,6 @@ class StrandTables:
     strands, knots : by hair and by knot, as strands_pose.wgsl reads them
     posed, drawn : knots in space and in the picture
     hairs, pieces : counts
-    skin : (3,) albedo of the skin under them
     constants : pipeline constants of the shaders that read knots
     """
 
@@ -38,7 +37,6 @@ class StrandTables:
     drawn: Any
     hairs: int
     pieces: int
-    skin: tuple[float, ...]
     constants: Constants
 
 
@@ -60,11 +58,13 @@ class StrandResources:
     """What the passes of hairs read and write.
 
     shadows : buffer of what they hold back of each light
+    skin : (3,) albedo of the skin under them
     """
 
     tables: StrandTables
     picture: StrandPicture
     shadows: Any
+    skin: tuple[float, ...]
 
 
 def strand_numbers() -> dict[str, float]:
@@ -93,7 +93,6 @@ def make_tables(device: Device, head: Head) -> StrandTables:
     table["share"] = weights(strands.roots.place)
     table["absorption"][:, :3] = strands.absorption
     rows = np.concatenate([strands.knots_mm, strands.radius_mm[..., None]], axis=-1).astype(np.float32)
-    colour = head.maps.mean_colour
     return StrandTables(
         strands=device.buffer(table.view(np.uint32), "STORAGE"),
         knots=device.buffer(rows.reshape(-1, 4), "STORAGE"),
@@ -101,9 +100,14 @@ def make_tables(device: Device, head: Head) -> StrandTables:
         drawn=_words(device, 8 * count * knots),
         hairs=count,
         pieces=count * (knots - 1),
-        skin=(DEFAULT_COLOUR,) * 3 if colour is None else tuple(colour.tolist()),
         constants=(("KNOTS", knots),),
     )
+
+
+def skin_under(head: Head) -> tuple[float, ...]:
+    """(3,) albedo of the skin that hairs see below them."""
+    colour = head.maps.mean_colour
+    return (DEFAULT_COLOUR,) * 3 if colour is None else tuple(colour.tolist())
 
 
 def make_strand_picture(device: Device, tables: StrandTables, size: tuple[int, int]) -> StrandPicture:

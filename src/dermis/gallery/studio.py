@@ -12,7 +12,7 @@ from dermis.frame.rendered import Rendered
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
 from dermis.mesh.samples import cached
-from dermis.scene.heads import load_head
+from dermis.scene.heads import HUMAN, load_head
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
@@ -22,7 +22,7 @@ _SCAN = "lee_perry_smith"
 class Studio:
     """A renderer, and the head that pictures show.
 
-    name : head to show; by default the scan if it is downloaded, else the bust
+    name : head to show; by default the scan if it is downloaded, else the human
     side : of a panel [pixel]
     settings : fields of `Settings` that override a script's
     """
@@ -30,7 +30,7 @@ class Studio:
     def __init__(
         self, name: str | None = None, side: int = 448, adapter: str = "auto", **settings: Any
     ) -> None:
-        self.name = name or (_SCAN if cached(_SCAN) else "bust")
+        self.name = name or (_SCAN if cached(_SCAN) else HUMAN)
         self.side = side
         self._adapter, self._settings = adapter, settings
         self.frames_ms: list[float] = []
@@ -42,9 +42,8 @@ class Studio:
         return Renderer(self._adapter)
 
     def head(self, name: str | None = None) -> Head:
-        """The head to show, or another one; all but the bust are subdivided once."""
-        name = name or self.name
-        return self._load(name, subdivide=0 if name == "bust" else 1)
+        """The head to show, or another one; subdivided once."""
+        return self._load(name or self.name, subdivide=1)
 
     def render(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.uint8]:
         """(h, w, 3) sRGB bytes.

@@ -52,7 +52,7 @@ class EyeLook:
                 )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Eyes:
     """The eyeballs of a head, in their true shape: a ball with a cornea, see `profile_mm`.
 

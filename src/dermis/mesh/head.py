@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from dermis.mesh.eyes import Eyes
+from dermis.mesh.eyes import EyeLook, Eyes
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Floats, Mesh
 from dermis.mesh.rig import Rig
@@ -43,6 +43,14 @@ class Head:
         points = np.zeros((int(self.mesh.point.max()) + 1, 3), np.float32)
         points[self.mesh.point] = self.mesh.positions
         return Rig(points)
+
+    @cached_property
+    def bare(self) -> Head:
+        """Its shape and what moves it, the same whatever it looks like."""
+        if self.rig is None:
+            return self
+        eyes = self.eyes and self.eyes.with_look(EyeLook())
+        return replace(self, maps=Maps(), eyes=eyes)
 
     @property
     def positions_mm(self) -> Floats:

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from dermis.errors import refuse
-from dermis.human.bust import BUSTS
 from dermis.mesh.check import check_head_height
 from dermis.mesh.formats import is_gltf
 from dermis.mesh.gltf.pictures import embedded_maps
@@ -23,6 +22,8 @@ from dermis.scene.head_table import NormalY, Up, VOrigin
 
 MapFile = str | os.PathLike[str] | None
 HUMAN = "human"
+REPLACED = ("bust", "bust_many_charts")
+"""Heads that the package had before `HUMAN`."""
 
 
 def load_head(
@@ -41,7 +42,7 @@ def load_head(
     opaque: Sequence[str] = (),
     subdivide: int = 0,
 ) -> Head:
-    """A built-in head ("human", "bust"), a sample ("lee_perry_smith") or a file (.glb, .gltf, .obj, .ply).
+    """The built-in head "human", a sample ("lee_perry_smith") or a file (.glb, .gltf, .obj, .ply).
 
     Options replace what a sample or a glTF file has of its own. Morph targets and bones of a glTF file move
     the head (`Pose`); it rests as the file has it, at the default weights of its targets.
@@ -64,12 +65,11 @@ def load_head(
     if name == HUMAN or name.startswith(f"{HUMAN}:"):
         told = {"unit_mm": unit_mm, "v_origin": v_origin, "up": up, "opaque": opaque}
         return _human(name, own, height_mm, normal_y, told, subdivide)
+    if name in REPLACED and not path.is_file():
+        came = f"this mannequin was replaced by the parametric human, {HUMAN!r}"
+        refuse(name, f"one of {', '.join(_head_names())} or a mesh file", came, f"Write {HUMAN} instead")
     sample, files = SAMPLES.get(name), dict[str, Any]()
-    if name in BUSTS:
-        from dermis.human.bust_file import cached_bust
-
-        path = cached_bust(name)
-    elif sample is not None:
+    if sample is not None:
         _check_kind(sample)
         files = fetch(name)
         path = files["mesh"]
@@ -149,4 +149,4 @@ def _chosen(given: dict[str, MapFile], files: dict[str, Any]) -> dict[str, Any]:
 
 
 def _head_names() -> list[str]:
-    return [HUMAN, *BUSTS, *(name for name, sample in SAMPLES.items() if sample.kind == "head")]
+    return [HUMAN, *(name for name, sample in SAMPLES.items() if sample.kind == "head")]

@@ -77,7 +77,7 @@ def serve(
 
 
 def notebook_viewer(
-    shown: ViewerState | str = "bust", adapter: str = "auto", size: Size = (720, 540), motion: str = ""
+    shown: ViewerState | str = "human", adapter: str = "auto", size: Size = (720, 540), motion: str = ""
 ) -> Viewer:
     """A viewer for a notebook cell to display.
 

@@ -41,21 +41,18 @@ class Surface(NamedTuple):
 
     positions: Doubles
     triangles: Index
-    seams: Index
-    density: Doubles
-    weight: Doubles
 
     def lay(self, chart: Index) -> Flat:
         """Its charts (f,) laid flat, faulty or not."""
-        corner, point = cut_open(self.triangles, chart, self.seams)
-        places = flatten(self.positions[point], corner, self.density, self.weight)
+        corner, point = cut_open(self.triangles, chart)
+        even = np.ones(len(corner))
+        places = flatten(self.positions[point], corner, even, even)
         piece = sheets(corner, len(point))[corner[:, 0]]
         return Flat(corner, point, places, piece, faults(places, corner, piece))
 
     def part(self, chosen: Flags) -> Surface:
         """Some of its triangles."""
-        density, weight = self.density[chosen], self.weight[chosen]
-        return Surface(self.positions, self.triangles[chosen], self.seams, density, weight)
+        return Surface(self.positions, self.triangles[chosen])
 
 
 def lay_flat(surface: Surface, chart: Index) -> Flat:

@@ -11,8 +11,7 @@ from dermis.atlas.unwrap.pack import pack
 from dermis.atlas.unwrap.seams import border_sides
 from dermis.atlas.unwrap.settle import Flat, Surface, lay_flat
 from dermis.errors import refuse
-from dermis.mesh.geometry import build_mesh, triangle_areas
-from dermis.mesh.mesh import Material, Mesh
+from dermis.mesh.geometry import triangle_areas
 
 Index = NDArray[np.int64]
 Doubles = NDArray[np.float64]
@@ -40,20 +39,11 @@ class Layout:
     point: Index
     chart: Index
 
-    def mesh(self, positions: Doubles, normals: Doubles, material: Material) -> Mesh:
-        """The `Mesh` with this layout; positions (n, 3) [mm] and normals (n, 3) of its points."""
-        kind = np.zeros(len(self.triangles))
-        places, upright = positions[self.point], normals[self.point]
-        return build_mesh(places, self.uv, self.triangles, kind, (material,), upright, self.point)
-
 
 def unwrap(
     positions: Doubles,
     triangles: Index,
     chart: Index,
-    seams: Index | None = None,
-    density: ArrayLike = 1.0,
-    weight: ArrayLike = 1.0,
     upright: ArrayLike = UPRIGHT,
     padding: float = PADDING,
 ) -> Layout:
@@ -62,9 +52,6 @@ def unwrap(
     positions : (n, 3) [mm]
     triangles : (f, 3), each with an area
     chart : (f,) what is laid flat together; a chart in several pieces becomes several charts
-    seams : edges (s, 2) along which charts are cut open too
-    density : (f,) texels per mm on each triangle relative to others
-    weight : (f,) how much it matters that each triangle keeps its shape and density
     upright : (3,), or one for each triangle (f, 3), the direction in space that points up on the map
     padding : empty space between charts, of the map's side
 
@@ -74,11 +61,7 @@ def unwrap(
     Raises DermisError when a triangle has no area, and when there are too many charts for one map.
     """
     _check_areas(positions, triangles)
-    cuts = np.empty((0, 2), dtype=np.int64) if seams is None else seams
-    dense, heavy = (
-        np.broadcast_to(np.asarray(k, dtype=np.float64), len(triangles)) for k in (density, weight)
-    )
-    flat = lay_flat(Surface(positions, triangles, cuts, dense, heavy), chart)
+    flat = lay_flat(Surface(positions, triangles), chart)
     up = np.broadcast_to(np.asarray(upright, dtype=np.float64), (len(triangles), 3))
     first = np.unique(flat.piece, return_index=True)[1]
     height = np.einsum("fki,fi->fk", positions[triangles], up[first][flat.piece])

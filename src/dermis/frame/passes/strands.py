@@ -45,7 +45,7 @@ def draw(
     light = program(graph.device, "strands_light.wgsl", made.constants + lights)
     looked = ("eye", "forward", "right", "up", "samples", "jitter", "shown")
     record = light.record("StrandView", **{name: view[name] for name in looked})
-    record["hairs"], record["size"], record["skin"] = made.hairs, picture.result.size[:2], made.skin
+    record["hairs"], record["size"], record["skin"] = made.hairs, picture.result.size[:2], strands.skin
     seen = {"strand_view": record, "drawn": made.drawn}
     graph.dispatch("strands", light, {**lit, **seen, "posed": made.posed}, each(made.hairs + made.pieces))
     listed = {"chains": picture.chains, "links": picture.links}

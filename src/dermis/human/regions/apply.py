@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
-from dermis.human.bust.fields import Doubles
 from dermis.human.regions.labels import label_texels
 from dermis.human.regions.table import DEFAULT, LIMITS, RegionTable, load_table
+from dermis.human.regions.zones import Doubles
 from dermis.mesh.head import Head
 
 Floats = NDArray[np.float32]

@@ -1,9 +1,9 @@
-"""The region of the face of each texel of a head's atlas, by a warp of landmarks onto the average bust."""
+"""The region of the face of each texel of a head's atlas, by a warp of landmarks onto the average human."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import cache
 from importlib import resources
 from pathlib import Path
 
@@ -12,12 +12,17 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.errors import refuse
-from dermis.human.bust import ears
-from dermis.human.bust.fields import Doubles, gradient
-from dermis.human.bust.parameters import BustParameters
-from dermis.human.bust.regions import REGIONS, region_of
-from dermis.human.bust.shape import landmarks, symmetric
+from dermis.human.regions.average import (
+    average_head,
+    average_skin,
+    control_quads,
+    human_landmarks,
+    human_regions,
+    is_human,
+    on_average,
+)
 from dermis.human.regions.table import RegionTable
+from dermis.human.regions.zones import REGIONS, Doubles
 from dermis.mesh.head import Head
 from dermis.mesh.maps import load_labels
 from dermis.tables import parse_rows
@@ -25,20 +30,10 @@ from dermis.tables import parse_rows
 Place = tuple[float, float, float]
 Places = Mapping[str, Place]
 
-AVERAGE = BustParameters(asymmetry=0.0)
-"""The bust in whose space regions are told apart."""
-# In the frame of the ear [mm].
-_EAR = {
-    "ear top": (17.5, 30, 3),
-    "ear back": (31, 11, 2),
-    "ear lobe": (8, -30, 0.5),
-    "tragus": (-1.6, -5.5, 3.5),
-}
 _FEWEST = 10
 _FLATTEST_MM = 2.0  # root mean square distance from a plane: the warp needs three dimensions
 _FARTHEST_MM = 15.0  # centres of eyes lie this deep; what is farther belongs to another head
 _SLACK = 1.0  # for places picked by eye; 0 would carry each landmark exactly onto its twin
-_STEPS, _LONGEST_MM = 4, 4.0
 
 
 def load_landmarks(path: Path) -> Places:
@@ -50,28 +45,30 @@ def load_landmarks(path: Path) -> Places:
 
 
 def known_landmarks(head: Head) -> Places | None:
-    """The landmarks that the package has for a head of this name, if any."""
+    """Landmarks that the package has for a head, if any: the human's, or by its name [mm from its centre]."""
+    if is_human(head):
+        return _plain(human_landmarks(head), head.centre_mm)
     file = resources.files(__package__) / "landmarks" / f"{Path(head.name).stem}.csv"
     return _read(file.read_text("utf-8"), file.name) if file.is_file() else None
 
 
-@lru_cache(maxsize=1)
-def average_landmarks() -> Mapping[str, Place]:
-    """All landmarks that can be given, where they are on the average bust [mm]."""
-    places = {name: place for name, place in landmarks(AVERAGE).items() if "ear" not in name.split()}
-    for name, local in _EAR.items():
-        place = ears.CENTRE + np.array(local) @ ears.FRAME
-        places |= {f"left {name}": place, f"right {name}": place * (-1, 1, 1)}
-    return {name: (float(x), float(y), float(z)) for name, (x, y, z) in places.items()}
+@cache
+def average_landmarks() -> Places:
+    """All landmarks that can be given, where they are on the average human [mm]."""
+    return _plain(human_landmarks(average_head()))
+
+
+def _plain(places: Mapping[str, Doubles], origin: Place = (0.0, 0.0, 0.0)) -> Places:
+    apart = {name: place - np.array(origin) for name, place in places.items()}
+    return {name: (float(x), float(y), float(z)) for name, (x, y, z) in apart.items()}
 
 
 def to_average(head: Head, places: Places, points: Doubles) -> Doubles:
-    """Where points (n, 3) on a head [mm] lie on the average bust (n, 3) [mm].
+    """Where points (n, 3) on a head [mm] lie on or near the average human (n, 3) [mm].
 
     places : the head's landmarks, some of `average_landmarks` [mm from its centre]
 
-    An affine map and a smooth bending, linear in the distance to each landmark, then along the field of the
-    bust onto its skin.
+    An affine map and a smooth bending, linear in the distance to each landmark.
     """
     from scipy.interpolate import RBFInterpolator
 
@@ -79,17 +76,7 @@ def to_average(head: Head, places: Places, points: Doubles) -> Doubles:
     _check(head, places, average)
     ours, theirs = np.array(list(places.values())), np.array([average[name] for name in places])
     warp = RBFInterpolator(ours, theirs, kernel="linear", degree=1, smoothing=_SLACK)
-    return _on_skin(warp(points - np.array(head.centre_mm)))
-
-
-def _on_skin(points: Doubles) -> Doubles:
-    for _ in range(_STEPS):
-        slope = gradient(lambda p: symmetric(p, AVERAGE), points)
-        step = symmetric(points, AVERAGE) / np.maximum((slope**2).sum(axis=1), 0.05)
-        away = slope * step[:, None]
-        length = np.linalg.norm(away, axis=1, keepdims=True)
-        points = points - away * np.minimum(1, _LONGEST_MM / np.maximum(length, _LONGEST_MM))
-    return points
+    return np.asarray(warp(points - np.array(head.centre_mm)))
 
 
 def _read(text: str, name: str) -> Places:
@@ -122,8 +109,8 @@ def _check(head: Head, places: Places, average: Places) -> None:
 def label_texels(head: Head, atlas: Atlas, table: RegionTable) -> NDArray[np.uint8]:
     """Index into `REGIONS` (n,) of each texel that the atlas covers, in the order of its rows.
 
-    The table's picture of labels or its landmarks, else the head's own labels, else the landmarks that the
-    package has for the head. Raises DermisError for a head with none of these.
+    The table's picture of labels or its landmarks, else the head's own labels, else what the package knows of
+    the head: the points of the human, or landmarks. Raises DermisError for a head with none of these.
     """
     if table.labels is not None:
         return _sampled(load_labels(table.labels), atlas, str(table.labels))
@@ -131,6 +118,8 @@ def label_texels(head: Head, atlas: Atlas, table: RegionTable) -> NDArray[np.uin
         return _warped(head, atlas, load_landmarks(table.landmarks))
     if head.maps.region is not None:
         return _sampled(head.maps.region, atlas, head.name)
+    if is_human(head):
+        return _human(head, atlas)
     places = known_landmarks(head)
     if places is None:
         remedy = "Name a file of its landmarks, or a picture of its labels, in the table"
@@ -151,4 +140,10 @@ def _sampled(labels: NDArray[np.uint8], atlas: Atlas, name: str) -> NDArray[np.u
 def _warped(head: Head, atlas: Atlas, places: Places) -> NDArray[np.uint8]:
     corners = to_average(head, places, head.mesh.positions.astype(np.float64))
     points = atlas.interpolate(head.mesh, corners)[atlas.coverage]
-    return region_of(points, AVERAGE).astype(np.uint8)
+    return human_regions(points, average_skin().quads(points))
+
+
+def _human(head: Head, atlas: Atlas) -> NDArray[np.uint8]:
+    """Of a head of the parametric human, which all have the same quads."""
+    points = atlas.interpolate(head.mesh, on_average(head))[atlas.coverage]
+    return human_regions(points, control_quads(head, atlas.triangle[atlas.coverage]))

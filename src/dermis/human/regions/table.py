@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
-from dermis.human.bust.regions import REGIONS
+from dermis.human.regions.zones import REGIONS
 
 DEFAULT = "default"
 """Name of the package's own table, of artist's values."""
@@ -24,7 +24,7 @@ _FILES = ("landmarks", "labels")
 class RegionTable:
     """Roughness and strength by region.
 
-    values : (10, 2) roughness m and strength rho_s [-] in the order of `bust.regions.REGIONS`
+    values : (10, 2) roughness m and strength rho_s [-] in the order of `zones.REGIONS`
     landmarks : file of the head's landmarks, for heads that the package does not know
     labels : picture of the head's labels, which then needs no landmarks
     """

@@ -1,6 +1,6 @@
-"""The head that the package generates.
+"""The head in the package.
 
-From numbers alone: a shape of signed distances, and maps of pigments, pores and folds. No scan, no file, no
+A person between all, from MakeHuman's parametric human, which comes with the package: no scan, no file, no
 network. With scattering above, without below.
 
 Deck: S11
@@ -12,7 +12,7 @@ from dermis.gallery.picture import main
 
 
 def draw(studio):
-    head = studio.head("bust")
+    head = studio.head("human")
     views = {"front": dermis.portrait, "three-quarter": dermis.three_quarter, "side": dermis.profile}
     panels = {}
     for technique, note in {"texture-space": "", "none": ", dry"}.items():

@@ -1,0 +1,65 @@
+"""The regions of the face: their names, and where each lies on the average human."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Doubles = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+REGIONS = (
+    "forehead",
+    "brow",
+    "eyelid",
+    "nose",
+    "cheek",
+    "upper lip",
+    "lips",
+    "chin",
+    "ear",
+    "neck and scalp",
+)
+"""Names of the labels; the sixth is the skin between nose and mouth."""
+
+# Artist's values on the average human [mm].
+_NOSE = np.array(
+    [[-49.0, 7.0], [-46, 15], [-41, 19.5], [-35, 19.5], [-29, 17.5], [-20, 12], [-10, 9], [6, 6]]
+)
+"""Height and half the breadth of the nose."""
+_NOSE_BASE = np.array([[0.0, -49.0], [7, -48], [12, -45.5], [18, -43]])
+"""From the middle outwards, height at which the nose ends."""
+_FOLD = np.array([[-68.0, 27.0], [-60, 24.5], [-50, 21.5], [-43, 20]])
+"""Height and distance from the middle of the fold between the skin over the upper lip and the cheek."""
+_CHIN = np.array([[-110.0, 26.0], [-68, 22.0]])
+
+
+def region_of(places: Doubles, lips: Mask, ears: Mask) -> NDArray[np.int64]:
+    """Index into `REGIONS` (n,) of places (n, 3) on the average human [mm].
+
+    lips, ears : (n,) what is these, the inside of the mouth with the lips
+    """
+    x, y, z = np.abs(places[:, 0]), places[:, 1], places[:, 2]
+    front, over_jaw = z > -20, y > -108 + 0.42 * np.maximum(6 - z, 0)
+    tests = {
+        "ear": ears,
+        "lips": lips,
+        "eyelid": (((x - 30) / 18) ** 2 + ((y + 0.5) / 12) ** 2 < 1) & (z > -40),
+        "brow": _brow(x, y) & (z > -30),
+        "nose": front
+        & (x < np.interp(y, _NOSE[:, 0], _NOSE[:, 1], right=0.0))
+        & (y > np.interp(x, *_NOSE_BASE.T)),
+        "upper lip": front & (y > -68) & (y < -40) & (x < np.interp(y, *_FOLD.T)),
+        "chin": front & over_jaw & (y <= -68) & (x < np.interp(y, *_CHIN.T)),
+        "forehead": (y > 10) & (y < 72 - 0.006 * np.maximum(x - 20, 0) ** 2) & (z > -45),
+        "cheek": (z > -66) & (y <= 24) & over_jaw,
+    }
+    order = [REGIONS.index(name) for name in tests]
+    return np.select(list(tests.values()), order, default=REGIONS.index("neck and scalp"))
+
+
+def _brow(x: Doubles, y: Doubles) -> Mask:
+    """The arch where eyebrows grow, thinner outwards."""
+    middle = 20.5 - ((x - 33) / 10) ** 2 * 1.2
+    inside = np.abs(y - middle) < 5.5 - 0.06 * np.maximum(x - 20, 0)
+    return np.asarray(inside & (x > 9) & (x < 55))

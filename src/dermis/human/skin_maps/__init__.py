@@ -1,1 +1,0 @@
-"""Colour, relief and gloss of skin, from places in space: no pattern repeats, no seam shows."""

@@ -1,1 +1,0 @@
-"""The loops over points, as machine code. Import these modules inside functions: they load numba."""

@@ -1,0 +1,15 @@
+// Where rays that meet the cornea see the plane of the iris, in an eye's own space.
+//#include "lighting.wgsl"
+//#include "eye.wgsl"
+
+@group(0) @binding(30) var places: texture_2d<f32>; // on the cornea [mm]
+@group(0) @binding(31) var ways: texture_2d<f32>; // of sight, unit
+@group(0) @binding(32) var seen: texture_storage_2d<rgba32float, write>;
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if (all(id.xy < textureDimensions(places))) {
+        let p = textureLoad(places, id.xy, 0).xyz;
+        textureStore(seen, id.xy, vec4f(seen_on_iris(p, textureLoad(ways, id.xy, 0).xyz), 0.0, 0.0));
+    }
+}

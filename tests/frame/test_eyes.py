@@ -1,0 +1,195 @@
+"""Eyes of true shape: what is seen through the cornea, where they stand, how lids close over them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from setups import frontal, head_of, probe, run_frame, scene_of, settings_of
+
+from dermis import Human
+from dermis.errors import DermisError
+from dermis.frame.renderer import Renderer
+from dermis.gpu.textures import texture_from
+from dermis.mesh.eyes import CORNEA_MM, EyeLook, apex_mm, cornea_centre_mm, iris_mm
+from dermis.mesh.head import Head
+from dermis.mesh.primitives import plane
+from dermis.scene.camera import Camera
+from dermis.scene.environment import Environment
+from dermis.scene.gaze import looking_at
+from dermis.scene.lights import DirectionalLight
+from dermis.scene.model import Scene
+from dermis.scene.pose import Pose
+
+Floats = NDArray[np.float64]
+SIZE = 32
+ETA = 1.336
+MM = 1e-3
+"""Off the traced ray at most: single precision [mm]."""
+
+
+@pytest.fixture(scope="module")
+def head() -> Head:
+    return Human().head()
+
+
+def traced(places: Floats, ways: Floats) -> Floats:
+    """(n, 2) where rays through the cornea meet the plane of the iris, by Snell's law with angles [mm]."""
+    found = []
+    for p, d in zip(places.reshape(-1, 3), ways.reshape(-1, 3), strict=True):
+        n = (p - [0, 0, cornea_centre_mm()]) / CORNEA_MM
+        outside = np.arccos(np.clip(-d @ n, -1, 1))
+        inside = np.arcsin(np.sin(outside) / ETA)
+        beside = d + np.cos(outside) * n
+        length = np.linalg.norm(beside)
+        beside = beside / length if length > 1e-12 else beside
+        t = np.sin(inside) * beside - np.cos(inside) * n
+        found.append((p + t * (iris_mm() - p[2]) / t[2])[:2])
+    return np.array(found).reshape(*places.shape[:2], 2)
+
+
+def test_the_iris_is_seen_where_a_traced_ray_meets_it(renderer: Renderer) -> None:
+    rng = np.random.default_rng(1)
+    turn, off = rng.uniform(0, 2 * np.pi, (SIZE, SIZE)), 5.5 * np.sqrt(rng.random((SIZE, SIZE)))
+    x, y = off * np.cos(turn), off * np.sin(turn)
+    places = np.stack([x, y, cornea_centre_mm() + np.sqrt(CORNEA_MM**2 - off**2)], axis=-1)
+    ways = rng.normal(0, 0.35, (SIZE, SIZE, 3)) - [0, 0, 1]
+    ways /= np.linalg.norm(ways, axis=-1, keepdims=True)
+    places, ways = (one.astype(np.float32).astype(float) for one in (places, ways))
+    seen = on_iris(renderer, places, ways)
+    assert np.abs(seen - traced(places, ways)).max() < MM
+
+
+def test_the_cornea_magnifies(renderer: Renderer) -> None:
+    """As an iris of 12 mm looks like one of 13 from the front."""
+    p = np.zeros((SIZE, SIZE, 3))
+    p[..., 0] = 2.0
+    p[..., 2] = cornea_centre_mm() + np.sqrt(CORNEA_MM**2 - 4)
+    straight = np.tile(np.array([0.0, 0.0, -1.0]), (SIZE, SIZE, 1))
+    seen = on_iris(renderer, p, straight)
+    assert 1.7 < seen[0, 0, 0] < 1.9
+
+
+def on_iris(renderer: Renderer, places: Floats, ways: Floats) -> Floats:
+    """(n, n, 2) what the shader finds."""
+    lit = run_frame(renderer, scene_of(head_of(plane(50.0)), frontal())).lit
+    bound = {
+        name: texture_from(renderer.device, np.dstack([one, np.ones((SIZE, SIZE))]), "rgba32float")
+        for name, one in (("places", places), ("ways", ways))
+    }
+    (seen,) = probe(renderer.device, "eye_probe", (SIZE, SIZE), ["seen"], **lit, **bound)
+    return np.asarray(seen[..., :2], np.float64)
+
+
+def axes(head: Head, pose: Pose) -> Floats:
+    """(2, 3) directions that the eyes look in."""
+    assert head.eyes is not None
+    frames = head.eyes.frames(head.control, pose.motion(head.control))
+    return np.asarray([frame[2, :3] / np.linalg.norm(frame[2, :3]) for frame in frames])
+
+
+def test_at_rest_both_look_forward(head: Head) -> None:
+    np.testing.assert_allclose(axes(head, Pose()), [[0, 0, 1], [0, 0, 1]], atol=1e-6)
+
+
+def test_targets_of_gaze_turn_them(head: Head) -> None:
+    left, right = axes(head, Pose({"eyeLookOutLeft": 1, "eyeLookInRight": 1}))  # both to the head's left
+    assert left[0] > 0.4 and right[0] > 0.4 and abs(left[1]) < 1e-6
+    up, still = axes(head, Pose({"eyeLookUpLeft": 0.5}))
+    assert up[1] > 0.1 and still[1] == pytest.approx(0, abs=1e-6)
+
+
+def test_a_turn_that_is_given_adds_to_the_gaze(head: Head) -> None:
+    both = axes(head, Pose({"eyeLookOutLeft": 1}, {"eye.L": (0, -28, 0)}))
+    np.testing.assert_allclose(both[0], [0, 0, 1], atol=1e-6)
+
+
+def test_frames_have_the_apex_on_their_axis(head: Head) -> None:
+    pose = Pose({"eyeLookOutLeft": 0.7}, {"head": (5, 20, 10)})
+    assert head.eyes is not None
+    motion = pose.motion(head.control)
+    frames = head.eyes.frames(head.control, motion)
+    apexes = head.control.some_posed(head.eyes.apex, motion)
+    for frame, apex in zip(frames, apexes, strict=True):
+        np.testing.assert_allclose((frame @ np.append(apex, 1))[:3], [0, 0, apex_mm()], atol=0.1)
+
+
+@pytest.mark.parametrize("place", [(0, 0, 600), (120, 40, 500), (-80, -60, 400)])
+def test_both_eyes_converge(head: Head, place: tuple[float, float, float]) -> None:
+    """Also with the head turned."""
+    pose = looking_at(head, place, Pose(bones={"head": (0, 8, 0)}))
+    assert head.eyes is not None
+    at = np.append(np.add(place, head.centre_mm), 1.0)
+    for frame in head.eyes.frames(head.control, pose.motion(head.control)):
+        x, y, z = (frame @ at)[:3]
+        assert np.degrees(np.arctan2(np.hypot(x, y), z)) < 1.0
+
+
+def test_gaze_needs_eyes_and_a_place(head: Head) -> None:
+    with pytest.raises(DermisError, match="eyes that turn"):
+        looking_at(replace(head, eyes=None), (0, 0, 500))
+    with pytest.raises(DermisError, match="three numbers"):
+        looking_at(head, (0, float("nan"), 500))
+
+
+def eye_pixels(renderer: Renderer, person: Human, weight: float) -> int:
+    """How many pixels of a picture of the eyes show one."""
+    head = person.head()
+    materials = tuple(
+        replace(one, colour=(0.0, 1.0, 0.0) if "eye" in one.name else (0.0, 0.0, 0.0))
+        for one in head.mesh.materials
+    )
+    plain = replace(head, mesh=replace(head.mesh, materials=materials), eyes=None)
+    middle = tuple(float(c) for c in np.array([0.0, 0.0, 0.0]) - head.centre_mm)
+    camera = Camera(position=(middle[0], middle[1], middle[2] + 600), target=middle, frame_mm=110.0)
+    lamp = DirectionalLight(direction=(0, 0, -1), irradiance=(3, 3, 3), shadows=False)
+    pose = {"eyeBlinkLeft": weight, "eyeBlinkRight": weight}
+    settings = settings_of(size=(256, 128), atlas=256, parts="diffuse", samples=4)
+    shown = renderer.draw(Scene(plain, lights=(lamp,), camera=camera, pose=pose), settings).linear()
+    return int((shown[..., 1] > 2 * shown[..., 0] + 0.05).sum())
+
+
+@pytest.mark.parametrize("seed", [None, 0, 5, 9])
+def test_closed_lids_leave_no_gap(renderer: Renderer, seed: int | None) -> None:
+    person = Human() if seed is None else Human.drawn(seed)
+    assert eye_pixels(renderer, person, 0.0) > 150
+    assert eye_pixels(renderer, person, 1.0) == 0
+
+
+def test_in_even_light_nothing_is_brighter_than_it(renderer: Renderer, head: Head) -> None:
+    centre = np.array(head.centre_mm)
+    middle = tuple(float(c) for c in -centre)
+    camera = Camera(position=(middle[0], middle[1], middle[2] + 600), target=middle, frame_mm=120.0)
+    white = Environment(name="uniform")
+    scene = Scene(head, lights=(), camera=camera, environment=white)
+    shown = renderer.draw(scene, settings_of(size=(160, 80), atlas=256)).linear()
+    assert shown.max() < 1.02
+
+
+def test_looks_change_the_iris_alone(renderer: Renderer, head: Head) -> None:
+    assert head.eyes is not None
+    middle = tuple(float(c) for c in -np.array(head.centre_mm))
+    camera = Camera(position=(middle[0], middle[1], middle[2] + 600), target=middle, frame_mm=110.0)
+    lamp = DirectionalLight(direction=(0, 0, -1), irradiance=(3, 3, 3))
+    shown = []
+    for eumelanin in (0.05, 0.95):
+        one = replace(head, eyes=head.eyes.with_look(EyeLook(eumelanin)))
+        shown.append(
+            renderer.draw(
+                Scene(one, lights=(lamp,), camera=camera), settings_of(size=(220, 110), atlas=256)
+            ).linear()
+        )
+    changed = np.abs(shown[0] - shown[1]).max(axis=-1) > 1e-3
+    assert 0.005 < changed.mean() < 0.08
+    blue, brown = (one[changed].mean(axis=0) for one in shown)
+    assert blue[2] / blue[0] > 1.3 * brown[2] / brown[0]
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"eumelanin": 1.2}, {"pupil_mm": 0.5}, {"seed": 0.5}, {"redness": float("nan")}]
+)
+def test_looks_that_cannot_be_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(DermisError, match=f"eyes: {next(iter(wrong))}"):
+        EyeLook(**wrong)  # type: ignore[arg-type]

@@ -1,0 +1,215 @@
+"""The human's painted skin: colours of pigments, marks, relief, and what expressions change."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from setups import settings_of
+
+from dermis import Human
+from dermis.atlas.raster import rasterise
+from dermis.errors import DermisError
+from dermis.frame.painted import with_painted_maps
+from dermis.frame.passes.painting import paint
+from dermis.frame.renderer import Renderer
+from dermis.gpu import Device, download
+from dermis.human.skin.colours import EPIDERMIS_MM, colours, mean_colour
+from dermis.human.skin.look import SkinLook
+from dermis.human.skin.movements import MOVEMENTS, movements
+from dermis.human.skin.painted import PaintedMaps
+from dermis.human.skin.surface import FIELDS, Painting, painting
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.scene.lights import studio
+from dermis.scene.model import Scene
+
+Floats = NDArray[np.float32]
+SIDE = 256
+BARE = SkinLook(freckles=0, moles=0, spots=0, veins=0, stubble=0, beard=0, tan=0, age=0)
+"""Skin without marks."""
+
+
+@pytest.fixture(scope="module")
+def head() -> Head:
+    return Human().head()
+
+
+@pytest.fixture(scope="module")
+def surface(head: Head) -> Painting:
+    return painting(head.mesh, head.control.stencils)
+
+
+def painted(device: Device, surface: Painting, look: SkinLook = BARE, side: int = SIDE) -> Maps:
+    return paint.painted_maps(device, surface, look, side)
+
+
+def covered(head: Head, side: int = SIDE) -> NDArray[np.bool_]:
+    """(side, side) texels on the skin."""
+    kinds = np.array([one.kind == "skin" for one in head.mesh.materials])[head.mesh.material]
+    texel, _ = rasterise(head.mesh, side, np.flatnonzero(kinds))
+    found = np.zeros(side * side, bool)
+    found[texel] = True
+    return found.reshape(side, side)
+
+
+def fields(head: Head, surface: Painting, name: str, side: int = SIDE) -> Floats:
+    """(side, side) a distance at the texels on the skin, far outside elsewhere [mm]."""
+    kinds = np.array([one.kind == "skin" for one in head.mesh.materials])[head.mesh.material]
+    texel, triangle = rasterise(head.mesh, side, np.flatnonzero(kinds))
+    values = surface.vertices[:, 8 + FIELDS.index(name)]
+    found = np.full(side * side, -99.0, np.float32)
+    found[texel] = values[head.mesh.triangles[triangle]].mean(axis=1)
+    return found.reshape(side, side)
+
+
+def grey(maps: Maps) -> Floats:
+    assert maps.colour is not None
+    return np.asarray(maps.colour.mean(axis=-1))
+
+
+def test_the_same_look_is_the_same_paint_to_the_bit(device: Device, surface: Painting) -> None:
+    first, second = painted(device, surface), painted(device, surface)
+    for role in ("colour", "height", "specular", "roughness"):
+        assert np.array_equal(getattr(first, role), getattr(second, role)), role
+
+
+def test_colours_are_those_of_the_pigments(device: Device, surface: Painting, head: Head) -> None:
+    """Every colour of bare skin is one that the table has for some melanin and blood."""
+    maps, on = painted(device, surface), covered(head)
+    assert maps.colour is not None
+    bare = maps.colour[on & (fields(head, surface, "lips") < -6)][::37]
+    table = colours(BARE.eumelanin, BARE.oxygen, EPIDERMIS_MM)
+    melanin, blood = np.meshgrid(
+        BARE.melanin * 2 ** np.linspace(-2, 2, 81), BARE.blood * 2 ** np.linspace(-2, 4, 121)
+    )
+    known = table.read(melanin.ravel(), blood.ravel())
+    away = np.abs(bare[:, None, :] - known[None]).max(axis=-1).min(axis=1)
+    assert away.max() < 0.012
+
+
+def test_its_mean_is_that_of_the_look(device: Device, surface: Painting, head: Head) -> None:
+    for look in (BARE, replace(BARE, melanin=0.2), replace(BARE, melanin=0.004, blood=0.005)):
+        maps = painted(device, surface, look)
+        assert maps.colour is not None
+        mean = maps.colour[covered(head)].mean(axis=0)
+        np.testing.assert_allclose(mean, mean_colour(look), rtol=0.16)
+
+
+def test_lips_are_redder_than_what_is_around(device: Device, surface: Painting, head: Head) -> None:
+    maps, lips = painted(device, surface), fields(head, surface, "lips")
+    mouth = fields(head, surface, "mouth")
+    assert maps.colour is not None
+    ratio = maps.colour[..., 0] / maps.colour[..., 1]
+    around = ratio[(lips > -8) & (lips < -3)].mean()
+    assert ratio[(lips > 1) & (mouth > 1)].mean() > 1.15 * around
+
+
+def test_no_texel_beside_a_chart_is_black_or_high(device: Device, surface: Painting) -> None:
+    maps = painted(device, surface, SkinLook(age=1.0))
+    assert grey(maps).min() > 0.02
+    assert maps.height is not None and np.isfinite(maps.height).all() and np.abs(maps.height).max() < 2.0
+
+
+def test_what_is_asked_for_shows(device: Device, surface: Painting, head: Head) -> None:
+    on = covered(head)
+    plain = painted(device, surface)
+
+    def change(**marks: float) -> float:
+        other = painted(device, surface, replace(BARE, **marks))
+        return float((grey(plain) - grey(other))[on].mean())
+
+    for marks in ({"freckles": 1.0}, {"spots": 1.0}, {"stubble": 1.0}, {"beard": 1.0}, {"veins": 1.0}):
+        assert change(**marks) > 1e-4, marks
+    assert change(seed=1) == pytest.approx(0.0, abs=0.01)
+
+
+def test_age_deepens_folds(device: Device, surface: Painting, head: Head) -> None:
+    on = covered(head)
+    depths = []
+    for age in (0.0, 0.5, 1.0):
+        height = painted(device, surface, replace(BARE, age=age)).height
+        assert height is not None
+        depths.append(-np.percentile(height[on], 0.2))
+    assert depths[0] < 0.6 * depths[1] < 0.6 * depths[2]
+
+
+def test_finer_maps_show_the_same_skin(device: Device, surface: Painting, head: Head) -> None:
+    coarse, fine = painted(device, surface), painted(device, surface, side=2 * SIDE)
+    assert coarse.colour is not None and fine.colour is not None
+    halved = fine.colour.reshape(SIDE, 2, SIDE, 2, 3).mean(axis=(1, 3))
+    inner = covered(head)
+    assert np.abs(halved - coarse.colour)[inner].mean() < 0.01
+
+
+def test_given_maps_stay_and_others_are_painted(device: Device, head: Head) -> None:
+    own = np.full((16, 16), 0.4, np.float32)
+    mixed = replace(head, maps=replace(head.maps, roughness=own))
+    found = with_painted_maps(device, mixed, SIDE).maps
+    assert found.roughness is own and found.colour is not None and found.height is not None
+    other = replace(head, maps=Maps())
+    assert with_painted_maps(device, other, SIDE) is other
+
+
+@pytest.mark.parametrize("side", [100, 128, 8192])
+def test_sides_that_cannot_be_are_refused(device: Device, head: Head, side: int) -> None:
+    with pytest.raises(DermisError, match="a power of two from 256 to 4096"):
+        with_painted_maps(device, head, side)
+
+
+def test_a_face_at_rest_is_the_one_without_a_pose(renderer: Renderer, head: Head) -> None:
+    still = renderer.draw(Scene(head, lights=studio()), settings_of(atlas=256)).linear()
+    posed = renderer.draw(
+        Scene(head, lights=studio(), pose={"jawOpen": 0.0}), settings_of(atlas=256)
+    ).linear()
+    assert np.array_equal(still, posed)
+
+
+def test_raised_brows_deepen_the_forehead_and_leave_the_chin(renderer: Renderer, head: Head) -> None:
+    """By the relief that the device holds, texel by texel."""
+    chosen = settings_of(atlas=512)
+    found = []
+    for weight in (0.0, 1.0):
+        scene = Scene(head, lights=studio(), pose={"browInnerUp": weight, "browOuterUpLeft": weight})
+        renderer.draw(scene, chosen)
+        lit = renderer.prepare(scene, chosen).lit
+        found.append(download(renderer.device, lit["relief_map"]).astype(np.float32)[..., :2])
+    change = np.abs(found[1] - found[0]).max(axis=-1)
+    surface = painting(head.mesh, head.control.stencils)
+    kinds = np.array([one.kind == "skin" for one in head.mesh.materials])[head.mesh.material]
+    texel, triangle = rasterise(head.mesh, 512, np.flatnonzero(kinds))
+    y = np.full(512 * 512, np.nan)
+    y[texel] = surface.vertices[head.mesh.triangles[triangle], 3].mean(axis=1)
+    y = y.reshape(512, 512)
+    assert change[(y > 25) & (y < 60)].max() > 0.02
+    assert (change[y < -20] > 1e-3).mean() < 1e-3  # but where charts meet in the map
+
+
+def test_movements_are_those_of_their_targets() -> None:
+    names = ("jawOpen", "browInnerUp", "mouthPressLeft")
+    made = dict(zip(MOVEMENTS, movements(names, np.array([0, 1, 0.5], np.float32)), strict=True))
+    assert made["raised-brows"] == pytest.approx(0.8) and made["pressed"] == pytest.approx(0.25)
+    assert made["smile"] == 0 and movements(names, np.full(3, 9, np.float32)).max() == 1
+    assert not movements((), np.zeros(0, np.float32)).any()
+
+
+def test_unposed_people_share_the_painted_places() -> None:
+    """Places and fields are those of the average person, whoever is painted."""
+    one, other = (painting(h.mesh, h.control.stencils) for h in (Human().head(), Human(age=80, sex=1).head()))
+    np.testing.assert_allclose(one.vertices[:, 2:5], other.vertices[:, 2:5], atol=1e-4)
+    assert np.array_equal(one.triangles, other.triangles)
+
+
+def test_looks_out_of_range_are_refused() -> None:
+    with pytest.raises(DermisError, match="freckles"):
+        SkinLook(freckles=1.5)
+    with pytest.raises(DermisError, match="seed"):
+        SkinLook(seed=0.5)  # type: ignore[arg-type]
+
+
+def test_mean_colour_of_painted_maps_is_known_before_they_are_painted(head: Head) -> None:
+    assert isinstance(head.maps, PaintedMaps) and head.maps.mean_colour is not None
+    red, green, blue = head.maps.mean_colour
+    assert red > green > blue

@@ -1,0 +1,29 @@
+"""A head whose uv layout is as bad as seams can make it: the human's skin in hundreds of charts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dermis.atlas.unwrap.charts import grow
+from dermis.atlas.unwrap.unwrap import unwrap
+from dermis.human.person import Human
+from dermis.mesh.geometry import build_mesh, triangle_areas
+from dermis.mesh.mesh import Mesh
+
+LEAST_MM2 = 1e-6
+"""Triangles under it have no place on a layout."""
+
+
+def many_charts_mesh(charts: int, subdivide: int = 0) -> Mesh:
+    """The skin of the human without eyes, teeth and tongue, each chart turned its own way."""
+    mesh = Human().head(subdivide=subdivide).mesh
+    points = mesh.point[mesh.triangles[mesh.material == 0]].astype(np.int64)
+    positions, normals = (np.zeros((int(mesh.point.max()) + 1, 3)) for _ in range(2))
+    positions[mesh.point], normals[mesh.point] = mesh.positions, mesh.normals
+    triangles = points[triangle_areas(positions[points]) > LEAST_MM2]
+    chart = grow(positions, triangles, charts)
+    upright = np.random.default_rng(0).normal(size=(int(chart.max()) + 1, 3))
+    layout = unwrap(positions, triangles, chart, upright=upright[chart])
+    places, smooth = positions[layout.point], normals[layout.point]
+    kind = np.zeros(len(triangles))
+    return build_mesh(places, layout.uv, layout.triangles, kind, mesh.materials[:1], smooth, layout.point)
