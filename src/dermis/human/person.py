@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -105,6 +105,14 @@ class Human:
         plain = human_head(self.weights(), painted, layout, self.iris)
         head = subdivide_head(plain, subdivide)
         return groomed(head, plain, control_mm(_MEAN.weights()).astype(np.float64), subdivide, self._hair)
+
+    def on(self, head: Head) -> Head:
+        """The head of another person with this one's skin and eyes.
+
+        With `Pose(positions_mm=person.positions_mm)` it is this person, and only the skin is painted anew.
+        """
+        eyes = None if head.eyes is None else head.eyes.with_look(self.iris)
+        return replace(head, maps=PaintedMaps(look=self.look), eyes=eyes)
 
     @property
     def look(self) -> SkinLook:

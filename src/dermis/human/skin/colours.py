@@ -17,7 +17,7 @@ LIP_EPIDERMIS_MM = 0.03
 """What stands over the blood of the lips, which shows through more than elsewhere [mm]."""
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=64)
 def colours(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
     """Colour of skin by its shares of melanin and of blood."""
     return colour_table(SkinParameters(eumelanin=eumelanin, oxygen=oxygen, epidermis_mm=epidermis_mm))

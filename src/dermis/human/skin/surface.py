@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -32,6 +33,10 @@ def average() -> tuple[Floats, Floats]:
     return places, fields
 
 
+_KEPT: dict[bytes, Painting] = {}
+_MOST_KEPT = 3
+
+
 @dataclass(frozen=True, eq=False)
 class Painting:
     """A human's triangles of skin, as painted_surface.wgsl reads them.
@@ -51,10 +56,22 @@ class Painting:
 
 
 def painting(mesh: Mesh, stencils: Stencils | None) -> Painting:
-    """What is painted of a human's mesh.
+    """What is painted of a human's mesh; the same for all people with its layout.
 
     stencils : which its points are refined by, if they are
     """
+    digest = hashlib.blake2b(digest_size=16)
+    for part in (mesh.uv, mesh.point, mesh.triangles, mesh.material):
+        digest.update(np.ascontiguousarray(part).tobytes())
+    key = digest.digest()
+    if key not in _KEPT:
+        while len(_KEPT) >= _MOST_KEPT:
+            _KEPT.pop(next(iter(_KEPT)), None)
+        _KEPT[key] = _painting(mesh, stencils)
+    return _KEPT[key]
+
+
+def _painting(mesh: Mesh, stencils: Stencils | None) -> Painting:
     places, fields = average()
     both = np.hstack([places, fields]).astype(np.float64)
     others = np.zeros(

@@ -16,6 +16,7 @@ _EUMELANIN = {"african": 0.85, "asian": 0.7, "caucasian": 0.65}
 _FRECKLES = {"african": 0.02, "asian": 0.06, "caucasian": 0.16}
 _IRIS = {"african": 0.95, "asian": 0.85, "caucasian": 0.4}
 _SPREAD = 0.42  # standard deviation of the melanin's logarithm within a people
+_STEP = 0.05  # of eumelanin: people share tables of colours
 _YOUNG, _OLD = 25.0, 90.0
 _SPOTS_FROM = 45.0
 _MOST_LINED = 0.8  # of `age` at 90
@@ -82,7 +83,7 @@ def drawn_look(rng: np.random.Generator, origin: Origin) -> SkinLook:
     male = max(2.0 * origin.sex - 1.0, 0.0)
     return SkinLook(
         melanin=_within(usual.melanin * math.exp(_SPREAD * n[0]), 0.002, 0.45),
-        eumelanin=_within(usual.eumelanin + 0.05 * n[1], 0.4, 0.95),
+        eumelanin=round(_within(usual.eumelanin + 0.05 * n[1], 0.4, 0.95) / _STEP) * _STEP,
         blood=_within(usual.blood * math.exp(0.2 * n[2]), 0.004, 0.018),
         redness=_within(0.5 + 0.15 * n[3], 0.1, 1.0),
         freckles=_within(0.5 * usual.freckles + 0.9 * freckled, 0.0, 1.0),
