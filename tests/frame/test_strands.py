@@ -12,6 +12,7 @@ from setups import front_camera, frontal, probe, run_frame, scene_of
 from strand_setups import hairy, shuffled
 from tolerances import FURNACE, LOBE_TWIN, TWIN
 
+from dermis.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.gpu.textures import texture_from
@@ -200,6 +201,13 @@ def test_parts_of_the_picture_add_up(renderer: Renderer) -> None:
     parts = ("all", "diffuse", "specular")
     whole, below, over = (picture(renderer, scene, parts=part)[..., :3] for part in parts)
     assert np.abs(below + over - whole).max() < TWIN * whole.max()
+
+
+def test_hairs_of_another_mesh_are_refused(renderer: Renderer) -> None:
+    head = one(0.1)
+    alone = replace(head, mesh=replace(head.mesh, quads=head.mesh.quads[:0]))
+    with pytest.raises(DermisError, match="rooted in quads"):
+        picture(renderer, lit(alone))
 
 
 def test_strands_are_a_setting() -> None:

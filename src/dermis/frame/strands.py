@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dermis.errors import refuse
 from dermis.frame.surface import DEFAULT_COLOUR
 from dermis.gpu import Constants, Device, make_texture
 from dermis.mesh.head import Head
@@ -84,9 +85,15 @@ def strand_constants(head: Head, settings: Settings) -> Constants:
 
 
 def make_tables(device: Device, head: Head) -> StrandTables:
-    """The hairs of a head."""
+    """The hairs of a head.
+
+    Raises DermisError for hairs of another mesh.
+    """
     strands = head.strands
     assert strands is not None
+    if int(strands.roots.quad.max()) >= len(head.mesh.quads):
+        came = f"its mesh has {len(head.mesh.quads)} quads"
+        refuse(head.name, "hairs rooted in quads of its mesh", came, "Leave its strands out")
     count, knots = strands.radius_mm.shape
     table = np.zeros(count, _STRAND)
     table["corner"] = corners(head.mesh, strands.roots.quad)
