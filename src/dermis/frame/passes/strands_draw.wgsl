@@ -5,10 +5,11 @@
 
 override ROWS: u32 = 1u; // pixels of an invocation, one below the other; see `rows_of`
 
-const NEAREST: u32 = 8u; // pieces that a pixel keeps; those behind them count by what they cover
+const NEAREST: u32 = 8u; // pieces that a pixel keeps; those behind them count by their mean and what they cover
 const MOST_DEPTHS: u32 = 8u; // samples of a pixel that hairs are compared with
 const FAR: f32 = 2e30; // depth of no piece, behind everything [mm]
-const FIXED: f32 = 65536.0; // so that sums do not depend on the order
+const FIXED: f32 = 16384.0; // so that sums do not depend on the order
+const BRIGHTEST: f32 = 16.0; // radiance of pieces behind those kept
 
 @group(0) @binding(30) var<storage, read> drawn: array<Drawn>;
 @group(0) @binding(31) var<storage, read> chains: array<u32>; // see strands_bin.wgsl
@@ -132,7 +133,8 @@ fn covered(pixel: vec2u, first: u32, under: vec4f) -> vec4f {
     let depths = depths_at(pixel);
     let none = Fragment(FAR, 0u, 0.0, 0.0);
     var kept = array<Fragment, NEAREST>(none, none, none, none, none, none, none, none);
-    var farther = 0u; // logarithm of what pieces behind those kept let through
+    var farther = vec2u(0u); // cover of pieces behind those kept, and the logarithm of what they let through
+    var light = vec3u(0u); // of these
     for (var link = first; link != 0u; link = links[link - 1u].y) {
         var one = fragment_at(vec2f(pixel) + 0.5, links[link - 1u].x);
         one.cover *= free_share(one.depth, depths);
@@ -145,19 +147,19 @@ fn covered(pixel: vec2u, first: u32, under: vec4f) -> vec4f {
             one = settle(&kept, 5u, one);
             one = settle(&kept, 6u, one);
             one = settle(&kept, 7u, one);
-            farther += u32(-FIXED * log(max(1.0 - one.cover, 1e-4)));
+            farther += vec2u(FIXED * vec2f(one.cover, -log(max(1.0 - one.cover, 1e-4))));
+            light += vec3u(FIXED * one.cover * min(radiance_at(one), vec3f(BRIGHTEST)));
         }
     }
     var through = 1.0;
     var sum = vec3f(0.0);
     for (var k = 0u; k < NEAREST; k += 1u) {
-        var cover = kept[k].cover;
-        if (k == NEAREST - 1u) {
-            cover = 1.0 - (1.0 - cover) * exp(-f32(farther) / FIXED);
-        }
-        sum += through * cover * radiance_at(kept[k]);
-        through *= 1.0 - cover;
+        sum += through * kept[k].cover * radiance_at(kept[k]);
+        through *= 1.0 - kept[k].cover;
     }
+    let rest = exp(-f32(farther.y) / FIXED);
+    sum += through * (1.0 - rest) * vec3f(light) / f32(max(farther.x, 1u));
+    through *= rest;
     return vec4f(sum + through * under.rgb, 1.0 - through * (1.0 - under.a));
 }
 

@@ -6,6 +6,8 @@
 //#include "strand_view.wgsl"
 
 const LIFT_MM: f32 = 0.4; // off the skin, for shadow rays
+const HORIZON: f32 = 0.2; // cosine by which the skin's horizon is soft
+const LOWERED: f32 = 0.3; // and by which it is lower a millimetre over the skin
 const BLURRED: f32 = 0.7; // roughness at which hairs see their surroundings
 const SKY_FROM: f32 = 0.5; // cosine below and above the skin's horizon between which skin gives way to sky
 const BEYOND: f32 = 64.0; // pixels outside the picture from which on knots are not lit
@@ -20,6 +22,7 @@ struct Knot {
     along: vec3f, // to the tip
     eye: vec3f, // unit
     depth: vec3f, // absorption over a radius
+    height: f32, // over the skin at the root [mm]
 }
 
 fn knot_at(strand: u32, k: u32) -> Knot {
@@ -28,7 +31,8 @@ fn knot_at(strand: u32, k: u32) -> Knot {
     let here = posed[first + k];
     let along = normalize(posed[first + min(k + 1u, KNOTS - 1u)].xyz - posed[first + max(k, 1u) - 1u].xyz);
     let depth = posed[row + 1u].xyz * here.w;
-    return Knot(here.xyz, posed[row].xyz, along, normalize(strand_view.eye - here.xyz), depth);
+    let height = dot(here.xyz - posed[first].xyz, posed[row].xyz);
+    return Knot(here.xyz, posed[row].xyz, along, normalize(strand_view.eye - here.xyz), depth, height);
 }
 
 // A direction's part across a fibre, unit.
@@ -49,12 +53,17 @@ fn arriving(light: Light, p: vec3f) -> Incident {
     return sum;
 }
 
+// Share of a light over the skin's horizon, which a knot sees beyond by its height; shadow maps are too coarse to tell.
+fn risen(knot: Knot, l: vec3f) -> f32 {
+    return smoothstep(-HORIZON - LOWERED * max(knot.height, 0.0), HORIZON, dot(knot.normal, l));
+}
+
 fn seen_of(light: Light, knot: Knot, l: vec3f) -> f32 {
     var point: Point;
     point.position = knot.position;
     point.lit_position = knot.position + LIFT_MM * knot.normal;
     point.normal = select(knot.normal, l, light.narrow == 0u); // a hair has no horizon
-    return visibility(light, point, l) * past_strands(light, knot.position);
+    return risen(knot, l) * visibility(light, point, l) * past_strands(light, knot.position);
 }
 
 // Mean radiance about a direction: of the sky, and of the skin below its horizon.
