@@ -1,37 +1,38 @@
-"""A face that moves.
+"""The six expressions that people everywhere know.
 
-One head under studio light, moved by weights of its targets and turns of its bones. Shape, shadows and what
-scatters below the skin follow each pose on the device. Its skin is one of MakeHuman's, from the sample data.
+Weights of ARKit's targets move the skin; the folds that belong to a movement deepen with it, lips that are
+pressed turn pale, and the eyes turn with the lids. Shape, shadows and what scatters below the skin follow.
 
 Deck: +
 Columns: 3
+Sources: Ekman1971
 """
-
-import os
-from pathlib import Path
 
 import dermis
 from dermis.gallery.picture import main
-from dermis.mesh.maps import load_maps
 
-DATA = Path(os.environ.get("DERMIS_DATA", ".")) / "heads"
-COLOUR = DATA / "makehuman" / "skins" / "young_lightskinned_male_diffuse.png"
-MAN = dermis.Human(sex=1, age=25)
-NECK = ("neck01", "neck02", "neck03", "head")
-SMILE = dict.fromkeys(("mouthSmileLeft", "mouthSmileRight", "cheekSquintLeft", "cheekSquintRight"), 0.8)
-POSES = {
-    "at rest": dermis.Pose(),
-    "a smile": dermis.Pose(SMILE),
-    "wonder": dermis.Pose({"jawOpen": 0.4, "browInnerUp": 1.0, "eyeWideLeft": 0.8, "eyeWideRight": 0.8}),
-    "pursed lips": dermis.Pose({"mouthPucker": 0.9, "mouthFunnel": 0.3, "browDownLeft": 0.5}),
-    "closed eyes": dermis.Pose({"eyeBlinkLeft": 1, "eyeBlinkRight": 1}, dict.fromkeys(NECK, (5, 0, 2))),
-    "turned by 40 degrees": dermis.Pose(SMILE, dict.fromkeys(NECK, (0, 10, 0))),
+WOMAN = dermis.Human(caucasian=0.5, african=0, asian=0.5, age=40)
+
+
+def both(**weights):
+    return {f"{name}{side}": weight for name, weight in weights.items() for side in ("Left", "Right")}
+
+
+FACES = {
+    "joy": both(mouthSmile=0.9, cheekSquint=0.8, eyeSquint=0.4),
+    "sadness": both(mouthFrown=0.8, browOuterUp=0.0, eyeLookDown=0.5)
+    | {"browInnerUp": 1.0, "mouthShrugLower": 0.4},
+    "anger": both(browDown=1.0, noseSneer=0.4, mouthPress=0.8, eyeSquint=0.5),
+    "fear": both(eyeWide=0.9, browOuterUp=0.5, mouthStretch=0.7) | {"browInnerUp": 0.9, "jawOpen": 0.12},
+    "disgust": both(noseSneer=1.0, browDown=0.6, mouthUpperUp=0.7, eyeSquint=0.5),
+    "surprise": both(eyeWide=0.8, browOuterUp=1.0) | {"browInnerUp": 1.0, "jawOpen": 0.45},
 }
 
 
 def draw(studio):
-    head = MAN.head(load_maps(colour=COLOUR), layout="hm08")
-    return {name: studio.render(dermis.Scene(head, pose=pose)) for name, pose in POSES.items()}
+    head = WOMAN.head(subdivide=2)
+    camera = dermis.Camera(position=(0, 10, 1200), target=(0, 10, 0), frame_mm=250)
+    return {name: studio.render(dermis.Scene(head, pose=pose, camera=camera)) for name, pose in FACES.items()}
 
 
 if __name__ == "__main__":

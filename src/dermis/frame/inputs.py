@@ -38,6 +38,7 @@ from dermis.frame.sky import Look
 from dermis.frame.strands import StrandResources
 from dermis.gpu import ComputeProgram, Constants
 from dermis.mesh.head import Head
+from dermis.mesh.mesh import PARTS
 from dermis.mesh.outline import Outline
 from dermis.scene.camera import Camera
 from dermis.scene.settings import Settings
@@ -181,6 +182,7 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Sp
         refuse(head.name, f"at most {_MOST_MATERIALS} materials", count, "Join some groups")
     for index, material in enumerate(materials):
         colours[index, :3] = material.colour
+        colours[index, 3] = 1 + PARTS.index(material.part) if material.part else 0
     record = shade.record(
         "Shade",
         samples=settings.samples,

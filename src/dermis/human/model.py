@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.human import globes
+from dermis.human import globes, teeth
 from dermis.human.movement import expressions, gaze, skeleton
 from dermis.human.published import Points, count, data, places_mm
 from dermis.mesh.eyes import EyeLook, Eyes
@@ -30,9 +30,9 @@ MATERIALS = {
     "body": Material("skin"),
     LEFT_EYE: Material("left eye", "opaque", _EYE),
     RIGHT_EYE: Material("right eye", "opaque", _EYE),
-    "helper-upper-teeth": Material("upper teeth", "opaque", _TOOTH),
-    "helper-lower-teeth": Material("lower teeth", "opaque", _TOOTH),
-    "helper-tongue": Material("tongue", "opaque", _TONGUE),
+    "helper-upper-teeth": Material("upper teeth", "opaque", _TOOTH, "upper teeth"),
+    "helper-lower-teeth": Material("lower teeth", "opaque", _TOOTH, "lower teeth"),
+    "helper-tongue": Material("tongue", "opaque", _TONGUE, "tongue"),
     "cap": Material("cut", "opaque", (0.02, 0.02, 0.02)),
 }
 """Groups of quads, and what they are."""
@@ -114,7 +114,12 @@ def _layout(layout: Layout) -> _Laid:
     stays = np.array([name not in (LEFT_EYE, RIGHT_EYE) for name in names])
     material = np.array([list(MATERIALS).index(name) for name in names])
     ball, quads = globes.globe()
-    size = len(ball)
+    size, points = len(ball), found["quads"][: len(corner)].astype(np.int64)
+    for upper, name in ((True, "helper-upper-teeth"), (False, "helper-lower-teeth")):
+        own, places = teeth.layout(upper)
+        those = np.array(names) == name
+        corner[those] = len(uv) + np.searchsorted(own, points[those])
+        uv = np.concatenate([uv, places])
     eyes = [np.full(len(quads), list(MATERIALS).index(name)) for name in (LEFT_EYE, RIGHT_EYE)]
     return _Laid(
         np.concatenate([uv, globes.layout()]),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,10 @@ Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]
 
 
+Part = Literal["upper teeth", "lower teeth", "tongue"]
+PARTS: tuple[Part, ...] = ("upper teeth", "lower teeth", "tongue")
+
+
 @dataclass(frozen=True)
 class Material:
     """What a group of triangles is made of.
@@ -21,11 +26,13 @@ class Material:
     name : the group's name in the file
     kind : "skin" gets the whole technique, "opaque" plain diffuse and specular (eyeballs, teeth)
     colour : diffuse albedo where no map gives one, linear Rec. 709 [-]
+    part : of a mouth whose layout tells where its teeth are, see mouth.wgsl
     """
 
     name: str
     kind: str = "skin"
     colour: tuple[float, float, float] = (0.8, 0.8, 0.8)
+    part: Part | None = None
 
 
 @dataclass(frozen=True)

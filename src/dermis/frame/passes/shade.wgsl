@@ -1,6 +1,6 @@
 // The image: light scattered below the skin, relit at its finest level, under the white lobe of the surface.
 //#include "lighting.wgsl"
-//#include "eye.wgsl"
+//#include "mouth.wgsl"
 //#include "pre_integrated.wgsl"
 //#include "sample_bits.wgsl"
 //#include "shaded.wgsl"
@@ -10,7 +10,7 @@ override SPLIT: bool = false; // whether light below the skin is kept apart, to 
 // them needs it: with a strip, each lane goes on to its next pixel that sees the head when it is done with one.
 override STRIP: u32 = 1u;
 
-override EYES: bool = false; // whether there are eyes of true shape
+override EYES: bool = false; // whether there are eyes of true shape, and teeth
 
 const WET_ROUGHNESS: f32 = 0.1; // of plain materials: teeth, tongues, eyeballs of files
 const FINEST_RATIO: f32 = 4.0; // longest over shortest side of a footprint that one map sample may cover
@@ -115,6 +115,12 @@ fn shaded(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Shaded {
         var k = 0u;
         loop {
             if (!opaque || k >= 2u) {
+                break;
+            }
+            let material = shade.material_colour[point.flags >> 8u];
+            if (material.w > 0.0) {
+                surface = mouth_at(point, material);
+                film = Film(surface.normal, MOUTH_SCATTERED);
                 break;
             }
             if (shade.eyes[k].material == (point.flags >> 8u)) {

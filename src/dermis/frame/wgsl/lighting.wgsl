@@ -80,10 +80,10 @@ fn light_through(point: Point, surface: Surface, film: Film, v: vec3f, open: f32
             if (cosine > 0.0) {
                 if (seen < 0.0) {
                     seen = visibility(light, point, arriving.direction) * past_strands(light, point.position);
-                    seen = max(seen, film.scattered);
                 }
                 let e = arriving.irradiance * seen;
-                var entering = e * (cosine * enters(cosine, surface.roughness, surface.rho_s));
+                let filled = arriving.irradiance * max(seen, film.scattered);
+                var entering = filled * (cosine * enters(cosine, surface.roughness, surface.rho_s));
                 if (by_direction) {
                     lit.directional += entering * beyond_mean(cosine, facing);
                     entering *= coming_back(cosine);
