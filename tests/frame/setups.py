@@ -17,7 +17,7 @@ from dermis.atlas.atlas import Atlas
 from dermis.frame.atlas_textures import AtlasTextures, upload_atlas
 from dermis.frame.frame import draw_frame
 from dermis.frame.inputs import Inputs
-from dermis.frame.passes import SHARED_SHADERS
+from dermis.frame.passes import SHARED_SHADERS, SPECULAR
 from dermis.frame.passes.stretch import draw_coarser
 from dermis.frame.renderer import Renderer
 from dermis.gpu import ComputeProgram, Constants, Device, Frame, download, make_texture, upload
@@ -112,7 +112,7 @@ def probe(
     A keyword whose value is a dict is taken as the members of the shader's struct of that name.
     """
     path = Path(__file__).parent / f"{name}.wgsl"
-    program = ComputeProgram(device, path, (SHARED_SHADERS,), dict(constants))
+    program = ComputeProgram(device, path, (SHARED_SHADERS, SPECULAR), dict(constants))
     made = {output: make_texture(device, size, "rgba32float") for output in outputs}
     records = {
         key: program.record(key.title(), **v) if isinstance(v, dict) else v for key, v in bound.items()

@@ -95,6 +95,7 @@ SETTINGS = Settings(
     bloom=0.2,
     tone="filmic",
     gamma="wrong",
+    strands=False,
     background=(0.1, 0.0, 0.0),
     parts="diffuse",
 )

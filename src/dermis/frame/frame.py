@@ -3,7 +3,16 @@
 from __future__ import annotations
 
 from dermis.frame.inputs import Inputs
-from dermis.frame.passes import bloom, moving_occlusion, post, shade, shadows, shape, visibility_buffer
+from dermis.frame.passes import (
+    bloom,
+    moving_occlusion,
+    post,
+    shade,
+    shadows,
+    shape,
+    strands,
+    visibility_buffer,
+)
 from dermis.frame.passes.painting import expression
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Graph
@@ -19,6 +28,10 @@ def draw_frame(graph: Graph, inputs: Inputs, technique: Technique) -> None:
         expression.draw(graph, made.face, inputs.movements)
     bounded = ("SHAPES", 1) in inputs.light_constants
     shadows.draw(graph, made.shadow_maps, inputs.shadow_views, made.head, bounded)
+    if made.strands:
+        graph.repeat(strands.pose, made.strands.tables, made.shape)
+        if len(inputs.shadow_views.clips):
+            strands.shadow(graph, made.strands, inputs.lit)
     if made.sky and inputs.around:
         moving_occlusion.draw(graph, made.sky, *inputs.around, inputs.layouts)
     below = technique.scatter(graph, inputs)
@@ -26,6 +39,9 @@ def draw_frame(graph: Graph, inputs: Inputs, technique: Technique) -> None:
     look, apart = (inputs.lit, inputs.view, inputs.constants), technique.apart(made.own)
     radiance = shade.draw(graph, *look, made.visibility, below, made.picture, apart)
     radiance = technique.finish(graph, inputs, radiance)
+    if made.strands:
+        seen = inputs.lit, inputs.view, inputs.light_constants
+        radiance = strands.draw(graph, made.strands, seen, made.head, made.visibility.texture, radiance)
     if made.glow:
         radiance = bloom.draw(graph, made.glow, radiance, inputs.settings.bloom)
     post.draw(graph, radiance, made.picture, inputs.settings)

@@ -35,6 +35,7 @@ from dermis.frame.projection import (
 from dermis.frame.samples import pixel_samples
 from dermis.frame.shape import Shape
 from dermis.frame.sky import Look
+from dermis.frame.strands import StrandResources
 from dermis.gpu import ComputeProgram, Constants
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import PARTS
@@ -65,6 +66,7 @@ class Resources:
     suns : lights that the environment adds
     sky : the open sky at the head's vertices, None where occlusion does not follow its shape
     gaussians : terms of the profile
+    strands : hairs, None for none
     glow : space for the bloom, None without one
     unscattered : share of the skin's triangles that the atlas cannot hold
     """
@@ -87,6 +89,7 @@ class Resources:
     suns: int
     sky: Sky | None
     gaussians: int
+    strands: StrandResources | None
     picture: Picture
     glow: Glow | None
     unscattered: float

@@ -20,6 +20,7 @@ from dermis.frame.projection import Views, shadow_layers
 from dermis.frame.resources import make_resources
 from dermis.frame.skin_profiles import SkinProfiles
 from dermis.frame.sky import Anchors, Look, anchors_of, look_around, turn_of
+from dermis.frame.strands import strand_constants
 from dermis.frame.surroundings import brightest, load_surroundings, with_suns
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Device, Memo
@@ -77,7 +78,8 @@ class Preparation:
         counts = parts, len(layers.clips), scene.motion is not None
         asked = Asked(*who, settings, around, surroundings, technique, *counts, view)
         resources = keep(make_resources, self.memo, device, asked)
-        seen_from, shone_on = pinhole(scene.camera, head, settings), light_constants(scene)
+        seen_from = pinhole(scene.camera, head, settings)
+        shone_on = light_constants(scene) + strand_constants(head, settings)
         scale = scale_of(resources.levels.texel, brightest(scene, surroundings))
         return Inputs(
             resources=resources,

@@ -25,6 +25,15 @@ from dermis.frame.passes.moving_occlusion import Sky, make_map, make_sky
 from dermis.frame.passes.shape import still_shape
 from dermis.frame.resting import resting
 from dermis.frame.shape import Shape, ShapeTables, make_shape, shape_tables
+from dermis.frame.strands import (
+    StrandResources,
+    has_strands,
+    make_strand_picture,
+    make_strand_shadows,
+    make_tables,
+    no_strand_shadows,
+    skin_under,
+)
 from dermis.frame.techniques.technique import AtlasTechnique, Technique
 from dermis.frame.translucency import translucency_of
 from dermis.gpu import Constants, Device, Memo
@@ -49,14 +58,13 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     shape = keep(make_shape, device, tables)
     person = keep(still_shape, device, tables) if asked.person is not None else None
     curvature = keep(_curvature, device, asked.head.bare) if technique.curved else None
-    shared = _shared(memo, device, asked, shadow_maps, curvature)
+    strands = _strands(memo, device, asked)
+    shared = _shared(memo, device, asked, shadow_maps, curvature, strands)
     atlases = [_atlas(memo, device, asked, name, k) for k, name in enumerate(asked.atlases.layouts)]
     uploaded: dict[str, Any] = memo.wait(maps)
     shared |= uploaded | keep(fine_detail, device, asked.painted_side > 0)
     layouts = [_layout(memo, device, asked, one, shape, person, shared, k) for k, one in enumerate(atlases)]
     own, view = _shading(memo, device, asked)
-    first, _ = atlases[0]
-    side, several = settings.atlas, len(layouts) > 1
     return Resources(
         shape=shape,
         person=person,
@@ -67,7 +75,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         scatters=asked.count > 0,
         levels=_levels(memo, device, asked),
         blurs=tuple(_blur(asked, textures) for _, textures in atlases) if asked.count else (),
-        scattered=_sum(memo, device, asked, side, "both") if several else layouts[0].scattered,
+        scattered=_sum(memo, device, asked, settings.atlas, "both") if layouts[1:] else layouts[0].scattered,
         curvature=curvature,
         own=own,
         visibility=keep(_visibility, device, settings.size, settings.samples),
@@ -76,9 +84,10 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         suns=len(asked.surroundings.suns),
         sky=_sky(memo, device, asked, layouts[0], tables) if asked.occlusion_moves else None,
         gaussians=len(asked.profile.variance_mm2),
+        strands=strands,
         picture=keep(post.make_picture, device, settings.size),
         glow=keep(bloom.make_glow, device, settings.size) if settings.bloom else None,
-        unscattered=keep(first.unscattered, asked.head.mesh),
+        unscattered=keep(atlases[0][0].unscattered, asked.head.mesh),
     )
 
 
@@ -97,6 +106,15 @@ def _shading(memo: Memo, device: Device, asked: Asked) -> tuple[Any, Any]:
     return own, view
 
 
+def _strands(memo: Memo, device: Device, asked: Asked) -> StrandResources | None:
+    if not has_strands(asked.head, asked.settings):
+        return None
+    tables = memo.keep(make_tables, device, asked.head.bare)
+    picture = memo.keep(make_strand_picture, device, tables, asked.settings.size)
+    shadows = memo.keep(make_strand_shadows, device, asked.shadow_layers, of=asked.view)
+    return StrandResources(tables, picture, shadows, memo.keep(skin_under, asked.head))
+
+
 def _shadows(memo: Memo, device: Device, asked: Asked) -> shadows.ShadowMaps:
     layers = asked.shadow_layers
     size = asked.settings.shadow_size if layers else 1
@@ -104,7 +122,12 @@ def _shadows(memo: Memo, device: Device, asked: Asked) -> shadows.ShadowMaps:
 
 
 def _shared(
-    memo: Memo, device: Device, asked: Asked, shadow_maps: shadows.ShadowMaps, curvature: Curvature | None
+    memo: Memo,
+    device: Device,
+    asked: Asked,
+    shadow_maps: shadows.ShadowMaps,
+    curvature: Curvature | None,
+    strands: StrandResources | None,
 ) -> dict[str, Any]:
     """What all layouts are lit with, lights aside."""
     skin, program = asked.skin, shade.shade_program(device)
@@ -114,6 +137,7 @@ def _shared(
         "environment": surroundings.environment_record(program, around, skin, total, asked.occluded),
         "shadow_maps": shadow_maps.texture,
         "shadow_bounds": shadow_maps.bounds,
+        "strand_shadows": strands.shadows if strands else no_strand_shadows(device),
         "curvatures": curvature.smoothed if curvature else no_curvature(device),
         "nearest_sampler": device.sampler(),
         "panorama": asked.surroundings.panorama,

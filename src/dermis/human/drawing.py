@@ -7,6 +7,7 @@ from numbers import Integral
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.errors import refuse
 from dermis.human.published import OLD, YOUNG, human_targets
@@ -57,9 +58,21 @@ def drawn(seed: int) -> dict[str, Any]:
         "weight": float(np.clip(weight, -0.7, 0.8)),
         "muscle": float(np.clip(muscle, -0.6, 0.6)),
         "targets": dict(_details(rng)),
+        **_hair(np.random.default_rng((int(seed), 1)), np.array([african, asian, caucasian])),
     }
     origin = Origin(african, asian, caucasian, sex, age)
     return found | {"skin": drawn_look(rng, origin), "eyes": drawn_eyes(rng, origin)}
+
+
+def _hair(rng: np.random.Generator, shares: NDArray[np.float64]) -> dict[str, float]:
+    """Pigments of the hair: near to black but for people of mostly European descent.
+
+    shares : (3,) of the ancestries
+    """
+    fair = np.exp(rng.uniform(np.log(0.4), np.log(5.0)))
+    brown = float(np.exp(shares @ np.log([8.0, 7.0, fair])) * rng.lognormal(0.0, 0.1))
+    red = float(shares[2] * rng.exponential(0.35) + 0.1)
+    return {"hair_eumelanin": min(brown, 10.0), "hair_pheomelanin": min(red, 4.0)}
 
 
 def _details(rng: np.random.Generator) -> Iterator[tuple[str, float]]:

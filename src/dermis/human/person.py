@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from dermis.errors import refuse
 from dermis.human.drawing import drawn
+from dermis.human.hair.groom import groomed
+from dermis.human.hair.look import HairLook
 from dermis.human.model import Layout, control_mm, human_head
 from dermis.human.published import OLD, YOUNG
 from dermis.human.skin.look import SkinLook
@@ -30,6 +32,8 @@ _RANGES = {
     "age": (YOUNG, OLD),
     "weight": (-1.0, 1.0),
     "muscle": (-1.0, 1.0),
+    "hair_eumelanin": (0.0, 10.0),
+    "hair_pheomelanin": (0.0, 10.0),
 }
 _MOST_WEIGHT = 2.0  # of a published target: what lies beyond is no face
 _NONE: Mapping[str, float] = MappingProxyType({})
@@ -43,6 +47,8 @@ class Human:
     sex : from 0, female, to 1, male [-]
     age : 25 to 90 [years]
     weight, muscle : from -1, least, to 1, most; 0 is the average [-]
+    hair_eumelanin, hair_pheomelanin : of brows and lashes: 0.3 of the first is blond, 1.3 brown,
+        4 dark, 8 black; red has 0.3 and 2
     targets : weights of published targets, such as {"nose/nose-hump-incr": 0.5}; mostly 0 to 1
     skin, eyes : what they look like; what usually goes with the person when left out
 
@@ -56,6 +62,8 @@ class Human:
     age: float = 30.0
     weight: float = 0.0
     muscle: float = 0.0
+    hair_eumelanin: float = 4.0
+    hair_pheomelanin: float = 0.3
     targets: Mapping[str, float] = field(default_factory=lambda: _NONE)
     skin: SkinLook | None = None
     eyes: EyeLook | None = None
@@ -94,7 +102,9 @@ class Human:
         Raises DermisError for targets that nobody knows.
         """
         painted = maps or PaintedMaps(look=self.look)
-        return subdivide_head(human_head(self.weights(), painted, layout, self.iris), subdivide)
+        plain = human_head(self.weights(), painted, layout, self.iris)
+        head = subdivide_head(plain, subdivide)
+        return groomed(head, plain, control_mm(_MEAN.weights()).astype(np.float64), subdivide, self._hair)
 
     def on(self, head: Head) -> Head:
         """The head of another person with this one's skin and eyes.
@@ -130,6 +140,13 @@ class Human:
         Raises DermisError for targets that nobody knows.
         """
         return control_mm(self.weights())
+
+    @property
+    def _hair(self) -> HairLook:
+        old = (self.age - YOUNG) / (OLD - YOUNG)
+        bushy = min(1.0, 0.25 + 0.5 * self.sex + 0.25 * old * self.sex)
+        grey = max(0.0, 0.9 * old - 0.25)
+        return HairLook(self.hair_eumelanin, self.hair_pheomelanin, bushy, grey)
 
     def weights(self) -> dict[str, float]:
         """Weights of published targets by name, those of 0 left out."""
@@ -170,3 +187,7 @@ class Human:
 def _steps(value: float) -> dict[str, float]:
     """Shares of the least, the average and the most, for a value from -1 to 1."""
     return {"min": max(-value, 0.0), "average": 1.0 - abs(value), "max": max(value, 0.0)}
+
+
+_MEAN = Human(sex=0.5, age=YOUNG)
+"""Whose brows are where the artist has them."""

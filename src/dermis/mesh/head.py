@@ -11,6 +11,7 @@ from dermis.mesh.eyes import EyeLook, Eyes
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Floats, Mesh
 from dermis.mesh.rig import Rig
+from dermis.mesh.strands import Strands
 
 _CROWN_TO_CENTRE_MM = 120.0  # half the height of an adult head
 
@@ -23,6 +24,7 @@ class Head:
     attribution : whom to credit when a picture of it is shown, empty when that is not required
     rig : what moves it; None for a head whose points move only if all their places are given
     eyes : its eyeballs, where they are of true shape
+    strands : its hairs, None for none
     """
 
     name: str
@@ -31,6 +33,7 @@ class Head:
     attribution: str = ""
     rig: Rig | None = None
     eyes: Eyes | None = None
+    strands: Strands | None = None
 
     @cached_property
     def control(self) -> Rig:

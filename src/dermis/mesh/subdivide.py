@@ -36,9 +36,10 @@ def subdivide_head(head: Head, levels: int) -> Head:
     levels : 0 to 3
     """
     mesh, stencils = subdivide(head.mesh, levels)
-    return (
-        head if stencils is None else replace(head, mesh=mesh, rig=replace(head.control, stencils=stencils))
-    )
+    if stencils is None:
+        return head
+    strands = head.strands and head.strands.refined(head.mesh, mesh, levels)
+    return replace(head, mesh=mesh, rig=replace(head.control, stencils=stencils), strands=strands)
 
 
 def subdivide(mesh: Mesh, levels: int) -> Subdivided:

@@ -51,6 +51,8 @@ class Settings(Plain):
     """Colour space: "wrong" takes the colour map to be linear and leaves the encoding out, for comparison."""
     background: Colour = (0.0, 0.0, 0.0)
     """Colour behind the head, linear Rec. 709."""
+    strands: bool = True
+    """Hairs of heads that have them, as the human's brows and lashes."""
     parts: Literal["all", "diffuse", "specular"] = "all"
     """Which light is shown: "all", only the "diffuse" from below the surface, or the "specular" off it."""
 

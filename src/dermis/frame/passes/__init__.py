@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from dermis import specular
 from dermis.frame.atlas_textures import atlas_numbers
 from dermis.frame.levels import FLOATS, HALVES, usual_texel
 from dermis.frame.lights import light_numbers
 from dermis.frame.lights.kind import light_shaders
 from dermis.frame.painting import painting_numbers, texture_names
+from dermis.frame.strands import strand_numbers
 from dermis.frame.surface import eye_numbers, lobe_shaders, surface_numbers
 from dermis.gpu import ComputeProgram, Constants, Device, compiled
 from dermis.gpu.program import declared
@@ -18,6 +20,7 @@ from dermis.scene.lights import LIGHTS
 from dermis.specular.models import MODELS
 
 PASSES = Path(__file__).parent
+SPECULAR = Path(str(specular.__file__)).parent
 TECHNIQUES = PASSES.parent / "techniques"
 SHARED_SHADERS = ShaderFolder(
     PASSES.parent / "wgsl",
@@ -28,6 +31,7 @@ SHARED_SHADERS = ShaderFolder(
         **atlas_numbers(),
         **painting_numbers(),
         **eye_numbers(),
+        **strand_numbers(),
     },
 )
 TILE = 16
@@ -46,7 +50,7 @@ def shader_folders(source: str = "", store: str = "") -> tuple[Folder, ...]:
     """
     levels = [_SOURCES[source]] if source else []
     levels += [_STORES[store]] if store else []
-    return (*levels, SHARED_SHADERS, TECHNIQUES)
+    return (*levels, SHARED_SHADERS, TECHNIQUES, SPECULAR)
 
 
 def program(

@@ -5,6 +5,7 @@
 //#include "direction.wgsl"
 //#include "lobe.wgsl"
 //#include "lights.wgsl"
+//#include "strand_shadows.wgsl"
 //#include "environment.wgsl"
 
 // Whether each point skips the lights behind its surface by itself. Without that, software adapters shade it with every light
@@ -78,7 +79,7 @@ fn light_through(point: Point, surface: Surface, film: Film, v: vec3f, open: f32
             let cosine = dot(surface.normal, arriving.direction);
             if (cosine > 0.0) {
                 if (seen < 0.0) {
-                    seen = visibility(light, point, arriving.direction);
+                    seen = visibility(light, point, arriving.direction) * past_strands(light, point.position);
                 }
                 let e = arriving.irradiance * seen;
                 let filled = arriving.irradiance * max(seen, film.scattered);

@@ -1,0 +1,12 @@
+// Empties the chains of all tiles.
+//#include "each.wgsl"
+
+@group(0) @binding(0) var<storage, read_write> chains: array<u32>; // links in use, then the first link + 1 of each tile
+
+@compute @workgroup_size(64)
+fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let index = number_of(group, groups, lane);
+    if (index < arrayLength(&chains)) {
+        chains[index] = 0u;
+    }
+}

@@ -1,0 +1,42 @@
+// Hairs where the skin has moved them: each turns with the quad that it is rooted in.
+//#include "each.wgsl"
+//#include "strand_knots.wgsl"
+
+struct Strand {
+    corner: vec4u, // points of its quad, in a round
+    share: vec4f, // of each in the root's place
+    absorption: vec3f, // of its inside [1/mm]
+}
+
+@group(0) @binding(0) var<storage, read> points: array<f32>; // three of each [mm]
+@group(0) @binding(1) var<storage, read> strands: array<Strand>;
+@group(0) @binding(2) var<storage, read> knots: array<vec4f>; // along the quad, beside that, along its normal; radius [mm]
+@group(0) @binding(3) var<storage, read_write> posed: array<vec4f>; // see strand_knots.wgsl
+
+fn point_at(index: u32) -> vec3f {
+    return vec3f(points[3u * index], points[3u * index + 1u], points[3u * index + 2u]);
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let index = number_of(group, groups, lane);
+    if (index >= arrayLength(&knots)) {
+        return;
+    }
+    let strand = strands[index / KNOTS];
+    let a = point_at(strand.corner.x);
+    let b = point_at(strand.corner.y);
+    let c = point_at(strand.corner.z);
+    let d = point_at(strand.corner.w);
+    let root = mat4x3f(a, b, c, d) * strand.share;
+    let along = normalize((b - a) + (c - d));
+    let across = cross(c - a, d - b);
+    let normal = normalize(across - dot(across, along) * along);
+    let knot = knots[index];
+    let row = index / KNOTS * rows_of_strand();
+    posed[row + KNOTS_FROM + index % KNOTS] = vec4f(root + mat3x3f(along, cross(normal, along), normal) * knot.xyz, knot.w);
+    if (index % KNOTS == 0u) {
+        posed[row] = vec4f(normal, 0.0);
+        posed[row + 1u] = vec4f(strand.absorption, 0.0);
+    }
+}

@@ -1,0 +1,65 @@
+// How much of each light hairs hold back: what they cover of coarse texels, and how deep they lie on average.
+// Whole numbers are added up, so that the order does not matter.
+//#include "each.wgsl"
+//#include "geometry.wgsl"
+//#include "surface.wgsl"
+//#include "strand_knots.wgsl"
+//#include "strand_window.wgsl"
+
+@group(0) @binding(30) var<storage, read> posed: array<vec4f>;
+@group(0) @binding(31) var<storage, read_write> splatted: array<atomic<u32>>; // see strand_window.wgsl
+
+const STEP: f32 = 1.0; // between places along a hair, at most [texel]
+
+fn window_at(layer: i32) -> Window {
+    let word = window_begin(layer);
+    let low = vec2u(atomicLoad(&splatted[word]), atomicLoad(&splatted[word + 1u]));
+    let size = vec2u(atomicLoad(&splatted[word + 2u]), atomicLoad(&splatted[word + 3u]));
+    return Window(bitcast<vec2f>(low), bitcast<vec2f>(size), bitcast<f32>(atomicLoad(&splatted[word + 4u])));
+}
+
+fn add(layer: i32, texel: vec2i, cover: f32, depth: f32) {
+    if (all(texel >= vec2i(0)) && all(texel < vec2i(WINDOW))) {
+        let word = window_word(layer, vec2u(texel));
+        let much = u32(cover * DENSE + 0.5);
+        atomicAdd(&splatted[word], much);
+        atomicAdd(&splatted[word + 1u], u32(f32(much) * DEEP * max(depth, 0.0) + 0.5));
+    }
+}
+
+fn splat(light: Light, a: vec4f, b: vec4f) {
+    let window = window_at(light.layer);
+    let begin = in_window(window, on_map(light, a.xyz));
+    let end = in_window(window, on_map(light, b.xyz));
+    let right = in_window(window, on_map(light, a.xyz + light.map_right)).x - begin.x;
+    let up = in_window(window, on_map(light, a.xyz + light.map_up)).y - begin.y;
+    let way = b.xyz - a.xyz;
+    let across = length(vec2f(dot(way, light.map_right), dot(way, light.map_up)));
+    let count = max(1u, u32(ceil(distance(begin.xy, end.xy) / STEP)));
+    let cover = (a.w + b.w) * across * abs(right * up) / f32(count);
+    for (var k = 0u; k < count; k += 1u) {
+        let at = mix(begin, end, (f32(k) + 0.5) / f32(count));
+        let place = at.xy - 0.5;
+        let corner = vec2i(floor(place));
+        let f = place - floor(place);
+        add(light.layer, corner, cover * (1.0 - f.x) * (1.0 - f.y), at.z);
+        add(light.layer, corner + vec2i(1, 0), cover * f.x * (1.0 - f.y), at.z);
+        add(light.layer, corner + vec2i(0, 1), cover * (1.0 - f.x) * f.y, at.z);
+        add(light.layer, corner + vec2i(1, 1), cover * f.x * f.y, at.z);
+    }
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let index = number_of(group, groups, lane);
+    let strand = index / (KNOTS - 1u);
+    if (strand >= arrayLength(&posed) / rows_of_strand()) {
+        return;
+    }
+    let row = strand * rows_of_strand() + KNOTS_FROM + index % (KNOTS - 1u);
+    for (var i = 0u; i < skin.light_count; i += 1u) {
+        if (lights.light[i].layer >= 0) {
+            splat(lights.light[i], posed[row], posed[row + 1u]);
+        }
+    }
+}

@@ -1,0 +1,13 @@
+// The picture in tiles, each with a chain of the pieces of hair that it may see.
+//#include "strand_knots.wgsl"
+
+//#fill const STRAND_TILE: u32 = {strand_tile}; // pixels a side
+
+fn tiles_across(size: vec2f) -> u32 {
+    return (u32(size.x) + STRAND_TILE - 1u) / STRAND_TILE;
+}
+
+// Knots at the beginning of a piece.
+fn piece_begin(piece: u32) -> u32 {
+    return piece / (KNOTS - 1u) * KNOTS + piece % (KNOTS - 1u);
+}

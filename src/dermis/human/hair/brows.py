@@ -1,0 +1,78 @@
+"""Eyebrows: short hairs that stand up at the inner end and lean outwards, together from above and below."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dermis.human.hair.look import HairLook
+from dermis.human.hair.skin import Skin
+from dermis.mesh.strands import Doubles
+
+KNOTS = 9
+_MOST = 760  # hairs of the bushiest brow
+# Artist's values along the brow, from its inner to its outer end, on a head seen from the front [mm]: its
+# middle, half of its height, where its hairs point from outwards to upwards, how dense and long they are.
+_ALONG = np.array([0.0, 0.1, 0.25, 0.45, 0.65, 0.85, 1.0])
+_X = np.array([10.5, 14.5, 21.0, 30.0, 39.5, 48.5, 54.5])
+_Y = np.array([12.6, 13.2, 14.7, 17.0, 18.4, 16.4, 12.8])
+_HALF = np.array([2.8, 3.4, 3.7, 3.5, 2.9, 2.0, 1.0])
+_TURN = np.radians([82, 66, 43, 21, 3, -20, -32])
+_DENSITY = np.array([0.3, 0.75, 1.0, 1.0, 1.0, 0.9, 0.55])
+_LENGTH = np.array([4.5, 6.3, 8.0, 9.0, 9.0, 7.5, 5.5])
+
+
+def places(rng: np.random.Generator) -> tuple[Doubles, Doubles, Doubles, Doubles]:
+    """Along the brow and across it (n,), and x, y in the front plane (n,) [mm], in no order."""
+    u = rng.random(4 * _MOST)
+    u = u[rng.random(len(u)) < np.interp(u, _ALONG, _DENSITY * _HALF / _HALF.max())][:_MOST]
+    v = np.clip(rng.normal(0.0, 0.52, len(u)), -1.5, 1.5)
+    ahead, behind = np.minimum(u + 0.02, 1.0), np.maximum(u - 0.02, 0.0)
+    along = np.stack([np.interp(ahead, _ALONG, c) - np.interp(behind, _ALONG, c) for c in (_X, _Y)])
+    along /= np.linalg.norm(along, axis=0)
+    off = v * np.interp(u, _ALONG, _HALF)
+    x = np.interp(u, _ALONG, _X) - along[1] * off + rng.normal(0, 0.4, len(u))
+    y = np.interp(u, _ALONG, _Y) + along[0] * off + rng.normal(0, 0.3, len(u))
+    return u, v, x, y
+
+
+def count(look: HairLook) -> int:
+    """Hairs of one brow."""
+    return int(_MOST * (0.55 + 0.45 * look.bushy))
+
+
+def grown(
+    skin: Skin,
+    root_mm: Doubles,
+    side: float,
+    u: Doubles,
+    v: Doubles,
+    rng: np.random.Generator,
+    look: HairLook,
+) -> tuple[Doubles, Doubles]:
+    """Knots (n, k, 3) and radii (n, k) of the hairs of one brow [mm].
+
+    root_mm : (n, 3) on the skin
+    side : 1 for the left one
+    u, v : places along and across the brow
+    """
+    n = len(u)
+    # hairs from above and from below lean together
+    turn = np.interp(u, _ALONG, _TURN) - 0.6 * v * np.minimum(2.5 * u, 1.0) + rng.normal(0, 0.13, n)
+    bend = -0.5 * np.clip(turn - np.interp(np.minimum(u + 0.2, 1), _ALONG, _TURN), 0, 1) - 0.25 * v * u
+    bend += rng.normal(0, 0.14, n)
+    length = np.interp(u, _ALONG, _LENGTH) * rng.uniform(0.6, 1.1, n) * (0.85 + 0.3 * look.bushy)
+    rise = np.clip(rng.gamma(4.0, 0.15, n), 0.15, 1.3)
+    t = np.linspace(0.0, 1.0, KNOTS)
+    height = rise[:, None] * (1 - (1 - t) ** 2.2) * (1 - 0.35 * t) - 0.25 * (1 - t) ** 8
+    foot, normal = skin.foot(root_mm)
+    knots = [foot + height[:, :1] * normal]
+    for k in range(1, KNOTS):
+        angle = turn + bend * t[k]
+        out = np.stack([side * np.cos(angle), np.sin(angle), np.zeros(n)], axis=-1)
+        out -= (out * normal).sum(axis=1, keepdims=True) * normal
+        out /= np.linalg.norm(out, axis=1, keepdims=True)
+        foot, normal = skin.foot(foot + (length / (KNOTS - 1))[:, None] * out)
+        knots.append(foot + height[:, k, None] * normal)
+    radius = rng.uniform(0.03, 0.05, n) * (0.9 + 0.2 * look.bushy)
+    taper = np.maximum(1.0 - t**2.5, 0.08)
+    return np.stack(knots, axis=1), radius[:, None] * taper * np.minimum(1.0, 0.75 + t)

@@ -1,0 +1,112 @@
+"""Hairs on a mesh: each is rooted in a quad and follows it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.mesh.mesh import Floats, Ints, Mesh
+
+Doubles = NDArray[np.float64]
+_LEAST = 1e-9
+
+
+class Roots(NamedTuple):
+    """Places on a mesh of quads.
+
+    quad : (n,) rows of `Mesh.quads`
+    place : (n, 2) on the way from the quad's first corner to its second, and to its last, 0 to 1
+    """
+
+    quad: Ints
+    place: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Strands:
+    """Hairs, thin round fibres through knots.
+
+    roots : where each begins
+    knots_mm : (n, k, 3) from the root, along the quad, beside that, and along its normal; from root to tip
+    radius_mm : (n, k) of the fibre
+    absorption : (n, 3) of its inside [1/mm]
+    """
+
+    roots: Roots
+    knots_mm: Floats
+    radius_mm: Floats
+    absorption: Floats
+
+    def __len__(self) -> int:
+        return len(self.roots.quad)
+
+    def places_mm(self, mesh: Mesh, points_mm: NDArray[np.floating]) -> Doubles:
+        """(n, k, 3) the knots where the points of the mesh (p, 3) are [mm]."""
+        root, frame = frames(mesh, self.roots, points_mm)
+        return np.asarray(root[:, None] + np.einsum("nic,nki->nkc", frame, self.knots_mm))
+
+    def refined(self, mesh: Mesh, finer: Mesh, levels: int) -> Strands:
+        """The same hairs on the mesh refined by Catmull's and Clark's rules."""
+        _, frame = frames(mesh, self.roots, points_of(mesh))
+        ways = np.einsum("nic,nki->nkc", frame, self.knots_mm)
+        roots = finer_roots(mesh, self.roots, levels)
+        return replace(self, roots=roots, knots_mm=seen_from(finer, roots, ways))
+
+
+def seen_from(mesh: Mesh, roots: Roots, ways_mm: Doubles) -> Floats:
+    """(n, k, 3) ways in space from roots to knots, as `Strands.knots_mm` has them on a mesh at rest [mm]."""
+    _, frame = frames(mesh, roots, points_of(mesh))
+    return np.asarray(np.einsum("nic,nkc->nki", frame, ways_mm), np.float32)
+
+
+def points_of(mesh: Mesh) -> Doubles:
+    """(p, 3) the points of a mesh at rest [mm]."""
+    points = np.zeros((int(mesh.point.max()) + 1, 3))
+    points[mesh.point] = mesh.positions
+    return points
+
+
+def corners(mesh: Mesh, quad: NDArray[np.integer]) -> Ints:
+    """(n, 4) points of the mesh around quads."""
+    first, second = mesh.quads[quad].T
+    around = np.column_stack([mesh.triangles[first], mesh.triangles[second, 1]])
+    return np.asarray(mesh.point[around], np.int32)
+
+
+def weights(place: NDArray[np.floating]) -> Doubles:
+    """(n, 4) shares of a quad's corners in places on it."""
+    s, t = place.astype(np.float64).T
+    return np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=-1)
+
+
+def frames(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
+    """Where roots are (n, 3) [mm], and unit vectors along the quad, beside that, along its normal (n, 3, 3).
+
+    points_mm : (p, 3) of the mesh
+    """
+    a, b, c, d = points_mm[corners(mesh, roots.quad)].astype(np.float64).transpose(1, 0, 2)
+    root = np.einsum("nk,knc->nc", weights(roots.place), np.stack([a, b, c, d]))
+    along, normal = (b - a) + (c - d), np.cross(c - a, d - b)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), _LEAST)
+    normal -= (normal * along).sum(axis=1, keepdims=True) * along
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), _LEAST)
+    return root, np.stack([along, np.cross(normal, along), normal], axis=1)
+
+
+def finer_roots(mesh: Mesh, roots: Roots, levels: int) -> Roots:
+    """The same places on the mesh refined by Catmull's and Clark's rules, whose quads begin at old corners.
+
+    mesh : before it is refined
+    """
+    alone = len(mesh.triangles) - 2 * len(mesh.quads)
+    quad, place = roots.quad.astype(np.int64), roots.place.astype(np.float64)
+    for _ in range(levels):
+        s, t = place.T
+        corner = np.where(t < 0.5, np.where(s < 0.5, 0, 1), np.where(s < 0.5, 3, 2))
+        ways = np.stack([place, np.stack([t, 1 - s], 1), 1 - place, np.stack([1 - t, s], 1)])
+        place = np.clip(2 * ways[corner, np.arange(len(quad))], 0.0, 1.0)
+        quad, alone = 3 * alone + 4 * quad + corner, 0
+    return Roots(quad.astype(np.int32), place.astype(np.float32))

@@ -1,0 +1,138 @@
+"""What a hair scatters: a rough dielectric cylinder that absorbs, seen from afar."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+ETA = 1.55
+"""Index of refraction of keratin [Marschner2003]."""
+TILT = np.radians(2.0)
+"""Angle by which scales of the cuticle rise from the fibre towards its tip."""
+ROUGH_ALONG, ROUGH_AROUND = 0.22, 0.5
+"""Roughness along and around the fibre, 0 to 1, as artists are given it [Chiang2016]."""
+PLACES = 16
+"""Places across the fibre that light is followed through, as in hair.wgsl."""
+_LEAST = 1e-5
+_EUMELANIN, _PHEOMELANIN = np.array([0.419, 0.697, 1.37]), np.array([0.187, 0.4, 1.05])
+_USUAL_RADIUS_MM = 0.04  # of the hairs whose absorption over a radius these are
+
+
+class Fibre(NamedTuple):
+    """Numbers that a fibre scatters by.
+
+    variance : along it, of light that is reflected, goes through, is reflected inside, and the rest
+    width : of the logistic distribution around it [rad]
+    """
+
+    variance: tuple[float, float, float, float]
+    width: float
+
+
+def fibre(along: float = ROUGH_ALONG, around: float = ROUGH_AROUND) -> Fibre:
+    """A fibre's numbers by its roughness. Source: [Chiang2016] equations 7 and 8."""
+    v = (0.726 * along + 0.812 * along**2 + 3.7 * along**20) ** 2
+    width = np.sqrt(np.pi / 8) * (0.265 * around + 1.194 * around**2 + 5.372 * around**22)
+    return Fibre((v, 0.25 * v, 4.0 * v, 4.0 * v), float(width))
+
+
+def hair_numbers() -> dict[str, float]:
+    """Numbers that hair.wgsl fills in."""
+    usual = fibre()
+    return {
+        "hair_eta": ETA,
+        "hair_width": usual.width,
+        "hair_cut": float(1.0 / np.tanh(np.pi / (2 * usual.width))),
+        "hair_variance": usual.variance[0],
+        "hair_tilt": float(TILT),
+        "hair_places": PLACES,
+    }
+
+
+def absorption_per_mm(eumelanin: ArrayLike, pheomelanin: ArrayLike) -> Floats:
+    """(..., 3) absorption of the inside of hairs of these concentrations [1/mm].
+
+    0.3 eumelanin is blond, 1.3 brown, 8 black; 2 pheomelanin without it red. Source: [dEon2011] section 6.1.
+    """
+    brown, red = (np.asarray(c, float)[..., None] for c in (eumelanin, pheomelanin))
+    return np.asarray((brown * _EUMELANIN + red * _PHEOMELANIN) / _USUAL_RADIUS_MM)
+
+
+def longitudinal(sin_i: ArrayLike, sin_o: ArrayLike, v: float) -> Floats:
+    """Share by the sines of light and view along the fibre; over cosines of the light it adds up to 1.
+
+    v : variance. Source: [dEon2011] equation 7.
+    """
+    i, o = np.asarray(sin_i, float), np.asarray(sin_o, float)
+    a = np.sqrt(np.maximum(1 - i * i, 0.0) * np.maximum(1 - o * o, 0.0)) / v
+    # exp(-i o / v) I0(a) / (2 v sinh(1 / v)), without overflow
+    return np.asarray(np.i0(a) * np.exp(-a) * np.exp(a - i * o / v - 1 / v) / (v * -np.expm1(-2 / v)))
+
+
+def logistic(x: ArrayLike, width: float) -> Floats:
+    """Logistic distribution over angles, cut at half a turn [1/rad]. Source: [Chiang2016]."""
+    turned = np.abs(np.mod(np.asarray(x, float) + np.pi, 2 * np.pi) - np.pi)
+    e = np.exp(-turned / width)
+    return np.asarray(e / (width * (1 + e) ** 2) / np.tanh(np.pi / (2 * width)))
+
+
+def fresnel(cosine: ArrayLike) -> Floats:
+    """Reflectance of the cuticle for a cosine of incidence."""
+    c = np.clip(np.asarray(cosine, float), 0.0, 1.0)
+    t = np.sqrt(1 - (1 - c * c) / ETA**2)
+    parallel, across = (ETA * c - t) / (ETA * c + t), (c - ETA * t) / (c + ETA * t)
+    return np.asarray(0.5 * (parallel**2 + across**2))
+
+
+def attenuations(sin_o: ArrayLike, depth: ArrayLike, h: ArrayLike) -> list[Floats]:
+    """Four shares (..., 3): reflected, let through, reflected inside once, and all the rest.
+
+    sin_o : sine of the view along the fibre
+    depth : (..., 3) absorption over a radius
+    h : where light enters, -1 to 1 across the fibre
+
+    Without absorption they add up to 1. Source: [Chiang2016] section 4.
+    """
+    o, h = np.asarray(sin_o, float), np.asarray(h, float)
+    cos_o = np.sqrt(np.maximum(1 - o * o, _LEAST))
+    within = h * cos_o / np.sqrt(ETA**2 - o * o)
+    way = 2 * np.sqrt(1 - within**2) / np.sqrt(1 - (o / ETA) ** 2)
+    through = np.exp(-np.asarray(depth, float) * way[..., None])
+    f = fresnel(cos_o * np.sqrt(1 - h * h))[..., None]
+    passed = (1 - f) ** 2 * through
+    inside = passed * through * f
+    return [np.broadcast_to(f, through.shape), passed, inside, inside * f * through / (1 - f * through)]
+
+
+def scattered(sin_i: ArrayLike, sin_o: ArrayLike, phi: ArrayLike, depth: ArrayLike, of: Fibre) -> Floats:
+    """(..., 3) radiance over the irradiance of a plane that faces the light, mean over the width [1/sr].
+
+    sin_i, sin_o : sines of light and view along the fibre, towards its tip
+    phi : angle between them around it [rad]
+    depth : (3,) absorption over a radius
+
+    It has the fibre's cosine of incidence in it: over all directions of light it adds up to 1 without
+    absorption. Source: [Marschner2003], with the terms of [dEon2011, Chiang2016].
+    """
+    i, o, phi = np.broadcast_arrays(*(np.asarray(x, float) for x in (sin_i, sin_o, phi)))
+    cos_o = np.sqrt(np.maximum(1 - o * o, _LEAST))
+    total = np.zeros((*o.shape, 3))
+    for h in (np.arange(PLACES) + 0.5) * 2 / PLACES - 1:
+        entry, inner = np.arcsin(h), np.arcsin(h * cos_o / np.sqrt(ETA**2 - o * o))
+        shares = attenuations(o, depth, np.full(o.shape, h))
+        for p, share in enumerate(shares):
+            turn = 2 * p * inner - 2 * entry + p * np.pi
+            around = logistic(phi - turn, of.width) if p < 3 else np.full(o.shape, 0.5 / np.pi)
+            along = longitudinal(i, tilted(o, p), of.variance[p])
+            total += share * (along * around / PLACES)[..., None]
+    return total
+
+
+def tilted(sin_o: ArrayLike, p: int) -> Floats:
+    """Sine of the view as the scales of the cuticle turn it for light reflected p times less one inside."""
+    angle = np.arcsin(np.clip(np.asarray(sin_o, float), -1, 1))
+    return np.asarray(np.sin(angle + (-2.0, 1.0, 4.0, 0.0)[p] * TILT))

@@ -1,0 +1,63 @@
+"""A sheet of quads with straight hairs over it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dermis.mesh.geometry import build_mesh
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.mesh import Material, Mesh
+from dermis.mesh.quads import halves
+from dermis.mesh.strands import Roots, Strands, frames, points_of, seen_from
+
+SIDE_MM = 100.0
+_CELLS = 4
+
+
+def sheet() -> Mesh:
+    """A square of quads in the XY plane about the origin that faces +Z."""
+    along = np.linspace(0, 1, _CELLS + 1)
+    v, u = (axis.ravel() for axis in np.meshgrid(along, along, indexing="ij"))
+    number = np.arange((_CELLS + 1) ** 2).reshape(_CELLS + 1, _CELLS + 1)
+    around = (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:])
+    quads = np.stack([part.ravel() for part in around], axis=1)
+    places = SIDE_MM * np.column_stack((u - 0.5, 0.5 - v, np.zeros_like(u)))
+    pairs = np.arange(2 * len(quads)).reshape(-1, 2)
+    flat, skin = np.zeros(2 * len(quads), np.int32), (Material("skin"),)
+    return build_mesh(places, np.column_stack((u, v)), halves(quads), flat, skin, quads=pairs)
+
+
+def hairy(
+    begins: ArrayLike, ends: ArrayLike, radius_mm: ArrayLike, absorption: ArrayLike = 0.0, knots: int = 5
+) -> Head:
+    """A white sheet with hairs from places to others (n, 3) [mm].
+
+    absorption : [1/mm]
+    """
+    mesh, count = sheet(), len(np.asarray(begins))
+    roots = Roots(np.zeros(count, np.int32), np.full((count, 2), 0.5, np.float32))
+    t = np.linspace(0, 1, knots)[None, :, None]
+    places = (1 - t) * np.asarray(begins, float)[:, None] + t * np.asarray(ends, float)[:, None]
+    root, _ = frames(mesh, roots, points_of(mesh))
+    radius = np.broadcast_to(np.asarray(radius_mm, np.float32), (count,))
+    strands = Strands(
+        roots,
+        seen_from(mesh, roots, places - root[:, None]),
+        np.repeat(radius[:, None], knots, axis=1),
+        np.broadcast_to(np.asarray(absorption, np.float32), (count, 3)).copy(),
+    )
+    return Head("sheet", mesh, Maps(colour=np.ones((4, 4, 3), np.float32)), strands=strands)
+
+
+def shuffled(head: Head, seed: int) -> Head:
+    """The same hairs in another order."""
+    from dataclasses import replace
+
+    strands = head.strands
+    assert strands is not None
+    order: NDArray[np.intp] = np.random.default_rng(seed).permutation(len(strands))
+    roots = Roots(*(part[order] for part in strands.roots))
+    parts = (strands.knots_mm, strands.radius_mm, strands.absorption)
+    return replace(head, strands=Strands(roots, *(part[order] for part in parts)))

@@ -1,0 +1,214 @@
+"""Hairs in the frame: their lobe, their cover, their order, and what they do to the light on the skin."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from setups import front_camera, frontal, probe, run_frame, scene_of
+from strand_setups import hairy, shuffled
+from tolerances import FURNACE, LOBE_TWIN, TWIN
+
+from dermis.errors import DermisError
+from dermis.frame.renderer import Renderer
+from dermis.gpu import download
+from dermis.gpu.textures import texture_from
+from dermis.mesh.head import Head
+from dermis.scene.environment import Environment
+from dermis.scene.model import Scene
+from dermis.scene.pose import Pose
+from dermis.scene.settings import Settings
+from dermis.scene.techniques import TECHNIQUES
+from dermis.specular.hair import attenuations, fibre, scattered
+
+Floats = NDArray[np.float64]
+FRAME_MM, SIZE = 40.0, 40  # a pixel is a millimetre, at the sheet
+ABOVE = 0.5  # of hairs over it [mm]
+BLACK = 1e5  # absorption [1/mm]
+
+
+def picture(renderer: Renderer, scene: Scene, **settings: Any) -> Floats:
+    """(h, w, 4) picture and coverage."""
+    given = {"size": (SIZE, SIZE), "technique": "none"} | settings
+    made = run_frame(renderer, scene, **given).resources.picture
+    return download(renderer.device, made.exposed).astype(float)
+
+
+def lit(head: Head, **more: Any) -> Scene:
+    return scene_of(head, frontal(), camera=front_camera(head, frame_mm=FRAME_MM), **more)
+
+
+def one(radius_mm: float, *, slope: float = 0.3, absorption: float = BLACK) -> Head:
+    """A single hair across the middle, leaning."""
+    ends = np.array([[-12.0, -12.0 * slope + 0.2, ABOVE], [12.0, 12.0 * slope + 0.2, ABOVE]])
+    return hairy(ends[:1], ends[1:], radius_mm, absorption)
+
+
+def tangle(count: int, absorption: float = 0.0, radius_mm: float = 0.2) -> Head:
+    """Hairs all over each other."""
+    rng = np.random.default_rng(3)
+    begins, ends = rng.uniform(-6, 6, (2, count, 3))
+    begins[:, 2], ends[:, 2] = rng.uniform(0.3, 4.0, (2, count))
+    return hairy(begins, ends, radius_mm, absorption)
+
+
+def test_the_lobe_is_its_twin(renderer: Renderer) -> None:
+    rng = np.random.default_rng(0)
+    sines = rng.uniform(-0.98, 0.98, (24, 24, 2))
+    drawn = np.dstack([sines, rng.uniform(-np.pi, np.pi, (24, 24)), rng.uniform(0, 2, (24, 24))])
+    drawn = drawn.astype(np.float32).astype(float)
+    bound = {"directions": texture_from(renderer.device, drawn, "rgba32float")}
+    seen, white = probe(renderer.device, "hair_probe", (24, 24), ["seen", "white"], **bound)
+    depth = drawn[..., 3:] * [0.5, 1.0, 2.0]
+    twin = np.array(
+        [[scattered(*d[:3], depth[i, j], fibre()) for j, d in enumerate(row)] for i, row in enumerate(drawn)]
+    )
+    assert np.abs(seen[..., :3] - twin).max() < LOBE_TWIN * twin.max()
+    h = (np.arange(16) + 0.5) / 8 - 1
+    for i, j in ((0, 0), (5, 9), (20, 3)):
+        mean = sum(attenuations(drawn[i, j, 1], np.broadcast_to(depth[i, j], (16, 3)), h)).mean(axis=0)
+        assert white[i, j, :3] == pytest.approx(mean, abs=LOBE_TWIN)
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.3, 2.5])
+@pytest.mark.parametrize("radius_mm", [0.04, 0.3, 1.4])
+def test_a_hair_covers_what_it_is_wide(renderer: Renderer, radius_mm: float, slope: float) -> None:
+    """Beside the sheet, over nothing: columns of pixels through a hair, thin as it may be."""
+    ends = np.array([[-12.0, -12.0 * slope + 80.2, 0.0], [12.0, 12.0 * slope + 80.2, 0.0]])
+    head = hairy(ends[:1], ends[1:], radius_mm, BLACK)
+    scene = scene_of(head, frontal(), camera=front_camera(head, (0.0, 80.0, 0.0), frame_mm=FRAME_MM))
+    cover = picture(renderer, scene)[..., 3]
+    axis, lean = (0, np.hypot(1.0, slope)) if slope < 1 else (1, np.hypot(1.0, 1 / slope))
+    found = cover.sum(axis=axis)[16:24]
+    assert found.mean() == pytest.approx(2 * radius_mm * lean, rel=0.01)
+    assert found == pytest.approx(np.full(8, found.mean()), rel=0.06)  # as wide in each
+
+
+def test_the_order_of_hairs_does_not_matter(renderer: Renderer) -> None:
+    """More of them over each pixel than it keeps."""
+    head = tangle(80, absorption=3.0)
+    first, second = (picture(renderer, lit(each)) for each in (head, shuffled(head, 1)))
+    assert np.array_equal(first, second)
+    assert np.array_equal(first, picture(renderer, lit(head)))
+
+
+def test_any_number_of_hairs_may_share_a_tile(renderer: Renderer) -> None:
+    """Thousands of them, so thin that they hardly cover anything: no pixel is left out, none changes much."""
+    head = tangle(3000, radius_mm=1e-5)
+    scene = scene_of(head, frontal(), camera=front_camera(head, frame_mm=60.0))
+    made, bare = (picture(renderer, scene, size=(24, 24), strands=on)[..., :3] for on in (True, False))
+    assert (made != bare).any()
+    assert np.abs(made / bare - 1.0).max() < 0.05
+
+
+def test_without_hairs_nothing_changes(renderer: Renderer) -> None:
+    """A head that has none and one whose hairs are left out: the same to the bit, by the same passes."""
+    head = tangle(20)
+    ran = []
+    for scene, strands in ((lit(head), False), (lit(replace(head, strands=None)), True)):
+        renderer.graph.forget()
+        made = picture(renderer, scene, strands=strands, technique="texture-space")
+        ran.append((list(renderer.graph.ran), made))
+    assert ran[0][0] == ran[1][0] and "strands" not in ran[0][0]
+    assert np.array_equal(ran[0][1], ran[1][1])
+
+
+@pytest.mark.parametrize("absorption", [0.0, 8.0])
+def test_white_hairs_vanish_in_a_furnace(renderer: Renderer, absorption: float) -> None:
+    head = tangle(120, absorption)
+    scene = replace(lit(head, rho_s=0.0), lights=(), environment=Environment(name="uniform"))
+    made = picture(renderer, scene, occlusion="none", samples=4)[..., :3]
+    assert made.max() < 1.0 + FURNACE
+    if absorption == 0.0:
+        assert made.min() > 1.0 - FURNACE
+    else:
+        assert made.min() < 0.8
+
+
+@pytest.mark.parametrize("technique", TECHNIQUES)
+def test_every_technique_has_hairs(renderer: Renderer, technique: str) -> None:
+    made, bare = (
+        picture(renderer, lit(one(0.4)), technique=technique, strands=on)[..., :3].sum()
+        for on in (True, False)
+    )
+    assert 0.5 * bare < made < 0.99 * bare
+
+
+def test_hairs_behind_the_skin_are_hidden(renderer: Renderer) -> None:
+    head = hairy([[-12, 0, -3]], [[12, 0, -3]], 0.5, BLACK)
+    made, bare = (picture(renderer, lit(head), strands=on) for on in (True, False))
+    assert np.array_equal(made, bare)
+
+
+def test_hairs_beyond_the_sheet_cover_nothing_else(renderer: Renderer) -> None:
+    """Over an empty background they count as coverage, so that pictures can be laid over others."""
+    head = hairy([[-90, 0, 1]], [[90, 0, 1]], 3.0, BLACK)
+    scene = scene_of(head, frontal(), camera=front_camera(head, frame_mm=160.0))
+    covered = picture(renderer, scene)[..., 3]
+    assert covered[:, 1].sum() == pytest.approx(1.5, rel=0.01)  # pixels of 4 mm
+    assert covered.max() <= 1.0 and covered[SIZE // 2, SIZE // 2] == 1.0
+    assert picture(renderer, scene, strands=False)[SIZE // 2, 1, 3] == 0.0
+
+
+def test_hairs_shade_the_skin_softly(renderer: Renderer) -> None:
+    """A row of thin hairs over the sheet, lit aslant: a band beside it, as dark as they cover the light."""
+    y = np.arange(-1.95, 2.0, 0.1)
+    begins = np.column_stack([np.full(40, -30.0), y, np.full(40, 8.0)])
+    head = hairy(begins, begins * [-1, 1, 1], 0.025, BLACK)
+    slanted = frontal(shadows=True).model_copy(update={"direction": (0.0, -1.0, -1.0)})
+    scene = replace(lit(head), lights=(slanted,))
+    made, bare = (picture(renderer, scene, strands=on, shadow_size=512)[..., 0] for on in (True, False))
+    share = (made / bare)[:, 20]
+    cover = 0.05 / 0.1 * np.sqrt(2.0)  # and texels are as wide as hairs are apart
+    assert share[27:29] == pytest.approx(np.full(2, np.exp(-cover)), abs=0.04)  # 8 mm below it
+    assert share[32:] == pytest.approx(1.0, abs=TWIN) and share[:17] == pytest.approx(1.0, abs=TWIN)
+
+
+def test_hairs_follow_the_skin(renderer: Renderer) -> None:
+    """A sheet that is moved and turned takes its hairs with it."""
+    head = one(0.4)
+    angle = np.radians(30.0)
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    moved = (head.positions_mm @ turn.T + [2.0, -3.0, 0.0]).astype(np.float32)
+    inputs = run_frame(renderer, replace(lit(head), pose=Pose(positions_mm=moved)), technique="none")
+    made = inputs.resources.strands
+    assert made is not None and head.strands is not None
+    raw = renderer.device.handle.queue.read_buffer(made.tables.posed)
+    rows = np.frombuffer(raw, np.float32).reshape(1, 7, 4)
+    there = head.strands.places_mm(head.mesh, moved)
+    assert np.abs(rows[:, 2:, :3] - there).max() < 1e-4
+    still = head.strands.places_mm(head.mesh, head.positions_mm)
+    assert np.abs(there - (still @ turn.T + [2.0, -3.0, 0.0])).max() < 1e-4
+
+
+def test_hairs_are_drawn_again_only_when_they_change(renderer: Renderer) -> None:
+    head = one(0.3)
+    turned = replace(lit(head), camera=front_camera(head, (2.0, 0.0, 0.0), frame_mm=FRAME_MM))
+    ran = []
+    for scene, exposure in ((lit(head), 1.0), (lit(head), 1.0), (lit(head), 2.0), (turned, 2.0)):
+        picture(renderer, scene, exposure=exposure)
+        ran.append(set(renderer.graph.ran))
+    assert ran[1:3] == [set(), {"post"}]
+    assert "strands" in ran[3] and not ran[3] & {"shape", "shadows"}
+
+
+def test_parts_of_the_picture_add_up(renderer: Renderer) -> None:
+    """What hairs scatter counts as reflected light; in the light from below the skin they only cover."""
+    scene = lit(tangle(40, absorption=2.0))
+    parts = ("all", "diffuse", "specular")
+    whole, below, over = (picture(renderer, scene, parts=part)[..., :3] for part in parts)
+    assert np.abs(below + over - whole).max() < TWIN * whole.max()
+
+
+def test_hairs_of_another_mesh_are_refused(renderer: Renderer) -> None:
+    head = one(0.1)
+    alone = replace(head, mesh=replace(head.mesh, quads=head.mesh.quads[:0]))
+    with pytest.raises(DermisError, match="rooted in quads"):
+        picture(renderer, lit(alone))
+
+
+def test_strands_are_a_setting() -> None:
+    assert Settings().strands and not Settings(strands=False).strands
