@@ -4,7 +4,7 @@ Fibres of the iris scatter blue, eumelanin over them makes it green and brown; s
 cornea. From the side the iris comes forward.
 
 Deck: +
-Columns: 3
+Columns: 4
 """
 
 from dataclasses import replace

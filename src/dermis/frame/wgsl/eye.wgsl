@@ -18,7 +18,7 @@ const TEARS: f32 = 0.06; // roughness of their film
 // Artist's values, linear.
 const STROMA: vec3f = vec3f(0.20, 0.27, 0.33); // without pigment, which scatters blue
 const PIGMENT: vec3f = vec3f(0.085, 0.040, 0.018); // of eumelanin
-const WHITE: vec3f = vec3f(0.72, 0.68, 0.65);
+const WHITE: vec3f = vec3f(0.56, 0.52, 0.49);
 const VESSEL: vec3f = vec3f(0.62, 0.20, 0.17);
 
 struct Eye {
