@@ -24,6 +24,9 @@ from dermis.mesh.mesh import Mesh
 from dermis.mesh.uv import triangle_uv_area
 from dermis.specular.beckmann import beckmann_table
 
+_SOFTWARE_SIDE = (
+    1024  # of painted maps on software adapters, which take a second and a half for a million texels
+)
 _MEAN_TEXELS = 512  # a side of the grid that a map's mean is taken on
 
 
@@ -56,9 +59,14 @@ def fine_detail(device: Device, fine: bool) -> dict[str, Any]:
 def _painted(
     device: Device, head: Head, maps: PaintedMaps, use_colour: bool, how: tuple[int, bool]
 ) -> dict[str, Any]:
-    """Maps that no file gives, painted."""
-    surface = painting(head.mesh, head.control.stencils)
-    found = paint.draw(device, surface, maps.look, *how)._asdict()
+    """Maps that no file gives, painted.
+
+    how : their side [texels], and whether expressions change them
+    """
+    surface, (side, moving) = painting(head.mesh, head.control.stencils), how
+    if device.adapter.kind == "CPU":
+        side = min(side, _SOFTWARE_SIDE)
+    found = paint.draw(device, surface, maps.look, side, moving)._asdict()
     face = found.pop("face")
     given = {"relief": maps.height if maps.normal is None else maps.normal, "colour": maps.colour}
     given |= {"specular": maps.specular, "roughness": maps.roughness}
