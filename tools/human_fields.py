@@ -18,7 +18,7 @@ from scipy.sparse.linalg import lsqr
 from scipy.spatial import cKDTree
 
 from dermis.human.person import Human
-from dermis.human.published import DELTA_MM
+from dermis.human.published import DELTA_MM, count
 from dermis.human.skin.surface import FIELDS
 from dermis.mesh.mesh import Mesh
 
@@ -55,7 +55,8 @@ def main() -> None:
     first, point, weight = stencils.first, stencils.point, stencils.weight
     matrix = csr_array((weight, point, first), shape=(len(first) - 1, len(head.positions_mm)))
     fields = fit(matrix, mesh.point[skin].astype(np.int64), values[skin])
-    np.savez_compressed(OUT, places=hundredths(head.positions_mm), fields=hundredths(fields))
+    places, fields = head.positions_mm[: count()], fields[: count()]  # without eyeballs
+    np.savez_compressed(OUT, places=hundredths(places), fields=hundredths(fields))
     sys.stdout.write(f"{OUT}  {OUT.stat().st_size / 1e3:.0f} kB\n")
 
 

@@ -27,6 +27,5 @@ def compiled(function: Function) -> Function:
 @cache
 def _code(folder: Path) -> str:
     """What stands for the text of all files that loops of a folder may take functions and constants from."""
-    around = folder.parent if folder.name == "kernels" else folder
-    texts = (file.read_bytes() for file in sorted(around.rglob("*.py")))
+    texts = (file.read_bytes() for file in sorted(folder.rglob("*.py")))
     return hashlib.sha256(b"".join(texts)).hexdigest()[:12]

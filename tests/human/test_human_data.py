@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dermis.human.skin.detail import detail_slopes
+
 TOOLS = Path(__file__).parents[2] / "tools"
 DATA = Path(__file__).parents[2] / "src" / "dermis" / "human" / "data"
 MOST_BYTES = 2_500_000
@@ -35,3 +37,39 @@ def test_it_is_what_the_tool_makes(
                 assert np.abs(made[name] - kept[name]).max() < 1e-4
             else:
                 assert np.array_equal(made[name], kept[name])
+
+
+@pytest.mark.samples
+def test_the_average_person_is_what_the_tool_measures(
+    sample_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(TOOLS))
+    import human_fields
+
+    monkeypatch.setattr(human_fields, "OUT", tmp_path / "average.npz")
+    monkeypatch.setattr(sys, "argv", ["human_fields.py", str(sample_folder / "heads" / "human")])
+    human_fields.main()
+    with np.load(tmp_path / "average.npz") as made, np.load(DATA / "average.npz") as kept:
+        assert set(made) == set(kept)
+        assert np.abs(made["places"].astype(int) - kept["places"]).max() <= 1
+        assert np.abs(made["fields"].astype(int) - kept["fields"]).max() <= 20  # hundredths of a mm
+
+
+def test_the_tile_of_detail_is_what_the_tool_makes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(TOOLS))
+    import human_detail
+    from PIL import Image
+
+    monkeypatch.setattr(human_detail, "OUT", tmp_path / "detail.png")
+    human_detail.main()
+    made, kept = (
+        np.asarray(Image.open(path), int) for path in (tmp_path / "detail.png", DATA / "detail.png")
+    )
+    assert np.abs(made - kept).max() <= 1
+
+
+def test_the_tile_goes_on_over_its_edges() -> None:
+    """Its slopes are no steeper there than inside."""
+    slopes = np.abs(detail_slopes()[..., 2:])
+    edge = np.concatenate([slopes[0], slopes[-1], slopes[:, 0], slopes[:, -1]])
+    assert edge.mean() < 1.3 * slopes.mean()
