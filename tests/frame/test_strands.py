@@ -13,6 +13,7 @@ from strand_setups import hairy, shuffled
 from tolerances import FURNACE, LOBE_TWIN, TWIN
 
 from dermis.errors import DermisError
+from dermis.frame import strands
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.gpu.textures import texture_from
@@ -212,3 +213,18 @@ def test_hairs_of_another_mesh_are_refused(renderer: Renderer) -> None:
 
 def test_strands_are_a_setting() -> None:
     assert Settings().strands and not Settings(strands=False).strands
+
+
+@pytest.mark.parametrize("size", [(96, 96), (75, 61)])
+def test_tiles_of_a_workgroup_draw_the_same(
+    renderer: Renderer, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As GPUs do it: many chains for each tile, followed side by side."""
+    scene, shown = lit(tangle(700, absorption=0.4)), []
+    for ways in (1, 64):
+        monkeypatch.setattr(strands, "ways_of", lambda device, tiles, ways=ways: ways)
+        renderer.forget()
+        shown.append(picture(renderer, scene, size=size))
+    renderer.forget()
+    np.testing.assert_allclose(shown[1], shown[0], rtol=1e-5, atol=1e-6)
+    assert shown[0][..., :3].std() > 0.02

@@ -16,6 +16,7 @@ from dermis.scene.settings import Settings
 from dermis.specular.hair import hair_numbers
 
 _TILE = 8  # pixels along a side of the tiles that hairs are listed in
+_WAYS = 64  # chains of a tile on GPUs: one for each pixel's invocation to follow
 _WINDOW = 256  # texels across what hairs hold back of a light, half as many down
 _HEAD_WORDS = 8  # before them
 _LINKS_OF_PIECE = 4  # for hairs in no more than a few tiles
@@ -47,11 +48,13 @@ class StrandPicture:
 
     chains, links : pieces of hair tile by tile, see strands_bin.wgsl
     result : the picture with hairs
+    ways : chains of a tile
     """
 
     chains: Any
     links: Any
     result: Any
+    ways: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,8 +125,15 @@ def make_strand_picture(device: Device, tables: StrandTables, size: tuple[int, i
     across, down = (-(-side // _TILE) for side in size)
     links = _LINKS_OF_PIECE * tables.pieces + tables.hairs * (across + down)
     links = min(links, device.max_storage_bytes // 8)
-    chains = _words(device, 1 + across * down)
-    return StrandPicture(chains, _words(device, 2 * links), make_texture(device, size, "rgba32float"))
+    ways = ways_of(device, across * down)
+    chains = _words(device, 1 + ways * across * down)
+    return StrandPicture(chains, _words(device, 2 * links), make_texture(device, size, "rgba32float"), ways)
+
+
+def ways_of(device: Device, tiles: int) -> int:
+    """Chains of a tile: as many as pixels, but on software adapters and for pictures of too many tiles."""
+    fits = 4 * (1 + _WAYS * tiles) <= device.max_storage_bytes
+    return _WAYS if fits and device.adapter.kind != "CPU" else 1
 
 
 def make_strand_shadows(device: Device, layers: int) -> Any:

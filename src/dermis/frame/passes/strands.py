@@ -50,12 +50,17 @@ def draw(
     graph.dispatch("strands", light, {**lit, **seen, "posed": made.posed}, each(made.hairs + made.pieces))
     listed = {"chains": picture.chains, "links": picture.links}
     _each(graph, "strands_empty.wgsl", listed, picture.chains.size // 4)
-    _each(graph, "strands_bin.wgsl", seen | listed, made.pieces, made.constants)
+    ways = (("WAYS", picture.ways),)
+    _each(graph, "strands_bin.wgsl", seen | listed, made.pieces, made.constants + ways)
     bound = head.resources | seen | listed
     bound |= {"visibility_buffer": visibility, "behind": radiance, "image": picture.result}
+    width, height = picture.result.size[:2]
+    if picture.ways > 1:
+        shader = program(graph.device, "strands_draw_tiles.wgsl", made.constants + ways)
+        graph.compute("strands", shader, bound, (width, height))
+        return picture.result
     rows = rows_of(graph.device, made.pieces)
     shader = program(graph.device, "strands_draw.wgsl", (*made.constants, ("ROWS", rows)))
-    width, height = picture.result.size[:2]
     graph.compute("strands", shader, bound, (width, -(-height // rows)))
     return picture.result
 

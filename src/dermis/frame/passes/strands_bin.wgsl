@@ -4,7 +4,7 @@
 //#include "strand_tiles.wgsl"
 
 @group(0) @binding(30) var<storage, read> drawn: array<Drawn>;
-@group(0) @binding(31) var<storage, read_write> chains: array<atomic<u32>>; // links in use, then the first link + 1 of each tile
+@group(0) @binding(31) var<storage, read_write> chains: array<atomic<u32>>; // links in use, then the first link + 1 of each chain
 @group(0) @binding(32) var<storage, read_write> links: array<vec2u>; // a piece, the next link + 1
 
 // A piece on its way through the tiles.
@@ -57,7 +57,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
         for (var x = one.low.x; x <= one.high.x; x += 1.0) {
             if (link < arrayLength(&links) && covers(one, vec2f(x, y))) {
                 let tile = u32(y) * tiles_across(strand_view.size) + u32(x);
-                links[link] = vec2u(piece, atomicExchange(&chains[1u + tile], link + 1u));
+                links[link] = vec2u(piece, atomicExchange(&chains[1u + tile * WAYS + piece % WAYS], link + 1u));
                 link += 1u;
             }
         }

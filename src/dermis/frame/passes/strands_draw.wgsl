@@ -1,166 +1,24 @@
 // Hairs over the picture: each pixel keeps the nearest pieces of hair that cover it and lays them over what it shows.
-//#include "geometry.wgsl"
-//#include "strand_view.wgsl"
-//#include "strand_tiles.wgsl"
+//#include "strand_fragments.wgsl"
 
 override ROWS: u32 = 1u; // pixels of an invocation, one below the other; see `rows_of`
 
-const NEAREST: u32 = 8u; // pieces that a pixel keeps; those behind them count by their mean and what they cover
-const MOST_DEPTHS: u32 = 8u; // samples of a pixel that hairs are compared with
-const FAR: f32 = 2e30; // depth of no piece, behind everything [mm]
-const FIXED: f32 = 16384.0; // so that sums do not depend on the order
-const BRIGHTEST: f32 = 16.0; // radiance of pieces behind those kept
-
-@group(0) @binding(30) var<storage, read> drawn: array<Drawn>;
 @group(0) @binding(31) var<storage, read> chains: array<u32>; // see strands_bin.wgsl
 @group(0) @binding(32) var<storage, read> links: array<vec2u>;
-@group(0) @binding(33) var visibility_buffer: texture_2d_array<u32>; // triangle + 1 of each sample
 @group(0) @binding(34) var behind: texture_2d<f32>; // radiance and coverage
 @group(0) @binding(35) var image: texture_storage_2d<rgba32float, write>;
 
-// A piece of hair over a pixel.
-struct Fragment {
-    depth: f32, // [mm]
-    piece: u32,
-    along: f32, // of the piece, 0 to 1
-    cover: f32, // of the pixel
-}
-
-// Depths of the surface at the samples of a pixel, up to eight.
-struct Depths {
-    first: vec4f,
-    second: vec4f,
-    share: f32, // of the pixel that a sample stands for
-}
-
-fn depth_at(triangle: u32, place: vec2f) -> f32 {
-    let t = triangle_at(triangle);
-    let a = position_of(t.x);
-    let n = cross(position_of(t.y) - a, position_of(t.z) - a);
-    let ndc = vec2f(2.0, -2.0) * place / strand_view.size + vec2f(-1.0, 1.0);
-    let ray = strand_view.forward + ndc.x * strand_view.right + ndc.y * strand_view.up;
-    return dot(n, a - strand_view.eye) / dot(n, ray);
-}
-
-fn depths_at(pixel: vec2u) -> Depths {
-    let count = min(strand_view.samples, MOST_DEPTHS);
-    var depths = Depths(vec4f(-1.0), vec4f(-1.0), 1.0 / f32(count));
-    for (var k = 0u; k < count; k += 1u) {
-        let s = k * strand_view.samples / count;
-        let found = textureLoad(visibility_buffer, pixel, s, 0).x;
-        var depth = 1e30;
-        if (found > 0u) {
-            depth = depth_at(found - 1u, vec2f(pixel) + strand_view.jitter[s].xy);
-        }
-        if (k < 4u) {
-            depths.first[k] = depth;
-        } else {
-            depths.second[k - 4u] = depth;
-        }
-    }
-    return depths;
-}
-
-// Share of a pixel at whose samples the surface is farther away.
-fn free_share(depth: f32, depths: Depths) -> f32 {
-    let first = select(vec4f(0.0), vec4f(1.0), vec4f(depth) < depths.first);
-    let second = select(vec4f(0.0), vec4f(1.0), vec4f(depth) < depths.second);
-    return depths.share * dot(first + second, vec4f(1.0));
-}
-
-// Where a piece may cover the plane: pieces of a hair meet on the lines that halve their angles.
-fn between(place: vec2f, piece: u32, way: vec2f) -> bool {
-    let begin = piece_begin(piece);
-    let k = piece % (KNOTS - 1u);
-    let a = drawn[begin].place;
-    let b = drawn[begin + 1u].place;
-    var first = way;
-    var last = way;
-    if (k > 0u) {
-        let before = a - drawn[begin - 1u].place;
-        first += before / max(length(before), 1e-6);
-    }
-    if (k + 2u < KNOTS) {
-        let after = drawn[begin + 2u].place - b;
-        last += after / max(length(after), 1e-6);
-    }
-    return dot(place - a, first) >= 0.0 && dot(place - b, last) < 0.0;
-}
-
-// A hair narrower than a pixel is drawn a pixel wide and covers less of it.
-fn fragment_at(place: vec2f, piece: u32) -> Fragment {
-    let begin = piece_begin(piece);
-    let a = drawn[begin];
-    let b = drawn[begin + 1u];
-    let run = distance(a.place, b.place);
-    let none = Fragment(0.0, 0u, 0.0, 0.0);
-    if (run < 1e-4) {
-        return none;
-    }
-    let way = (b.place - a.place) / run;
-    let from_a = place - a.place;
-    let along = clamp(dot(from_a, way) / run, 0.0, 1.0);
-    let beside = abs(from_a.x * way.y - from_a.y * way.x);
-    let width = mix(a.width, b.width, along);
-    let shown = max(width, 1.0);
-    if (beside >= 0.5 * shown + 0.5 || !between(place, piece, way)) {
-        return none;
-    }
-    let cover = clamp(0.5 * shown + 0.5 - beside, 0.0, 1.0) * width / shown;
-    return Fragment(mix(a.depth, b.depth, along), piece, along, cover);
-}
-
-fn in_front(a: Fragment, b: Fragment) -> bool {
-    return a.depth < b.depth || (a.depth == b.depth && a.piece < b.piece);
-}
-
-fn radiance_at(one: Fragment) -> vec3f {
-    let begin = piece_begin(one.piece);
-    return mix(drawn[begin].radiance, drawn[begin + 1u].radiance, one.along);
-}
-
-// Puts a fragment in the place of one behind it, which is handed on.
-fn settle(kept: ptr<function, array<Fragment, NEAREST>>, k: u32, one: Fragment) -> Fragment {
-    let other = (*kept)[k];
-    if (in_front(one, other)) {
-        (*kept)[k] = one;
-        return other;
-    }
-    return one;
-}
-
 fn covered(pixel: vec2u, first: u32, under: vec4f) -> vec4f {
     let depths = depths_at(pixel);
-    let none = Fragment(FAR, 0u, 0.0, 0.0);
-    var kept = array<Fragment, NEAREST>(none, none, none, none, none, none, none, none);
-    var farther = vec2u(0u); // cover of pieces behind those kept, and the logarithm of what they let through
-    var light = vec3u(0u); // of these
+    take_none();
     for (var link = first; link != 0u; link = links[link - 1u].y) {
         var one = fragment_at(vec2f(pixel) + 0.5, links[link - 1u].x);
         one.cover *= free_share(one.depth, depths);
-        if (one.cover > 0.0) { // without a loop, see `rows_of`
-            one = settle(&kept, 0u, one);
-            one = settle(&kept, 1u, one);
-            one = settle(&kept, 2u, one);
-            one = settle(&kept, 3u, one);
-            one = settle(&kept, 4u, one);
-            one = settle(&kept, 5u, one);
-            one = settle(&kept, 6u, one);
-            one = settle(&kept, 7u, one);
-            farther += vec2u(FIXED * vec2f(one.cover, -log(max(1.0 - one.cover, 1e-4))));
-            light += vec3u(FIXED * one.cover * min(radiance_at(one), vec3f(BRIGHTEST)));
+        if (one.cover > 0.0) {
+            take(one);
         }
     }
-    var through = 1.0;
-    var sum = vec3f(0.0);
-    for (var k = 0u; k < NEAREST; k += 1u) {
-        sum += through * kept[k].cover * radiance_at(kept[k]);
-        through *= 1.0 - kept[k].cover;
-    }
-    let rest = exp(-f32(farther.y) / FIXED);
-    sum += through * (1.0 - rest) * vec3f(light) / f32(max(farther.x, 1u));
-    through *= rest;
-    return vec4f(sum + through * under.rgb, 1.0 - through * (1.0 - under.a));
+    return laid_over(under);
 }
 
 fn chain_at(pixel: vec2u) -> u32 {
