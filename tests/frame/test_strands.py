@@ -13,7 +13,7 @@ from strand_setups import hairy, shuffled
 from tolerances import FURNACE, LOBE_TWIN, TWIN
 
 from dermis.errors import DermisError
-from dermis.frame import strands
+from dermis.frame import strands as hairs
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.gpu.textures import texture_from
@@ -222,7 +222,7 @@ def test_tiles_of_a_workgroup_draw_the_same(
     """As GPUs do it: many chains for each tile, followed side by side."""
     scene, shown = lit(tangle(700, absorption=0.4)), []
     for ways in (1, 64):
-        monkeypatch.setattr(strands, "ways_of", lambda device, tiles, ways=ways: ways)
+        monkeypatch.setattr(hairs, "ways_of", lambda device, tiles, ways=ways: ways)
         renderer.forget()
         shown.append(picture(renderer, scene, size=size))
     renderer.forget()
