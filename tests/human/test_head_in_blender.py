@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 from dermis import Human, Pose, load_head
+from dermis.frame.painted import with_painted_maps
+from dermis.gpu import open_device
 from dermis.human.head_file import write_person
 from dermis.images.io import read_image
 from dermis.mesh.head import Head
@@ -34,7 +36,9 @@ pytestmark = pytest.mark.skipif(not os.environ.get(PYTHON_VARIABLE), reason=f"{P
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """With the file, and what Blender found in it."""
     made = tmp_path_factory.mktemp("blender")
-    write_person(made / "person.glb", PERSON, PERSON.head(), roughness=0.3)
+    device = open_device(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
+    painted = with_painted_maps(device, PERSON.head(), 512)
+    write_person(made / "person.glb", PERSON, painted, roughness=0.3)
     command = [os.environ[PYTHON_VARIABLE], str(SCRIPT), str(made / "person.glb"), str(made)]
     apart = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     run = subprocess.run(command, capture_output=True, text=True, timeout=300, env=apart)
