@@ -1,0 +1,25 @@
+"""Scattering below the skin of a person of the parametric human."""
+
+from __future__ import annotations
+
+from dermis.human.person import Human
+from dermis.human.skin.colours import EPIDERMIS_MM
+from dermis.scene.skin import Pigments, Skin
+
+
+def skin_of(person: Human, base: Skin | None = None) -> Skin:
+    """Skin in which light spreads as far as the person's pigments let it: less the darker the skin is.
+
+    base : of all else; the default skin when left out
+
+    The colour stays that of the person's painted maps.
+    """
+    look = person.look
+    own = Pigments(
+        melanin=look.melanin,
+        eumelanin=look.eumelanin,
+        blood=look.blood,
+        oxygen=look.oxygen,
+        epidermis_mm=EPIDERMIS_MM,
+    )
+    return Skin(**((base or Skin()).model_dump() | {"profile": "spectral", "pigments": own}))
