@@ -65,12 +65,14 @@ def head(
 
         dermis head --african 1 --asian 0 --caucasian 0 --skin melanin=0.3,moles=0.6 --size 4096 -o dark.glb
 
+        dermis head --seed 7 --skin freckles=0.8 -o person.json && dermis render person.json
+
         dermis render other.glb --pose jawOpen=0.6 --bone head=0,20,0 -o other.png
 
     Parameters
     ----------
     output:
-        File to write: .glb.
+        File to write: .glb, or .json for the person's numbers alone, which dermis render takes.
     seed:
         A person at random, the same for the same number [a person between all].
     african:
@@ -116,17 +118,21 @@ def head(
     """
     from dermis.frame.painted import with_painted_maps
     from dermis.gpu import open_device
+    from dermis.human.person_file import write_numbers
     from dermis.outputs import check_output
 
     if list_targets:
         return _list_targets(as_json)
     started = time.perf_counter()
-    check_output(output, (".glb",), "Name it something.glb")
+    check_output(output, (".glb", ".json"), "Name it something.glb")
     numbers = given(african=african, asian=asian, caucasian=caucasian, sex=sex, age=age)
     numbers |= given(weight=weight, muscle=muscle)
     person = _person(seed, numbers, parse_weights(target or [], TARGET))
     own = _look(person.look, skin, "--skin"), _look(person.iris, eye, "--eye")
     person = replace(person, skin=own[0], eyes=own[1])
+    if output.suffix.lower() == ".json":
+        length = write_numbers(output, person)
+        return _tell_numbers(output, person, length, as_json)
     with working_on("making the head"):
         made = person.head(layout=layout, **given(subdivide=subdivide))
         made = _with_maps(made, given(colour=colour, normal=normal, roughness=roughness))
@@ -176,7 +182,7 @@ def _write(output: Path, person: Human, made: Head, expression: dict[str, float]
 
 
 def _report(output: Path, person: Human, made: Head, as_json: bool, **told: Any) -> None:
-    from dermis.human.head_file import numbers_of
+    from dermis.human.person_file import numbers_of
 
     if as_json:
         size = {"vertices": len(made.mesh.positions), "triangles": len(made.mesh.triangles)}
@@ -184,6 +190,16 @@ def _report(output: Path, person: Human, made: Head, as_json: bool, **told: Any)
         return
     counted = f"{len(made.mesh.triangles):,} triangles  {told['bytes'] / 1e6:.1f} MB"
     print_lines(f"{output}  {counted}  {told['seconds']:.1f} s", *filter(None, [made.attribution]))
+
+
+def _tell_numbers(output: Path, person: Human, length: int, as_json: bool) -> int:
+    from dermis.human.person_file import numbers_of
+
+    if as_json:
+        print_json({"head": str(output), "person": numbers_of(person), "bytes": length})
+    else:
+        print_lines(f"{output}  {length} bytes")
+    return 0
 
 
 def _list_targets(as_json: bool) -> int:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.build import SMALLEST, build_atlas
 from dermis.human.person import Human
+from dermis.human.person_file import numbers_of
 from dermis.mesh.gltf.write import encode_head
 from dermis.mesh.head import Head
 from dermis.outputs import replacing
@@ -30,12 +29,6 @@ def write_person(
     with replacing(path) as trial:
         trial.write_bytes(data)
     return len(data)
-
-
-def numbers_of(person: Human) -> dict[str, Any]:
-    """All that a person is made from, by name."""
-    found = {one.name: getattr(person, one.name) for one in fields(person)}
-    return found | {"targets": dict(person.targets), "skin": asdict(person.look), "eyes": asdict(person.iris)}
 
 
 def _relief(head: Head) -> NDArray[np.float32] | None:

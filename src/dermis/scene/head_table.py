@@ -18,7 +18,7 @@ class HeadTable(Plain):
     """The [head] of a scene: what `load_head` takes, and a table of regions of the face."""
 
     name: str
-    """The built-in head human, a sample (lee_perry_smith) or a mesh (.glb .gltf .obj .ply)."""
+    """A person (human, human:SEED, .json), a sample (lee_perry_smith) or a mesh (.glb .gltf .obj .ply)."""
     colour: str | None = None
     """Colour map (sRGB)."""
     normal: str | None = None

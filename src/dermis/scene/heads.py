@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dermis.errors import refuse
 from dermis.mesh.check import check_head_height
@@ -19,6 +19,9 @@ from dermis.mesh.maps import load_maps
 from dermis.mesh.samples import SAMPLES, Sample, fetch
 from dermis.mesh.subdivide import subdivide_head
 from dermis.scene.head_table import NormalY, Up, VOrigin
+
+if TYPE_CHECKING:
+    from dermis.human.person import Human
 
 MapFile = str | os.PathLike[str] | None
 HUMAN = "human"
@@ -42,7 +45,9 @@ def load_head(
     opaque: Sequence[str] = (),
     subdivide: int = 0,
 ) -> Head:
-    """The built-in head "human", a sample ("lee_perry_smith") or a file (.glb, .gltf, .obj, .ply).
+    """The parametric human ("human"), a sample ("lee_perry_smith") or a file (.glb, .gltf, .obj, .ply).
+
+    "human:7" is the person drawn by the seed 7, and a .json file of `dermis head` one by its numbers.
 
     Options replace what a sample or a glTF file has of its own. Morph targets and bones of a glTF file move
     the head (`Pose`); it rests as the file has it, at the default weights of its targets.
@@ -62,7 +67,7 @@ def load_head(
     name, path = str(head), Path(head)
     own = {"colour": colour, "normal": normal, "height": height}
     own |= {"specular": specular, "roughness": roughness}
-    if name == HUMAN or name.startswith(f"{HUMAN}:"):
+    if name == HUMAN or name.startswith(f"{HUMAN}:") or path.suffix.lower() == ".json":
         told = {"unit_mm": unit_mm, "v_origin": v_origin, "up": up, "opaque": opaque}
         return _human(name, own, height_mm, normal_y, told, subdivide)
     if name in REPLACED and not path.is_file():
@@ -115,11 +120,9 @@ def _human(
 ) -> Head:
     """The parametric human, in its own layout.
 
-    name : "human", or with a seed: "human:7"
+    name : "human", or with a seed: "human:7", or a file of numbers
     told : what is told of files alone
     """
-    from dermis.human.person import Human
-
     for option, usual in (("unit_mm", None), ("v_origin", "auto"), ("up", "y"), ("opaque", ())):
         if told[option] not in (usual, list(usual or ())):
             refuse(option, "a file that it tells of", f"it came with {HUMAN!r}", "Leave it out")
@@ -130,16 +133,21 @@ def _human(
     del chosen["region"]  # which is the files' own
     given = any(file is not None for file in chosen.values())
     loaded = load_maps(**chosen, height_mm=height_mm, normal_y=normal_y) if given else None
-    person = Human() if name == HUMAN else Human.drawn(_seed(name))
-    return replace(person.head(loaded, subdivide=max(1, subdivide)), name=name)
+    return replace(_person(name).head(loaded, subdivide=max(1, subdivide)), name=name)
 
 
-def _seed(name: str) -> int:
-    """Of a person by its name."""
+def _person(name: str) -> Human:
+    from dermis.human.person import Human
+    from dermis.human.person_file import read_person
+
+    if name == HUMAN:
+        return Human()
+    if Path(name).suffix.lower() == ".json":
+        return read_person(Path(name))
     words = name.partition(":")[2]
     if not words.isdecimal():
         refuse(name, f"{HUMAN}, or {HUMAN}:SEED with a whole number", f"{words!r} came", f"Try {HUMAN}:7")
-    return int(words)
+    return Human.drawn(int(words))
 
 
 def _chosen(given: dict[str, MapFile], files: dict[str, Any]) -> dict[str, Any]:
