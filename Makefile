@@ -14,7 +14,7 @@ setup: ## an environment in .venv from requirements.lock, and a Vulkan driver
 
 demo: setup ## render the package's head into out/demo.png
 	@mkdir -p out
-	@.venv/bin/dermis render -o out/demo.png
+	@.venv/bin/dermis render --atlas 1024 -o out/demo.png
 
 lint: setup ## style, types and floors
 	$(PY) -m ruff check .
