@@ -153,6 +153,25 @@ def test_given_maps_stay_and_others_are_painted(device: Device, head: Head) -> N
     assert with_painted_maps(device, other, SIDE) is other
 
 
+def test_the_finest_mesh_is_painted_as_the_coarsest(device: Device, surface: Painting, head: Head) -> None:
+    """As many triangles as there can be."""
+    fine = Human().head(subdivide=3)
+    finest = painting(fine.mesh, fine.control.stencils)
+    assert finest.count == 16 * surface.count
+    both = [painted(device, one).colour for one in (surface, finest)]
+    assert both[0] is not None and both[1] is not None
+    apart = np.abs(both[0] - both[1]).max(axis=-1)[covered(head)]
+    assert apart.mean() < 0.005 and (apart > 0.1).mean() < 0.01
+
+
+def test_more_triangles_than_have_numbers_are_refused(
+    device: Device, surface: Painting, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(paint, "_MOST_TRIANGLES", surface.count)
+    with pytest.raises(DermisError, match="Subdivide less"):
+        painted(device, surface)
+
+
 @pytest.mark.parametrize("side", [100, 128, 8192])
 def test_sides_that_cannot_be_are_refused(device: Device, head: Head, side: int) -> None:
     with pytest.raises(DermisError, match="a power of two from 256 to 4096"):

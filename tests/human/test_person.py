@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -11,7 +14,10 @@ from dermis.atlas.build import build_atlas
 from dermis.atlas.unwrap.stretch import singular_values
 from dermis.human.model import MATERIALS
 from dermis.human.published import count
+from dermis.human.skin.painted import PaintedMaps
+from dermis.images.codecs import encode_png8
 from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
 
 FACE_MM = 0.11  # a texel of a map of 4096 texels a side
 
@@ -168,3 +174,25 @@ def test_unknown_targets_and_seeds_are_refused() -> None:
         _ = Human(targets={"wings": 1.0}).positions_mm
     with pytest.raises(DermisError, match="seed: expected a whole number"):
         Human.drawn(-1)
+
+
+def test_maps_of_files_leave_the_others_painted(tmp_path: Path) -> None:
+    path = tmp_path / "rough.png"
+    path.write_bytes(encode_png8(np.full((32, 32, 1), 64, np.uint8)))
+    maps = dermis.load_head("human", roughness=path).maps
+    assert isinstance(maps, PaintedMaps) and maps.colour is None
+    assert maps.roughness is not None and np.allclose(maps.roughness, 64 / 255)
+
+
+def test_a_look_is_put_on_painted_people_alone(head: Head) -> None:
+    person = Human.drawn(5)
+    dressed = person.on(head)
+    assert isinstance(dressed.maps, PaintedMaps) and dressed.maps.look == person.look
+    assert dressed.mesh is head.mesh and dressed.eyes is not None and dressed.eyes.look == person.iris
+    with pytest.raises(DermisError, match="painted skin"):
+        person.on(replace(head, maps=Maps()))
+
+
+def test_levels_that_cannot_be_are_refused() -> None:
+    with pytest.raises(DermisError, match="subdivide"):
+        dermis.load_head("human", subdivide=-5)

@@ -38,6 +38,7 @@ def test_it_is_a_head(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text",
     [
+        '{"person": {"targets": {"nose/nose-hump-incr": 1' + 400 * "0" + "}}}",
         "", "[]", "{}", '{"person": 3}', '{"person": {"age": "old"}}', '{"person": {"age": 200}}',
         '{"person": {"skin": []}}', '{"person": {"skin": {"blood": NaN}}}', '{"person": {"nose": 1}}',
         '{"person": {"targets": 4}}', '{"person": {"eyes": {"seed": "x"}}}', "\x00\x01", "[" * 5000,

@@ -44,8 +44,8 @@ def render(
     Parameters
     ----------
     head:
-        human, the head of the package, a sample (lee_perry_smith), a mesh (.glb .gltf .obj .ply) or a scene
-        (.toml).
+        human, the head of the package, human:7, a person by seed, or a person's numbers (.json); a sample
+        (lee_perry_smith), a mesh (.glb .gltf .obj .ply) or a scene (.toml).
     output:
         Image to write: .png (sRGB, 8 bit) or .exr (linear Rec. 709, float).
     as_json:

@@ -82,6 +82,12 @@ class Asked:
         return min(max(side, paint.LEAST), paint.MOST)
 
     @property
+    def finely_painted(self) -> bool:
+        """Whether there is relief finer than maps: painted maps of gloss say how much of it is where."""
+        maps = self.head.maps
+        return self.painted_side > 0 and maps.specular is None and maps.roughness is None
+
+    @property
     def moving(self) -> bool:
         """Whether expressions change the maps."""
         return self.posed and self.painted_side > 0 and bool(self.head.targets)

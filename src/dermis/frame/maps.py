@@ -66,9 +66,10 @@ def _painted(
     surface, (side, moving) = painting(head.mesh, head.control.stencils), how
     if device.adapter.kind == "CPU":
         side = min(side, _SOFTWARE_SIDE)
+    given = {"relief": maps.height if maps.normal is None else maps.normal, "colour": maps.colour}
+    moving = moving and (given["relief"] is None or (use_colour and maps.colour is None))
     found = paint.draw(device, surface, maps.look, side, moving)._asdict()
     face = found.pop("face")
-    given = {"relief": maps.height if maps.normal is None else maps.normal, "colour": maps.colour}
     given |= {"specular": maps.specular, "roughness": maps.roughness}
     kept = [role for role in found if given[role] is None and (use_colour or role != "colour")]
     return {f"{role}_map": found[role] for role in kept} | {"face": face}

@@ -62,7 +62,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     shared = _shared(memo, device, asked, shadow_maps, curvature, strands)
     atlases = [_atlas(memo, device, asked, name, k) for k, name in enumerate(asked.atlases.layouts)]
     uploaded: dict[str, Any] = memo.wait(maps)
-    shared |= uploaded | keep(fine_detail, device, asked.painted_side > 0)
+    shared |= uploaded | keep(fine_detail, device, asked.finely_painted)
     layouts = [_layout(memo, device, asked, one, shape, person, shared, k) for k, one in enumerate(atlases)]
     own, view = _shading(memo, device, asked)
     return Resources(
@@ -93,7 +93,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
 
 def _details(asked: Asked) -> Constants:
     """Whether there is relief finer than maps, and eyes of true shape."""
-    found = {"DETAIL": asked.painted_side > 0, "EYES": asked.head.eyes is not None}
+    found = {"DETAIL": asked.finely_painted, "EYES": asked.head.eyes is not None}
     return tuple((name, 1) for name, there in found.items() if there)
 
 

@@ -10,7 +10,7 @@ from dermis.gpu import ComputeProgram
 from dermis.gpu.shader_types import struct_dtype
 from dermis.gpu.wgsl_source import Member
 from dermis.human import teeth
-from dermis.mesh.eyes import CORNEA_MM, LIMBUS_MM, SCLERA_MM, cornea_centre_mm, iris_mm
+from dermis.mesh.eyes import LIMBUS_MM, cornea_centre_mm, iris_mm
 from dermis.mesh.maps import Maps
 from dermis.optics.directions import directions
 from dermis.optics.gaussians import GaussianSum
@@ -44,8 +44,6 @@ def surface_numbers() -> dict[str, float]:
 def eye_numbers() -> dict[str, float]:
     """Numbers that eye.wgsl and mouth.wgsl fill in."""
     return {
-        "sclera_mm": SCLERA_MM,
-        "cornea_mm": CORNEA_MM,
         "cornea_at": cornea_centre_mm(),
         "limbus_mm": LIMBUS_MM,
         "iris_at": iris_mm(),

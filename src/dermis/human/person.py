@@ -109,10 +109,15 @@ class Human:
     def on(self, head: Head) -> Head:
         """The head of another person with this one's skin and eyes.
 
-        With `Pose(positions_mm=person.positions_mm)` it is this person, and only the skin is painted anew.
+        With `Pose(positions_mm=person.positions_mm)` it has this person's shape too, and only the skin is
+        painted anew. Places where bones turn stay the other's, and so does the hair.
+
+        Raises DermisError for heads that are no painted people.
         """
-        eyes = None if head.eyes is None else head.eyes.with_look(self.iris)
-        return replace(head, maps=PaintedMaps(look=self.look), eyes=eyes)
+        if not isinstance(head.maps, PaintedMaps) or head.eyes is None:
+            refuse(head.name, "a head of the parametric human with painted skin", "it is none", "Load human")
+        eyes = head.eyes.with_look(self.iris)
+        return replace(head, maps=replace(head.maps, look=self.look), eyes=eyes)
 
     @property
     def look(self) -> SkinLook:

@@ -26,7 +26,7 @@ def numbers_of(person: Human) -> dict[str, Any]:
 
 def write_numbers(path: Path, person: Human) -> int:
     """Write a person as JSON, whole or not at all; its length [byte]."""
-    data = (json.dumps({"person": numbers_of(person)}, indent=2) + "\n").encode()
+    data = (json.dumps({"person": numbers_of(person)}, indent=2, default=float) + "\n").encode()
     with replacing(path) as trial:
         trial.write_bytes(data)
     return len(data)
@@ -64,5 +64,5 @@ def _made(path: Path, kind: type[T], numbers: Any) -> T:
             refuse(path, f"names of {', '.join(known)}", f"{name!r:.40} came", "Correct it there")
     try:
         return kind(**numbers)
-    except (TypeError, AttributeError) as fault:
+    except (TypeError, ValueError, AttributeError, OverflowError) as fault:
         refuse(path, "plain numbers", f"one is none ({str(fault)[:80]})", "Correct it there")

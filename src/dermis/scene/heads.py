@@ -129,11 +129,11 @@ def _human(
     if height_mm is not None and maps["height"] is None:
         came = f"{height_mm} came without a height map"
         refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
-    chosen = _chosen(maps, {})
-    del chosen["region"]  # which is the files' own
-    given = any(file is not None for file in chosen.values())
-    loaded = load_maps(**chosen, height_mm=height_mm, normal_y=normal_y) if given else None
-    return replace(_person(name).head(loaded, subdivide=max(1, subdivide)), name=name)
+    given: dict[str, Any] = {role: file for role, file in maps.items() if file is not None}
+    loaded = load_maps(**given, height_mm=height_mm, normal_y=normal_y) if given else None
+    made = _person(name).head(subdivide=subdivide or 1)
+    own = {role: getattr(loaded, role) for role in given}  # all others are painted
+    return replace(made, name=name, maps=replace(made.maps, **own))
 
 
 def _person(name: str) -> Human:

@@ -1,8 +1,6 @@
 // An eye as light finds it: the white, the iris seen through the cornea, the film of tears over both.
 //#include "lighting.wgsl"
 
-//#fill const SCLERA_MM: f32 = {sclera_mm};
-//#fill const CORNEA_MM: f32 = {cornea_mm};
 //#fill const CORNEA_AT: f32 = {cornea_at}; // centre of the cornea's front on the axis [mm]
 //#fill const LIMBUS_MM: f32 = {limbus_mm};
 //#fill const IRIS_AT: f32 = {iris_at}; // plane of the iris on the axis [mm]

@@ -5,8 +5,7 @@
 //#fill const CROWN_MM: f32 = {crown_mm};
 //#fill const BITE: f32 = {bite};
 
-const UPPER_TEETH: f32 = 1.0; // what a material's colour has behind it
-const LOWER_TEETH: f32 = 2.0;
+const UPPER_TEETH: f32 = 1.0; // what a material's colour has behind it; 2 for lower teeth
 const TONGUE: f32 = 3.0;
 const TEETH: u32 = 7u; // of half an arch
 // Widths of usual teeth from the middle on [mm].

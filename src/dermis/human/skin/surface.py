@@ -6,6 +6,7 @@ import hashlib
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,7 @@ def average() -> tuple[Floats, Floats]:
 
 _KEPT: dict[bytes, Painting] = {}
 _MOST_KEPT = 3
+_ALONE = Lock()
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,11 +66,12 @@ def painting(mesh: Mesh, stencils: Stencils | None) -> Painting:
     for part in (mesh.uv, mesh.point, mesh.triangles, mesh.material):
         digest.update(np.ascontiguousarray(part).tobytes())
     key = digest.digest()
-    if key not in _KEPT:
-        while len(_KEPT) >= _MOST_KEPT:
-            _KEPT.pop(next(iter(_KEPT)), None)
-        _KEPT[key] = _painting(mesh, stencils)
-    return _KEPT[key]
+    with _ALONE:
+        if key not in _KEPT:
+            while len(_KEPT) >= _MOST_KEPT:
+                _KEPT.pop(next(iter(_KEPT)))
+            _KEPT[key] = _painting(mesh, stencils)
+        return _KEPT[key]
 
 
 def _painting(mesh: Mesh, stencils: Stencils | None) -> Painting:

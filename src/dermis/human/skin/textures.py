@@ -97,7 +97,7 @@ DOTS = (  # artist's values
 
 @cache
 def noise_table() -> NDArray[np.float32]:
-    """(n, 16) a row for each octave of each noise, as paint.wgsl reads it.
+    """(n, 16) a row for each octave of each noise, as spot.wgsl reads it.
 
     Three rows of the matrix from its space to its lattice [1/mm], each with a number behind it: which size of
     texel shows it [mm], 0 for any; its strength; its seed. Then which noise it belongs to, and which space.

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dermis.human.published import OLD, YOUNG
 from dermis.human.skin.look import SkinLook
 from dermis.mesh.eyes import EyeLook
 
@@ -17,7 +18,6 @@ _FRECKLES = {"african": 0.02, "asian": 0.06, "caucasian": 0.16}
 _IRIS = {"african": 0.95, "asian": 0.85, "caucasian": 0.4}
 _SPREAD = 0.42  # standard deviation of the melanin's logarithm within a people
 _STEP = 0.05  # of eumelanin: people share tables of colours
-_YOUNG, _OLD = 25.0, 90.0
 _SPOTS_FROM = 45.0
 _MOST_LINED = 0.8  # of `age` at 90
 
@@ -44,8 +44,8 @@ class Origin(NamedTuple):
 
 def usual_look(origin: Origin) -> SkinLook:
     """The skin that goes with a person: by ancestry, age and sex."""
-    old = (origin.age - _YOUNG) / (_OLD - _YOUNG)
-    lines = max(origin.age - _SPOTS_FROM, 0.0) / (_OLD - _SPOTS_FROM)
+    old = (origin.age - YOUNG) / (OLD - YOUNG)
+    lines = max(origin.age - _SPOTS_FROM, 0.0) / (OLD - _SPOTS_FROM)
     return SkinLook(
         melanin=math.exp(origin.mean({name: math.log(share) for name, share in _MELANIN.items()})),
         eumelanin=origin.mean(_EUMELANIN),
@@ -62,7 +62,7 @@ def usual_look(origin: Origin) -> SkinLook:
 
 def usual_eyes(origin: Origin) -> EyeLook:
     """The eyes that go with a person: brown, lighter the more of the ancestry is European."""
-    return EyeLook(eumelanin=origin.mean(_IRIS), redness=0.15 + 0.2 * (origin.age - _YOUNG) / (_OLD - _YOUNG))
+    return EyeLook(eumelanin=origin.mean(_IRIS), redness=0.15 + 0.2 * (origin.age - YOUNG) / (OLD - YOUNG))
 
 
 def drawn_eyes(rng: np.random.Generator, origin: Origin) -> EyeLook:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from dermis.frame.passes import map_mips, program
 from dermis.gpu import Device, Graph, Recorder
+from dermis.human.skin.movements import FOLDING
 
-_FOLDING = 8  # numbers of the shader's record, the last of which is the flush
+_FOLDING = FOLDING + 1  # numbers of the shader's record, the last of which is the flush
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dermis.errors import refuse
 from dermis.frame.levels import HALVES
 from dermis.frame.passes import each, map_mips, program
 from dermis.frame.passes.painting.expression import Face, make_face
@@ -20,6 +21,7 @@ from dermis.human.skin.surface import Painting
 from dermis.mesh.maps import Maps
 from dermis.scene.skin import Skin
 
+_MOST_TRIANGLES = 1 << 20  # that painted_surface.wgsl has bits for
 _TEXEL = 4  # floats of a vector, which the tables' size is a multiple of
 LEAST, MOST = 256, 4096
 """Sides of the maps [texels]."""
@@ -79,6 +81,9 @@ def _paint(
     device: Device, painting: Painting, look: SkinLook, side: int
 ) -> tuple[list[map_mips.Mipped], Any, Any]:
     """Colour, specular and roughness without mips, a buffer of heights, and what movements add to them."""
+    if painting.count >= _MOST_TRIANGLES:
+        came = f"{painting.count:,} came"
+        refuse("painted skin", f"fewer than {_MOST_TRIANGLES:,} triangles", came, "Subdivide less")
     shader = program(device, "painting/skin.wgsl")
     bound = {**_surface(device, painting, look, side), **_tables(device, look)}
     made = [map_mips.empty(device, (side, side)) for _ in range(3)]

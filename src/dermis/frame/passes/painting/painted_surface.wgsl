@@ -1,9 +1,9 @@
 // The surface that skin is painted on: a human's triangles, and where on the average person their corners are.
 
 const MARGIN: f32 = 8.0; // texels around charts that are painted too
-const ID_BITS: u32 = 19u;
-const NEAREST: u32 = 0x1fffu;
-const STEPS: f32 = 512.0; // of a texel, that distances are told apart by
+const ID_BITS: u32 = 20u;
+const NEAREST: u32 = 0xfffu;
+const STEPS: f32 = 256.0; // of a texel, that distances are told apart by
 
 struct Paint {
     side: u32, // of the maps [texels]
