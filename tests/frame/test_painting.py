@@ -232,3 +232,12 @@ def test_mean_colour_of_painted_maps_is_known_before_they_are_painted(head: Head
     assert isinstance(head.maps, PaintedMaps) and head.maps.mean_colour is not None
     red, green, blue = head.maps.mean_colour
     assert red > green > blue
+
+
+def test_the_wrong_gamma_is_wrong_for_painted_skin_too(renderer: Renderer, head: Head) -> None:
+    right, wrong = (
+        renderer.draw(Scene(head, lights=studio()), settings_of(atlas=256, gamma=gamma)).linear()
+        for gamma in ("right", "wrong")
+    )
+    seen = right.max(axis=-1) > 0.05
+    assert wrong[seen].mean() > 1.2 * right[seen].mean()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,10 @@ def upload_maps(
     """
     maps = head.maps
     if isinstance(maps, PaintedMaps):
+        if not decoded and use_colour and maps.colour is None:  # which only pictures can be
+            found = paint.painted_maps(device, painting(head.mesh, head.control.stencils), maps.look, side)
+            maps = replace(maps, colour=found.colour)
+            head = replace(head, maps=maps)
         return _of_files(device, head, use_colour, decoded) | _painted(
             device, head, maps, use_colour, (side, moving)
         )
