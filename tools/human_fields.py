@@ -1,4 +1,4 @@
-"""Makes src/dermis/human/data/average.npz: the average person, and how far skin is from lips, lids, ears.
+"""Makes src/dermis/human/data/average.npz: the average person, and how far skin is from lips and lids.
 
 python tools/human_fields.py FOLDER, where FOLDER holds the published human.npz and its masks (CC0).
 """
@@ -42,13 +42,12 @@ def main() -> None:
     assert head.rig is not None and head.rig.stencils is not None
     mesh, stencils = head.mesh, head.rig.stencils
     skin = skin_vertices(mesh)
-    masks = {name: mask(folder, name, mesh.uv) for name in ("lips", "inside-mouth", "ears")}
+    masks = {name: mask(folder, name, mesh.uv) for name in ("lips", "inside-mouth")}
     inside = masks["inside-mouth"]
     found = {
         "lips": signed(mesh, skin, np.where(inside > 0.5, 1.0, masks["lips"]), ignored=inside > 0.5),
         "mouth": -signed(mesh, skin, inside),
         "lids": away(mesh, lash_roots(folder, mesh, skin)),
-        "ears": signed(mesh, skin, masks["ears"]),
     }
     assert tuple(found) == FIELDS
     values = np.stack([np.clip(one, -FARTHEST_MM, FARTHEST_MM) for one in found.values()], axis=1)

@@ -14,6 +14,7 @@ from dermis.atlas.build import build_atlas
 from dermis.atlas.unwrap.stretch import singular_values
 from dermis.human.model import MATERIALS
 from dermis.human.published import count
+from dermis.human.skin import face
 from dermis.human.skin.painted import PaintedMaps
 from dermis.images.codecs import encode_png8
 from dermis.mesh.head import Head
@@ -196,3 +197,9 @@ def test_a_look_is_put_on_painted_people_alone(head: Head) -> None:
 def test_levels_that_cannot_be_are_refused() -> None:
     with pytest.raises(DermisError, match="subdivide"):
         dermis.load_head("human", subdivide=-5)
+
+
+def test_sizes_of_tables_are_theirs() -> None:
+    folds = face.folds()
+    tables = {"zones": face.zones(), "folds": folds.curves, "knots": folds.knots, "edges": face.hairline()}
+    assert face.sizes() == {name: len(table) for name, table in tables.items()}

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from encoded_glb import encode_glb
 
 from dermis.errors import DermisError
 from dermis.images.codecs import encode_png8, encode_png16
 from dermis.images.io import Picture, read_image
-from dermis.mesh.gltf.encode import encode_glb
 from dermis.mesh.gltf.pictures import embedded_maps
 from dermis.mesh.load import load_mesh
 from dermis.mesh.primitives import uv_sphere

@@ -25,9 +25,7 @@ from dermis.mesh.mesh import Mesh
 from dermis.mesh.uv import triangle_uv_area
 from dermis.specular.beckmann import beckmann_table
 
-_SOFTWARE_SIDE = (
-    1024  # of painted maps on software adapters, which take a second and a half for a million texels
-)
+_SOFTWARE_SIDE = 1024  # of painted maps on software adapters, which take over a second for so many texels
 _MEAN_TEXELS = 512  # a side of the grid that a map's mean is taken on
 
 
@@ -42,15 +40,14 @@ def upload_maps(
     moving : whether expressions change them; with what does, a `Face`, under "face"
     """
     maps = head.maps
-    if isinstance(maps, PaintedMaps):
-        if not decoded and use_colour and maps.colour is None:  # which only pictures can be
-            found = paint.painted_maps(device, painting(head.mesh, head.control.stencils), maps.look, side)
-            maps = replace(maps, colour=found.colour)
-            head = replace(head, maps=maps)
-        return _of_files(device, head, use_colour, decoded) | _painted(
-            device, head, maps, use_colour, (side, moving)
-        )
-    return _of_files(device, head, use_colour, decoded)
+    if not isinstance(maps, PaintedMaps):
+        return _of_files(device, head, use_colour, decoded)
+    if not decoded and use_colour and maps.colour is None:  # which only pictures can be
+        found = paint.painted_maps(device, painting(head.mesh, head.control.stencils), maps.look, side)
+        maps = replace(maps, colour=found.colour)
+        head = replace(head, maps=maps)
+    painted = _painted(device, head, maps, use_colour, (side, moving))
+    return _of_files(device, head, use_colour, decoded) | painted
 
 
 def fine_detail(device: Device, fine: bool) -> dict[str, Any]:

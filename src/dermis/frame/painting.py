@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dermis.gpu.wgsl_source import Member
 from dermis.human.skin.detail import TILE_MM
-from dermis.human.skin.face import AMOUNTS, DEGREES, folds, hairline, zones
+from dermis.human.skin.face import AMOUNTS, DEGREES, sizes
 from dermis.human.skin.movements import FOLDING
 from dermis.human.skin.textures import DOTS, NOISES, noise_table
 
@@ -25,22 +25,9 @@ def texture_names() -> Mapping[str, Callable[[], Sequence[Member]]]:
 
 def painting_numbers() -> dict[str, float]:
     """Numbers that the shaders fill in."""
-    found = folds()
-    rows = {
-        "noise_rows": noise_table(),
-        "zones": zones(),
-        "folds": found.curves,
-        "knots": found.knots,
-        "edges": hairline(),
-    }
     names = {name: len(names) for name, names in _NAMES.items()}
-    return {
-        "degrees": float(DEGREES),
-        "tile_mm": TILE_MM,
-        "folding": FOLDING,
-        **names,
-        **{name: len(table) for name, table in rows.items()},
-    }
+    own = {"degrees": float(DEGREES), "tile_mm": TILE_MM, "folding": FOLDING}
+    return own | names | sizes() | {"noise_rows": len(noise_table())}
 
 
 def _members(names: Sequence[str]) -> Callable[[], Sequence[Member]]:

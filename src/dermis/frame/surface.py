@@ -50,6 +50,7 @@ def eye_numbers() -> dict[str, float]:
         "arch_mm": teeth.ARCH_MM,
         "crown_mm": teeth.CROWN_MM,
         "bite": teeth.BITE,
+        "middle": teeth.MIDDLE,
     }
 
 

@@ -25,7 +25,7 @@ Index = NDArray[np.int64]
 
 THANKS = "MakeHuman community, CC0"
 _EYE, _TOOTH, _TONGUE = (0.85, 0.83, 0.8), (0.7, 0.66, 0.56), (0.45, 0.16, 0.14)
-LEFT_EYE, RIGHT_EYE = _BALLS = "helper-l-eye", "helper-r-eye"
+LEFT_EYE, RIGHT_EYE = "helper-l-eye", "helper-r-eye"
 MATERIALS = {
     "body": Material("skin"),
     LEFT_EYE: Material("left eye", "opaque", _EYE),
@@ -123,9 +123,7 @@ def _layout(layout: Layout) -> _Laid:
     eyes = [np.full(len(quads), list(MATERIALS).index(name)) for name in (LEFT_EYE, RIGHT_EYE)]
     return _Laid(
         np.concatenate([uv, globes.layout()]),
-        np.concatenate(
-            [found["quads"][: len(corner)][stays].astype(np.int64), count() + quads, count() + size + quads]
-        ),
+        np.concatenate([points[stays], count() + quads, count() + size + quads]),
         np.concatenate([corner[stays], len(uv) + quads, len(uv) + quads]),
         np.concatenate([material[stays], *eyes]),
     )

@@ -12,7 +12,7 @@ fn covered(pixel: vec2u, first: u32, under: vec4f) -> vec4f {
     let depths = depths_at(pixel);
     take_none();
     for (var link = first; link != 0u; link = links[link - 1u].y) {
-        var one = fragment_at(vec2f(pixel) + 0.5, links[link - 1u].x);
+        var one = fragment_of(vec2f(pixel) + 0.5, hold(links[link - 1u].x));
         one.cover *= free_share(one.depth, depths);
         if (one.cover > 0.0) {
             take(one);

@@ -8,59 +8,9 @@ const LANES: u32 = 64u; // of a workgroup, which does a tile
 @group(0) @binding(34) var behind: texture_2d<f32>; // radiance and coverage
 @group(0) @binding(35) var image: texture_storage_2d<rgba32float, write>;
 
-// A piece of hair, and the lines on which it meets those beside it.
-struct Held {
-    a: vec2f,
-    b: vec2f,
-    first: vec2f,
-    last: vec2f,
-    ends: vec4f, // widths, then depths
-    piece: u32,
-}
-
 var<workgroup> held: array<Held, LANES>;
 var<workgroup> found: atomic<u32>;
 var<workgroup> count: u32;
-
-fn unit(way: vec2f) -> vec2f {
-    return way / max(length(way), 1e-6);
-}
-
-fn hold(piece: u32) -> Held {
-    let begin = piece_begin(piece);
-    let k = piece % (KNOTS - 1u);
-    let a = drawn[begin];
-    let b = drawn[begin + 1u];
-    let way = (b.place - a.place) / max(distance(a.place, b.place), 1e-4);
-    var first = way;
-    var last = way;
-    if (k > 0u) {
-        first += unit(a.place - drawn[begin - 1u].place);
-    }
-    if (k + 2u < KNOTS) {
-        last += unit(drawn[begin + 2u].place - b.place);
-    }
-    return Held(a.place, b.place, first, last, vec4f(a.width, b.width, a.depth, b.depth), piece);
-}
-
-fn fragment_of(place: vec2f, one: Held) -> Fragment {
-    let none = Fragment(0.0, 0u, 0.0, 0.0);
-    let run = distance(one.a, one.b);
-    if (run < 1e-4) {
-        return none;
-    }
-    let way = (one.b - one.a) / run;
-    let from_a = place - one.a;
-    let along = clamp(dot(from_a, way) / run, 0.0, 1.0);
-    let beside = abs(from_a.x * way.y - from_a.y * way.x);
-    let width = mix(one.ends.x, one.ends.y, along);
-    let shown = max(width, 1.0);
-    if (beside >= 0.5 * shown + 0.5 || dot(from_a, one.first) < 0.0 || dot(place - one.b, one.last) >= 0.0) {
-        return none;
-    }
-    let cover = clamp(0.5 * shown + 0.5 - beside, 0.0, 1.0) * width / shown;
-    return Fragment(mix(one.ends.z, one.ends.w, along), one.piece, along, cover);
-}
 
 @compute @workgroup_size(8, 8)
 fn main(

@@ -4,6 +4,7 @@
 //#fill const ARCH_MM: f32 = {arch_mm};
 //#fill const CROWN_MM: f32 = {crown_mm};
 //#fill const BITE: f32 = {bite};
+//#fill const MIDDLE: f32 = {middle};
 
 const UPPER_TEETH: f32 = 1.0; // what a material's colour has behind it; 2 for lower teeth
 const TONGUE: f32 = 3.0;
@@ -26,7 +27,7 @@ fn tooth_width(kind: f32, index: u32) -> f32 {
 }
 
 fn teeth_at(point: Point, kind: f32) -> Surface {
-    let along = abs(point.uv.x - 0.5) * ARCH_MM;
+    let along = abs(point.uv.x - MIDDLE) * ARCH_MM;
     let height = (point.uv.y - BITE) * CROWN_MM;
     var index = 0u;
     var first = 0.0;
@@ -46,7 +47,7 @@ fn teeth_at(point: Point, kind: f32) -> Surface {
     var colour = mix(ENAMEL, NECK, smoothstep(0.45, 1.0, height / crown));
     colour = mix(CLEAR_EDGE, colour, smoothstep(0.0, 2.0, height));
     colour = mix(colour * mix(0.16, 1.0, gap), GUM * mix(0.75, 1.0, gap), gum);
-    let slope = -4.0 * BULGE_MM * side / width * (1.0 - gum) * sign(point.uv.x - 0.5);
+    let slope = -4.0 * BULGE_MM * side / width * (1.0 - gum) * sign(point.uv.x - MIDDLE);
     return Surface(bend(point, vec2f(slope * ARCH_MM, 0.0)), colour, SALIVA, 1.0);
 }
 

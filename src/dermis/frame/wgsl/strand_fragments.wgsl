@@ -62,46 +62,55 @@ fn free_share(depth: f32, depths: Depths) -> f32 {
     return depths.share * dot(first + second, vec4f(1.0));
 }
 
-// Where a piece may cover the plane: pieces of a hair meet on the lines that halve their angles.
-fn between(place: vec2f, piece: u32, way: vec2f) -> bool {
+// A piece of hair, and the lines on which it meets those beside it: they halve its angles with these.
+struct Held {
+    a: vec2f,
+    b: vec2f,
+    first: vec2f,
+    last: vec2f,
+    ends: vec4f, // widths, then depths
+    piece: u32,
+}
+
+fn unit(way: vec2f) -> vec2f {
+    return way / max(length(way), 1e-6);
+}
+
+fn hold(piece: u32) -> Held {
     let begin = piece_begin(piece);
     let k = piece % (KNOTS - 1u);
-    let a = drawn[begin].place;
-    let b = drawn[begin + 1u].place;
+    let a = drawn[begin];
+    let b = drawn[begin + 1u];
+    let way = (b.place - a.place) / max(distance(a.place, b.place), 1e-4);
     var first = way;
     var last = way;
     if (k > 0u) {
-        let before = a - drawn[begin - 1u].place;
-        first += before / max(length(before), 1e-6);
+        first += unit(a.place - drawn[begin - 1u].place);
     }
     if (k + 2u < KNOTS) {
-        let after = drawn[begin + 2u].place - b;
-        last += after / max(length(after), 1e-6);
+        last += unit(drawn[begin + 2u].place - b.place);
     }
-    return dot(place - a, first) >= 0.0 && dot(place - b, last) < 0.0;
+    return Held(a.place, b.place, first, last, vec4f(a.width, b.width, a.depth, b.depth), piece);
 }
 
 // A hair narrower than a pixel is drawn a pixel wide and covers less of it.
-fn fragment_at(place: vec2f, piece: u32) -> Fragment {
-    let begin = piece_begin(piece);
-    let a = drawn[begin];
-    let b = drawn[begin + 1u];
-    let run = distance(a.place, b.place);
+fn fragment_of(place: vec2f, one: Held) -> Fragment {
     let none = Fragment(0.0, 0u, 0.0, 0.0);
+    let run = distance(one.a, one.b);
     if (run < 1e-4) {
         return none;
     }
-    let way = (b.place - a.place) / run;
-    let from_a = place - a.place;
+    let way = (one.b - one.a) / run;
+    let from_a = place - one.a;
     let along = clamp(dot(from_a, way) / run, 0.0, 1.0);
     let beside = abs(from_a.x * way.y - from_a.y * way.x);
-    let width = mix(a.width, b.width, along);
+    let width = mix(one.ends.x, one.ends.y, along);
     let shown = max(width, 1.0);
-    if (beside >= 0.5 * shown + 0.5 || !between(place, piece, way)) {
+    if (beside >= 0.5 * shown + 0.5 || dot(from_a, one.first) < 0.0 || dot(place - one.b, one.last) >= 0.0) {
         return none;
     }
     let cover = clamp(0.5 * shown + 0.5 - beside, 0.0, 1.0) * width / shown;
-    return Fragment(mix(a.depth, b.depth, along), piece, along, cover);
+    return Fragment(mix(one.ends.z, one.ends.w, along), one.piece, along, cover);
 }
 
 fn in_front(a: Fragment, b: Fragment) -> bool {

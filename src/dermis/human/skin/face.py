@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import cache
 from itertools import groupby
 from typing import NamedTuple
@@ -21,6 +22,7 @@ AMOUNTS = (
 """What zones change, see zones.csv."""
 DEGREES = 2
 """Angle between the heights of `hairline`."""
+_EDGES = 180 // DEGREES + 1
 _PIECES = 4
 
 
@@ -39,7 +41,7 @@ def hairline() -> Floats:
     from scipy.interpolate import PchipInterpolator
 
     angle, height = numbers(read_rows(__package__, "hairline"), "angle height").T
-    return np.asarray(PchipInterpolator(angle, height)(np.arange(0, 181, DEGREES)), np.float32)
+    return np.asarray(PchipInterpolator(angle, height)(DEGREES * np.arange(_EDGES)), np.float32)
 
 
 class Folds(NamedTuple):
@@ -71,14 +73,25 @@ def folds() -> Folds:
     return Folds(np.concatenate(knots).astype(np.float32), np.stack(curves).astype(np.float32), first)
 
 
+@cache
+def sizes() -> dict[str, int]:
+    """How many zones, folds, knots and edges there are; found without the libraries that draw curves."""
+    lengths = Counter(row["fold"] for row in read_rows(__package__, "folds")).values()
+    knots = sum(map(_pieces, lengths))
+    return {"zones": len(zones()), "folds": len(lengths), "knots": knots, "edges": _EDGES}
+
+
+def _pieces(knots: int) -> int:
+    """Places on a curve through so many knots."""
+    return _PIECES * (knots - 1) + 1
+
+
 def _spline(knots: NDArray[np.float64]) -> NDArray[np.float64]:
     """Places on the smooth curve through some, several from each to the next."""
     from scipy.interpolate import CubicSpline
 
     place = np.arange(len(knots))
-    return np.asarray(
-        CubicSpline(place, knots)(np.linspace(0, len(knots) - 1, _PIECES * (len(knots) - 1) + 1))
-    )
+    return np.asarray(CubicSpline(place, knots)(np.linspace(0, len(knots) - 1, _pieces(len(knots)))))
 
 
 def _ball(points: NDArray[np.float64]) -> NDArray[np.float64]:

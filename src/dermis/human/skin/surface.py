@@ -17,15 +17,15 @@ from dermis.mesh.rig import Stencils
 
 Floats = NDArray[np.float32]
 
-FIELDS = ("lips", "mouth", "lids", "ears")
+FIELDS = ("lips", "mouth", "lids")
 """Distances from borders [mm]: of the lips, positive inside; of the mouth, negative inside; from the edges of
-the lids; of the ears, positive on them."""
+the lids."""
 _UNIT_MM = 0.01
 
 
 @cache
 def average() -> tuple[Floats, Floats]:
-    """(p, 3) the average person's control points, and (p, 4) the fields there, see `FIELDS` [mm]."""
+    """(p, 3) the average person's control points, and (p, 3) the fields there, see `FIELDS` [mm]."""
     file = resources.files("dermis.human").joinpath("data", "average.npz")
     with resources.as_file(file) as path, np.load(path) as found:
         places, fields = (
@@ -43,7 +43,7 @@ _ALONE = Lock()
 class Painting:
     """A human's triangles of skin, as painted_surface.wgsl reads them.
 
-    vertices : (v, 13) uv, place and normal on the average person, fields, and the binary logarithm of the mm
+    vertices : (v, 12) uv, place and normal on the average person, fields, and the binary logarithm of the mm
         in a unit of uv
     triangles : (t, 4) corners, and 1 where one of the sides is a chart's border
     """

@@ -27,12 +27,12 @@ struct Vertex {
     uv: vec2f,
     place: vec3f, // on the average person [mm]
     normal: vec3f,
-    fields: vec4f, // distances [mm], see human/skin/surface.py
+    fields: vec3f, // distances [mm], see human/skin/surface.py
     density: f32, // binary logarithm of the mm in a unit of uv
 }
 
 @group(0) @binding(0) var<uniform> paint: Paint;
-@group(0) @binding(1) var<storage, read> vertices: array<f32>; // thirteen of each
+@group(0) @binding(1) var<storage, read> vertices: array<f32>; // twelve of each
 @group(0) @binding(2) var<storage, read> triangles: array<u32>; // three corners, and 1 at a chart's border
 
 fn triangle_of(index: u32) -> vec4u {
@@ -41,7 +41,7 @@ fn triangle_of(index: u32) -> vec4u {
 }
 
 fn uv_of(index: u32) -> vec2f {
-    return vec2f(vertices[13u * index], vertices[13u * index + 1u]);
+    return vec2f(vertices[12u * index], vertices[12u * index + 1u]);
 }
 
 fn three(at: u32) -> vec3f {
@@ -49,7 +49,6 @@ fn three(at: u32) -> vec3f {
 }
 
 fn vertex_of(index: u32) -> Vertex {
-    let at = 13u * index;
-    let fields = vec4f(three(at + 8u), vertices[at + 11u]);
-    return Vertex(uv_of(index), three(at + 2u), three(at + 5u), fields, vertices[at + 12u]);
+    let at = 12u * index;
+    return Vertex(uv_of(index), three(at + 2u), three(at + 5u), three(at + 8u), vertices[at + 11u]);
 }

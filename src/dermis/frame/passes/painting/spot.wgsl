@@ -56,7 +56,7 @@ struct Spot {
     body: vec3f, // place on the average person [mm]
     left: vec3f, // the same on its left half
     normal: vec3f,
-    fields: vec4f,
+    fields: vec3f,
     texel_mm: f32,
     density: f32,
 }
