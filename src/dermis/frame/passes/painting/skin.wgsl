@@ -132,6 +132,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     keep_moved(id.xy, runs_out, saturate(zone[ZONE_BLOOD]) * (1.0 - lip), lip);
     let bare = (1.0 - lip) * (1.0 - mucosa);
     let pores = saturate(0.45 + zone[ZONE_PORES]) * bare;
-    let furrows = max(1.0 + zone[ZONE_FURROWS], 0.2) * bare * (0.8 + 1.4 * paint.age * paint.age);
+    let furrows = max(1.0 + zone[ZONE_FURROWS], 0.2) * bare * (0.8 + 2.2 * paint.age * paint.age);
     keep(id.xy, rgb, gloss(lip, wet, max(scalp * paint.stubble, beard)), height, vec3f(pores, furrows, spot.density));
 }
