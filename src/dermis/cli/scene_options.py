@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from dermis.cli.eye_options import EYE, EyeLooks, note_eyes
 from dermis.cli.options import check, option_name, options_of, refuse_options
 from dermis.cli.pose_options import (
     LookAt,
@@ -63,6 +64,7 @@ class SceneOptions:
         Parameter(help="portrait, three-quarter, profile, ear, cheek, or a TOML file with [camera]."),
     ] = None
     head: HeadOptions = field(default_factory=dict)
+    eye: EyeLooks = None
     pose: Weights = None
     bone: Turns = None
     look_at: LookAt = None
@@ -76,8 +78,11 @@ def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     from dermis.scene import Scene, load_camera
 
     weights, turns = parse_weights(given.pose or ()), parse_turns(given.bone or ())
+    if given.eye:
+        given = replace(given, head=given.head | {"eye": parse_weights(given.eye, EYE)}, eye=None)
     _check(name, given)
     scene, settings = _begin(name, given)
+    note_eyes(scene.head, given.head.get("eyes"))
     if weights or turns:
         scene = replace(scene, pose=laid_over(pose_given(weights, turns, scene.head, name), scene.pose))
     environment = _environment(scene.environment, given.around)

@@ -96,9 +96,7 @@ def _ball(name: str) -> Index:
 
 def _eyes(look: EyeLook) -> Eyes:
     size = len(globes.globe()[0])
-    apex, back, side = (
-        np.array([count() + mark, count() + size + mark], np.int32) for mark in globe.marks()
-    )
+    apex, back, side = (np.array([count() + mark, count() + size + mark], np.int32) for mark in globe.marks())
     material = np.array([list(MATERIALS).index(name) for name in (LEFT_EYE, RIGHT_EYE)], np.int32)
     return Eyes(apex, back, side, material, look)
 
