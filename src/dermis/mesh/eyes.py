@@ -61,7 +61,9 @@ class Eyes:
         the right of who looks out of it
     material : (k,) index of what its triangles are made of
     look : of both
-    ball_mm : (k,) radius of each ball in mm of a usual eye, whose cornea it has
+    ball_mm, middle_mm : (k,) radius of each ball, and where on the axis its middle lies, in mm of a usual
+        eye, whose cornea it has; 0 for the middle of one of usual size
+    sight : (k, 3) the way each looks in its own space: along the axis, unless lids show it elsewhere
     """
 
     apex: NDArray[np.int32]
@@ -70,11 +72,8 @@ class Eyes:
     material: NDArray[np.int32]
     look: EyeLook
     ball_mm: Doubles = field(default_factory=lambda: np.full(2, SCLERA_MM))
-
-    @property
-    def middle_mm(self) -> Doubles:
-        """(k,) where on each eye's axis the middle of its ball lies: 0 for those of usual size [mm]."""
-        return np.asarray(plane_mm(SCLERA_MM) - plane_mm(self.ball_mm))
+    middle_mm: Doubles = field(default_factory=lambda: np.zeros(2))
+    sight: Doubles = field(default_factory=lambda: np.tile([0.0, 0.0, 1.0], (2, 1)))
 
     def frames(self, rig: Rig, motion: Motion) -> Doubles:
         """(k, 4, 4) from the head's space [mm] to each eye's own: in mm of a usual eye, z along its axis.

@@ -49,13 +49,13 @@ def looking_at(head: Head, place_mm: ArrayLike, pose: Pose | Mapping[str, float]
     bones = {name: value for name, value in base.bones.items() if name not in own}
     frames = eyes.frames(rig, Pose(weights, bones, base.positions_mm).motion(rig))
     resting = eyes.frames(rig, rig.rest)
-    for frame, rest, bone, middle, side in zip(frames, resting, own, eyes.middle_mm, _SIDES, strict=True):
-        seen = (frame @ np.append(place + np.array(head.centre_mm), 1.0))[:3] - [0.0, 0.0, middle]
-        angles = _turning(_unit(rest[:3, :3].T @ seen), _unit(rest[2, :3]))
+    for k, (frame, rest, bone) in enumerate(zip(frames, resting, own, strict=True)):
+        seen = (frame @ np.append(place + np.array(head.centre_mm), 1.0))[:3] - [0.0, 0.0, eyes.middle_mm[k]]
+        angles = _turning(_unit(rest[:3, :3].T @ seen), _unit(rest[:3, :3].T @ eyes.sight[k]))
         turns = [turn for turn in rig.turns if turn.bone == bone]
         if not turns:
             bones[bone] = [*np.clip(np.degrees(angles), -_MOST_DEGREES, _MOST_DEGREES).tolist(), 0.0]
-            turns = _of_lids(rig, side)
+            turns = _of_lids(rig, _SIDES[k])
         weights |= _weights(turns, angles)
     return Pose(weights, bones, base.positions_mm)
 

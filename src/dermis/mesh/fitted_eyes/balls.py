@@ -30,12 +30,14 @@ class Ball:
     """An eyeball of a file.
 
     sphere : that of its white
-    axis : (3,) unit vector along which it looks
+    sight : (3,) unit vector along which it looks
+    cornea : whether a cornea shows that; else it is straight ahead
     points : (n,) the mesh's points that it is made of
     """
 
     sphere: Sphere
-    axis: Doubles
+    sight: Doubles
+    cornea: bool
     points: Index
 
 
@@ -124,8 +126,7 @@ def _looking(mesh: Mesh, left: _Piece, right: _Piece, pieces: list[_Piece]) -> t
         those = [one for one in pieces if one is ball or _far(places[one.points], ball).max() < _BELONGS]
         points = np.concatenate([one.points for one in those])
         area = np.concatenate([one.area for one in those])
-        axis = corneal_axis(places[points], area, ball.sphere, ahead)
-        if axis is None:
-            axis = middle + _MEETING_MM * ahead - ball.sphere.middle
-        found.append(Ball(ball.sphere, axis / np.linalg.norm(axis), points))
+        shown = corneal_axis(places[points], area, ball.sphere, ahead)
+        sight = middle + _MEETING_MM * ahead - ball.sphere.middle if shown is None else shown
+        found.append(Ball(ball.sphere, sight / np.linalg.norm(sight), shown is not None, points))
     return found[0], found[1]

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.mesh import globe
-from dermis.mesh.eyes import LIMBUS_MM, SCLERA_MM, EyeLook, Eyes, plane_mm
+from dermis.mesh.eyes import CORNEA_MM, LIMBUS_MM, SCLERA_MM, EyeLook, Eyes, cornea_centre_mm, plane_mm
 from dermis.mesh.fitted_eyes.balls import Ball, find_balls
+from dermis.mesh.fitted_eyes.lids import axes_along, lids_before
 from dermis.mesh.fitted_eyes.rigging import Globe, with_globes
+from dermis.mesh.fitted_eyes.spheres import Sphere
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material, Mesh
@@ -25,14 +27,20 @@ _SIDE = 2 * globe.SIDE  # as fine as the human's own once it is subdivided
 _NAMES = "left eye", "right eye"
 
 
-class _Size(NamedTuple):
-    """Of a fitted eye: radius of its ball in mm of a usual eye, and how long such a mm is in the head [mm].
+class _Shape(NamedTuple):
+    """Of a fitted eye.
 
     Corneas and irises hardly differ between people: those of larger balls are of usual size, and only smaller
     balls are small in all.
+
+    axis : (3,) unit vector along which its cornea lies
+    ball_mm, middle_mm : see `Eyes`
+    scale : how long a mm of a usual eye is in the head [mm]
     """
 
+    axis: Doubles
     ball_mm: float
+    middle_mm: float
     scale: float
 
 
@@ -49,20 +57,23 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None) -> Head:
     found, why = find_balls(coarse or mesh)
     if found is None:
         return replace(head, note=why)
-    sizes = [_size(ball) for ball in found]
+    those = _of_balls(mesh, control.stencils, found)
+    shapes = _shapes(np.delete(mesh.positions[mesh.triangles], np.concatenate(those), axis=0), found)
     points, quads = globe.globe(_SIDE)
-    places = [_placed(ball, size) for ball, size in zip(found, sizes, strict=True)]
+    places = [_placed(ball.sphere, shape) for ball, shape in zip(found, shapes, strict=True)]
     balls = [Globe(ball.sphere.middle, own, ball.points) for ball, own in zip(found, places, strict=True)]
     corner = mesh.point if control.corner is None else control.corner
     rig = with_globes(replace(control, corner=corner), balls)
     begin, count = len(control.positions_mm), len(points)
     if control.stencils is not None:
         rig = replace(rig, stencils=_with_rows(control.stencils, begin, 2 * count))
-    made = _with_meshes(mesh, _of_balls(mesh, control.stencils, found), places, quads)
+    made = _with_meshes(mesh, those, places, quads)
     apex, back, side = (np.array([begin + k, begin + count + k], np.int32) for k in globe.marks(_SIDE))
     material = np.arange(-2, 0, dtype=np.int32) + len(made.materials)
-    radii = np.array([size.ball_mm for size in sizes])
-    return replace(head, mesh=made, rig=rig, eyes=Eyes(apex, back, side, material, EyeLook(), radii))
+    balls_mm, middles_mm = np.array([(shape.ball_mm, shape.middle_mm) for shape in shapes]).T
+    sight = np.stack([axes_along(shape.axis) @ ball.sight for ball, shape in zip(found, shapes, strict=True)])
+    eyes = Eyes(apex, back, side, material, EyeLook(), balls_mm, middles_mm, sight)
+    return replace(head, mesh=made, rig=rig, eyes=eyes)
 
 
 def _of_balls(mesh: Mesh, stencils: Stencils | None, balls: tuple[Ball, Ball]) -> tuple[Index, Index]:
@@ -74,30 +85,42 @@ def _of_balls(mesh: Mesh, stencils: Stencils | None, balls: tuple[Ball, Ball]) -
     return left, right
 
 
-def _size(ball: Ball) -> _Size:
-    scale = min(1.0, ball.sphere.radius / SCLERA_MM)
-    return _Size(ball.sphere.radius / scale, scale)
+def _shapes(corners_mm: Doubles, balls: tuple[Ball, Ball]) -> list[_Shape]:
+    """The shapes of both eyes; those that no cornea tells of fit the lids before them.
+
+    corners_mm : (f, 3, 3) of all other triangles
+    """
+    lids = [lids_before(corners_mm, ball.sphere, ball.sight) for ball in balls]
+    pitch = float(np.mean([one.pitch for one in lids]))
+    found = []
+    for ball, before in zip(balls, lids, strict=True):
+        scale, sunk, axis = min(1.0, ball.sphere.radius / SCLERA_MM), 0.0, ball.sight
+        if not ball.cornea:
+            axis = np.cos(pitch) * before.axes[2] + np.sin(pitch) * before.axes[1]
+            sunk = before.sunk_mm(axis, scale) / scale
+        radius = ball.sphere.radius / scale
+        found.append(_Shape(axis, radius, float(plane_mm(SCLERA_MM) - plane_mm(radius)) + sunk, scale))
+    return found
 
 
-def _placed(ball: Ball, size: _Size) -> Doubles:
-    """(n, 3) points of an eyeball that looks along the axis of another, around its middle [mm]."""
-    axis = ball.axis
-    across = np.cross((0.0, 1.0, 0.0), axis)
-    across /= np.linalg.norm(across)
-    axes = np.stack([across, np.cross(axis, across), axis])
-    return np.asarray(ball.sphere.middle + size.scale * _of_radius(size.ball_mm) @ axes)
+def _placed(ball: Sphere, shape: _Shape) -> Doubles:
+    """(n, 3) points of an eyeball in the head [mm]."""
+    return np.asarray(ball.middle + shape.scale * _points(shape) @ axes_along(shape.axis))
 
 
-def _of_radius(radius_mm: float) -> Doubles:
+def _points(shape: _Shape) -> Doubles:
     """(n, 3) points of an eyeball around its middle, of any radius, with a usual cornea [mm]."""
     points, _ = globe.globe(_SIDE)
-    angle = np.arccos(np.clip(points[:, 2] / np.linalg.norm(points, axis=1), -1.0, 1.0))
-    turn = np.arctan2(points[:, 1], points[:, 0])
-    edge, own = (float(np.arcsin(LIMBUS_MM / radius)) for radius in (SCLERA_MM, radius_mm))
-    white = own + (angle - edge) * (np.pi - own) / (np.pi - edge)
-    around = [np.cos(turn) * np.sin(white), np.sin(turn) * np.sin(white), np.cos(white)]
-    cornea = points + np.array([0.0, 0.0, plane_mm(radius_mm) - plane_mm(SCLERA_MM)])
-    return np.where((angle < edge)[:, None], cornea, radius_mm * np.stack(around, axis=1))
+    along = points / np.linalg.norm(points, axis=1, keepdims=True)
+    angle, turn = np.arccos(np.clip(along[:, 2], -1.0, 1.0)), np.arctan2(along[:, 1], along[:, 0])
+    centre = cornea_centre_mm() - shape.middle_mm
+    meeting = (shape.ball_mm**2 - CORNEA_MM**2 + centre**2) / (2 * centre)  # along the axis
+    white, edge = float(np.arccos(meeting / shape.ball_mm)), float(np.arcsin(LIMBUS_MM / SCLERA_MM))
+    clear = float(np.arccos((meeting - centre) / CORNEA_MM)) * angle / edge
+    behind = white + (angle - edge) * (np.pi - white) / (np.pi - edge)
+    off = np.where(angle < edge, CORNEA_MM * np.sin(clear), shape.ball_mm * np.sin(behind))
+    far = np.where(angle < edge, centre + CORNEA_MM * np.cos(clear), shape.ball_mm * np.cos(behind))
+    return np.stack([off * np.cos(turn), off * np.sin(turn), far], axis=1)
 
 
 def _with_rows(stencils: Stencils, begin: int, count: int) -> Stencils:
