@@ -25,6 +25,7 @@ Index = NDArray[np.int64]
 
 _SIDE = 2 * globe.SIDE  # as fine as the human's own once it is subdivided
 _NAMES = "left eye", "right eye"
+_INWARDS = np.radians(2.5)  # an iris lies nearer to the nose than the middle of what is seen of the white
 
 
 class _Shape(NamedTuple):
@@ -91,12 +92,13 @@ def _shapes(corners_mm: Doubles, balls: tuple[Ball, Ball]) -> list[_Shape]:
     corners_mm : (f, 3, 3) of all other triangles
     """
     lids = [lids_before(corners_mm, ball.sphere, ball.sight) for ball in balls]
-    pitch = float(np.mean([one.pitch for one in lids]))
+    (left, a), (right, b) = (one.iris for one in lids)
+    outwards, up = (left - right) / 2 - _INWARDS * (left != right), (a + b) / 2
     found = []
-    for ball, before in zip(balls, lids, strict=True):
+    for ball, before, side in zip(balls, lids, (1.0, -1.0), strict=True):
         scale, sunk, axis = min(1.0, ball.sphere.radius / SCLERA_MM), 0.0, ball.sight
         if not ball.cornea:
-            axis = np.cos(pitch) * before.axes[2] + np.sin(pitch) * before.axes[1]
+            axis = before.looking(side * outwards, up)
             sunk = before.sunk_mm(axis, scale) / scale
         radius = ball.sphere.radius / scale
         found.append(_Shape(axis, radius, float(plane_mm(SCLERA_MM) - plane_mm(radius)) + sunk, scale))

@@ -13,11 +13,12 @@ from dermis.mesh.fitted_eyes.spheres import Sphere
 
 Doubles = NDArray[np.float64]
 
-_CELLS, _REACH = 33, 0.66
+_CELLS, _REACH = 49, 0.9
 """Rays along each side of what is looked at, and how many radii it reaches from the axis."""
 _COLUMN = 0.25  # radii beside the axis, where the iris is
 _ABOVE = 0.08  # of the opening's height: an upper lid lies on the iris, a lower one touches it
-_MOST_PITCH = np.radians(15.0)
+_BESIDE = 0.3  # of the rays at an end, beyond which there is no lid
+_MOST = np.radians(15.0)
 _OUT_MM, _LEAST_MM = 0.3, 0.5
 """How far a cornea may stand out of a lid that lies on the ball, and does out of the ball at least."""
 
@@ -45,7 +46,7 @@ class Lids:
     @cached_property
     def front(self) -> Doubles:
         """(n,) how far before the ball's middle each ray meets it [mm]."""
-        return np.asarray(np.sqrt(self.ball.radius**2 - (self.places**2).sum(axis=1)))
+        return np.asarray(np.sqrt(np.maximum(self.ball.radius**2 - (self.places**2).sum(axis=1), 0.0)))
 
     @cached_property
     def height(self) -> Doubles:
@@ -65,14 +66,27 @@ class Lids:
         return np.asarray(met.max(axis=0, initial=-np.inf))
 
     @property
-    def pitch(self) -> float:
-        """By how much an iris is higher than straight ahead that lies in the opening as irises do [rad]."""
-        column = np.abs(self.places[:, 0]) < _COLUMN * self.ball.radius
-        y, seen = self.places[column, 1], (self.height < self.front)[column]
-        if not seen.any() or seen[y == y.min()].any() or seen[y == y.max()].any():
-            return 0.0  # without lids above and below
-        middle = y[seen].mean() + _ABOVE * np.ptp(y[seen])
-        return float(np.clip(np.arcsin(middle / self.ball.radius), -_MOST_PITCH, _MOST_PITCH))
+    def iris(self) -> tuple[float, float]:
+        """Where in the opening an iris lies that looks straight ahead, as angles across and up [rad].
+
+        Zeros without lids on all sides. Lids show best where a file's eyes look: balls and lids of artists
+        are seldom around one centre.
+        """
+        found = []
+        for way, beside, share in ((0, 1, 0.0), (1, 0, _ABOVE)):
+            column = np.abs(self.places[:, beside]) < _COLUMN * self.ball.radius
+            at, seen = self.places[column, way], (self.height < self.front)[column]
+            ends = np.sign(at) * (np.abs(at) > 0.99 * at.max())
+            if not seen.any() or max(seen[ends == end].mean() for end in (-1, 1)) > _BESIDE:
+                return 0.0, 0.0
+            middle = at[seen].mean() + share * np.ptp(at[seen])
+            found.append(float(np.clip(np.arcsin(middle / self.ball.radius), -_MOST, _MOST)))
+        return found[0], found[1]
+
+    def looking(self, across: float, up: float) -> Doubles:
+        """(3,) unit vector by angles across and up [rad]."""
+        own = np.sin(across) * np.cos(up), np.sin(up), np.cos(across) * np.cos(up)
+        return np.asarray(np.array(own) @ self.axes)
 
     def sunk_mm(self, axis: Doubles, scale: float) -> float:
         """How far a cornea along an axis has to lie further in, to stay behind lids on the ball [mm].
