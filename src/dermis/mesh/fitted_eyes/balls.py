@@ -81,9 +81,9 @@ def find_balls(mesh: Mesh) -> tuple[tuple[Ball, Ball] | None, str]:
     if len(chosen) == 2:
         left, right = sorted(chosen, key=lambda piece: -float(piece.sphere.middle[0]))
         return _looking(mesh, left, right, pieces), ""
-    names = ", ".join(repr(one.name) for one in mesh.materials if one.eye)
-    why = f"the largest piece {pieces[0].fault}" if not chosen else f"{len(chosen)} balls, where two are eyes"
-    return None, f"eyes: {names} stays plain: {why}"
+    names = ", ".join(sorted({repr(one.name) for one in mesh.materials if one.eye}))
+    count = f"{len(chosen)} ball{'s' * (len(chosen) > 1)}, where two are eyes"
+    return None, f"eyes: {names} stay plain: {count if chosen else f'the largest piece {pieces[0].fault}'}"
 
 
 def _pieces(mesh: Mesh, called: Index) -> list[_Piece]:
