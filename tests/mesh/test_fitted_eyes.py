@@ -49,18 +49,17 @@ def degrees_between(a: Floats, b: Floats) -> float:
     return float(np.degrees(np.arccos(np.clip(a @ b / np.linalg.norm(a) / np.linalg.norm(b), -1, 1))))
 
 
-@pytest.mark.parametrize(
-    "name",
-    "eye eyes Eye_L eye.R EyeLeft lefteye eyeball Sclera iris Std_Cornea_L Wolf3D_Eye high-poly:eyes".split(),
-)
+EYES = "eye eyes Eye_L eye.R EyeLeft lefteye eyeball Sclera iris Std_Cornea_L Wolf3D_Eye high-poly:eyes"
+NEAR = "skin eyelash Eyelashes eye_brow eyelids CC_Base_EyeOcclusion TearLine eyewear parisian"
+
+
+@pytest.mark.parametrize("name", EYES.split())
 def test_names_of_eyes(name: str) -> None:
     assert names_eye((name,))
     assert names_eye(("white", name)) and not names_eye(("skin", name))
 
 
-@pytest.mark.parametrize(
-    "name", "skin eyelash Eyelashes eye_brow eyelids CC_Base_EyeOcclusion TearLine eyewear parisian".split()
-)
+@pytest.mark.parametrize("name", NEAR.split())
 def test_names_of_what_is_near_eyes(name: str) -> None:
     assert not names_eye((name,))
 

@@ -22,7 +22,7 @@ from dermis.cli.pose_options import (
 )
 from dermis.errors import refuse
 from dermis.scene.environment import Environment
-from dermis.scene.head_table import HeadTable
+from dermis.scene.head_table import EyeTable, HeadTable
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 
@@ -104,6 +104,8 @@ def _check(name: str, given: SceneOptions) -> None:
     from dermis.environment.panorama import panorama_file
     from dermis.optics.profiles import load_profile
 
+    looks = given.head.get("eye", {})
+    check(EyeTable, looks, {field_: f"eye {field_}" for field_ in looks})
     check(HeadTable, {"name": name} | given.head, HEAD)
     check(Skin, given.skin)
     check(Settings, given.settings)
