@@ -12,6 +12,7 @@ from dermis.mesh.eyes import CORNEA_MM, plane_mm
 from dermis.mesh.fitted_eyes.spheres import Sphere
 
 Doubles = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 _CELLS, _REACH = 49, 0.9
 """Rays along each side of what is looked at, and how many radii it reaches from the axis."""
@@ -51,19 +52,32 @@ class Lids:
     @cached_property
     def height(self) -> Doubles:
         """(n,) how far before the ball's middle each ray meets anything else first, -inf for never [mm]."""
-        low, high = self.corners[:, :, :2].min(axis=1), self.corners[:, :, :2].max(axis=1)
-        reach = _REACH * self.ball.radius
-        near = ((high > -reach) & (low < reach)).all(axis=1) & (self.corners[:, :, 2].max(axis=1) > 0)
-        a, b, c = np.moveaxis(self.corners[near], 1, 0)
-        b, c = b - a, c - a
+        corners = self.corners[self.corners[:, :, 2].max(axis=1) > 0]
+        triangle, ray = self._meetings(corners)
+        a, b, c = np.moveaxis(corners[triangle], 1, 0)
+        b, c, p = b - a, c - a, self.places[ray] - a[:, :2]
         area = b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0]
         area = np.where(np.abs(area) < 1e-9, np.inf, area)
-        x, y = (self.places[None, :, k] - a[:, None, k] for k in (0, 1))
-        u = (x * c[:, None, 1] - y * c[:, None, 0]) / area[:, None]
-        v = (b[:, None, 0] * y - b[:, None, 1] * x) / area[:, None]
-        far = a[:, None, 2] + u * b[:, None, 2] + v * c[:, None, 2]
-        met = np.where((u >= 0) & (v >= 0) & (u + v <= 1), far, -np.inf)
-        return np.asarray(met.max(axis=0, initial=-np.inf))
+        u = (p[:, 0] * c[:, 1] - p[:, 1] * c[:, 0]) / area
+        v = (b[:, 0] * p[:, 1] - b[:, 1] * p[:, 0]) / area
+        far = a[:, 2] + u * b[:, 2] + v * c[:, 2]
+        met = np.full(_CELLS**2, -np.inf)
+        inside = (u >= 0) & (v >= 0) & (u + v <= 1)
+        np.maximum.at(met, ray[inside], far[inside])
+        return met
+
+    def _meetings(self, corners: Doubles) -> tuple[Index, Index]:
+        """Triangles and rays, pair by pair, of which the rays lie within the triangles' bounds."""
+        reach = _REACH * self.ball.radius
+        cell = (corners[:, :, :2] + reach) * (_CELLS - 1) / (2 * reach)
+        first = np.maximum(np.ceil(cell.min(axis=1)), 0).astype(np.int64)
+        last = np.minimum(np.floor(cell.max(axis=1)), _CELLS - 1).astype(np.int64)
+        size = np.maximum(last - first + 1, 0)
+        count = size.prod(axis=1)
+        triangle = np.repeat(np.arange(len(corners)), count)
+        own = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
+        row, column = np.divmod(own, size[triangle, 0])
+        return triangle, (first[triangle, 1] + row) * _CELLS + first[triangle, 0] + column
 
     @property
     def iris(self) -> tuple[float, float]:
