@@ -165,7 +165,8 @@ def _made_of(take: _Take, given: SceneOptions, *files: str) -> str:
     scene = take.scene
     named = [*files, scene.head.name, *map(str, given.head.values()), take.clip.name]
     seen = (scene.lights, scene.camera, scene.skin, scene.environment, take.settings, take.rate)
-    parts = [*map(_as_it_is, named), repr(given.head), repr(given.pose), repr(given.bone), repr(seen)]
+    typed = given.head, given.eye, given.pose, given.bone, given.look_at
+    parts = [*map(_as_it_is, named), *map(repr, typed), repr(seen)]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 

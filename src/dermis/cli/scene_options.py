@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from dermis.cli.eye_options import EYE, EyeLooks, note_eyes
 from dermis.cli.options import check, option_name, options_of, refuse_options
 from dermis.cli.pose_options import (
     LookAt,
@@ -21,7 +22,7 @@ from dermis.cli.pose_options import (
 )
 from dermis.errors import refuse
 from dermis.scene.environment import Environment
-from dermis.scene.head_table import NO_REGIONS, HeadTable, names_regions
+from dermis.scene.head_table import NO_REGIONS, EyeTable, HeadTable, names_regions
 from dermis.scene.settings import Settings
 from dermis.scene.skin import PRESETS, Skin
 
@@ -72,6 +73,7 @@ class SceneOptions:
         Parameter(help="portrait, three-quarter, profile, ear, cheek, or a TOML file with [camera]."),
     ] = None
     head: HeadOptions = field(default_factory=dict)
+    eye: EyeLooks = None
     pose: Weights = None
     bone: Turns = None
     look_at: LookAt = None
@@ -85,8 +87,11 @@ def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     from dermis.scene import Scene, load_camera
 
     weights, turns = parse_weights(given.pose or ()), parse_turns(given.bone or ())
+    if given.eye:
+        given = replace(given, head=given.head | {"eye": parse_weights(given.eye, EYE)}, eye=None)
     _check(name, given)
     scene, settings = _begin(name, given)
+    note_eyes(scene.head, given.head.get("eyes"))
     if weights or turns:
         scene = replace(scene, pose=laid_over(pose_given(weights, turns, scene.head, name), scene.pose))
     environment = _environment(scene.environment, given.around)
@@ -108,6 +113,8 @@ def _check(name: str, given: SceneOptions) -> None:
     from dermis.environment.panorama import panorama_file
     from dermis.optics.profiles import load_profile
 
+    looks = given.head.get("eye", {})
+    check(EyeTable, looks, {field_: f"eye {field_}" for field_ in looks})
     check(HeadTable, {"name": name} | given.head, HEAD)
     check(Skin, given.skin)
     check(Settings, given.settings)

@@ -198,6 +198,7 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Sp
             record["eyes"][name] = getattr(head.eyes.look, name)
         record["eyes"]["seed"] = head.eyes.look.seed % _EYE_SEEDS
         record["eyes"]["material"] = head.eyes.material
+        record["eyes"]["middle_mm"] = head.eyes.middle_mm
     return record
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from dermis.errors import refuse
 from dermis.human.regions.usual import with_usual_regions
 from dermis.mesh.check import check_head_height
+from dermis.mesh.eyes import EyeLook
+from dermis.mesh.fitted_eyes.fit import with_fitted_eyes
 from dermis.mesh.formats import is_gltf
 from dermis.mesh.gltf.pictures import embedded_maps
 from dermis.mesh.head import Head
@@ -19,7 +21,7 @@ from dermis.mesh.load import load_rigged
 from dermis.mesh.maps import load_maps
 from dermis.mesh.samples import SAMPLES, Sample, fetch
 from dermis.mesh.subdivide import subdivide_head
-from dermis.scene.head_table import AUTO, NormalY, Up, VOrigin
+from dermis.scene.head_table import AUTO, Eyes, NormalY, Up, VOrigin
 
 if TYPE_CHECKING:
     from dermis.human.person import Human
@@ -44,6 +46,9 @@ def load_head(
     up: Up = "y",
     normal_y: NormalY = "up",
     opaque: Sequence[str] = (),
+    eyes: Eyes = "fitted",
+    eye_groups: Sequence[str] = (),
+    eye: Mapping[str, float] | None = None,
     subdivide: int = 0,
     regions: Literal["auto", "none"] = "auto",
 ) -> Head:
@@ -61,6 +66,10 @@ def load_head(
     up : the file's upward axis
     normal_y : way in which green points in the normal map: "up" (OpenGL) or "down" (DirectX)
     opaque : groups of the file that are not skin, whatever they are called
+    eyes : "fitted" puts the package's own eyes where a file has two balls called so, see `with_fitted_eyes`;
+        "plain" keeps the file's
+    eye_groups : groups of the file that hold eyeballs, whatever they are called, be it with all of the head
+    eye : what the eyes look like where it is not as usual: fields of `EyeLook`
     subdivide : levels of subdivision, 0 to 3: Catmull-Clark for a file of quads, else Loop; the human has one
         at least
     regions : "auto" for gloss by region of the face where the package knows the head and no map says the
@@ -71,9 +80,10 @@ def load_head(
     name, path = str(head), Path(head)
     own = {"colour": colour, "normal": normal, "height": height}
     own |= {"specular": specular, "roughness": roughness}
+    told: dict[str, Any] = {"unit_mm": unit_mm, "v_origin": v_origin, "up": up, "opaque": tuple(opaque)}
+    told["eye_groups"] = tuple(eye_groups)
     if name == HUMAN or name.startswith(f"{HUMAN}:") or path.suffix.lower() == ".json":
-        told = {"unit_mm": unit_mm, "v_origin": v_origin, "up": up, "opaque": opaque}
-        return _human(name, own, height_mm, normal_y, told, subdivide)
+        return _with_look(_human(name, own, height_mm, normal_y, told | {"eyes": eyes}, subdivide), eye)
     if name in REPLACED and not path.is_file():
         came = f"this mannequin was replaced by the parametric human, {HUMAN!r}"
         refuse(name, f"one of {', '.join(_head_names())} or a mesh file", came, f"Write {HUMAN} instead")
@@ -82,8 +92,8 @@ def load_head(
         _check_kind(sample)
         files = fetch(name)
         path = files["mesh"]
-        unit_mm = sample.unit_mm if unit_mm is None else unit_mm
-        v_origin = sample.v_origin or v_origin if v_origin == "auto" else v_origin
+        told["unit_mm"] = sample.unit_mm if unit_mm is None else unit_mm
+        told["v_origin"] = sample.v_origin or v_origin if v_origin == "auto" else v_origin
         height_mm = sample.height_mm if height_mm is None else height_mm
     elif not path.is_file():
         known = ", ".join(_head_names())
@@ -93,19 +103,47 @@ def load_head(
     chosen = _chosen(own, files)
     if height is None and height_mm is None:
         height_mm = files.get("height_mm")
-    if height_mm is not None and chosen["height"] is None:
-        came = f"{height_mm} came without a height map"
-        refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
+    _check_relief(height_mm, chosen["height"])
     with ThreadPoolExecutor(1) as beside:
         reading = beside.submit(load_maps, **chosen, height_mm=height_mm, normal_y=normal_y)
-        rigged = load_rigged(path, unit_mm=unit_mm, v_origin=v_origin, up=up, opaque=tuple(opaque))
-        check_head_height(rigged.mesh, name, unit_mm)
+        rigged = load_rigged(path, **told)
+        check_head_height(rigged.mesh, name, told["unit_mm"])
         maps = reading.result()
     thanks = f"{sample.attribution}, {sample.licence}" if sample else ""
-    made = subdivide_head(Head(name, rigged.mesh, maps, thanks, rigged.rig), subdivide)
-    if subdivide and made.rig is not None:  # sequences of files have places for the file's own vertices
-        made = replace(made, rig=replace(made.rig, corner=rigged.mesh.point))
-    return with_usual_regions(made) if regions == AUTO else made
+    made = _subdivided(Head(name, rigged.mesh, maps, thanks, rigged.rig), subdivide)
+    made = with_usual_regions(made) if regions == AUTO else made
+    return _with_look(with_fitted_eyes(made, rigged.mesh) if eyes == "fitted" else made, eye)
+
+
+def _check_relief(height_mm: float | None, height: MapFile) -> None:
+    if height_mm is not None and height is None:
+        came = f"{height_mm} came without a height map"
+        refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
+
+
+def _subdivided(head: Head, levels: int) -> Head:
+    """The head on a finer mesh; sequences of files have places for the file's own vertices."""
+    made = subdivide_head(head, levels)
+    if levels and made.rig is not None:
+        return replace(made, rig=replace(made.rig, corner=head.mesh.point))
+    return made
+
+
+def _with_look(head: Head, look: Mapping[str, float] | None) -> Head:
+    """The head with eyes that look as told.
+
+    Raises DermisError where it has none of true shape, and for looks that no eyes have.
+    """
+    if not look:
+        return head
+    known = [one.name for one in fields(EyeLook)]
+    for name in look.keys() - set(known):
+        refuse("eye", f"one of {', '.join(known)}", f"{name!r} came", "Correct its name")
+    if head.eyes is None:
+        came = head.note or "nothing in its file is called eyes"
+        remedy = "Name the groups that hold eyeballs (eye_groups)"
+        refuse("eye", "a head with the package's eyes", f"{head.name} has none: {came}", remedy)
+    return replace(head, eyes=head.eyes.with_look(replace(head.eyes.look, **dict[str, Any](look))))
 
 
 def _check_kind(sample: Sample) -> None:
@@ -127,12 +165,11 @@ def _human(
     name : "human", or with a seed: "human:7", or a file of numbers
     told : what is told of files alone
     """
-    for option, usual in (("unit_mm", None), ("v_origin", "auto"), ("up", "y"), ("opaque", ())):
-        if told[option] not in (usual, list(usual or ())):
+    usual = {"unit_mm": None, "v_origin": "auto", "up": "y", "opaque": (), "eye_groups": (), "eyes": "fitted"}
+    for option, value in told.items():
+        if value != usual[option]:
             refuse(option, "a file that it tells of", f"it came with {HUMAN!r}", "Leave it out")
-    if height_mm is not None and maps["height"] is None:
-        came = f"{height_mm} came without a height map"
-        refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
+    _check_relief(height_mm, maps["height"])
     given: dict[str, Any] = {role: file for role, file in maps.items() if file is not None}
     loaded = load_maps(**given, height_mm=height_mm, normal_y=normal_y) if given else None
     made = _person(name).head(subdivide=subdivide or 1)
