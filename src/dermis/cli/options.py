@@ -28,6 +28,12 @@ def _colour(_: type, tokens: Sequence[Token]) -> tuple[float, float, float]:
     return parse_colour(tokens[0].value, str(tokens[0].keyword))
 
 
+def _worded(_: type, tokens: Sequence[Token]) -> Any:
+    """A word or a number, which the model tells apart, or a colour."""
+    text = tokens[0].value
+    return parse_colour(text, str(tokens[0].keyword)) if "," in text else text
+
+
 Json = Annotated[
     bool, Parameter(name="--json", negative="", show_default=False, help="Print one JSON object.")
 ]
@@ -83,10 +89,13 @@ def is_option(model: type[Plain], field: str) -> bool:
 
 def _kind(model: type[Plain], field: str) -> tuple[Any, dict[str, Any]]:
     """What cyclopts takes a field's words for, and how it makes the value of them; None for no option."""
-    from dermis.scene.plain import choices_of
+    from dermis.scene.plain import choices_of, words_of
 
     if choices := choices_of(model, field):
         return Literal[choices], {}
+    if words := words_of(model, field):
+        numbers = "NUMBER" if model.model_fields[field].annotation is float else "R,G,B|#RRGGBB"
+        return str, {"negative": "", "converter": _worded, "metavar": "|".join((*words, numbers))}
     kind = model.model_fields[field].annotation
     kind = next((one for one in get_args(kind) if get_args(kind)[-1] is NoneType), kind)
     parts = tuple(get_args(part)[0] if get_args(part) else part for part in get_args(kind))
