@@ -43,7 +43,7 @@ def test_an_environment_lights_alone_unless_lights_are_named(render: Run) -> Non
 
 def test_the_environment_is_shown_when_asked(render: Run, sky: str) -> None:
     words = ("--env", sky, "--occlusion", "none", "--samples", "1")
-    plain, shown = picture(render, *words), picture(render, *words, "--env-visible")
+    plain, shown = picture(render, *words), picture(render, *words, "--background", "environment")
     behind = plain.max(axis=-1) == 0
     assert behind.any() and (shown[behind] > 0.1).all()
     assert np.array_equal(shown[~behind], plain[~behind])
@@ -102,7 +102,7 @@ def test_bloom_and_tone_reach_the_picture(render: Run) -> None:
         ("--env lee_perry_smith", "lee_perry_smith", "a head"),
         ("--env head.obj", "head.obj", "none"),
         ("--env-rotation 30", "--env-rotation", "there is none"),
-        ("--env-visible", "--env-visible", "there is none"),
+        ("--background environment", "background environment", "there is none"),
         ("--env uniform --env-rotation nan", "--env-rotation", "nan"),
         ("--env uniform --env-exposure -1", "--env-exposure", "-1.0 came"),
         ("--lights none", "--lights", "'none' has none"),

@@ -75,7 +75,10 @@ def test_every_rig_loads_and_says_what_it_is(name: str) -> None:
 
 
 def test_rigs_are_those_asked_for() -> None:
-    assert light_presets() == ["laser", "none", "rembrandt", "rim", "studio", "top", "window"]
+    assert light_presets() == [
+        "backlit",
+        *("laser", "none", "rembrandt", "rim", "studio", "top", "window"),
+    ]
     assert load_lights("studio") == studio()
     assert isinstance(load_lights("laser")[0], StripeLight)
     top, rim = load_lights("top")[0], load_lights("rim")[0]

@@ -181,16 +181,9 @@ def _made_of(take: _Take, given: SceneOptions, *files: str) -> str:
     """
     scene = take.scene
     named = [*files, scene.head.name, *map(str, given.head.values()), take.clip.name]
-    seen = (scene.lights, scene.camera, scene.skin, scene.environment, take.settings, take.rate)
-    metered_at = take.first if take.settings.exposure == "auto" else ""
-    parts = [
-        *map(_as_it_is, named),
-        repr(given.head),
-        repr(given.pose),
-        repr(given.bone),
-        repr(seen),
-        str(metered_at),
-    ]
+    metered_at = take.first if take.settings.exposure == "auto" else None
+    seen = scene.lights, scene.camera, scene.skin, scene.environment, take.settings, take.rate, metered_at
+    parts = [*map(_as_it_is, named), repr(given.head), repr(given.pose), repr(given.bone), repr(seen)]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
