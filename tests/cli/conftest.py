@@ -46,9 +46,9 @@ def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> R
 
 @pytest.fixture(autouse=True)
 def plainly_exposed(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures are radiance over nothing, which tests can reckon with; marked `photographed` they are not."""
+    """Pictures are radiance over black, which tests can reckon with; marked `photographed` they are not."""
     if not request.node.get_closest_marker("photographed"):
-        monkeypatch.setattr("dermis.cli.scene_options.PHOTOGRAPHED", {})
+        monkeypatch.setattr("dermis.cli.scene_options.PHOTOGRAPHED", {"background": (0.0, 0.0, 0.0)})
 
 
 @pytest.fixture

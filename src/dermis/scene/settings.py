@@ -20,11 +20,15 @@ _HEX = re.compile(r"#[0-9a-fA-F]{6}")
 
 
 def _decoded(value: Any) -> Any:
-    """#rrggbb as linear Rec. 709."""
+    """#rrggbb and "red,green,blue" as linear Rec. 709."""
     if not isinstance(value, str):
         return value
     if not _HEX.fullmatch(value):
-        raise ValueError("a colour: three linear numbers, or #rrggbb")
+        try:
+            red, green, blue = map(float, value.split(","))
+        except ValueError:
+            raise ValueError("a colour: three linear numbers, or #rrggbb") from None
+        return red, green, blue
     import numpy as np
 
     from dermis.images.colour import decode_srgb_levels
