@@ -75,13 +75,10 @@ def _draw_field(session: Session, values: Plain, name: str, apply: Apply, style:
         return apply(**{name: found})
 
     if words := words_of(kind, name):
-        chosen = value if isinstance(value, str) else _OWN
-        own = style.own
-
-        def choose(word: str) -> ViewerState:
-            return put(own(session) if own and word == _OWN else word)
-
-        combo(session, f"{label} from", chosen, (*words, _OWN) if own else words, choose)
+        _draw_words(session, label, value, words, put, style)
+        explain(help_of(kind, name))
+        if isinstance(value, str):
+            return
     if isinstance(value, bool):
         hold(session, label, imgui.checkbox(label, value), put)
     elif style.options:
@@ -102,6 +99,19 @@ def _draw_field(session: Session, values: Plain, name: str, apply: Apply, style:
     else:
         return
     explain(help_of(kind, name))
+
+
+def _draw_words(
+    session: Session, label: str, value: Any, words: tuple[str, ...], put: Put, style: Style
+) -> None:
+    """A list of the words that a number or a colour may be instead."""
+    own = style.own
+
+    def choose(word: str) -> ViewerState:
+        return put(own(session) if own and word == _OWN else word)
+
+    chosen = value if isinstance(value, str) else _OWN
+    combo(session, f"{label} from", chosen, (*words, _OWN) if own else words, choose)
 
 
 def _label_of(name: str) -> str:
