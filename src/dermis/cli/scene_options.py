@@ -23,7 +23,7 @@ from dermis.cli.pose_options import (
 from dermis.errors import refuse
 from dermis.scene.environment import Environment
 from dermis.scene.head_table import NO_REGIONS, EyeTable, HeadTable, names_regions
-from dermis.scene.settings import Settings
+from dermis.scene.settings import PHOTOGRAPHED, Settings
 from dermis.scene.skin import PRESETS, Skin
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ AROUND |= {"name": "env", "rotation_degrees": "env_rotation"}
 
 if not TYPE_CHECKING:
     HeadOptions = options_of(HeadTable, without=("name",), names=HEAD)
-    SkinOptions, SettingsOptions = options_of(Skin), options_of(Settings)
+    SkinOptions, SettingsOptions = options_of(Skin), options_of(Settings, defaults=PHOTOGRAPHED)
     EnvironmentOptions = options_of(Environment, names=AROUND)
 
 
@@ -63,8 +63,8 @@ class SceneOptions:
     lights: Annotated[
         str | None,
         Parameter(
-            help="A rig (studio, window, top, rim, rembrandt, laser, none) or a TOML file with [[lights]]; "
-            "studio unless --env is given."
+            help="A rig (studio, window, top, rim, backlit, rembrandt, laser, none) or a TOML file with "
+            "[[lights]]; studio unless --env is given."
         ),
     ] = None
     around: EnvironmentOptions = field(default_factory=dict)
@@ -83,7 +83,10 @@ DEFAULTS = SceneOptions()
 
 
 def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
-    """The scene and its settings: those of a head or of a scene's file, with the options given on top."""
+    """The scene and its settings: those of a head or of a scene's file, with the options given on top.
+
+    What neither says is as in `PHOTOGRAPHED`.
+    """
     from dermis.scene import Scene, load_camera
 
     weights, turns = parse_weights(given.pose or ()), parse_turns(given.bone or ())
@@ -105,7 +108,7 @@ def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     )
     if given.look_at is not None:
         made = replace(made, pose=gaze_given(given.look_at, made))
-    return made, Settings(**(settings.model_dump() | given.settings))
+    return made, Settings(**{**PHOTOGRAPHED, **settings.model_dump(exclude_unset=True), **given.settings})
 
 
 def _check(name: str, given: SceneOptions) -> None:

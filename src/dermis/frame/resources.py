@@ -20,9 +20,10 @@ from dermis.frame.inputs import Resources, view_record
 from dermis.frame.levels import Blur, Levels
 from dermis.frame.limits import check_limits
 from dermis.frame.maps import fine_detail, upload_maps
-from dermis.frame.passes import bloom, post, shade, shadows, surface_texels, visibility_buffer
+from dermis.frame.passes import shade, shadows, surface_texels, visibility_buffer
 from dermis.frame.passes.moving_occlusion import Sky, make_map, make_sky
 from dermis.frame.passes.shape import still_shape
+from dermis.frame.picture_resources import picture_resources
 from dermis.frame.resting import resting
 from dermis.frame.shape import Shape, ShapeTables, make_shape, shape_tables
 from dermis.frame.strands import (
@@ -85,9 +86,8 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         sky=_sky(memo, device, asked, layouts[0], tables) if asked.occlusion_moves else None,
         gaussians=len(asked.profile.variance_mm2),
         strands=strands,
-        picture=keep(post.make_picture, device, settings.size),
-        glow=keep(bloom.make_glow, device, settings.size) if settings.bloom else None,
         unscattered=keep(atlases[0][0].unscattered, asked.head.mesh),
+        **picture_resources(memo, device, asked),
     )
 
 
