@@ -116,14 +116,20 @@ def _surface(device: Device, painting: Painting, look: SkinLook, side: int) -> R
 
 
 def _tables(device: Device, look: SkinLook) -> Resources:
-    folds = face.folds()
-    tables = [textures.noise_table(), textures.dot_table(), face.zones(), folds.curves, folds.knots]
-    tables += [folds.first.astype(np.float32), face.hairline()]
-    data = np.concatenate([table.ravel() for table in tables])
-    padded = np.pad(data, (0, -len(data) % _TEXEL))
     colours = colour_tables(look)
     nodes = colours.shape[1]
     texture = make_texture(device, (nodes, nodes), "rgba32float", layers=len(colours), use="map")
     for layer, table in enumerate(colours):
         upload(device, texture, np.dstack([table, np.ones((nodes, nodes, 1), np.float32)]), layer=layer)
-    return {"tables": device.buffer(padded, "STORAGE"), "colour_tables": texture}
+    kind = struct_dtype(program(device, "painting/skin.wgsl").source.text, "Tables")
+    return {"tables": np.ndarray((), kind, _face()), "colour_tables": texture}
+
+
+def _face() -> bytes:
+    """Noises, dots, zones, folds and the edge of the hair, as spot.wgsl reads them."""
+    folds, edge = face.folds(), face.hairline()
+    ends = np.column_stack([folds.first[:-1], folds.first[1:] - 1]).astype(np.float32)
+    curves = np.pad(np.hstack([folds.curves, ends]), ((0, 0), (0, _TEXEL - 2)))
+    hairline = np.pad(np.column_stack([edge, np.append(edge[1:], edge[-1])]), ((0, 0), (0, _TEXEL - 2)))
+    tables = textures.noise_table(), textures.dot_table(), face.zones(), curves, folds.knots, hairline
+    return b"".join(table.tobytes() for table in tables)
