@@ -41,7 +41,8 @@ def places_mm(weights: Mapping[str, float]) -> Points:
     Raises DermisError for targets that nobody knows.
     """
     found, moved = data(), moves()
-    points, deltas = [np.arange(len(found["positions_mm"]))], [found["positions_mm"].astype(np.float64)]
+    points = [np.arange(len(found["positions_mm"]))]
+    deltas: list[NDArray[np.floating]] = [found["positions_mm"].astype(np.float64)]
     known = {name: index for index, name in enumerate(moved.names)}
     for name, weight in weights.items():
         if name not in known:
