@@ -61,15 +61,14 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     strands = _strands(memo, device, asked)
     shared = _shared(memo, device, asked, shadow_maps, curvature, strands)
     atlases = [_atlas(memo, device, asked, name, k) for k, name in enumerate(asked.atlases.layouts)]
-    uploaded: dict[str, Any] = memo.wait(maps)
-    shared |= uploaded | keep(fine_detail, device, asked.finely_painted)
+    shared |= memo.wait(maps) | keep(fine_detail, device, asked.finely_painted)
     layouts = [_layout(memo, device, asked, one, shape, person, shared, k) for k, one in enumerate(atlases)]
     blurs = tuple(_blur(asked, textures) for _, textures in atlases) if asked.count else ()
     own, view = _shading(memo, device, asked)
     return Resources(
         shape=shape,
         person=person,
-        face=uploaded.get("face"),
+        face=shared.get("face"),
         head=layouts[0].head,
         layouts=tuple(layouts),
         shadow_maps=shadow_maps,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.hankel import STILL
 from dermis.optics.diffusion.models import transform
 from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium
-from dermis.optics.pigments.skin import SkinParameters, spectral_medium
+from dermis.optics.pigments.skin import SkinParameters, mixed_layers
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
 _NODES = 65
@@ -54,8 +53,7 @@ def _split(share: Floats, nodes: int) -> tuple[NDArray[np.int64], Floats]:
 
 def colour_table(parameters: SkinParameters) -> ColourTable:
     """The colours of all skins like this one, by layered diffusion; its own melanin and blood are ignored."""
-    epidermis, dermis = _layers(replace(parameters, epidermis_mm=SkinParameters().epidermis_mm))
-    epidermis = replace(epidermis, thickness_mm=parameters.epidermis_mm)
+    epidermis, dermis = mixed_layers(parameters, np.linspace(0.0, 1.0, _NODES) ** 2)
     bloods = np.arange(_NODES)
     spectra = []
     for melanins in np.array_split(np.arange(_NODES), _PARTS):
@@ -66,21 +64,6 @@ def colour_table(parameters: SkinParameters) -> ColourTable:
     entering = 1.0 - normal_reflectance(SKIN_ETA)
     colours = entering * np.concatenate(spectra) @ rgb_weights(WAVELENGTHS_NM).T
     return ColourTable(np.maximum(colours, 0.0).reshape(_NODES, _NODES, 3))
-
-
-@lru_cache(maxsize=4)
-def _layers(parameters: SkinParameters) -> tuple[Layer, Layer]:
-    """Epidermis and dermis of all shares of melanin and of blood, (n, wavelengths); their thickness aside."""
-    shares = np.linspace(0.0, 1.0, _NODES) ** 2
-    media = [spectral_medium("dj2006", replace(parameters, melanin=share, blood=share)) for share in shares]
-    epidermis, dermis = (_stacked([medium.layers[k] for medium in media]) for k in (0, 1))
-    return epidermis, dermis
-
-
-def _stacked(layers: list[Layer]) -> Layer:
-    """Layers of one thickness as one, with coefficients (k, c)."""
-    sigma_a, sigma_s_prime = (np.array([getattr(layer, name) for layer in layers]) for name in _COEFFICIENTS)
-    return replace(layers[0], sigma_a=sigma_a, sigma_s_prime=sigma_s_prime)
 
 
 def _picked(layer: Layer, rows: NDArray[np.int64]) -> Layer:

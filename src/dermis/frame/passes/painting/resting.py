@@ -14,6 +14,7 @@ from dermis.gpu import Device, Frame, make_texture, upload
 from dermis.gpu.textures import download
 
 _FOLDER = "painted"
+_WORD = 4  # bytes
 _MAPS = ("colour", "specular", "roughness")
 
 
@@ -57,10 +58,10 @@ def painted(device: Device, given: Given, side: int) -> Resting:
         "paint": given.paint,
         "vertices": device.buffer(surface.vertices, "STORAGE"),
         "triangles": device.buffer(surface.triangles, "STORAGE"),
-        "owners": device.buffer(np.zeros(side * side, np.uint32), "STORAGE"),
+        "owners": device.space(_WORD * side * side),
     }
     maps = {name: map_mips.empty(device, (side, side)) for name in _MAPS}
-    heights = device.buffer(np.zeros((side + 2) ** 2, np.float32), "STORAGE")
+    heights = device.space(_WORD * (side + 2) ** 2)
     moved = make_texture(device, (side, side), HALVES, layers=2)
     into = {name: one.levels[0] for name, one in maps.items()} | {"heights": heights, "moved": moved}
     tables = {"tables": given.tables, "colour_tables": _colours(device, given)}
