@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import time
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -58,19 +62,34 @@ def render(
     from dermis.images.io import check_output
 
     check_output(output)
-    with working_on("loading"):
-        described, settings = assemble(head, scene)
-    return _draw_and_report(described, settings, output, adapter, as_json, started)
+    from dermis.frame.renderer import Renderer
+
+    with _uncollected(), ThreadPoolExecutor(1) as beside:
+        opening = beside.submit(Renderer, adapter)  # its driver starts and compiles while the head loads
+        with working_on("loading"):
+            described, settings = assemble(head, scene)
+        return _draw_and_report(described, settings, output, opening, as_json, started)
+
+
+@contextlib.contextmanager
+def _uncollected() -> Iterator[None]:
+    """No search for garbage: one picture leaves little, and a search looks through all libraries."""
+    was = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was:
+            gc.enable()
 
 
 def _draw_and_report(
-    scene: Any, settings: Any, output: Path, adapter: str, as_json: bool, started: float
+    scene: Any, settings: Any, output: Path, opening: Future[Any], as_json: bool, started: float
 ) -> int:
-    from dermis.frame.renderer import Renderer
     from dermis.images.io import write_image, write_png
 
     with working_on("rendering"):
-        renderer = Renderer(adapter)
+        renderer = opening.result()
         rendered = renderer.draw(scene, settings)
         setup_ms = rendered.setup_ms
         if as_json:  # the first frame fills caches; a warm one is timed
