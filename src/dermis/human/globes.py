@@ -7,15 +7,14 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.mesh.eyes import profile_mm
+from dermis.human.lids import FORWARD_MM, Socket
+from dermis.mesh.eyeball import profile_mm
 
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 SIDE = 10
 """Quads along each edge of the cube that a ball is made from; an even number, for a point on the axis."""
-_BALL_MM = 15.4
-"""Mean radius of the published ball, which lids lie on, where the eye is of usual size [mm]."""
 _RIM = 0.49  # of the layout, around its middle
 _SPLINE = 1.0045
 """By how much the smooth surface lies within its control points."""
@@ -60,11 +59,7 @@ def marks() -> tuple[int, int, int]:
     return apex, back, side
 
 
-def placed(balls: Doubles) -> tuple[Doubles, Doubles]:
-    """(n, 3) points of a person's eyeball, and its centre (3,) [mm].
-
-    balls : (b, 3) of the published ball there
-    """
-    middle = (balls.min(axis=0) + balls.max(axis=0)) / 2
-    size = float(np.linalg.norm(balls - middle, axis=1).mean()) / _BALL_MM
-    return middle + size * globe()[0], middle
+def placed(eye: Socket) -> tuple[Doubles, Doubles]:
+    """(n, 3) points of a person's eyeball, and its centre (3,) [mm]."""
+    centre = eye.middle + eye.size * FORWARD_MM * np.array([0.0, 0.0, 1.0])
+    return centre + eye.size * globe()[0], centre

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.disk import cached_array
+from dermis.mesh.contact import Contact
 from dermis.mesh.morph_targets import MorphTargets, no_targets
 from dermis.mesh.rig_outline import RigOutline, corners_of, outline_of, outline_points
 from dermis.mesh.skeleton import INFLUENCES, Skeleton
@@ -75,6 +76,7 @@ class Rig:
     stencils : from the control points to those of the mesh; None where they are the same
     corner : (v,) the control point of each vertex of the file's mesh; None where `Mesh.point` tells it
     turns : of bones, by targets
+    contact : points that stay off the eyes; None for none
     """
 
     positions_mm: Floats
@@ -83,6 +85,7 @@ class Rig:
     stencils: Stencils | None = None
     corner: Ints | None = None
     turns: tuple[Turn, ...] = ()
+    contact: Contact | None = None
 
     @cached_property
     def rest(self) -> Motion:
@@ -138,6 +141,21 @@ class Rig:
         control = resting.posed(motion.weights.astype(np.float64), motion.matrices.astype(np.float64))
         return control if self.stencils is None else self.stencils.points(control)
 
+    def margins_mm(self, motion: Motion) -> Floats:
+        """(k, r, 3) the margins of the lids around each eye, as control points, in a motion [mm]."""
+        assert self.contact is not None
+        margin = self.contact.margin
+        rest = self._margins.rest_mm.copy()
+        rest[:3] = motion.positions_mm[margin.ravel()].T
+        posed = replace(self._margins, rest_mm=rest).posed(motion.weights, motion.matrices)
+        return posed.reshape(*margin.shape, 3)
+
+    @cached_property
+    def _margins(self) -> RigOutline:
+        assert self.contact is not None
+        points = self.contact.margin.ravel().astype(np.intp)
+        return outline_of(self.positions_mm, self.targets, self.skeleton, points)
+
     def some_posed(self, points: Ints, motion: Motion) -> Doubles:
         """(n, 3) some points, which no target moves, in a motion [mm]."""
         places = motion.positions_mm[points].astype(np.float64)
@@ -156,8 +174,8 @@ class Rig:
         targets, points = self.targets, self.positions_mm.astype(np.float64)
         each = np.repeat(weights, np.diff(targets.first))
         np.add.at(points, targets.point, each[:, None] * targets.delta_mm)
-        if self.skeleton is None or matrices is None:
-            return points
-        whole = np.concatenate([points, np.ones((len(points), 1))], axis=1)
-        blended = np.einsum("pk,pkij->pij", self.skeleton.weight, matrices[self.skeleton.bone])
-        return np.asarray(np.einsum("pij,pj->pi", blended, whole))
+        if self.skeleton is not None and matrices is not None:
+            whole = np.concatenate([points, np.ones((len(points), 1))], axis=1)
+            blended = np.einsum("pk,pkij->pij", self.skeleton.weight, matrices[self.skeleton.bone])
+            points = np.asarray(np.einsum("pij,pj->pi", blended, whole))
+        return points if self.contact is None else self.contact.kept_off(points)

@@ -12,6 +12,8 @@ override STRIP: u32 = 1u;
 
 override EYES: bool = false; // whether there are eyes of true shape, and teeth
 
+const MARGIN: u32 = 28u; // points around an eye, of which those of the upper lid come first
+const UPPER_LID: u32 = 13u;
 const WET_ROUGHNESS: f32 = 0.1; // of plain materials: teeth, tongues, eyeballs of files
 const FINEST_RATIO: f32 = 4.0; // longest over shortest side of a footprint that one map sample may cover
 
@@ -27,6 +29,7 @@ struct Shade {
     pre: PreIntegrated,
     background: vec3f,
     eyes: array<Eye, 2>,
+    lids: array<vec4f, 56>, // the margins around each eye, half of them each; see human/lid_rings.csv
     material_colour: array<vec4f, 64>,
     jitter: array<vec4f, 64>, // sample places in the pixel, 0..1
 }
@@ -73,6 +76,29 @@ fn shaded_skin(point: Point, surface: Surface, lit: Lit, out: f32, footprint: f3
 fn shaded_plain(surface: Surface, lit: Lit, out: f32) -> Shaded {
     let below = lit.entered * surface.colour * out;
     return Shaded(vec3f(0.0), vec3f(0.0), shade.shown.x * below + shade.shown.y * lit.reflected, 0.0);
+}
+
+// Share of all light that lids leave to a place of an eye.
+fn open_between_lids(eye: u32, p: vec3f) -> f32 {
+    var above = 1e6;
+    var below = 1e6;
+    var i = 0u;
+    loop {
+        let a = shade.lids[eye * MARGIN + i].xyz;
+        let b = shade.lids[eye * MARGIN + (i + 1u) % MARGIN].xyz;
+        let t = clamp(dot(p - a, b - a) / dot(b - a, b - a), 0.0, 1.0);
+        let far = distance(p, mix(a, b, t));
+        if (i < UPPER_LID) {
+            above = min(above, far);
+        } else {
+            below = min(below, far);
+        }
+        i++;
+        if (i >= MARGIN) {
+            break;
+        }
+    }
+    return lid_shade(above, below);
 }
 
 fn ray_through(place: vec2f, size: vec2f) -> vec3f {
@@ -126,6 +152,7 @@ fn shaded(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Shaded {
             if (shade.eyes[k].material == (point.flags >> 8u)) {
                 let eye = eye_at(shade.eyes[k], point, v);
                 surface = eye.surface;
+                surface.colour *= open_between_lids(k, point.position);
                 film = eye.film;
                 point.lit_position += SCATTERED_MM * film.normal;
                 break;
