@@ -146,11 +146,11 @@ class EyesSeen(NamedTuple):
     """How eyes of true shape stand in a motion.
 
     frames : (2, 4, 4) from the head's space to each eye's
-    margins_mm : (2, r, 3) the margins of the lids around each
+    edges_mm : (2, r, 3) the edges of the lids around each; between two, a point of a smooth curve is put
     """
 
     frames: NDArray[np.float64]
-    margins_mm: NDArray[np.float32]
+    edges_mm: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -224,5 +224,9 @@ def seen_by(view: Any, pinhole: Pinhole, eyes: EyesSeen | None) -> Any:
     record["right"], record["up"] = tuple(half[0] * c for c in right), tuple(half[1] * c for c in up)
     if eyes is not None:
         record["eyes"]["to_own"] = eyes.frames.transpose(0, 2, 1)  # by columns
-        record["lids"][:, :3] = eyes.margins_mm.reshape(-1, 3)
+        edges = eyes.edges_mm
+        a, b, c = (np.roll(edges, -k, axis=1) for k in (-1, 1, 2))
+        both = np.stack([edges, (9.0 * (edges + b) - a - c) / 16.0], axis=2).reshape(2, -1, 3)
+        whole = np.concatenate([both, np.ones((*both.shape[:2], 1))], axis=-1)
+        record["lids"] = np.einsum("kij,krj->kri", eyes.frames, whole).reshape(-1, 4)
     return record

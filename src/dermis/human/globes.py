@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.human.lids import FORWARD_MM, Socket
+from dermis.human.lids import FORWARD_MM, SPLINE, Socket
 from dermis.mesh.eyeball import profile_mm
 
 Doubles = NDArray[np.float64]
@@ -16,8 +16,6 @@ Index = NDArray[np.int64]
 SIDE = 10
 """Quads along each edge of the cube that a ball is made from; an even number, for a point on the axis."""
 _RIM = 0.49  # of the layout, around its middle
-_SPLINE = 1.0045
-"""By how much the smooth surface lies within its control points."""
 
 
 @cache
@@ -39,7 +37,7 @@ def globe() -> tuple[Doubles, Index]:
     _, first, welded = np.unique(np.rint(1e6 * every), axis=0, return_index=True, return_inverse=True)
     along = every[first] / np.linalg.norm(every[first], axis=1, keepdims=True)
     radius = profile_mm(np.arccos(np.clip(along[:, 2], -1.0, 1.0)))
-    return _SPLINE * radius[:, None] * along, welded.reshape(-1)[np.concatenate(quads)]
+    return SPLINE * radius[:, None] * along, welded.reshape(-1)[np.concatenate(quads)]
 
 
 def layout() -> Doubles:

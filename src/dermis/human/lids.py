@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.human.movement import gaze
 from dermis.human.published import EXPRESSIONS, Points, data, moves
 from dermis.human.skin.surface import average, lid_rings
 from dermis.mesh.contact import Contact
@@ -19,11 +20,13 @@ BALL_MM = 15.4
 """Mean radius of the published ball, which the published lids lie on, where the eye is of usual size [mm]."""
 FORWARD_MM = 2.2
 """How far the true ball's centre lies before the published one's, so that corneas stand as far out [mm]."""
+SPLINE = 1.0045
+"""How much larger an eyeball's control points are than its smooth surface."""
 _REACH_MM = 15.0  # of the skin around the lids that goes with them
 _SHARP = 1.0  # mm over which neighbours share what they follow
 _DEEPEST_MM = -1.5  # below the surface of the ball; what lies deeper is never seen
 _STRAIGHT, _STEEPEST = 0.75, 0.95  # shares of the radius across the axis, see `_narrowed`
-_CLEAR_MM = 0.15, 0.5, 0.8  # of edge, crest and skin
+_CLEAR_MM = -0.3, 0.25, 0.75, 1.0  # of wall, edge, crest and skin
 _TOUCHING_MM = 0.2  # of the edge: the smooth surface lies a little within its control points
 _LIES_ON = np.array([0, 0.2, 0.6, *21 * [1.0], 0.6, 0.2, 0, 0])
 """How far each row of lid_rings.csv lies on the ball: not around the caruncle."""
@@ -68,20 +71,24 @@ def socket(balls: Points) -> Socket:
     return Socket(middle, float(np.linalg.norm(balls - middle, axis=1).mean()) / BALL_MM)
 
 
-def conformed(places: Points, sockets: tuple[Socket, Socket], closed: bool = False) -> Points:
+def conformed(
+    places: Points, sockets: tuple[Socket, Socket], closed: bool = False, axis: Points = _AHEAD
+) -> Points:
     """(n, 3) a person's published points with the lids on eyes of true size [mm].
 
     sockets : of the left and of the right eye
     closed : whether upper lids end at the lower ones, however far they are published to go
+    axis : (3,) along which the eyes look, unit
     """
     found = places.copy()
     for side, eye in zip(_sides(), sockets, strict=True):
         found[side.point] += side.share @ _ways(places[side.rings], eye, closed)
         centre = eye.middle + eye.size * FORWARD_MM * _AHEAD
-        off = (found[side.contact] - centre) / eye.size
-        far, surface = clearance_mm(off, _AHEAD)
+        size = SPLINE * eye.size
+        off = (found[side.contact] - centre) / size
+        far, surface = clearance_mm(off, axis)
         out = np.maximum(1.0, (surface + side.clear_mm) / far)
-        found[side.contact] = centre + eye.size * off * out[:, None]
+        found[side.contact] = centre + size * off * out[:, None]
     return found
 
 
@@ -97,8 +104,9 @@ def conformed_targets(places: Points, sockets: tuple[Socket, Socket]) -> NDArray
             part = slice(*moves().first[index : index + 2])
             moved = places.copy()
             moved[moves().point[part]] += delta_mm[part]
-            closed = "Blink" in name
-            found[part] = (conformed(moved, sockets, closed) - resting)[moves().point[part]]
+            axis = _axes().get(name.removeprefix(EXPRESSIONS), _AHEAD)
+            drawn = conformed(moved, sockets, "Blink" in name, axis)
+            found[part] = (drawn - resting)[moves().point[part]]
     return found
 
 
@@ -115,7 +123,7 @@ def contact(first: int, globe: int, apex: int, back: int) -> Contact:
         np.concatenate([side.clear_mm for side in sides]).astype(np.float32),
         np.array([first + apex, first + globe + apex], np.int32),
         np.array([first + back, first + globe + back], np.int32),
-        lid_rings()[..., _CREST].astype(np.int32),
+        lid_rings()[..., _EDGE].astype(np.int32),
     )
 
 
@@ -156,6 +164,14 @@ def _narrowed(across: Points) -> Points:
 
 
 @cache
+def _axes() -> dict[str, Points]:
+    """Along which an eye looks by each target of gaze."""
+    turns = {turn.target: np.radians(turn.degrees) for turn in gaze()}
+    found = {name: np.array([np.sin(y), -np.sin(x), np.cos(x) * np.cos(y)]) for name, (x, y, _) in turns.items()}
+    return {name: axis / np.linalg.norm(axis) for name, axis in found.items()}
+
+
+@cache
 def _sides() -> tuple[_Side, _Side]:
     """Of the left and of the right eye; told on the average person, so the same for all people."""
     places, (left, right) = average()[0].astype(np.float64), lid_rings()
@@ -176,7 +192,7 @@ def _side(rings: Index, places: Points, body: Index, name: str) -> _Side:
     share[own] = point[own][:, None] == every
     sliding = _sliding(rings, point, name)
     clear = np.concatenate([np.repeat(_CLEAR_MM, len(rings)), np.full(len(sliding), _CLEAR_MM[-1])])
-    return _Side(every, point, share, np.concatenate([rings[:, 1:].T.ravel(), sliding]), clear)
+    return _Side(every, point, share, np.concatenate([rings.T.ravel(), sliding]), clear)
 
 
 def _sliding(rings: Index, point: Index, name: str) -> Index:

@@ -21,7 +21,7 @@ class Contact:
     ball : (n,) which of the eyeballs each slides over
     clear_mm : (n,) least distance from its surface, in mm of a usual eye
     apex, back : (k,) control points of each eyeball: the cornea's apex and the one opposite
-    margin : (k, r) those of the lids' margins, once around each opening
+    edge : (k, r) those of the lids' edges, which touch the eye, once around each opening
     """
 
     point: Ints
@@ -29,7 +29,7 @@ class Contact:
     clear_mm: NDArray[np.float32]
     apex: Ints
     back: Ints
-    margin: Ints
+    edge: Ints
 
     def kept_off(self, points_mm: Doubles) -> Doubles:
         """(p, 3) all control points of a posed head, with those of the lids pushed out of the eyes [mm]."""

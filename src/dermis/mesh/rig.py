@@ -141,20 +141,27 @@ class Rig:
         control = resting.posed(motion.weights.astype(np.float64), motion.matrices.astype(np.float64))
         return control if self.stencils is None else self.stencils.points(control)
 
-    def margins_mm(self, motion: Motion) -> Floats:
-        """(k, r, 3) the margins of the lids around each eye, as control points, in a motion [mm]."""
+    def edges_mm(self, motion: Motion) -> Doubles:
+        """(k, r, 3) the edges of the lids around each eye, on the surface, in a motion [mm]."""
         assert self.contact is not None
-        margin = self.contact.margin
-        rest = self._margins.rest_mm.copy()
-        rest[:3] = motion.positions_mm[margin.ravel()].T
-        posed = replace(self._margins, rest_mm=rest).posed(motion.weights, motion.matrices)
-        return posed.reshape(*margin.shape, 3)
+        points, share, outline = self._edges
+        rest = np.vstack([motion.positions_mm[points].T, outline.rest_mm[3]])
+        posed = replace(outline, rest_mm=rest).posed(motion.weights, motion.matrices)
+        return np.asarray(share @ posed).reshape(*self.contact.edge.shape, 3)
 
     @cached_property
-    def _margins(self) -> RigOutline:
+    def _edges(self) -> tuple[NDArray[np.intp], Doubles, RigOutline]:
+        """Control points around edges of lids, their shares in these, and what moves them."""
         assert self.contact is not None
-        points = self.contact.margin.ravel().astype(np.intp)
-        return outline_of(self.positions_mm, self.targets, self.skeleton, points)
+        edge = self.contact.edge.ravel().astype(np.intp)
+        points, share = edge, np.eye(len(edge))
+        if self.stencils is not None:  # whose first points are the control points, on the surface
+            parts = [slice(*self.stencils.first[one : one + 2]) for one in edge]
+            points = np.unique(np.concatenate([self.stencils.point[part] for part in parts])).astype(np.intp)
+            share = np.zeros((len(edge), len(points)))
+            for row, part in zip(share, parts, strict=True):
+                row[np.searchsorted(points, self.stencils.point[part])] = self.stencils.weight[part]
+        return points, share, outline_of(self.positions_mm, self.targets, self.skeleton, points)
 
     def some_posed(self, points: Ints, motion: Motion) -> Doubles:
         """(n, 3) some points, which no target moves, in a motion [mm]."""

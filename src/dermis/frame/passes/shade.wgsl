@@ -12,8 +12,9 @@ override STRIP: u32 = 1u;
 
 override EYES: bool = false; // whether there are eyes of true shape, and teeth
 
-const MARGIN: u32 = 28u; // points around an eye, of which those of the upper lid come first
-const UPPER_LID: u32 = 13u;
+const LID_POINTS: u32 = 56u; // around an eye; these are of the lower lid
+const LOWER_LID: vec2u = vec2u(27u, 49u);
+const FARTHEST_LID: f32 = 1e6;
 const WET_ROUGHNESS: f32 = 0.1; // of plain materials: teeth, tongues, eyeballs of files
 const FINEST_RATIO: f32 = 4.0; // longest over shortest side of a footprint that one map sample may cover
 
@@ -29,7 +30,7 @@ struct Shade {
     pre: PreIntegrated,
     background: vec3f,
     eyes: array<Eye, 2>,
-    lids: array<vec4f, 56>, // the margins around each eye, half of them each; see human/lid_rings.csv
+    lids: array<vec4f, 112>, // edges of the lids around each eye, in its own space, half of them each; see human/lid_rings.csv
     material_colour: array<vec4f, 64>,
     jitter: array<vec4f, 64>, // sample places in the pixel, 0..1
 }
@@ -78,27 +79,30 @@ fn shaded_plain(surface: Surface, lit: Lit, out: f32) -> Shaded {
     return Shaded(vec3f(0.0), vec3f(0.0), shade.shown.x * below + shade.shown.y * lit.reflected, 0.0);
 }
 
-// Share of all light that lids leave to a place of an eye.
-fn open_between_lids(eye: u32, p: vec3f) -> f32 {
-    var above = 1e6;
-    var below = 1e6;
+// How far the lids' edges are from a place of an eye, in its own space; seen from its centre, on the ball.
+fn lids_around(eye: u32, p: vec3f) -> Lids {
+    let q = SCLERA_MM * normalize(p);
+    var lids = Lids(FARTHEST_LID, FARTHEST_LID, vec3f(0.0));
+    var a = SCLERA_MM * normalize(shade.lids[eye * LID_POINTS + LID_POINTS - 1u].xyz);
     var i = 0u;
     loop {
-        let a = shade.lids[eye * MARGIN + i].xyz;
-        let b = shade.lids[eye * MARGIN + (i + 1u) % MARGIN].xyz;
-        let t = clamp(dot(p - a, b - a) / dot(b - a, b - a), 0.0, 1.0);
-        let far = distance(p, mix(a, b, t));
-        if (i < UPPER_LID) {
-            above = min(above, far);
-        } else {
-            below = min(below, far);
+        let b = SCLERA_MM * normalize(shade.lids[eye * LID_POINTS + i].xyz);
+        let t = clamp(dot(q - a, b - a) / dot(b - a, b - a), 0.0, 1.0);
+        let off = q - mix(a, b, t);
+        let far = length(off);
+        if (i < LOWER_LID.x || i > LOWER_LID.y) {
+            lids.above = min(lids.above, far);
+        } else if (far < lids.below) {
+            lids.below = far;
+            lids.from_below = off / max(far, 1e-4);
         }
+        a = b;
         i++;
-        if (i >= MARGIN) {
+        if (i >= LID_POINTS) {
             break;
         }
     }
-    return lid_shade(above, below);
+    return lids;
 }
 
 fn ray_through(place: vec2f, size: vec2f) -> vec3f {
@@ -150,9 +154,9 @@ fn shaded(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Shaded {
                 break;
             }
             if (shade.eyes[k].material == (point.flags >> 8u)) {
-                let eye = eye_at(shade.eyes[k], point, v);
+                let own = (shade.eyes[k].to_own * vec4f(point.position, 1.0)).xyz;
+                let eye = eye_at(shade.eyes[k], own, lids_around(k, own), v);
                 surface = eye.surface;
-                surface.colour *= open_between_lids(k, point.position);
                 film = eye.film;
                 point.lit_position += SCATTERED_MM * film.normal;
                 break;

@@ -14,7 +14,13 @@ const AROUND: f32 = 1.0; // how far normals of the white turn to its front by th
 const SCATTERED: f32 = 0.35; // share of a light that comes into such a shadow
 // Artist's values: what the lids, which lie close, keep of the light from all around.
 const UPPER_SHADE: f32 = 0.6;
+const UPPER_SHADE_MM: f32 = 2.2;
 const LOWER_SHADE: f32 = 0.3;
+const LOWER_SHADE_MM: f32 = 1.3;
+const MENISCUS: f32 = 1.1; // how steep tears rise to the lower lid
+const MENISCUS_ROUGHNESS: f32 = 0.16; // over its curve, which is finer than pixels
+const MENISCUS_FROM_MM: f32 = 0.15; // from its edge, within which it lies on the eye
+const MENISCUS_TO_MM: f32 = 0.6;
 const TEARS: f32 = 0.06; // roughness of their film
 // Artist's values, linear.
 const STROMA: vec3f = vec3f(0.20, 0.27, 0.33); // without pigment, which scatters blue
@@ -29,6 +35,13 @@ struct Eye {
     pupil_mm: f32,
     redness: f32,
     seed: f32,
+}
+
+// Distances from the edges of the lids [mm], and the way from the lower one, unit.
+struct Lids {
+    above: f32,
+    below: f32,
+    from_below: vec3f,
 }
 
 struct EyeLit {
@@ -103,17 +116,27 @@ fn white_colour(eye: Eye, p: vec3f) -> vec3f {
     return mix(WHITE * yellow, VESSEL, clamp(red, 0.0, 0.8));
 }
 
-// Share of the light that lids at some distances leave [mm].
-fn lid_shade(above: f32, below: f32) -> f32 {
-    let upper = UPPER_SHADE * exp(-pow(above / 2.6, 2.0));
-    let lower = LOWER_SHADE * exp(-pow(below / 1.6, 2.0));
+// Share of the light that lids leave.
+fn lid_shade(lids: Lids) -> f32 {
+    let upper = UPPER_SHADE * exp(-pow(lids.above / UPPER_SHADE_MM, 2.0));
+    let lower = LOWER_SHADE * exp(-pow(lids.below / LOWER_SHADE_MM, 2.0));
     return (1.0 - upper) * (1.0 - lower);
 }
 
-// v: towards the viewer
-fn eye_at(eye: Eye, point: Point, v: vec3f) -> EyeLit {
+// How much a place belongs to the tears along the lower lid.
+fn meniscus_at(lids: Lids) -> f32 {
+    let lies = 1.0 - smoothstep(MENISCUS_FROM_MM, MENISCUS_TO_MM, lids.below);
+    return lies * smoothstep(0.3, 2.0, lids.above); // it runs out towards the corners
+}
+
+// The surface of the tears: along the lower lid they rise to it in a curve.
+fn tears_at(smooth_film: vec3f, lids: Lids) -> vec3f {
+    return normalize(smooth_film + MENISCUS * meniscus_at(lids) * lids.from_below);
+}
+
+// p: in its own space; v: towards the viewer
+fn eye_at(eye: Eye, p: vec3f, lids: Lids, v: vec3f) -> EyeLit {
     let turned = mat3x3f(eye.to_own[0].xyz, eye.to_own[1].xyz, eye.to_own[2].xyz);
-    let p = (eye.to_own * vec4f(point.position, 1.0)).xyz;
     let d = normalize(turned * -v);
     let off = length(p.xy);
     let clear = (1.0 - smoothstep(LIMBUS_MM - LIMBUS_SOFT_MM, LIMBUS_MM + LIMBUS_SOFT_MM, off)) * step(0.0, p.z);
@@ -122,10 +145,11 @@ fn eye_at(eye: Eye, point: Point, v: vec3f) -> EyeLit {
     let q = seen_on_iris(p, d);
     let on_iris = q * min(1.0, IRIS_MM / max(length(q), 1e-3));
     let gathered = normalize(vec3f(-CONCAVE * on_iris / IRIS_MM, 1.0));
-    let film = normalize(mix(ball, cornea, clear));
+    let film = tears_at(normalize(mix(ball, cornea, clear)), lids);
     // the white scatters light around its curve
     let below = normalize(mix(ball + vec3f(0.0, 0.0, AROUND), gathered, clear));
-    let colour = mix(white_colour(eye, p), iris_colour(eye, on_iris), clear);
+    let colour = mix(white_colour(eye, p), iris_colour(eye, on_iris), clear) * lid_shade(lids);
     let back = transpose(turned); // a turn and a scale: normals come back by it
-    return EyeLit(Surface(normalize(back * below), colour, TEARS, 1.0), Film(normalize(back * film), SCATTERED));
+    let film_roughness = mix(TEARS, MENISCUS_ROUGHNESS, meniscus_at(lids));
+    return EyeLit(Surface(normalize(back * below), colour, film_roughness, 1.0), Film(normalize(back * film), SCATTERED));
 }

@@ -22,14 +22,17 @@ FIELDS = ("lips", "mouth", "lids")
 """Distances from borders [mm]: of the lips, positive inside; of the mouth, negative inside; of the lids,
 negative where they face the eye."""
 _UNIT_MM = 0.01
-_LIDS_MM = -2.0, -0.6, 0.15  # of the first columns of lid_rings.csv
+_LIDS_MM = -2.0, -0.6  # of the first columns of lid_rings.csv
+_CREST_MM = 0.15, 0.8  # least and most of the third
 
 
 @cache
 def average() -> tuple[Floats, Floats]:
     """(p, 3) the average person's control points, and (p, 3) the fields there, see `FIELDS` [mm]."""
     places, fields = _stored("places"), _stored("fields")
-    fields[lid_rings()[..., :3], 2] = _LIDS_MM
+    rings = lid_rings()
+    fields[rings[..., :2], 2] = _LIDS_MM
+    fields[rings[..., 2], 2] = fields[rings[..., 2], 2].clip(*_CREST_MM)
     return places, fields
 
 
