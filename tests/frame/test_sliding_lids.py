@@ -10,6 +10,7 @@ from setups import settings_of
 from tolerances import SHAPE
 
 from dermis import Human
+from dermis.frame.painted import with_painted_maps
 from dermis.frame.passes import shape
 from dermis.frame.passes.shape import MotionBytes
 from dermis.frame.renderer import Renderer
@@ -17,7 +18,6 @@ from dermis.frame.shape import make_shape, shape_tables
 from dermis.gpu import Device, Frame
 from dermis.human.model import human_head
 from dermis.human.skin.surface import lid_rings
-from dermis.mesh.eyeball import SCLERA_MM
 from dermis.mesh.eyes import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -60,32 +60,45 @@ def test_edges_of_lids_are_those_of_the_surface() -> None:
         np.testing.assert_allclose(edges, points[lid_rings()[..., 1]], atol=1e-3)
 
 
-def white_of(renderer: Renderer, head: Head, parts: str) -> Floats:
-    """(h, w) what is seen of the left eye from its front, 40 pixels a millimetre of height."""
+def seen_from_front(renderer: Renderer, head: Head, parts: str) -> Floats:
+    """(256, 512) the left eye from its front, 20 pixels a millimetre, its middle in the picture's."""
     middle = np.array([28.4, 0.0, 14.0]) - head.centre_mm
     near = tuple(float(c) for c in middle)
     camera = Camera(position=(near[0], near[1], near[2] + 400), target=near, frame_mm=12.8)
     lamp = DirectionalLight(direction=(0, -0.5, -1), irradiance=(3, 3, 3), shadows=False)
     settings = settings_of(size=(512, 256), atlas=64, samples=4, parts=parts)
-    return np.asarray(renderer.draw(Scene(head, lights=(lamp,), camera=camera), settings).linear()[..., 1])
+    dark = replace(head, maps=Maps(colour=np.zeros((4, 4, 3), np.float32)))
+    return np.asarray(renderer.draw(Scene(dark, lights=(lamp,), camera=camera), settings).linear()[..., 1])
 
 
-def column(head: Head, x_mm: float) -> int:
-    return int(256 + x_mm / 12.8 * 256)
-
-
-def test_lids_shade_the_white_and_tears_shine_along_the_lower_one(renderer: Renderer) -> None:
-    head = bare(1)
-    skin = Maps(colour=np.zeros((4, 4, 3), np.float32))
-    head = replace(head, maps=skin)
-    below, shine = (white_of(renderer, head, part) for part in ("diffuse", "specular"))
-    at = column(head, 7.6)
+def test_lids_shade_the_white(renderer: Renderer) -> None:
+    below = seen_from_front(renderer, bare(1), "diffuse")
+    at = 256 + 20 * 8
     lit = below[:, at - 3 : at + 4].mean(axis=1)
     seen = np.flatnonzero(lit > 0.1 * lit.max())
-    first, last = seen[0], seen[-1]
-    middle = lit[first + (last - first) // 2]
-    assert lit[first + 6] < 0.8 * middle  # a third of a millimetre below the upper lid
-    assert SCLERA_MM == 12.0
-    low = shine[last - 12 : last + 3, at - 40 : at + 41].max()
-    white = shine[first + (last - first) // 2, at - 40 : at + 41].mean()
-    assert low > 3.0 * white
+    middle = lit[(seen[0] + seen[-1]) // 2]
+    assert lit[seen[0] + 6] < 0.8 * middle  # a third of a millimetre below the upper lid
+    assert 0.2 < middle < 0.5  # of 3 / pi: no white of an eye is white
+
+
+def test_tears_shine_along_the_lower_lid(renderer: Renderer) -> None:
+    """In a thin line, below the middle of the eye, where neither the ball nor the lid throws the light to us."""
+    shine = seen_from_front(renderer, bare(1), "specular")[180:, 236:277].max(axis=1)
+    bright = np.flatnonzero(shine > 0.1)
+    assert 2 <= len(bright) <= 16 and bright[-1] - bright[0] < 16
+
+
+def test_the_caruncle_is_pink_and_wet(device: Device) -> None:
+    head = Human(caucasian=0, asian=0).head(subdivide=0)
+    maps = with_painted_maps(device, head, 1024).maps
+    assert maps.colour is not None and maps.roughness is not None
+    rings = lid_rings()[0]
+
+    def painted(picture: NDArray[np.float32], points: NDArray[np.int64]) -> Floats:
+        uv = head.mesh.uv[np.isin(head.mesh.point, points)]
+        across, down = (uv * 1024).astype(int).T
+        return np.asarray(picture[down, across], np.float64).reshape(len(uv), -1).mean(axis=0)
+
+    inner, skin = (painted(maps.colour, points) for points in (rings[25:, 1], rings[10:20, 3]))
+    assert inner[0] > 2.0 * skin[0] and inner[0] > 1.8 * inner[1] > 1.5 * inner[2] > 0.0
+    assert painted(maps.roughness, rings[25:, 1])[0] < 0.16 < 0.25 < painted(maps.roughness, rings[10:20, 3])[0]
