@@ -40,7 +40,9 @@ def test_the_device_slides_lids_as_the_twin_does(device: Device) -> None:
     pose = Pose({"eyeBlinkLeft": 0.5, "eyeBlinkRight": 0.3, "eyeLookDownLeft": 0.6}, {"head": (5, 20, 0)})
     motion = pose.motion(rig)
     made, frame = make_shape(device, shape_tables(device, head)), Frame(device)
-    words = (part.astype(np.float32).tobytes() for part in (rig.positions_mm, motion.weights, motion.matrices))
+    words = (
+        part.astype(np.float32).tobytes() for part in (rig.positions_mm, motion.weights, motion.matrices)
+    )
     shape.draw(frame, made, MotionBytes(*words))
     frame.submit()
     found = np.frombuffer(device.handle.queue.read_buffer(made.surface["points"]), np.float32).reshape(-1, 3)
@@ -82,7 +84,7 @@ def test_lids_shade_the_white(renderer: Renderer) -> None:
 
 
 def test_tears_shine_along_the_lower_lid(renderer: Renderer) -> None:
-    """In a thin line, below the middle of the eye, where neither the ball nor the lid throws the light to us."""
+    """In a thin line, below the middle of the eye, where neither ball nor lid does."""
     shine = seen_from_front(renderer, bare(1), "specular")[180:, 236:277].max(axis=1)
     bright = np.flatnonzero(shine > 0.1)
     assert 2 <= len(bright) <= 16 and bright[-1] - bright[0] < 16
@@ -101,4 +103,6 @@ def test_the_caruncle_is_pink_and_wet(device: Device) -> None:
 
     inner, skin = (painted(maps.colour, points) for points in (rings[25:, 1], rings[10:20, 3]))
     assert inner[0] > 2.0 * skin[0] and inner[0] > 1.8 * inner[1] > 1.5 * inner[2] > 0.0
-    assert painted(maps.roughness, rings[25:, 1])[0] < 0.16 < 0.25 < painted(maps.roughness, rings[10:20, 3])[0]
+    assert (
+        painted(maps.roughness, rings[25:, 1])[0] < 0.16 < 0.25 < painted(maps.roughness, rings[10:20, 3])[0]
+    )

@@ -13,7 +13,6 @@ from dermis import DermisError, Human, Pose
 from dermis.atlas.build import build_atlas
 from dermis.atlas.unwrap.stretch import singular_values
 from dermis.human.model import MATERIALS
-from dermis.human.published import count
 from dermis.human.skin import face
 from dermis.human.skin.painted import PaintedMaps
 from dermis.images.codecs import encode_png8

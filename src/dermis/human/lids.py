@@ -34,7 +34,9 @@ _CARUNCLE_MM = np.array([[0.3, 0.7, 0.0, 0.0], [0.0, 0.2, 0.0, 0.0], *23 * [4 * 
                          [0.0, 0.3, 0.0, 0.0], [0.5, 1.0, 0.0, 0.0], [0.6, 1.1, 0.0, 0.0]])  # fmt: skip
 """How far the floor of the inner corner rises, row by row, while the eye is open."""
 _UPPER, _LOWER = slice(1, 12), slice(13, 28)  # rows of lid_rings.csv
-_OVER_MM = 1.6 * np.array([0.4, 0.8, *7 * [1.0], 0.8, 0.4])  # by which closed upper lids reach beyond lower ones
+_OVER_MM = 1.6 * np.array(
+    [0.4, 0.8, *7 * [1.0], 0.8, 0.4]
+)  # by which closed upper lids reach beyond lower ones
 _ROWS = 6  # of quads, of skin that may slide
 _MOVED_MM = 2.0  # by a blink: skin that slides over the eye
 _RINGS, _EDGE, _CREST = 4, 1, 2  # columns of lid_rings.csv
@@ -130,8 +132,8 @@ def contact(first: int, globe: int, apex: int, back: int) -> Contact:
 def _ways(rings: Points, eye: Socket, closed: bool) -> Points:
     """(r, 3) from where points of the lids are published to where they lie on the true ball [mm].
 
-    Seen from the front they stay where they are, near the ball's outline apart. Edges touch the ball, and lids
-    are as thick as before.
+    Seen from the front they stay where they are, but near the ball's outline. Edges touch the ball, and lids are
+    as thick as before.
     """
     published = (rings - eye.middle) / eye.size
     off = published.copy()
@@ -148,7 +150,7 @@ def _ways(rings: Points, eye: Socket, closed: bool) -> Points:
 
 
 def _close(rings: Points) -> None:
-    """Raise or lower the rows of an upper lid (rows, 4, 3) so that its crest ends a little below the lower one's."""
+    """Move the rows of an upper lid (rows, 4, 3) so that its crest ends a little below the lower one's."""
     crest = rings[:, _CREST]
     lower = crest[_LOWER][np.argsort(crest[_LOWER, 0])]
     ends = np.interp(crest[_UPPER, 0], lower[:, 0], lower[:, 1]) - _OVER_MM
@@ -158,16 +160,16 @@ def _close(rings: Points) -> None:
 def _narrowed(across: Points) -> Points:
     """Distances from the axis in radii: as they are near it, short of the outline farther out."""
     room = _STEEPEST - _STRAIGHT
-    return np.where(
-        across < _STRAIGHT, across, _STRAIGHT + room * np.tanh((across - _STRAIGHT) / room)
-    )
+    return np.where(across < _STRAIGHT, across, _STRAIGHT + room * np.tanh((across - _STRAIGHT) / room))
 
 
 @cache
 def _axes() -> dict[str, Points]:
     """Along which an eye looks by each target of gaze."""
     turns = {turn.target: np.radians(turn.degrees) for turn in gaze()}
-    found = {name: np.array([np.sin(y), -np.sin(x), np.cos(x) * np.cos(y)]) for name, (x, y, _) in turns.items()}
+    found = {
+        name: np.array([np.sin(y), -np.sin(x), np.cos(x) * np.cos(y)]) for name, (x, y, _) in turns.items()
+    }
     return {name: axis / np.linalg.norm(axis) for name, axis in found.items()}
 
 

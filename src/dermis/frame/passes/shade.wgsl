@@ -1,6 +1,7 @@
 // The image: light scattered below the skin, relit at its finest level, under the white lobe of the surface.
 //#include "lighting.wgsl"
 //#include "mouth.wgsl"
+//#include "lids.wgsl"
 //#include "pre_integrated.wgsl"
 //#include "sample_bits.wgsl"
 //#include "shaded.wgsl"
@@ -12,9 +13,6 @@ override STRIP: u32 = 1u;
 
 override EYES: bool = false; // whether there are eyes of true shape, and teeth
 
-const LID_POINTS: u32 = 56u; // around an eye; these are of the lower lid
-const LOWER_LID: vec2u = vec2u(27u, 49u);
-const FARTHEST_LID: f32 = 1e6;
 const WET_ROUGHNESS: f32 = 0.1; // of plain materials: teeth, tongues, eyeballs of files
 const FINEST_RATIO: f32 = 4.0; // longest over shortest side of a footprint that one map sample may cover
 
@@ -77,32 +75,6 @@ fn shaded_skin(point: Point, surface: Surface, lit: Lit, out: f32, footprint: f3
 fn shaded_plain(surface: Surface, lit: Lit, out: f32) -> Shaded {
     let below = lit.entered * surface.colour * out;
     return Shaded(vec3f(0.0), vec3f(0.0), shade.shown.x * below + shade.shown.y * lit.reflected, 0.0);
-}
-
-// How far the lids' edges are from a place of an eye, in its own space; seen from its centre, on the ball.
-fn lids_around(eye: u32, p: vec3f) -> Lids {
-    let q = SCLERA_MM * normalize(p);
-    var lids = Lids(FARTHEST_LID, FARTHEST_LID, vec3f(0.0));
-    var a = SCLERA_MM * normalize(shade.lids[eye * LID_POINTS + LID_POINTS - 1u].xyz);
-    var i = 0u;
-    loop {
-        let b = SCLERA_MM * normalize(shade.lids[eye * LID_POINTS + i].xyz);
-        let t = clamp(dot(q - a, b - a) / dot(b - a, b - a), 0.0, 1.0);
-        let off = q - mix(a, b, t);
-        let far = length(off);
-        if (i < LOWER_LID.x || i > LOWER_LID.y) {
-            lids.above = min(lids.above, far);
-        } else if (far < lids.below) {
-            lids.below = far;
-            lids.from_below = off / max(far, 1e-4);
-        }
-        a = b;
-        i++;
-        if (i >= LID_POINTS) {
-            break;
-        }
-    }
-    return lids;
 }
 
 fn ray_through(place: vec2f, size: vec2f) -> vec3f {

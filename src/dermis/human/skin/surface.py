@@ -41,7 +41,7 @@ def lid_rings() -> NDArray[np.int64]:
     """(2, r, 4) control points of the left and the right eye's lids, see human/lid_rings.csv."""
     left = numbers(read_rows("dermis.human", "lid_rings"), "wall edge crest skin").astype(np.int64)
     places = _stored("places")
-    wanted = places[left.ravel()] * np.float32([-1.0, 1.0, 1.0])
+    wanted = places[left.ravel()] * np.array([-1.0, 1.0, 1.0], np.float32)
     opposite = np.array([np.abs(places - place).sum(axis=1).argmin() for place in wanted])
     return np.stack([left, opposite.reshape(left.shape)])
 
