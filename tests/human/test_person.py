@@ -13,6 +13,7 @@ from dermis import DermisError, Human, Pose
 from dermis.atlas.build import build_atlas
 from dermis.atlas.unwrap.stretch import singular_values
 from dermis.human.model import MATERIALS
+from dermis.human.published import count
 from dermis.human.skin import face
 from dermis.human.skin.painted import PaintedMaps
 from dermis.images.codecs import encode_png8
@@ -49,7 +50,7 @@ def test_people_between_two_lie_between_them() -> None:
     """Seen from the middle between the eyes, as all of them are."""
     young, middle, old = (Human(age=age).positions_mm for age in (25, 57.5, 90))
     off = np.abs(0.5 * (young + old) - middle)
-    assert (off.max(axis=1) < 1e-3).mean() > 0.8
+    assert (off[: count()].max(axis=1) < 1e-3).mean() > 0.85
     assert off.max() < 0.15  # eyeballs stay round, and lids are drawn onto each person's own
     assert np.abs(old - young).max() > 3.0
 

@@ -132,8 +132,8 @@ def contact(first: int, globe: int, apex: int, back: int) -> Contact:
 def _ways(rings: Points, eye: Socket, closed: bool) -> Points:
     """(r, 3) from where points of the lids are published to where they lie on the true ball [mm].
 
-    Seen from the front they stay where they are, but near the ball's outline. Edges touch the ball, and lids are
-    as thick as before.
+    Seen from the front they stay where they are, but near the ball's outline. Edges touch the ball; lids stay
+    as thick.
     """
     published = (rings - eye.middle) / eye.size
     off = published.copy()
