@@ -67,6 +67,7 @@ class Human:
     targets: Mapping[str, float] = field(default_factory=lambda: _NONE)
     skin: SkinLook | None = None
     eyes: EyeLook | None = None
+    hair: HairLook | None = None
 
     def __post_init__(self) -> None:
         for one in fields(self):
@@ -149,9 +150,11 @@ class Human:
     @property
     def _hair(self) -> HairLook:
         old = (self.age - YOUNG) / (OLD - YOUNG)
+        if self.hair is not None:
+            return self.hair
         bushy = min(1.0, 0.25 + 0.5 * self.sex + 0.25 * old * self.sex)
         grey = max(0.0, 0.9 * old - 0.25)
-        return HairLook(self.hair_eumelanin, self.hair_pheomelanin, bushy, grey)
+        return HairLook(style="cropped", eumelanin=self.hair_eumelanin, pheomelanin=self.hair_pheomelanin, bushy=bushy, grey=grey)
 
     def weights(self) -> dict[str, float]:
         """Weights of published targets by name, those of 0 left out."""

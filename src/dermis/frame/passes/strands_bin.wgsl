@@ -33,7 +33,7 @@ fn covers(piece: Piece, tile: vec2f) -> bool {
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
     let piece = number_of(group, groups, lane);
-    if (piece >= strand_view.hairs * (KNOTS - 1u)) {
+    if (piece >= pieces_of(strand_view.coarse)) {
         return;
     }
     let begin = piece_begin(piece);

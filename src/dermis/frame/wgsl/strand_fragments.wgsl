@@ -78,7 +78,8 @@ fn unit(way: vec2f) -> vec2f {
 
 fn hold(piece: u32) -> Held {
     let begin = piece_begin(piece);
-    let k = piece % (KNOTS - 1u);
+    let hair = begin - piece;
+    let k = begin - first_knot(hair);
     let a = drawn[begin];
     let b = drawn[begin + 1u];
     let way = (b.place - a.place) / max(distance(a.place, b.place), 1e-4);
@@ -87,7 +88,7 @@ fn hold(piece: u32) -> Held {
     if (k > 0u) {
         first += unit(a.place - drawn[begin - 1u].place);
     }
-    if (k + 2u < KNOTS) {
+    if (k + 2u < knots_of(hair)) {
         last += unit(drawn[begin + 2u].place - b.place);
     }
     return Held(a.place, b.place, first, last, vec4f(a.width, b.width, a.depth, b.depth), piece);

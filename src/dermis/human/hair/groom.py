@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
-
 import numpy as np
 
 from dermis.human.hair import brows, lashes
+from dermis.human.hair.head_hair import beard_hair, scalp_hair
 from dermis.human.hair.look import HairLook
+from dermis.human.hair.grown import Grown
 from dermis.human.hair.skin import Skin, beside_edges, front_places, mirrored
 from dermis.mesh.head import Head
 from dermis.mesh.strands import Doubles, Roots, Strands, finer_roots, frames, points_of, seen_from
@@ -17,29 +17,21 @@ from dermis.specular.hair import absorption_per_mm
 _LASHES_DARKER = 1.6
 
 
-class _Grown(NamedTuple):
-    """Hairs of one kind on one side; all but `roots` in the space of the person."""
-
-    roots: Roots
-    knots: Doubles
-    radius: Doubles
-    darker: float
-
-
 def groomed(head: Head, plain: Head, mean_mm: Doubles, levels: int, look: HairLook) -> Head:
     """The head with brows and lashes.
 
     plain : the head before it was subdivided `levels` times
     mean_mm : (p, 3) control points of the person whose brows are where the artist has them
     """
-    skin, parts = Skin(head.mesh), list[_Grown]()
+    skin, parts = Skin(head.mesh), list[Grown]()
     eyes = _eyes(plain)
     for side, eye in zip((1.0, -1.0), eyes, strict=True):
         rng = np.random.default_rng((look.seed, int(side > 0)))
         parts.append(_brow(head, plain, mean_mm, levels, look, skin, side, rng))
         for lid in (lashes.UPPER, lashes.LOWER):
             parts.append(_lashes(head, plain, mean_mm, levels, lid, side, eye, rng))
-    return replace(head, strands=_joined(head, parts, look))
+    hair = [*scalp_hair(head, plain, levels, look, skin), *beard_hair(head, plain, levels, look, skin)]
+    return replace(head, strands=_joined(head, parts, look), hair=_joined(head, hair, look) if hair else None)
 
 
 def _brow(
@@ -51,13 +43,13 @@ def _brow(
     skin: Skin,
     side: float,
     rng: np.random.Generator,
-) -> _Grown:
+) -> Grown:
     u, v, x, y = brows.places(rng)
     roots, there = front_places(plain.mesh, mean_mm, side * x, y)
     kept = np.flatnonzero(there)[: brows.count(look)]
     roots = finer_roots(plain.mesh, Roots(roots.quad[kept], roots.place[kept]), levels)
     root, _ = frames(head.mesh, roots, points_of(head.mesh))
-    return _Grown(roots, *brows.grown(skin, root, side, u[kept], v[kept], rng, look), 1.0)
+    return Grown(roots, *brows.grown(skin, root, side, u[kept], v[kept], rng, look), 1.0)
 
 
 def _lashes(
@@ -69,13 +61,13 @@ def _lashes(
     side: float,
     eye: Doubles,
     rng: np.random.Generator,
-) -> _Grown:
+) -> Grown:
     u, across = lashes.places(lid, rng)
     loop = np.array(lid.loop)
     loop = loop if side > 0 else mirrored(mean_mm, loop)
     roots = finer_roots(plain.mesh, beside_edges(plain.mesh, mean_mm, loop, u, across, eye), levels)
     root, _ = frames(head.mesh, roots, points_of(head.mesh))
-    return _Grown(roots, *lashes.grown(lid, root, eye, side, u, rng), _LASHES_DARKER)
+    return Grown(roots, *lashes.grown(lid, root, eye, side, u, rng), _LASHES_DARKER)
 
 
 def _eyes(plain: Head) -> list[Doubles]:
@@ -88,13 +80,16 @@ def _eyes(plain: Head) -> list[Doubles]:
     return found
 
 
-def _joined(head: Head, parts: list[_Grown], look: HairLook) -> Strands:
+def _joined(head: Head, parts: list[Grown], look: HairLook) -> Strands:
     roots = Roots(*(np.concatenate(each) for each in zip(*(part.roots for part in parts), strict=True)))
     knots, radius = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
     darker = np.concatenate([np.full(len(part.radius), part.darker) for part in parts])
+    bundle = np.concatenate([np.full(len(part.radius), part.bundle) for part in parts])
     rng = np.random.default_rng((look.seed, 2))
     much = darker * rng.lognormal(0.0, 0.15, len(darker)) * (rng.random(len(darker)) >= look.grey)
-    absorption = absorption_per_mm(much * look.eumelanin, much * look.pheomelanin)
+    absorption = absorption_per_mm(much * look.eumelanin, much * look.pheomelanin) / bundle[:, None]
     root, _ = frames(head.mesh, roots, points_of(head.mesh))
     ways = seen_from(head.mesh, roots, knots - root[:, None])
-    return Strands(roots, ways, radius.astype(np.float32), absorption.astype(np.float32))
+    cover = np.concatenate([np.full(len(part.radius), part.cover) for part in parts])
+    grown = radius.astype(np.float32), absorption.astype(np.float32), cover.astype(np.float32)
+    return Strands(roots, ways, *grown)
