@@ -16,7 +16,8 @@ from dermis.mesh.strands import Strands, corners, weights
 from dermis.scene.settings import Settings
 from dermis.specular.hair import hair_numbers
 
-_TILE = 8  # pixels along a side of the tiles that hairs are listed in
+TILE = 8
+"""Pixels along a side of the tiles that hairs are listed in."""
 _WAYS = 64  # chains of a tile on GPUs: one for each pixel's invocation to follow
 _FINE_WINDOW, _WINDOW = 256, 512  # texels across what hairs hold back of a light, half as many down
 _LAYERS = 5  # of depth there
@@ -25,7 +26,7 @@ _LINKS_OF_PIECE = 4  # for hairs in no more than a few tiles
 _MOST_LINKS = 1 << 22
 _SHADING = 12_000  # coarse hairs that shade as all do
 _LEAST_DRAWN = 5_000
-_DRAWN_PIXELS = 1.0  # width of the coarse hairs that are drawn
+_DRAWN_PIXELS, _DENSER = 0.45, 0.2  # width of the coarse hairs that are drawn, and more of it where hair hides hair
 _STRAND = np.dtype([("corner", "u4", 4), ("share", "f4", 4), ("absorption", "f4", 4)])  # in strands_pose.wgsl
 _HAIRS = np.dtype([("fine", "u4"), ("coarse", "u4"), ("shading", "u4"), ("wider", "f4")])  # in strand_knots.wgsl
 
@@ -52,6 +53,7 @@ class StrandTables:
     shading : coarse hairs that shade
     middle_mm : of the coarse hairs at rest (3,) [mm]
     wide_mm : they are on average [mm]
+    cover : of their roots by hair, on average [-]
     constants, window : pipeline constants of the shaders that read knots, and what hairs hold back
     """
 
@@ -65,6 +67,7 @@ class StrandTables:
     shading: int
     middle_mm: NDArray[np.float64]
     wide_mm: float
+    cover: float
     constants: Constants
     window: Constants
 
@@ -101,7 +104,7 @@ class StrandResources:
 def strand_numbers() -> dict[str, float]:
     """Numbers that the shaders of hairs fill in."""
     window = {"strand_layers": _LAYERS, "strand_window_words": _HEAD_WORDS}
-    return {"strand_tile": _TILE, **window, **hair_numbers()}
+    return {"strand_tile": TILE, **window, **hair_numbers()}
 
 
 def has_strands(head: Head, settings: Settings) -> bool:
@@ -124,7 +127,8 @@ def window_of(coarse: int) -> int:
 def drawn_of(tables: StrandTables, pixel_mm: float) -> int:
     """How many of the coarse hairs stand for all, as wide as a pixel of this size."""
     everything = tables.coarse.hairs * tables.wide_mm
-    return int(min(tables.coarse.hairs, max(_LEAST_DRAWN, everything / (_DRAWN_PIXELS * pixel_mm))))
+    wide = (_DRAWN_PIXELS + _DENSER * tables.cover) * pixel_mm
+    return int(min(tables.coarse.hairs, max(_LEAST_DRAWN, everything / wide)))
 
 
 def make_tables(device: Device, head: Head) -> StrandTables:
@@ -151,6 +155,7 @@ def make_tables(device: Device, head: Head) -> StrandTables:
         shading=shading,
         middle_mm=np.zeros(3) if head.hair is None else head.hair.middle_mm(head.mesh),
         wide_mm=0.0 if head.hair is None else 2.0 * float(head.hair.radius_mm[:, 0].mean()),
+        cover=0.0 if head.hair is None or head.hair.cover is None else float(head.hair.cover.mean()),
         constants=(("KNOTS", fine.knots), ("COARSE_KNOTS", coarse.knots)),
         window=(("STRAND_WINDOW", window_of(coarse.hairs)),),
     )
@@ -178,7 +183,7 @@ def skin_under(head: Head) -> tuple[float, ...]:
 
 def make_strand_picture(device: Device, tables: StrandTables, size: tuple[int, int]) -> StrandPicture:
     """Space for hairs in a picture of size (width, height), where each may cross all of it."""
-    across, down = (-(-side // _TILE) for side in size)
+    across, down = (-(-side // TILE) for side in size)
     pieces = tables.fine.pieces() + tables.coarse.pieces()
     links = _LINKS_OF_PIECE * pieces + tables.fine.hairs * (across + down)
     links = min(links, _MOST_LINKS, device.max_storage_bytes // 8)

@@ -9,13 +9,15 @@ import numpy as np
 from dermis.frame.geometry import HeadResources
 from dermis.frame.passes import each, program
 from dermis.frame.shape import Shape
-from dermis.frame.strands import StrandResources, StrandTables, drawn_of
+from dermis.frame.strands import TILE, StrandResources, StrandTables, drawn_of
 from dermis.gpu import Constants, Device, Recorder
 from dermis.gpu.program import Resources
 
 Look = tuple[Resources, Any, Constants]
 
 _ROWS, _ROUNDS = 8, 60_000
+_HEAD_MM = 100.0  # side of a square that has no more hair than a head seen from anywhere
+_CROWDED = 6.0  # pieces that a tile may list, over their mean
 _CLEARING = 64  # workgroups that empty the shadows of hairs, one for each light at least
 
 
@@ -51,7 +53,8 @@ def draw(
     looked = ("eye", "forward", "right", "up", "samples", "jitter", "shown")
     record = light.record("StrandView", **{name: view[name] for name in looked})
     size = picture.result.size[:2]
-    coarse = drawn_of(made, _pixel_mm(view, made, size[1]))
+    pixel_mm = _pixel_mm(view, made, size[1])
+    coarse = drawn_of(made, pixel_mm)
     record["coarse"], record["size"], record["skin"] = coarse, size, strands.skin
     record["wider"] = made.coarse.hairs / max(1, coarse)
     seen = {"strand_view": record, "drawn": made.drawn, "hairs": made.record}
@@ -69,7 +72,7 @@ def draw(
         shader = program(graph.device, "strands_draw_tiles.wgsl", made.constants + ways)
         graph.compute("strands", shader, bound, (width, height))
         return picture.result
-    rows = rows_of(graph.device, pieces)
+    rows = rows_of(graph.device, _most_in_tile(made, pieces, pixel_mm))
     shader = program(graph.device, "strands_draw.wgsl", (*made.constants, ("ROWS", rows)))
     graph.compute("strands", shader, bound, (width, -(-height // rows)))
     return picture.result
@@ -81,13 +84,21 @@ def _pixel_mm(view: Any, made: StrandTables, height: int) -> float:
     return 2.0 * float(np.linalg.norm(view["up"])) * max(deep, 1.0) / height
 
 
+def _most_in_tile(made: StrandTables, pieces: int, pixel_mm: float) -> int:
+    """Pieces that a tile may list: all the fine ones, and several times the mean of the coarse ones."""
+    tiles = max(1.0, (_HEAD_MM / (TILE * pixel_mm)) ** 2)
+    return int(made.fine.pieces() + min(1.0, _CROWDED / tiles) * (pieces - made.fine.pieces()))
+
+
 def rows_of(device: Device, pieces: int) -> int:
     """Pixels that an invocation draws one below the other.
 
+    pieces : in a tile, at most
+
     Software adapters run the whole shader for pixels without hairs too, unless a loop skips these. They also
-    leave a shader's loops, all together, after 65,535 rounds, and all hairs may lie in one tile.
+    leave a shader's loops, all together, after 65,535 rounds.
     """
-    return max(1, min(_ROWS, _ROUNDS // max(1, pieces))) if device.adapter.kind == "CPU" else 1
+    return max(1, min(_ROWS, _ROUNDS // max(1, 2 * pieces))) if device.adapter.kind == "CPU" else 1
 
 
 def _each(graph: Recorder, name: str, bound: Any, count: int, constants: Any = ()) -> None:

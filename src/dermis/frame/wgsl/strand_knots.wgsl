@@ -48,9 +48,17 @@ fn pieces_of(coarse: u32) -> u32 {
     return hairs.fine * (KNOTS - 1u) + coarse * (COARSE_KNOTS - 1u);
 }
 
-// Knot at which a piece begins: each hair has one more than pieces.
-fn piece_begin(piece: u32) -> u32 {
-    return piece + hair_of_piece(piece);
+// A piece as tiles list it: the knot at which it begins, and whether it is a hair's first and last.
+const FIRST_PIECE: u32 = 0x40000000u;
+const LAST_PIECE: u32 = 0x80000000u;
+
+fn listed_piece(begin: u32, hair: u32) -> u32 {
+    let k = begin - first_knot(hair);
+    return begin | select(0u, FIRST_PIECE, k == 0u) | select(0u, LAST_PIECE, k + 2u == knots_of(hair));
+}
+
+fn begin_of(listed: u32) -> u32 {
+    return listed & ~(FIRST_PIECE | LAST_PIECE);
 }
 
 // First of a hair's rows.

@@ -30,8 +30,17 @@ def groomed(head: Head, plain: Head, mean_mm: Doubles, levels: int, look: HairLo
         parts.append(_brow(head, plain, mean_mm, levels, look, skin, side, rng))
         for lid in (lashes.UPPER, lashes.LOWER):
             parts.append(_lashes(head, plain, mean_mm, levels, lid, side, eye, rng))
+    head = replace(head, strands=_joined(head, parts, look))
     hair = [*scalp_hair(head, plain, levels, look, skin), *beard_hair(head, plain, levels, look, skin)]
-    return replace(head, strands=_joined(head, parts, look), hair=_joined(head, hair, look) if hair else None)
+    return replace(head, hair=shuffled(_joined(head, hair, look), look.seed)) if hair else head
+
+
+def shuffled(strands: Strands, seed: int) -> Strands:
+    """The same hairs in no order, so that the first few are like all."""
+    order = np.random.default_rng((seed, 5)).permutation(len(strands))
+    roots = Roots(*(part[order] for part in strands.roots))
+    parts = {name: getattr(strands, name)[order] for name in ("knots_mm", "radius_mm", "absorption", "cover")}
+    return replace(strands, roots=roots, **parts)
 
 
 def _brow(

@@ -16,7 +16,7 @@ from dermis.mesh.strands import Doubles, finer_roots, frames, points_of
 MOST_PER_CM2 = 200.0
 """Hairs of the densest heads."""
 _DRAWN_PER_CM2 = 75.0  # each of which stands for some
-_STRAIGHT_KNOTS, _BENT_KNOTS = 5, 9
+_STRAIGHT_KNOTS, _BENT_KNOTS = 5, 7
 _GUIDES_PER_CM2 = 1.6
 _BEARD_PER_CM2 = 60.0
 _BEARD_DRAWN_PER_CM2 = 60.0
