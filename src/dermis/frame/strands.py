@@ -26,9 +26,12 @@ _LINKS_OF_PIECE = 4  # for hairs in no more than a few tiles
 _MOST_LINKS = 1 << 22
 _SHADING = 12_000  # coarse hairs that shade as all do
 _LEAST_DRAWN = 5_000
-_DRAWN_PIXELS, _DENSER = 0.45, 0.2  # width of the coarse hairs that are drawn, and more of it where hair hides hair
+_DRAWN_PIXELS = 0.45  # width of the coarse hairs that are drawn
+_DENSER = 0.2  # and more of it where hair hides hair
 _STRAND = np.dtype([("corner", "u4", 4), ("share", "f4", 4), ("absorption", "f4", 4)])  # in strands_pose.wgsl
-_HAIRS = np.dtype([("fine", "u4"), ("coarse", "u4"), ("shading", "u4"), ("wider", "f4")])  # in strand_knots.wgsl
+_HAIRS = np.dtype(
+    [("fine", "u4"), ("coarse", "u4"), ("shading", "u4"), ("wider", "f4")]
+)  # in strand_knots.wgsl
 
 
 class Counts(NamedTuple):

@@ -23,7 +23,12 @@ _CLEARING = 64  # workgroups that empty the shadows of hairs, one for each light
 
 def pose(graph: Recorder, made: StrandTables, shape: Shape) -> None:
     """Put the hairs where the skin is."""
-    bound = {"points": shape.surface["points"], "strands": made.strands, "knots": made.knots, "hairs": made.record}
+    bound = {
+        "points": shape.surface["points"],
+        "strands": made.strands,
+        "knots": made.knots,
+        "hairs": made.record,
+    }
     count = made.fine.hairs * made.fine.knots + made.coarse.hairs * made.coarse.knots
     _each(graph, "strands_pose.wgsl", bound | {"posed": made.posed}, count, made.constants)
 
@@ -31,7 +36,13 @@ def pose(graph: Recorder, made: StrandTables, shape: Shape) -> None:
 def shadow(graph: Recorder, strands: StrandResources, lit: Resources) -> None:
     """Find what the hairs hold back of each light that casts shadows."""
     made = strands.tables
-    bound = {**lit, "posed": made.posed, "windows": strands.shadows, "splatted": strands.shadows, "hairs": made.record}
+    bound = {
+        **lit,
+        "posed": made.posed,
+        "windows": strands.shadows,
+        "splatted": strands.shadows,
+        "hairs": made.record,
+    }
     pieces = made.fine.pieces() + made.coarse.pieces(made.shading)
     constants = made.constants + made.window
     shader = program(graph.device, "strands_window.wgsl", constants)

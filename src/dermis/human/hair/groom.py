@@ -1,14 +1,15 @@
-"""Brows and lashes of a person, rooted in the same places of everyone's skin."""
+"""Hair, beard, brows and lashes of a person, rooted in the same places of everyone's skin."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+
 import numpy as np
 
 from dermis.human.hair import brows, lashes
-from dermis.human.hair.head_hair import beard_hair, scalp_hair
-from dermis.human.hair.look import HairLook
 from dermis.human.hair.grown import Grown
+from dermis.human.hair.head_hair import Ground, beard_hair, scalp_hair
+from dermis.human.hair.look import HairLook
 from dermis.human.hair.skin import Skin, beside_edges, front_places, mirrored
 from dermis.mesh.head import Head
 from dermis.mesh.strands import Doubles, Roots, Strands, finer_roots, frames, points_of, seen_from
@@ -17,11 +18,14 @@ from dermis.specular.hair import absorption_per_mm
 _LASHES_DARKER = 1.6
 
 
-def groomed(head: Head, plain: Head, mean_mm: Doubles, levels: int, look: HairLook) -> Head:
-    """The head with brows and lashes.
+def groomed(
+    head: Head, plain: Head, mean_mm: Doubles, levels: int, look: HairLook, recession: float = 0.0
+) -> Head:
+    """The head with hair, beard, brows and lashes.
 
     plain : the head before it was subdivided `levels` times
     mean_mm : (p, 3) control points of the person whose brows are where the artist has them
+    recession : see `SkinLook`
     """
     skin, parts = Skin(head.mesh), list[Grown]()
     eyes = _eyes(plain)
@@ -31,14 +35,15 @@ def groomed(head: Head, plain: Head, mean_mm: Doubles, levels: int, look: HairLo
         for lid in (lashes.UPPER, lashes.LOWER):
             parts.append(_lashes(head, plain, mean_mm, levels, lid, side, eye, rng))
     head = replace(head, strands=_joined(head, parts, look))
-    hair = [*scalp_hair(head, plain, levels, look, skin), *beard_hair(head, plain, levels, look, skin)]
-    return replace(head, hair=shuffled(_joined(head, hair, look), look.seed)) if hair else head
+    ground = Ground(head, plain, levels, skin)
+    hair = [*scalp_hair(ground, look, recession), *beard_hair(ground, look)]
+    return replace(head, hair=_shuffled(_joined(head, hair, look), look.seed)) if hair else head
 
 
-def shuffled(strands: Strands, seed: int) -> Strands:
+def _shuffled(strands: Strands, seed: int) -> Strands:
     """The same hairs in no order, so that the first few are like all."""
     order = np.random.default_rng((seed, 5)).permutation(len(strands))
-    roots = Roots(*(part[order] for part in strands.roots))
+    roots = Roots(strands.roots.quad[order], strands.roots.place[order])
     parts = {name: getattr(strands, name)[order] for name in ("knots_mm", "radius_mm", "absorption", "cover")}
     return replace(strands, roots=roots, **parts)
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import get_args
-
-from typing import Literal
+from typing import Literal, get_args
 
 from dermis.errors import refuse
 
@@ -25,12 +23,12 @@ RANGES = {
 class HairLook:
     """Hair of the head, beard, brows and lashes.
 
-    style : "none" for a bald or shaved head, "cropped" for hair of one length that stands up, "short" for hair that is
-        combed to the side and shorter at the sides and the nape
+    style : "none" for a bald or shaved head, "cropped" for hair of one length that stands up, "short" for
+        hair that is combed to the side and shorter at the sides and the nape
     length_mm : of the hair of the head where it is longest, 1 to 60 [mm]
     density : of the hair of the head, 0 to 1; 1 is 200 hairs on a square centimetre [-]
     curl : from straight, 0, to tightly coiled, 1 [-]
-    recession : how far hair has left temples, forehead and crown, 0 to 1 [-]
+    fade : how much shorter short hair is at the sides and the nape than on top, 0 to 1 [-]
     beard_mm : length of the beard, 0 for none, to 30 [mm]
     bushy : of brows, from 0, sparse and short, to 1, dense and long [-]
     grey : share of hairs without pigment, 0 to 1 [-]
@@ -42,7 +40,7 @@ class HairLook:
     length_mm: float = 6.0
     density: float = 0.85
     curl: float = 0.1
-    recession: float = 0.0
+    fade: float = 0.6
     beard_mm: float = 0.0
     bushy: float = 0.4
     grey: float = 0.0

@@ -117,8 +117,14 @@ def _surface(device: Device, painting: Painting, look: SkinLook, side: int) -> R
 
 def _tables(device: Device, look: SkinLook) -> Resources:
     folds = face.folds()
-    tables = [textures.noise_table(), textures.dot_table(), face.zones(), folds.curves, folds.knots]
-    tables += [folds.first.astype(np.float32), face.hairline()]
+    tables = [
+        textures.noise_table(),
+        textures.dot_table(),
+        face.zones(look.recession),
+        folds.curves,
+        folds.knots,
+    ]
+    tables += [folds.first.astype(np.float32), face.hairline(look.recession)]
     data = np.concatenate([table.ravel() for table in tables])
     padded = np.pad(data, (0, -len(data) % _TEXEL))
     colours = colour_tables(look)
