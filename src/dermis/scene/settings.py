@@ -52,7 +52,7 @@ class Settings(Plain):
     background: Colour = (0.0, 0.0, 0.0)
     """Colour behind the head, linear Rec. 709."""
     strands: bool = True
-    """Hairs of heads that have them, as the human's brows and lashes."""
+    """Hairs of heads that have them, as the human's hair, beard, brows and lashes."""
     parts: Literal["all", "diffuse", "specular"] = "all"
     """Which light is shown: "all", only the "diffuse" from below the surface, or the "specular" off it."""
 

@@ -16,6 +16,8 @@ from dermis.mesh.strands import Doubles, Roots, Strands, finer_roots, frames, po
 from dermis.specular.hair import absorption_per_mm
 
 _LASHES_DARKER = 1.6
+_ALIKE = 5  # hairs of head and beard whose mean one that is drawn has the colour of
+_LEAST_EUMELANIN = 0.07  # white hair is not quite white
 
 
 def groomed(
@@ -34,10 +36,13 @@ def groomed(
         parts.append(_brow(head, plain, mean_mm, levels, look, skin, side, rng))
         for lid in (lashes.UPPER, lashes.LOWER):
             parts.append(_lashes(head, plain, mean_mm, levels, lid, side, eye, rng))
-    head = replace(head, strands=_joined(head, parts, look))
+    head = replace(head, strands=_joined(head, parts, _absorption(parts, look)))
     ground = Ground(head, plain, levels, skin)
     hair = [*scalp_hair(ground, look, recession), *beard_hair(ground, look)]
-    return replace(head, hair=_shuffled(_joined(head, hair, look), look.seed)) if hair else head
+    if not hair:
+        return head
+    joined = _joined(head, hair, _mixed_absorption(hair, look))
+    return replace(head, hair=_shuffled(joined, look.seed))
 
 
 def _shuffled(strands: Strands, seed: int) -> Strands:
@@ -94,16 +99,41 @@ def _eyes(plain: Head) -> list[Doubles]:
     return found
 
 
-def _joined(head: Head, parts: list[Grown], look: HairLook) -> Strands:
+def _joined(head: Head, parts: list[Grown], absorption: Doubles) -> Strands:
+    """All hairs of some kinds.
+
+    absorption : (n, 3) of single hairs [1/mm]
+    """
     roots = Roots(*(np.concatenate(each) for each in zip(*(part.roots for part in parts), strict=True)))
     knots, radius = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
-    darker = np.concatenate([np.full(len(part.radius), part.darker) for part in parts])
-    bundle = np.concatenate([np.full(len(part.radius), part.bundle) for part in parts])
-    rng = np.random.default_rng((look.seed, 2))
-    much = darker * rng.lognormal(0.0, 0.15, len(darker)) * (rng.random(len(darker)) >= look.grey)
-    absorption = absorption_per_mm(much * look.eumelanin, much * look.pheomelanin) / bundle[:, None]
+    bundle, cover = (_each(parts, name) for name in ("bundle", "cover"))
     root, _ = frames(head.mesh, roots, points_of(head.mesh))
     ways = seen_from(head.mesh, roots, knots - root[:, None])
-    cover = np.concatenate([np.full(len(part.radius), part.cover) for part in parts])
-    grown = radius.astype(np.float32), absorption.astype(np.float32), cover.astype(np.float32)
-    return Strands(roots, ways, *grown)
+    numbers = radius, absorption / bundle[:, None], cover
+    return Strands(roots, ways, *(one.astype(np.float32) for one in numbers))
+
+
+def _each(parts: list[Grown], name: str) -> Doubles:
+    """(n,) a number of the kinds, for each of their hairs."""
+    return np.concatenate([np.full(len(part.radius), getattr(part, name)) for part in parts])
+
+
+def _absorption(parts: list[Grown], look: HairLook) -> Doubles:
+    """(n, 3) of brows and lashes, of which some have no pigment [1/mm]."""
+    rng, darker = np.random.default_rng((look.seed, 2)), _each(parts, "darker")
+    n = len(darker)
+    much = darker * rng.lognormal(0.0, 0.15, n) * (rng.random(n) >= look.grey)
+    return absorption_per_mm(much * look.eumelanin, much * look.pheomelanin)
+
+
+def _mixed_absorption(parts: list[Grown], look: HairLook) -> Doubles:
+    """(n, 3) of hairs that stand for some, of which some have no pigment [1/mm].
+
+    The mean of white and of brown hairs is grey, where brown hair with less pigment would be blond.
+    """
+    rng, n = np.random.default_rng((look.seed, 6)), sum(len(part.radius) for part in parts)
+    white = rng.binomial(_ALIKE, look.grey, n)[:, None] / _ALIKE
+    much = rng.lognormal(0.0, 0.12, n)
+    dark = absorption_per_mm(much * look.eumelanin, much * look.pheomelanin)
+    mixed = (1.0 - white) * dark + white * dark.mean(axis=1, keepdims=True)
+    return np.maximum((1.0 - white) ** 2 * mixed, absorption_per_mm(_LEAST_EUMELANIN, 0.0))

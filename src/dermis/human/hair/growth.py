@@ -79,9 +79,12 @@ def _between(root_mm: Doubles, guide_mm: Doubles, ways: Doubles) -> Doubles:
     from scipy.spatial import cKDTree
 
     far, near = cKDTree(guide_mm).query(root_mm, k=_BESIDE)
-    share = 1.0 / (far**2 + 4.0)
+    share = 1.0 / (np.asarray(far) ** 2 + 4.0)
     share /= share.sum(axis=1, keepdims=True)
-    return np.asarray(sum(share[:, k, None, None] * ways[near[:, k]] for k in range(_BESIDE)))
+    found = np.zeros((len(root_mm), *ways.shape[1:]))
+    for beside, which in zip(share.T, np.asarray(near).T, strict=True):
+        found += beside[:, None, None] * ways[which]
+    return found
 
 
 def _astray(ways: Doubles, normal: Doubles, rough: Roughness, rng: np.random.Generator) -> Doubles:
@@ -108,7 +111,7 @@ def _tufted(root_mm: Doubles, ways: Doubles, t: Doubles, much: float, rng: np.ra
 def _waves(n: int, t: Doubles, rng: np.random.Generator) -> Doubles:
     """(n, k, 3) smooth, 0 at roots."""
     found = np.zeros((n, len(t), 3))
-    for waves in (0.7, 1.6):
+    for waves in (0.5, 1.1):
         phase, size = rng.uniform(0, 2 * np.pi, (n, 1, 3)), rng.uniform(-1, 1, (n, 1, 3))
         found += size * np.sin(2 * np.pi * waves * t[None, :, None] + phase) / waves
     return np.asarray((found - found[:, :1]) * np.minimum(2 * t, 1.0)[None, :, None])

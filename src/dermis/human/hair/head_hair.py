@@ -104,7 +104,7 @@ def _stranded(
 
 
 def _roughness(look: HairLook) -> Roughness:
+    tight = max(look.curl - _TIGHT, 0.0) * 2
     if look.style == "cropped":
-        tight = max(look.curl - _TIGHT, 0.0) * 2
-        return Roughness(0.25, 0.12, 0.1 + 0.2 * tight, 0.05 + 0.1 * look.curl, 0.9 * tight, 2.0)
-    return Roughness(0.14, 0.14, 0.5, 0.03 + 0.12 * look.curl, 1.6 * max(look.curl - 0.35, 0.0), 2.0)
+        return Roughness(0.25, 0.12, 0.1 + 0.2 * tight, 0.04 + 0.06 * look.curl, 0.9 * tight, 2.0)
+    return Roughness(0.14, 0.14, 0.5, 0.025 + 0.04 * look.curl, 1.6 * tight, 2.0)

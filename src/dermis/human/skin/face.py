@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from functools import cache
+from functools import cache, lru_cache
 from itertools import groupby
 from typing import NamedTuple
 
@@ -24,6 +24,7 @@ DEGREES = 2
 """Angle between the heights of `hairline`."""
 _EDGES = 180 // DEGREES + 1
 _PIECES = 4
+_MOST_KEPT = 32  # tables of receding hair
 
 
 _CROWN = "crown"  # zone that thin hair leaves
@@ -31,7 +32,7 @@ _TEMPLES_MM, _FOREHEAD_MM = 22.0, 16.0  # by which hair recedes at most, there a
 _TEMPLES, _TEMPLES_WIDE, _FOREHEAD_WIDE = 33.0, 15.0, 38.0  # where these are and how wide [degrees]
 
 
-@cache
+@lru_cache(maxsize=_MOST_KEPT)
 def zones(recession: float = 0.0) -> Floats:
     """(k, 20) of each zone its centre and 0, one over its radii and 0 [mm], and its amounts.
 
@@ -46,7 +47,7 @@ def zones(recession: float = 0.0) -> Floats:
     return np.hstack([centres, none, 1.0 / radii, none, amounts]).astype(np.float32)
 
 
-@cache
+@lru_cache(maxsize=_MOST_KEPT)
 def hairline(recession: float = 0.0) -> Floats:
     """(91,) height of the edge of the hair, by the angle from the front [mm].
 
