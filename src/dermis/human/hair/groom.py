@@ -136,4 +136,4 @@ def _mixed_absorption(parts: list[Grown], look: HairLook) -> Doubles:
     much = rng.lognormal(0.0, 0.12, n)
     dark = absorption_per_mm(much * look.eumelanin, much * look.pheomelanin)
     mixed = (1.0 - white) * dark + white * dark.mean(axis=1, keepdims=True)
-    return np.maximum((1.0 - white) ** 2 * mixed, absorption_per_mm(_LEAST_EUMELANIN, 0.0))
+    return np.asarray(np.maximum((1.0 - white) ** 2 * mixed, absorption_per_mm(_LEAST_EUMELANIN, 0.0)))
