@@ -50,12 +50,11 @@ def wool(count: int, absorption: float, cover: float = 0.0) -> Head:
 def test_brightness_does_not_depend_on_how_many_hairs_are_drawn(
     renderer: Renderer, absorption: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A quarter of them, four times as wide, seen and shading."""
+    """A quarter of them, four times as wide."""
     scene = replace(lit(wool(6000, absorption)), lights=(frontal(shadows=True),))
     shown = []
     for share in (1, 4):
         monkeypatch.setattr(drawing, "drawn_of", lambda made, _, share=share: made.coarse.hairs // share)
-        monkeypatch.setattr(hairs, "_SHADING", 6000 // share)
         renderer.forget()
         shown.append(picture(renderer, scene, size=(48, 48))[..., :3])
     renderer.forget()
@@ -90,7 +89,7 @@ def test_hair_shades_hair(renderer: Renderer, absorption: float, low: float, hig
     y = np.linspace(-4, 4, 80)
     roof = np.column_stack([np.full(80, -14.0), y, np.full(80, 9.0)])
     seen = []
-    for above in (roof[:1] + [0.0, 40.0, 0.0], roof):
+    for above in (roof[:1] + np.array([0.0, 40.0, 0.0]), roof):
         begins = np.concatenate([[[-12.0, 0.0, 0.6]], above])
         head = hairy(begins, begins * [-1, 1, 1], 0.1, absorption)
         scene = replace(lit(head), lights=(frontal(shadows=True),))

@@ -38,6 +38,7 @@ class Roughness(NamedTuple):
 def guides(skin: Skin, root_mm: Doubles, combed: Combed, knots: int) -> Doubles:
     """(n, k, 3) ways from roots (n, 3) to knots, over the skin [mm]."""
     foot, normal = skin.foot(root_mm)
+    off = root_mm - foot  # as far as the skin of few vertices is from the surface
     way, height = combed.way, np.zeros(len(root_mm))
     step = combed.length_mm / (knots - 1)
     found = [root_mm]
@@ -46,7 +47,7 @@ def guides(skin: Skin, root_mm: Doubles, combed: Combed, knots: int) -> Doubles:
         height = np.maximum(height + step * np.sin(rise), _LEAST_OVER_MM)
         way = along_skin(way, normal)
         foot, normal = skin.foot(foot + (step * np.cos(rise))[:, None] * way)
-        found.append(foot + height[:, None] * normal)
+        found.append(foot + off + height[:, None] * normal)
     return np.stack(found, axis=1) - root_mm[:, None]
 
 

@@ -48,7 +48,9 @@ def drawn_hair(rng: np.random.Generator, origin: Origin, usual: HairLook) -> Hai
     man = origin.sex > 0.5
     bare, cropped = (0.12, 0.5) if man else (0.03, 0.25)
     curl = float(np.clip(usual.curl + 0.12 * n[0], 0.0, 1.0))
-    style: Style = "none" if share < bare else "cropped" if share < cropped or curl > _TIGHT else "short"
+    style: Style = (
+        "none" if share < bare else "cropped" if share < cropped or usual.curl > _TIGHT else "short"
+    )
     usual_mm = _CROPPED_MM if style == "cropped" else usual.length_mm if usual.style == "short" else _SHORT_MM
     length = usual_mm * float(np.exp((0.3 if style == "cropped" else 0.15) * n[1]))
     beard = float(np.exp(rng.uniform(np.log(0.8), np.log(_LONGEST_BEARD_MM))))

@@ -21,6 +21,10 @@ FIELDS = ("lips", "mouth", "lids")
 """Distances from borders [mm]: of the lips, positive inside; of the mouth, negative inside; from the edges of
 the lids."""
 _UNIT_MM = 0.01
+_HIGHEST_MM, _WRAPPED_MM = (
+    200.0,
+    655.36,
+)  # the file's 16 bits end above the edge of the breast, and begin anew
 
 
 @cache
@@ -31,6 +35,7 @@ def average() -> tuple[Floats, Floats]:
         places, fields = (
             found[name].astype(np.float32) * np.float32(_UNIT_MM) for name in ("places", "fields")
         )
+    places[places[:, 1] > _HIGHEST_MM, 1] -= _WRAPPED_MM
     return places, fields
 
 
