@@ -1,7 +1,7 @@
 """Short hair and beards.
 
-Tens of thousands of hairs on the skin of whoever it is, cropped, combed or coiled, with the pigments of brown, red
-and grey. They shade each other, and pass on light.
+Tens of thousands of hairs on whoever it is, cropped, combed or coiled, by their pigments. They shade each
+other, and pass on light.
 
 Deck: +
 Equation: T = exp(-n (1 - a_f))
