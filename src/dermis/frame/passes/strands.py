@@ -109,7 +109,7 @@ def rows_of(device: Device, pieces: int) -> int:
     Software adapters run the whole shader for pixels without hairs too, unless a loop skips these. They also
     leave a shader's loops, all together, after 65,535 rounds.
     """
-    return max(1, min(_ROWS, _ROUNDS // max(1, 2 * pieces))) if device.adapter.kind == "CPU" else 1
+    return max(1, min(_ROWS, _ROUNDS // max(1, pieces))) if device.adapter.kind == "CPU" else 1
 
 
 def _each(graph: Recorder, name: str, bound: Any, count: int, constants: Any = ()) -> None:

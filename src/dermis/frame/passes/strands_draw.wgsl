@@ -12,18 +12,10 @@ fn covered(pixel: vec2u, first: u32, under: vec4f) -> vec4f {
     let depths = depths_at(pixel);
     take_none();
     for (var link = first; link != 0u; link = links[link - 1u].y) {
-        let listed = links[link - 1u].x;
-        let place = vec2f(pixel) + 0.5;
-        loop { // instead of a branch, whose both sides software adapters run
-            if (!is_near(place, listed)) {
-                break;
-            }
-            var one = fragment_of(place, hold(listed));
-            one.cover *= free_share(one.depth, depths);
-            if (one.cover > 0.0) {
-                take(one);
-            }
-            break;
+        var one = fragment_of(vec2f(pixel) + 0.5, hold(links[link - 1u].x));
+        one.cover *= free_share(one.depth, depths);
+        if (one.cover > 0.0) {
+            take(one);
         }
     }
     return laid_over(under);

@@ -76,21 +76,6 @@ fn unit(way: vec2f) -> vec2f {
     return way / max(length(way), 1e-6);
 }
 
-// Whether a piece may cover some of a pixel; less work than finding out how much.
-fn is_near(place: vec2f, listed: u32) -> bool {
-    let begin = begin_of(listed);
-    let a = drawn[begin].place;
-    let way = drawn[begin + 1u].place - a;
-    let off = place - a;
-    let square = max(dot(way, way), 1e-8);
-    let along = dot(off, way);
-    let across = off.x * way.y - off.y * way.x;
-    let reach = 0.5 * max(max(drawn[begin].width, drawn[begin + 1u].width), 1.0) + 0.5;
-    // at a bend the line between two pieces leans by less than a right angle
-    let beyond = reach * sqrt(square);
-    return across * across < reach * reach * square && along > -beyond && along < square + beyond;
-}
-
 fn hold(listed: u32) -> Held {
     let begin = begin_of(listed);
     let a = drawn[begin];
