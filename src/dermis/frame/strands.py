@@ -19,12 +19,12 @@ from dermis.specular.hair import hair_numbers
 TILE = 8
 """Pixels along a side of the tiles that hairs are listed in."""
 _WAYS = 64  # chains of a tile on GPUs: one for each pixel's invocation to follow
-_FINE_WINDOW, _WINDOW = 256, 384  # texels across what hairs hold back of a light, half as many down
+_FINE_WINDOW, _WINDOW = 256, 288  # texels across what hairs hold back of a light, half as many down
 _LAYERS = 5  # of depth there
 _HEAD_WORDS = 8  # before them
 _LINKS_OF_PIECE = 4  # for hairs in no more than a few tiles
 _MOST_LINKS = 1 << 22
-_SHADING = 16_000  # coarse hairs that shade as all do
+_SHADING = 32_000  # coarse hairs that shade as all do
 _LEAST_DRAWN = 5_000
 _DRAWN_PIXELS = 0.45  # width of the coarse hairs that are drawn
 _DENSER = 0.2  # and more of it where hair hides hair
