@@ -111,7 +111,7 @@ def _strands(memo: Memo, device: Device, asked: Asked) -> StrandResources | None
         return None
     tables = memo.keep(make_tables, device, asked.head.bare)
     picture = memo.keep(make_strand_picture, device, tables, asked.settings.size)
-    shadows = memo.keep(make_strand_shadows, device, asked.shadow_layers, of=asked.view)
+    shadows = memo.keep(make_strand_shadows, device, asked.shadow_layers, tables, of=asked.view)
     return StrandResources(tables, picture, shadows, memo.keep(skin_under, asked.head))
 
 

@@ -24,7 +24,8 @@ class Head:
     attribution : whom to credit when a picture of it is shown, empty when that is not required
     rig : what moves it; None for a head whose points move only if all their places are given
     eyes : its eyeballs, where they are of true shape
-    strands : its hairs, None for none
+    strands : its brows and lashes, None for none
+    hair : of head and beard, in no order: from afar the first few, wider, stand for all; None for none
     note : what could not be made of its file, and why; empty for nothing
     """
 
@@ -35,6 +36,7 @@ class Head:
     rig: Rig | None = None
     eyes: Eyes | None = None
     strands: Strands | None = None
+    hair: Strands | None = None
     note: str = ""
 
     @cached_property

@@ -38,8 +38,8 @@ def subdivide_head(head: Head, levels: int) -> Head:
     mesh, stencils = subdivide(head.mesh, levels)
     if stencils is None:
         return head
-    strands = head.strands and head.strands.refined(head.mesh, mesh, levels)
-    return replace(head, mesh=mesh, rig=replace(head.control, stencils=stencils), strands=strands)
+    strands, hair = (part and part.refined(head.mesh, mesh, levels) for part in (head.strands, head.hair))
+    return replace(head, mesh=mesh, rig=replace(head.control, stencils=stencils), strands=strands, hair=hair)
 
 
 def subdivide(mesh: Mesh, levels: int) -> Subdivided:

@@ -88,7 +88,7 @@ class Settings(Plain):
     """Roughness of the mirror in which the environment behind the head is seen, at least 0.05; 0 for none, so
     that it is sharp."""
     strands: bool = True
-    """Hairs of heads that have them, as the human's brows and lashes."""
+    """Hairs of heads that have them, as the human's hair, beard, brows and lashes."""
     parts: Literal["all", "diffuse", "specular"] = "all"
     """Which light is shown: "all", only the "diffuse" from below the surface, or the "specular" off it."""
 

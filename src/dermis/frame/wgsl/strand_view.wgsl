@@ -4,11 +4,12 @@ struct StrandView {
     eye: vec3f,
     samples: u32, // in a pixel
     forward: vec3f,
-    hairs: u32, // how many
+    coarse: u32, // coarse hairs that stand for all
     right: vec3f, // scaled as in shade.wgsl
     up: vec3f,
     shown: vec2f, // factors of light from below the skin and of reflected light, which that of hairs counts as
     size: vec2f, // of the picture [pixel]
+    wider: f32, // than they are, for coarse hairs to cover what all do
     skin: vec3f, // albedo of the skin under the hairs
     jitter: array<vec4f, 64>, // sample places in the pixel, 0..1
 }

@@ -48,7 +48,7 @@ def given_for(surface: Painting, look: SkinLook, side: int) -> Given:
     text = _text(SKIN)
     names = set(struct_dtype(text, "Paint").names or ()) & set(vars(look))
     paint = record_of(text, "Paint", side=side, **{name: getattr(look, name) for name in names})
-    tables = np.ndarray((), struct_dtype(text, "Tables"), _face())
+    tables = np.ndarray((), struct_dtype(text, "Tables"), _face(look.recession))
     return Given(paint, tables, colour_tables(look), surface)
 
 
@@ -63,11 +63,18 @@ def _text(shader: str) -> str:
     return source_of(PASSES / shader, shader_folders()).text
 
 
-def _face() -> bytes:
+def _face(recession: float) -> bytes:
     """Noises, dots, zones, folds and the edge of the hair, as spot.wgsl reads them."""
-    folds, edge = face.folds(), face.hairline()
+    folds, edge = face.folds(), face.hairline(recession)
     ends = np.column_stack([folds.first[:-1], folds.first[1:] - 1]).astype(np.float32)
     curves = np.pad(np.hstack([folds.curves, ends]), ((0, 0), (0, _TEXEL - 2)))
     hairline = np.pad(np.column_stack([edge, np.append(edge[1:], edge[-1])]), ((0, 0), (0, _TEXEL - 2)))
-    tables = textures.noise_table(), textures.dot_table(), face.zones(), curves, folds.knots, hairline
+    tables = (
+        textures.noise_table(),
+        textures.dot_table(),
+        face.zones(recession),
+        curves,
+        folds.knots,
+        hairline,
+    )
     return b"".join(table.tobytes() for table in tables)
