@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+import warnings
+from typing import Any
 
 COMMANDS = {
     "render": "Render a head to a PNG (sRGB) or EXR (linear float) image.",
@@ -36,13 +38,31 @@ def main() -> None:
         shown = None if sys.argv[1:2] == [name] else summary
         app.command(f"dermis.cli.{name}:{name}", name=name, help=shown, version_flags=())
     try:
-        sys.exit(app(sys.argv[1:], exit_on_error=False, print_error=False) or 0)
+        with warnings.catch_warnings():
+            _show_notes()
+            sys.exit(app(sys.argv[1:], exit_on_error=False, print_error=False) or 0)
     except DermisError as error:
         _fail(str(error))
     except CycloptsError as error:
         _fail(explain(error))
     except KeyboardInterrupt:
         sys.exit(130)
+
+
+def _show_notes() -> None:
+    """Print the package's own warnings as notes, each once."""
+    from dermis.errors import DermisWarning
+
+    usual = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *more: Any, **named: Any) -> None:
+        if issubclass(category, DermisWarning):
+            sys.stderr.write(f"note: {message}\n")
+        else:
+            usual(message, category, *more, **named)
+
+    warnings.simplefilter("default", DermisWarning)
+    warnings.showwarning = show
 
 
 def _fail(message: str) -> None:

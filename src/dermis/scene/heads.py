@@ -9,13 +9,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dermis.errors import refuse
+from dermis.errors import notify, refuse
 from dermis.mesh.check import check_head_height
 from dermis.mesh.formats import is_gltf
 from dermis.mesh.gltf.pictures import embedded_maps
 from dermis.mesh.head import Head
 from dermis.mesh.load import load_rigged
-from dermis.mesh.maps import load_maps
+from dermis.mesh.maps import Maps, load_maps
+from dermis.mesh.obj_maps import obj_maps
 from dermis.mesh.samples import SAMPLES, Sample, fetch
 from dermis.mesh.subdivide import subdivide_head
 from dermis.scene.head_table import NormalY, Up, VOrigin
@@ -49,8 +50,8 @@ def load_head(
 
     "human:7" is the person drawn by the seed 7, and a .json file of `dermis head` one by its numbers.
 
-    Options replace what a sample or a glTF file has of its own. Morph targets and bones of a glTF file move
-    the head (`Pose`); it rests as the file has it, at the default weights of its targets.
+    Options replace what a sample, a glTF file or an OBJ file's .mtl has of its own. Morph targets and bones
+    of a glTF file move the head (`Pose`); it rests as the file has it, at the default weights of its targets.
 
     colour, normal, height, specular, roughness : image files; see `load_maps`
     height_mm : relief of one grey level of an 8-bit height map [mm]
@@ -62,7 +63,8 @@ def load_head(
     subdivide : levels of subdivision, 0 to 3: Catmull-Clark for a file of quads, else Loop; the human has one
         at least
 
-    Raises DermisError for files that cannot be rendered as a head.
+    Raises DermisError for files that cannot be rendered as a head; warns with DermisWarning of pictures of
+    an .mtl that are left out.
     """
     name, path = str(head), Path(head)
     own = {"colour": colour, "normal": normal, "height": height}
@@ -89,19 +91,42 @@ def load_head(
     chosen = _chosen(own, files)
     if height is None and height_mm is None:
         height_mm = files.get("height_mm")
-    if height_mm is not None and chosen["height"] is None:
-        came = f"{height_mm} came without a height map"
-        refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
+    obj = path if sample is None and path.suffix.lower() == ".obj" else None
     with ThreadPoolExecutor(1) as beside:
-        reading = beside.submit(load_maps, **chosen, height_mm=height_mm, normal_y=normal_y)
+        reading = beside.submit(_read_maps, obj, chosen, tuple(opaque), height_mm, normal_y)
         rigged = load_rigged(path, unit_mm=unit_mm, v_origin=v_origin, up=up, opaque=tuple(opaque))
         check_head_height(rigged.mesh, name, unit_mm)
-        maps = reading.result()
+        maps, notice = reading.result()
+    _check_height(height_mm, maps.height)
+    if notice:
+        notify(notice)
     thanks = f"{sample.attribution}, {sample.licence}" if sample else ""
     made = subdivide_head(Head(name, rigged.mesh, maps, thanks, rigged.rig), subdivide)
     if subdivide and made.rig is not None:  # sequences of files have places for the file's own vertices
         made = replace(made, rig=replace(made.rig, corner=rigged.mesh.point))
     return made
+
+
+def _read_maps(
+    obj: Path | None,
+    chosen: dict[str, Any],
+    opaque: tuple[str, ...],
+    height_mm: float | None,
+    normal_y: NormalY,
+) -> tuple[Maps, str]:
+    """The maps that are given, and those that an OBJ file's materials name for other roles; a notice."""
+    given = {role: file for role, file in chosen.items() if file is not None}
+    loaded = load_maps(**given, height_mm=height_mm, normal_y=normal_y)
+    if obj is None:
+        return loaded, ""
+    named, notice = obj_maps(obj, opaque=opaque, given=given, height_mm=height_mm, normal_y=normal_y)
+    return replace(named, **{role: getattr(loaded, role) for role in given}), notice
+
+
+def _check_height(height_mm: float | None, height: object) -> None:
+    if height_mm is not None and height is None:
+        came = f"{height_mm} came without a height map"
+        refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
 
 
 def _check_kind(sample: Sample) -> None:
@@ -126,9 +151,7 @@ def _human(
     for option, usual in (("unit_mm", None), ("v_origin", "auto"), ("up", "y"), ("opaque", ())):
         if told[option] not in (usual, list(usual or ())):
             refuse(option, "a file that it tells of", f"it came with {HUMAN!r}", "Leave it out")
-    if height_mm is not None and maps["height"] is None:
-        came = f"{height_mm} came without a height map"
-        refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
+    _check_height(height_mm, maps["height"])
     given: dict[str, Any] = {role: file for role, file in maps.items() if file is not None}
     loaded = load_maps(**given, height_mm=height_mm, normal_y=normal_y) if given else None
     made = _person(name).head(subdivide=subdivide or 1)
