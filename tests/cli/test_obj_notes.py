@@ -19,6 +19,5 @@ def test_a_missing_picture_is_one_note(run: Run, folder: Path) -> None:
     ended = run("render", "head.obj", "--size", "32x32", "--atlas", "64", "-o", "out.png")
     assert ended.code == 0 and (folder / "out.png").is_file()
     lines = ended.stderr.splitlines()
-    assert lines[0].startswith("note: head.obj: ") and lines[1:] == [
-        "  map_Kd: gone.png is not in its folder"
-    ]
+    assert lines[0].startswith("note: head.obj: ")
+    assert lines[1:] == ["  map_Kd: gone.png is not in its folder"]

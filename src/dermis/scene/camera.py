@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -17,6 +18,14 @@ _DISTANCE_MM = 1100.0  # a portrait lens' distance: closer makes noses large
 
 class Camera(Plain):
     """Where the picture is taken from."""
+
+    meant: ClassVar[Mapping[str, str]] = {
+        "eye": "position",
+        "location": "position",
+        "look_at": "target",
+        "field_of_view": "frame_mm (height of what is shown at the target)",
+        "fov": "frame_mm (height of what is shown at the target)",
+    }
 
     position: Vector
     """Place of the eye [mm]."""

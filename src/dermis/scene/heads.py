@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from dermis.errors import notify, refuse
 from dermis.mesh.check import check_head_height
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 MapFile = str | os.PathLike[str] | None
 HUMAN = "human"
+_UNITS_MM = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "inch": 25.4, "in": 25.4, "ft": 304.8}
 REPLACED = ("bust", "bust_many_charts")
 """Heads that the package had before `HUMAN`."""
 
@@ -43,7 +44,7 @@ def load_head(
     v_origin: VOrigin = "auto",
     up: Up = "y",
     normal_y: NormalY = "up",
-    opaque: Sequence[str] = (),
+    opaque: Sequence[str] | str = (),
     subdivide: int = 0,
 ) -> Head:
     """The parametric human ("human"), a sample ("lee_perry_smith") or a file (.glb, .gltf, .obj, .ply).
@@ -66,15 +67,14 @@ def load_head(
     Raises DermisError for files that cannot be rendered as a head; warns with DermisWarning of pictures of
     an .mtl that are left out.
     """
-    name, path = str(head), Path(head)
+    opaque = (opaque,) if isinstance(opaque, str) else opaque
+    name, path = _named(head), Path(head)
     own = {"colour": colour, "normal": normal, "height": height}
     own |= {"specular": specular, "roughness": roughness}
+    _check_given(own, unit_mm=unit_mm, height_mm=height_mm)
     if name == HUMAN or name.startswith(f"{HUMAN}:") or path.suffix.lower() == ".json":
         told = {"unit_mm": unit_mm, "v_origin": v_origin, "up": up, "opaque": opaque}
         return _human(name, own, height_mm, normal_y, told, subdivide)
-    if name in REPLACED and not path.is_file():
-        came = f"this mannequin was replaced by the parametric human, {HUMAN!r}"
-        refuse(name, f"one of {', '.join(_head_names())} or a mesh file", came, f"Write {HUMAN} instead")
     sample, files = SAMPLES.get(name), dict[str, Any]()
     if sample is not None:
         _check_kind(sample)
@@ -84,9 +84,8 @@ def load_head(
         v_origin = sample.v_origin or v_origin if v_origin == "auto" else v_origin
         height_mm = sample.height_mm if height_mm is None else height_mm
     elif not path.is_file():
-        known = ", ".join(_head_names())
-        refuse(name or "head", f"a mesh file or a sample ({known})", f"{name!r} is neither", "Check the name")
-    if sample is None and is_gltf(path):
+        _refuse_name(name)
+    elif is_gltf(path):
         files = embedded_maps(path)
     chosen = _chosen(own, files)
     if height is None and height_mm is None:
@@ -121,6 +120,36 @@ def _read_maps(
         return loaded, ""
     named, notice = obj_maps(obj, opaque=opaque, given=given, height_mm=height_mm, normal_y=normal_y)
     return replace(named, **{role: getattr(loaded, role) for role in given}), notice
+
+
+def _named(head: object) -> str:
+    """The name of what is to be loaded."""
+    if not isinstance(head, str | os.PathLike):
+        came = "None came" if head is None else f"a {type(head).__name__} came"
+        remedy = "Use a head as it is; write human.head() for that of a Human"
+        refuse("load_head", "the name of a head or a file", came, remedy)
+    return str(head)
+
+
+def _refuse_name(name: str) -> NoReturn:
+    known = ", ".join(_head_names())
+    if name in REPLACED:
+        came = f"this mannequin was replaced by the parametric human, {HUMAN!r}"
+        refuse(name, f"one of {known} or a mesh file", came, f"Write {HUMAN} instead")
+    refuse(name or "head", f"a mesh file or a sample ({known})", f"{name!r} is neither", "Check the name")
+
+
+def _check_given(files: dict[str, MapFile], **lengths: object) -> None:
+    """Refuse words for lengths [mm], and pictures that are no files."""
+    for name, value in lengths.items():
+        if isinstance(value, str):
+            known = value in _UNITS_MM
+            remedy = f"Write {name}={_UNITS_MM[value]:g}" if known else "Write 10 for cm, 1000 for m"
+            refuse(name, "a length in mm, as a number", f"{value!r} came", remedy)
+    for role, file in files.items():
+        if file is not None and not isinstance(file, str | os.PathLike):
+            remedy = f"Write dataclasses.replace(head, maps=replace(head.maps, {role}=...)) for one in memory"
+            refuse(role, "the name of a picture file", f"a {type(file).__name__} came", remedy)
 
 
 def _check_height(height_mm: float | None, height: object) -> None:

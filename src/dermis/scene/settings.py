@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from dermis.registry import Named
 from dermis.scene.plain import Colour, Plain, slider
@@ -15,10 +16,17 @@ _MOST_SAMPLES = 64
 MOST_WORK = 2**27
 
 
+def _square(value: Any) -> Any:
+    """A number as both sides."""
+    return (value, value) if isinstance(value, int) else value
+
+
 class Settings(Plain):
     """Sizes, quality, and what leaves linear light."""
 
-    size: tuple[_Side, _Side] = (1024, 1024)
+    meant: ClassVar[Mapping[str, str]] = {"resolution": "size", "spp": "samples"}
+
+    size: Annotated[tuple[_Side, _Side], BeforeValidator(_square)] = (1024, 1024)
     """Width and height of the picture [pixel]."""
     atlas: Annotated[int, Field(ge=64)] = 2048
     """Side of the atlas, the map in which light scatters [texel]."""
