@@ -43,7 +43,7 @@ def draw(
     """
     made, picture, (lit, view, lights) = strands.tables, strands.picture, look
     light = program(graph.device, "strands_light.wgsl", made.constants + lights)
-    looked = ("eye", "forward", "right", "up", "samples", "jitter", "shown")
+    looked = ("eye", "forward", "right", "up", "shift", "samples", "jitter", "shown")
     record = light.record("StrandView", **{name: view[name] for name in looked})
     record["hairs"], record["size"], record["skin"] = made.hairs, picture.result.size[:2], strands.skin
     seen = {"strand_view": record, "drawn": made.drawn}
