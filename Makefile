@@ -1,6 +1,6 @@
 # Two commands are enough: `make demo` shows the package, `make test` checks it.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo lint test wheel docs lock clean
+.PHONY: help setup setup-dev demo lint test wheel docs lock clean
 
 PY := .venv/bin/python
 ARGS ?=
@@ -9,14 +9,17 @@ help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | while IFS="$$(printf '\t')" read -r name what; do \
 		printf '  make %-6s %s\n' "$$name" "$$what"; done
 
-setup: ## an environment in .venv from requirements.lock, and a Vulkan driver
+setup: ## what a picture needs: an environment in .venv from requirements.lock, and a Vulkan driver
 	@sh tools/setup.sh
+
+setup-dev: # all that tests and docs need too
+	@sh tools/setup.sh dev
 
 demo: setup ## render the package's head into out/demo.png
 	@mkdir -p out
 	@.venv/bin/dermis render --atlas 1024 -o out/demo.png
 
-lint: setup ## style, types and floors
+lint: setup-dev ## style, types and floors
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy
@@ -28,10 +31,10 @@ test: lint ## lint and every test (ARGS="-k blur" chooses some)
 wheel: setup ## the package as a wheel in dist
 	$(PY) -m pip wheel --quiet --no-deps --no-build-isolation --disable-pip-version-check -w dist . && ls dist
 
-lock: ## write requirements.lock anew from pyproject.toml (ARGS=--upgrade for newer versions)
+lock: ## write both requirements locks anew from pyproject.toml (ARGS=--upgrade for newer versions)
 	@sh tools/lock.sh $(ARGS)
 
-docs: setup ## the documentation as web pages in out/docs
+docs: setup-dev ## the documentation as web pages in out/docs
 	@.venv/bin/sphinx-build -q -W --keep-going docs out/docs && echo out/docs/index.html
 
 clean: ## remove what was built and cached here, except .venv

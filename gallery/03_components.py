@@ -16,7 +16,7 @@ PARTS = {"reflected": "specular", "scattered": "diffuse", "both": "all"}
 
 def draw(studio):
     head = studio.head()
-    scene = dermis.Scene(head, camera=dermis.three_quarter(head), skin=dermis.Skin(oiliness=0.3))
+    scene = dermis.Scene(head, camera=dermis.three_quarter(head))
     return {name: studio.render(scene, parts=part) for name, part in PARTS.items()}
 
 

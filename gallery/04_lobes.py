@@ -1,6 +1,6 @@
 """Five models of surface reflection.
 
-The same slightly oily skin with each model: on the head, alone (twice as bright), and in close-up. Phong and
+The same skin with each model: on the head, alone (twice as bright), and in close-up. Phong and
 Blinn-Phong reflect far too little at grazing angles.
 
 Deck: S3, S4, S5
@@ -24,7 +24,7 @@ def draw(studio):
     panels = {}
     for view, (camera, shown) in views.items():
         for model in MODELS:
-            skin = dermis.Skin(specular=model, oiliness=0.3)
+            skin = dermis.Skin(specular=model)
             scene = dermis.Scene(head, camera=camera, skin=skin)
             panels[model + view] = studio.render(scene, 0.8, **shown)
     return panels

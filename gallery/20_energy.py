@@ -1,6 +1,6 @@
 """What is reflected does not enter.
 
-Above, the head without an energy term, with the published one, and with the full one. Below, the same head in
+With the talk's surface. Above, the head without an energy term, with the published one, and with the full one. Below, the same head in
 white under uniform light: it should return exactly what it receives, shown as grey; blue is up to 10 % too
 dark, red up to 10 % too bright.
 
@@ -22,10 +22,10 @@ TERMS = ("none", "published", "full")
 
 
 def draw(studio):
-    head = studio.head()
+    head, deck = studio.head(regions="none"), dermis.Skin.preset("deck-2007")
     camera, even = dermis.three_quarter(head), dermis.Environment(name="uniform")
     white = replace(head, maps=replace(head.maps, colour=np.ones((4, 4, 3), np.float32)))
-    skins = {name: dermis.Skin(energy=name) for name in TERMS}
+    skins = {name: deck.model_copy(update={"energy": name}) for name in TERMS}
     heads = {name: dermis.Scene(head, camera=camera, skin=skin) for name, skin in skins.items()}
     panels = {name: studio.render(scene) for name, scene in heads.items()}
     for name, skin in skins.items():

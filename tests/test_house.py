@@ -146,8 +146,9 @@ def test_tracked_images_are_small() -> None:
     assert sum(sizes.values()) < IMAGE_BYTES, sorted(sizes.items(), key=lambda item: -item[1])[:5]
 
 
-def test_lock_names_no_package_index() -> None:
-    lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+@pytest.mark.parametrize("name", ["requirements.lock", "requirements-dev.lock"])
+def test_lock_names_no_package_index(name: str) -> None:
+    lock = (ROOT / name).read_text(encoding="utf-8")
     assert "numpy==" in lock and "--hash=sha256:" in lock
     assert not re.search(r"://|--(extra-)?index-url|--find-links", lock)
 

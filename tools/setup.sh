@@ -1,11 +1,21 @@
 #!/bin/sh
-# Make .venv from requirements.lock and see to a Vulkan driver. Run again, it does only what is missing.
+# Make .venv and see to a Vulkan driver. Run again, it does only what is missing.
+# setup.sh [dev]: what a picture needs, from requirements.lock; with dev all that tests and docs need too.
 # PYTHON=... names the interpreter to use instead of the first one that is new enough.
 set -eu
 cd "$(dirname "$0")/.."
 
+level=${1:-base}
+case $level in
+base) lock=requirements.lock ;;
+dev) lock=requirements-dev.lock ;;
+*)
+    echo "setup: expected nothing or dev, but $level came" >&2
+    exit 2
+    ;;
+esac
 # What was installed, for which pins and in which folder (an environment does not survive a move).
-installed_stamp=.venv/.installed
+installed_stamp=.venv/.installed-$level
 # The Vulkan drivers among which an adapter was found.
 adapter_stamp=.venv/.adapter
 
@@ -77,26 +87,31 @@ make_venv() {
 # Does .venv run, with pip, in the folder it was made in?
 venv_works() {
     new_enough .venv/bin/python || return 1
-    [ ! -f $installed_stamp ] || [ "$(head -n 1 $installed_stamp)" = "$PWD" ] || return 1
+    for stamp in .venv/.installed-*; do
+        [ ! -f "$stamp" ] || [ "$(head -n 1 "$stamp")" = "$PWD" ] || return 1
+    done
     .venv/bin/python -c 'import pip' 2>/dev/null || .venv/bin/python -m ensurepip >/dev/null 2>&1
 }
 
 wanted_stamp() {
     echo "$PWD"
-    cksum requirements.lock pyproject.toml
+    cksum "$1" pyproject.toml
 }
+
+# Is all of a level there, with the pins as they are now?
+installed() { [ -f ".venv/.installed-$1" ] && [ "$(wanted_stamp "$2")" = "$(cat ".venv/.installed-$1")" ]; }
 
 pip_install() { quietly .venv/bin/python -m pip install --quiet --no-input --disable-pip-version-check "$@"; }
 
 install_locked() {
-    if [ -f $installed_stamp ] && [ "$(wanted_stamp)" = "$(cat $installed_stamp)" ]; then
+    if installed "$level" $lock || installed dev requirements-dev.lock; then
         say ".venv is up to date"
         return
     fi
-    say "installing $(grep -c '==' requirements.lock) locked packages (minutes, once)"
-    pip_install --require-hashes -r requirements.lock || fail "could not install the locked packages (see above)."
+    say "installing $(grep -c '==' $lock) locked packages (once)"
+    pip_install --require-hashes -r $lock || fail "could not install the locked packages (see above)."
     pip_install --no-deps --no-build-isolation -e . || fail "could not install dermis itself (see above)."
-    wanted_stamp >$installed_stamp
+    wanted_stamp $lock >"$installed_stamp"
 }
 
 # Which drivers the Vulkan loader would find; asking wgpu takes a second, this does not.

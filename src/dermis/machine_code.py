@@ -8,7 +8,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-import numba
+from dermis.extras import needed
+
+numba = needed("numba", "ground truth")
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

@@ -13,7 +13,7 @@ import pytest
 import dermis
 from dermis import Human
 from dermis.human.skin.look import SkinLook
-from dermis.images.codecs import encode_png8
+from dermis.images.codecs import encode_png
 from dermis.mesh.eyes import EyeLook
 from dermis.mesh.head import Head
 from dermis.scene.heads import load_head
@@ -78,8 +78,8 @@ def test_fields_targets_and_expressions_add_up(run: Run, folder: Path) -> None:
 def test_maps_of_files_take_the_place_of_the_own(run: Run, folder: Path) -> None:
     side = 32
     flat = np.tile(np.array([128, 128, 255], np.uint8), (side, side, 1))
-    (folder / "flat.png").write_bytes(encode_png8(flat))
-    (folder / "rough.png").write_bytes(encode_png8(np.full((side, side, 1), 64, np.uint8)))
+    (folder / "flat.png").write_bytes(encode_png(flat))
+    (folder / "rough.png").write_bytes(encode_png(np.full((side, side, 1), 64, np.uint8)))
     words = ("--normal", "flat.png", "--roughness", "rough.png", "--subdivide", "0")
     assert run("head", *words).code == 0
     maps = load_head(folder / "head.glb").maps

@@ -86,7 +86,7 @@ def test_kelemen_by_table(renderer: Renderer, m: float) -> None:
     """Against its table read in float64, and against the lobe that the table stands for."""
     light, view = directions(1), directions(2)
     light[0, 0] = view[0, 0] = Z
-    _, slopes, lobe, *_ = shader(renderer, light, view, m, 0.18)
+    _, slopes, lobe, *_ = shader(renderer, light, view, m, 0.18, specular="kelemen")
     assert worst(slopes, twins.beckmann_by_table(light[..., 2], m)) < LOBE_TWIN
     assert worst(slopes, beckmann(light[..., 2], m)) < TABLE_LOBE
     assert worst(lobe, kelemen(cosines(Z, light, view), m)) < TABLE_LOBE
@@ -95,7 +95,7 @@ def test_kelemen_by_table(renderer: Renderer, m: float) -> None:
 @pytest.mark.parametrize("m", [0.1, 0.3, 0.5])
 def test_kelemen_by_table_near_the_mirror_direction(renderer: Renderer, m: float) -> None:
     light, view = near_the_mirror(3)
-    _, _, lobe, *_ = shader(renderer, light, view, m, 1.0)
+    _, _, lobe, *_ = shader(renderer, light, view, m, 1.0, specular="kelemen")
     exact = kelemen(cosines(Z, light, view), m)
     # at every angle of incidence by itself: the lobe at grazing light is a hundred times that at the front
     assert (np.abs(lobe - exact) / exact)[exact > 0.1 * exact.max()].max() < 2 * TABLE_LOBE

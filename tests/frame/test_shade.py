@@ -23,7 +23,7 @@ from dermis.optics.profiles import load_profile
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
 from dermis.scene.model import Scene
 from dermis.specular.cosines import cosines
-from dermis.specular.kelemen import kelemen
+from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]
 Z = np.array([0.0, 0.0, 1.0])
@@ -58,7 +58,11 @@ def closed_form(scene: Scene, colour: Floats | float) -> Floats:
     radiance = below * colour * twins.leaves(view[..., 2], m, rho_s)[..., None] / np.pi
     for light in scene.lights:
         to_light, arriving = twins.incident(light, scene.head.centre_mm, points)
-        lobe = rho_s * kelemen(cosines(Z, np.asarray(to_light), view), m) * np.maximum(to_light[..., 2], 0)
+        lobe = (
+            rho_s
+            * MODELS[scene.skin.specular].lobe(cosines(Z, np.asarray(to_light), view), m)
+            * np.maximum(to_light[..., 2], 0)
+        )
         radiance = radiance + arriving * lobe[..., None]
     return radiance
 

@@ -14,12 +14,14 @@ from dermis.mesh.head import Head
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.lights import DirectionalLight, PointLight, SpotLight
 from dermis.scene.model import Scene
+from dermis.scene.skin import Skin
 from dermis.specular.albedo import albedo_table
 from dermis.specular.beckmann import beckmann_table
 from dermis.specular.energy import ENERGY
 
 Floats = NDArray[np.float64]
 SMOOTH = 1.6
+USUAL = str(Skin().specular)
 WIDE_TRUNCATION = 4.0
 DEFAULT_COLOUR = float(np.float16(0.8))  # maps are stored as halves
 
@@ -138,7 +140,7 @@ def gaussian_sum(profile: GaussianSum, first: int, r2_mm2: Floats) -> Floats:
 
 
 def surface_albedo(
-    cosine: ArrayLike, m: float, model: str = "kelemen", fresnel: str = "schlick"
+    cosine: ArrayLike, m: float, model: str = USUAL, fresnel: str = "schlick"
 ) -> tuple[Floats, Floats]:
     """Directional albedo of the surface and its mean, by the shader's table."""
     table = albedo_table(model, fresnel).astype(np.float64)

@@ -16,7 +16,7 @@ from dermis.human.model import MATERIALS
 from dermis.human.published import count
 from dermis.human.skin import face
 from dermis.human.skin.painted import PaintedMaps
-from dermis.images.codecs import encode_png8
+from dermis.images.codecs import encode_png
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 
@@ -179,7 +179,7 @@ def test_unknown_targets_and_seeds_are_refused() -> None:
 
 def test_maps_of_files_leave_the_others_painted(tmp_path: Path) -> None:
     path = tmp_path / "rough.png"
-    path.write_bytes(encode_png8(np.full((32, 32, 1), 64, np.uint8)))
+    path.write_bytes(encode_png(np.full((32, 32, 1), 64, np.uint8)))
     maps = dermis.load_head("human", roughness=path).maps
     assert isinstance(maps, PaintedMaps) and maps.colour is None
     assert maps.roughness is not None and np.allclose(maps.roughness, 64 / 255)

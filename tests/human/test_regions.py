@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from dermis.cli.scene_options import SceneOptions, assemble
 from dermis.errors import DermisError
 from dermis.human.person import Human
 from dermis.human.regions import apply
-from dermis.human.regions.apply import soften
+from dermis.human.regions.apply import soften, with_regions
 from dermis.human.regions.average import (
     AVERAGE,
     average_head,
@@ -26,6 +27,7 @@ from dermis.human.regions.average import (
 )
 from dermis.human.regions.labels import average_landmarks, known_landmarks, label_texels, to_average
 from dermis.human.regions.table import RegionTable, load_table
+from dermis.human.regions.usual import with_usual_regions
 from dermis.human.regions.zones import REGIONS
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -285,10 +287,10 @@ def test_the_default_table_is_called_what_it_is() -> None:
     ("change", "message"),
     [
         (lambda text: text.replace("[cheek]", "[beard]"), r"\[beard\] is none of them"),
-        (lambda text: text.replace("[cheek]\nm = 0.33\nrho_s = 0.17", ""), r"\[cheek\] is missing"),
+        (lambda text: text.replace("[cheek]\nm = 0.33\nrho_s = 0.51", ""), r"\[cheek\] is missing"),
         (lambda text: text.replace("m = 0.33", "m = 0"), "cheek: m: expected a number from 0.05 to 1"),
         (lambda text: text.replace("m = 0.33", "m = nan"), "cheek: m: expected a number"),
-        (lambda text: text.replace("rho_s = 0.27", "rho_s = true"), "lips: rho_s: expected a number"),
+        (lambda text: text.replace("rho_s = 0.81", "rho_s = true"), "lips: rho_s: expected a number"),
         (lambda text: text.replace("m = 0.33\n", ""), "cheek: expected m and rho_s"),
         (lambda text: "labels = 3\n" + text, "labels: expected the name of a file"),
         (lambda text: text + "[", "not TOML"),
@@ -337,3 +339,19 @@ def _quad() -> Mesh:
     corners = np.array([[0, 2, 1], [0, 3, 2]])
     normals = np.full((4, 3), np.nan)
     return build_mesh(place, uv, corners, np.zeros(2, np.int32), (Material("skin"),), normals)
+
+
+def test_known_heads_have_the_usual_regions_and_others_none(sample_folder: Path) -> None:
+    known, alike = load_head(SCAN), load_head(SCAN, regions="none")
+    assert known.maps.roughness is not None and alike.maps.roughness is None
+    wanted, _ = with_regions(alike)
+    np.testing.assert_array_equal(known.maps.roughness, np.float32(wanted.maps.roughness))
+    np.testing.assert_array_equal(known.maps.specular, np.float32(wanted.maps.specular))
+    assert with_usual_regions(known) is known  # a map says the roughness
+    stranger = replace(alike, name="nobody")
+    assert with_usual_regions(stranger) is stranger
+    tiny = replace(alike, mesh=replace(alike.mesh, positions=0.1 * alike.mesh.positions))
+    assert with_usual_regions(tiny) is tiny  # of that name, but its landmarks are not there
+    scene, _ = assemble(SCAN, SceneOptions(surface="deck-2007"))
+    assert scene.head.maps.roughness is None
+    assert (scene.skin.specular, scene.skin.rho_s) == ("kelemen", 0.18)

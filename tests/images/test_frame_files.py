@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dermis.errors import DermisError
-from dermis.images.codecs import encode_png8, png_size
+from dermis.images.codecs import encode_png, png_size
 from dermis.images.frame_files import FrameFiles
 from dermis.images.io import write_exr, write_png
 
@@ -71,7 +71,7 @@ def test_frames_of_something_else_are_drawn_again(tmp_path: Path) -> None:
 
 
 def test_png_is_checked_without_decoding() -> None:
-    data = encode_png8(PICTURE)
+    data = encode_png(PICTURE)
     assert png_size(data) == SIZE
     damaged = bytearray(data)
     damaged[len(data) // 2] ^= 1

@@ -9,7 +9,7 @@ import pytest
 
 from dermis.errors import DermisError
 from dermis.images import writer as writing
-from dermis.images.codecs import decode_with_pillow, encode_png8
+from dermis.images.codecs import decode_with_pillow, encode_png
 from dermis.images.io import read_image
 from dermis.images.writer import ImageWriter
 
@@ -18,13 +18,13 @@ from dermis.images.writer import ImageWriter
 @pytest.mark.parametrize("effort", [1, 6])
 def test_png_keeps_every_byte(shape: tuple[int, int, int], effort: int) -> None:
     levels = np.random.default_rng(1).integers(0, 256, shape).astype(np.uint8)
-    decoded = decode_with_pillow(encode_png8(levels, effort))
+    decoded = decode_with_pillow(encode_png(levels, effort))
     assert np.array_equal(decoded.reshape(shape), levels)
 
 
 def test_smooth_pictures_become_small() -> None:
     ramp = np.linspace(0, 255, 256).astype(np.uint8)
-    assert len(encode_png8(np.broadcast_to(ramp[:, None, None], (256, 256, 3)).copy())) < 3000
+    assert len(encode_png(np.broadcast_to(ramp[:, None, None], (256, 256, 3)).copy())) < 3000
 
 
 def test_many_pictures_are_all_written(tmp_path: Path) -> None:

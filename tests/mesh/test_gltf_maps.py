@@ -13,7 +13,7 @@ import pytest
 from encoded_glb import encode_glb
 
 from dermis.errors import DermisError
-from dermis.images.codecs import encode_png8, encode_png16
+from dermis.images.codecs import encode_png
 from dermis.images.io import Picture, read_image
 from dermis.mesh.gltf.pictures import embedded_maps
 from dermis.mesh.load import load_mesh
@@ -31,11 +31,11 @@ def ramp(levels: int, channels: int = 1) -> np.ndarray:
 
 def written(roles: dict[str, Any] | None = None) -> bytes:
     pictures = {
-        "colour": encode_png8(ramp(255, 3)),
-        "height": encode_png16(ramp(65535)),
-        "specular": encode_png8(ramp(255)),
-        "roughness": encode_png8(ramp(255)),
-        "region": encode_png8(ramp(255) // 26),
+        "colour": encode_png(ramp(255, 3)),
+        "height": encode_png(ramp(65535)),
+        "specular": encode_png(ramp(255)),
+        "roughness": encode_png(ramp(255)),
+        "region": encode_png(ramp(255) // 26),
     }
     own = {role: {"index": role} for role in ("height", "specular", "roughness", "region")}
     material = {"name": "skin", "pbrMetallicRoughness": {"baseColorTexture": {"index": "colour"}}}
@@ -95,7 +95,7 @@ def test_maps_read_back(glb: Path) -> None:
 
 def test_options_replace_what_the_file_has(glb: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.png"
-    other.write_bytes(encode_png8(np.full((SIDE, SIDE, 3), 128, np.uint8)))
+    other.write_bytes(encode_png(np.full((SIDE, SIDE, 3), 128, np.uint8)))
     maps = load_head(glb, colour=other, height_mm=0.002).maps
     assert maps.colour is not None and np.ptp(maps.colour) == 0.0
     assert maps.height is not None and np.ptp(maps.height) == pytest.approx(255 * 0.002, rel=1e-4)
@@ -113,7 +113,7 @@ def test_other_programs_files_give_colour_and_normals(tmp_path: Path) -> None:
 
 
 def test_pictures_by_uri(tmp_path: Path) -> None:
-    png = encode_png8(ramp(255, 3))
+    png = encode_png(ramp(255, 3))
     (tmp_path / "a b.png").write_bytes(png)
     uris = ["a%20b.png", f"data:image/png;base64,{base64.b64encode(png).decode()}", "c.ktx2"]
     found = []

@@ -13,7 +13,7 @@ from small_head import obj_text
 import dermis
 from dermis.errors import DermisError, DermisWarning
 from dermis.gpu.device import Device
-from dermis.images.codecs import encode_png8
+from dermis.images.codecs import encode_png
 from dermis.images.io import write_png
 from dermis.mesh.primitives import uv_sphere
 
@@ -148,7 +148,7 @@ def test_maps_of_a_few_texels_are_drawn(
 
 
 def test_a_gltf_file_may_have_placeholders(tmp_path: Path) -> None:
-    pictures = {"c": encode_png8(plain(188, 188, 0)), "n": encode_png8(plain(128, 128, 255, 2))}
+    pictures = {"c": encode_png(plain(188, 188, 0)), "n": encode_png(plain(128, 128, 255, 2))}
     material = {
         "name": "skin",
         "pbrMetallicRoughness": {"baseColorTexture": {"index": "c"}},

@@ -10,8 +10,9 @@ from PIL import Image
 
 from dermis.errors import DermisError
 from dermis.human.regions.zones import REGIONS
+from dermis.scene.head_table import AUTO
 from dermis.scene.skin import Skin
-from dermis.viewer.session import NO_REGIONS, apply_regions
+from dermis.viewer.session import apply_regions
 from dermis.viewer.state import ViewerState
 
 
@@ -36,14 +37,14 @@ def test_a_table_gives_maps_and_their_mean_and_none_takes_them_away(state: Viewe
     maps = found.scene.head.maps
     assert maps.specular is not None and np.ptp(maps.specular) > 0.05
     assert 0.1 < found.scene.skin.rho_s < 0.25 and found.head["regions"] == table
-    bare = apply_regions(found, NO_REGIONS)
+    bare = apply_regions(found, AUTO)
     assert bare.scene.head.maps.specular is None and "regions" not in bare.head
     assert bare.scene.skin.rho_s == Skin().rho_s
 
 
 def test_heads_that_are_there_are_not_made_again(state: ViewerState, table: str) -> None:
     found = apply_regions(state, table)
-    assert apply_regions(found, NO_REGIONS, [state, found]).scene.head is state.scene.head
+    assert apply_regions(found, AUTO, [state, found]).scene.head is state.scene.head
     assert apply_regions(state, table, [state, found]).scene.head is found.scene.head
 
 

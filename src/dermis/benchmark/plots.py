@@ -6,6 +6,8 @@ from collections.abc import Callable
 from io import StringIO
 from typing import TYPE_CHECKING, Any
 
+from dermis.extras import needed
+
 if TYPE_CHECKING:
     from dermis.benchmark.measure import Row
     from dermis.benchmark.run import Benchmark
@@ -60,9 +62,7 @@ def stages(row: Row) -> str:
 
 
 def _figure(width: float, height: float, columns: int) -> tuple[Any, list[Any]]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = needed("matplotlib.figure", "plots").Figure(figsize=(width, height), layout="constrained")
     figure.patch.set_alpha(0.0)
     panels = list(figure.subplots(1, columns, squeeze=False)[0])
     for axes in panels:

@@ -50,11 +50,13 @@ def bench(
     from dermis.benchmark.report import as_json as to_json
     from dermis.benchmark.report import write_report
     from dermis.benchmark.run import run
+    from dermis.extras import needed
     from dermis.gpu.adapters import fitting_adapters
     from dermis.outputs import check_output
 
     if output is not None:
         check_output(output, (".html",), "Choose such a name")
+        needed("matplotlib", "the report's plots")
     software = fitting_adapters(adapter)[0][0].kind == "CPU"
     cases = PRESETS[preset or ("cpu" if software else "interactive")].cases()
     with progress("measuring") as tell:

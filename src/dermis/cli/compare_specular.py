@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from dermis.cli.console import print_json, print_lines, working_on
+from dermis.extras import needed
 from dermis.outputs import refuse_output, replacing
 from dermis.specular.albedo import directional_albedo
 from dermis.specular.cosines import cosines
@@ -98,9 +99,7 @@ def _draw(folder: Path, m: float) -> None:
 
 def _lobes(m: float) -> Any:
     """Intensity under three lights in the plane of incidence: a polar panel for each model."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(12.0, 4.8), dpi=130, layout="constrained")
+    figure = needed("matplotlib.figure", "plots").Figure(figsize=(12.0, 4.8), dpi=130, layout="constrained")
     figure.suptitle(f"Intensity over kelemen's peak under the same light, on a root scale; m = {m:g}")
     panels = figure.subplots(2, 4, subplot_kw={"projection": "polar"}).ravel()
     whole = _intensity("kelemen", m).max(axis=1, keepdims=True)
@@ -139,9 +138,7 @@ def _view_angles() -> Any:
 
 def _albedos(m: float) -> Any:
     """Directional albedo by angle, all models in one panel."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.2, 4.6), dpi=130, layout="constrained")
+    figure = needed("matplotlib.figure", "plots").Figure(figsize=(7.2, 4.6), dpi=130, layout="constrained")
     axes = figure.subplots()
     degrees = np.linspace(0.0, 89.0, 180)
     for name in _DRAWN:

@@ -10,7 +10,7 @@ from dermis.cli.console import print_json, print_lines
 from dermis.cli.options import Adapter, Json
 from dermis.errors import DermisError
 
-_LIBRARIES = ("dermis", "wgpu", "numpy", "scipy", "trimesh", "pydantic", "imageio", "OpenEXR", "pillow")
+_LIBRARIES = ("dermis", "wgpu", "numpy", "scipy", "trimesh", "pydantic", "OpenEXR", "pillow")
 
 
 def doctor(*, adapter: Adapter = "auto", as_json: Json = False) -> int:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dermis.extras import needed
 from dermis.optics.fits.burley import BurleyFit
 from dermis.outputs import replacing
 
@@ -29,10 +30,8 @@ def draw(path: Path, found: Report, counted: RadialProfile | None) -> None:
 
     path : .png, .svg or .pdf
     """
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.2, 5.2), dpi=160, layout="constrained")
+    rc_context = needed("matplotlib", "plots").rc_context
+    figure = needed("matplotlib.figure", "plots").Figure(figsize=(7.2, 5.2), dpi=160, layout="constrained")
     axes = figure.subplots()
     peak = _curves(axes, found)
     if counted is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -21,9 +21,9 @@ from dermis.cli.pose_options import (
 )
 from dermis.errors import refuse
 from dermis.scene.environment import Environment
-from dermis.scene.head_table import HeadTable
+from dermis.scene.head_table import NO_REGIONS, HeadTable, names_regions
 from dermis.scene.settings import Settings
-from dermis.scene.skin import Skin
+from dermis.scene.skin import PRESETS, Skin
 
 if TYPE_CHECKING:
     from dermis.scene import Light, Scene
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     SettingsOptions = dict[str, Any]
     EnvironmentOptions = dict[str, Any]
 
+SkinPreset = Literal["default", "deck-2007"] | None
 HEAD = {"specular": "specular_map", "roughness": "roughness_map"}
 AROUND = {field: f"env_{field}" for field in Environment.model_fields}
 AROUND |= {"name": "env", "rotation_degrees": "env_rotation"}
@@ -50,6 +51,14 @@ class SceneOptions:
 
     settings: SettingsOptions = field(default_factory=dict)
     skin: SkinOptions = field(default_factory=dict)
+    surface: Annotated[
+        SkinPreset,
+        Parameter(
+            name="--skin",
+            help="Skin to start from: default, or deck-2007 for the surface as the talk had it: one lobe "
+            "of strength 0.18, alike all over.",
+        ),
+    ] = None
     lights: Annotated[
         str | None,
         Parameter(
@@ -85,7 +94,7 @@ def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
         scene.head,
         lights=_lights(scene, given.lights, environment, replaced="name" in given.around),
         camera=scene.camera if given.camera is None else load_camera(given.camera, scene.head),
-        skin=Skin(**(scene.skin.model_dump() | given.skin)),
+        skin=Skin(**(scene.skin.model_dump() | PRESETS[given.surface or "default"] | given.skin)),
         environment=environment,
         pose=scene.pose,
     )
@@ -117,11 +126,13 @@ def _begin(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     if Path(name).suffix.lower() == ".toml":
         refuse_options(given.head, HEAD, "with a scene file", "Write it into the file's [head]")
         return load_scene(Path(name))
+    alike = {"regions": NO_REGIONS} if given.surface == "deck-2007" else {}
+    table = HeadTable(**{"name": name, **alike, **given.head})
     for field_ in ("rho_s", "roughness"):
-        if "regions" in given.head and field_ in given.skin:
+        if names_regions(vars(table)) and field_ in given.skin:
             came = "it came with --regions, which says it for each region"
             refuse(option_name(field_), "one or the other", came, "Leave one out, or use --oiliness")
-    head, skin = head_and_skin(HeadTable(name=name, **given.head), Skin(), Path())
+    head, skin = head_and_skin(table, Skin(), Path())
     return Scene(head, skin=skin), Settings()
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dermis.comparison.compare import Comparison, Row
 from dermis.comparison.sources import comparison_sources
-from dermis.images.codecs import encode_png8
+from dermis.images.codecs import encode_png
 from dermis.outputs import replacing
 from dermis.reference.metrics import MID_GREY, signed_difference
 
@@ -76,7 +76,7 @@ def _figures(made: Comparison, row: Row) -> str:
 
 
 def _figure(caption: str, picture: Floats) -> str:
-    png = base64.b64encode(encode_png8(np.rint(255 * picture).astype(np.uint8))).decode("ascii")
+    png = base64.b64encode(encode_png(np.rint(255 * picture).astype(np.uint8))).decode("ascii")
     return (
         f'<figure><img src="data:image/png;base64,{png}" alt="{html.escape(caption)}">'
         f"<figcaption>{html.escape(caption)}</figcaption></figure>"

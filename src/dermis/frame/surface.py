@@ -14,7 +14,7 @@ from dermis.mesh.eyes import LIMBUS_MM, cornea_centre_mm, iris_mm
 from dermis.mesh.maps import Maps
 from dermis.optics.directions import directions
 from dermis.optics.gaussians import GaussianSum
-from dermis.scene.skin import Skin
+from dermis.scene.skin import USUAL_ROUGHNESS, Skin
 from dermis.specular.albedo import ROOT_OF_FIRST_ROW
 from dermis.specular.energy import ENERGY
 from dermis.specular.fresnel import SKIN_ETA, SKIN_F0
@@ -73,10 +73,10 @@ def skin_record(
 
 
 def _derived(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any]:
-    """Members that no field or property of the model holds; a roughness map replaces the model's number."""
-    energy, mapped = ENERGY[skin.energy], maps.rough
+    """Members that no field or property of the model holds; the usual roughness leaves a map as it is."""
+    energy, usual = ENERGY[skin.energy], USUAL_ROUGHNESS if maps.rough else 1.0
     return {
-        "m": skin.smoothing * (1.0 if mapped else skin.roughness),
+        "m": skin.smoothing * skin.roughness / usual,
         "f0": SKIN_F0,
         "eta": SKIN_ETA,
         "loss": energy.loss,

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.extras import needed
 from dermis.gallery.script import Image, Panel, Panels, read_script
 from dermis.gallery.studio import Studio
 from dermis.images.colour import encode_srgb8
@@ -45,12 +46,10 @@ def sheet(panels: Panels, columns: int = 0) -> Bytes:
 
 def main(draw: Callable[[Studio], Panels]) -> None:
     """Draw the running script's picture: python gallery/NN_name.py OUTPUT [HEAD]."""
-    from matplotlib import style
-
     from dermis.images.io import write_png
 
     output, head = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else None
-    with style.context("dark_background"):
+    with needed("matplotlib.style", "the gallery").context("dark_background"):
         panels = draw(Studio(head))
     write_png(output, sheet(panels, read_script(Path(sys.argv[0])).columns))
 
@@ -61,12 +60,12 @@ def plotted(plot: Callable[[Any], Any], side: int = 448) -> Bytes:
     plot : draws into matplotlib axes
     side : of the picture [pixel]
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(_INCHES, _INCHES), dpi=side / _INCHES, facecolor="#141417", layout="constrained")
+    canvases = needed("matplotlib.backends.backend_agg", "the gallery")
+    figure = needed("matplotlib.figure", "the gallery").Figure(
+        figsize=(_INCHES, _INCHES), dpi=side / _INCHES, facecolor="#141417", layout="constrained"
+    )
     plot(figure.subplots())
-    canvas: Any = FigureCanvasAgg(figure)
+    canvas: Any = canvases.FigureCanvasAgg(figure)
     canvas.draw()
     return np.array(canvas.buffer_rgba(), np.uint8)[..., :3]
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
+from dermis.extras import needed
 from dermis.gallery.studio import Studio
 
 Image = NDArray[np.uint8] | NDArray[np.float32]
@@ -54,9 +55,7 @@ class Script:
 
         Raises DermisError when the script lacks something that it needs.
         """
-        from matplotlib import style
-
-        with style.context("dark_background"):
+        with needed("matplotlib.style", "the gallery").context("dark_background"):
             panels: Panels = runpy.run_path(str(self.path))["draw"](studio)
         return panels
 

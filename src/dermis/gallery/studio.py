@@ -41,9 +41,12 @@ class Studio:
         """The renderer, opened on first use."""
         return Renderer(self._adapter)
 
-    def head(self, name: str | None = None) -> Head:
-        """The head to show, or another one; subdivided once."""
-        return self._load(name or self.name, subdivide=1)
+    def head(self, name: str | None = None, **options: Any) -> Head:
+        """The head to show, or another one; subdivided once.
+
+        options : of `load_head`
+        """
+        return self._load(name or self.name, subdivide=1, **options)
 
     def render(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.uint8]:
         """(h, w, 3) sRGB bytes.

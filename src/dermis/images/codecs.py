@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.extras import needed
+
 Pixels = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32]
 
 MAX_PIXELS = 16384**2
@@ -97,15 +99,15 @@ def _format_of_16_bit(data: bytes, picture: Any) -> str | None:
 
 
 def _decode_16_bit(data: bytes, pixel_format: str) -> NDArray[np.uint16]:
-    import imageio.v3
-
+    av = needed("av", "a picture with 16 bits of colour")
     # bytes, not the path: FFmpeg would take a percent sign in a name for a numbered sequence
-    image: NDArray[np.uint16] = imageio.v3.imread(data, plugin="pyav", format=pixel_format, index=0)
+    with av.open(io.BytesIO(data)) as container:
+        image: NDArray[np.uint16] = next(container.decode(video=0)).to_ndarray(format=pixel_format)
     return image[..., [0, 0, 0, 1]] if pixel_format == "ya16le" else image
 
 
-def encode_png8(levels: NDArray[Any], effort: int = 6) -> bytes:
-    """A PNG file of (H, W, 1, 3 or 4) uint8.
+def encode_png(levels: NDArray[Any], effort: int = 6) -> bytes:
+    """A PNG file of (H, W, 1, 3 or 4) uint8 or uint16.
 
     effort : of the compression, from 1 (fast) to 9 (small files)
 
@@ -113,11 +115,12 @@ def encode_png8(levels: NDArray[Any], effort: int = 6) -> bytes:
     those of libraries that try every filter on every row, in a third to half of the time.
     """
     height, width, channels = levels.shape
-    rows = levels.reshape(height, -1)
+    bits = 8 * levels.itemsize
+    rows = levels.astype(levels.dtype.newbyteorder(">")).reshape(height, -1).view(np.uint8)
     filtered = np.full((height, 1 + rows.shape[1]), _UP, np.uint8)
     filtered[0, 1:] = rows[0]
     np.subtract(rows[1:], rows[:-1], out=filtered[1:, 1:])
-    header = struct.pack(">IIBBBBB", width, height, 8, _PNG_KINDS[channels], 0, 0, 0)
+    header = struct.pack(">IIBBBBB", width, height, bits, _PNG_KINDS[channels], 0, 0, 0)
     pixels = zlib.compress(filtered.data, effort)  # releases the GIL
     return _PNG_START + _chunk(b"IHDR", header) + _chunk(b"IDAT", pixels) + _chunk(b"IEND", b"")
 
@@ -144,22 +147,6 @@ def png_size(data: bytes) -> tuple[int, int]:
         place = end + 4
     width, height = struct.unpack_from(">II", data, 16)
     return width, height
-
-
-def encode_png16(levels: NDArray[Any]) -> bytes:
-    """A PNG file of (H, W, 1, 3 or 4) uint16, by FFmpeg: Pillow writes no 16-bit colour."""
-    from fractions import Fraction
-
-    import av
-
-    pixel_format = {1: "gray16", 3: "rgb48", 4: "rgba64"}[levels.shape[2]]
-    pixels = np.ascontiguousarray(levels[..., 0] if levels.shape[2] == 1 else levels)
-    encoder = av.CodecContext.create("png", "w")
-    encoder.height, encoder.width = pixels.shape[:2]
-    encoder.pix_fmt, encoder.time_base = f"{pixel_format}be", Fraction(1, 1)
-    frame = av.VideoFrame.from_ndarray(pixels, format=f"{pixel_format}le")
-    frame = frame.reformat(format=f"{pixel_format}be")
-    return b"".join(bytes(packet) for packet in [*encoder.encode(frame), *encoder.encode(None)])
 
 
 def decode_radiance(data: bytes) -> NDArray[np.float32]:

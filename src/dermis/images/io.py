@@ -21,8 +21,7 @@ from dermis.images.codecs import (
     decode_exr,
     decode_radiance,
     decode_with_pillow,
-    encode_png8,
-    encode_png16,
+    encode_png,
 )
 from dermis.images.colour import encode_srgb8
 
@@ -125,7 +124,7 @@ def write_png(path: str | Path, levels: NDArray[Any], effort: int = 6) -> None:
     if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or image.dtype not in (np.uint8, np.uint16):
         came = f"they have shape {levels.shape} and type {levels.dtype}"
         refuse(path, "pixels (H, W, 1, 3 or 4) of uint8 or uint16", came, "Convert them first")
-    data = encode_png8(image, effort) if image.dtype == np.uint8 else encode_png16(image)
+    data = encode_png(image, effort)
     with outputs.replacing(path) as temporary:
         temporary.write_bytes(data)
 

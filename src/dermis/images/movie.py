@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from dermis import outputs
 from dermis.errors import refuse
+from dermis.extras import needed
 
 SUFFIX = ".mp4"
 DEFAULT_CRF = 18
@@ -64,8 +65,7 @@ def check_movie(path: str | Path, size: tuple[int, int], crf: int = DEFAULT_CRF)
 
 
 def _check_encoder(path: str | Path) -> None:
-    import av
-
+    av = needed("av", "movies")
     try:
         av.codec.Codec(_ENCODER, "w")
     except ValueError:

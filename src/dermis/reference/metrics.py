@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.errors import refuse
+from dermis.extras import needed
 from dermis.images.colour import encode_srgb
 
 Floats = NDArray[np.float64]
@@ -145,7 +145,7 @@ def flip(
 
     Source: [Andersson2020], and [Andersson2021] for high dynamic range.
     """
-    evaluator = _flip_evaluator()
+    evaluator = needed("flip_evaluator", "FLIP")
     T = _shown(truth, high_dynamic_range)
     counted = _counted(mask, T.shape[:2])
     I = np.where(counted[..., None], _shown(image, high_dynamic_range, T.shape), T)
@@ -167,14 +167,6 @@ def _shown(picture: ArrayLike, high_dynamic_range: bool, shape: tuple[int, ...] 
         came = f"they go from {values.min():.4g} to {values.max():.4g}"
         refuse("flip", expected, came, "Tone-map and encode the picture first, or clip it")
     return values
-
-
-def _flip_evaluator() -> Any:
-    try:
-        return import_module("flip_evaluator")
-    except ImportError:
-        remedy = "Install it with `pip install flip-evaluator`"
-        refuse("FLIP", "the package flip-evaluator", "it is not installed", remedy)
 
 
 def signed_difference(image: ArrayLike, truth: ArrayLike, gain: float = 4.0) -> Floats:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from importlib import import_module
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from dermis.errors import refuse
+from dermis.extras import needed
 from dermis.mesh.head import Head
 from dermis.optics.media import Layer, Medium
 from dermis.reference.described import check_lens, rgb, surroundings
@@ -47,11 +47,7 @@ def load_mitsuba() -> Any:
 
     Raises DermisError when it is not installed.
     """
-    try:
-        return import_module("mitsuba")
-    except ImportError as fault:
-        remedy = "Install it with: pip install dermis[truth]"
-        refuse("path tracing", "the package mitsuba", f"it cannot be imported ({fault})", remedy)
+    return needed("mitsuba", "path tracing")
 
 
 @contextmanager

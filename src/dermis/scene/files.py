@@ -14,7 +14,7 @@ from dermis.human.regions.table import load_table
 from dermis.mesh.head import Head
 from dermis.scene.camera import PRESETS, Camera, preset
 from dermis.scene.environment import Environment
-from dermis.scene.head_table import HeadTable
+from dermis.scene.head_table import NO_REGIONS, HeadTable, names_regions
 from dermis.scene.heads import load_head
 from dermis.scene.lights import LIGHTS, NO_LIGHTS, Light, light_presets, preset_lights
 from dermis.scene.model import Scene
@@ -22,6 +22,7 @@ from dermis.scene.plain import ImpossibleError, Plain
 from dermis.scene.pose import Pose
 from dermis.scene.pose_table import PoseTable
 from dermis.scene.settings import Settings
+from dermis.scene.skin import PRESETS as SKINS
 from dermis.scene.skin import Skin
 
 P = TypeVar("P", bound=Plain)
@@ -49,9 +50,9 @@ def load_scene(path: str | Path, known: Head | None = None) -> tuple[Scene, Sett
     """Scene and settings of a TOML file; what it leaves out keeps its default.
 
     Tables: [head] (file or sample under `name`, the options of `load_head`, and `regions`, a table as for
-    `with_regions`), [pose] (`weights` and `bones` by name), [skin], [[lights]] or lights = "preset",
-    [environment], [camera] or camera = "preset", [render]. File names are relative to the scene's folder.
-    With an environment there are no other lights unless the file names some.
+    `with_regions`), [pose] (`weights` and `bones` by name), [skin] or skin = "deck-2007", [[lights]] or
+    lights = "preset", [environment], [camera] or camera = "preset", [render]. File names are relative to the
+    scene's folder. With an environment there are no other lights unless the file names some.
 
     known : the head of the file's [head], when the caller has it already
     """
@@ -59,7 +60,7 @@ def load_scene(path: str | Path, known: Head | None = None) -> tuple[Scene, Sett
     table = _read(path, "a scene in TOML")
     for part in table.keys() - _PARTS:
         refuse(path, f"only the parts {', '.join(sorted(_PARTS))}", f"{part!r} came", "Correct its name")
-    skin = _made(Skin, path, "skin", table.get("skin", {}))
+    skin = _skin(path, table.get("skin", {}))
     settings = _made(Settings, path, "render", table.get("render", {}))
     described = _made(HeadTable, path, "head", table.get("head"))
     _check_said_once(path, described, skin)
@@ -101,8 +102,10 @@ def head_and_skin(table: HeadTable, skin: Skin, folder: Path) -> tuple[Head, Ski
 
     Raises DermisError for files that cannot be used.
     """
-    regions = None if table.regions is None else load_table(_beside(folder, table.regions))
-    options = table.model_dump(exclude={"name", "regions"}, exclude_none=True)
+    regions = load_table(_beside(folder, table.regions)) if names_regions(vars(table)) else None
+    options = table.model_dump(exclude={"name"}, exclude_none=True)
+    if regions is not None:
+        options["regions"] = NO_REGIONS
     options |= {role: folder / options[role] for role in _MAPS if role in options}
     head = load_head(_beside(folder, table.name), **options)
     if regions is None:
@@ -111,9 +114,18 @@ def head_and_skin(table: HeadTable, skin: Skin, folder: Path) -> tuple[Head, Ski
     return head, skin.model_copy(update={"rho_s": rho_s})
 
 
+def _skin(path: Path, told: Any) -> Skin:
+    """The [skin] table's skin, or the one of a preset's name."""
+    if not isinstance(told, str):
+        return _made(Skin, path, "skin", told)
+    if told not in SKINS:
+        refuse(f"{path}: skin", f"a table or one of {', '.join(SKINS)}", f"{told!r} came", "Correct it")
+    return Skin.preset(told)
+
+
 def _check_said_once(path: Path, table: HeadTable, skin: Skin) -> None:
     for name in ("rho_s", "roughness"):
-        if table.regions is not None and name in skin.model_fields_set:
+        if names_regions(vars(table)) and name in skin.model_fields_set:
             came = "it came beside the head's regions, which say it for each region"
             refuse(f"{path}: skin: {name}", "one or the other", came, "Leave one out, or use oiliness")
 

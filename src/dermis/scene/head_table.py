@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -12,6 +13,7 @@ _Length = Annotated[float | None, Field(gt=0, allow_inf_nan=False)]
 VOrigin = Literal["auto", "top", "bottom"]
 Up = Literal["y", "z"]
 NormalY = Literal["up", "down"]
+AUTO, NO_REGIONS = "auto", "none"
 
 
 class HeadTable(Plain):
@@ -43,5 +45,12 @@ class HeadTable(Plain):
     """Groups of the file that are not skin, whatever they are called."""
     subdivide: Annotated[int, Field(ge=0, le=3)] = 0
     """Levels of subdivision: Catmull-Clark for a file of quads (.obj, .ply), else Loop."""
-    regions: str | None = None
-    """Roughness and strength by region of the face: "default" (an artist's values), or a TOML file."""
+    regions: str = AUTO
+    """Roughness and strength by region of the face: "auto" has the package's values where it knows the head
+    and no map says the roughness, "none" has one value for all; "default" names the package's table (an
+    artist's), and a TOML file is one of your own, which then say rho_s too."""
+
+
+def names_regions(table: Mapping[str, Any]) -> bool:
+    """Whether a [head] names a table of regions, which says roughness and strength."""
+    return table.get("regions", AUTO) not in (AUTO, NO_REGIONS)

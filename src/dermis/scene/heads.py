@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
 from dermis.errors import notify, refuse
+from dermis.human.regions.usual import with_usual_regions
 from dermis.mesh.check import check_head_height
 from dermis.mesh.formats import is_gltf
 from dermis.mesh.gltf.pictures import embedded_maps
@@ -19,7 +20,7 @@ from dermis.mesh.maps import Maps, load_maps
 from dermis.mesh.obj_maps import obj_maps
 from dermis.mesh.samples import SAMPLES, Sample, fetch
 from dermis.mesh.subdivide import subdivide_head
-from dermis.scene.head_table import NormalY, Up, VOrigin
+from dermis.scene.head_table import AUTO, NormalY, Up, VOrigin
 
 if TYPE_CHECKING:
     from dermis.human.person import Human
@@ -46,6 +47,7 @@ def load_head(
     normal_y: NormalY = "up",
     opaque: Sequence[str] | str = (),
     subdivide: int = 0,
+    regions: Literal["auto", "none"] = "auto",
 ) -> Head:
     """The parametric human ("human"), a sample ("lee_perry_smith") or a file (.glb, .gltf, .obj, .ply).
 
@@ -63,6 +65,8 @@ def load_head(
     opaque : groups of the file that are not skin, whatever they are called
     subdivide : levels of subdivision, 0 to 3: Catmull-Clark for a file of quads, else Loop; the human has one
         at least
+    regions : "auto" for gloss by region of the face where the package knows the head and no map says the
+        roughness; "none" for one roughness all over
 
     Raises DermisError for files that cannot be rendered as a head; warns with DermisWarning of pictures of
     an .mtl that are left out.
@@ -103,7 +107,7 @@ def load_head(
     made = subdivide_head(Head(name, rigged.mesh, maps, thanks, rigged.rig), subdivide)
     if subdivide and made.rig is not None:  # sequences of files have places for the file's own vertices
         made = replace(made, rig=replace(made.rig, corner=rigged.mesh.point))
-    return made
+    return with_usual_regions(made) if regions == AUTO else made
 
 
 def _read_maps(

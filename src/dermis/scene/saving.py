@@ -12,6 +12,7 @@ import numpy as np
 
 from dermis.errors import refuse
 from dermis.outputs import replacing
+from dermis.scene.head_table import names_regions
 from dermis.scene.model import Scene
 from dermis.scene.plain import Plain
 from dermis.scene.pose import Pose
@@ -38,7 +39,7 @@ def scene_toml(scene: Scene, settings: Settings, head: Mapping[str, Any]) -> str
 
     Raises DermisError for a pose by places of points.
     """
-    said = _SAID_BY_REGIONS if "regions" in head else set()
+    said = _SAID_BY_REGIONS if names_regions(head) else set()
     parts = [] if scene.lights else ['lights = "none"\n']
     parts += [_table("[head]", head), *_pose(Pose.of(scene.pose))]
     parts.append(_plain("[skin]", scene.skin, said | {"pigments", "layers"}))

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from dermis.errors import refuse
 from dermis.scene.plain import Plain, slider
 from dermis.specular.models import EnergyName, FresnelName, SpecularName
 
 StructureName = Literal["dj2006", "donner2008", "biospec"]
 MOST_LAYERS = 8
-_OILY_STRENGTH, _OILY_SMOOTHING = 3.0, 0.6
+_OILY_STRENGTH, _OILY_SMOOTHING = 2.0, 0.6
+USUAL_ROUGHNESS, USUAL_RHO_S = 0.3, 0.45
+PRESETS: dict[str, dict[str, Any]] = {"default": {}, "deck-2007": {"specular": "kelemen", "rho_s": 0.18}}
+"""Fields of skins by name: what dermis takes for skin, and the surface as the talk of 2007 had it."""
 
 
 _Share = Annotated[float | None, Field(ge=0, le=1)]
@@ -72,14 +76,15 @@ class Skin(Plain):
     profile's own colour and uses no map."""
     mix: Annotated[float, Field(ge=0, le=1)] = 0.5
     """Share of the colour map applied before scattering, the rest after it."""
-    roughness: Annotated[float, Field(ge=0.05, le=1)] = 0.3
-    """Beckmann roughness m of the surface; a roughness map replaces it."""
-    rho_s: Annotated[float, Field(ge=0, le=1)] = 0.18
-    """Strength of the surface reflection."""
+    roughness: Annotated[float, Field(ge=0.05, le=1)] = USUAL_ROUGHNESS
+    """Beckmann roughness m of the surface; where a head has a map of it, 0.3 leaves that as it is, and 0.6
+    makes it twice as rough."""
+    rho_s: Annotated[float, Field(ge=0, le=1)] = USUAL_RHO_S
+    """Strength of the surface reflection: 1 is that of a smooth boundary of index 1.4 cut into facets."""
     oiliness: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """One dial over strength and roughness: 1 is shiny skin, 3 times as strong and 0.6 times as rough; an
+    """One dial over strength and roughness: 1 is shiny skin, twice as strong and 0.6 times as rough; an
     artist's mapping, not a measured one."""
-    specular: SpecularName = "kelemen"
+    specular: SpecularName = "two-lobe"
     """Model of the surface reflection; "none" leaves it out."""
     fresnel: FresnelName = "schlick"
     """Schlick's curve with F0 = 0.028, or the exact one of index 1.4."""
@@ -95,6 +100,16 @@ class Skin(Plain):
     """What replaces pigments of the profile's skin, of "spectral", "light", "medium", "dark" or a file."""
     layers: Annotated[tuple[TissueLayer, ...], Field(max_length=MOST_LAYERS)] = ()
     """What replaces the layers of the profile's medium ("dj3", "skin1", a file's), topmost first."""
+
+    @classmethod
+    def preset(cls, name: str) -> Skin:
+        """The skin of a name in `PRESETS`.
+
+        Raises DermisError for any other name.
+        """
+        if name not in PRESETS:
+            refuse("skin", f"one of {', '.join(PRESETS)}", f"{name!r} came", "Choose one of them")
+        return cls(**PRESETS[name])
 
     @property
     def has_own_tissue(self) -> bool:

@@ -7,15 +7,13 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from dermis.errors import refuse
-from dermis.human.regions.apply import with_regions
-from dermis.scene.heads import load_head
+from dermis.scene.files import head_and_skin
+from dermis.scene.head_table import AUTO, HeadTable
 from dermis.scene.skin import Skin
 from dermis.viewer.controls import Controls, Split
 from dermis.viewer.player import MotionFile, Player
 from dermis.viewer.state import PARTS, PICTURE, History, ViewerState, load_state, save_state
 from dermis.viewer.studio import Studio
-
-NO_REGIONS = "none"
 
 
 class Session:
@@ -106,7 +104,7 @@ class Session:
 def apply_regions(state: ViewerState, name: str, known: Iterable[ViewerState] = ()) -> ViewerState:
     """The state with the maps of a table of face regions, or without them.
 
-    name : of the table, or "none"
+    name : of the table, "auto" or "none"
     known : states whose heads are reused when they already have these maps
 
     Raises DermisError for heads whose regions are not known and for heads made in memory.
@@ -115,15 +113,11 @@ def apply_regions(state: ViewerState, name: str, known: Iterable[ViewerState] = 
         refuse(
             "regions", "a head from a file or a sample", "it was made in memory", "Write it to a file first"
         )
-    bare = {key: value for key, value in state.head.items() if key != "regions"}
-    wanted = bare if name == NO_REGIONS else bare | {"regions": name}
+    wanted = {key: value for key, value in state.head.items() if key != "regions"}
+    if name != AUTO:
+        wanted["regions"] = name
     for other in known:
         if dict(other.head) == wanted:
             return state.with_head(other.scene.head, wanted, other.scene.skin.rho_s)
-    head, rho_s = state.scene.head, Skin().rho_s
-    if "regions" in state.head:
-        options = dict(bare)
-        head = load_head(options.pop("name"), **options)
-    if name != NO_REGIONS:
-        head, rho_s = with_regions(head, name)
-    return state.with_head(head, wanted, rho_s)
+    head, skin = head_and_skin(HeadTable(**wanted), Skin(), Path())
+    return state.with_head(head, wanted, skin.rho_s)

@@ -13,6 +13,7 @@ from dermis.scene.camera import Camera
 from dermis.scene.clips.clip import Clip
 from dermis.scene.environment import Environment
 from dermis.scene.files import head_table, load_lights, load_scene
+from dermis.scene.head_table import names_regions
 from dermis.scene.heads import load_head
 from dermis.scene.lights import NO_LIGHTS, Light
 from dermis.scene.model import Scene
@@ -167,7 +168,7 @@ def load_state(path: Path, before: ViewerState | None = None) -> ViewerState:
     Raises DermisError for a file that is not a scene.
     """
     table = head_table(path)
-    known = before.scene.head if before and before.head == table and "regions" not in table else None
+    known = before.scene.head if before and before.head == table and not names_regions(table) else None
     scene, settings = load_scene(path, known)
     return opened(scene, settings, table, rig="" if scene.lights else NO_LIGHTS)
 

@@ -19,7 +19,7 @@ _IRIS = {"african": 0.95, "asian": 0.85, "caucasian": 0.4}
 _SPREAD = 0.42  # standard deviation of the melanin's logarithm within a people
 _STEP = 0.05  # of eumelanin: people share tables of colours
 _SPOTS_FROM = 45.0
-_MOST_LINED = 0.8  # of `age` at 90
+_MOST_LINED = 1.0  # of `age` at 90
 
 
 class Origin(NamedTuple):
@@ -56,7 +56,7 @@ def usual_look(origin: Origin) -> SkinLook:
         veins=0.2 + 0.5 * old,
         beard=0.45 * max(2.0 * origin.sex - 1.0, 0.0),
         oil=0.45 - 0.25 * old,
-        age=0.04 + (_MOST_LINED - 0.04) * old**1.3,
+        age=0.04 + (_MOST_LINED - 0.04) * old**1.1,
     )
 
 

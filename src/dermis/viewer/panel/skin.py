@@ -11,11 +11,12 @@ from dermis.human.regions.table import DEFAULT
 from dermis.optics.pigments.skin import EXAMPLES, SkinParameters
 from dermis.optics.profiles import preset_names
 from dermis.optics.tissue import SPECTRAL
+from dermis.scene.head_table import AUTO, NO_REGIONS, names_regions
 from dermis.scene.skin import MOST_LAYERS, Pigments, Skin, TissueLayer
 from dermis.scene.tissue import layers_of
 from dermis.viewer.panel.fields import Style, attempt, button, combo, draw_fields, record_position
 from dermis.viewer.panel.plots import plot_profile
-from dermis.viewer.session import NO_REGIONS, Session, apply_regions
+from dermis.viewer.session import Session, apply_regions
 from dermis.viewer.state import ViewerState, changed
 
 Layers = tuple[TissueLayer, ...]
@@ -62,13 +63,12 @@ def draw_surface(session: Session) -> None:
     """All that the section above leaves of the skin's fields: a new one appears here."""
     state, known = session.state, session.history.states
     replaced = {
-        "roughness": state.scene.head.maps.rough and "roughness comes from the head's map",
-        "rho_s": "regions" in state.head and "rho_s comes from the regions",
+        "rho_s": names_regions(state.head) and "rho_s comes from the regions",
     }
     for name in type(state.scene.skin).model_fields:
         if name == "rho_s":
-            now = str(state.head.get("regions", NO_REGIONS))
-            names = dict.fromkeys((NO_REGIONS, DEFAULT, now))
+            now = str(state.head.get("regions", AUTO))
+            names = dict.fromkeys((AUTO, NO_REGIONS, DEFAULT, now))
             combo(session, "regions", now, names, lambda name: apply_regions(state, name, known))
         if text := replaced.get(name):
             imgui.text_disabled(text)

@@ -27,7 +27,7 @@ fn relief(spot: Spot, lip: f32) -> f32 {
     let uneven = max(0.45 + 0.9 * noise[NOISE_LINE_DEPTH], 0.0);
     let lines = zone[ZONE_LEVEL] * uneven * groove(noise[NOISE_LEVEL_LINES], 3.5, texel, 1.5)
         + zone[ZONE_AROUND] * (0.3 + uneven) * 0.9 * groove(noise[NOISE_EYE_LINES], 3.0, texel, 1.1);
-    height -= (0.3 + 2.6 * paint.age) * LINE_MM * lines;
+    height -= (0.3 + 4.0 * paint.age) * LINE_MM * lines;
     let creases = (0.6 + 0.6 * noise[NOISE_CREASE_DEPTH]) * groove(noise[NOISE_CREASES], 2.2, texel, 1.7)
         + 0.3 * groove(noise[NOISE_FINE_CREASES], 2.5, texel, 0.8);
     height -= lip * LIP_MM * creases * smoothstep(0.2, 2.0, abs(spot.fields.y));

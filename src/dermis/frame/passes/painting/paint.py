@@ -19,7 +19,7 @@ from dermis.human.skin.colours import colour_tables
 from dermis.human.skin.look import SkinLook
 from dermis.human.skin.surface import Painting
 from dermis.mesh.maps import Maps
-from dermis.scene.skin import Skin
+from dermis.scene.skin import USUAL_RHO_S
 
 _MOST_TRIANGLES = 1 << 20  # that painted_surface.wgsl has bits for
 _TEXEL = 4  # floats of a vector, which the tables' size is a multiple of
@@ -68,7 +68,7 @@ def painted_maps(device: Device, painting: Painting, look: SkinLook, side: int) 
     textures, heights, _ = _paint(device, painting, look, side)
     colour, specular, roughness = (download(device, one.texture).astype(np.float32) for one in textures)
     raw = np.frombuffer(device.handle.queue.read_buffer(heights), np.float32)
-    rho_s = _usual_strength() * specular[..., 0]
+    rho_s = USUAL_RHO_S * specular[..., 0]
     return Maps(
         colour=np.ascontiguousarray(colour[..., :3]),
         height=np.ascontiguousarray(raw.reshape(side + 2, side + 2)[1:-1, 1:-1]),
@@ -98,17 +98,12 @@ def _paint(
     return made, heights, moved
 
 
-def _usual_strength() -> float:
-    """rho_s that a factor of 1 stands for."""
-    return float(Skin.model_fields["rho_s"].default)
-
-
 def _surface(device: Device, painting: Painting, look: SkinLook, side: int) -> Resources:
     shader = program(device, "painting/skin.wgsl")
     names = set(struct_dtype(shader.source.text, "Paint").names or ()) & set(vars(look))
     numbers = {name: getattr(look, name) for name in names}
     return {
-        "paint": shader.record("Paint", side=side, usual_strength=_usual_strength(), **numbers),
+        "paint": shader.record("Paint", side=side, **numbers),
         "vertices": device.buffer(painting.vertices, "STORAGE"),
         "triangles": device.buffer(painting.triangles, "STORAGE"),
         "owners": device.buffer(np.zeros(side * side, np.uint32), "STORAGE"),

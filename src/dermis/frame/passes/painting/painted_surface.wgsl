@@ -20,7 +20,6 @@ struct Paint {
     beard: f32,
     oil: f32,
     age: f32,
-    usual_strength: f32, // rho_s that a factor of 1 stands for
 }
 
 struct Vertex {

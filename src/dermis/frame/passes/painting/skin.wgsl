@@ -25,13 +25,13 @@ const RED_SLIT: f32 = 1.0;
 const STUBBLE_COLOUR: vec3f = vec3f(0.095, 0.085, 0.08); // hair seen through skin, which makes it blueish
 const BEARD_COLOUR: vec3f = vec3f(0.11, 0.10, 0.095);
 const VEIN_COLOUR: vec3f = vec3f(0.80, 0.90, 1.0); // factor
-const STRENGTH: f32 = 0.155;
-const OILY_STRENGTH: f32 = 0.08;
+const STRENGTH: f32 = 0.86; // of the reflection, in parts of the usual one
+const OILY_STRENGTH: f32 = 0.44;
 const ROUGHNESS: f32 = 0.36;
 const OILY_ROUGHNESS: f32 = -0.10;
-const LIP_STRENGTH: f32 = 0.05;
+const LIP_STRENGTH: f32 = 0.28;
 const LIP_ROUGHNESS: f32 = -0.07;
-const WET_STRENGTH: f32 = 0.10; // of the inside of the mouth and the lids' edges
+const WET_STRENGTH: f32 = 0.55; // of the inside of the mouth and the lids' edges
 const WET_ROUGHNESS: f32 = -0.12;
 const UNEVEN: f32 = 0.15; // of the oil
 
@@ -75,15 +75,15 @@ fn over(below: vec3f, above: vec3f, share: f32) -> vec3f {
     return mix(below, min(above, below), share); // what is dark already does not turn lighter
 }
 
-// rho_s and roughness.
+// Strength, in parts of the usual one, and roughness.
 fn gloss(lip: f32, wet: f32, hair: f32) -> vec2f {
     let film = noise[NOISE_OIL_FILM] + 0.7 * noise[NOISE_FINE_FILM];
     let zones = 0.5 + 1.25 * paint.oil;
-    var rho_s = STRENGTH + OILY_STRENGTH * paint.oil + zones * zone[ZONE_STRENGTH] + LIP_STRENGTH * lip + WET_STRENGTH * wet;
-    rho_s *= (1.0 + UNEVEN * film) * (1.0 - 0.4 * hair);
+    var strength = STRENGTH + OILY_STRENGTH * paint.oil + zones * zone[ZONE_STRENGTH] + LIP_STRENGTH * lip + WET_STRENGTH * wet;
+    strength *= (1.0 + UNEVEN * film) * (1.0 - 0.4 * hair);
     var m = ROUGHNESS + OILY_ROUGHNESS * paint.oil + zones * zone[ZONE_ROUGHNESS] + LIP_ROUGHNESS * lip + WET_ROUGHNESS * wet;
     m *= 1.0 - 0.5 * UNEVEN * film;
-    return vec2f(clamp(rho_s, 0.05, 0.45), clamp(m, 0.15, 0.6));
+    return vec2f(clamp(strength, 0.3, 2.2), clamp(m, 0.15, 0.6));
 }
 
 // flush, pressed: where blood comes to, and where it is pressed out
@@ -94,7 +94,7 @@ fn keep_moved(at: vec2u, share: f32, flush: f32, pressed: f32) {
 
 fn keep(at: vec2u, rgb: vec3f, shine: vec2f, height: f32, amounts: vec3f) {
     textureStore(colour, at, vec4f(rgb, 1.0));
-    textureStore(specular, at, vec4f(shine.x / paint.usual_strength, amounts.x, amounts.z, 0.0));
+    textureStore(specular, at, vec4f(shine.x, amounts.x, amounts.z, 0.0));
     textureStore(roughness, at, vec4f(shine.y, amounts.y, 0.0, 0.0));
     heights[(at.y + 1u) * (paint.side + 2u) + at.x + 1u] = height;
 }
@@ -132,6 +132,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     keep_moved(id.xy, runs_out, saturate(zone[ZONE_BLOOD]) * (1.0 - lip), lip);
     let bare = (1.0 - lip) * (1.0 - mucosa);
     let pores = saturate(0.45 + zone[ZONE_PORES]) * bare;
-    let furrows = max(1.0 + zone[ZONE_FURROWS], 0.2) * bare * (0.8 + 1.4 * paint.age * paint.age);
+    let furrows = max(1.0 + zone[ZONE_FURROWS], 0.2) * bare * (0.8 + 2.2 * paint.age * paint.age);
     keep(id.xy, rgb, gloss(lip, wet, max(scalp * paint.stubble, beard)), height, vec3f(pores, furrows, spot.density));
 }

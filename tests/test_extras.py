@@ -1,0 +1,73 @@
+"""A picture needs none of the extras' packages, and what needs one says which."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from moving_head import write_moving_head
+from small_head import write_head
+
+from dermis.errors import DermisError
+from dermis.extras import EXTRAS, needed
+from dermis.images.codecs import decode_with_pillow, encode_png
+
+SOURCE = Path(__file__).resolve().parents[1] / "src"
+ADAPTER = os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
+WITHOUT = "import sys; sys.modules.update(dict.fromkeys({names}, None)); import dermis.cli; dermis.cli.main()"
+
+
+def run(*options: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """The command where no extra is installed."""
+    code = WITHOUT.format(names=[*EXTRAS, "imgui_bundle", "uvicorn"])
+    environment = {**os.environ, "PYTHONPATH": str(SOURCE)}
+    return subprocess.run(
+        [sys.executable, "-c", code, *options], capture_output=True, text=True, env=environment, cwd=folder
+    )
+
+
+def test_a_picture_needs_no_extra(tmp_path: Path) -> None:
+    head = write_head(tmp_path / "head.obj")
+    small = ("--size", "64x64", "--atlas", "128", "--shadow-size", "64", "--adapter", ADAPTER)
+    made = run("render", str(head), *small, "-o", "a.png", folder=tmp_path)
+    assert made.returncode == 0, made.stderr
+    assert (tmp_path / "a.png").is_file()
+
+
+@pytest.mark.parametrize(
+    ("options", "extra"),
+    [
+        (("profile", "dj3", "--plot", "curve.png"), "plots"),
+        (("animate", "face.glb", "-o", "turn.mp4"), "video"),
+        (("profile", "skin1", "--model", "montecarlo", "--photons", "1000"), "truth"),
+        (("gallery", "--only", "13_gaussians", "-o", "out"), "plots"),
+    ],
+)
+def test_what_needs_an_extra_says_which(options: tuple[str, ...], extra: str, tmp_path: Path) -> None:
+    write_moving_head(tmp_path / "face.glb")
+    made = run(*options, folder=tmp_path)
+    assert made.returncode == 2, made.stdout + made.stderr
+    assert f"dermis[{extra}]" in " ".join(made.stderr.split()) and "Traceback" not in made.stderr
+
+
+def test_each_extra_is_one_of_the_packages() -> None:
+    text = (SOURCE.parent / "pyproject.toml").read_text("utf-8")
+    for module, extra in EXTRAS.items():
+        (line,) = [line for line in text.splitlines() if line.startswith(f"{extra} = [")]
+        assert module.replace("_", "-").removesuffix("evaluator") in line
+
+
+def test_what_is_missing_is_named() -> None:
+    sys.modules["matplotlib.nothing"] = None  # type: ignore[assignment]
+    with pytest.raises(DermisError, match=r"plots: expected the package matplotlib, .*dermis\[plots\]"):
+        needed("matplotlib.nothing", "plots")
+
+
+@pytest.mark.parametrize("channels", [1, 3, 4])
+def test_deep_pictures_come_back_bit_for_bit(channels: int) -> None:
+    levels = np.random.default_rng(1).integers(0, 65536, (9, 13, channels), np.uint16)
+    np.testing.assert_array_equal(decode_with_pillow(encode_png(levels)).reshape(levels.shape), levels)
