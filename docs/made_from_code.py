@@ -13,6 +13,7 @@ from dermis.cli.scene_options import AROUND, HEAD
 from dermis.gallery.script import Script, find_scripts
 from dermis.scene import Camera, Environment, Settings, Skin
 from dermis.scene.head_table import HeadTable
+from dermis.scene.lights import LIGHTS
 from dermis.scene.plain import Plain, help_of, shown, values_of
 from dermis.scene.pose_table import PoseTable
 from dermis.scene.skin import Pigments, TissueLayer
@@ -24,6 +25,7 @@ TABLES: dict[str, tuple[type[Plain], dict[str, str] | None]] = {
     "[skin]": (Skin, {}),
     "[skin.pigments]": (Pigments, None),
     "[[skin.layers]]": (TissueLayer, None),
+    **{f"[[lights]], {name}": (kind, None) for name, kind in LIGHTS.items()},
     "[environment]": (Environment, AROUND),
     "[camera]": (Camera, None),
     "[render]": (Settings, {}),

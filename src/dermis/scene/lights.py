@@ -24,6 +24,7 @@ __all__ = [
     "StripeLight",
     "light_presets",
     "preset_lights",
+    "preset_text",
     "studio",
 ]
 
@@ -190,8 +191,12 @@ def preset_lights(name: str) -> tuple[Light, ...]:
     """The lights of a rig of the package, by its name."""
     if name == NO_LIGHTS:
         return ()
-    text = (resources.files("dermis.scene") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
-    return tuple(LIGHTS[table["kind"]](**table) for table in tomllib.loads(text)["lights"])
+    return tuple(LIGHTS[table["kind"]](**table) for table in tomllib.loads(preset_text(name))["lights"])
+
+
+def preset_text(name: str) -> str:
+    """The file of a rig of the package."""
+    return (resources.files("dermis.scene") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
 
 
 def studio() -> tuple[Light, ...]:
