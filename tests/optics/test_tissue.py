@@ -122,6 +122,4 @@ def test_a_tissue_prints_on_three_lines() -> None:
     assert len(lines) == 3 and lines[0] == "Tissue dj3: red, green, blue, index of refraction 1.4"
     assert lines[1] == "  epidermis 0.25 mm, upper dermis 0.2 mm, bloody dermis (semi-infinite)"
     assert "0.0085 to 2.5 /mm" in lines[2]
-    assert (
-        "31 wavelengths" in repr(load_tissue("light")) and len(repr(load_tissue("light")).splitlines()) == 3
-    )
+    assert repr(load_tissue("light")).startswith("Tissue light: 31 wavelengths")
