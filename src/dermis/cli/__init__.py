@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import warnings
+from importlib import import_module
 from typing import Any
 
 COMMANDS = {
@@ -25,6 +26,7 @@ def main() -> None:
     """Run the command line; exit with 2 when the caller can mend what went wrong."""
     from cyclopts import App, CycloptsError
 
+    from dermis.cli.help_text import reflowed
     from dermis.cli.misuse import explain
     from dermis.errors import DermisError
 
@@ -34,6 +36,9 @@ def main() -> None:
         help_format="plaintext",
         result_action="return_value",
     )
+    if (chosen := next(iter(sys.argv[1:]), "")) in COMMANDS:
+        command = getattr(import_module(f"dermis.cli.{chosen}"), chosen)
+        command.__doc__ = reflowed(command.__doc__)
     for name, summary in COMMANDS.items():
         # The list of commands must not import them; a command's own help is its docstring.
         shown = None if sys.argv[1:2] == [name] else summary

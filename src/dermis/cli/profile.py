@@ -144,7 +144,7 @@ def _check_outputs(output: Path | None, plot: Path | None, check: bool) -> None:
     from dermis.outputs import check_output
 
     if output is not None:
-        check_output(output, (".toml",), "Name it something.toml")
+        check_output(output, (".toml",), "Give it the suffix .toml")
     if plot is not None:
         check_output(plot, (".png", ".svg", ".pdf"))
     elif check:
