@@ -12,7 +12,7 @@ from dermis.cli.options import is_option, option_name
 from dermis.cli.scene_options import AROUND, HEAD
 from dermis.gallery.script import Script, find_scripts
 from dermis.scene import Camera, Environment, Settings, Skin
-from dermis.scene.head_table import HeadTable
+from dermis.scene.head_table import EyeTable, HeadTable
 from dermis.scene.lights import LIGHTS
 from dermis.scene.plain import Plain, help_of, shown, values_of
 from dermis.scene.pose_table import PoseTable
@@ -21,6 +21,7 @@ from dermis.scene.skin import Pigments, TissueLayer
 HERE = Path(__file__).parent
 TABLES: dict[str, tuple[type[Plain], dict[str, str] | None]] = {
     "[head]": (HeadTable, {"name": ""} | HEAD),
+    "[head.eye]": (EyeTable, None),
     "[pose]": (PoseTable, None),
     "[skin]": (Skin, {}),
     "[skin.pigments]": (Pigments, None),

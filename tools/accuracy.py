@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import accuracy_highlight as highlight
 import accuracy_light as light
 import accuracy_optics as optics
 import accuracy_specular as specular
@@ -90,6 +91,8 @@ def main() -> None:
             leaning=leaning,
             constant=f"{constant_light(device):.1e}",
             rounding=half_store_rounding(device),
+            highlights=highlight.table(),
+            highlight_paths=highlight.PATHS,
             **specular.tables(),
             **light.tables(*sys.argv[1:2]),
             **optics.tables(),

@@ -44,6 +44,13 @@ def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> R
     return call
 
 
+@pytest.fixture(autouse=True)
+def plainly_exposed(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures are radiance over black, which tests can reckon with; marked `photographed` they are not."""
+    if not request.node.get_closest_marker("photographed"):
+        monkeypatch.setattr("dermis.cli.scene_options.PHOTOGRAPHED", {"background": (0.0, 0.0, 0.0)})
+
+
 @pytest.fixture
 def opened(monkeypatch: pytest.MonkeyPatch, device: object) -> None:
     """Commands use the session's device instead of opening one each."""

@@ -93,8 +93,8 @@ def test_a_crop_is_a_part_of_the_whole_picture(renderer: Renderer, head: Head, t
     size, (left, top), part = (96, 96), (20, 9), (48, 40)
     k = np.array([[150.0, 0.0, 47.5], [0.0, 150.0, 47.5], [0.0, 0.0, 1.0]])
     moved = k - [[0, 0, left], [0, 0, top], [0, 0, 0]]
-    around = dermis.Environment(name="uniform", visible=True)
-    settings = {"atlas": 128, "technique": technique, "samples": 2}
+    around = dermis.Environment(name="uniform")
+    settings = {"atlas": 128, "technique": technique, "samples": 2, "background": "environment"}
     images = []
     for matrix, wanted in ((k, size), (moved, part)):
         camera = dermis.Camera.from_opencv(matrix, R, (0, 0, 300), wanted)

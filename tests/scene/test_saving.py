@@ -86,7 +86,7 @@ SKIN = Skin(
     pigments=PIGMENTS,
     layers=LAYERS,
 )
-ROOM = Environment(name="uniform", rotation_degrees=33.0, exposure=0.5, visible=True)
+ROOM = Environment(name="uniform", rotation_degrees=33.0, exposure=0.5)
 SETTINGS = Settings(
     size=(10, 20),
     atlas=128,
@@ -104,6 +104,7 @@ SETTINGS = Settings(
     gamma="wrong",
     strands=False,
     background=(0.1, 0.0, 0.0),
+    background_blur=0.2,
     parts="diffuse",
 )
 

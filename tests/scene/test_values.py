@@ -28,7 +28,10 @@ BAD = [
     (Settings, {"samples": 65}, "65 came"),
     (Settings, {"exposure": 0}, "0 came"),
     (Settings, {"exposure": float("inf")}, "inf came"),
+    (Settings, {"exposure": "bright"}, "expected auto or a valid number, but 'bright' came"),
     (Settings, {"background": (0, 0, -1)}, "background.2"),
+    (Settings, {"background": "#12345"}, "none, gradient, environment or a colour: three linear numbers"),
+    (Settings, {"background_blur": 2}, "2 came"),
     (Settings, {"technique": "wet"}, "'wet' came"),
     (Camera, {}, "position: expected a value, but there is none"),
     (Camera, {"position": (0, 0, 0)}, "away from the target"),
@@ -115,3 +118,13 @@ def test_equal_values_are_those_that_say_the_same() -> None:
     assert Skin(mix=0.3) != Skin(mix=0.4)
     assert PointLight(position=(0, 0, 9)) != SpotLight(position=(0, 0, 9))
     assert Skin() != "skin"
+
+
+def test_a_word_may_stand_for_a_number() -> None:
+    """And comes out as it went in, into files too; colours as they are encoded become linear."""
+    settings = Settings(exposure="auto", background="gradient")
+    assert Settings(**settings.model_dump()) == settings
+    assert (settings.exposure, settings.background) == ("auto", "gradient")
+    half = Settings(background="#bcbcbc").background
+    assert half == Settings(background=half).background and half == pytest.approx((0.503,) * 3, abs=1e-3)
+    assert Settings(background="0,0.5,1").background == (0.0, 0.5, 1.0)

@@ -13,7 +13,9 @@ from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.curvature import Curvature
 from dermis.frame.geometry import HeadResources
 from dermis.frame.levels import Blur, Levels
+from dermis.frame.passes.background import Backdrop
 from dermis.frame.passes.bloom import Glow
+from dermis.frame.passes.meter import Meter
 from dermis.frame.passes.moving_occlusion import Sky
 from dermis.frame.passes.painting.expression import Face
 from dermis.frame.passes.post import Picture
@@ -66,6 +68,8 @@ class Resources:
     sky : the open sky at the head's vertices, None where occlusion does not follow its shape
     gaussians : terms of the profile
     strands : hairs, None for none
+    meter : what meters the exposure, None where it is given
+    backdrop : space for what is behind the head, None for nothing
     glow : space for the bloom, None without one
     unscattered : share of the skin's triangles that the atlas cannot hold
     """
@@ -90,6 +94,8 @@ class Resources:
     gaussians: int
     strands: StrandResources | None
     picture: Picture
+    meter: Meter | None
+    backdrop: Backdrop | None
     glow: Glow | None
     unscattered: float
 
@@ -187,7 +193,6 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Sp
         relit=split.relit,
         total=split.total,
         shown=_PARTS[settings.parts],
-        background=np.divide(settings.background, settings.exposure),
         material_colour=colours,
         jitter=jitter,
     )
@@ -196,6 +201,7 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Sp
             record["eyes"][name] = getattr(head.eyes.look, name)
         record["eyes"]["seed"] = head.eyes.look.seed % _EYE_SEEDS
         record["eyes"]["material"] = head.eyes.material
+        record["eyes"]["middle_mm"] = head.eyes.middle_mm
     return record
 
 

@@ -110,7 +110,7 @@ class Preparation:
 
 def _person(scene: Scene) -> Any:
     """Where the control points rest, if not where the head's own do."""
-    motion, own = scene.motion, scene.head.positions_mm
+    motion, own = scene.motion, scene.head.control.positions_mm
     return None if motion is None or motion.positions_mm is own else motion.positions_mm
 
 

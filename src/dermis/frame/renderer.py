@@ -102,7 +102,9 @@ class Renderer:
             made.gaussians,
             made.unscattered,
             made.suns,
+            inputs.settings,
             self._leave,
+            made.meter,
             is_current=lambda: number == self._frames,
         )
 
@@ -138,9 +140,9 @@ class Renderer:
         while len(self._in_flight) > _IN_FLIGHT:
             self.device.wait(self._in_flight.popleft())
 
-    def _leave(self, picture: Picture) -> Leaving:
+    def _leave(self, picture: Picture, **how: Any) -> Leaving:
         self.graph.begin()
-        leaving = pack.draw(self.graph, picture)
+        leaving = pack.draw(self.graph, picture, **how)
         self.graph.submit()
         return leaving
 
@@ -150,27 +152,28 @@ class Renderer:
 
     @overload
     def render_many(
-        self, scenes: Iterable[Scene], *, linear: Literal[False] = False, **settings: Any
+        self, scenes: Iterable[Scene], *, linear: Literal[False] = False, alpha: bool = False, **settings: Any
     ) -> Iterator[NDArray[np.uint8]]: ...
 
     @overload
     def render_many(
-        self, scenes: Iterable[Scene], *, linear: Literal[True], **settings: Any
+        self, scenes: Iterable[Scene], *, linear: Literal[True], alpha: bool = False, **settings: Any
     ) -> Iterator[NDArray[np.float32]]: ...
 
     def render_many(
-        self, scenes: Iterable[Scene], *, linear: bool = False, **settings: Any
+        self, scenes: Iterable[Scene], *, linear: bool = False, alpha: bool = False, **settings: Any
     ) -> Iterator[NDArray[Any]]:
         """(h, w, 3) sRGB bytes of each scene in turn, each yielded while the next ones are drawn.
 
         linear : float32 linear Rec. 709 instead, as of `render`
+        alpha : (h, w, 4) as of `Rendered.rgba8` and `linear_rgba`
         settings : those of `Settings`, for all of them; heads and textures that scenes share are loaded once
 
         Raises DermisError as `draw` does.
         """
         chosen, leaving = Settings(**settings), deque[Leaving]()
         for scene in scenes:
-            leaving.append(self._send(scene, chosen, linear))
+            leaving.append(self._send(scene, chosen, linear, alpha))
             if len(leaving) >= _IN_FLIGHT:
                 yield self._arrived(leaving.popleft())
         while leaving:
@@ -180,11 +183,12 @@ class Renderer:
         with gpu_failures(self.device):
             return leaving.image()
 
-    def _send(self, scene: Scene, settings: Settings, linear: bool) -> Leaving:
+    def _send(self, scene: Scene, settings: Settings, linear: bool, alpha: bool) -> Leaving:
         """Submit a frame and start reading its picture back."""
         with gpu_failures(self.device):
             inputs = self.prepare(Scene.of(scene), settings)
-            _, leaving = self._submit(inputs, False, False, partial(pack.draw, linear=linear))
+            leave = partial(pack.draw, linear=linear, alpha=settings if alpha else None)
+            _, leaving = self._submit(inputs, False, False, leave)
         assert leaving is not None
         return leaving
 

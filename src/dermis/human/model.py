@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dermis.human import globes, teeth
 from dermis.human.movement import expressions, gaze, skeleton
 from dermis.human.published import Points, count, data, places_mm
+from dermis.mesh import globe
 from dermis.mesh.eyes import EyeLook, Eyes
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
@@ -95,9 +96,7 @@ def _ball(name: str) -> Index:
 
 def _eyes(look: EyeLook) -> Eyes:
     size = len(globes.globe()[0])
-    apex, back, side = (
-        np.array([count() + mark, count() + size + mark], np.int32) for mark in globes.marks()
-    )
+    apex, back, side = (np.array([count() + mark, count() + size + mark], np.int32) for mark in globe.marks())
     material = np.array([list(MATERIALS).index(name) for name in (LEFT_EYE, RIGHT_EYE)], np.int32)
     return Eyes(apex, back, side, material, look)
 
@@ -122,7 +121,7 @@ def _layout(layout: Layout) -> _Laid:
         uv = np.concatenate([uv, places])
     eyes = [np.full(len(quads), list(MATERIALS).index(name)) for name in (LEFT_EYE, RIGHT_EYE)]
     return _Laid(
-        np.concatenate([uv, globes.layout()]),
+        np.concatenate([uv, globe.layout()]),
         np.concatenate([points[stays], count() + quads, count() + size + quads]),
         np.concatenate([corner[stays], len(uv) + quads, len(uv) + quads]),
         np.concatenate([material[stays], *eyes]),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +61,9 @@ class Eyes:
         the right of who looks out of it
     material : (k,) index of what its triangles are made of
     look : of both
+    ball_mm, middle_mm : (k,) radius of each ball, and where on the axis its middle lies, in mm of a usual
+        eye, whose cornea it has; 0 for the middle of one of usual size
+    sight : (k, 3) the way each looks in its own space: along the axis, unless lids show it elsewhere
     """
 
     apex: NDArray[np.int32]
@@ -67,15 +71,22 @@ class Eyes:
     side: NDArray[np.int32]
     material: NDArray[np.int32]
     look: EyeLook
+    ball_mm: Doubles = field(default_factory=lambda: np.full(2, SCLERA_MM))
+    middle_mm: Doubles = field(default_factory=lambda: np.zeros(2))
+    sight: Doubles = field(default_factory=lambda: np.tile([0.0, 0.0, 1.0], (2, 1)))
 
     def frames(self, rig: Rig, motion: Motion) -> Doubles:
-        """(k, 4, 4) from the head's space [mm] to each eye's own: in mm of a usual eye, z along its axis."""
+        """(k, 4, 4) from the head's space [mm] to each eye's own: in mm of a usual eye, z along its axis.
+
+        The cornea lies in all spaces where a usual eye has it, whatever the size of the ball behind.
+        """
         count = len(self.apex)
         points = rig.some_posed(np.concatenate([self.apex, self.back, self.side]), motion)
         apex, back, side = points.reshape(3, count, 3)
         length = np.linalg.norm(apex - back, axis=1, keepdims=True)
-        axis, scale = (apex - back) / length, (apex_mm() + SCLERA_MM) / length
-        middle = back + axis * SCLERA_MM / scale
+        behind = (self.ball_mm - self.middle_mm)[:, None]
+        axis, scale = (apex - back) / length, (apex_mm() + behind) / length
+        middle = back + axis * behind / scale
         across = side - middle
         across -= (across * axis).sum(axis=1, keepdims=True) * axis
         across /= np.linalg.norm(across, axis=1, keepdims=True)
@@ -90,9 +101,14 @@ class Eyes:
         return replace(self, look=look)
 
 
+def plane_mm(radius_mm: Any) -> Any:
+    """How far before the middle of a ball the cornea begins, at the limbus [mm]."""
+    return np.sqrt(radius_mm**2 - LIMBUS_MM**2)
+
+
 def cornea_centre_mm() -> float:
     """Where on the axis the centre of the cornea's front lies, from the ball's [mm]."""
-    return float(np.sqrt(SCLERA_MM**2 - LIMBUS_MM**2) - np.sqrt(CORNEA_MM**2 - LIMBUS_MM**2))
+    return float(plane_mm(SCLERA_MM) - plane_mm(CORNEA_MM))
 
 
 def apex_mm() -> float:

@@ -25,6 +25,7 @@ class Head:
     rig : what moves it; None for a head whose points move only if all their places are given
     eyes : its eyeballs, where they are of true shape
     strands : its hairs, None for none
+    note : what could not be made of its file, and why; empty for nothing
     """
 
     name: str
@@ -34,6 +35,7 @@ class Head:
     rig: Rig | None = None
     eyes: Eyes | None = None
     strands: Strands | None = None
+    note: str = ""
 
     @cached_property
     def control(self) -> Rig:
@@ -54,8 +56,12 @@ class Head:
 
     @property
     def positions_mm(self) -> Floats:
-        """(n, 3) the unique points of the mesh as it was loaded, before any subdivision [mm]."""
-        return self.control.positions_mm
+        """(n, 3) the unique points of the mesh as it was loaded, before any subdivision [mm].
+
+        Without those of eyeballs that are not the file's own, see `Rig.carried`.
+        """
+        places = self.control.positions_mm
+        return places[: self.control.of_file] if self.control.carried else places
 
     @property
     def targets(self) -> tuple[str, ...]:

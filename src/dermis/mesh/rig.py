@@ -13,12 +13,23 @@ from dermis.disk import cached_array
 from dermis.mesh.morph_targets import MorphTargets, no_targets
 from dermis.mesh.rig_outline import RigOutline, corners_of, outline_of, outline_points
 from dermis.mesh.skeleton import INFLUENCES, Skeleton
+from dermis.mesh.turns import rigid_motion
 
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-__all__ = ["INFLUENCES", "MorphTargets", "Motion", "Rig", "Skeleton", "Stencils", "Turn", "no_targets"]
+__all__ = [
+    "INFLUENCES",
+    "Carried",
+    "MorphTargets",
+    "Motion",
+    "Rig",
+    "Skeleton",
+    "Stencils",
+    "Turn",
+    "no_targets",
+]
 
 _FORM = "outline 6"  # another number when other points are found
 
@@ -66,6 +77,17 @@ class Turn(NamedTuple):
     degrees: tuple[float, float, float]
 
 
+class Carried(NamedTuple):
+    """Points that lie where others of the file take them, as one rigid body.
+
+    others : (n,) of the file
+    points : (m,) those that go with them
+    """
+
+    others: Ints
+    points: Ints
+
+
 @dataclass(frozen=True, eq=False)
 class Rig:
     """The control points of a head and what moves them: morph targets first, then bones.
@@ -75,6 +97,7 @@ class Rig:
     stencils : from the control points to those of the mesh; None where they are the same
     corner : (v,) the control point of each vertex of the file's mesh; None where `Mesh.point` tells it
     turns : of bones, by targets
+    carried : points that the file has not, after all of its own
     """
 
     positions_mm: Floats
@@ -83,12 +106,27 @@ class Rig:
     stencils: Stencils | None = None
     corner: Ints | None = None
     turns: tuple[Turn, ...] = ()
+    carried: tuple[Carried, ...] = ()
 
     @cached_property
     def rest(self) -> Motion:
         """That of a rig which nothing moves."""
         bones = np.zeros((0, 3, 4), np.float32) if self.skeleton is None else self.skeleton.resting
         return Motion(np.zeros(len(self.targets.names), np.float32), bones, self.positions_mm)
+
+    @property
+    def of_file(self) -> int:
+        """How many points are the file's own; they come first."""
+        return len(self.positions_mm) - sum(len(one.points) for one in self.carried)
+
+    def completed(self, places_mm: Floats) -> Floats:
+        """(p, 3) where all points rest, of those of the file [mm]."""
+        both = np.concatenate([places_mm, self.positions_mm[len(places_mm) :]])
+        for others, points in self.carried:
+            before, after = self.positions_mm[others], places_mm[others]
+            matrix, shift = rigid_motion(before.astype(np.float64), after.astype(np.float64))
+            both[points] = self.positions_mm[points] @ matrix.T + shift
+        return both
 
     @property
     def target_index(self) -> dict[str, int]:
@@ -139,13 +177,30 @@ class Rig:
         return control if self.stencils is None else self.stencils.points(control)
 
     def some_posed(self, points: Ints, motion: Motion) -> Doubles:
-        """(n, 3) some points, which no target moves, in a motion [mm]."""
+        """(n, 3) some points in a motion [mm]."""
         places = motion.positions_mm[points].astype(np.float64)
+        if self._moved[points].any():
+            places += np.einsum("t,tpk->pk", motion.weights, self._dense(points))
         if self.skeleton is None:
             return places
         whole = np.concatenate([places, np.ones((len(places), 1))], axis=1)
         weight, matrices = self.skeleton.weight[points], motion.matrices[self.skeleton.bone[points]]
         return np.asarray(np.einsum("pk,pkij,pj->pi", weight, matrices, whole))
+
+    @cached_property
+    def _moved(self) -> NDArray[np.bool_]:
+        """(p,) whether a target moves a point."""
+        moved = np.zeros(len(self.positions_mm), bool)
+        moved[self.targets.point] = True
+        return moved
+
+    def _dense(self, points: Ints) -> Floats:
+        """(t, n, 3) displacements of some points; the last ones are kept."""
+        asked, found = vars(self).get("_last", (None, None))
+        if found is None or not np.array_equal(asked, points):
+            found = self.targets.dense(points.astype(np.intp), len(self.positions_mm))
+            vars(self)["_last"] = points, found
+        return np.asarray(found)
 
     def posed(self, weights: Doubles, matrices: Doubles | None = None) -> Doubles:
         """(p, 3) the points in a pose, as the device computes them [mm].

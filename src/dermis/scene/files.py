@@ -138,6 +138,9 @@ def _pose(path: Path, table: Any, head: Head) -> Pose:
 
 
 def _environment(path: Path, table: Any) -> Environment:
+    if isinstance(table, dict) and "visible" in table:
+        remedy = 'Write background = "environment" into [render]'
+        refuse(f"{path}: environment: visible", "what is behind the head elsewhere", "it came", remedy)
     environment = _made(Environment, path, "environment", table)
     return environment.model_copy(update={"name": _beside(path.parent, environment.name)})
 

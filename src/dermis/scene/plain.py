@@ -34,6 +34,22 @@ Intensity = Annotated[float, Field(ge=0, le=1e6)]
 Colour = tuple[Intensity, Intensity, Intensity]
 
 
+class Words:
+    """For a field of numbers: `Annotated[float, Words("auto")]` may also be one of some words."""
+
+    def __init__(self, *words: str) -> None:
+        self.words = words
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        from pydantic_core import core_schema
+
+        def check(value: Any, numbers: Any) -> Any:
+            return value if isinstance(value, str) and value in self.words else numbers(value)
+
+        as_it_is = core_schema.plain_serializer_function_ser_schema(lambda value: value)
+        return core_schema.no_info_wrap_validator_function(check, handler(source), serialization=as_it_is)
+
+
 class ImpossibleError(DermisError):
     """Values that cannot be.
 
@@ -110,17 +126,24 @@ def choices_of(model: type[BaseModel], field: str) -> tuple[str, ...]:
     return tuple(words)
 
 
+def words_of(model: type[BaseModel], field: str) -> tuple[str, ...]:
+    """The words that a field of numbers may be instead."""
+    found = [one.words for one in model.model_fields[field].metadata if isinstance(one, Words)]
+    return found[0] if found else ()
+
+
 def range_of(model: type[BaseModel], field: str) -> Range | None:
     """The ends of a number's slider, or of each number in a tuple; None where the model names no two ends."""
     return _range(model.model_fields[field])
 
 
 def values_of(model: type[BaseModel], field: str) -> str:
-    """The words that a field may be, or the bounds of a number where they say something."""
+    """The words that a field may be, and the bounds of a number where they say something."""
     low, high = _bounds(model.model_fields[field])
+    words = [*words_of(model, field), *choices_of(model, field)]
     if low is not None and high is not None and high < _VAST:
-        return f"{low:g} to {high:g}"
-    return ", ".join(choices_of(model, field))
+        words.append(f"{low:g} to {high:g}")
+    return ", ".join(words)
 
 
 def shown(value: Any) -> str:
@@ -212,6 +235,8 @@ def _finding(one: ErrorDetails, model: type[Plain]) -> str:
     expected = expected.replace("a valid tuple", f"a list{_length(one, model)}")
     if expected.startswith(("greater", "less")):
         expected = f"a number {expected}"
+    if len(one["loc"]) == 1 and (words := words_of(model, str(one["loc"][0]))):
+        expected = f"{', '.join(words)} or {expected}"
     came = repr(one["input"])
     if not one["loc"] and isinstance(one["input"], dict):  # values that do not go together
         came = ", ".join(f"{name} {value}" for name, value in one["input"].items())

@@ -20,7 +20,7 @@ from dermis.scene.model import Scene
 from dermis.scene.plain import Plain
 from dermis.scene.pose import Pose
 from dermis.scene.saving import save_scene
-from dermis.scene.settings import Settings
+from dermis.scene.settings import PHOTOGRAPHED, Settings
 from dermis.scene.skin import Pigments
 from dermis.viewer.chart import Chart
 from dermis.viewer.posing import same_pose, with_moves
@@ -169,7 +169,8 @@ def load_state(path: Path, before: ViewerState | None = None) -> ViewerState:
     """
     table = head_table(path)
     known = before.scene.head if before and before.head == table and not names_regions(table) else None
-    scene, settings = load_scene(path, known)
+    scene, described = load_scene(path, known)
+    settings = Settings(**{**PHOTOGRAPHED, **described.model_dump(exclude_unset=True)})
     return opened(scene, settings, table, rig="" if scene.lights else NO_LIGHTS)
 
 

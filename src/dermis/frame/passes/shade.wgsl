@@ -26,7 +26,6 @@ struct Shade {
     total: vec3f, // weight of all levels
     shown: vec2f, // factors of the light from below and of the reflected light
     pre: PreIntegrated,
-    background: vec3f,
     eyes: array<Eye, 2>,
     material_colour: array<vec4f, 64>,
     jitter: array<vec4f, 64>, // sample places in the pixel, 0..1
@@ -214,9 +213,7 @@ fn finish(pixel: Pixel) {
         textureStore(apart, pixel.at, 0, vec4f(skin.below, skin.depth) / held);
         textureStore(apart, pixel.at, 1, vec4f(skin.leaving, 0.0));
     }
-    let size = vec2f(textureDimensions(image));
-    let behind = seen_behind(ray_through(vec2f(pixel.at) + 0.5, size), shade.background);
-    textureStore(image, pixel.at, vec4f(sum.rgb + (1.0 - sum.a) * behind, sum.a));
+    textureStore(image, pixel.at, sum);
 }
 
 @compute @workgroup_size(8, 8)

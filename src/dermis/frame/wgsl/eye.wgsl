@@ -26,6 +26,7 @@ struct Eye {
     pupil_mm: f32,
     redness: f32,
     seed: f32,
+    middle_mm: f32, // where on the axis the middle of the ball lies: 0 for one of usual size
 }
 
 struct EyeLit {
@@ -107,7 +108,7 @@ fn eye_at(eye: Eye, point: Point, v: vec3f) -> EyeLit {
     let d = normalize(turned * -v);
     let off = length(p.xy);
     let clear = (1.0 - smoothstep(LIMBUS_MM - LIMBUS_SOFT_MM, LIMBUS_MM + LIMBUS_SOFT_MM, off)) * step(0.0, p.z);
-    let ball = normalize(p);
+    let ball = normalize(p - vec3f(0.0, 0.0, eye.middle_mm));
     let cornea = normalize(p - vec3f(0.0, 0.0, CORNEA_AT));
     let q = seen_on_iris(p, d);
     let on_iris = q * min(1.0, IRIS_MM / max(length(q), 1e-3));
