@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +28,9 @@ def written(folder: Path, head: Head, **more: object) -> Path:
 
 
 def posed_mm(head: Head, pose: Pose) -> np.ndarray:
-    """(v, 3) the vertices in a pose."""
-    return np.asarray(head.control.points_mm(pose.motion(head.control))[head.mesh.point])
+    """(v, 3) the vertices in a pose, of lids that do not slide over the eyes: in files nothing does."""
+    rig = replace(head.control, contact=None)
+    return np.asarray(rig.points_mm(pose.motion(rig))[head.mesh.point])
 
 
 def in_file(head: Head) -> np.ndarray:

@@ -138,10 +138,9 @@ def _begin(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
         return load_scene(Path(name))
     alike = {"regions": NO_REGIONS} if given.surface == "deck-2007" else {}
     table = HeadTable(**{"name": name, **alike, **given.head})
-    for field_ in ("rho_s", "roughness"):
-        if names_regions(vars(table)) and field_ in given.skin:
-            came = "it came with --regions, which says it for each region"
-            refuse(option_name(field_), "one or the other", came, "Leave one out, or use --oiliness")
+    if names_regions(vars(table)) and "rho_s" in given.skin:
+        came = "it came with --regions, which says it for each region"
+        refuse(option_name("rho_s"), "one or the other", came, "Leave one out, or use --oiliness")
     head, skin = head_and_skin(table, Skin(), Path())
     return Scene(head, skin=skin), Settings()
 

@@ -147,6 +147,17 @@ class Pinhole(NamedTuple):
     window: Window
 
 
+class EyesSeen(NamedTuple):
+    """How eyes of true shape stand in a motion.
+
+    frames : (2, 4, 4) from the head's space to each eye's
+    edges_mm : (2, r, 3) the edges of the lids around each; between two, a point of a smooth curve is put
+    """
+
+    frames: NDArray[np.float64]
+    edges_mm: NDArray[np.float64]
+
+
 @dataclass(frozen=True)
 class Split:
     """A profile divided into the level that is lit again in the image and those that are blurred.
@@ -205,10 +216,10 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Sp
     return record
 
 
-def seen_by(view: Any, pinhole: Pinhole, eyes: NDArray[np.float64] | None) -> Any:
+def seen_by(view: Any, pinhole: Pinhole, eyes: EyesSeen | None) -> Any:
     """A shading pass' record with the rays of a camera.
 
-    eyes : (2, 4, 4) from the head's space to that of each eye of true shape, if it has such
+    eyes : of true shape, if it has such
     """
     eye, (right, up, forward), (half, shift) = pinhole
     # Its bytes: numpy's own copy takes the members one by one, and has anything between them.
@@ -217,5 +228,10 @@ def seen_by(view: Any, pinhole: Pinhole, eyes: NDArray[np.float64] | None) -> An
     record["right"], record["up"] = tuple(half[0] * c for c in right), tuple(half[1] * c for c in up)
     record["shift"] = shift
     if eyes is not None:
-        record["eyes"]["to_own"] = eyes.transpose(0, 2, 1)  # by columns
+        record["eyes"]["to_own"] = eyes.frames.transpose(0, 2, 1)  # by columns
+        edges = eyes.edges_mm
+        a, b, c = (np.roll(edges, -k, axis=1) for k in (-1, 1, 2))
+        both = np.stack([edges, (9.0 * (edges + b) - a - c) / 16.0], axis=2).reshape(2, -1, 3)
+        whole = np.concatenate([both, np.ones((*both.shape[:2], 1))], axis=-1)
+        record["lids"] = np.einsum("kij,krj->kri", eyes.frames, whole).reshape(-1, 4)
     return record

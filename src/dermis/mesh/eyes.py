@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
+from dermis.mesh.eyeball import SCLERA_MM, apex_mm
 from dermis.mesh.rig import Motion, Rig
 
 Doubles = NDArray[np.float64]
 
-SCLERA_MM, CORNEA_MM, LIMBUS_MM = 14.2, 7.8, 5.85
-"""Radii of the ball, of the cornea's front, and of the circle where they meet [mm].
-
-Cornea and iris are those of an adult. A ball is 12 mm in truth; here it has the curve that the published lids
-are shaped for, so that none of them stands off it."""
-IRIS_BEHIND_MM = 3.0
-"""Depth of the plane of the iris behind the cornea's apex [mm]."""
 PUPIL_MM = 1.0, 4.0
 
 
@@ -55,7 +48,7 @@ class EyeLook:
 
 @dataclass(frozen=True)
 class Eyes:
-    """The eyeballs of a head, in their true shape: a ball with a cornea, see `profile_mm`.
+    """The eyeballs of a head, in their true shape: a ball with a cornea, see mesh/eyeball.py.
 
     apex, back, side : (k,) control points of each: the cornea's apex, the one opposite, one of the equator to
         the right of who looks out of it
@@ -99,31 +92,3 @@ class Eyes:
     def with_look(self, look: EyeLook) -> Eyes:
         """The same eyes of another look."""
         return replace(self, look=look)
-
-
-def plane_mm(radius_mm: Any) -> Any:
-    """How far before the middle of a ball the cornea begins, at the limbus [mm]."""
-    return np.sqrt(radius_mm**2 - LIMBUS_MM**2)
-
-
-def cornea_centre_mm() -> float:
-    """Where on the axis the centre of the cornea's front lies, from the ball's [mm]."""
-    return float(plane_mm(SCLERA_MM) - plane_mm(CORNEA_MM))
-
-
-def apex_mm() -> float:
-    """Where on the axis the cornea's apex lies [mm]."""
-    return cornea_centre_mm() + CORNEA_MM
-
-
-def iris_mm() -> float:
-    """Where on the axis the plane of the iris lies [mm]."""
-    return apex_mm() - IRIS_BEHIND_MM
-
-
-def profile_mm(angle: Doubles) -> Doubles:
-    """Distance from the ball's centre to its surface, by the angle from its axis [rad] [mm]."""
-    centre = cornea_centre_mm()
-    within = np.maximum(CORNEA_MM**2 - (centre * np.sin(angle)) ** 2, 0.0)
-    edge = np.arctan2(LIMBUS_MM, np.sqrt(SCLERA_MM**2 - LIMBUS_MM**2))
-    return np.where(angle < edge, centre * np.cos(angle) + np.sqrt(within), SCLERA_MM)

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.mesh.eyes import profile_mm
+from dermis.mesh.eyeball import profile_mm
 
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.disk import cached_array
+from dermis.mesh.contact import Contact
 from dermis.mesh.morph_targets import MorphTargets, no_targets
 from dermis.mesh.rig_outline import RigOutline, corners_of, outline_of, outline_points
 from dermis.mesh.skeleton import INFLUENCES, Skeleton
@@ -98,6 +99,7 @@ class Rig:
     corner : (v,) the control point of each vertex of the file's mesh; None where `Mesh.point` tells it
     turns : of bones, by targets
     carried : points that the file has not, after all of its own
+    contact : points that stay off the eyes; None for none
     """
 
     positions_mm: Floats
@@ -107,6 +109,7 @@ class Rig:
     corner: Ints | None = None
     turns: tuple[Turn, ...] = ()
     carried: tuple[Carried, ...] = ()
+    contact: Contact | None = None
 
     @cached_property
     def rest(self) -> Motion:
@@ -176,6 +179,28 @@ class Rig:
         control = resting.posed(motion.weights.astype(np.float64), motion.matrices.astype(np.float64))
         return control if self.stencils is None else self.stencils.points(control)
 
+    def edges_mm(self, motion: Motion) -> Doubles:
+        """(k, r, 3) the edges of the lids around each eye, on the surface, in a motion [mm]."""
+        assert self.contact is not None
+        points, share, outline = self._edges
+        rest = np.vstack([motion.positions_mm[points].T, outline.rest_mm[3]])
+        posed = replace(outline, rest_mm=rest).posed(motion.weights, motion.matrices)
+        return np.asarray(share @ posed).reshape(*self.contact.edge.shape, 3)
+
+    @cached_property
+    def _edges(self) -> tuple[NDArray[np.intp], Doubles, RigOutline]:
+        """Control points around edges of lids, their shares in these, and what moves them."""
+        assert self.contact is not None
+        edge = self.contact.edge.ravel().astype(np.intp)
+        points, share = edge, np.eye(len(edge))
+        if self.stencils is not None:  # whose first points are the control points, on the surface
+            parts = [slice(*self.stencils.first[one : one + 2]) for one in edge]
+            points = np.unique(np.concatenate([self.stencils.point[part] for part in parts])).astype(np.intp)
+            share = np.zeros((len(edge), len(points)))
+            for row, part in zip(share, parts, strict=True):
+                row[np.searchsorted(points, self.stencils.point[part])] = self.stencils.weight[part]
+        return points, share, outline_of(self.positions_mm, self.targets, self.skeleton, points)
+
     def some_posed(self, points: Ints, motion: Motion) -> Doubles:
         """(n, 3) some points in a motion [mm]."""
         places = motion.positions_mm[points].astype(np.float64)
@@ -211,8 +236,8 @@ class Rig:
         targets, points = self.targets, self.positions_mm.astype(np.float64)
         each = np.repeat(weights, np.diff(targets.first))
         np.add.at(points, targets.point, each[:, None] * targets.delta_mm)
-        if self.skeleton is None or matrices is None:
-            return points
-        whole = np.concatenate([points, np.ones((len(points), 1))], axis=1)
-        blended = np.einsum("pk,pkij->pij", self.skeleton.weight, matrices[self.skeleton.bone])
-        return np.asarray(np.einsum("pij,pj->pi", blended, whole))
+        if self.skeleton is not None and matrices is not None:
+            whole = np.concatenate([points, np.ones((len(points), 1))], axis=1)
+            blended = np.einsum("pk,pkij->pij", self.skeleton.weight, matrices[self.skeleton.bone])
+            points = np.asarray(np.einsum("pij,pj->pi", blended, whole))
+        return points if self.contact is None else self.contact.kept_off(points)

@@ -124,10 +124,9 @@ def _skin(path: Path, told: Any) -> Skin:
 
 
 def _check_said_once(path: Path, table: HeadTable, skin: Skin) -> None:
-    for name in ("rho_s", "roughness"):
-        if names_regions(vars(table)) and name in skin.model_fields_set:
-            came = "it came beside the head's regions, which say it for each region"
-            refuse(f"{path}: skin: {name}", "one or the other", came, "Leave one out, or use oiliness")
+    if names_regions(vars(table)) and "rho_s" in skin.model_fields_set:
+        came = "it came beside the head's regions, which say it for each region"
+        refuse(f"{path}: skin: rho_s", "one or the other", came, "Leave one out, or use oiliness")
 
 
 def _pose(path: Path, table: Any, head: Head) -> Pose:

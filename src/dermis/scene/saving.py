@@ -19,7 +19,7 @@ from dermis.scene.pose import Pose
 from dermis.scene.settings import Settings
 
 _HEADER = "# A scene of dermis: lengths in mm from the head's centre, colours linear Rec. 709."
-_SAID_BY_REGIONS = {"rho_s", "roughness"}
+_SAID_BY_REGIONS = {"rho_s"}
 _FILES = {"profile", "name"}  # of skins and environments, where they are no presets
 
 

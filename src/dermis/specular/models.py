@@ -63,7 +63,7 @@ MODELS: Registry[Model] = Registry(
         "kelemen-direct": "dermis.specular.kelemen:KELEMEN_DIRECT",
     },
 )
-"""By the names that scenes use, the default first; imported when needed, so that a command's help is quick."""
+"""By the names that scenes use, the default first; imported when needed: a command's help is quick."""
 
 SpecularName = Annotated[str, Named(MODELS, "none")]
 FresnelName = Literal["schlick", "exact"]

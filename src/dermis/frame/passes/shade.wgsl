@@ -1,6 +1,7 @@
 // The image: light scattered below the skin, relit at its finest level, under the white lobe of the surface.
 //#include "lighting.wgsl"
 //#include "mouth.wgsl"
+//#include "lids.wgsl"
 //#include "pre_integrated.wgsl"
 //#include "sample_bits.wgsl"
 //#include "shaded.wgsl"
@@ -27,6 +28,7 @@ struct Shade {
     shown: vec2f, // factors of the light from below and of the reflected light
     pre: PreIntegrated,
     eyes: array<Eye, 2>,
+    lids: array<vec4f, 112>, // edges of the lids around each eye, in its own space, half of them each; see human/lid_rings.csv
     material_colour: array<vec4f, 64>,
     jitter: array<vec4f, 64>, // sample places in the pixel, 0..1
 }
@@ -124,7 +126,8 @@ fn shaded(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Shaded {
                 break;
             }
             if (shade.eyes[k].material == (point.flags >> 8u)) {
-                let eye = eye_at(shade.eyes[k], point, v);
+                let own = (shade.eyes[k].to_own * vec4f(point.position, 1.0)).xyz;
+                let eye = eye_at(shade.eyes[k], own, lids_around(k, own), v);
                 surface = eye.surface;
                 film = eye.film;
                 point.lit_position += SCATTERED_MM * film.normal;

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.mesh import globe
-from dermis.mesh.eyes import CORNEA_MM, LIMBUS_MM, SCLERA_MM, EyeLook, Eyes, cornea_centre_mm, plane_mm
+from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, cornea_centre_mm, plane_mm
+from dermis.mesh.eyes import EyeLook, Eyes
 from dermis.mesh.fitted_eyes.balls import Ball, find_balls
 from dermis.mesh.fitted_eyes.lids import axes_along, lids_before
 from dermis.mesh.fitted_eyes.rigging import Globe, with_globes

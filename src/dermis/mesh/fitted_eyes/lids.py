@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.mesh.eyes import CORNEA_MM, plane_mm
+from dermis.mesh.eyeball import CORNEA_MM, plane_mm
 from dermis.mesh.fitted_eyes.spheres import Sphere
 
 Doubles = NDArray[np.float64]
