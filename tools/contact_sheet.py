@@ -18,8 +18,8 @@ from dermis.mesh.head import Head
 from dermis.mesh.samples import SAMPLES, cached
 from dermis.scene import Environment, Scene, Settings, load_lights
 from dermis.scene.camera import preset
-from dermis.scene.files import NO_LIGHTS, light_presets
 from dermis.scene.heads import HUMAN, load_head
+from dermis.scene.lights import NO_LIGHTS, light_presets
 from dermis.scene.settings import PHOTOGRAPHED
 
 TURNS = (0.0, 90.0, 180.0, -90.0)

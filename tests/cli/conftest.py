@@ -79,7 +79,6 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / name).write_text(text)
     rng = np.random.default_rng(1)
     colours = rng.integers(0, 255, (64, 64, 3), dtype=np.uint8)
-    write_png(folder / "tiny.png", colours[:8, :8])
     write_png(folder / "grey.png", colours[..., 0])
     write_png(folder / "red.png", colours * np.uint8([1, 0, 0]))
     write_exr(folder / "bright.exr", np.full((32, 32, 3), 9.0))

@@ -19,7 +19,7 @@ from dermis.scene import (
     load_scene,
     studio,
 )
-from dermis.scene.files import light_presets
+from dermis.scene.lights import light_presets
 
 KINDS = """
 [[lights]]

@@ -133,7 +133,7 @@ def head(
     if list_targets:
         return _list_targets(as_json)
     started = time.perf_counter()
-    check_output(output, (".glb", ".json"), "Name it something.glb")
+    check_output(output, (".glb", ".json"), "Choose .glb for a head, .json for the numbers of a person")
     numbers = given(african=african, asian=asian, caucasian=caucasian, sex=sex, age=age)
     numbers |= given(weight=weight, muscle=muscle)
     person = _person(seed, numbers, parse_weights(target or [], TARGET))

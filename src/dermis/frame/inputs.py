@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -42,7 +41,7 @@ from dermis.gpu import ComputeProgram, Constants
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import PARTS
 from dermis.mesh.outline import Outline
-from dermis.scene.camera import Camera
+from dermis.scene.camera import Camera, Window
 from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
@@ -111,7 +110,7 @@ class Inputs:
     shadow_views : how the shadow maps see the head
     light_constants : pipeline constants of what is lit
     camera : how the picture's samples see the head
-    half : tangents of the half angles of view, across and up
+    seen : what the picture shows of a plane before the eye
     around : how the sky sees the head, and the shader's record of it; None where occlusion does not move
     view, constants : record of the shading pass, and its pipeline constants
     """
@@ -125,7 +124,7 @@ class Inputs:
     shadow_views: Views
     light_constants: Constants
     camera: Views
-    half: tuple[float, float]
+    seen: Window
     around: tuple[Look, Any] | None
     view: Any
     constants: Constants
@@ -140,12 +139,12 @@ class Pinhole(NamedTuple):
     """Where a camera is and what it sees.
 
     axes : right, up and forward
-    half : tangents of the half angles of view, across and up
+    window : of a plane before the eye
     """
 
     eye: Triple
     axes: Axes
-    half: tuple[float, float]
+    window: Window
 
 
 class EyesSeen(NamedTuple):
@@ -176,15 +175,14 @@ class Split:
 def pinhole(camera: Camera, head: Head, settings: Settings) -> Pinhole:
     """The camera as the renderer takes it."""
     eye, path = place_of(camera.position, head.centre_mm), between(camera.position, camera.target)
-    half = 0.5 * camera.frame_mm / math.hypot(*path)
     width, height = settings.size
-    return Pinhole(eye, axes_of(path, camera.up), (half * width / height, half))
+    return Pinhole(eye, axes_of(path, camera.up), camera.window(width / height))
 
 
 def camera_views(pinhole: Pinhole, outline: Outline, samples: int) -> Views:
     """What the camera sees at each sample of the pixel."""
     rows = rows_of(pinhole.eye, pinhole.axes)
-    clip = perspective(rows, pinhole.half, *depth_range(outline, rows))
+    clip = perspective(rows, pinhole.window, *depth_range(outline, rows))
     return Views(np.array([clip]), pixel_samples(samples))
 
 
@@ -223,11 +221,12 @@ def seen_by(view: Any, pinhole: Pinhole, eyes: EyesSeen | None) -> Any:
 
     eyes : of true shape, if it has such
     """
-    eye, (right, up, forward), half = pinhole
+    eye, (right, up, forward), (half, shift) = pinhole
     # Its bytes: numpy's own copy takes the members one by one, and has anything between them.
     record: Any = np.ndarray((), view.dtype, bytearray(view.tobytes()))
     record["eye"], record["forward"] = eye, forward
     record["right"], record["up"] = tuple(half[0] * c for c in right), tuple(half[1] * c for c in up)
+    record["shift"] = shift
     if eyes is not None:
         record["eyes"]["to_own"] = eyes.frames.transpose(0, 2, 1)  # by columns
         edges = eyes.edges_mm

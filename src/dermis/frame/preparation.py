@@ -91,7 +91,7 @@ class Preparation:
             shadow_views=layers,
             light_constants=shone_on,
             camera=camera_views(seen_from, moved.outline, settings.samples),
-            half=seen_from.half,
+            seen=seen_from.window,
             around=self._around(head, scene.motion, moved.outline) if resources.sky else None,
             view=seen_by(resources.view, seen_from, moved.eyes),
             constants=resources.constants + shone_on,

@@ -11,6 +11,7 @@ from typing import Any, Literal, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.errors import refuse
 from dermis.frame.frame import draw_frame
 from dermis.frame.inputs import Inputs
 from dermis.frame.passes import pack, warm_up
@@ -21,6 +22,8 @@ from dermis.frame.rendered import Rendered
 from dermis.gpu import Frame, Graph, open_device
 from dermis.gpu.device import gpu_failures
 from dermis.gpu.frame import Timed
+from dermis.mesh.head import Head
+from dermis.scene.given import given_plain, shown_value
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES
@@ -74,7 +77,8 @@ class Renderer:
 
         Raises DermisError for sizes over the device's limits and when the device fails.
         """
-        settings = settings or Settings()
+        settings = given_plain(Settings, settings or {}, "settings", "size=(512, 512)")
+        scene = Scene.of(scene)
         with gpu_failures(self.device):
             started = time.perf_counter()
             inputs = self.prepare(scene, settings, view)
@@ -142,9 +146,9 @@ class Renderer:
         self.graph.submit()
         return leaving
 
-    def render(self, scene: Scene, **settings: Any) -> NDArray[np.float32]:
+    def render(self, scene: Scene | Head, **settings: Any) -> NDArray[np.float32]:
         """(h, w, 3) float32 linear Rec. 709 image; `settings` are those of `Settings`."""
-        return self.draw(scene, Settings(**settings)).linear()
+        return self.draw(Scene.of(scene), Settings(**settings)).linear()
 
     @overload
     def render_many(
@@ -182,16 +186,20 @@ class Renderer:
     def _send(self, scene: Scene, settings: Settings, linear: bool, alpha: bool) -> Leaving:
         """Submit a frame and start reading its picture back."""
         with gpu_failures(self.device):
-            inputs = self.prepare(scene, settings)
+            inputs = self.prepare(Scene.of(scene), settings)
             leave = partial(pack.draw, linear=linear, alpha=settings if alpha else None)
             _, leaving = self._submit(inputs, False, False, leave)
         assert leaving is not None
         return leaving
 
 
-def render(scene: Scene, adapter: str = "auto", **settings: Any) -> NDArray[np.float32]:
+def render(scene: Scene | Head, adapter: str = "auto", **settings: Any) -> NDArray[np.float32]:
     """(h, w, 3) float32 linear Rec. 709 image of a scene; for many images keep a `Renderer`.
 
+    scene : or a head alone, which gets studio light and the camera of a portrait
     settings : those of `Settings`: size, atlas, samples, technique, exposure, ...
     """
-    return Renderer(adapter).render(scene, **settings)
+    if not isinstance(adapter, str):
+        remedy = "Write dermis.Renderer().draw(scene, settings).linear() for a Settings object"
+        refuse("adapter", "its name, and settings by name", f"{shown_value(adapter)} came", remedy)
+    return Renderer(adapter).render(Scene.of(scene), **settings)

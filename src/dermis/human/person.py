@@ -75,10 +75,13 @@ class Human:
             if one.name in _RANGES:
                 low, high = _RANGES[one.name]
                 value = getattr(self, one.name)
-                if not low <= value <= high:
+                if not isinstance(value, int | float | np.number) or not low <= value <= high:
                     refuse(one.name, f"a number from {low:g} to {high:g}", f"{value!r} came", "Choose within")
         if not self.african + self.asian + self.caucasian > 0:
             refuse("ancestry", "a share of african, asian or caucasian", "all are 0", "Raise one")
+        if not isinstance(self.targets, Mapping):
+            expected, came = "weights of targets by name", f"{self.targets!r:.60} came"
+            refuse("targets", expected, came, 'Write targets={"nose/nose-hump-incr": 0.5}')
         for name, weight in self.targets.items():
             if not (math.isfinite(weight) and abs(weight) <= _MOST_WEIGHT):
                 expected = f"a weight from {-_MOST_WEIGHT:g} to {_MOST_WEIGHT:g}"

@@ -52,7 +52,7 @@ def subdivide(mesh: Mesh, levels: int) -> Subdivided:
 
     levels : 0 to 3, each takes four times the triangles
     """
-    if levels not in range(MAX_LEVELS + 1):
+    if not isinstance(levels, int | np.integer) or levels not in range(MAX_LEVELS + 1):
         refuse("subdivide", f"0 to {MAX_LEVELS} levels", f"{levels} came", "Each level takes 4x the memory")
     if levels == 0:
         return Subdivided(mesh, None)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.errors import refuse
 from dermis.mesh.head import Head
 from dermis.optics.media import Medium
-from dermis.reference.described import UNIT_MM, cycles_looking, world
+from dermis.reference.described import UNIT_MM, check_lens, cycles_looking, world
 from dermis.reference.half_space import diffuse_albedo
 from dermis.reference.lights import lamp
 from dermis.reference.mitsuba_scene import Lambertian
@@ -104,8 +104,9 @@ def _skin(medium: Below, method: str) -> dict[str, Any]:
 
 def _camera(scene: Scene) -> dict[str, Any]:
     camera = scene.camera
+    check_lens(camera, "Cycles")
     path = np.subtract(camera.target, camera.position)
     return {
         "to_world": cycles_looking(camera.position, path, camera.up),
-        "half_tangent": 0.5 * camera.frame_mm / float(np.linalg.norm(path)),
+        "half_tangent": camera.half_tangent,
     }

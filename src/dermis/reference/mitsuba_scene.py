@@ -14,7 +14,7 @@ from dermis.errors import refuse
 from dermis.extras import needed
 from dermis.mesh.head import Head
 from dermis.optics.media import Layer, Medium
-from dermis.reference.described import rgb, surroundings
+from dermis.reference.described import check_lens, rgb, surroundings
 from dermis.reference.lights import emitter
 from dermis.reference.mitsuba_solid import Solid, inwards, skin_solid
 from dermis.scene.camera import Camera
@@ -101,13 +101,13 @@ def mask_scene(mi: Any, scene: Scene, size: tuple[int, int]) -> Any:
 
 def _sensor(mi: Any, camera: Camera, size: tuple[int, int], sampler: str = "independent") -> dict[str, Any]:
     width, height = size
-    distance = float(np.linalg.norm(np.subtract(camera.target, camera.position)))
+    check_lens(camera, "Mitsuba")
     view = ([float(c) for c in v] for v in (camera.position, camera.target, camera.up))
     film = {"width": width, "height": height, "pixel_format": "rgb", "component_format": "float32"}
     return {
         "type": "perspective",
         "fov_axis": "y",
-        "fov": float(2.0 * np.degrees(np.arctan(0.5 * camera.frame_mm / distance))),
+        "fov": float(2.0 * np.degrees(np.arctan(camera.half_tangent))),
         "to_world": mi.ScalarTransform4f().look_at(*view),
         "near_clip": 0.5,
         "far_clip": 1e7,

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
-from dermis.errors import refuse
+from dermis.errors import notify, refuse
 from dermis.human.regions.usual import with_usual_regions
 from dermis.mesh.check import check_head_height
 from dermis.mesh.eyes import EyeLook
@@ -18,9 +18,11 @@ from dermis.mesh.formats import is_gltf
 from dermis.mesh.gltf.pictures import embedded_maps
 from dermis.mesh.head import Head
 from dermis.mesh.load import load_rigged
-from dermis.mesh.maps import load_maps
+from dermis.mesh.maps import Maps, load_maps
+from dermis.mesh.obj_maps import obj_maps
 from dermis.mesh.samples import SAMPLES, Sample, fetch
 from dermis.mesh.subdivide import subdivide_head
+from dermis.scene.head_checks import check_given, check_relief, named
 from dermis.scene.head_table import AUTO, Eyes, NormalY, Up, VOrigin
 
 if TYPE_CHECKING:
@@ -45,9 +47,9 @@ def load_head(
     v_origin: VOrigin = "auto",
     up: Up = "y",
     normal_y: NormalY = "up",
-    opaque: Sequence[str] = (),
+    opaque: Sequence[str] | str = (),
     eyes: Eyes = "fitted",
-    eye_groups: Sequence[str] = (),
+    eye_groups: Sequence[str] | str = (),
     eye: Mapping[str, float] | None = None,
     subdivide: int = 0,
     regions: Literal["auto", "none"] = "auto",
@@ -56,8 +58,8 @@ def load_head(
 
     "human:7" is the person drawn by the seed 7, and a .json file of `dermis head` one by its numbers.
 
-    Options replace what a sample or a glTF file has of its own. Morph targets and bones of a glTF file move
-    the head (`Pose`); it rests as the file has it, at the default weights of its targets.
+    Options replace what a sample, a glTF file or an OBJ file's .mtl has of its own. Morph targets and bones
+    of a glTF file move the head (`Pose`); it rests as the file has it, at the default weights of its targets.
 
     colour, normal, height, specular, roughness : image files; see `load_maps`
     height_mm : relief of one grey level of an 8-bit height map [mm]
@@ -75,18 +77,18 @@ def load_head(
     regions : "auto" for gloss by region of the face where the package knows the head and no map says the
         roughness; "none" for one roughness all over
 
-    Raises DermisError for files that cannot be rendered as a head.
+    Raises DermisError for files that cannot be rendered as a head; warns with DermisWarning of pictures of
+    an .mtl that are left out.
     """
-    name, path = str(head), Path(head)
+    opaque, eye_groups = ((one,) if isinstance(one, str) else one for one in (opaque, eye_groups))
+    name, path = named(head), Path(head)
     own = {"colour": colour, "normal": normal, "height": height}
     own |= {"specular": specular, "roughness": roughness}
+    check_given(own, unit_mm=unit_mm, height_mm=height_mm)
     told: dict[str, Any] = {"unit_mm": unit_mm, "v_origin": v_origin, "up": up, "opaque": tuple(opaque)}
     told["eye_groups"] = tuple(eye_groups)
     if name == HUMAN or name.startswith(f"{HUMAN}:") or path.suffix.lower() == ".json":
         return _with_look(_human(name, own, height_mm, normal_y, told | {"eyes": eyes}, subdivide), eye)
-    if name in REPLACED and not path.is_file():
-        came = f"this mannequin was replaced by the parametric human, {HUMAN!r}"
-        refuse(name, f"one of {', '.join(_head_names())} or a mesh file", came, f"Write {HUMAN} instead")
     sample, files = SAMPLES.get(name), dict[str, Any]()
     if sample is not None:
         _check_kind(sample)
@@ -96,29 +98,25 @@ def load_head(
         told["v_origin"] = sample.v_origin or v_origin if v_origin == "auto" else v_origin
         height_mm = sample.height_mm if height_mm is None else height_mm
     elif not path.is_file():
-        known = ", ".join(_head_names())
-        refuse(name or "head", f"a mesh file or a sample ({known})", f"{name!r} is neither", "Check the name")
-    if sample is None and is_gltf(path):
+        _refuse_name(name)
+    elif is_gltf(path):
         files = embedded_maps(path)
     chosen = _chosen(own, files)
     if height is None and height_mm is None:
         height_mm = files.get("height_mm")
-    _check_relief(height_mm, chosen["height"])
+    obj = path if sample is None and path.suffix.lower() == ".obj" else None
     with ThreadPoolExecutor(1) as beside:
-        reading = beside.submit(load_maps, **chosen, height_mm=height_mm, normal_y=normal_y)
+        reading = beside.submit(_read_maps, obj, chosen, told["opaque"], height_mm, normal_y)
         rigged = load_rigged(path, **told)
         check_head_height(rigged.mesh, name, told["unit_mm"])
-        maps = reading.result()
+        maps, notice = reading.result()
+    check_relief(height_mm, maps.height)
+    if notice:
+        notify(notice)
     thanks = f"{sample.attribution}, {sample.licence}" if sample else ""
     made = _subdivided(Head(name, rigged.mesh, maps, thanks, rigged.rig), subdivide)
     made = with_usual_regions(made) if regions == AUTO else made
     return _with_look(with_fitted_eyes(made, rigged.mesh) if eyes == "fitted" else made, eye)
-
-
-def _check_relief(height_mm: float | None, height: MapFile) -> None:
-    if height_mm is not None and height is None:
-        came = f"{height_mm} came without a height map"
-        refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
 
 
 def _subdivided(head: Head, levels: int) -> Head:
@@ -146,6 +144,30 @@ def _with_look(head: Head, look: Mapping[str, float] | None) -> Head:
     return replace(head, eyes=head.eyes.with_look(replace(head.eyes.look, **dict[str, Any](look))))
 
 
+def _read_maps(
+    obj: Path | None,
+    chosen: dict[str, Any],
+    opaque: tuple[str, ...],
+    height_mm: float | None,
+    normal_y: NormalY,
+) -> tuple[Maps, str]:
+    """The maps that are given, and those that an OBJ file's materials name for other roles; a notice."""
+    given = {role: file for role, file in chosen.items() if file is not None}
+    loaded = load_maps(**given, height_mm=height_mm, normal_y=normal_y)
+    if obj is None:
+        return loaded, ""
+    named, notice = obj_maps(obj, opaque=opaque, given=given, height_mm=height_mm, normal_y=normal_y)
+    return replace(named, **{role: getattr(loaded, role) for role in given}), notice
+
+
+def _refuse_name(name: str) -> NoReturn:
+    known = ", ".join(_head_names())
+    if name in REPLACED:
+        came = f"this mannequin was replaced by the parametric human, {HUMAN!r}"
+        refuse(name, f"one of {known} or a mesh file", came, f"Write {HUMAN} instead")
+    refuse(name or "head", f"a mesh file or a sample ({known})", f"{name!r} is neither", "Check the name")
+
+
 def _check_kind(sample: Sample) -> None:
     if sample.kind != "head":
         hint = f"Use one of {', '.join(_head_names())}"
@@ -169,7 +191,7 @@ def _human(
     for option, value in told.items():
         if value != usual[option]:
             refuse(option, "a file that it tells of", f"it came with {HUMAN!r}", "Leave it out")
-    _check_relief(height_mm, maps["height"])
+    check_relief(height_mm, maps["height"])
     given: dict[str, Any] = {role: file for role, file in maps.items() if file is not None}
     loaded = load_maps(**given, height_mm=height_mm, normal_y=normal_y) if given else None
     made = _person(name).head(subdivide=subdivide or 1)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import difflib
 import re
+from collections.abc import Iterator, Mapping
 from types import UnionType
-from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, Union, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticUndefined
 
-from dermis.errors import DermisError
+from dermis.errors import DermisError, refuse
 from dermis.registry import Named
 
 FARTHEST_MM = 1e6
@@ -67,14 +69,27 @@ class Plain(BaseModel):
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True, defer_build=True)
+    meant: ClassVar[Mapping[str, str]] = {}
+    """Fields by the names that other programs have for them."""
 
-    def __init__(self, **data: Any) -> None:
+    def __init__(self, *value: Any, **data: Any) -> None:
+        """Values by name; one without a name is that of the one field that has no default."""
+        model = type(self)
+        if value:
+            data[_only_required(model, value)] = value[0]
         try:
             super().__init__(**data)
         except ValidationError as error:
-            model = type(self)
             findings = {_place(one): _finding(one, model) for one in error.errors()}
             raise ImpossibleError(model.__name__, findings) from None
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        owner, remedy = type(self).__name__, f"Write replace({name}={value!r:.40}) for a copy with it"
+        refuse(owner, "a value that stays as it is", f"{name} was to be changed", remedy)
+
+    def replace(self, **values: Any) -> Self:
+        """The same with other values, checked."""
+        return type(self)(**{name: getattr(self, name) for name in self.model_fields_set} | values)
 
     def __eq__(self, other: object) -> bool:
         """As pydantic has it, which takes ten times as long over values that differ."""
@@ -167,18 +182,57 @@ def _bounds(info: FieldInfo) -> tuple[float | None, float | None]:
     return next(iter(low), None), next(iter(high), None)
 
 
+def _only_required(model: type[BaseModel], value: tuple[Any, ...]) -> str:
+    """The field that a value without a name is for."""
+    required = [name for name, info in model.model_fields.items() if info.is_required()]
+    if len(required) != 1 or len(value) != 1:
+        some, came = (
+            ", ".join(f"{name}=..." for name in list(model.model_fields)[:3]),
+            f"{value[0]!r:.40} came",
+        )
+        refuse(model.__name__, f"values by name, such as {some}", f"{came} without one", "Name it")
+    return required[0]
+
+
+def _length(one: ErrorDetails, model: type[BaseModel]) -> str:
+    """How many numbers a list has that a field wants, where it says so."""
+    info = model.model_fields.get(str(one["loc"][0])) if len(one["loc"]) == 1 else None
+    count = len([part for part in get_args(info.annotation) if part is not Ellipsis]) if info else 0
+    return f" of {count} numbers" if count > 1 else ""
+
+
 def _place(one: ErrorDetails) -> str:
     return ".".join(str(part) for part in one["loc"])
 
 
-def _finding(one: ErrorDetails, model: type[BaseModel]) -> str:
+def _unknown(name: str, model: type[Plain]) -> str:
+    """What to say of a name that is no field: the nearest, or whose field it is."""
+    known, finding = list(model.model_fields), "but this name is unknown"
+    plain = name.lower().replace("-", "_")
+    near = [model.meant[plain]] if plain in model.meant else difflib.get_close_matches(plain, known, 1, 0.7)
+    if near:
+        return f"expected {near[0]}, {finding}"
+    owners = [one.__name__ for one in _kinds_of_plain(Plain) if name in one.model_fields]
+    if owners:
+        finding += f" here (it is one of {owners[0]})"
+    return f"expected one of {', '.join(known)}, {finding}"
+
+
+def _kinds_of_plain(kind: type[Plain]) -> Iterator[type[Plain]]:
+    for one in kind.__subclasses__():
+        if not one.__name__.startswith("_"):
+            yield one
+        yield from _kinds_of_plain(one)
+
+
+def _finding(one: ErrorDetails, model: type[Plain]) -> str:
     """One of pydantic's findings as what was expected and what came."""
     if one["type"] == "extra_forbidden":
-        return f"expected one of {', '.join(model.model_fields)}, but this name is unknown"
+        return _unknown(str(one["loc"][-1]), model)
     if one["type"] == "missing":
         return "expected a value, but there is none"
     expected = re.sub("^(Input should be|Tuple should have|Value error,) |, unable to .*", "", one["msg"])
-    expected = expected.replace("a valid tuple", "a list")
+    expected = expected.replace("a valid tuple", f"a list{_length(one, model)}")
     if expected.startswith(("greater", "less")):
         expected = f"a number {expected}"
     if len(one["loc"]) == 1 and (words := words_of(model, str(one["loc"][0]))):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -47,10 +47,17 @@ else:
     Background = Annotated[Colour, BeforeValidator(_decoded), Words("none", "gradient", "environment")]
 
 
+def _square(value: Any) -> Any:
+    """A number as both sides."""
+    return (value, value) if isinstance(value, int) else value
+
+
 class Settings(Plain):
     """Sizes, quality, and what leaves linear light."""
 
-    size: tuple[_Side, _Side] = (1024, 1024)
+    meant: ClassVar[Mapping[str, str]] = {"resolution": "size", "spp": "samples"}
+
+    size: Annotated[tuple[_Side, _Side], BeforeValidator(_square)] = (1024, 1024)
     """Width and height of the picture [pixel]."""
     atlas: Annotated[int, Field(ge=64)] = 2048
     """Side of the atlas, the map in which light scatters [texel]."""

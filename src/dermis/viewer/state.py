@@ -12,10 +12,10 @@ from dermis.mesh.head import Head
 from dermis.scene.camera import Camera
 from dermis.scene.clips.clip import Clip
 from dermis.scene.environment import Environment
-from dermis.scene.files import NO_LIGHTS, head_table, load_lights, load_scene
+from dermis.scene.files import head_table, load_lights, load_scene
 from dermis.scene.head_table import names_regions
 from dermis.scene.heads import load_head
-from dermis.scene.lights import Light
+from dermis.scene.lights import NO_LIGHTS, Light
 from dermis.scene.model import Scene
 from dermis.scene.plain import Plain
 from dermis.scene.pose import Pose

@@ -57,7 +57,7 @@ class Views:
         constants = tuple(switch for switch in inputs.light_constants if switch[0] not in around)
         shader = program(self._renderer.device, _INTERMEDIATE, constants)
         layer, scale = self._layer(inputs, view, settings)
-        looked = ("eye", "forward", "right", "up", "samples", "jitter")
+        looked = ("eye", "forward", "right", "up", "shift", "samples", "jitter")
         record = shader.record("Look", **{name: inputs.view[name] for name in looked})
         record["what"], record["scale"] = _NUMBERS.get(view, 0), scale
         bound = {

@@ -47,7 +47,8 @@ def draw(
 
 def rays_of(shader: Any, view: Any) -> NDArray[Any]:
     """A record of a shader's struct Rays from that of the shading."""
-    record: NDArray[Any] = shader.record("Rays", **{n: view[n] for n in ("eye", "forward", "right", "up")})
+    names = ("eye", "forward", "right", "up", "shift")
+    record: NDArray[Any] = shader.record("Rays", **{name: view[name] for name in names})
     return record
 
 

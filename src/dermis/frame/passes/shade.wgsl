@@ -20,8 +20,9 @@ struct Shade {
     eye: vec3f,
     samples: u32,
     forward: vec3f,
-    right: vec3f, // scaled so that forward + x right + y up spans the image for x, y in -1..1
+    right: vec3f, // scaled so that forward + (x + shift) right + (y + shift) up spans the image for x, y in -1..1
     up: vec3f,
+    shift: vec2f, // of the picture's middle from the axis
     relit: vec3f, // weight of the level that is not blurred
     total: vec3f, // weight of all levels
     shown: vec2f, // factors of the light from below and of the reflected light
@@ -78,7 +79,7 @@ fn shaded_plain(surface: Surface, lit: Lit, out: f32) -> Shaded {
 
 fn ray_through(place: vec2f, size: vec2f) -> vec3f {
     let ndc = vec2f(2.0, -2.0) * place / size + vec2f(-1.0, 1.0);
-    return shade.forward + ndc.x * shade.right + ndc.y * shade.up;
+    return shade.forward + (ndc.x + shade.shift.x) * shade.right + (ndc.y + shade.shift.y) * shade.up;
 }
 
 // share: part of the pixel that is shaded at once; maps are filtered over it.

@@ -61,7 +61,7 @@ def draw(
     """
     made, picture, (lit, view, lights) = strands.tables, strands.picture, look
     light = program(graph.device, "strands_light.wgsl", made.constants + lights)
-    looked = ("eye", "forward", "right", "up", "samples", "jitter", "shown")
+    looked = ("eye", "forward", "right", "up", "shift", "samples", "jitter", "shown")
     record = light.record("StrandView", **{name: view[name] for name in looked})
     size = picture.result.size[:2]
     pixel_mm = _pixel_mm(view, made, size[1])

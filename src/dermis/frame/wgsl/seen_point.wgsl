@@ -5,13 +5,14 @@
 struct Rays {
     eye: vec3f,
     forward: vec3f,
-    right: vec3f, // scaled so that forward + x right + y up spans the image for x, y in -1..1
+    right: vec3f, // scaled so that forward + (x + shift) right + (y + shift) up spans the image for x, y in -1..1
     up: vec3f,
+    shift: vec2f, // of the picture's middle from the axis
 }
 
 fn ray_to(rays: Rays, place: vec2f, size: vec2f) -> vec3f {
     let ndc = vec2f(2.0, -2.0) * place / size + vec2f(-1.0, 1.0);
-    return rays.forward + ndc.x * rays.right + ndc.y * rays.up;
+    return rays.forward + (ndc.x + rays.shift.x) * rays.right + (ndc.y + rays.shift.y) * rays.up;
 }
 
 // Barycentric weights within a triangle of corners `t`.

@@ -32,7 +32,7 @@ fn depth_at(triangle: u32, place: vec2f) -> f32 {
     let a = position_of(t.x);
     let n = cross(position_of(t.y) - a, position_of(t.z) - a);
     let ndc = vec2f(2.0, -2.0) * place / strand_view.size + vec2f(-1.0, 1.0);
-    let ray = strand_view.forward + ndc.x * strand_view.right + ndc.y * strand_view.up;
+    let ray = strand_view.forward + (ndc.x + strand_view.shift.x) * strand_view.right + (ndc.y + strand_view.shift.y) * strand_view.up;
     return dot(n, a - strand_view.eye) / dot(n, ray);
 }
 

@@ -8,8 +8,7 @@ from imgui_bundle import imgui
 
 from dermis.mesh.samples import SAMPLES
 from dermis.scene.environment import Environment
-from dermis.scene.files import light_presets
-from dermis.scene.lights import Light, SpotLight
+from dermis.scene.lights import Light, SpotLight, light_presets
 from dermis.scene.plain import Range
 from dermis.viewer.panel.fields import Style, attempt, button, combo, draw_fields, slider
 from dermis.viewer.session import Session
