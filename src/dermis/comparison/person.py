@@ -101,7 +101,7 @@ def drawn(renderer: Renderer, scene: Scene, settings: Settings) -> Floats:
     width, height = settings.size
     larger = settings.model_copy(update={"size": (2 * width, 2 * height)})
     image = renderer.draw(scene, larger).linear().astype(np.float64)
-    return image.reshape(height, 2, width, 2, 3).mean(axis=(1, 3))
+    return np.asarray(image.reshape(height, 2, width, 2, 3).mean(axis=(1, 3)))
 
 
 def traced(

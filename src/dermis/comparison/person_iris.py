@@ -61,12 +61,12 @@ def _dull(image: Floats, ring: Mask) -> Mask:
 
 def _shift(ours: Floats, truth: Floats, noise: Floats, part: Mask) -> tuple[Estimate, Estimate]:
     """By how much the truth lies to the right of and below ours, where it is so many times as bright."""
-    down, right = np.gradient(ours)
+    down, right = (np.asarray(slope) for slope in np.gradient(ours))
     columns = np.stack([ours[part], -right[part], -down[part], np.ones(int(part.sum()))], axis=-1)
-    gain, x, y, _ = np.linalg.lstsq(columns, truth[part], rcond=None)[0]
     inverse = np.linalg.inv(columns.T @ columns) @ columns.T
-    error = np.sqrt((inverse**2 * noise[part]).sum(axis=1)) / abs(gain)
-    return Estimate(float(x / gain), float(error[1])), Estimate(float(y / gain), float(error[2]))
+    gain, x, y, _ = (float(one) for one in inverse @ truth[part])
+    error: Floats = np.sqrt((inverse**2 * noise[part]).sum(axis=1)) / abs(gain)
+    return Estimate(x / gain, float(error[1])), Estimate(y / gain, float(error[2]))
 
 
 def _ratio(ours: Floats, truth: Floats, noise: Floats, part: Mask) -> Estimate:

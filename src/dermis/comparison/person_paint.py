@@ -26,6 +26,7 @@ _SIDE = 1024
 """Of the pictures of eyes and teeth [texels]."""
 _PARTS = ("iris", "white", "upper teeth", "lower teeth")  # numbered as in person_paint.wgsl
 _LEAST_ROUGH = 0.05
+_DENSITIES = 5.0, 14.0  # binary logarithms of mm in a unit of uv
 _ANY = Settings(size=(16, 16), atlas=64, samples=1, shadow_size=64)
 
 
@@ -55,6 +56,7 @@ def _detail(pores: Floats, furrows: Floats, density: Floats) -> Floats:
     density : binary logarithm of the mm in a unit of uv
     """
     side = len(pores)
+    density = np.clip(density, *_DENSITIES)  # beside the charts it may be anything
     level = density - np.log2(TILE_MM)
     whole = np.floor(level)
     part = np.clip((level - whole - 0.4) / 0.2, 0.0, 1.0)

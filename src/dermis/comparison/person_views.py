@@ -18,13 +18,13 @@ from dermis.scene.model import Scene
 from dermis.scene.pose import Pose
 
 _SOFTBOX_MM = 500.0
-_EYE_MM, _LIPS_MM, _EAR_MM = 30.0, 72.0, 120.0
-SMILE = {
-    "jawOpen": 0.18,
-    "mouthSmileLeft": 0.7,
-    "mouthSmileRight": 0.7,
-    "mouthUpperUpLeft": 0.4,
-    "mouthUpperUpRight": 0.4,
+EYE_MM = 30.0
+"""Height of the pictures of an eye."""
+_LIPS_MM, _EAR_MM = 72.0, 120.0
+SMILE = {"jawOpen": 0.18} | {
+    f"{name}{side}": weight
+    for name, weight in (("mouthSmile", 0.7), ("mouthUpperUp", 0.4))
+    for side in ("Left", "Right")
 }
 
 
@@ -47,13 +47,13 @@ class View:
 def at_eye(head: Head) -> Camera:
     """The left eye from the front, 30 mm of it."""
     x, y, z = _eye_mm(head)
-    return Camera(position=(x, y, z + 500.0), target=(x, y, z), frame_mm=_EYE_MM)
+    return Camera(position=(x, y, z + 500.0), target=(x, y, z), frame_mm=EYE_MM)
 
 
 def at_eye_beside(head: Head) -> Camera:
     """The left eye from its outer side."""
     x, y, z = _eye_mm(head)
-    return Camera(position=(x + 380.0, y, z + 330.0), target=(x, y, z), frame_mm=_EYE_MM)
+    return Camera(position=(x + 380.0, y, z + 330.0), target=(x, y, z), frame_mm=EYE_MM)
 
 
 def at_lips(head: Head) -> Camera:
@@ -116,5 +116,10 @@ def softbox(light: Light) -> Light:
     """A light from a point as a softbox in its place; any other as it is."""
     if type(light) is RectangleLight or not isinstance(light, PointLight) or hasattr(light, "radius_mm"):
         return light
-    size = {"width_mm": _SOFTBOX_MM, "height_mm": _SOFTBOX_MM}
-    return RectangleLight(position=light.position, target=light.target, irradiance=light.irradiance, **size)
+    return RectangleLight(
+        position=light.position,
+        target=light.target,
+        irradiance=light.irradiance,
+        width_mm=_SOFTBOX_MM,
+        height_mm=_SOFTBOX_MM,
+    )

@@ -132,7 +132,7 @@ def _mask(mi: Any, scene: Scene, size: tuple[int, int]) -> Floats:
 def add_passes(
     mi: Any, built: Any, passes: Passes, wanted: int, key: str | None, report: Report | None
 ) -> None:
-    """Add passes of a scene of Mitsuba up to the number wanted; with a key those done are stored, whatever happens."""
+    """Add passes of Mitsuba's scene up to the number wanted; with a key those done are stored in any case."""
     stored = time.perf_counter()
     try:
         while passes.count < wanted:

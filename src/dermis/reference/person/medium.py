@@ -23,31 +23,32 @@ Floats = NDArray[np.float32]
 PASSED = 0.98
 """Share of light that the coat lets through, see `skin.coat`; the medium makes up for it."""
 INDEX = SKIN_ETA
-VOXELS = 128
+VOXELS = 96
 """Along the longest side of the grid of colours."""
 _MARGIN, _LEAST_MM = 0.75, 25.0  # of the grid: over the height of the picture; least half of its side
-_DEEP_MM = 6.0  # from the surface, to which places have its colour
+_DEEP_MM = 3.0  # from the surface, to which places have its colour
 _DENSE = 3.0  # samples of the surface for the square of a voxel's side
 _MOST_COLOUR = 0.97
+_LEAST_ROOT = 0.01
 _PHOTONS = 40_000
 
 
 @cache
 def _scattering() -> tuple[Doubles, Doubles]:
-    """Albedos of half-spaces, and those of their single scatterings."""
-    single = 1.0 - np.geomspace(1.0, 1e-4, 48)
-    return np.array([diffuse_albedo(float(one)) for one in single]), single
+    """Albedos of half-spaces, and roots of what single scatterings absorb in them: both change evenly."""
+    root = np.linspace(1.0, _LEAST_ROOT, 32)
+    return np.array([diffuse_albedo(float(1.0 - one**2)) for one in root]), root
 
 
 def single_albedo(colour: ArrayLike) -> Doubles:
     """Albedo of single scattering of half-spaces that give back a colour, under light from everywhere [-]."""
-    total, single = _scattering()
+    total, root = _scattering()
     wanted = np.clip(np.asarray(colour, np.float64) / PASSED, 0.0, _MOST_COLOUR)
-    return np.asarray(np.interp(wanted, total, single))
+    return np.asarray(1.0 - np.interp(wanted, total, root) ** 2)
 
 
 def mean_free_paths(colour: ArrayLike, distance_mm: ArrayLike) -> Doubles:
-    """(3,) of media of a colour (3,) in which light leaves so far (3,) from where it entered, in the mean [mm].
+    """(3,) of media of a colour (3,) by the mean way (3,) from where light enters to where it leaves [mm].
 
     By photons, which fall in at right angles.
     """
@@ -68,7 +69,7 @@ def medium_of(mi: Any, person: Person, camera: Camera, mean_free_path_mm: Double
     """Mitsuba's medium below the skin, exact in colour where the camera looks."""
     extinction = 1.0 / mean_free_path_mm
     low, high = _box(person, camera)
-    grid = single_albedo(colours_in(person, low, high)).astype(np.float32)
+    grid = single_albedo(colours_in(person, low, high, VOXELS)).astype(np.float32)
     to_world = mi.ScalarTransform4f().translate([float(c) for c in low])
     return mi.load_dict(
         {
@@ -99,10 +100,11 @@ def _box(person: Person, camera: Camera) -> tuple[Doubles, Doubles]:
 def _skin(person: Person) -> NDArray[np.int32]:
     """(f, 3) triangles of skin."""
     mesh = person.mesh
-    return mesh.triangles[np.array([one.kind == "skin" for one in mesh.materials])[mesh.material]]
+    kinds = np.array([one.kind == "skin" for one in mesh.materials])
+    return np.asarray(mesh.triangles[kinds[mesh.material]])
 
 
-def colours_in(person: Person, low: Doubles, high: Doubles, voxels: int = VOXELS) -> Doubles:
+def colours_in(person: Person, low: Doubles, high: Doubles, voxels: int) -> Doubles:
     """(z, y, x, 3) colours of the nearest skin in even cells of a box, deeper inside the mean of all.
 
     low, high : (3,) corners of the box [mm]

@@ -60,7 +60,7 @@ def trace_person(
     distance_mm : (3,) from where light enters skin of the mean colour (3,) to where it leaves, in the mean
     samples, variant, keep, report : as of `path_trace`
 
-    The skin is a medium under a rough coat that does not refract; its albedo is a grid of the painted colours.
+    The skin is a medium under a rough coat that does not refract; its albedo is a grid of painted colours.
     The cornea refracts, and the iris is a painted disc behind it, so lights must have a size.
 
     Raises DermisError when Mitsuba is missing, and for heads without eyes of true shape.
