@@ -54,8 +54,8 @@ def pictures(pairs: Sequence[Pair]) -> bytes:
     """A sheet of all views, ours to the left of the truth, as WebP of at most `MOST_BYTES`."""
     panels = {}
     for pair in pairs:
-        panels[f"{pair.name}"] = pair.shown(pair.ours)
-        panels[f"{pair.name}, path-traced"] = pair.shown(pair.truth)
+        panels[pair.name] = pair.shown(pair.ours)
+        panels[f"{pair.name}, traced"] = pair.shown(pair.truth)
     drawn = np.asarray(sheet(panels, COLUMNS))
     for quality in (80, 65, 50, 35, 20):
         data = encode_webp(drawn, quality)
