@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from dermis.mesh.eyes import (
     LIMBUS_MM,
     SCLERA_MM,
-    apex_mm,
     cornea_centre_mm,
     iris_mm,
     profile_mm,
@@ -120,8 +119,3 @@ def eye_shapes(mi: Any, person: Person) -> dict[str, Any]:
 
 def _moved(matrix: Doubles, places: Doubles) -> Doubles:
     return np.asarray(places @ matrix[:3, :3].T + matrix[:3, 3])
-
-
-def depth_mm() -> float:
-    """From the cornea's apex to the plane of the iris [mm]."""
-    return apex_mm() - iris_mm()
