@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.frame.passes import map_mips
 from dermis.frame.passes.painting.expression import Face, make_face
@@ -29,6 +30,20 @@ class PaintedTextures(NamedTuple):
     roughness: Any
     relief: Any
     face: Face | None
+
+
+class PaintedTexels(NamedTuple):
+    """What is painted, as skin.wgsl of the painting keeps it.
+
+    colour, specular, roughness : (n, n, 4) with how much there is of pores and of furrows, and the binary
+        logarithm of the mm in a unit of uv, in the channels beside
+    height_mm : (n, n)
+    """
+
+    colour: NDArray[np.float32]
+    specular: NDArray[np.float32]
+    roughness: NDArray[np.float32]
+    height_mm: NDArray[np.float32]
 
 
 def draw(
@@ -59,14 +74,21 @@ def painted_maps(device: Device, painting: Painting, look: SkinLook, side: int) 
 
     Heights run out beside the charts, where nothing is drawn.
     """
+    found = painted_texels(device, painting, look, side)
+    rho_s = USUAL_RHO_S * found.specular[..., 0]
+    return Maps(
+        colour=np.ascontiguousarray(found.colour[..., :3]),
+        height=found.height_mm,
+        specular=np.clip(rho_s, 0.0, 1.0),
+        roughness=np.ascontiguousarray(found.roughness[..., 0]),
+    )
+
+
+def painted_texels(device: Device, painting: Painting, look: SkinLook, side: int) -> PaintedTexels:
+    """All that is painted, as arrays."""
     made = painted(device, given_for(painting, look, side), side)
     textures = made.colour, made.specular, made.roughness
     colour, specular, roughness = (download(device, one.texture).astype(np.float32) for one in textures)
     raw = np.frombuffer(device.handle.queue.read_buffer(made.heights), np.float32)
-    rho_s = USUAL_RHO_S * specular[..., 0]
-    return Maps(
-        colour=np.ascontiguousarray(colour[..., :3]),
-        height=np.ascontiguousarray(raw.reshape(side + 2, side + 2)[1:-1, 1:-1]),
-        specular=np.clip(rho_s, 0.0, 1.0),
-        roughness=np.ascontiguousarray(roughness[..., 0]),
-    )
+    height = np.ascontiguousarray(raw.reshape(side + 2, side + 2)[1:-1, 1:-1])
+    return PaintedTexels(colour, specular, roughness, height)
