@@ -29,7 +29,7 @@ def paint(colour: Any = (0.5, 0.3, 0.2), roughness: float = 0.3, side: int = 16)
 
 def ball(**painted: Any) -> Person:
     """Without eyes and hairs."""
-    return Person("ball", uv_sphere(RADIUS_MM, 64, 32), np.zeros((0, 4, 4)), (), None, paint(**painted))
+    return Person("ball", uv_sphere(RADIUS_MM, 64, 32), np.zeros((0, 4, 4)), (), (), paint(**painted))
 
 
 def scene(**given: Any) -> Scene:

@@ -59,9 +59,8 @@ def test_more_samples_are_added_to_those_that_are_kept() -> None:
 
 def test_pictures_are_kept_by_what_they_depend_on() -> None:
     person, path = person_of(scene(), paint()), np.ones(3)
-    hairs = person.hairs
-    assert hairs is not None
-    thicker = replace(person, hairs=replace(hairs, radius_mm=2 * hairs.radius_mm))
+    brows, *others = person.hairs
+    thicker = replace(person, hairs=(replace(brows, radius_mm=2 * brows.radius_mm), *others))
     others = [
         person_key(scene(), person, path, "form"),
         person_key(scene(), person, 2 * path, "form"),
@@ -82,8 +81,8 @@ def test_a_pose_moves_skin_eyes_and_hairs() -> None:
     assert 10.0 < moved.max() < 60.0 and np.median(moved) < 0.5
     assert np.abs(posed.eyes[0, :3, :3] - rest.eyes[0, :3, :3]).max() > 0.1
     np.testing.assert_allclose(posed.eyes[1], rest.eyes[1], atol=1e-6)
-    assert posed.hairs is not None and rest.hairs is not None
-    assert 1.0 < np.linalg.norm(posed.hairs.knots_mm - rest.hairs.knots_mm, axis=-1).max() < 20.0
+    assert len(posed.hairs) == len(rest.hairs) == 2  # brows and lashes, and the hair of the head
+    assert 1.0 < np.linalg.norm(posed.hairs[0].knots_mm - rest.hairs[0].knots_mm, axis=-1).max() < 20.0
 
 
 def test_eyes_look_out_of_the_head() -> None:

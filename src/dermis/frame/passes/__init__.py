@@ -43,6 +43,7 @@ _SOURCES = {FLOATS: _LEVELS / "loaded", HALVES: _LEVELS / "filtered"}
 _STORES = {FLOATS: _LEVELS / "floats", HALVES: _LEVELS / "halves"}
 _EACH, _ROW = 64, 32768  # invocations of a workgroup as in each.wgsl; workgroups in a row, at most 65535
 _STRIP = 16  # pixels of an invocation on software adapters, see shade.wgsl
+_SAMPLES = 64  # that an invocation may meet: drivers end what goes round loops 65,535 times
 
 
 def shader_folders(source: str = "", store: str = "") -> tuple[Folder, ...]:
@@ -100,6 +101,12 @@ def device_constants(device: Device) -> Constants:
     if device.adapter.kind == "CPU":
         return (("PASSES_DARK", 1), ("STRIP", _STRIP))
     return (("MESH_IN_BUFFERS", 1),)
+
+
+def strip_for(device: Device, samples: int) -> Constants:
+    """What another number of samples than usual makes of the strips of `device_constants`."""
+    fewer = max(1, _SAMPLES // samples)
+    return (("STRIP", fewer),) if device.adapter.kind == "CPU" and fewer < _STRIP else ()
 
 
 def warm_up(device: Device) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from dermis.frame.passes import program
+from dermis.frame.passes import program, strip_for
 from dermis.frame.passes.post import Picture
 from dermis.frame.passes.visibility_buffer import Layers
 from dermis.gpu import ComputeProgram, Constants, Device, Recorder, make_texture
@@ -39,7 +39,7 @@ def draw(
     device, (width, height) = graph.device, picture.size
     bound = {**lit, "shade": view, "visibility_buffer": visibility.texture, "scattered": scattered}
     bound |= {"image": picture.radiance, "apart": apart or nothing_apart(device)}
-    shader = shade_program(device, constants)
+    shader = shade_program(device, (*constants, *strip_for(device, visibility.count)))
     graph.compute("shade", shader, bound, (width, -(-height // int(shader.constants.get("STRIP", 1)))))
     return picture.radiance
 

@@ -25,8 +25,8 @@ COLOURS = 12
 _LEAST_MM = 1e-3
 
 
-def hair_shapes(mi: Any, hairs: Hairs) -> dict[str, Any]:
-    """The hairs in groups of nearly the same absorption."""
+def hair_shapes(mi: Any, hairs: Hairs, name: str = "hairs") -> dict[str, Any]:
+    """The hairs in groups of nearly the same absorption, each a shape of that name and a number."""
     shapes = {}
     depth = hairs.absorption * hairs.radius_mm.max(axis=1, keepdims=True)  # Mitsuba's unit is the radius
     with tempfile.TemporaryDirectory() as folder:
@@ -41,7 +41,7 @@ def hair_shapes(mi: Any, hairs: Hairs) -> dict[str, Any]:
                 "scale_tilt": TILT_DEGREES,
                 "int_ior": INDEX,
             }
-            shapes[f"hairs_{k}"] = mi.load_dict(
+            shapes[f"{name}_{k}"] = mi.load_dict(
                 {"type": "bsplinecurve", "filename": str(file), "bsdf": fibre}
             )
     return shapes

@@ -69,7 +69,7 @@ class Person:
     mesh: Mesh
     eyes: Doubles
     eye_materials: tuple[int, ...]
-    hairs: Hairs | None
+    hairs: tuple[Hairs, ...]
     paint: Paint
 
     def arrays(self) -> Iterator[NDArray[np.generic]]:
@@ -77,8 +77,8 @@ class Person:
         mesh = self.mesh
         yield from (mesh.positions, mesh.normals, mesh.uv, mesh.point, mesh.triangles, mesh.material)
         yield self.eyes
-        if self.hairs is not None:
-            yield from (self.hairs.knots_mm, self.hairs.radius_mm, self.hairs.absorption)
+        for hairs in self.hairs:
+            yield from (hairs.knots_mm, hairs.radius_mm, hairs.absorption)
         yield from self.paint.arrays()
 
 
@@ -102,10 +102,11 @@ def person_of(scene: Scene, paint: Paint) -> Person:
         point=mesh.point,
         quads=mesh.quads,
     )
-    hairs = None
-    if head.strands is not None and len(head.strands):
-        strands = head.strands
-        hairs = Hairs(strands.places_mm(mesh, points), strands.radius_mm, strands.absorption)
+    hairs = tuple(
+        Hairs(strands.places_mm(mesh, points), strands.radius_mm, strands.absorption)
+        for strands in (head.strands, head.hair)
+        if strands is not None and len(strands)
+    )
     centred = np.eye(4)
     centred[:3, 3] = head.centre_mm
     eyes = head.eyes.frames(rig, motion) @ centred

@@ -87,8 +87,8 @@ def person_scene(
     medium = medium_of(mi, person, scene.camera, mean_free_path_mm)
     shapes, notes = skin_shapes(mi, person, medium)
     shapes |= eye_shapes(mi, person) | _opaque_shapes(mi, person)
-    if person.hairs is not None:
-        shapes |= hair_shapes(mi, person.hairs)
+    for number, hairs in enumerate(person.hairs):
+        shapes |= hair_shapes(mi, hairs, f"hairs_{number}")
     integrator = {"type": "volpathmis", "rr_depth": ROULETTE_DEPTH, "hide_emitters": True}
     return lit_scene(mi, scene, integrator, shapes, size), notes
 
