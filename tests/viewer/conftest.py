@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+from chromium_input import opened_browser
 from offscreen_input import ADAPTER, SETTINGS, InputDriver
 from rigged_head import write_rigged_head
 from small_head import write_head
@@ -46,6 +48,13 @@ def rigged_head(rigged_file: Path) -> Head:
 def rigged(rigged_head: Head, rigged_file: Path) -> ViewerState:
     """A head with expressions and bones."""
     return ViewerState(Scene(rigged_head), SETTINGS, {"name": str(rigged_file)})
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with opened_browser() as one:
+        yield one
 
 
 @pytest.fixture(scope="module")

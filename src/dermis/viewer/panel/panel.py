@@ -6,39 +6,20 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import imgui_bundle
 from imgui_bundle import imgui, implot
-from wgpu.utils.imgui import ImguiRenderer, ImguiWgpuBackend
+from wgpu.utils.imgui import ImguiWgpuBackend
 
 from dermis.gpu import Device
+from dermis.viewer.panel.feeding import POINTER, feed_key, feed_pointer
 from dermis.viewer.panel.fields import attempt, button, record_position
 from dermis.viewer.panel.overlay import HELP_KEYS, PLAY_KEY, draw_divider, draw_help, draw_messages
 from dermis.viewer.panel.sections import SECTIONS
+from dermis.viewer.panel.style import set_style
 from dermis.viewer.session import Session
 
-_WIDTH, _FONT_SIZE = 290.0, 15.0
+_WIDTH = 290.0
 _MOST_OF_WINDOW, _LEAST_SCALE = 0.5, 0.8  # of text in a narrow panel
 _MARGIN, _FAINT = 8.0, 0.6  # of the button that brings the panel back
-_WHEEL = 0.01
-_POINTER = ("pointer_down", "pointer_move", "pointer_up", "double_click", "wheel")
-_GREYS = (  # without hues, which would affect how the skin beside them is judged
-    ("window_bg", 0.08),
-    ("frame_bg", 0.18),
-    ("frame_bg_hovered", 0.26),
-    ("frame_bg_active", 0.32),
-    ("slider_grab", 0.42),  # dark enough for the number over it
-    ("slider_grab_active", 0.55),
-    ("check_mark", 0.8),
-    ("checkbox_selected_bg", 0.26),
-    ("button", 0.26),
-    ("button_hovered", 0.36),
-    ("button_active", 0.46),
-    ("header", 0.22),
-    ("header_hovered", 0.32),
-    ("header_active", 0.4),
-    ("text_selected_bg", 0.4),
-    ("nav_cursor", 0.6),
-)
 
 
 class Panel:
@@ -57,7 +38,7 @@ class Panel:
         self._context = imgui.create_context()
         self._plots = implot.create_context()
         self._enter()
-        _set_style()
+        set_style()
         self._is_new = True
         self._device = device
         self._backend = ImguiWgpuBackend(device.handle, target)
@@ -74,16 +55,14 @@ class Panel:
             return True
         if kind == "pointer_down" and event["x"] >= self.width(size):
             self.shows_help = False
-        if kind in _POINTER:
-            _feed_pointer(io, event)
-            return self._covers(event["x"], event["y"], size)
+        if kind in POINTER:
+            covers = self._covers(event["x"], event["y"], size)  # before a press closes a list
+            feed_pointer(event, lambda: self._frame(size))
+            return covers
         if kind == "pointer_leave":
             io.add_mouse_pos_event(-1e6, -1e6)
             return False
-        if kind == "char":
-            io.add_input_characters_utf8(event.get("data") or event.get("char_str") or "")
-        else:
-            _feed_key(io, str(event["key"]), kind == "key_down")
+        feed_key(event, lambda: self._frame(size))
         return bool(io.want_text_input)
 
     def draw(self, target: Any, size: tuple[float, float], pixel_ratio: float) -> None:
@@ -92,9 +71,18 @@ class Panel:
         size : of the window, logical
         """
         self._enter()
-        io = imgui.get_io()
-        io.display_size = imgui.ImVec2(*size)
-        io.display_framebuffer_scale = imgui.ImVec2(pixel_ratio, pixel_ratio)
+        imgui.get_io().display_framebuffer_scale = imgui.ImVec2(pixel_ratio, pixel_ratio)
+        self._frame(size)
+        encoder = self._device.handle.create_command_encoder()
+        attachment = {"view": target, "load_op": "load", "store_op": "store"}
+        render_pass = encoder.begin_render_pass(label="panel", color_attachments=[attachment])
+        self._backend.render(imgui.get_draw_data(), render_pass)
+        render_pass.end()
+        self._device.handle.queue.submit([encoder.finish()])
+
+    def _frame(self, size: tuple[float, float]) -> None:
+        """Let Dear ImGui see the events so far, and lay out what `draw` draws."""
+        imgui.get_io().display_size = imgui.ImVec2(*size)
         for _ in range(2 if self._is_new else 1):  # the first frame of a window only measures it
             self._is_new = False
             imgui.new_frame()
@@ -102,12 +90,6 @@ class Panel:
                 self._draw_windows(size)
             finally:
                 imgui.render()
-        encoder = self._device.handle.create_command_encoder()
-        attachment = {"view": target, "load_op": "load", "store_op": "store"}
-        render_pass = encoder.begin_render_pass(label="panel", color_attachments=[attachment])
-        self._backend.render(imgui.get_draw_data(), render_pass)
-        render_pass.end()
-        self._device.handle.queue.submit([encoder.finish()])
 
     def _shortcut(self, event: Mapping[str, Any]) -> bool:
         """Whether a key was a shortcut of the panel."""
@@ -200,36 +182,3 @@ class Panel:
             self._scrolls = imgui.is_window_hovered() and not imgui.is_any_item_hovered()
         if self._scrolls and imgui.is_mouse_down(0):
             imgui.set_scroll_y(imgui.get_scroll_y() - imgui.get_io().mouse_delta.y)
-
-
-def _feed_pointer(io: Any, event: Mapping[str, Any]) -> None:
-    kind = event["event_type"]
-    io.add_mouse_pos_event(event["x"], event["y"])
-    if kind in ("pointer_down", "pointer_up"):
-        io.add_mouse_button_event(max(0, event["button"] - 1), kind == "pointer_down")
-    elif kind == "wheel":
-        io.add_mouse_wheel_event(-_WHEEL * event["dx"], -_WHEEL * event["dy"])
-
-
-def _feed_key(io: Any, name: str, down: bool) -> None:
-    key = ImguiRenderer.KEY_MAP.get(name)
-    if key is None and len(name) == 1 and name.isascii() and name.isalnum():
-        key = getattr(imgui.Key, f"_{name}" if name.isdigit() else name.lower(), None)
-    if key is not None:
-        io.add_key_event(key, down)
-    if name in ImguiRenderer.KEY_MAP_MOD:
-        io.add_key_event(ImguiRenderer.KEY_MAP_MOD[name], down)
-
-
-def _set_style() -> None:
-    """A legible font on a dark ground."""
-    io, style = imgui.get_io(), imgui.get_style()
-    font = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "Roboto" / "Roboto-Regular.ttf"
-    if font.is_file():
-        io.fonts.add_font_from_file_ttf(str(font), _FONT_SIZE)
-    imgui.style_colors_dark()
-    io.fonts.flags |= int(imgui.ImFontAtlasFlags_.no_baked_lines)  # some backends cannot draw them
-    style.window_rounding, style.frame_rounding, style.window_border_size = 0.0, 3.0, 0.0
-    for name, grey in _GREYS:
-        if hasattr(imgui.Col_, name):  # some need a newer version
-            style.set_color_(int(getattr(imgui.Col_, name)), imgui.ImVec4(grey, grey, grey, 1.0))

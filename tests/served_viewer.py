@@ -1,0 +1,34 @@
+"""A viewer that a server in this process shows to pages."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from offscreen_input import ADAPTER
+
+from dermis.viewer.state import ViewerState
+
+
+@contextmanager
+def served(state: ViewerState, size: tuple[int, int] = (400, 300)) -> Iterator[Any]:
+    """The viewer, in a thread of its own; `viewer.url` is its page."""
+    from dermis.viewer.browser.canvas import PageCanvas
+    from dermis.viewer.browser.server import bind, server
+    from dermis.viewer.viewer import Viewer
+
+    listener, address = bind("127.0.0.1", 0)
+    with listener:
+        one: Any = Viewer(state, PageCanvas(size=size, max_fps=60), ADAPTER)
+        one.url = address.url
+        running = server(address)
+        thread = threading.Thread(target=running.run, kwargs={"sockets": [listener]}, daemon=True)
+        thread.start()
+        while not running.started:
+            time.sleep(0.05)
+        yield one
+        running.should_exit = True
+        thread.join(20.0)
