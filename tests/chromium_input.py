@@ -57,6 +57,14 @@ def wait_for_picture(page: Any) -> None:
     page.wait_for_function(_GET_IMAGE, timeout=1000 * PATIENCE_S)
 
 
+def wait(page: Any, reached: Callable[[], Any]) -> bool:
+    """Whether something comes to be; the page goes on meanwhile."""
+    end = time.monotonic() + PATIENCE_S
+    while not reached() and time.monotonic() < end:
+        page.wait_for_timeout(50)
+    return bool(reached())
+
+
 def pixels(page: Any) -> NDArray[np.int64]:
     from PIL import Image
 

@@ -21,14 +21,20 @@ def served(state: ViewerState, size: tuple[int, int] = (400, 300)) -> Iterator[A
     from dermis.viewer.viewer import Viewer
 
     listener, address = bind("127.0.0.1", 0)
-    with listener:
+    made: list[Any] = []
+
+    def run() -> None:  # in whose event loop the canvas belongs
         one: Any = Viewer(state, PageCanvas(size=size, max_fps=60), ADAPTER)
-        one.url = address.url
-        running = server(address)
-        thread = threading.Thread(target=running.run, kwargs={"sockets": [listener]}, daemon=True)
+        one.url, running = address.url, server(address)
+        made.extend((one, running))
+        running.run(sockets=[listener])
+
+    with listener:
+        thread = threading.Thread(target=run, daemon=True)
         thread.start()
-        while not running.started:
+        while not (made and made[1].started):
+            assert thread.is_alive()
             time.sleep(0.05)
-        yield one
-        running.should_exit = True
+        yield made[0]
+        made[1].should_exit = True
         thread.join(20.0)

@@ -10,6 +10,7 @@ import pytest
 from chromium_input import opened_browser
 from offscreen_input import ADAPTER, SETTINGS, InputDriver
 from rigged_head import write_rigged_head
+from served_viewer import served
 from small_head import write_head
 
 from dermis.mesh.head import Head
@@ -54,6 +55,14 @@ def rigged(rigged_head: Head, rigged_file: Path) -> ViewerState:
 def browser() -> Iterator[Any]:
     pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     with opened_browser() as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
+def shown(head: Head, head_file: Path) -> Iterator[Any]:
+    """A viewer that a server in this process shows, `shown.url` is its page."""
+    pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
+    with served(ViewerState(Scene(head), SETTINGS, {"name": str(head_file)}), (400, 480)) as one:
         yield one
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from dermis.errors import refuse
 from dermis.scene.files import head_and_skin
@@ -24,7 +25,9 @@ class Session:
 
     split : the before/after comparison
     status, message : text over the picture: the adapter's state, and the result of the last action
-    scene_file, picture_file, picture_size : what the panel's buttons write [pixel]
+    scene_file, picture_file : what the panel's buttons write
+    picture_size, view_size : of a screenshot, (0, 0) for that of the view; and of the view [pixel]
+    offer : takes name and bytes of a file that a page offers as a download; None where files are written
     motion_file, search : what is opened, and which expressions the panel shows
     positions : of the panel's controls in the window, by label
     """
@@ -42,7 +45,9 @@ class Session:
         self.studio = studio
         self.split = Split()
         self.status = self.message = ""
-        self.scene_file, self.picture_file, self.picture_size = "scene.toml", "dermis.png", (1920, 1080)
+        self.scene_file, self.picture_file = "scene.toml", "dermis.png"
+        self.picture_size = self.view_size = 0, 0
+        self.offer: Callable[[str, bytes], None] | None = None
         self.motion_file, self.search = motion.path if motion else "", ""
         self.positions: dict[str, tuple[float, float]] = {}
 
@@ -62,11 +67,11 @@ class Session:
         self.message = ""
 
     def save(self, path: Path) -> None:
-        """Write the scene file.
+        """Write the scene file, or offer it as a download.
 
         Raises DermisError when that is not possible.
         """
-        save_state(path, self.shown)
+        self._write(path, lambda target: save_state(target, self.shown))
         self.message = f"saved {path}"
 
     def load(self, path: Path) -> None:
@@ -88,7 +93,7 @@ class Session:
         self.message = f"opened {path}"
 
     def screenshot(self, path: Path, size: tuple[int, int]) -> None:
-        """Write the picture at any size: .png with the tone curve or .exr, linear.
+        """Write the picture at any size, or offer it as a download: .png with the tone curve or .exr, linear.
 
         Raises DermisError when that is not possible.
         """
@@ -97,8 +102,17 @@ class Session:
             refuse(f"picture {path}", "a name that ends in .png or .exr", f"{path.name!r} came", "Change it")
         if kind == ".exr" and view not in (PICTURE, *PARTS):
             refuse(f"view {view} as .exr", "a view of linear light", "its numbers are colours", "Take .png")
-        self.studio.screenshot(path, self.shown, size)
+        self._write(path, lambda target: self.studio.screenshot(target, self.shown, size))
         self.message = f"wrote {path}, {size[0]} x {size[1]}"
+
+    def _write(self, path: Path, write: Callable[[Path], None]) -> None:
+        if self.offer is None:
+            write(path)
+            return
+        with TemporaryDirectory(prefix="dermis-") as folder:
+            target = Path(folder) / path.name
+            write(target)
+            self.offer(path.name, target.read_bytes())
 
 
 def apply_regions(state: ViewerState, name: str, known: Iterable[ViewerState] = ()) -> ViewerState:

@@ -53,6 +53,7 @@ class Viewer:
         self._adapter, self._clock = adapter, clock
         self._context = canvas.get_wgpu_context()
         self.session = Session(state, Studio(adapter), motion, clock)
+        self.session.offer = getattr(canvas, "offer", None)  # of a page, which may be on another machine
         self.session.player.play()
         self.panel = Panel(self.session)
         self._easing = Easing(state.scene.camera)
@@ -100,7 +101,7 @@ class Viewer:
         camera = self._easing.advance(state.scene.camera, elapsed)
         if state is not self._last_state or camera != before or size != self._last_size:
             self._last_change, self._last_state, self._last_size = now, state, size
-        self._last_draw = now
+        self._last_draw, session.view_size = now, size
         images = self._images(state, camera, size, self._is_moving(now))
         session.status = self._status(size)
         target = self._context.get_current_texture().create_view()

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rendercanvas.http import HttpRenderCanvas
+from rendercanvas.http import HttpRenderCanvas, asgi
 
 _QUALITY = 88
 _LOSSLESS_AFTER_S = 0.3
@@ -27,6 +27,10 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         self._drawn = self._sent = 0  # numbers of the last frame drawn and of the last one sent
         self._lossless = 0  # number of the current lossless frame, 0 when a newer frame has replaced it
         super().__init__(**given)
+
+    def offer(self, name: str, data: bytes) -> None:
+        """Send a file to the page that has control, which offers it as a download."""
+        asgi.send_to({"type": "download", "name": name, "nbuffers": 1}, [data], self._active_client)
 
     def _on_event(self, event: dict[str, Any], id: int) -> None:
         kind = str(event.get("type"))

@@ -1,6 +1,8 @@
 // What rendercanvas' page lacks: it reconnects, works behind https, sends pinch gestures, and reports its size when
 // it becomes active.
 
+import { take } from './files.js'
+
 const RETRY_MS = 1000
 const TAPS_MS = 350
 const TAPS_PX = 24
@@ -57,7 +59,8 @@ setInterval(() => {
 }, RETRY_MS)
 
 function hear (event) {
-  const message = typeof event.data === 'string' ? JSON.parse(event.data) : {}
+  const message = typeof event.data === 'string' ? JSON.parse(event.data) : { bytes: event.data }
+  take(message)
   if (message.type !== 'active') { return }
   notice.textContent = message.value ? '' : WATCHING
   if (message.value) {

@@ -74,7 +74,8 @@ def server(address: Address) -> Any:
 
     folder = Path(__file__).parent
     resources["index.html"] = "text/html", (folder / "page.html").read_text(encoding="utf-8")
-    resources["page.js"] = "text/javascript", (folder / "page.js").read_text(encoding="utf-8")
+    for script in ("page.js", "files.js"):
+        resources[script] = "text/javascript", (folder / script).read_text(encoding="utf-8")
     config = uvicorn.Config(
         Guard(asgi, address.token),
         log_level="warning",

@@ -100,10 +100,25 @@ class Panel:
             attempt(session, lambda: session.save(Path(session.scene_file)))
         elif key == "Tab":
             self.visible = not self.visible
-        elif key in HELP_KEYS or (key == "Escape" and self.shows_help):
+        elif key == "Escape":
+            return self._escape()
+        elif key in HELP_KEYS:
             self.shows_help = not self.shows_help
         elif key == PLAY_KEY and session.player.clip is not None:
             session.player.toggle()
+        else:
+            return False
+        return True
+
+    def _escape(self) -> bool:
+        """Close what is open, the topmost first; returns whether there was something."""
+        if self._has_popup:
+            imgui.internal.close_popup_to_level(0, False)
+            self._has_popup = False
+        elif self.shows_help:
+            self.shows_help = False
+        elif self._session.search:
+            self._session.search = ""
         else:
             return False
         return True

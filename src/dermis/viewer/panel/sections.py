@@ -15,7 +15,7 @@ from imgui_bundle import imgui
 from dermis.scene.plain import choices_of
 from dermis.viewer.chart import ATLAS
 from dermis.viewer.controls import CAMERAS
-from dermis.viewer.panel.fields import Style, attempt, button, combo, draw_fields
+from dermis.viewer.panel.fields import Style, attempt, button, combo, draw_fields, record_position
 from dermis.viewer.panel.light import draw_lights
 from dermis.viewer.panel.movement import can_move, draw_expressions, draw_motion, has_expressions
 from dermis.viewer.panel.plots import draw_timing
@@ -98,7 +98,7 @@ def draw_picture(session: Session) -> None:
 
 
 def draw_files(session: Session) -> None:
-    """The scene file, and screenshots of any size."""
+    """The scene file, and screenshots of any size, that of the view unless told."""
     _, session.scene_file = imgui.input_text("scene", session.scene_file)
     if button(session, "save"):
         attempt(session, lambda: session.save(Path(session.scene_file)))
@@ -106,10 +106,17 @@ def draw_files(session: Session) -> None:
     if button(session, "load"):
         attempt(session, lambda: session.load(Path(session.scene_file)))
     _, session.picture_file = imgui.input_text("picture", session.picture_file)
-    _, sides = imgui.input_int2("size", list(session.picture_size))
-    session.picture_size = max(1, sides[0]), max(1, sides[1])
+    size = session.picture_size if any(session.picture_size) else session.view_size
+    told, sides = imgui.input_int2("size", list(size))
+    record_position(session, "size")
+    if told:
+        session.picture_size = max(1, sides[0]), max(1, sides[1])
     if button(session, "screenshot"):
-        attempt(session, lambda: session.screenshot(Path(session.picture_file), session.picture_size))
+        attempt(session, lambda: session.screenshot(Path(session.picture_file), size))
+    if any(session.picture_size):
+        imgui.same_line()
+        if button(session, "size of the view"):
+            session.picture_size = 0, 0
 
 
 SECTIONS = (
