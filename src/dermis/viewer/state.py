@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 from dermis.errors import refuse
+from dermis.human.person import Human
 from dermis.mesh.head import Head
 from dermis.scene.camera import Camera
 from dermis.scene.clips.clip import Clip
@@ -17,6 +19,7 @@ from dermis.scene.head_table import names_regions
 from dermis.scene.heads import load_head
 from dermis.scene.lights import Light
 from dermis.scene.model import Scene
+from dermis.scene.people import skin_of
 from dermis.scene.plain import Plain
 from dermis.scene.pose import Pose
 from dermis.scene.saving import save_scene
@@ -160,6 +163,26 @@ def named_state(name: str) -> ViewerState:
         return load_state(Path(name))
     path = str(Path(name).resolve()) if Path(name).is_file() else name
     return ViewerState(Scene(load_head(name)), head={"name": path})
+
+
+def state_of(shown: Head | Human | Scene | ViewerState | str | os.PathLike[str]) -> ViewerState:
+    """What is to be seen first: a head or a person in studio light, a scene, or one of them by name.
+
+    Raises DermisError for anything else.
+    """
+    if isinstance(shown, ViewerState):
+        return shown
+    if isinstance(shown, Human):
+        return ViewerState(Scene(shown.head(), skin=skin_of(shown)))
+    if isinstance(shown, Head):
+        return ViewerState(Scene(shown))
+    if isinstance(shown, Scene):
+        return ViewerState(shown, rig="")
+    if isinstance(shown, str | os.PathLike):
+        return named_state(os.fspath(shown))
+    refuse(
+        "view", "a head, a person, a scene or a name", f"a {type(shown).__name__} came", "Try dermis.Human()"
+    )
 
 
 def load_state(path: Path, before: ViewerState | None = None) -> ViewerState:

@@ -89,10 +89,6 @@ class Viewer:
         final = studio.is_current or self._refused is state
         return arrived and final and not self._is_moving(self._clock())
 
-    def _repr_mimebundle_(self, **options: Any) -> Any:
-        """What a notebook displays."""
-        return self.canvas._repr_mimebundle_(**options)
-
     def _draw(self, now: float) -> None:
         session, size = self.session, self._picture_size()
         session.player.advance()

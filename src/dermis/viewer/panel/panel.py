@@ -17,7 +17,7 @@ from dermis.viewer.panel.sections import SECTIONS
 from dermis.viewer.panel.style import set_style
 from dermis.viewer.session import Session
 
-_WIDTH = 290.0
+_WIDTH, _CONTROLS = 330.0, 0.5  # of the panel, and their share of it
 _MOST_OF_WINDOW, _LEAST_SCALE = 0.5, 0.8  # of text in a narrow panel
 _MARGIN, _FAINT = 8.0, 0.6  # of the button that brings the panel back
 
@@ -31,6 +31,7 @@ class Panel:
         self._is_new = self._has_popup = self._scrolls = False
         self._button_end = (0.0, 0.0)
         self._context: Any = None
+        self.label_width = 0.0  # right of the controls, logical
 
     def open(self, device: Device, target: str) -> None:
         """Create the resources for drawing into textures of a format."""
@@ -165,7 +166,9 @@ class Panel:
         fixed = imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_collapse
         imgui.begin("dermis", None, int(fixed | imgui.WindowFlags_.no_title_bar))
         self._draw_toolbar()
-        imgui.push_item_width(0.58 * width)
+        imgui.push_item_width(_CONTROLS * width)
+        gap = imgui.get_style().item_inner_spacing.x
+        self.label_width = imgui.get_content_region_avail().x - _CONTROLS * width - gap
         for section in (one for one in SECTIONS if one.applies(session)):
             flags = int(imgui.TreeNodeFlags_.default_open) if section.is_open else 0
             is_open = imgui.collapsing_header(section.title, flags)

@@ -20,12 +20,14 @@ from dermis.viewer.panel.light import draw_lights
 from dermis.viewer.panel.movement import can_move, draw_expressions, draw_motion, has_expressions
 from dermis.viewer.panel.plots import draw_timing
 from dermis.viewer.panel.skin import draw_profile, draw_surface
+from dermis.viewer.panel.words import TECHNIQUE
 from dermis.viewer.session import Session
 from dermis.viewer.views import LAYERS, VIEWS
 
 _BUTTONS_PER_ROW = 3
 _SIDES = (256, 512, 1024, 2048, 4096)
 _SETTINGS = {
+    **TECHNIQUE,
     "atlas": Style(options=_SIDES),
     "shadow_size": Style("shadow map", options=_SIDES),
     "samples": Style(options=(1, 2, 4, 8, 16)),
