@@ -21,7 +21,7 @@ from dermis.viewer.panel.sections import SECTIONS
 from dermis.viewer.state import ViewerState, same
 
 BUTTONS = {"undo", "redo", "help", "hide", "save", "load", "screenshot", "reset", "freeze"}
-BUTTONS |= {"open", "search", "bones"}
+BUTTONS |= {"open", "search", "bones", "size"}
 CAMERAS = {f"{name}##camera" for name in ("portrait", "three-quarter", "profile", "ear", "cheek")}
 NO_STATE = BUTTONS | CAMERAS | {section.title for section in SECTIONS} | {"regions"}
 STARTS: dict[str, Callable[[ViewerState], ViewerState]] = {
@@ -32,7 +32,7 @@ STARTS: dict[str, Callable[[ViewerState], ViewerState]] = {
 }
 EXPECTED = {
     "table": "show, profile, colour from, mix, roughness, rho_s, oiliness, BRDF, Fresnel, energy, "
-    "reflection, rig, strength, irradiance, inner cone, outer cone, softness, shadows, copy, remove, "
+    "reflection, rig, strength, irradiance, inner cone, outer cone, softness, shadows, copy, remove, add, "
     "environment, rotation, brightness, visible, technique, stretch, seams, transmission, occlusion, atlas, "
     "shadow map, samples, exposure, tone, gamma, bloom, background",
     "pigments": "layers, melanin, eumelanin, thickness, blood##epidermis, blood, oxygen",

@@ -8,8 +8,9 @@ from typing import Any
 
 from dermis.scene.camera import preset
 from dermis.viewer.chart import ATLAS, Chart
+from dermis.viewer.history import History
 from dermis.viewer.navigation import dolly, drag_light, focus, orbit, pan, pick
-from dermis.viewer.state import History, ViewerState
+from dermis.viewer.state import ViewerState
 
 Event = Mapping[str, Any]
 Pair = tuple[float, float]

@@ -12,8 +12,9 @@ from dermis.scene.files import head_and_skin
 from dermis.scene.head_table import AUTO, HeadTable
 from dermis.scene.skin import Skin
 from dermis.viewer.controls import Controls, Split
+from dermis.viewer.history import History
 from dermis.viewer.player import MotionFile, Player
-from dermis.viewer.state import PARTS, PICTURE, History, ViewerState, load_state, save_state
+from dermis.viewer.state import PARTS, PICTURE, ViewerState, load_state, save_state
 from dermis.viewer.studio import Studio
 
 

@@ -38,11 +38,9 @@ def draw_lights(session: Session) -> None:
 
 def _added(session: Session, kind: str) -> ViewerState:
     """The state with a light of that kind more, which is selected."""
-    fields = LIGHTS[kind].model_fields
     places = {"position": _PLACE, "direction": tuple(-one for one in _PLACE)}
-    told: dict[str, Any] = {
-        name: place for name, place in places.items() if name in fields and fields[name].is_required()
-    }
+    required = {name for name, field in LIGHTS[kind].model_fields.items() if field.is_required()}
+    told: dict[str, Any] = {name: place for name, place in places.items() if name in required}
     lights = session.state.scene.lights
     made = session.state.with_lights([*lights, LIGHTS[kind](**told)])
     session.controls.light = len(lights)
