@@ -50,7 +50,7 @@ def tall(make_driver: Callable[[], InputDriver]) -> InputDriver:
     studio: Any = driver.viewer.session.studio
     image = studio.last_image
     studio.pictures = lambda *_: (image, None)
-    driver.canvas.set_logical_size(400, 1500)
+    driver.canvas.set_logical_size(500, 1500)
     for section in SECTIONS:
         if section.applies(driver.viewer.session) and not section.is_open and section.title != "Timing":
             driver.press(section.title)

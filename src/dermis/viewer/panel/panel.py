@@ -19,15 +19,24 @@ from dermis.viewer.session import Session
 
 _WIDTH, _CONTROLS = 330.0, 0.5  # of the panel, and their share of it
 _MOST_OF_WINDOW, _LEAST_SCALE = 0.5, 0.8  # of text in a narrow panel
+_NARROW, _PHONE = 400.0, 480.0  # less wide windows have a drawer; the latter is for phones held upright
+_UPRIGHT = 1.4  # height over width, at least
+_DRAWER = 0.86  # of the window's width
+_FINGER = 8.0  # room around text for a finger
 _MARGIN, _FAINT = 8.0, 0.6  # of the button that brings the panel back
 
 
 class Panel:
-    """Draws the sections, and decides which events are for the panel."""
+    """Draws the sections, and decides which events are for the panel.
+
+    visible : whether it is there in a window of some width
+    opened : whether it is there in a narrow window, as a drawer over the picture
+    """
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self.visible, self.shows_help = True, False
+        self.visible, self.opened, self.shows_help = True, False, False
+        self._size = (0.0, 0.0)
         self._is_new = self._has_popup = self._scrolls = False
         self._button_end = (0.0, 0.0)
         self._context: Any = None
@@ -45,16 +54,29 @@ class Panel:
         self._backend = ImguiWgpuBackend(device.handle, target)
 
     def width(self, size: tuple[float, float]) -> float:
-        """Of the panel in a window of that size, logical; 0 when it is hidden."""
-        return round(min(_WIDTH, _MOST_OF_WINDOW * size[0])) if self.visible else 0.0
+        """Of what the panel takes from the picture in a window of that size, logical."""
+        return 0.0 if is_drawer(size) else self._reach(size)
+
+    def _reach(self, size: tuple[float, float]) -> float:
+        """Of what it covers, logical; 0 when it is hidden."""
+        share, there = (_DRAWER, self.opened) if is_drawer(size) else (_MOST_OF_WINDOW, self.visible)
+        return round(min(_WIDTH, share * size[0])) if there else 0.0
+
+    def toggle(self) -> None:
+        """Hide or show it."""
+        if is_drawer(self._size):
+            self.opened = not self.opened
+        else:
+            self.visible = not self.visible
 
     def feed(self, event: Mapping[str, Any], size: tuple[float, float]) -> bool:
         """Process an event; returns whether it was for the panel, not for the picture."""
         self._enter()
+        self._size = size
         io, kind = imgui.get_io(), event["event_type"]
         if kind == "key_down" and not io.want_text_input and self._shortcut(event):
             return True
-        if kind == "pointer_down" and event["x"] >= self.width(size):
+        if kind == "pointer_down" and event["x"] >= self._reach(size):
             self.shows_help = False
         if kind in POINTER:
             covers = self._covers(event["x"], event["y"], size)  # before a press closes a list
@@ -83,6 +105,7 @@ class Panel:
 
     def _frame(self, size: tuple[float, float]) -> None:
         """Let Dear ImGui see the events so far, and lay out what `draw` draws."""
+        self._size = size
         imgui.get_io().display_size = imgui.ImVec2(*size)
         for _ in range(2 if self._is_new else 1):  # the first frame of a window only measures it
             self._is_new = False
@@ -100,7 +123,7 @@ class Panel:
                 return False
             attempt(session, lambda: session.save(Path(session.scene_file)))
         elif key == "Tab":
-            self.visible = not self.visible
+            self.toggle()
         elif key == "Escape":
             return self._escape()
         elif key in HELP_KEYS:
@@ -130,20 +153,26 @@ class Panel:
 
     def _covers(self, x: float, y: float, size: tuple[float, float]) -> bool:
         """Whether a pointer there is over the panel; Dear ImGui would know it only a frame later."""
-        on_button = not self.visible and x < self._button_end[0] and y < self._button_end[1]
-        return x < self.width(size) or on_button or self._has_popup or bool(imgui.is_any_item_active())
+        reach = self._reach(size)
+        on_button = not reach and x < self._button_end[0] and y < self._button_end[1]
+        return x < reach or on_button or self._has_popup or bool(imgui.is_any_item_active())
 
     def _draw_windows(self, size: tuple[float, float]) -> None:
         """The panel, or the button that brings it back, and the overlay."""
-        if self.visible:
+        room = _FINGER if is_drawer(size) else imgui.get_style().frame_padding.y
+        padding = imgui.ImVec2(imgui.get_style().frame_padding.x, room)
+        imgui.push_style_var(int(imgui.StyleVar_.frame_padding), padding)
+        if self._reach(size):
             self._draw_panel(size)
         else:
             self._draw_button()
+        imgui.pop_style_var()
         left, session = self.width(size), self._session
         if self.shows_help:
             draw_help(left, size)
         draw_divider(session.split, left, size)
-        draw_messages([line for line in (session.message, session.status) if line], left, size)
+        lines = session.message, session.heads.note, "" if self._reach(size) > left else session.status
+        draw_messages([line for line in lines if line], left, size)
 
     def _draw_button(self) -> None:
         """A button in the corner of the picture."""
@@ -152,14 +181,15 @@ class Panel:
         flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_background
         imgui.push_style_var(int(imgui.StyleVar_.alpha), _FAINT)
         imgui.begin("corner", None, int(flags | imgui.WindowFlags_.always_auto_resize))
-        self.visible = button(self._session, "panel")
+        if button(self._session, "panel"):
+            self.toggle()
         end = imgui.get_item_rect_max()
         self._button_end = float(end.x) + _MARGIN, float(end.y) + _MARGIN
         imgui.end()
         imgui.pop_style_var()
 
     def _draw_panel(self, size: tuple[float, float]) -> None:
-        session, width = self._session, self.width(size)
+        session, width = self._session, self._reach(size)
         imgui.get_style().font_scale_main = max(_LEAST_SCALE, min(1.0, width / _WIDTH))
         imgui.set_next_window_pos(imgui.ImVec2(0.0, 0.0))
         imgui.set_next_window_size(imgui.ImVec2(width, size[1]))
@@ -192,7 +222,8 @@ class Panel:
             imgui.same_line()
         self.shows_help ^= button(self._session, "help")
         imgui.same_line()
-        self.visible = not button(self._session, "hide")
+        if button(self._session, "hide"):
+            self.toggle()
 
     def _scroll_by_touch(self) -> None:
         """Scroll with a drag that began beside all controls: fingers have no wheel."""
@@ -200,3 +231,9 @@ class Panel:
             self._scrolls = imgui.is_window_hovered() and not imgui.is_any_item_hovered()
         if self._scrolls and imgui.is_mouse_down(0):
             imgui.set_scroll_y(imgui.get_scroll_y() - imgui.get_io().mouse_delta.y)
+
+
+def is_drawer(size: tuple[float, float]) -> bool:
+    """Whether a window of that size is too narrow for the panel beside the picture, as a phone is."""
+    width, height = size
+    return width < (_PHONE if height > _UPRIGHT * width else _NARROW)
