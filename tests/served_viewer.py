@@ -6,6 +6,8 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from offscreen_input import ADAPTER
@@ -25,11 +27,12 @@ def served(state: ViewerState, size: tuple[int, int] = (400, 300)) -> Iterator[A
 
     def run() -> None:  # in whose event loop the canvas belongs
         one: Any = Viewer(state, PageCanvas(size=size, max_fps=60), ADAPTER)
-        one.url, running = address.url, server(address)
+        one.folder = folder
+        one.url, running = address.url, server(address, one.canvas, Path(folder))
         made.extend((one, running))
         running.run(sockets=[listener])
 
-    with listener:
+    with listener, TemporaryDirectory() as folder:
         thread = threading.Thread(target=run, daemon=True)
         thread.start()
         while not (made and made[1].started):

@@ -1,4 +1,4 @@
-"""Files in a real browser: what is saved comes as a download."""
+"""Files in a real browser: what is saved comes as a download, heads are sent."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from chromium_input import CHROMIUM, visited, wait
+from small_head import write_head
 
 from dermis.scene.files import load_scene
 
@@ -29,7 +30,11 @@ def test_scene_and_screenshot_are_downloads_and_nothing_is_left_on_the_server(
         assert load_scene(tmp_path / "got.toml")[0].skin.mix == 0.25
         assert page.inner_text("#files a") == "scene.toml" == coming.value.suggested_filename
         session.picture_file = "nowhere/view.png"
-        for title in ("Surface", "Profile"):  # closed, else the button would be below the window's edge
+        for title in (
+            "Surface",
+            "Profile",
+            "Head",
+        ):  # closed, else the button would be below the window's edge
             page.mouse.click(*session.positions[title])
         assert wait(page, lambda: session.positions.get("screenshot", (0, 500))[1] < 450)
         with page.expect_download() as coming:
@@ -38,3 +43,32 @@ def test_scene_and_screenshot_are_downloads_and_nothing_is_left_on_the_server(
         picture = Image.open(io.BytesIO(Path(coming.value.path()).read_bytes()))
         assert picture.size == session.view_size == (200, 480)
     assert [path.name for path in tmp_path.iterdir()] == ["got.toml"]
+
+
+def test_a_chosen_file_is_sent_and_shown_and_others_are_refused(
+    browser: Any, shown: Any, tmp_path: Path
+) -> None:
+    session, first = shown.session, shown.session.state
+    good, bad, other = (tmp_path / name for name in ("mine.obj", "broken.obj", "notes.txt"))
+    write_head(good)
+    bad.write_text("v 1 2\nf 1 2 3\n")
+    other.write_text("x")
+    with visited(browser, shown.url, expected="status of 400") as page:
+
+        def choose(path: Path) -> None:
+            assert wait(page, lambda: "upload a file" in session.positions)
+            with page.expect_file_chooser() as chooser:
+                page.mouse.click(*session.positions["upload a file"])
+            chooser.value.set_files(path)
+
+        choose(good)
+        assert wait(page, lambda: session.state.scene.head is not first.scene.head)
+        (opened,) = session.heads.recent
+        assert opened.endswith("/mine.obj") and opened.startswith(shown.folder)
+        page.wait_for_function("() => document.querySelector('#files').innerText === ''")
+        state = session.state
+        choose(bad)
+        assert wait(page, lambda: "broken.obj" in session.message) and session.state is state
+        choose(other)
+        page.wait_for_function("() => document.querySelector('#files').innerText.includes('.glb, .obj')")
+        assert session.heads.recent == [opened] and len(list(Path(shown.folder).rglob("*.*"))) == 2

@@ -7,11 +7,12 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from dermis.errors import refuse
+from dermis.errors import DermisError, refuse
 from dermis.scene.files import head_and_skin
 from dermis.scene.head_table import AUTO, HeadTable
 from dermis.scene.skin import Skin
 from dermis.viewer.controls import Controls, Split
+from dermis.viewer.heads import Heads
 from dermis.viewer.history import History
 from dermis.viewer.player import MotionFile, Player
 from dermis.viewer.state import PARTS, PICTURE, ViewerState, load_state, save_state
@@ -28,6 +29,8 @@ class Session:
     status, message : text over the picture: the adapter's state, and the result of the last action
     scene_file, picture_file : what the panel's buttons write
     picture_size, view_size : of a screenshot, (0, 0) for that of the view; and of the view [pixel]
+    heads, head_file : what opens other heads, and the file that it is to open
+    ask_for_file : asks a page for a file; None where files have paths
     offer : takes name and bytes of a file that a page offers as a download; None where files are written
     motion_file, search : what is opened, and which expressions the panel shows
     positions : of the panel's controls in the window, by label
@@ -48,6 +51,8 @@ class Session:
         self.status = self.message = ""
         self.scene_file, self.picture_file = "scene.toml", "dermis.png"
         self.picture_size = self.view_size = 0, 0
+        self.heads, self.head_file = Heads(), ""
+        self.ask_for_file: Callable[[], None] | None = None
         self.offer: Callable[[str, bytes], None] | None = None
         self.motion_file, self.search = motion.path if motion else "", ""
         self.positions: dict[str, tuple[float, float]] = {}
@@ -84,6 +89,17 @@ class Session:
         self.player.stop()
         self.change(state)
         self.message = f"loaded {path}"
+
+    def take_head(self) -> None:
+        """Show the head that was opened meanwhile, if there is one, or tell why it cannot be."""
+        try:
+            state = self.heads.take(self.state)
+        except DermisError as error:
+            self.message = str(error)
+            return
+        if state is not None:
+            self.player.stop()
+            self.change(state)
 
     def open_motion(self, path: str) -> None:
         """Play the motion of a file.

@@ -53,7 +53,7 @@ class Viewer:
         self._adapter, self._clock = adapter, clock
         self._context = canvas.get_wgpu_context()
         self.session = Session(state, Studio(adapter), motion, clock)
-        self.session.offer = getattr(canvas, "offer", None)  # of a page, which may be on another machine
+        self._connect()
         self.session.player.play()
         self.panel = Panel(self.session)
         self._easing = Easing(state.scene.camera)
@@ -91,6 +91,7 @@ class Viewer:
 
     def _draw(self, now: float) -> None:
         session, size = self.session, self._picture_size()
+        session.take_head()
         session.player.advance()
         state, elapsed = session.shown, min(now - self._last_draw, _LONGEST_STEP_S)
         before = self._easing.camera
@@ -185,6 +186,16 @@ class Viewer:
         self._context.configure(device=device.handle, format=format_)
         self._blit = Blit(device, format_)
         self.panel.open(device, format_)
+
+    def _connect(self) -> None:
+        """Let files come from and go to a page, which may be on another machine."""
+        canvas, session = self.canvas, self.session
+        session.offer = getattr(canvas, "offer", None)
+        session.ask_for_file = getattr(canvas, "ask_for_file", None)
+        if session.ask_for_file:
+            canvas.on_file = lambda path: session.heads.open(str(path))
+        loop = canvas._rc_canvas_group.get_loop()
+        session.heads.wake = lambda: loop and loop.call_soon_threadsafe(canvas.request_draw)
 
     def _recover(self, error: Exception) -> None:
         """Open the device again after it was lost or ran out of memory."""

@@ -6,6 +6,8 @@ import importlib
 import os
 import warnings
 from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NoReturn
 
 from dermis.errors import refuse
@@ -65,15 +67,16 @@ def serve(
     """
     _backend("http", ("uvicorn", "websockets"), "viewer")
     from dermis.viewer.browser.canvas import PageCanvas
-    from dermis.viewer.browser.server import bind, is_local, server
+    from dermis.viewer.browser.guard import is_local
+    from dermis.viewer.browser.server import bind, server
 
     listener, address = bind(host, port, secret=secret)
-    with listener:
+    with listener, TemporaryDirectory(prefix="dermis-") as folder:
         canvas = PageCanvas(size=size, title=_TITLE, max_fps=_MOST_FPS)
         viewer = Viewer(state, canvas, adapter, motion=motion)
         viewer.canvas._size_info.set_physical_size(*size, 1.0)
         announce(address.url, not is_local(host))
-        pages = server(address)
+        pages = server(address, canvas, Path(folder))
         # rendercanvas handles Ctrl+C by closing the canvas; without this the server would keep running.
         viewer.canvas.add_event_handler(lambda event: setattr(pages, "should_exit", True), "close")
         pages.run(sockets=[listener])

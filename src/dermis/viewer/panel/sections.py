@@ -16,6 +16,7 @@ from dermis.scene.plain import choices_of
 from dermis.viewer.chart import ATLAS
 from dermis.viewer.controls import CAMERAS
 from dermis.viewer.panel.fields import Style, attempt, button, combo, draw_fields, record_position
+from dermis.viewer.panel.heads import draw_head
 from dermis.viewer.panel.light import draw_lights
 from dermis.viewer.panel.movement import can_move, draw_expressions, draw_motion, has_expressions
 from dermis.viewer.panel.plots import draw_timing
@@ -122,6 +123,7 @@ def draw_files(session: Session) -> None:
 
 
 SECTIONS = (
+    Section("Head", draw_head, is_open=True),
     Section("View", draw_view, is_open=True),
     Section("Before and after", draw_comparison),
     Section("Expressions", draw_expressions, is_open=True, applies=has_expressions),
