@@ -30,11 +30,8 @@ def test_scene_and_screenshot_are_downloads_and_nothing_is_left_on_the_server(
         assert load_scene(tmp_path / "got.toml")[0].skin.mix == 0.25
         assert page.inner_text("#files a") == "scene.toml" == coming.value.suggested_filename
         session.picture_file = "nowhere/view.png"
-        for title in (
-            "Surface",
-            "Profile",
-            "Head",
-        ):  # closed, else the button would be below the window's edge
+        sections = ("Surface", "Profile", "Head")
+        for title in sections:  # closed, else the button would be below the window's edge
             page.mouse.click(*session.positions[title])
         assert wait(page, lambda: session.positions.get("screenshot", (0, 500))[1] < 450)
         with page.expect_download() as coming:
@@ -42,6 +39,9 @@ def test_scene_and_screenshot_are_downloads_and_nothing_is_left_on_the_server(
         assert coming.value.suggested_filename == "view.png"
         picture = Image.open(io.BytesIO(Path(coming.value.path()).read_bytes()))
         assert picture.size == session.view_size == (200, 480)
+        for title in sections[::-1]:
+            page.mouse.click(*session.positions[title])
+            page.wait_for_timeout(300)
     assert [path.name for path in tmp_path.iterdir()] == ["got.toml"]
 
 

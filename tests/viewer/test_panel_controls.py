@@ -21,7 +21,7 @@ from dermis.viewer.panel.sections import SECTIONS
 from dermis.viewer.state import ViewerState, same
 
 BUTTONS = {"undo", "redo", "help", "hide", "save", "load", "screenshot", "reset", "freeze"}
-BUTTONS |= {"open", "search", "bones", "size"}
+BUTTONS |= {"open", "search", "bones", "size", "head", "seed", "dice", "path", "open file"}
 CAMERAS = {f"{name}##camera" for name in ("portrait", "three-quarter", "profile", "ear", "cheek")}
 NO_STATE = BUTTONS | CAMERAS | {section.title for section in SECTIONS} | {"regions"}
 STARTS: dict[str, Callable[[ViewerState], ViewerState]] = {
