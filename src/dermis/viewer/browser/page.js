@@ -15,25 +15,6 @@ const OUR_KEYS_WITH_CONTROL = ['z', 'y', 's']
 window.BaseRenderView.prototype.setThrottle = function (throttle) {
   this._moveThrottle = 0
   this._wheelThrottle = throttle
-  const send = this.onEvent
-  this.onEvent = (event) => send.call(this, placed(event))
-}
-
-// Where the last pointer was: one that the browser takes away is let go at 0, 0 otherwise.
-let last = { x: 0, y: 0 }
-let cancelled = false
-
-function placed (event) {
-  return event.type === 'pointer_up' && cancelled ? { ...event, ...last } : event
-}
-
-function locate (event) {
-  cancelled = event.type === 'pointercancel'
-  if (!cancelled) { last = { x: event.clientX, y: event.clientY } }
-}
-
-for (const type of ['pointerdown', 'pointermove', 'pointercancel']) {
-  window.addEventListener(type, locate, { capture: true })
 }
 
 const notice = document.getElementById('notice')

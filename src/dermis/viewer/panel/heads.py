@@ -19,9 +19,9 @@ def draw_head(session: Session) -> None:
     """Which head is shown, a person drawn by a number, and a file."""
     _choice(session)
     seed = _seed_of(session)
-    told, number = imgui.input_int("person###seed", seed)
+    told, number = imgui.input_int("person###seed", seed, flags=_ENTERED)
     record_position(session, "seed")
-    explain("A person by a number: the same one each time.")
+    explain("A person by a number, the same one each time; Enter draws it.")
     if told:
         session.heads.open(f"{HUMAN}:{max(0, number)}")
     imgui.same_line()
