@@ -24,7 +24,7 @@ from dermis.viewer.windows import view
 pytest.importorskip("anywidget", reason="the extra `notebook` is not installed")
 pytest.importorskip("imgui_bundle", reason="the extra `viewer` is not installed")
 
-SIZE = (320, 200)
+SIZE = (480, 200)
 
 
 class Page:
@@ -65,13 +65,13 @@ def test_the_widget_shows_the_head_and_a_drag_turns_it(state: ViewerState) -> No
         page = Page(widget)
         page.open()
         before = await page.still()
-        assert before.shape == (*SIZE[::-1], 3) and before[80:120, 225:255].mean() > 20.0
+        assert before.shape == (*SIZE[::-1], 3) and before[80:120, 345:375].mean() > 20.0
         button = {"button": 1, "buttons": [1], "modifiers": []}
-        page.tell("pointer_down", x=240.0, y=100.0, **button)
-        page.tell("pointer_move", x=200.0, y=100.0, **button)
-        page.tell("pointer_up", x=200.0, y=100.0, **button)
+        page.tell("pointer_down", x=360.0, y=100.0, **button)
+        page.tell("pointer_move", x=320.0, y=100.0, **button)
+        page.tell("pointer_up", x=320.0, y=100.0, **button)
         after = await page.still()
-        assert np.abs(after[:150, 165:] - before[:150, 165:]).mean() > 0.5
+        assert np.abs(after[:150, 245:] - before[:150, 245:]).mean() > 0.5
 
     asyncio.run(visit())
 

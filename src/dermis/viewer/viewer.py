@@ -63,7 +63,7 @@ class Viewer:
         self._refused: ViewerState | None = None
         self._failures = self._panel_frames = 0
         self.failure: Exception | None = None
-        self._on_panel = False
+        self._on_panel, self._pressed_left = False, 0.0
         self._open()
         canvas.add_event_handler(self._on_event, *_POINTER, *_KEYS)
         canvas.request_draw(self.draw)
@@ -172,10 +172,13 @@ class Viewer:
         self.canvas.request_draw()
 
     def _on_picture(self, event: dict[str, Any]) -> None:
-        """Handle an event over the picture, which begins where the panel ends."""
+        """Handle an event over the picture, which begins where the panel ends, or ended when it was pressed."""
         width, height = self.canvas.get_logical_size()
         left = self.panel.width((width, height))
-        moved, size = shifted(event, left), (max(1.0, width - left), height)
+        if event["event_type"] == "pointer_down":
+            self._pressed_left = left
+        start = self._pressed_left if event["event_type"] in ("pointer_move", "pointer_up") else left
+        moved, size = shifted(event, start), (max(1.0, width - left), height)
         if not self.session.split.handle(moved, size[0]):
             self.session.controls.handle(moved, size)
 

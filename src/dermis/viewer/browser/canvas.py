@@ -32,6 +32,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         self._encoding = 0  # lossy frames being encoded
         self._drawn = self._sent = 0  # numbers of the last frame drawn and of the last one sent
         self._lossless = 0  # number of the current lossless frame, 0 when a newer frame has replaced it
+        self._ticket_holder = 0
         self.ticket = ""  # of the page that has control, for files that it sends
         self.on_file: Callable[[Path], None] = lambda path: None
         super().__init__(**given)
@@ -42,8 +43,9 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
 
     def _update_active_states(self) -> None:
         super()._update_active_states()
-        self.ticket = secrets.token_urlsafe(_TICKET_BYTES)
-        asgi.send_to({"type": "ticket", "value": self.ticket}, [], self._active_client)
+        if self._active_client != self._ticket_holder:
+            self.ticket, self._ticket_holder = secrets.token_urlsafe(_TICKET_BYTES), self._active_client
+            asgi.send_to({"type": "ticket", "value": self.ticket}, [], self._active_client)
 
     def offer(self, name: str, data: bytes) -> None:
         """Send a file to the page that has control, which offers it as a download."""
