@@ -39,5 +39,9 @@ def served(state: ViewerState, size: tuple[int, int] = (400, 300)) -> Iterator[A
             assert thread.is_alive()
             time.sleep(0.05)
         yield made[0]
+        end = time.monotonic() + 5.0
+        while made[0].canvas._frame_info_per_client and time.monotonic() < end:
+            time.sleep(0.05)
+        time.sleep(0.2)  # what is on its way to pages that left
         made[1].should_exit = True
         thread.join(20.0)

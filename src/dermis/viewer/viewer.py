@@ -172,7 +172,7 @@ class Viewer:
         self.canvas.request_draw()
 
     def _on_picture(self, event: dict[str, Any]) -> None:
-        """Handle an event over the picture, which begins where the panel ends, or ended when it was pressed."""
+        """Handle an event over the picture, which begins where the panel ended at the press."""
         width, height = self.canvas.get_logical_size()
         left = self.panel.width((width, height))
         if event["event_type"] == "pointer_down":
