@@ -13,7 +13,7 @@ from viewer_page import resident_mb
 
 from dermis.gpu.memory import held_bytes
 from dermis.scene.environment import Environment
-from dermis.scene.files import light_presets
+from dermis.scene.lights import light_presets
 from dermis.viewer.controls import CAMERAS
 from dermis.viewer.navigation import dolly, drag_light, orbit, pan
 from dermis.viewer.state import ViewerState

@@ -25,3 +25,4 @@ html_theme_options: dict[str, Any] = {"source_repository": ""}
 html_show_sphinx = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
+autodoc_type_aliases = {name: name for name in ("ArrayLike", "Floats", "Doubles", "Mapping")}

@@ -12,7 +12,8 @@ from dermis.cli.options import is_option, option_name
 from dermis.cli.scene_options import AROUND, HEAD
 from dermis.gallery.script import Script, find_scripts
 from dermis.scene import Camera, Environment, Settings, Skin
-from dermis.scene.head_table import HeadTable
+from dermis.scene.head_table import EyeTable, HeadTable
+from dermis.scene.lights import LIGHTS
 from dermis.scene.plain import Plain, help_of, shown, values_of
 from dermis.scene.pose_table import PoseTable
 from dermis.scene.skin import Pigments, TissueLayer
@@ -20,10 +21,12 @@ from dermis.scene.skin import Pigments, TissueLayer
 HERE = Path(__file__).parent
 TABLES: dict[str, tuple[type[Plain], dict[str, str] | None]] = {
     "[head]": (HeadTable, {"name": ""} | HEAD),
+    "[head.eye]": (EyeTable, None),
     "[pose]": (PoseTable, None),
     "[skin]": (Skin, {}),
     "[skin.pigments]": (Pigments, None),
     "[[skin.layers]]": (TissueLayer, None),
+    **{f"[[lights]], {name}": (kind, None) for name, kind in LIGHTS.items()},
     "[environment]": (Environment, AROUND),
     "[camera]": (Camera, None),
     "[render]": (Settings, {}),
@@ -37,6 +40,7 @@ def setup(app: Any) -> dict[str, bool]:
     """Sphinx calls this."""
     app.connect("builder-inited", lambda app: write_pages(HERE / "generated"))
     app.connect("autodoc-process-docstring", _as_fields)
+    app.connect("autodoc-process-signature", _signature)
     return {"parallel_read_safe": True}
 
 
@@ -75,12 +79,16 @@ def table_of(model: type[Plain], names: dict[str, str] | None) -> str:
 
     names : options by field where they are called otherwise; None for a model without options
     """
-    rows = ["| key | option | values | default | meaning |", "|---|---|---|---|---|"]
+    columns = ["key", *(["option"] if names is not None else []), "values", "default", "meaning"]
+    rows = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
     for field, info in model.model_fields.items():
-        known = names is not None and names.get(field) != "" and is_option(model, field)
-        option = f"`{option_name(field, names)}`" if known else ""
-        values, default = values_of(model, field), shown(info.get_default())
-        rows.append(f"| `{field}` | {option} | {values} | {default} | {help_of(model, field)} |")
+        cells = [f"`{field}`"]
+        if names is not None:
+            known = names.get(field) != "" and is_option(model, field)
+            cells.append(f"`{option_name(field, names)}`" if known else "")
+        default = "needed" if info.is_required() else shown(info.get_default())
+        cells += [values_of(model, field), default, help_of(model, field)]
+        rows.append(f"| {' | '.join(cells)} |")
     return "\n".join([*rows, ""])
 
 
@@ -91,16 +99,32 @@ def reference() -> str:
         thing = getattr(dermis, name)
         kind = "autofunction" if not isinstance(thing, type) else "autoclass"
         kind = "autoexception" if isinstance(thing, type) and issubclass(thing, Exception) else kind
-        members = "\n:members:" if kind == "autoclass" and name in ("Renderer", "Tissue") else ""
-        home = f"dermis.{dermis._HOME[name]}.{name}"
-        entry = f"## {name}\n\n```{{eval-rst}}\n.. {kind}:: {home}{_indented(members)}\n```\n"
+        members = ", ".join(_methods(thing)) if kind == "autoclass" else ""
+        listed = f"\n   :members: {members}" if members else ""
+        entry = f"## {name}\n\n```{{eval-rst}}\n.. {kind}:: dermis.{name}{listed}\n```\n"
         told = isinstance(thing, type) and issubclass(thing, Plain)
         entries.append(f"{entry}\n{table_of(thing, None)}" if told else entry)
-    return "# Reference\n\nAll of these are names of `dermis`.\n\n" + "\n".join(entries)
+    intro = "All of these are names of `dermis`. Lights, cameras, skins, environments and settings do not "
+    intro += "change: `replace(...)` of each gives a checked copy with other values."
+    return f"# Reference\n\n{intro}\n\n" + "\n".join(entries)
 
 
-def _indented(text: str) -> str:
-    return text.replace("\n", "\n   ")
+def _methods(kind: type) -> list[str]:
+    """What a class offers besides its values."""
+    fields = getattr(kind, "model_fields", getattr(kind, "__dataclass_fields__", {}))
+    return [
+        name
+        for name, thing in vars(kind).items()
+        if not name.startswith(("_", "model_")) and name not in fields and name != "meant" and _told(thing)
+    ]
+
+
+def _told(thing: Any) -> bool:
+    """Whether it is a method or a property with a docstring."""
+    thing = getattr(thing, "__func__", thing)
+    return bool(callable(thing) or hasattr(thing, "func") or isinstance(thing, property)) and bool(
+        thing.__doc__
+    )
 
 
 def bibliography() -> str:
@@ -113,7 +137,40 @@ def bibliography() -> str:
 
 def _as_fields(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
     """Lines "name : meaning" of the house's docstrings as Sphinx's fields, and keys as links."""
-    for number, line in enumerate(lines):
+    made: list[str] = []
+    entry: list[str] = []  # of the fields of a line, with what goes on below it
+    for line in [*lines, ""]:
         found = _FIELD.match(line)
-        said = f":param {found['names']}: {found['meaning']}" if found else line
-        lines[number] = _KEY.sub(lambda key: f":ref:`{key[1]} <{key[1].lower()}>`", said)
+        if entry and (found or not line.startswith(" ")):
+            made += _fields_of(entry)
+            entry = []
+        if found or entry:
+            entry.append(line)
+        else:
+            made.append(line)
+    lines[:] = [_KEY.sub(lambda key: f":ref:`{key[1]} <{key[1].lower()}>`", line) for line in made]
+
+
+def _fields_of(entry: list[str]) -> list[str]:
+    """The fields of "position, target : meaning", one for each name."""
+    found = _FIELD.match(entry[0])
+    assert found is not None
+    made: list[str] = []
+    for name in found["names"].split(", "):
+        kind = "raises" if name.endswith("Error") else "param"
+        made += [f":{kind} {name}: {found['meaning']}", *entry[1:]]
+    return made
+
+
+def _signature(
+    app: Any, what: str, name: str, thing: Any, options: Any, signature: str | None, returned: str | None
+) -> tuple[str | None, str | None]:
+    """The fields of plain data, where Sphinx would show what pydantic makes of them."""
+    if what != "class" or not issubclass(thing, Plain):
+        return signature and signature.replace("<factory>", "..."), returned
+    fields = sorted(thing.model_fields.items(), key=lambda field: not field[1].is_required())
+    told = (
+        name if info.is_required() else f"{name}={info.get_default(call_default_factory=True)!r}"
+        for name, info in fields
+    )
+    return f"({', '.join(told)})", ""

@@ -12,15 +12,17 @@ Columns: 3
 import dermis
 from dermis.gallery.picture import main
 
+SEEN = {"background": "environment", "background_blur": 0.05}
+
 
 def draw(studio):
     head = studio.head()
     panels = {}
     for name in ("royal_esplanade", "lebombo"):
         for turn in (0, 120, 240):
-            around = dermis.Environment(name=name, rotation_degrees=turn, visible=True)
+            around = dermis.Environment(name=name, rotation_degrees=turn)
             scene = dermis.Scene(head, camera=dermis.three_quarter(head), environment=around)
-            panels[f"{name}, {turn}°"] = studio.render(scene, tone="filmic")
+            panels[f"{name}, {turn}°"] = studio.render(scene, tone="filmic", **SEEN)
     return panels
 
 

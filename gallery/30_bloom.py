@@ -19,7 +19,8 @@ def draw(studio):
         head, lights=lights, camera=dermis.three_quarter(head), skin=dermis.Skin(oiliness=0.4)
     )
     shares = {"without": 0.0, "a tenth of the light": 0.1}
-    return {label: studio.render(scene, 1.4, bloom=share, tone="filmic") for label, share in shares.items()}
+    shown = {"exposure": 2.4, "tone": "filmic"}
+    return {label: studio.render(scene, 1.4, bloom=share, **shown) for label, share in shares.items()}
 
 
 if __name__ == "__main__":

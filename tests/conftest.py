@@ -23,6 +23,7 @@ _UNSET = "DERMIS_DATA is not set"
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "samples: needs the sample data that DERMIS_DATA names")
+    config.addinivalue_line("markers", "photographed: commands expose and choose backgrounds by themselves")
     if os.environ.get("DERMIS_DATA"):  # a relative path must survive a test that changes folder
         os.environ["DERMIS_DATA"] = str(Path(os.environ["DERMIS_DATA"]).expanduser().resolve())
 

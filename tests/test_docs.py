@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,15 @@ def test_pages_build(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", str(DOCS), str(tmp_path)]
     built = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert built.returncode == 0, built.stderr
+    reference = (tmp_path / "generated" / "reference.html").read_text("utf-8")
+    text = re.sub(r"<[^>]+>", "", reference)
+    for dump in ("_Buffer", "FieldInfo", "pydantic", "factory", "**data"):
+        assert dump not in text
+    assert "dermis.Camera(position, target=(0.0, 0.0, 0.0), up=" in " ".join(text.split())
+    assert "from_opencv" in text and "irradiance" in text.partition("dermis.SpotLight")[2][:3000]  # inherited
+    named = re.findall(r"<strong>(\w+)</strong>", reference)
+    assert {"african", "asian", "caucasian", "weights", "bones"} <= set(named)  # each of a shared line
+    assert "math notranslate" in (tmp_path / "profiles.html").read_text("utf-8")
     assert "The whole technique in studio light" in (tmp_path / "generated" / "gallery.html").read_text(
         "utf-8"
     )

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import inspect
 import pydoc
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +15,7 @@ from small_head import write_head
 
 import dermis
 from dermis.gpu.device import Device
+from dermis.images.io import read_image
 
 
 def test_names_are_listed_in_order_and_each_has_a_home() -> None:
@@ -34,6 +38,11 @@ def test_each_name_resolves_and_is_explained(name: str) -> None:
 def test_unknown_names_are_attribute_errors(name: str) -> None:
     with pytest.raises(AttributeError, match=f"module 'dermis' has no attribute '{name}'"):
         getattr(dermis, name)
+
+
+def test_all_names_are_listed_before_they_are_used() -> None:
+    code = "import dermis; assert set(dermis.__all__) <= set(dir(dermis)); assert '_HOME' not in dir(dermis)"
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_import_by_star_gives_what_is_promised() -> None:
@@ -68,6 +77,53 @@ def test_a_renderer_is_kept_for_many_frames(
     again = renderer.render(front, size=(32, 32), atlas=64)
     assert not np.array_equal(first, other)
     np.testing.assert_array_equal(first, again)
+
+
+def test_a_head_alone_is_drawn_as_its_portrait(
+    tmp_path: Path, device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dermis.frame.renderer.open_device", lambda adapter: device)
+    head = dermis.load_head(write_head(tmp_path / "head.obj"))
+    whole = dermis.render(dermis.Scene(head), size=32, atlas=64)
+    np.testing.assert_array_equal(dermis.render(head, size=32, atlas=64), whole)
+    for wrong, said in ((None, "None came"), ((dermis.Scene(head), 1), "came"), ("s.toml", "load_scene")):
+        with pytest.raises(dermis.DermisError, match=f"^scene: expected a head to show, .*{said}"):
+            dermis.render(wrong)  # type: ignore[arg-type]
+    with pytest.raises(dermis.DermisError, match=r"^adapter: .*a Settings came\. .*draw\(scene, settings\)"):
+        dermis.render(head, dermis.Settings())  # type: ignore[arg-type]
+
+
+def test_a_picture_is_written_by_what_it_is(tmp_path: Path) -> None:
+    levels = np.arange(48, dtype=np.uint8).reshape(4, 4, 3)
+    dermis.write_image(tmp_path / "a.png", levels)
+    np.testing.assert_array_equal(read_image(tmp_path / "a.png"), levels)
+    linear = np.full((4, 4, 3), 0.5)
+    dermis.write_image(tmp_path / "b.png", linear.tolist())  # type: ignore[arg-type]
+    assert read_image(tmp_path / "b.png").max() == 188
+    for path, picture in ((tmp_path / "a.exr", levels), (linear, "a.png"), (tmp_path / "a.png", np.ones(3))):
+        with pytest.raises(dermis.DermisError, match=r"expected .* but .*\."):
+            dermis.write_image(path, picture)  # type: ignore[arg-type]
+    assert not (tmp_path / "a.exr").exists()
+
+
+@pytest.mark.parametrize(
+    ("slip", "said"),
+    [
+        (lambda path: dermis.load_head(path, unit_mm="cm"), r"unit_mm: .*'cm' came\. Write unit_mm=10\."),
+        (lambda path: dermis.load_head(path, unit_mm="ell"), "unit_mm: .*'ell' came"),
+        (lambda path: dermis.load_head(path, subdivide=1.0), "subdivide: .*1.0 came"),
+        (lambda path: dermis.load_head(path, colour=np.ones((8, 8, 3))), "colour: .*a ndarray came"),
+        (lambda path: dermis.load_head(dermis.load_head(path)), "load_head: .*a Head came"),
+        (lambda path: dermis.load_head(path, opaque="eyes"), "'eyes' is none"),
+        (lambda path: dermis.load_lights(None), "file: .*a NoneType came"),
+        (lambda path: dermis.load_scene(None), "file: .*a NoneType came"),
+        (lambda path: dermis.Human(sex="male"), "sex: expected a number from 0 to 1, but 'male' came"),
+        (lambda path: dermis.Human(targets=["nose"]), "targets: expected weights of targets by name"),
+    ],
+)
+def test_slips_get_a_sentence(slip: Callable[[Path], object], said: str, tmp_path: Path) -> None:
+    with pytest.raises(dermis.DermisError, match=said):
+        slip(write_head(tmp_path / "head.obj"))
 
 
 @pytest.mark.parametrize("name", ["bust", "bust_many_charts"])

@@ -23,6 +23,9 @@ QUADRATURE = 0.001
 FURNACE = 0.01
 """White skin under light from everywhere alike against 1: what the tables of albedo cost."""
 
+FURNACE_OF_HAIR = 1.02
+"""Greatest radiance of hair under light of 1 from everywhere alike."""
+
 TABLE_ALBEDO = 0.005
 """The shader's 64 x 32 table of the surface albedo, read between its texels, relative."""
 

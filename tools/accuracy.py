@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import accuracy_highlight as highlight
 import accuracy_light as light
 import accuracy_optics as optics
 import accuracy_specular as specular
@@ -13,7 +14,7 @@ import accuracy_thin as thin
 import numpy as np
 
 from dermis.atlas.build import build_atlas
-from dermis.gpu import Device, download, open_device
+from dermis.gpu import Device, open_device
 from dermis.gpu.probe import half_store_rounding
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.mesh import Mesh
@@ -28,7 +29,7 @@ SIZE = 256
 def spread(device: Device, mesh: Mesh, light: np.ndarray, stretch: str = "full") -> list[np.ndarray]:
     """The blurred levels of light (n, n) on a mesh's atlas."""
     levels, blur = surface.spread(device, mesh, build_atlas(mesh, len(light)), light[..., None], stretch)
-    return [download(device, levels.stack, layer=k + 1)[..., 0] for k in range(len(blur.variance_mm2))]
+    return [surface.level(device, levels, blur, k + 1) for k in range(len(blur.variance_mm2))]
 
 
 def point_of_light(device: Device, texels_per_mm: float) -> str:
@@ -90,6 +91,8 @@ def main() -> None:
             leaning=leaning,
             constant=f"{constant_light(device):.1e}",
             rounding=half_store_rounding(device),
+            highlights=highlight.table(),
+            highlight_paths=highlight.PATHS,
             **specular.tables(),
             **light.tables(*sys.argv[1:2]),
             **optics.tables(),

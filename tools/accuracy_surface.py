@@ -74,8 +74,8 @@ def spread(
     most = len(textures.sheets("repeated")) - 1
     halvings = halvings_of(variance, textures.usual_per_mm, most)
     blur = Blur(variance, PROFILE.weight[1:], halvings)
-    levels = make_levels(device, len(light), len(variance), usual_texel(device))
-    upload(device, levels.stack, np.dstack([light, light, light, np.ones_like(light)]))
+    levels = make_levels(device, len(light), (halvings,), usual_texel(device))
+    upload(device, levels.stacks[0], np.dstack([light, light, light, np.ones_like(light)]))
     frame = Frame(device)
     head = Head("", mesh, Maps())
     shape = rest_shape(device, shape_tables(device, head), head.positions_mm)
@@ -85,14 +85,20 @@ def spread(
     return levels, blur
 
 
-def widest(renderer: Renderer, levels: Levels, blur: Blur) -> np.ndarray:
-    """(n, n, 1) the widest level, read between the texels of its own resolution."""
+def level(device: Device, levels: Levels, blur: Blur, k: int) -> np.ndarray:
+    """(n, n) level k, read between the texels of its own resolution."""
     from scipy.ndimage import zoom
 
-    halvings = blur.halvings[-1]
-    layer = download(renderer.device, levels.stack, mip=halvings, layer=len(blur.halvings) - 1)[..., 0]
-    wide: np.ndarray = zoom(layer, 2**halvings, order=1, mode="nearest", grid_mode=True)
-    return wide[..., None]
+    halvings = blur.halvings[k]
+    layer = download(device, levels.stacks[halvings], layer=k - levels.first[halvings])[..., 0]
+    return (
+        np.asarray(zoom(layer, 2**halvings, order=1, mode="nearest", grid_mode=True)) if halvings else layer
+    )
+
+
+def widest(renderer: Renderer, levels: Levels, blur: Blur) -> np.ndarray:
+    """(n, n, 1) the widest level."""
+    return level(renderer.device, levels, blur, len(blur.halvings) - 1)[..., None]
 
 
 def seams(renderer: Renderer) -> list[str]:
@@ -103,6 +109,7 @@ def seams(renderer: Renderer) -> list[str]:
     rows += row(renderer, "human, neck and back of the head", own, HEAD_SIDE, seen)
     rows += row(renderer, "human, eye sockets and inside of the mouth", own, HEAD_SIDE, hidden)
     human = dermis.load_head(Path(os.environ["DERMIS_DATA"]) / HUMAN, unit_mm=100)
+    human = replace(human, maps=Maps())
     rows += row(renderer, "MakeHuman, neck", human, HEAD_SIDE, at_neck)
     return rows + row(renderer, "MakeHuman, back of the head", human, HEAD_SIDE, behind)
 

@@ -126,3 +126,8 @@ def __getattr__(name: str) -> Any:
     value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
     globals()[name] = value
     return value
+
+
+def __dir__() -> list[str]:
+    """The public names, whether they were used before or not."""
+    return [*__all__, *(name for name in globals() if name.startswith("__"))]

@@ -54,7 +54,19 @@ def cached_arrays(
 ) -> Arrays:
     """The arrays `names` that `make` returns for others, kept on disk in the same way."""
     sources = [sources] if isinstance(sources, np.ndarray) else sources
-    return stored("arrays", _array_key(sources, form), names, make)
+    return stored("arrays", array_key(sources, form), names, make)
+
+
+def array_key(sources: Sequence[Array], form: str) -> str:
+    """The key of what follows from these arrays.
+
+    form : all that it depends on besides their content
+    """
+    digest = hashlib.sha256(form.encode())
+    for source in sources:
+        digest.update(f" {source.shape} {source.dtype}".encode())
+        digest.update(np.ascontiguousarray(source).data)
+    return digest.hexdigest()[:40]
 
 
 def stored(folder: str, key: str, names: list[str], make: Callable[[], Arrays]) -> Arrays:
@@ -115,14 +127,6 @@ def stored_file(folder: str, name: str, make: Callable[[], bytes]) -> Path:
         with _whole(target) as unfinished:
             unfinished.write_bytes(content)
     return path
-
-
-def _array_key(sources: Sequence[Array], form: str) -> str:
-    digest = hashlib.sha256(form.encode())
-    for source in sources:
-        digest.update(f" {source.shape} {source.dtype}".encode())
-        digest.update(np.ascontiguousarray(source).data)
-    return digest.hexdigest()[:40]
 
 
 def _has_room(folder: Path, size: int) -> bool:

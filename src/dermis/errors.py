@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import NoReturn
 
 
@@ -10,6 +11,15 @@ class DermisError(Exception):
 
     The command line prints it without a traceback and exits with 2.
     """
+
+
+class DermisWarning(UserWarning):
+    """The picture may not be what was meant: the message says why and what to do."""
+
+
+def notify(message: str) -> None:
+    """Warn with a `DermisWarning`; the command line prints it as a note."""
+    warnings.warn(message, DermisWarning, stacklevel=3)
 
 
 def refuse(culprit: object, expected: str, came: str, remedy: str) -> NoReturn:

@@ -87,7 +87,7 @@ def test_the_floor_by_hand(renderer: Renderer, head_file: str, tmp_path: Path) -
     assert found["visibility"] == moved.seen * 2 * 4 + geometry
     assert found["post"] == 48 * 32 * (16 + 16 + 4)
     # the narrower of the two is lit again, not blurred; the other one's blur knows stretch and reach by texel
-    light = texel_bytes(moved.inputs.resources.levels.stack)
+    light = texel_bytes(moved.inputs.resources.levels.stacks[0])
     gutter = moved.inputs.layouts[0].atlas.gutter.size // 16
     assert gutter > 0
     assert found["irradiance"] == moved.texels * (32 + 4 + light)
@@ -114,7 +114,9 @@ def test_the_floor_of_thin_parts_is_their_buffers(renderer: Renderer, tmp_path: 
     assert len(words) == 2 * thin.pairs.count and words[::2].max() == sources - 1
     lists = 8 * thin.pairs.count + 4 * sources + 12 * receivers
     light = min(4 * sources, (levels.size >> moved.inputs.blurs[0].halvings[1 + thin.layer]) ** 2)
-    assert stage_bytes(moved)["translucency"] == lists + light * texel_bytes(levels.stack) + 16 * receivers
+    assert (
+        stage_bytes(moved)["translucency"] == lists + light * texel_bytes(levels.stacks[0]) + 16 * receivers
+    )
 
 
 def test_a_row_is_complete(row: Row) -> None:

@@ -44,6 +44,13 @@ def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> R
     return call
 
 
+@pytest.fixture(autouse=True)
+def plainly_exposed(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures are radiance over black, which tests can reckon with; marked `photographed` they are not."""
+    if not request.node.get_closest_marker("photographed"):
+        monkeypatch.setattr("dermis.cli.scene_options.PHOTOGRAPHED", {"background": (0.0, 0.0, 0.0)})
+
+
 @pytest.fixture
 def opened(monkeypatch: pytest.MonkeyPatch, device: object) -> None:
     """Commands use the session's device instead of opening one each."""
@@ -72,7 +79,6 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / name).write_text(text)
     rng = np.random.default_rng(1)
     colours = rng.integers(0, 255, (64, 64, 3), dtype=np.uint8)
-    write_png(folder / "tiny.png", colours[:8, :8])
     write_png(folder / "grey.png", colours[..., 0])
     write_png(folder / "red.png", colours * np.uint8([1, 0, 0]))
     write_exr(folder / "bright.exr", np.full((32, 32, 3), 9.0))

@@ -47,7 +47,6 @@ MAPS = {
     "not a picture": Bad("head.obj --colour text.obj", "text.obj", "first bytes"),
     "truncated JPEG": Bad("head.obj --colour short.jpg", "short.jpg", "cannot be decoded"),
     "truncated PNG": Bad("head.obj --specular-map short.png", "short.png", "cannot be decoded"),
-    "too few texels": Bad("head.obj --colour tiny.png", "tiny.png", "8 x 8"),
     "bit depth": Bad("head.obj --height deep.tif --height-mm 0.02", "deep.tif", "kind I"),
     "a float out of range": Bad("head.obj --colour bright.exr", "bright.exr", "to 9"),
     "grey for colour": Bad("head.obj --colour grey.png", "grey.png", "grey"),

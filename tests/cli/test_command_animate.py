@@ -229,3 +229,17 @@ def test_a_missing_encoder_is_told_before_the_head_is_loaded(
 
 def test_the_writer_is_public() -> None:
     assert dermis.MovieWriter.__name__ == "MovieWriter"
+
+
+@pytest.mark.photographed
+def test_one_exposure_for_all_frames_is_metered_at_the_first(animate: Run, run: Run) -> None:
+    """Whichever frames are drawn; and pictures over nothing have alpha."""
+    words = ("face.glb", "-o", "f/%d.png", "--fps", "10", "--background", "none")
+    ended = animate(*words)
+    assert ended.code == 0 and ended.stderr.startswith("note: --exposure ")
+    assert ended.stderr.endswith(", metered at the first frame\n")
+    whole = {path.name: path.read_bytes() for path in Path("f").glob("*.png")}
+    assert len(whole) == 4 and read_image("f/3.png").shape[2] == 4
+    Path("f/3.png").unlink()
+    assert animate(*words).stderr == ended.stderr
+    assert {path.name: path.read_bytes() for path in Path("f").glob("*.png")} == whole

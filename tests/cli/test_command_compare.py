@@ -115,7 +115,7 @@ def test_surface_options_of_render_reach_the_picture(render: Run) -> None:
         ("--oiliness", "1"),
     ):
         assert not np.array_equal(picture(*words), plain), words
-    np.testing.assert_array_equal(picture("--specular", "kelemen", "--energy", "full"), plain)
+    np.testing.assert_array_equal(picture("--specular", "two-lobe", "--energy", "full"), plain)
     Path("s.toml").write_text('[head]\nname = "head.obj"\n[skin]\nspecular = "phong"\nrho_s = 1\n')
     from_file = render("s.toml", "-o", "b.exr")
     assert from_file.code == 0

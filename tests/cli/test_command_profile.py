@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 
 from dermis.images.io import read_image
+from dermis.optics.pigments.spectra import rgb_weights
 from dermis.optics.profiles import load_profile
 
 Run = Callable[..., Any]
 KEYS = {
     "name", "model", "eta", "layers", "thickness_mm", "mean_free_path_mm", "per", "radius_mm",
-    "reflectance_per_mm2", "total", "gaussians", "warnings", "notes", "sources",
+    "absorption_per_mm", "scattering_per_mm", "model_error", "reflectance_per_mm2", "total",
+    "gaussians", "warnings", "notes", "sources",
 }  # fmt: skip
 
 
@@ -55,6 +57,34 @@ def test_json_holds_the_profile_and_its_fit(told: Callable[..., dict[str, Any]])
     assert any("thinner" in text for text in report["warnings"])
     assert any("1/cm" in text for text in report["notes"])
     assert "DonnerJensen2005" in report["sources"]
+
+
+def test_a_skin_of_pigments_has_its_spectra(told: Callable[..., dict[str, Any]]) -> None:
+    ended = told("light")
+    wavelength, R = np.array(ended["wavelength_nm"]), np.array(ended["reflectance"])
+    assert wavelength.shape == R.shape == (31,) and wavelength[0] == 400
+    assert R.min() > 0.1 and R.max() < 0.75 and R[-1] > 1.3 * R[15]  # blood is red
+    np.testing.assert_allclose(rgb_weights(wavelength) @ R, ended["total"], rtol=1e-9)
+    a, s = np.array(ended["absorption_per_mm"]), np.array(ended["scattering_per_mm"])
+    assert a.shape == s.shape == (2, 31) and (np.diff(s) < 0).all()
+    np.testing.assert_allclose(1 / (a + s), ended["mean_free_path_mm"])
+    assert "reflectance" not in told("dj3")
+
+
+def test_the_models_own_error_stands_beside_that_of_the_fit(
+    told: Callable[..., dict[str, Any]], run: Run, tmp_path: Path
+) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "accuracy.md").read_text("utf-8")
+    row = page.partition("| **skin2** |")[2].partition("| | layered |")[2].split("|")[1]
+    own = told("skin2")["model_error"]
+    assert own["tissues"] == ["skin2"] and own["least"] == own["most"]
+    np.testing.assert_allclose(own["most"], [float(x) / 100 for x in row.split("%")[0].split()], atol=1e-9)
+    other = told("skin2", "--eta", 1.2)["model_error"]
+    assert len(other["tissues"]) == 6 and other["least"][0] <= own["most"][0] < other["most"][0]
+    assert "\nmodel  " in run("profile", "skin2").stdout
+    assert "model_error" not in told("skin2", "--model", "montecarlo", "--photons", 2000)
+    checked = told("skin2", "--plot", tmp_path / "a.svg", "--check", "--photons", 20000)["model_error"]
+    np.testing.assert_allclose(checked["most"], own["most"], rtol=0.35)  # few photons, another index
 
 
 @pytest.mark.parametrize("model", ["dipole", "better-dipole", "multipole", "layered", "layered-point"])
@@ -188,7 +218,7 @@ def test_lines_are_for_people(run: Run) -> None:
     [
         (["nothing"], "dj3"),
         (["nothing.toml"], "No such file"),
-        (["dj3", "--model", "dipole"], "one layer"),
+        (["dj3", "--model", "dipole"], "one semi-infinite layer"),
         (["dj3", "--model", "monopole"], "monopole"),
         (["dj3", "--fit", "0"], "1 to 8"),
         (["dj3", "--fit", "9"], "1 to 8"),

@@ -15,6 +15,7 @@ from dermis.images.io import read_image, write_png
 
 Run = Callable[..., Any]
 STAGES = {
+    "background",
     "shape",
     "stretch",
     "shadows",
@@ -29,7 +30,7 @@ STAGES = {
     "post",
     "total",
 }
-KEYS = ["image", "adapter", "size", "atlas", "gaussians", "gpu_ms", "frame_ms", "setup_ms"]
+KEYS = ["image", "adapter", "size", "atlas", "exposure", "gaussians", "gpu_ms", "frame_ms", "setup_ms"]
 SCENE = """
 lights = "studio"
 camera = "profile"
@@ -48,7 +49,7 @@ samples = 1
 
 
 def test_json_is_one_object_with_the_promised_keys(render: Run, device: Any) -> None:
-    ended = render("head.obj", "-o", "a.png", "--json")
+    ended = render("head.obj", "-o", "a.png", "--json", "--exposure", "0.5")
     assert (ended.code, ended.stderr) == (0, "")
     report = json.loads(ended.stdout)  # which refuses anything before or after the object
     assert list(report) == KEYS
@@ -80,7 +81,7 @@ def test_png_and_exr_show_the_same_picture(render: Run) -> None:
 
 
 def test_without_json_one_line_names_image_time_and_adapter(render: Run, device: Any) -> None:
-    ended = render("head.obj", "-o", "a.png")
+    ended = render("head.obj", "-o", "a.png", "--exposure", "0.5")
     assert ended.stderr == ""
     assert ended.stdout.startswith("a.png  ") and ended.stdout.count("\n") == 1
     assert " s on " in ended.stdout and device.adapter.name in ended.stdout

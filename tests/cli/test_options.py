@@ -17,12 +17,13 @@ from dermis.cli.options import check, options_of
 from dermis.cli.scene_options import AROUND, HEAD
 from dermis.errors import DermisError
 from dermis.scene import Camera, Environment, Settings, Skin, files
-from dermis.scene.head_table import HeadTable
+from dermis.scene.head_table import EyeTable, HeadTable
 from dermis.scene.plain import Plain, choices_of, help_of, range_of, slider
 from dermis.scene.skin import Pigments, TissueLayer
 
 ROOT = Path(__file__).resolve().parents[2]
-MODELS: tuple[type[Plain], ...] = (Skin, Pigments, TissueLayer, Settings, Environment, HeadTable, Camera)
+_OF_SKIN: tuple[type[Plain], ...] = (Skin, Pigments, TissueLayer)
+MODELS = (*_OF_SKIN, Settings, Environment, HeadTable, EyeTable, Camera)
 
 
 class WaxedSkin(Skin):

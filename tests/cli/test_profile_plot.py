@@ -31,6 +31,16 @@ def legend(figure: Figure) -> list[str]:
     return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
+def test_spectra_of_a_skin_of_pigments(drawn: Drawn) -> None:
+    figure = drawn("light", "--fit", 2)
+    _, spectrum, coefficients = figure.axes
+    assert [line.get_label() for line in spectrum.lines] == ["R"]
+    assert [line.get_label() for line in coefficients.lines] == [
+        "µa, epidermis", "µs′, epidermis", "µa, dermis", "µs′, dermis"
+    ]  # fmt: skip
+    assert len(drawn("skin1", "--fit", 2).axes) == 1
+
+
 def test_model_and_its_fit_in_each_colour(drawn: Drawn) -> None:
     figure = drawn("skin1", "--fit", 3, "--fit-kind", "burley")
     entries = legend(figure)

@@ -39,7 +39,7 @@ AnyLight = PointLight | SpotLight | DirectionalLight
 
 def entered_light(renderer: Renderer, inputs: Inputs) -> NDArray[np.float64]:
     """(n, n, 4) light that has entered the skin, and 1 where there is any; as halves on GPUs."""
-    made = download(renderer.device, inputs.resources.levels.stack).astype(float)
+    made = download(renderer.device, inputs.resources.levels.stacks[0]).astype(float)
     return made / [*(3 * [inputs.blurs[0].scale]), 1.0]
 
 

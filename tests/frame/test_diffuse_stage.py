@@ -31,14 +31,16 @@ def blur(
 ) -> list[Floats]:
     """Levels of 32-bit floats over an (n, n, 3) source, or (n, n, 4) with its coverage."""
     size = len(source)
-    space = make_levels(device, size, len(variances), FLOATS)
     most = len(atlas.sheets(edge.get("edge", "repeated"))) - 1
     halvings = halvings_of(variances, atlas.usual_per_mm, most)
-    upload(device, space.stack, np.dstack([source, np.ones((size, size))])[..., :4])
+    space = make_levels(device, size, (halvings,), FLOATS)
+    upload(device, space.stacks[0], np.dstack([source, np.ones((size, size))])[..., :4])
     frame = Frame(device)
     diffuse.draw(frame, space, atlas, Blur(variances, np.zeros((len(variances), 3)), halvings, **edge))
     frame.submit()
-    return [download(device, space.stack, layer=k + 1)[..., :3].astype(float) for k in range(len(variances))]
+    return [
+        download(device, space.stacks[0], layer=k + 1)[..., :3].astype(float) for k in range(len(variances))
+    ]
 
 
 def random_atlas(size: int, shear: float) -> Atlas:
@@ -86,10 +88,10 @@ def test_empty_texels_show_the_clear_colour(device: Device) -> None:
 
 def test_combined_twin(device: Device) -> None:
     rng = np.random.default_rng(4)
-    space = make_levels(device, 64, 5, FLOATS)
+    space = make_levels(device, 64, ((0,) * 6,), FLOATS)
     values = rng.random((5, 64, 64, 4)).astype(np.float32)
     for k, value in enumerate(values):
-        upload(device, space.stack, value, layer=k + 1)
+        upload(device, space.stacks[0], value, layer=k + 1)
     weight = rng.random((5, 3))
     into, frame = make_texture(device, (64, 64), "rgba32float"), Frame(device)
     combine.draw(frame, space, Blur(np.arange(1.0, 6.0), weight, (0,) * 6), into)

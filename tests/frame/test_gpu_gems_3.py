@@ -24,16 +24,16 @@ BLUR = Blur(VARIANCES, np.zeros((4, 3)), (0,) * 5)
 def levels(device: Device) -> list[np.ndarray]:
     """A lit texel spread over a plane."""
     atlas = build_atlas(plane(SIZE / TEXELS_PER_MM), SIZE)
-    space = TECHNIQUE.make_levels(device, SIZE, len(VARIANCES))
+    space = TECHNIQUE.make_levels(device, SIZE, (BLUR.halvings,))
     light = np.zeros((SIZE, SIZE, 4))
     light[..., 3] = 1.0
     light[SIZE // 2, SIZE // 2, :3] = 1000.0
-    upload(device, space.stack, light)
+    upload(device, space.stacks[0], light)
     frame = Frame(device)
     TECHNIQUE.fill(frame, space, resting(device, atlas), BLUR)
     frame.submit()
     return [
-        download(device, space.stack, layer=k + 1)[..., 0].astype(float) / 1000.0
+        download(device, space.stacks[0], layer=k + 1)[..., 0].astype(float) / 1000.0
         for k in range(len(VARIANCES))
     ]
 
@@ -61,11 +61,11 @@ def test_between_seven_taps_there_are_gaps(levels: list[np.ndarray]) -> None:
 
 def test_the_clear_colour_takes_no_light_away(device: Device) -> None:
     """Weights of 1.001 make no texel more than covered, which would take that colour's light off."""
-    space = TECHNIQUE.make_levels(device, SIZE, len(VARIANCES))
-    upload(device, space.stack, np.dstack([np.zeros((SIZE, SIZE, 3)), np.ones((SIZE, SIZE))]))
+    space = TECHNIQUE.make_levels(device, SIZE, (BLUR.halvings,))
+    upload(device, space.stacks[0], np.dstack([np.zeros((SIZE, SIZE, 3)), np.ones((SIZE, SIZE))]))
     frame = Frame(device)
     atlas = resting(device, build_atlas(plane(SIZE / TEXELS_PER_MM), SIZE))
     TECHNIQUE.fill(frame, space, atlas, replace(BLUR, edge="cleared", clear=(0.5, 0.35, 0.3)))
     frame.submit()
-    dark = download(device, space.stack, layer=len(VARIANCES))
+    dark = download(device, space.stacks[0], layer=len(VARIANCES))
     assert np.abs(dark[8:-8, 8:-8, :3]).max() == 0.0 and dark[8:-8, 8:-8, 3].max() == 1.0

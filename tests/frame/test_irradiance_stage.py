@@ -81,9 +81,12 @@ def test_specular_map_is_a_factor_with_mean_one(renderer: Renderer) -> None:
     assert np.abs(plain - even).max() < 1e-3 * plain.max()  # the factor is stored as a half
 
 
-def test_roughness_map_replaces_the_constant(renderer: Renderer) -> None:
-    mapped = scene_of(head_of(SPHERE, roughness=np.full((8, 8), 0.5)), LIGHTS["directional"], roughness=0.2)
-    plain = scene_of(PLAIN, LIGHTS["directional"], roughness=0.5)
+@pytest.mark.parametrize(("constant", "same"), [(0.3, 0.5), (0.15, 0.25)])
+def test_the_constant_scales_a_roughness_map(renderer: Renderer, constant: float, same: float) -> None:
+    """And the usual one leaves it as it is."""
+    rough = head_of(SPHERE, roughness=np.full((8, 8), 0.5))
+    mapped = scene_of(rough, LIGHTS["directional"], roughness=constant)
+    plain = scene_of(PLAIN, LIGHTS["directional"], roughness=same)
     assert np.abs(entered(renderer, mapped) - entered(renderer, plain)).max() < TWIN
 
 

@@ -17,7 +17,7 @@ from dermis.atlas.atlas import Atlas
 from dermis.atlas.build import build_atlas
 from dermis.frame.atlas_textures import AtlasTextures, _coarser, upload_atlas
 from dermis.frame.coarser import Sheet, halved
-from dermis.frame.levels import FLOATS, Blur, halvings_of, make_levels, scale_of
+from dermis.frame.levels import FLOATS, Blur, halvings_of, layers_of, make_levels, scale_of
 from dermis.frame.passes import combine, diffuse
 from dermis.gpu import Device, Frame, download, make_texture, upload
 from dermis.mesh.primitives import plane
@@ -73,9 +73,9 @@ def combined(
     """The sum of the blurred levels, and how often each was halved."""
     side, halvings = len(light), halvings_of(BLURRED, textures.usual_per_mm, len(textures.coarser))
     blur = Blur(BLURRED, WEIGHT, halvings, scale)
-    space = make_levels(device, side, len(BLURRED), texel)
+    space = make_levels(device, side, (halvings,), texel)
     into = make_texture(device, (side, side), FLOATS)
-    upload(device, space.stack, light * [scale, scale, scale, 1.0])
+    upload(device, space.stacks[0], light * [scale, scale, scale, 1.0])
     frame = Frame(device)
     diffuse.draw(frame, space, textures, blur)
     combine.draw(frame, space, blur, into)
@@ -115,19 +115,26 @@ def test_what_halving_adds_too_much_is_taken_off_the_next_level(device: Device) 
     textures = resting(device, atlas, coarser=coarser, usual_per_mm=2.0)
     variances = np.array([0.5, 0.9, 3.0])
     halvings = halvings_of(variances, 2.0, len(coarser))
-    space, light = make_levels(device, 256, 3, FLOATS), np.zeros((256, 256, 4))
+    space, light = make_levels(device, 256, (halvings,), FLOATS), np.zeros((256, 256, 4))
     light[..., 3], light[128, 128, :3] = 1.0, 1.0
-    upload(device, space.stack, light)
+    upload(device, space.stacks[0], light)
     frame = Frame(device)
     diffuse.draw(frame, space, textures, Blur(variances, np.zeros((3, 3)), halvings))
     frame.submit()
     assert halvings == (0, 0, 1, 1)
     for level, variance in ((2, 0.5 + 1.0), (3, 3.0)):
-        made = download(device, space.stack, layer=level, mip=1)[..., 0].astype(float)
+        made = download(device, space.stacks[1], layer=level - space.first[1])[..., 0].astype(float)
         x = 2 * np.arange(128) + 0.5 - 128  # from the lit texel [mm]
         middle = (made.sum(axis=0) @ x) / made.sum()
         wide = (made.sum(axis=0) @ (x - middle) ** 2) / made.sum()
         assert wide == pytest.approx(variance - 4 * 3 / 16, rel=0.01)  # what reading between texels will add
+
+
+def test_levels_are_held_at_their_own_resolution_alone() -> None:
+    """And the last finer one before them, halved; of two layouts what either needs."""
+    assert layers_of(((0,),)) == (range(1),)
+    assert layers_of(((0, 0, 0, 1, 1, 2),)) == (range(3), range(2, 5), range(4, 6))
+    assert layers_of(((0, 0, 0, 1, 1, 2), (0, 0, 1, 1, 1, 1))) == (range(3), range(1, 6), range(4, 6))
 
 
 @pytest.mark.parametrize("brightest", [1.0, 5e5, 3e-6, 1e9])

@@ -113,8 +113,9 @@ def bare(renderer: Renderer) -> Renderer:
 def test_bare_device_draws_the_same(renderer: Renderer, bare: Renderer, given: dict[str, Any]) -> None:
     head = Head("ball", uv_sphere(90.0, 24, 12), Maps())
     lights = [*load_lights("window"), *load_lights("rim"), *load_lights("laser")]
-    scene = Scene(head, lights=lights, environment=Environment(name="uniform", visible=True))
-    settings = settings_of(**({"seams": "stitch"} | given))
+    scene = Scene(head, lights=lights, environment=Environment(name="uniform"))
+    shown = {"background": "environment", "exposure": "auto"}
+    settings = settings_of(**({"seams": "stitch"} | shown | given))
     usual, plain = (one.draw(scene, settings).linear() for one in (renderer, bare))
     assert np.array_equal(usual, plain) and usual.max() > 0
 

@@ -49,16 +49,17 @@ def spread(device: Device, head: Head, atlas: Atlas, motion: MotionBytes, light:
     made, textures = make_shape(device, shape_tables(device, head)), upload_atlas(device, atlas)
     most = len(textures.sheets("repeated")) - 1
     halvings = halvings_of(BLURRED, textures.usual_per_mm, most)
-    space = make_levels(device, SIDE, len(BLURRED), FLOATS)
-    upload(device, space.stack, np.dstack([light, light, light, atlas.own[..., None]]))
+    space = make_levels(device, SIDE, (halvings,), FLOATS)
+    upload(device, space.stacks[0], np.dstack([light, light, light, atlas.own[..., None]]))
     frame = Frame(device)
     shape.draw(frame, made, motion)
     stretch.draw(frame, upload_geometry(device, head.mesh, atlas, made), textures)
     diffuse.draw(frame, space, textures, Blur(BLURRED, np.zeros((len(BLURRED), 3)), halvings))
     frame.submit()
     return [
-        download(device, space.stack, layer=k + 1, mip=halvings[k + 1])[..., :1].astype(float)
-        for k in range(len(BLURRED))
+        download(device, space.stacks[times], layer=k - space.first[times])[..., :1].astype(float)
+        for k, times in enumerate(halvings)
+        if k
     ]
 
 

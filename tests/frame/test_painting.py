@@ -13,7 +13,7 @@ from dermis import Human
 from dermis.atlas.raster import rasterise
 from dermis.errors import DermisError
 from dermis.frame.painted import with_painted_maps
-from dermis.frame.passes.painting import paint
+from dermis.frame.passes.painting import given, paint
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device, download
 from dermis.human.skin.colours import EPIDERMIS_MM, colours, mean_colour
@@ -167,7 +167,7 @@ def test_the_finest_mesh_is_painted_as_the_coarsest(device: Device, surface: Pai
 def test_more_triangles_than_have_numbers_are_refused(
     device: Device, surface: Painting, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(paint, "_MOST_TRIANGLES", surface.count)
+    monkeypatch.setattr(given, "_MOST_TRIANGLES", surface.count)
     with pytest.raises(DermisError, match="Subdivide less"):
         painted(device, surface)
 

@@ -14,6 +14,7 @@ from dermis.frame.techniques.screen_space import draw, kernel_table, make_apart,
 from dermis.gpu import Device, Frame, download, make_texture, upload
 from dermis.optics.fits.separable import SeparableKernel, preintegrate
 from dermis.optics.profiles import load_profile
+from dermis.scene.camera import Window
 
 Floats = NDArray[np.float64]
 PROFILE = load_profile("gpu-gems-3")
@@ -48,7 +49,7 @@ def spread(device: Device, view: View, light: Floats, depth: Floats) -> Floats:
     upload(device, apart.layers, np.dstack([light, depth]), layer=0)
     upload(device, apart.layers, np.ones((*depth.shape, 4)), layer=1)
     over, frame = make_texture(device, view.size, "rgba32float"), Frame(device)
-    result = draw(frame, apart, make_kernel(device, PROFILE), view.half, over)
+    result = draw(frame, apart, make_kernel(device, PROFILE), Window(view.half, (0.0, 0.0)), over)
     frame.submit()
     return download(device, result)[..., :3].astype(float)
 

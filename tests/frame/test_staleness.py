@@ -37,6 +37,7 @@ WORDS: dict[tuple[type[Plain], str], Any] = {  # for what is neither a number no
     (Skin, "pigments"): Pigments(melanin=0.2).model_dump(),
     (Skin, "layers"): (LAYER.model_dump(),),
     (Environment, "name"): "uniform",
+    (Settings, "background"): (0.1, 0.2, 0.3),
 }
 FIXED = {("stripe", "angle_degrees")}  # a sheet of light is parallel
 GIVEN: dict[str, dict[str, Any]] = {  # what kinds of light have no default for
@@ -135,7 +136,7 @@ def test_each_field_of_the_camera(renderer: Renderer, name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for _, name in model_fields(Environment) if name != "name"])
 def test_each_field_of_the_environment(renderer: Renderer, name: str) -> None:
-    environment = Environment(name="uniform", visible=True)
+    environment = Environment(name="uniform")
     both = environment, changed(environment, name)
     kept, fresh = kept_and_fresh(renderer, *((replace(BASE, environment=one), SETTINGS) for one in both))
     assert kept == fresh
@@ -173,6 +174,11 @@ RUNS: dict[str, tuple[Callable[[], tuple[Scene, Settings]], tuple[str, ...]]] = 
         ("irradiance", *SPREAD, *SEEN),
     ),
     "exposure": (lambda: (BASE, SETTINGS.model_copy(update={"exposure": 2.0})), ("post",)),
+    "metered": (lambda: (BASE, SETTINGS.model_copy(update={"exposure": "auto"})), ("meter", "post")),
+    "background": (
+        lambda: (BASE, SETTINGS.model_copy(update={"background": "gradient"})),
+        ("background", "post"),
+    ),
     "profile": (
         lambda: (replace(BASE, skin=Skin(profile="dj3")), SETTINGS),
         ("pairs", *SPREAD, *SEEN),

@@ -85,9 +85,9 @@ def summed(
     levels : (2, 64, 64, 3) blurred light
     """
     thin, side = weighed.thin, weighed.thin.pairs.cells.side
-    space = make_levels(device, 64, 2, FLOATS)
+    space = make_levels(device, 64, (BLUR.halvings,), FLOATS)
     for layer, level in enumerate(levels, start=1):
-        upload(device, space.stack, np.dstack([level, np.ones((64, 64))]), layer=layer)
+        upload(device, space.stacks[0], np.dstack([level, np.ones((64, 64))]), layer=layer)
     frame = Frame(device)
     translucency.draw(frame, space, BLUR, thin, constants)
     frame.submit()
@@ -130,7 +130,7 @@ def test_a_head_without_thin_parts_gets_nothing(device: Device) -> None:
     ball = weighed_of(device, uv_sphere(30.0, 24, 12))
     assert ball.thin.pairs.count == 0
     frame = Frame(device)
-    translucency.draw(frame, make_levels(device, 64, 2, FLOATS), BLUR, ball.thin)
+    translucency.draw(frame, make_levels(device, 64, (BLUR.halvings,), FLOATS), BLUR, ball.thin)
     frame.submit()
     light = download(device, ball.thin.light)
     assert (light[..., :3] == 0).all()

@@ -96,7 +96,7 @@ def test_a_blink_takes_upper_lashes_along() -> None:
     assert np.median(moved[:, 0, 1]) < -4.0  # roots go down
     assert (np.median(moved[:, -1, 1]) - np.median(moved[:, 0, 1])) < -1.0  # tips farther: the hairs turn
     right = still[:, 0, 0] < 0
-    assert np.abs((closed - still)[right]).max() < 0.2
+    assert np.abs((closed - still)[right]).max() < 0.3
     assert np.isfinite(closed).all()
 
 

@@ -54,7 +54,7 @@ def told(folder: Path) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def head(folder: Path) -> Head:
-    return load_head(folder / "person.glb")
+    return load_head(folder / "person.glb", eyes="plain")
 
 
 def test_names_are_those_of_the_head(told: dict[str, Any], head: Head) -> None:

@@ -159,7 +159,7 @@ def _refused(folder: Path) -> dict[str, tuple[str, np.ndarray, str]]:
         "skin_normal.png": ("normal", skin, "normal map"),
         "white_normal.png": ("normal", np.full((*SHAPE, 3), 255, np.uint8), "normal map"),
         "light_grey_normal.png": ("normal", np.full((*SHAPE, 3), 200, np.uint8), "normal map"),
-        "tiny_colour.png": ("colour", colour[:8], "32 x 8"),
+        "wide_colour.png": ("colour", np.zeros((1, 16385, 3), np.uint8), "16385 x 1"),
     }
 
 

@@ -11,7 +11,7 @@ from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.hankel import STILL
 from dermis.optics.diffusion.models import transform
 from dermis.optics.media import Floats
-from dermis.optics.pigments.skin import SkinParameters, spectral_medium
+from dermis.optics.pigments.skin import SkinParameters, mixed_layers, spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.skin_colours import colour_table
 from dermis.optics.tissue import load_tissue
@@ -29,6 +29,18 @@ def computed(parameters: SkinParameters, melanin: Floats, blood: Floats) -> Floa
     ]
     spectra = np.array([transform(medium, "layered", "layer", STILL)[0] for medium in media])
     return (1.0 - normal_reflectance(media[0].eta)) * spectra @ rgb_weights(WAVELENGTHS_NM).T
+
+
+def test_layers_of_many_shares_are_those_of_each_skin() -> None:
+    """To the bit."""
+    shares = np.array([0.0, 0.01, 0.3, 1.0])
+    mixed = mixed_layers(FACE, shares)
+    for row, share in enumerate(shares):
+        alone = spectral_medium("dj2006", replace(FACE, melanin=share, blood=share)).layers
+        for many, one in zip(mixed, alone, strict=True):
+            assert (many.thickness_mm, many.name) == (one.thickness_mm, one.name)
+            assert np.array_equal(many.sigma_a[row], one.sigma_a)
+            assert np.array_equal(many.sigma_s_prime[row], one.sigma_s_prime)
 
 
 @pytest.mark.parametrize("thickness", [0.03, 0.05, 0.25])

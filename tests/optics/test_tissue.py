@@ -115,3 +115,11 @@ def test_wavelengths_add_up_to_the_total() -> None:
     spectrum = np.array([diffusion_profile(one).total[0] for one in each])
     entering = 1.0 - normal_reflectance(1.4)
     assert tissue.profile().total == pytest.approx(entering * tissue.rgb @ spectrum, rel=1e-9)
+
+
+def test_a_tissue_prints_on_three_lines() -> None:
+    lines = repr(load_tissue("dj3")).splitlines()
+    assert len(lines) == 3 and lines[0] == "Tissue dj3: red, green, blue, index of refraction 1.4"
+    assert lines[1] == "  epidermis 0.25 mm, upper dermis 0.2 mm, bloody dermis (semi-infinite)"
+    assert "0.0085 to 2.5 /mm" in lines[2]
+    assert repr(load_tissue("light")).startswith("Tissue light: 31 wavelengths")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from small_head import write_head
 
@@ -18,7 +19,7 @@ from dermis.scene import (
     load_scene,
     studio,
 )
-from dermis.scene.files import light_presets
+from dermis.scene.lights import light_presets
 
 KINDS = """
 [[lights]]
@@ -75,12 +76,18 @@ def test_every_rig_loads_and_says_what_it_is(name: str) -> None:
 
 
 def test_rigs_are_those_asked_for() -> None:
-    assert light_presets() == ["laser", "none", "rembrandt", "rim", "studio", "top", "window"]
+    assert light_presets() == [
+        "backlit",
+        *("laser", "none", "rembrandt", "rim", "studio", "top", "window"),
+    ]
     assert load_lights("studio") == studio()
     assert isinstance(load_lights("laser")[0], StripeLight)
     top, rim = load_lights("top")[0], load_lights("rim")[0]
     assert isinstance(top, RectangleLight) and top.position[1] > 2 * abs(top.position[2])
     assert isinstance(rim, RectangleLight) and rim.position[2] < 0
+    assert max(max(light.irradiance) for light in load_lights("rim")) < np.pi  # white skin is not clipped
+    ears = [light for light in load_lights("backlit") if light.position[2] < 0]
+    assert sorted(np.sign(light.target[0]) for light in ears) == [-1, 1]
 
 
 def test_an_environment_replaces_the_lights_that_are_not_named(folder: Path) -> None:
@@ -105,6 +112,7 @@ def test_an_environments_file_lies_beside_the_scene(folder: Path) -> None:
         ("[environment]\nexposure = 2\n", "name: expected a value"),
         ('[environment]\nname = "uniform"\nturn = 2\n', "turn"),
         ('[environment]\nname = "uniform"\nexposure = -1\n', "-1"),
+        ('[environment]\nname = "uniform"\nvisible = true\n', 'background = "environment"'),
         ('[[lights]]\nkind = "sphere"\nposition = [0, 0, 90]\nradius_mm = 100\n', "outside the sphere"),
         ('[[lights]]\nkind = "stripe"\ndirection = [0, -1, 0]\n', "another direction"),
         ('[[lights]]\nkind = "stripe"\ndirection = [1, 0, 0]\nangle_degrees = 2\n', "no angle_degrees"),

@@ -45,7 +45,14 @@ LIGHTS = (
     DirectionalLight(**SHEET, angle_degrees=0.53),
     StripeLight(**SHEET, position=(1.0, 2.0, 3.0), up=(1.0, 0.2, 0.0), width_mm=3.0, length_mm=20.0),
 )
-CAMERA = Camera(position=(1.0, 2.0, 900.0), target=(1e-7, 3.0, 0.0), up=(0.1, 1.0, 0.0), frame_mm=33.0)
+CAMERA = Camera(
+    position=(1.0, 2.0, 900.0),
+    target=(1e-7, 3.0, 0.0),
+    up=(0.1, 1.0, 0.0),
+    frame_mm=33.0,
+    principal_point=(0.4, 1.2),
+    pixel_aspect=1.1,
+)
 PIGMENTS = Pigments(
     structure="donner2008",
     melanin=0.1,
@@ -79,7 +86,7 @@ SKIN = Skin(
     pigments=PIGMENTS,
     layers=LAYERS,
 )
-ROOM = Environment(name="uniform", rotation_degrees=33.0, exposure=0.5, visible=True)
+ROOM = Environment(name="uniform", rotation_degrees=33.0, exposure=0.5)
 SETTINGS = Settings(
     size=(10, 20),
     atlas=128,
@@ -97,6 +104,7 @@ SETTINGS = Settings(
     gamma="wrong",
     strands=False,
     background=(0.1, 0.0, 0.0),
+    background_blur=0.2,
     parts="diffuse",
 )
 

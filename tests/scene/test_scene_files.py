@@ -191,7 +191,6 @@ def test_regions_of_the_face_come_from_a_table(folder: Path) -> None:
     ("head", "skin", "said"),
     [
         ('regions = "default"', "rho_s = 0.2", "scene.toml: skin: rho_s: expected one or the other"),
-        ('regions = "default"', "roughness = 0.2", "skin: roughness: expected one or the other"),
         ('regions = "other"', "", "other: expected default, or regions in TOML"),
         ('regions = "default"', "", "a head whose regions are known"),
         ("regions = 3", "", "regions"),

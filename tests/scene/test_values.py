@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
 
 from dermis.errors import DermisError
-from dermis.scene import Camera, DirectionalLight, PointLight, Settings, Skin, SpotLight
+from dermis.scene import Camera, DirectionalLight, Environment, PointLight, Settings, Skin, SpotLight
 from dermis.scene.plain import ImpossibleError
 
 FORM = re.compile(r"\w+: (\S+: )?expected .+, but .+\. Correct it\.")
@@ -27,7 +28,10 @@ BAD = [
     (Settings, {"samples": 65}, "65 came"),
     (Settings, {"exposure": 0}, "0 came"),
     (Settings, {"exposure": float("inf")}, "inf came"),
+    (Settings, {"exposure": "bright"}, "expected auto or a valid number, but 'bright' came"),
     (Settings, {"background": (0, 0, -1)}, "background.2"),
+    (Settings, {"background": "#12345"}, "none, gradient, environment or a colour: three linear numbers"),
+    (Settings, {"background_blur": 2}, "2 came"),
     (Settings, {"technique": "wet"}, "'wet' came"),
     (Camera, {}, "position: expected a value, but there is none"),
     (Camera, {"position": (0, 0, 0)}, "away from the target"),
@@ -64,9 +68,49 @@ def test_edges_of_the_ranges_are_allowed() -> None:
     Settings(size=(1, 1), atlas=64, samples=1), Settings(size=(16384, 1), samples=64)
 
 
-def test_scene_data_are_frozen() -> None:
-    with pytest.raises(ValueError, match="frozen"):
-        Skin().mix = 0.1  # type: ignore[misc]
+def test_scene_data_are_frozen_and_copied_with_other_values() -> None:
+    skin = Skin(roughness=0.4)
+    with pytest.raises(DermisError, match=r"Skin: .*mix was to be changed\. Write replace\(mix=0\.1\)"):
+        skin.mix = 0.1  # type: ignore[misc]
+    assert skin.replace(mix=0.1) == Skin(roughness=0.4, mix=0.1)
+    with pytest.raises(DermisError, match="7 came"):
+        skin.replace(mix=7)
+
+
+def test_the_one_value_that_is_needed_may_come_without_its_name() -> None:
+    assert Environment("lebombo") == Environment(name="lebombo")
+    assert Camera((0, 0, 900), frame_mm=200) == Camera(position=(0, 0, 900), frame_mm=200)
+    assert PointLight(np.array([0, 0, 900])) == PointLight(position=(0, 0, 900))
+    with pytest.raises(DermisError, match=r"Skin: expected values by name, such as .*'olive' came"):
+        Skin("olive")
+    with pytest.raises(DermisError, match="by name"):
+        Camera((0, 0, 900), (0, 0, 0))
+
+
+def test_clear_values_are_taken() -> None:
+    assert Settings(size=64) == Settings(size=(64, 64)) == Settings(size=np.array([64, 64]))
+    assert PointLight(position=[0, 0, 9], irradiance=2) == PointLight(
+        position=(0, 0, 9), irradiance=(2, 2, 2)
+    )
+    wide = Camera(position=np.array([0, 0, 900], np.float32), frame_mm=np.float32(200))
+    assert wide == Camera(position=(0, 0, 900), frame_mm=200)
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "says"),
+    [
+        (Skin, {"roughnes": 0.3}, "roughnes: expected roughness, but"),
+        (PointLight, {"position": (0, 0, 9), "intensity": 3}, "intensity: expected irradiance, but"),
+        (Camera, {"position": (0, 0, 9), "fov": 30}, "fov: expected frame_mm (height"),
+        (Settings, {"rho_s": 0.2}, "unknown here (it is one of Skin)"),
+        (Settings, {"size": "64x64"}, "expected a list of 2 numbers, but '64x64' came"),
+        (PointLight, {"position": (0, 0, 9), "irradiance": "white"}, "expected a list of 3 numbers, but"),
+    ],
+)
+def test_wrong_names_and_forms_say_what_is_meant(kind: type, values: dict, says: str) -> None:
+    with pytest.raises(DermisError) as caught:
+        kind(**values)
+    assert says in str(caught.value)
 
 
 def test_equal_values_are_those_that_say_the_same() -> None:
@@ -74,3 +118,13 @@ def test_equal_values_are_those_that_say_the_same() -> None:
     assert Skin(mix=0.3) != Skin(mix=0.4)
     assert PointLight(position=(0, 0, 9)) != SpotLight(position=(0, 0, 9))
     assert Skin() != "skin"
+
+
+def test_a_word_may_stand_for_a_number() -> None:
+    """And comes out as it went in, into files too; colours as they are encoded become linear."""
+    settings = Settings(exposure="auto", background="gradient")
+    assert Settings(**settings.model_dump()) == settings
+    assert (settings.exposure, settings.background) == ("auto", "gradient")
+    half = Settings(background="#bcbcbc").background
+    assert half == Settings(background=half).background and half == pytest.approx((0.503,) * 3, abs=1e-3)
+    assert Settings(background="0,0.5,1").background == (0.0, 0.5, 1.0)

@@ -39,7 +39,7 @@ def test_each_texel_is_a_square_with_the_layer_s_own_light(state: ViewerState) -
     levels = studio.renderer.prepare(
         state.scene, state.settings.model_copy(update={"size": (2 * SIDE, 2 * SIDE)})
     ).resources.levels
-    light = download(studio.renderer.device, levels.stack)
+    light = download(studio.renderer.device, levels.stacks[0])
     light = (light if light.ndim == 3 else light[0])[..., :3] / np.pi
     assert light.max() > 0.1
     c = np.clip(light, 0.0, 1.0)

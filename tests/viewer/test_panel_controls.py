@@ -25,7 +25,9 @@ BUTTONS |= {"open", "search", "bones", "size", "head", "seed", "dice", "path", "
 CAMERAS = {f"{name}##camera" for name in ("portrait", "three-quarter", "profile", "ear", "cheek")}
 NO_STATE = BUTTONS | CAMERAS | {section.title for section in SECTIONS} | {"regions"}
 STARTS: dict[str, Callable[[ViewerState], ViewerState]] = {
-    "table": lambda state: state.with_environment(Environment(name="uniform")),
+    "table": lambda state: state.with_environment(Environment(name="uniform")).with_settings(
+        background=(0.2, 0.1, 0.1)
+    ),
     "pigments": lambda state: state.with_skin(profile="light").with_pigments(structure="donner2008"),
     "layers": lambda state: state.with_skin(profile="dj3").with_settings(seams="clear-colour"),
     "window": lambda state: state.with_rig("window"),
@@ -33,8 +35,9 @@ STARTS: dict[str, Callable[[ViewerState], ViewerState]] = {
 EXPECTED = {
     "table": "show, profile, colour from, mix, roughness, rho_s, oiliness, BRDF, Fresnel, energy, "
     "reflection, rig, strength, irradiance, inner cone, outer cone, softness, shadows, copy, remove, add, "
-    "environment, rotation, brightness, visible, technique, stretch, seams, transmission, occlusion, atlas, "
-    "shadow map, samples, exposure, tone, gamma, bloom, background",
+    "environment, rotation, brightness, technique, stretch, seams, transmission, occlusion, atlas, "
+    "shadow map, samples, exposure from, exposure, tone, gamma, bloom, background from, background, "
+    "background blur",
     "pigments": "layers, melanin, eumelanin, thickness, blood##epidermis, blood, oxygen",
     "layers": "thickness##1, absorption##1, scattering##1, add above##1, remove##1, seam colour",
     "window": "width, height",

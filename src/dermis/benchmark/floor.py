@@ -17,7 +17,7 @@ from dermis.frame.levels import Blur, Levels
 from dermis.frame.passes.surface_texels import SURFACE_BYTES
 from dermis.frame.techniques.gpu_gems_3 import StretchedLevels
 from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture
-from dermis.gpu.textures import texel_bytes
+from dermis.gpu.textures import FORMAT_BYTES, texel_bytes
 
 _MAPS = ("colour_map", "slope_map", "relief_map", "specular_map", "roughness_map")
 _CORNERS, _PLACE = 16, 16  # bytes of a triangle's corners and of a vertex' position in the tables
@@ -80,8 +80,8 @@ def _scattering_bytes(moved: Moved, looked_up: int) -> dict[str, float]:
     """Bytes of the stages that light the atlas and spread the light."""
     inputs, texels, levels = moved.inputs, moved.texels, moved.inputs.resources.levels
     blur = inputs.blurs[0]
-    entered = texels * texel_bytes(levels.stack)
-    blurred = [texels * texel_bytes(levels.stack) / 4**halved for halved in blur.halvings[1:]]
+    entered = texels * FORMAT_BYTES[levels.texel]
+    blurred = [texels * FORMAT_BYTES[levels.texel] / 4**halved for halved in blur.halvings[1:]]
     found: dict[str, float] = {
         "irradiance": texels * (SURFACE_BYTES + looked_up) + entered,
         "diffuse": entered + sum(blurred[:-1]) + sum(blurred) + _surface_of_blurs(inputs, texels),
@@ -108,7 +108,7 @@ def _surface_of_blurs(inputs: Inputs, texels: int) -> float:
         maps = (sheets[halved].resources[name] for name in ("stretch_map", "reach_map"))
         moved += sum(map(texel_bytes, maps)) * texels / 4**halved
         if blur.edge == "repeated" and (gutter := sheets[source].gutter):
-            moved += gutter.size * (1 + 2 * texel_bytes(levels.stack) / _LISTED)
+            moved += gutter.size * (1 + 2 * FORMAT_BYTES[levels.texel] / _LISTED)
     return moved
 
 
@@ -118,7 +118,7 @@ def _through(thin: Translucency, levels: Levels, blur: Blur) -> float:
     receivers, sources = pairs.receivers[1], pairs.sources[1]
     lists = thin.weights.size + pairs.sums.size + _TEXEL * sources
     level = (levels.size >> halved) ** 2
-    read = min(_BILINEAR * sources, level) * texel_bytes(levels.stack)
+    read = min(_BILINEAR * sources, level) * FORMAT_BYTES[levels.texel]
     return float(lists + read + receivers * texel_bytes(thin.light))
 
 

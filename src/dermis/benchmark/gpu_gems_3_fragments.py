@@ -9,7 +9,7 @@ import numpy as np
 
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.inputs import Inputs
-from dermis.frame.levels import FLOATS, HALVES, Blur, Levels
+from dermis.frame.levels import FLOATS, HALVES, Blur, Halvings, Levels
 from dermis.frame.passes import (
     registered,
     shader_folders,
@@ -30,12 +30,13 @@ _FOLDER = Path(__file__).parent
 class Fragments(GpuGems3):
     """Lights the atlas, blurs and adds up in render passes; the same up to the rounding of halves."""
 
-    def make_levels(self, device: Device, side: int, count: int) -> Levels:
-        """Space for the light that enters and `count` blurred levels, all of it halves."""
-        stack = make_texture(device, (side, side), HALVES, layers=max(2, count + 1), use="raster")
+    def make_levels(self, device: Device, side: int, halvings: Halvings) -> Levels:
+        """Space for the light that enters and the blurred levels, all of it halves."""
+        count = max(map(len, halvings))
+        stack = make_texture(device, (side, side), HALVES, layers=count, use="raster")
         scratch, *stretch = (make_texture(device, (side, side), HALVES, use="raster") for _ in range(3))
         first, second = (texture.create_view() for texture in stretch)
-        return StretchedLevels(stack, scratch, side, HALVES, stretch=(first, second))
+        return StretchedLevels((stack,), (0,), scratch, side, HALVES, stretch=(first, second))
 
     def make_sum(self, device: Device, side: int) -> Any:
         """Space for the sum."""
@@ -83,7 +84,7 @@ class Fragments(GpuGems3):
         counts = {"count": len(blur.weight), "through": through is not None}
         bound = {
             "weights": shader.record("Weights", weight=padded, **counts),
-            "levels": levels.stack,
+            "levels": levels.stacks[0],
             "transmitted": nothing(graph.device) if through is None else through,
         }
         graph.fill("combine", shader, bound, [into])

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import sys
+import warnings
+from importlib import import_module
+from typing import Any
 
 COMMANDS = {
     "render": "Render a head to a PNG (sRGB) or EXR (linear float) image.",
@@ -10,6 +13,7 @@ COMMANDS = {
     "view": "Turn a head, its skin and its light in a window or a web page.",
     "profile": "Compute how light spreads below a skin, and fit Gaussians to it.",
     "head": "Make a person of the parametric human and write it as glTF.",
+    "lights": "Print a rig of lights as a file to start from.",
     "compare": "Compare techniques with the truth, or the models of the surface.",
     "gallery": "Draw every comparison of the talk, and a page that explains them.",
     "bench": "Measure how fast frames are on this machine.",
@@ -22,6 +26,7 @@ def main() -> None:
     """Run the command line; exit with 2 when the caller can mend what went wrong."""
     from cyclopts import App, CycloptsError
 
+    from dermis.cli.help_text import reflowed
     from dermis.cli.misuse import explain
     from dermis.errors import DermisError
 
@@ -31,18 +36,39 @@ def main() -> None:
         help_format="plaintext",
         result_action="return_value",
     )
+    if (chosen := next(iter(sys.argv[1:]), "")) in COMMANDS:
+        command = getattr(import_module(f"dermis.cli.{chosen}"), chosen)
+        command.__doc__ = reflowed(command.__doc__)
     for name, summary in COMMANDS.items():
         # The list of commands must not import them; a command's own help is its docstring.
         shown = None if sys.argv[1:2] == [name] else summary
         app.command(f"dermis.cli.{name}:{name}", name=name, help=shown, version_flags=())
     try:
-        sys.exit(app(sys.argv[1:], exit_on_error=False, print_error=False) or 0)
+        with warnings.catch_warnings():
+            _show_notes()
+            sys.exit(app(sys.argv[1:], exit_on_error=False, print_error=False) or 0)
     except DermisError as error:
         _fail(str(error))
     except CycloptsError as error:
         _fail(explain(error))
     except KeyboardInterrupt:
         sys.exit(130)
+
+
+def _show_notes() -> None:
+    """Print the package's own warnings as notes, each once."""
+    from dermis.errors import DermisWarning
+
+    usual = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *more: Any, **named: Any) -> None:
+        if issubclass(category, DermisWarning):
+            sys.stderr.write(f"note: {message}\n")
+        else:
+            usual(message, category, *more, **named)
+
+    warnings.simplefilter("default", DermisWarning)
+    warnings.showwarning = show
 
 
 def _fail(message: str) -> None:

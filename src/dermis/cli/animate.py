@@ -20,6 +20,7 @@ from dermis.cli.pose_options import laid_over
 from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble
 
 if TYPE_CHECKING:
+    from dermis.frame.renderer import Renderer
     from dermis.scene.clips.clip import Clip
     from dermis.scene.model import Scene
     from dermis.scene.settings import Settings
@@ -27,12 +28,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class _Take:
-    """What is drawn: a scene moved by a clip, frame k at k / rate."""
+    """What is drawn: a scene moved by a clip, frame k at k / rate.
+
+    first : number of the first frame
+    """
 
     scene: Scene
     settings: Settings
     clip: Clip
     rate: Fraction
+    first: int
 
     def scenes(self, numbers: Iterable[int], check: Callable[[], None]) -> Iterator[Scene]:
         """The scene of each frame; what the clip does not move keeps the scene's own pose.
@@ -120,7 +125,7 @@ def animate(
         numbers, rate = span.frames(moved)
     if moved.note:
         note(f"note: {moved.note}")
-    take = _Take(described, settings, moved, rate)
+    take = _Take(described, settings, moved, rate, numbers[0])
     missing = target.missing(numbers, settings.size, _made_of(take, scene, head, moving))
     began = time.perf_counter()
     used = _draw(take, missing, target, adapter) if missing else None
@@ -148,6 +153,8 @@ def _draw(take: _Take, numbers: Sequence[int], target: MovingOutput, adapter: st
 
     renderer, size = Renderer(adapter), take.settings.size
     options: dict[str, Any] = {**take.settings.model_dump(), "linear": target.linear}
+    options["exposure"] = _exposure(take, renderer)
+    options["alpha"] = target.numbered and take.settings.background == "none"
     writing, bar = target.writing(size, take.rate), progress("drawing frames")
     with interruptible() as check, writing as write, bar as report:
         pictures = renderer.render_many(take.scenes(numbers, check), **options)
@@ -157,6 +164,16 @@ def _draw(take: _Take, numbers: Sequence[int], target: MovingOutput, adapter: st
     return str(renderer.device.adapter.name)
 
 
+def _exposure(take: _Take, renderer: Renderer) -> float:
+    """One for all frames: that given, or metered at the first, whichever of them are still to be drawn."""
+    if take.settings.exposure != "auto":
+        return take.settings.exposure
+    (scene,) = take.scenes([take.first], lambda: None)
+    found = renderer.draw(scene, take.settings, timed=False).exposure
+    note(f"note: --exposure {found:.3g}, metered at the first frame")
+    return found
+
+
 def _made_of(take: _Take, given: SceneOptions, *files: str) -> str:
     """A text that two frames of one number share if they look the same.
 
@@ -164,8 +181,10 @@ def _made_of(take: _Take, given: SceneOptions, *files: str) -> str:
     """
     scene = take.scene
     named = [*files, scene.head.name, *map(str, given.head.values()), take.clip.name]
-    seen = (scene.lights, scene.camera, scene.skin, scene.environment, take.settings, take.rate)
-    parts = [*map(_as_it_is, named), repr(given.head), repr(given.pose), repr(given.bone), repr(seen)]
+    metered_at = take.first if take.settings.exposure == "auto" else None
+    seen = scene.lights, scene.camera, scene.skin, scene.environment, take.settings, take.rate, metered_at
+    typed = given.head, given.eye, given.pose, given.bone, given.look_at
+    parts = [*map(_as_it_is, named), *map(repr, typed), repr(seen)]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 

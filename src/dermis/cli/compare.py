@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dermis.cli.console import print_json, print_lines, working_on
+from dermis.cli.eye_options import note_eyes
 from dermis.cli.options import NOTHING, Adapter, Json, Output, Whole, check, given, option_name, options_of
 from dermis.errors import refuse
+from dermis.scene.head_table import HeadTable
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.techniques import TECHNIQUES
@@ -22,9 +24,11 @@ if TYPE_CHECKING:
 
     SizeOptions = dict[str, Any]
     SkinOptions = dict[str, Any]
+    EyesOptions = dict[str, Any]
 else:
     SizeOptions = options_of(Settings, only=_SIZES, defaults=_SIZES)
     SkinOptions = options_of(Skin, only=("direction", "roughness"))
+    EyesOptions = options_of(HeadTable, only=("eyes", "eye_groups"))
 
 
 def compare(
@@ -38,6 +42,7 @@ def compare(
     medium: str | None = None,
     sizes: SizeOptions = NOTHING,
     skin: SkinOptions = NOTHING,
+    eyes: EyesOptions = NOTHING,
     samples: Whole = None,
     output: Output = None,
     adapter: Adapter = "auto",
@@ -79,7 +84,7 @@ def compare(
         HTML report; for specular a folder of plots.
     """
     words = given(against=against, techniques=techniques, light=light, region=region)
-    chosen = words | given(medium=medium, samples=samples) | sizes | skin
+    chosen = words | given(medium=medium, samples=samples) | sizes | skin | eyes
     _check_used(what, chosen)
     if what == "specular":
         from dermis.cli.compare_specular import compare_specular
@@ -87,7 +92,7 @@ def compare(
         check(Skin, skin)
         compare_specular(output, Skin(**skin).roughness, adapter, as_json)
     else:
-        _compare_techniques(what, _choose(chosen, sizes) | {"adapter": adapter}, output, as_json)
+        _compare_techniques(what, eyes, _choose(chosen, sizes) | {"adapter": adapter}, output, as_json)
     return 0
 
 
@@ -125,7 +130,9 @@ def _choose(chosen: Mapping[str, Any], sizes: Mapping[str, Any]) -> dict[str, An
     }
 
 
-def _compare_techniques(head: str, chosen: dict[str, Any], output: Path | None, as_json: bool) -> None:
+def _compare_techniques(
+    head: str, eyes: Mapping[str, Any], chosen: dict[str, Any], output: Path | None, as_json: bool
+) -> None:
     """Render a head with each technique, judge it by a truth, print and write what came of it."""
     from dermis.comparison import compare as comparison
     from dermis.comparison.report import write_report
@@ -136,7 +143,9 @@ def _compare_techniques(head: str, chosen: dict[str, Any], output: Path | None, 
     if output is not None:
         check_output(output, (".html",), "Choose such a name")
     with working_on("comparing"):
-        made = comparison.compare(load_head(head), **chosen)
+        loaded = load_head(head, **eyes)
+        note_eyes(loaded, eyes.get("eyes"))
+        made = comparison.compare(loaded, **chosen)
     if output is not None:
         write_report(output, made)
     if as_json:

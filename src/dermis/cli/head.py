@@ -15,13 +15,15 @@ from dermis.cli.pose_options import parse_weights
 from dermis.errors import refuse
 
 if TYPE_CHECKING:
+    from dermis.human.hair.look import HairLook
     from dermis.human.person import Human
     from dermis.human.skin.look import SkinLook
     from dermis.mesh.eyes import EyeLook
     from dermis.mesh.head import Head
 
-L = TypeVar("L", "SkinLook", "EyeLook")
+L = TypeVar("L", "SkinLook", "EyeLook", "HairLook")
 TARGET, EXPRESSION = "--target", "--expression"
+_Values = Parameter(negative="", metavar="NAME=VALUE,...", show_default=False)
 _Pairs = Parameter(negative="", metavar="NAME=WEIGHT,...", show_default=False)
 
 
@@ -40,6 +42,7 @@ def head(
     expression: Annotated[list[str] | None, _Pairs] = None,
     skin: Annotated[list[str] | None, _Pairs] = None,
     eye: Annotated[list[str] | None, _Pairs] = None,
+    hair: Annotated[list[str] | None, _Values] = None,
     colour: Path | None = None,
     normal: Path | None = None,
     roughness: Path | None = None,
@@ -66,6 +69,8 @@ def head(
         dermis head --african 1 --asian 0 --caucasian 0 --skin melanin=0.3,moles=0.6 --size 4096 -o dark.glb
 
         dermis head --seed 7 --skin freckles=0.8 -o person.json && dermis render person.json
+
+        dermis head --sex 1 --hair style=cropped,length_mm=5,beard_mm=4 -o man.json && dermis render man.json
 
         dermis render other.glb --pose jawOpen=0.6 --bone head=0,20,0 -o other.png
 
@@ -95,10 +100,14 @@ def head(
         Weights with which morph targets of the file rest, as jawOpen=0.2; may be given again.
     skin:
         Pigments and texture: melanin, eumelanin, blood, oxygen, redness, freckles, moles, spots, tan, veins,
-        stubble, beard, oil and age, all from 0 to 1, and seed; as melanin=0.1,freckles=0.4 [what goes with
-        the person].
+        stubble, recession, beard, oil and age, all from 0 to 1, and seed; as melanin=0.1,freckles=0.4 [what
+        goes with the person].
     eye:
         eumelanin, 0 (blue) to 1 (dark brown), pupil_mm, redness, seed; as eumelanin=0.2 [what goes with it].
+    hair:
+        style (none, cropped or short), length_mm, density, curl, fade, beard_mm, bushy, grey, eumelanin,
+        pheomelanin and seed; as style=cropped,length_mm=5 [what goes with the person]. Only .json has it:
+        hairs are not written as glTF.
     colour:
         Picture of the skin's colour, sRGB [the head's own, as the next two].
     normal:
@@ -124,12 +133,12 @@ def head(
     if list_targets:
         return _list_targets(as_json)
     started = time.perf_counter()
-    check_output(output, (".glb", ".json"), "Name it something.glb")
+    check_output(output, (".glb", ".json"), "Choose .glb for a head, .json for the numbers of a person")
     numbers = given(african=african, asian=asian, caucasian=caucasian, sex=sex, age=age)
     numbers |= given(weight=weight, muscle=muscle)
     person = _person(seed, numbers, parse_weights(target or [], TARGET))
     own = _look(person.look, skin, "--skin"), _look(person.iris, eye, "--eye")
-    person = replace(person, skin=own[0], eyes=own[1])
+    person = replace(person, skin=own[0], eyes=own[1], hair=_hair(person.hairdo, hair))
     if output.suffix.lower() == ".json":
         length = write_numbers(output, person)
         return _tell_numbers(output, person, length, as_json)
@@ -161,6 +170,18 @@ def _look(usual: L, words: list[str] | None, option: str) -> L:
     if "seed" in numbers and numbers["seed"] == int(numbers["seed"]):
         numbers["seed"] = int(numbers["seed"])
     return replace(usual, **numbers)
+
+
+def _hair(usual: HairLook, words: list[str] | None) -> HairLook:
+    """Hair with some of it replaced; its style is a word."""
+    style: Any = usual.style
+    numbers = []
+    for pair in ",".join(words or []).split(","):
+        if pair.startswith("style="):
+            style = pair.removeprefix("style=")
+        elif pair:
+            numbers.append(pair)
+    return replace(_look(usual, numbers, "--hair"), style=style)
 
 
 def _with_maps(made: Head, files: dict[str, Any]) -> Head:

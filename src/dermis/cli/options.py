@@ -83,10 +83,14 @@ def is_option(model: type[Plain], field: str) -> bool:
 
 def _kind(model: type[Plain], field: str) -> tuple[Any, dict[str, Any]]:
     """What cyclopts takes a field's words for, and how it makes the value of them; None for no option."""
-    from dermis.scene.plain import choices_of
+    from dermis.scene.plain import choices_of, words_of
 
     if choices := choices_of(model, field):
         return Literal[choices], {}
+    if words := words_of(model, field):
+        number = model.model_fields[field].annotation is float
+        shown = {"metavar": "|".join((*words, "NUMBER" if number else "COLOUR")), "show_choices": False}
+        return (float | Literal[words] if number else str), shown
     kind = model.model_fields[field].annotation
     kind = next((one for one in get_args(kind) if get_args(kind)[-1] is NoneType), kind)
     parts = tuple(get_args(part)[0] if get_args(part) else part for part in get_args(kind))
@@ -107,10 +111,11 @@ def _kind(model: type[Plain], field: str) -> tuple[Any, dict[str, Any]]:
 
 def _help(model: type[Plain], field: str, defaults: Mapping[str, Any]) -> str:
     """A field's help with its bounds, where they say something, and its default."""
-    from dermis.scene.plain import choices_of, help_of, shown, values_of
+    from dermis.scene.plain import choices_of, help_of, shown, values_of, words_of
 
     text = help_of(model, field)
-    if (values := values_of(model, field)) and not choices_of(model, field):  # cyclopts adds choices itself
+    worded = choices_of(model, field) or words_of(model, field)  # which cyclopts adds itself
+    if (values := values_of(model, field)) and not worded:
         text += f" [range: {values}]"
     default = shown(defaults.get(field, model.model_fields[field].get_default()))
     return f"{text} [default: {default}]" if default else text

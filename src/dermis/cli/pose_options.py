@@ -30,7 +30,8 @@ LookAt = Annotated[
     Parameter(
         name=LOOK_AT,
         metavar="X,Y,Z",
-        help="Where the eyes of the parametric human look: a place in mm from the head's centre, or camera.",
+        help="Where the eyes look, the human's or those fitted to a file: a place in mm from the head's "
+        "centre, or camera.",
     ),
 ]
 Turns = Annotated[

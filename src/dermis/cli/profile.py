@@ -69,8 +69,8 @@ def profile(
         A medium (dj3, skin1, skin2, marble ...), a skin of pigments (spectral, light, medium, dark), the
         published table gpu-gems-3, or a .toml file: [[layers]], a table [skin], or what -o wrote.
     model:
-        dipole and better-dipole take one endless layer; multipole is the deck's; layered is diffusion with
-        continuous flux [the default]; layered-point is finite at its centre; montecarlo is the truth.
+        dipole and better-dipole take one semi-infinite layer; multipole is the deck's; layered is diffusion
+        with continuous flux [the default]; layered-point is finite at its centre; montecarlo is the truth.
     clamp:
         Where the multipole puts the source of a layer thinner than a mean free path: inside it (layer), or
         below it as printed (none).
@@ -102,6 +102,7 @@ def profile(
         Add Monte Carlo points with error bars to the plot.
     """
     from dermis.cli.profile_report import Report, Request
+    from dermis.optics.diffusion.known_errors import counted_error, known_error
     from dermis.optics.profiles import find_table
     from dermis.optics.radial import profile_of_table
 
@@ -114,11 +115,16 @@ def profile(
     if table is not None:
         _refuse_tissue_options(name, given | {"model": model, "eta": eta, "check": check or None})
         tissue, radial, counted = None, replace(profile_of_table(table), name=name), None
+        error, spectrum = None, None
     else:
         tissue = _tissue(name, given, eta)
         radial = _profile(tissue, model or "layered", clamp, light)
         counted = _profile(tissue, "montecarlo", clamp, light) if check and model != "montecarlo" else None
-    found = Report.of(radial, tissue, request, None if fit is not None else table, thicknesses)
+        usual = name if not given and eta is None else ""
+        error = counted_error(radial, counted) if counted else known_error(model or "layered", usual)
+        spectrum = tissue.spectrum("layered" if model is None or model == "montecarlo" else model, clamp)
+    own = None if fit is not None else table
+    found = Report.of(radial, tissue, request, own, thicknesses, error, spectrum)
     if output is not None:
         found.save(output)
     if plot is not None:
@@ -138,7 +144,7 @@ def _check_outputs(output: Path | None, plot: Path | None, check: bool) -> None:
     from dermis.outputs import check_output
 
     if output is not None:
-        check_output(output, (".toml",), "Name it something.toml")
+        check_output(output, (".toml",), "Give it the suffix .toml")
     if plot is not None:
         check_output(plot, (".png", ".svg", ".pdf"))
     elif check:

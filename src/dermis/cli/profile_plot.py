@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from dermis.optics.radial import RadialProfile
 
 _INK = ("#c0392b", "#2e8b57", "#2a62b0")
+_ABOVE: dict[str, Any] = {"frameon": False, "fontsize": 7, "loc": "lower left", "bbox_to_anchor": (0, 1)}
+_LAYERS = ("#b8860b", "#8e44ad", "#16808a", "#7f8c8d")
 _NAMES = ("red", "green", "blue")
 _FAINTEST = 1e-5  # of the peak of r R(r): below that numbers are noise and eyes see nothing
 _UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
@@ -31,8 +33,12 @@ def draw(path: Path, found: Report, counted: RadialProfile | None) -> None:
     path : .png, .svg or .pdf
     """
     rc_context = needed("matplotlib", "plots").rc_context
-    figure = needed("matplotlib.figure", "plots").Figure(figsize=(7.2, 5.2), dpi=160, layout="constrained")
-    axes = figure.subplots()
+    spectral = found.spectrum is not None
+    size = (7.2, 7.8 if spectral else 5.2)
+    figure = needed("matplotlib.figure", "plots").Figure(figsize=size, dpi=160, layout="constrained")
+    axes, *more = figure.subplots(1 + spectral, squeeze=False, height_ratios=[2, 1][: 1 + spectral])[:, 0]
+    for below in more:
+        _spectra(below, found)
     peak = _curves(axes, found)
     if counted is not None:
         peak = max(peak, _photons(axes, counted))
@@ -46,6 +52,23 @@ def draw(path: Path, found: Report, counted: RadialProfile | None) -> None:
         figure.savefig(drawn, format=form, metadata=_UNDATED.get(form))
     with replacing(path) as trial:  # matplotlib itself has no clean end on a full disk
         trial.write_bytes(drawn.getvalue())
+
+
+def _spectra(axes: Any, found: Report) -> None:
+    """Reflectance by wavelength, and the layers' coefficients on an axis of their own."""
+    from dermis.optics.pigments.spectra import WAVELENGTHS_NM
+
+    assert found.tissue is not None
+    axes.plot(WAVELENGTHS_NM, found.spectrum, color="black", linewidth=1.6, label="R")
+    axes.set(xlim=(400, 700), ylim=(0, 1), xlabel="wavelength [nm]", ylabel="R, of incident light")
+    right = axes.twinx()
+    right.set(yscale="log", ylabel="µa, µs′ [1/mm]")
+    for layer, ink in zip(found.tissue.medium.layers, _LAYERS, strict=False):
+        right.plot(WAVELENGTHS_NM, layer.sigma_a, color=ink, linewidth=1.0, label=f"µa, {layer.name}")
+        dashes = {"linewidth": 1.0, "linestyle": (0, (4, 3)), "label": f"µs′, {layer.name}"}
+        right.plot(WAVELENGTHS_NM, layer.sigma_s_prime, color=ink, **dashes)
+    lines = [*axes.get_lines(), *right.get_lines()]
+    axes.legend(lines, [line.get_label() for line in lines], ncols=5, **_ABOVE)
 
 
 def _legend(figure: Any, axes: Any) -> None:

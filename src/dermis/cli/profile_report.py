@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from dermis.cli.profile_values import finite, plain, row
 from dermis.optics.diffusion.models import through_gaussians
 from dermis.optics.fits.gaussian import GaussianFit, fit_gaussians
 
 if TYPE_CHECKING:
+    from dermis.optics.diffusion.known_errors import ModelError
     from dermis.optics.fits.burley import BurleyFit
     from dermis.optics.fits.separable import SeparableFit
     from dermis.optics.gaussians import GaussianSum
@@ -46,6 +48,8 @@ class Report:
     ring_error : (3,) of the Gaussians in the light through rings, to compare all kinds of fit by [-]
     other : a fit of another kind
     through_mm : thicknesses that light is to come through [mm]
+    model_error : of the model against photons, None where it is not known
+    spectrum : (31,) total reflectance by wavelength, None for colours [-]
     """
 
     radial: RadialProfile
@@ -54,6 +58,8 @@ class Report:
     ring_error: Floats
     other: BurleyFit | SeparableFit | None
     through_mm: tuple[float, ...]
+    model_error: ModelError | None = None
+    spectrum: Floats | None = None
 
     @classmethod
     def of(
@@ -63,6 +69,8 @@ class Report:
         request: Request,
         table: GaussianSum | None,
         through_mm: tuple[float, ...],
+        model_error: ModelError | None = None,
+        spectrum: Floats | None = None,
     ) -> Report:
         """The report of a profile; a table that is given is taken as its own fit."""
         target = radial.points() if radial.finite else radial.rings()
@@ -75,12 +83,13 @@ class Report:
             fit = GaussianFit(table, np.zeros(3), np.zeros(3), "pointwise", shared=True)
         rings = radial.rings()
         ring_error = rings.error(fit.profile.variance_mm2, fit.profile.weight)
-        return cls(radial, tissue, fit, ring_error, _other(radial, request.kind), through_mm)
+        other = _other(radial, request.kind)
+        return cls(radial, tissue, fit, ring_error, other, through_mm, model_error, spectrum)
 
     def as_json(self) -> dict[str, Any]:
         """Everything, in plain lists."""
         radial, sum_ = self.radial, self.fit.profile
-        found: dict[str, Any] = _plain(
+        found: dict[str, Any] = plain(
             {
                 "name": radial.name,
                 "model": radial.model,
@@ -100,6 +109,7 @@ class Report:
                     "energy_error": self.fit.energy_error,
                     "shared": self.fit.shared,
                 },
+                "model_error": asdict(self.model_error) if self.model_error else None,
                 **self._other_json(),
                 **self._through_json(),
                 "warnings": radial.warnings,
@@ -112,22 +122,34 @@ class Report:
     def lines(self) -> list[str]:
         """The report to read."""
         radial, fit = self.radial, self.fit
-        lines = [f"{radial.name}, model {radial.model}", f"total      {_row(radial.total)}  {self._per()}"]
+        lines = [f"{radial.name}, model {radial.model}", f"total      {row(radial.total)}  {self._per()}"]
         if self.tissue is not None and self.tissue.rgb is None:
             for layer in self.tissue.medium.layers:
-                lines.append(f"mean free  {_row(layer.mean_free_path_mm)}  mm in {layer.name}")
+                path = row(layer.mean_free_path_mm)
+                lines.append(f"path       {path}  mm, reduced mean free path in {layer.name}")
         lines += ["", "variance mm2     red   green    blue"]
         for variance, weight in zip(fit.profile.variance_mm2, fit.profile.weight, strict=True):
-            lines.append(f"{variance:12.5g} {_row(weight)}")
+            lines.append(f"{variance:12.5g} {row(weight)}")
         kind = "R(r)" if fit.kind == "pointwise" else "rings"
-        lines.append(f"error      {_row(fit.error)}  of {kind}, relative")
-        lines.append(f"energy     {_row(fit.energy_error)}  too much or too little, relative")
-        lines += self._other_lines()
+        lines.append(f"error      {row(fit.error)}  of {kind}, relative")
+        lines.append(f"energy     {row(fit.energy_error)}  too much or too little, relative")
+        lines += self._model_lines() + self._other_lines()
         for way, colours in self._through().items():
             for thickness, colour in zip(self.through_mm, colours, strict=True):
-                lines.append(f"through    {_row(colour)}  {thickness:g} mm, by its {way}")
+                lines.append(f"through    {row(colour)}  {thickness:g} mm, by its {way}")
         lines += [f"note: {note}" for note in (self.tissue.medium.notes if self.tissue else ())]
         return lines
+
+    def _model_lines(self) -> list[str]:
+        """What the model itself is off by, which no fit mends."""
+        error = self.model_error
+        if error is None:
+            return []
+        where = "against photons, in rings, most within a mean free path of r = 0"
+        if len(error.tissues) == 1:
+            return [f"model      {row(error.most)}  {where}"]
+        lines = [f"model      {row(error.least)}  at least, {where},"]
+        return [*lines, f"           {row(error.most)}  at most, on {', '.join(error.tissues)}"]
 
     def _other_lines(self) -> list[str]:
         from dermis.optics.fits.burley import BurleyFit
@@ -135,13 +157,13 @@ class Report:
         if self.other is None:
             return []
         if isinstance(self.other, BurleyFit):
-            lines = [f"Burley     {_row(self.other.profile.shape)}  s [1/mm]"]
+            lines = [f"Burley     {row(self.other.profile.shape)}  s [1/mm]"]
         else:
             kernel = self.other.kernel
             pairs = zip(kernel.variance_mm2, kernel.weight, strict=True)
-            lines = [f"separable  {_row(v)}  mm2, weights {_row(w)}" for v, w in pairs]
-        mine = f"rings      {_row(self.other.error)}  its error in the light through rings"
-        return [*lines, mine, f"rings      {_row(self.ring_error)}  the Gaussians'"]
+            lines = [f"separable  {row(v)}  mm2, weights {row(w)}" for v, w in pairs]
+        mine = f"rings      {row(self.other.error)}  its error in the light through rings"
+        return [*lines, mine, f"rings      {row(self.ring_error)}  the Gaussians'"]
 
     def save(self, path: Path) -> None:
         """Write the Gaussians for the renderer."""
@@ -171,13 +193,16 @@ class Report:
         found: dict[str, Any] = {
             "eta": medium.eta,
             "layers": [layer.name for layer in medium.layers],
-            "thickness_mm": [_finite(layer.thickness_mm) for layer in medium.layers],
+            "thickness_mm": [finite(layer.thickness_mm) for layer in medium.layers],
             "mean_free_path_mm": [layer.mean_free_path_mm for layer in medium.layers],
+            "absorption_per_mm": [layer.sigma_a for layer in medium.layers],
+            "scattering_per_mm": [layer.sigma_s_prime for layer in medium.layers],
         }
         if parameters is not None:
             from dermis.optics.pigments.spectra import WAVELENGTHS_NM
 
             found |= {"skin": asdict(parameters), "wavelength_nm": WAVELENGTHS_NM}
+            found["reflectance"] = self.spectrum
         return found
 
     def _other_json(self) -> dict[str, Any]:
@@ -213,21 +238,3 @@ def _other(radial: RadialProfile, kind: str) -> BurleyFit | SeparableFit | None:
 
         return fit_separable(radial.rings())
     return None
-
-
-def _row(values: Floats) -> str:
-    return " ".join(f"{value:7.4f}" for value in values)
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, dict):
-        return {key: _plain(one) for key, one in value.items() if one is not None}
-    if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
-    return value

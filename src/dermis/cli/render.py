@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import time
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,6 +18,8 @@ from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble
 from dermis.scene.techniques import TECHNIQUES
 
 _MOST_UNSCATTERED = 0.05  # closed eyes and other collapsed charts of real scans stay under it
+
+_MOST_CLIPPED = 0.02
 
 
 def render(
@@ -47,7 +53,8 @@ def render(
         human, the head of the package, human:7, a person by seed, or a person's numbers (.json); a sample
         (lee_perry_smith), a mesh (.glb .gltf .obj .ply) or a scene (.toml).
     output:
-        Image to write: .png (sRGB, 8 bit) or .exr (linear Rec. 709, float).
+        Image to write: .png (sRGB, 8 bit) or .exr (linear Rec. 709, float); with --background none it has
+        alpha.
     as_json:
         Print one JSON object with the timings of a warm frame.
     """
@@ -55,19 +62,34 @@ def render(
     from dermis.images.io import check_output
 
     check_output(output)
-    with working_on("loading"):
-        described, settings = assemble(head, scene)
-    return _draw_and_report(described, settings, output, adapter, as_json, started)
+    from dermis.frame.renderer import Renderer
+
+    with _uncollected(), ThreadPoolExecutor(1) as beside:
+        opening = beside.submit(Renderer, adapter)  # its driver starts and compiles while the head loads
+        with working_on("loading"):
+            described, settings = assemble(head, scene)
+        return _draw_and_report(described, settings, output, opening, as_json, started)
+
+
+@contextlib.contextmanager
+def _uncollected() -> Iterator[None]:
+    """No search for garbage: one picture leaves little, and a search looks through all libraries."""
+    was = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was:
+            gc.enable()
 
 
 def _draw_and_report(
-    scene: Any, settings: Any, output: Path, adapter: str, as_json: bool, started: float
+    scene: Any, settings: Any, output: Path, opening: Future[Any], as_json: bool, started: float
 ) -> int:
-    from dermis.frame.renderer import Renderer
     from dermis.images.io import write_image, write_png
 
     with working_on("rendering"):
-        renderer = Renderer(adapter)
+        renderer = opening.result()
         rendered = renderer.draw(scene, settings)
         setup_ms = rendered.setup_ms
         if as_json:  # the first frame fills caches; a warm one is timed
@@ -78,15 +100,18 @@ def _draw_and_report(
         why = "their uv is collapsed, mirrored onto other skin, or thinner than a texel of the atlas"
         note(f"note: {share} are lit without scattering: {why}")
     _note_light(scene, settings, rendered.suns)
+    _note_clipped(rendered)
+    with_alpha = settings.background == "none"
     if output.suffix.lower() == ".png":
-        write_png(output, rendered.srgb8())
+        write_png(output, rendered.rgba8() if with_alpha else rendered.srgb8())
     else:
-        write_image(output, rendered.linear())
+        write_image(output, rendered.linear_rgba() if with_alpha else rendered.linear())
     report = {
         "image": str(output),
         "adapter": renderer.device.adapter.name,
         "size": list(settings.size),
         "atlas": settings.atlas,
+        "exposure": rendered.exposure,
         "gaussians": rendered.gaussians,
         "gpu_ms": rendered.gpu_ms,
         "frame_ms": rendered.frame_ms,
@@ -108,6 +133,12 @@ def _note_light(scene: Any, settings: Any, suns: int) -> None:
         note(f"note: {peaks} of {name} {shine} with shadows, the rest from all around")
     if settings.gamma == "wrong":
         note("note: --gamma wrong shades encoded colours, which is a mistake: for comparison only")
+
+
+def _note_clipped(rendered: Any) -> None:
+    if (share := rendered.clipped()) > _MOST_CLIPPED:
+        remedy = f"take less than --exposure {rendered.exposure:.3g}, or --tone neutral"
+        note(f"note: {share:.0%} of the head is brighter than the picture can show: {remedy}")
 
 
 def _thanks(attribution: str) -> list[str]:

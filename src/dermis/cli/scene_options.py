@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from dermis.cli.eye_options import EYE, EyeLooks, note_eyes
 from dermis.cli.options import check, option_name, options_of, refuse_options
 from dermis.cli.pose_options import (
     LookAt,
@@ -21,8 +22,8 @@ from dermis.cli.pose_options import (
 )
 from dermis.errors import refuse
 from dermis.scene.environment import Environment
-from dermis.scene.head_table import NO_REGIONS, HeadTable, names_regions
-from dermis.scene.settings import Settings
+from dermis.scene.head_table import NO_REGIONS, EyeTable, HeadTable, names_regions
+from dermis.scene.settings import PHOTOGRAPHED, Settings
 from dermis.scene.skin import PRESETS, Skin
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ AROUND |= {"name": "env", "rotation_degrees": "env_rotation"}
 
 if not TYPE_CHECKING:
     HeadOptions = options_of(HeadTable, without=("name",), names=HEAD)
-    SkinOptions, SettingsOptions = options_of(Skin), options_of(Settings)
+    SkinOptions, SettingsOptions = options_of(Skin), options_of(Settings, defaults=PHOTOGRAPHED)
     EnvironmentOptions = options_of(Environment, names=AROUND)
 
 
@@ -62,8 +63,8 @@ class SceneOptions:
     lights: Annotated[
         str | None,
         Parameter(
-            help="A rig (studio, window, top, rim, rembrandt, laser, none) or a TOML file with [[lights]]; "
-            "studio unless --env is given."
+            help="A rig (studio, window, top, rim, backlit, rembrandt, laser, none) or a TOML file with "
+            "[[lights]]; studio unless --env is given."
         ),
     ] = None
     around: EnvironmentOptions = field(default_factory=dict)
@@ -72,6 +73,7 @@ class SceneOptions:
         Parameter(help="portrait, three-quarter, profile, ear, cheek, or a TOML file with [camera]."),
     ] = None
     head: HeadOptions = field(default_factory=dict)
+    eye: EyeLooks = None
     pose: Weights = None
     bone: Turns = None
     look_at: LookAt = None
@@ -81,12 +83,18 @@ DEFAULTS = SceneOptions()
 
 
 def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
-    """The scene and its settings: those of a head or of a scene's file, with the options given on top."""
+    """The scene and its settings: those of a head or of a scene's file, with the options given on top.
+
+    What neither says is as in `PHOTOGRAPHED`.
+    """
     from dermis.scene import Scene, load_camera
 
     weights, turns = parse_weights(given.pose or ()), parse_turns(given.bone or ())
+    if given.eye:
+        given = replace(given, head=given.head | {"eye": parse_weights(given.eye, EYE)}, eye=None)
     _check(name, given)
     scene, settings = _begin(name, given)
+    note_eyes(scene.head, given.head.get("eyes"))
     if weights or turns:
         scene = replace(scene, pose=laid_over(pose_given(weights, turns, scene.head, name), scene.pose))
     environment = _environment(scene.environment, given.around)
@@ -100,7 +108,7 @@ def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     )
     if given.look_at is not None:
         made = replace(made, pose=gaze_given(given.look_at, made))
-    return made, Settings(**(settings.model_dump() | given.settings))
+    return made, Settings(**{**PHOTOGRAPHED, **settings.model_dump(exclude_unset=True), **given.settings})
 
 
 def _check(name: str, given: SceneOptions) -> None:
@@ -108,6 +116,8 @@ def _check(name: str, given: SceneOptions) -> None:
     from dermis.environment.panorama import panorama_file
     from dermis.optics.profiles import load_profile
 
+    looks = given.head.get("eye", {})
+    check(EyeTable, looks, {field_: f"eye {field_}" for field_ in looks})
     check(HeadTable, {"name": name} | given.head, HEAD)
     check(Skin, given.skin)
     check(Settings, given.settings)
@@ -128,10 +138,9 @@ def _begin(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
         return load_scene(Path(name))
     alike = {"regions": NO_REGIONS} if given.surface == "deck-2007" else {}
     table = HeadTable(**{"name": name, **alike, **given.head})
-    for field_ in ("rho_s", "roughness"):
-        if names_regions(vars(table)) and field_ in given.skin:
-            came = "it came with --regions, which says it for each region"
-            refuse(option_name(field_), "one or the other", came, "Leave one out, or use --oiliness")
+    if names_regions(vars(table)) and "rho_s" in given.skin:
+        came = "it came with --regions, which says it for each region"
+        refuse(option_name("rho_s"), "one or the other", came, "Leave one out, or use --oiliness")
     head, skin = head_and_skin(table, Skin(), Path())
     return Scene(head, skin=skin), Settings()
 

@@ -1,4 +1,4 @@
-"""`dermis view`: a head to turn in one's hands."""
+"""`dermis view`: a head in an interactive window or web page."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def view(
 ) -> int:
     """Turn a head, its skin and its light in a window or in a web page.
 
-    Drag to turn, right drag to pan, wheel to come nearer, double click to turn around a place, Shift and
-    drag to carry the light. Keys 1 to 5 are the camera presets, Space plays and pauses a motion, Tab hides
+    Drag to turn, right drag to pan, wheel to zoom, double click to turn around a place, Shift-drag
+    to move the light. Keys 1 to 5 are the camera presets, Space plays and pauses a motion, Tab hides
     the panel, ? shows all keys, Ctrl+Z and Ctrl+Y undo and redo. The panel saves the scene as a TOML file
     that `dermis render` takes. The options are those of `dermis render`; --size is the window's, 1280x800
     when left out.

@@ -25,10 +25,11 @@ _NEAR_DEGREES = 8.0
 _LEAST_SHARE = 0.05  # of the irradiance that the mean radiance gives
 
 
-def load_panorama(name: str) -> Floats:
+def load_panorama(name: str, most_rows: int = _MOST_ROWS) -> Floats:
     """(h, w, 3) radiance, linear Rec. 709; the picture's middle is -Z, its right +X, its top +Y.
 
     name : a sample, a file (.hdr, .exr), or "uniform"
+    most_rows : of what is returned; where the picture has more, they are averaged
 
     Raises DermisError for any other name, and for a picture that holds no radiance.
     """
@@ -48,7 +49,7 @@ def load_panorama(name: str) -> Floats:
     if width != 2 * height:
         came, remedy = f"it is {width}x{height}", "Export it as latitude and longitude"
         refuse(name, "a picture twice as wide as high", came, remedy)
-    return resampled(rgb.astype(np.float32, copy=False), min(max(height, _LEAST_ROWS), _MOST_ROWS))
+    return resampled(rgb.astype(np.float32, copy=False), min(max(height, _LEAST_ROWS), most_rows))
 
 
 def directions(height: int, width: int) -> Floats:

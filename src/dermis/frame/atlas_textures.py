@@ -20,6 +20,7 @@ from dermis.gpu.textures import texture_from
 _HALVING = "halved 2"  # raise when `halved` gives other results
 ENTRY_BYTES = 16
 """Of a texel in a list of gutters, as gutter.wgsl reads it."""
+_LIGHT = 16  # bytes of what a texel beyond a chart shows
 _GUTTER_BIT = 1 << 15  # of the first number of a texel's reach, see reach.wgsl
 
 
@@ -118,9 +119,8 @@ def _uploaded(device: Device, sheet: Sheet, resources: dict[str, Any], **more: A
     if not len(sheet.gutter):
         return AtlasTextures(resources, **more)
     beyond = np.concatenate([sheet.source.view(np.uint32), sheet.gutter.astype(np.uint32)], axis=1)
-    light = np.zeros((len(beyond), 4), np.float32)
-    gutter, gathered = (device.buffer(words, "STORAGE") for words in (beyond, light))
-    lists = {"gutter": gutter, "gathered": scratch(device, gathered)}
+    gathered = scratch(device, device.space(_LIGHT * len(beyond)))
+    lists = {"gutter": device.buffer(beyond, "STORAGE"), "gathered": gathered}
     return AtlasTextures(resources, gutter_texels=sheet.gutter, **lists, **more)
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dermis.frame.inputs import Inputs
 from dermis.frame.passes import (
+    background,
     bloom,
+    meter,
     moving_occlusion,
     post,
     shade,
@@ -39,9 +41,13 @@ def draw_frame(graph: Graph, inputs: Inputs, technique: Technique) -> None:
     look, apart = (inputs.lit, inputs.view, inputs.constants), technique.apart(made.own)
     radiance = shade.draw(graph, *look, made.visibility, below, made.picture, apart)
     radiance = technique.finish(graph, inputs, radiance)
+    seen = inputs.lit, inputs.view, inputs.light_constants
     if made.strands:
-        seen = inputs.lit, inputs.view, inputs.light_constants
         radiance = strands.draw(graph, made.strands, seen, made.head, made.visibility.texture, radiance)
+    if made.meter:
+        meter.draw(graph, made.meter, seen, made.visibility.texture, radiance)
+    if made.backdrop:
+        radiance = background.draw(graph, made.backdrop, seen[:2], radiance, made.meter, inputs.settings)
     if made.glow:
         radiance = bloom.draw(graph, made.glow, radiance, inputs.settings.bloom)
-    post.draw(graph, radiance, made.picture, inputs.settings)
+    post.draw(graph, radiance, made.picture, inputs.settings, made.meter)

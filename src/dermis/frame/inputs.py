@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -14,7 +13,9 @@ from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.curvature import Curvature
 from dermis.frame.geometry import HeadResources
 from dermis.frame.levels import Blur, Levels
+from dermis.frame.passes.background import Backdrop
 from dermis.frame.passes.bloom import Glow
+from dermis.frame.passes.meter import Meter
 from dermis.frame.passes.moving_occlusion import Sky
 from dermis.frame.passes.painting.expression import Face
 from dermis.frame.passes.post import Picture
@@ -40,7 +41,7 @@ from dermis.gpu import ComputeProgram, Constants
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import PARTS
 from dermis.mesh.outline import Outline
-from dermis.scene.camera import Camera
+from dermis.scene.camera import Camera, Window
 from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
@@ -67,6 +68,8 @@ class Resources:
     sky : the open sky at the head's vertices, None where occlusion does not follow its shape
     gaussians : terms of the profile
     strands : hairs, None for none
+    meter : what meters the exposure, None where it is given
+    backdrop : space for what is behind the head, None for nothing
     glow : space for the bloom, None without one
     unscattered : share of the skin's triangles that the atlas cannot hold
     """
@@ -91,6 +94,8 @@ class Resources:
     gaussians: int
     strands: StrandResources | None
     picture: Picture
+    meter: Meter | None
+    backdrop: Backdrop | None
     glow: Glow | None
     unscattered: float
 
@@ -105,7 +110,7 @@ class Inputs:
     shadow_views : how the shadow maps see the head
     light_constants : pipeline constants of what is lit
     camera : how the picture's samples see the head
-    half : tangents of the half angles of view, across and up
+    seen : what the picture shows of a plane before the eye
     around : how the sky sees the head, and the shader's record of it; None where occlusion does not move
     view, constants : record of the shading pass, and its pipeline constants
     """
@@ -119,7 +124,7 @@ class Inputs:
     shadow_views: Views
     light_constants: Constants
     camera: Views
-    half: tuple[float, float]
+    seen: Window
     around: tuple[Look, Any] | None
     view: Any
     constants: Constants
@@ -134,12 +139,23 @@ class Pinhole(NamedTuple):
     """Where a camera is and what it sees.
 
     axes : right, up and forward
-    half : tangents of the half angles of view, across and up
+    window : of a plane before the eye
     """
 
     eye: Triple
     axes: Axes
-    half: tuple[float, float]
+    window: Window
+
+
+class EyesSeen(NamedTuple):
+    """How eyes of true shape stand in a motion.
+
+    frames : (2, 4, 4) from the head's space to each eye's
+    edges_mm : (2, r, 3) the edges of the lids around each; between two, a point of a smooth curve is put
+    """
+
+    frames: NDArray[np.float64]
+    edges_mm: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -159,15 +175,14 @@ class Split:
 def pinhole(camera: Camera, head: Head, settings: Settings) -> Pinhole:
     """The camera as the renderer takes it."""
     eye, path = place_of(camera.position, head.centre_mm), between(camera.position, camera.target)
-    half = 0.5 * camera.frame_mm / math.hypot(*path)
     width, height = settings.size
-    return Pinhole(eye, axes_of(path, camera.up), (half * width / height, half))
+    return Pinhole(eye, axes_of(path, camera.up), camera.window(width / height))
 
 
 def camera_views(pinhole: Pinhole, outline: Outline, samples: int) -> Views:
     """What the camera sees at each sample of the pixel."""
     rows = rows_of(pinhole.eye, pinhole.axes)
-    clip = perspective(rows, pinhole.half, *depth_range(outline, rows))
+    clip = perspective(rows, pinhole.window, *depth_range(outline, rows))
     return Views(np.array([clip]), pixel_samples(samples))
 
 
@@ -189,7 +204,6 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Sp
         relit=split.relit,
         total=split.total,
         shown=_PARTS[settings.parts],
-        background=np.divide(settings.background, settings.exposure),
         material_colour=colours,
         jitter=jitter,
     )
@@ -198,19 +212,26 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Sp
             record["eyes"][name] = getattr(head.eyes.look, name)
         record["eyes"]["seed"] = head.eyes.look.seed % _EYE_SEEDS
         record["eyes"]["material"] = head.eyes.material
+        record["eyes"]["middle_mm"] = head.eyes.middle_mm
     return record
 
 
-def seen_by(view: Any, pinhole: Pinhole, eyes: NDArray[np.float64] | None) -> Any:
+def seen_by(view: Any, pinhole: Pinhole, eyes: EyesSeen | None) -> Any:
     """A shading pass' record with the rays of a camera.
 
-    eyes : (2, 4, 4) from the head's space to that of each eye of true shape, if it has such
+    eyes : of true shape, if it has such
     """
-    eye, (right, up, forward), half = pinhole
+    eye, (right, up, forward), (half, shift) = pinhole
     # Its bytes: numpy's own copy takes the members one by one, and has anything between them.
     record: Any = np.ndarray((), view.dtype, bytearray(view.tobytes()))
     record["eye"], record["forward"] = eye, forward
     record["right"], record["up"] = tuple(half[0] * c for c in right), tuple(half[1] * c for c in up)
+    record["shift"] = shift
     if eyes is not None:
-        record["eyes"]["to_own"] = eyes.transpose(0, 2, 1)  # by columns
+        record["eyes"]["to_own"] = eyes.frames.transpose(0, 2, 1)  # by columns
+        edges = eyes.edges_mm
+        a, b, c = (np.roll(edges, -k, axis=1) for k in (-1, 1, 2))
+        both = np.stack([edges, (9.0 * (edges + b) - a - c) / 16.0], axis=2).reshape(2, -1, 3)
+        whole = np.concatenate([both, np.ones((*both.shape[:2], 1))], axis=-1)
+        record["lids"] = np.einsum("kij,krj->kri", eyes.frames, whole).reshape(-1, 4)
     return record

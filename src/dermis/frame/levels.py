@@ -17,38 +17,40 @@ HALVES = "rgba16float"
 MOST_HALVINGS = 3
 _BRIGHT = 16.0  # scaled irradiance of all lights, a 4000th of the largest half
 _MOST_SCALED = 2.0**100  # its inverse is a float too; light that would need more counts as none
+Halvings = tuple[tuple[int, ...], ...]
+"""Of each layout, how often the resolution of each level is halved, see `Blur`."""
 SHARP = 0.45  # least standard deviation [mm] of a halved level, over its squared texel side [mm^2]
 
 
 @dataclass(frozen=True, eq=False)
 class Levels:
-    """Textures for light and its blurred levels, layer 0 unblurred, and for light between two passes.
+    """Textures for light and its blurred levels, level 0 unblurred, and for light between two passes.
 
-    A level that is halved k times is in mip k of its layer.
-
+    stacks : for each number of halvings a texture with a layer for each level of that resolution, before
+        them the last finer one, halved
+    first : the level in the first layer of each
     texel : format of the textures
     """
 
-    stack: Any
+    stacks: tuple[Any, ...]
+    first: tuple[int, ...]
     scratch: Any
     size: int
     texel: str
     _views: dict[tuple[int, int], Any] = field(default_factory=dict)
 
     def layer(self, k: int, halvings: int = 0) -> Any:
-        """A view of one layer."""
-        return self._view(self.stack, k, halvings)
+        """A view of level k at one resolution."""
+        if (k, halvings) not in self._views:
+            layer = k - self.first[halvings]
+            self._views[k, halvings] = _view(self.stacks[halvings], layer=layer)
+        return self._views[k, halvings]
 
     def spare(self, halvings: int = 0) -> Any:
         """A view of the texture between two passes."""
-        return self._view(self.scratch, -1, halvings)
-
-    def _view(self, texture: Any, k: int, mip: int) -> Any:
-        if (k, mip) not in self._views:
-            options = {"dimension": "2d", "array_layer_count": 1, "mip_level_count": 1}
-            view = texture.create_view(base_array_layer=max(0, k), base_mip_level=mip, **options)
-            self._views[k, mip] = view
-        return self._views[k, mip]
+        if (-1, halvings) not in self._views:
+            self._views[-1, halvings] = _view(self.scratch, mip=halvings)
+        return self._views[-1, halvings]
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class Blur:
     """How light spreads over an atlas.
 
     variance_mm2, weight : (k,) increasing, and (k, 3) of the Gaussians
-    halvings : how often the resolution of each layer is halved, that of the unblurred one first
+    halvings : how often the resolution of each level is halved, that of the unblurred one first
     scale : factor of the light in the layers
     edge : what lies beyond a chart's edge and its gutter: "repeated", "cleared" or "skipped"
     clear : the light that empty texels show when the edge is "cleared"
@@ -75,15 +77,32 @@ def usual_texel(device: Device) -> str:
     return FLOATS if device.adapter.kind == "CPU" else HALVES
 
 
-def make_levels(device: Device, size: int, count: int, texel: str, halved: bool = True) -> Levels:
-    """Space for the light that enters and `count` blurred levels of the format `texel`.
+def make_levels(device: Device, size: int, halvings: Halvings, texel: str) -> Levels:
+    """Space for the light that enters and the blurred levels, of the format `texel`."""
+    held = layers_of(halvings)
+    stacks = tuple(
+        make_texture(device, (size >> times,) * 2, texel, layers=len(levels))
+        for times, levels in enumerate(held)
+    )
+    between = scratch(device, make_texture(device, (size, size), texel, mips=len(held)))
+    return Levels(stacks, tuple(levels.start for levels in held), between, size, texel)
 
-    halved : whether there may be levels of less resolution
-    """
-    mips = 1 + sum(size % 2**times == 0 for times in range(1, MOST_HALVINGS + 1)) if halved else 1
-    stack = make_texture(device, (size, size), texel, layers=max(2, count + 1), mips=mips)
-    between = scratch(device, make_texture(device, (size, size), texel, mips=mips))
-    return Levels(stack, between, size, texel)
+
+def layers_of(halvings: Halvings) -> tuple[range, ...]:
+    """The levels that are held at each resolution."""
+    coarsest = max(map(max, halvings))
+    return tuple(
+        range(
+            min(one.index(times) for one in halvings if times in one) - (times > 0),
+            max(len(one) - one[::-1].index(times) for one in halvings if times in one),
+        )
+        for times in range(coarsest + 1)
+    )
+
+
+def _view(texture: Any, layer: int = 0, mip: int = 0) -> Any:
+    options = {"dimension": "2d", "array_layer_count": 1, "mip_level_count": 1}
+    return texture.create_view(base_array_layer=layer, base_mip_level=mip, **options)
 
 
 def scale_of(texel: str, brightest: float) -> float:
@@ -97,12 +116,12 @@ def scale_of(texel: str, brightest: float) -> float:
 
 
 def halvings_of(variance_mm2: NDArray[np.float64], texels_per_mm: float, most: int) -> tuple[int, ...]:
-    """How often the resolution of each layer may be halved, the unblurred one included.
+    """How often the resolution of each level may be halved, the unblurred one included.
 
     Texels twice as large need a blur four times as wide: what they lose in the sparse parts of a map is then
     as small a part of the image (docs/performance.md has the errors).
 
-    variance_mm2 : of the blurred layers, increasing
+    variance_mm2 : of the blurred levels, increasing
     texels_per_mm : of the map
     """
     found = [0]

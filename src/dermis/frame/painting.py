@@ -27,7 +27,7 @@ def painting_numbers() -> dict[str, float]:
     """Numbers that the shaders fill in."""
     names = {name: len(names) for name, names in _NAMES.items()}
     own = {"degrees": float(DEGREES), "tile_mm": TILE_MM, "folding": FOLDING}
-    return own | names | sizes() | {"noise_rows": len(noise_table())}
+    return own | names | sizes() | {"noise_rows": len(noise_table()), "amount_rows": len(AMOUNTS) // 4}
 
 
 def _members(names: Sequence[str]) -> Callable[[], Sequence[Member]]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.frame.asked import Asked
 from dermis.frame.atlas_layout import AtlasLayout
-from dermis.frame.inputs import Inputs, camera_views, pinhole, seen_by
+from dermis.frame.inputs import EyesSeen, Inputs, camera_views, pinhole, seen_by
 from dermis.frame.levels import Blur, scale_of
 from dermis.frame.lights import light_constants, light_records, light_views
 from dermis.frame.passes.moving_occlusion import sky_record
@@ -42,7 +42,7 @@ class Moved(NamedTuple):
 
     motion: MotionBytes
     outline: Outline
-    eyes: NDArray[np.float64] | None
+    eyes: EyesSeen | None
 
 
 class Preparation:
@@ -91,7 +91,7 @@ class Preparation:
             shadow_views=layers,
             light_constants=shone_on,
             camera=camera_views(seen_from, moved.outline, settings.samples),
-            half=seen_from.half,
+            seen=seen_from.window,
             around=self._around(head, scene.motion, moved.outline) if resources.sky else None,
             view=seen_by(resources.view, seen_from, moved.eyes),
             constants=resources.constants + shone_on,
@@ -110,7 +110,7 @@ class Preparation:
 
 def _person(scene: Scene) -> Any:
     """Where the control points rest, if not where the head's own do."""
-    motion, own = scene.motion, scene.head.positions_mm
+    motion, own = scene.motion, scene.head.control.positions_mm
     return None if motion is None or motion.positions_mm is own else motion.positions_mm
 
 
@@ -123,8 +123,10 @@ def _resting(head: Head) -> Moved:
     return Moved(resting(head.control), head.mesh.outline, _eyes(head, head.control.rest))
 
 
-def _eyes(head: Head, motion: Motion) -> NDArray[np.float64] | None:
-    return None if head.eyes is None else head.eyes.frames(head.control, motion)
+def _eyes(head: Head, motion: Motion) -> EyesSeen | None:
+    if head.eyes is None:
+        return None
+    return EyesSeen(head.eyes.frames(head.control, motion), head.control.edges_mm(motion))
 
 
 def _posed(head: Head, motion: Motion, at_rest: MotionBytes) -> Moved:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.errors import refuse
 from dermis.mesh.outline import Outline
+from dermis.scene.camera import Window
 from dermis.scene.lights import PointLight
 
 Vec = NDArray[np.float64]
@@ -22,6 +23,7 @@ Rows = tuple[Row, Row, Row]
 _WIDEST_LIGHT = math.tan(math.radians(80.0))
 _NEAREST_MM = 1.0
 _UP = 0.0, 1.0, 0.0
+_CENTRED = 0.0, 0.0
 MIDDLE = np.full((1, 2), 0.5)
 """The one place of a sample in the pixel: its middle."""
 
@@ -122,15 +124,17 @@ def rows_of(eye: Triple, axes: Axes) -> Rows:
     return (*right, -_dot(right, eye)), (*up, -_dot(up, eye)), (*forward, -_dot(forward, eye))
 
 
-def perspective(rows: Rows, half: tuple[float, float], near: float, far: float) -> list[Sequence[float]]:
-    """Rows of the matrix to clip space, for tangents `half` of the half angles; depth 1 at near, 0 at far.
+def perspective(rows: Rows, window: Window, near: float, far: float) -> list[Sequence[float]]:
+    """Rows of the matrix to clip space for a window before the eye; depth 1 at near, 0 at far.
 
     Floats are densest at 0: reversed depth is evenly precise over the whole range.
     """
     scale = -near / (far - near)
     depth = [scale * c for c in rows[2]]
     depth[3] -= far * scale
-    return [[c / half[0] for c in rows[0]], [c / half[1] for c in rows[1]], depth, rows[2]]
+    along = zip(rows, window.half, window.shift, strict=False)
+    across = [[c / half - shift * w for c, w in zip(row, rows[2], strict=True)] for row, half, shift in along]
+    return [*across, depth, rows[2]]
 
 
 def depth_range(outline: Outline, rows: Rows) -> tuple[float, float]:
@@ -166,7 +170,9 @@ def point_views(
         (1.02 * h, max(0.98 * n - slack, 0.1 * n), 1.02 * f + slack)
         for h, n, f in zip(steepest, near, far, strict=True)
     ]
-    clips = [perspective(r, (h, h), n, f) for r, (h, n, f) in zip(rows, bounds, strict=True)]
+    clips = [
+        perspective(r, Window((h, h), _CENTRED), n, f) for r, (h, n, f) in zip(rows, bounds, strict=True)
+    ]
     return [
         ShadowView(clip, 2.0 * h / size, eye, right, up, n, f)
         for clip, eye, (right, up, _), (h, n, f) in zip(np.array(clips), eyes, axes, bounds, strict=True)

@@ -9,10 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.frame.passes.meter import Meter, read_meter
 from dermis.frame.passes.pack import Leaving
 from dermis.frame.passes.post import Picture
 from dermis.gpu import Device, download
 from dermis.gpu.device import gpu_failures
+from dermis.scene.settings import Settings
+
+_MOST = 255
 
 
 @dataclass(frozen=True)
@@ -25,7 +29,9 @@ class Rendered:
     gaussians : levels of the profile
     unscattered : share of the skin's triangles that the atlas cannot hold; they are lit directly
     suns : sun-like peaks of the environment that shine as lights of their own
-    leave : starts reading the picture's bytes back
+    settings : what it was drawn with
+    leave : starts reading the picture back, as `pack.draw` does
+    meter : what metered the exposure, None where it was given
     """
 
     device: Device
@@ -36,8 +42,18 @@ class Rendered:
     gaussians: int
     unscattered: float
     suns: int
-    leave: Callable[[Picture], Leaving]
+    settings: Settings
+    leave: Callable[..., Leaving]
+    meter: Meter | None
     is_current: Callable[[], bool]
+
+    @property
+    def exposure(self) -> float:
+        """Factor from radiance to the picture, metered or given."""
+        if self.meter is None:
+            return float(self.settings.exposure)
+        self._check_current()
+        return read_meter(self.device, self.meter)
 
     def linear(self) -> NDArray[np.float32]:
         """(h, w, 3) linear Rec. 709 after bloom and exposure, float32."""
@@ -45,9 +61,29 @@ class Rendered:
 
     def srgb8(self) -> NDArray[np.uint8]:
         """(h, w, 3) sRGB bytes, with the tone curve, encoded on the device."""
+        return self._leave()
+
+    def rgba8(self) -> NDArray[np.uint8]:
+        """(h, w, 4) sRGB bytes over the background "none": alpha is what the head covers of each pixel.
+
+        Colours are not multiplied by it, as PNG has it.
+        """
+        return self._leave(alpha=self.settings)
+
+    def linear_rgba(self) -> NDArray[np.float32]:
+        """(h, w, 4) float32 over the background "none", multiplied by alpha as OpenEXR has it."""
+        return self._read(self.picture.exposed)
+
+    def clipped(self) -> float:
+        """Share of the head's pixels with a part that is brighter than the picture's bytes can show."""
+        levels = self._read(self.picture.bytes)
+        head = levels[levels[..., 3] == _MOST]
+        return float((head[:, :3].max(axis=1) == _MOST).mean()) if len(head) else 0.0
+
+    def _leave(self, **how: Any) -> NDArray[Any]:
         self._check_current()
         with gpu_failures(self.device):
-            return self.leave(self.picture).image()
+            return self.leave(self.picture, **how).image()
 
     def _read(self, texture: Any) -> NDArray[Any]:
         self._check_current()

@@ -11,6 +11,7 @@ from typing import Any, Literal, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.errors import refuse
 from dermis.frame.frame import draw_frame
 from dermis.frame.inputs import Inputs
 from dermis.frame.passes import pack, warm_up
@@ -21,6 +22,8 @@ from dermis.frame.rendered import Rendered
 from dermis.gpu import Frame, Graph, open_device
 from dermis.gpu.device import gpu_failures
 from dermis.gpu.frame import Timed
+from dermis.mesh.head import Head
+from dermis.scene.given import given_plain, shown_value
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES
@@ -74,7 +77,8 @@ class Renderer:
 
         Raises DermisError for sizes over the device's limits and when the device fails.
         """
-        settings = settings or Settings()
+        settings = given_plain(Settings, settings or {}, "settings", "size=(512, 512)")
+        scene = Scene.of(scene)
         with gpu_failures(self.device):
             started = time.perf_counter()
             inputs = self.prepare(scene, settings, view)
@@ -98,7 +102,9 @@ class Renderer:
             made.gaussians,
             made.unscattered,
             made.suns,
+            inputs.settings,
             self._leave,
+            made.meter,
             is_current=lambda: number == self._frames,
         )
 
@@ -134,39 +140,40 @@ class Renderer:
         while len(self._in_flight) > _IN_FLIGHT:
             self.device.wait(self._in_flight.popleft())
 
-    def _leave(self, picture: Picture) -> Leaving:
+    def _leave(self, picture: Picture, **how: Any) -> Leaving:
         self.graph.begin()
-        leaving = pack.draw(self.graph, picture)
+        leaving = pack.draw(self.graph, picture, **how)
         self.graph.submit()
         return leaving
 
-    def render(self, scene: Scene, **settings: Any) -> NDArray[np.float32]:
+    def render(self, scene: Scene | Head, **settings: Any) -> NDArray[np.float32]:
         """(h, w, 3) float32 linear Rec. 709 image; `settings` are those of `Settings`."""
-        return self.draw(scene, Settings(**settings)).linear()
+        return self.draw(Scene.of(scene), Settings(**settings)).linear()
 
     @overload
     def render_many(
-        self, scenes: Iterable[Scene], *, linear: Literal[False] = False, **settings: Any
+        self, scenes: Iterable[Scene], *, linear: Literal[False] = False, alpha: bool = False, **settings: Any
     ) -> Iterator[NDArray[np.uint8]]: ...
 
     @overload
     def render_many(
-        self, scenes: Iterable[Scene], *, linear: Literal[True], **settings: Any
+        self, scenes: Iterable[Scene], *, linear: Literal[True], alpha: bool = False, **settings: Any
     ) -> Iterator[NDArray[np.float32]]: ...
 
     def render_many(
-        self, scenes: Iterable[Scene], *, linear: bool = False, **settings: Any
+        self, scenes: Iterable[Scene], *, linear: bool = False, alpha: bool = False, **settings: Any
     ) -> Iterator[NDArray[Any]]:
         """(h, w, 3) sRGB bytes of each scene in turn, each yielded while the next ones are drawn.
 
         linear : float32 linear Rec. 709 instead, as of `render`
+        alpha : (h, w, 4) as of `Rendered.rgba8` and `linear_rgba`
         settings : those of `Settings`, for all of them; heads and textures that scenes share are loaded once
 
         Raises DermisError as `draw` does.
         """
         chosen, leaving = Settings(**settings), deque[Leaving]()
         for scene in scenes:
-            leaving.append(self._send(scene, chosen, linear))
+            leaving.append(self._send(scene, chosen, linear, alpha))
             if len(leaving) >= _IN_FLIGHT:
                 yield self._arrived(leaving.popleft())
         while leaving:
@@ -176,18 +183,23 @@ class Renderer:
         with gpu_failures(self.device):
             return leaving.image()
 
-    def _send(self, scene: Scene, settings: Settings, linear: bool) -> Leaving:
+    def _send(self, scene: Scene, settings: Settings, linear: bool, alpha: bool) -> Leaving:
         """Submit a frame and start reading its picture back."""
         with gpu_failures(self.device):
-            inputs = self.prepare(scene, settings)
-            _, leaving = self._submit(inputs, False, False, partial(pack.draw, linear=linear))
+            inputs = self.prepare(Scene.of(scene), settings)
+            leave = partial(pack.draw, linear=linear, alpha=settings if alpha else None)
+            _, leaving = self._submit(inputs, False, False, leave)
         assert leaving is not None
         return leaving
 
 
-def render(scene: Scene, adapter: str = "auto", **settings: Any) -> NDArray[np.float32]:
+def render(scene: Scene | Head, adapter: str = "auto", **settings: Any) -> NDArray[np.float32]:
     """(h, w, 3) float32 linear Rec. 709 image of a scene; for many images keep a `Renderer`.
 
+    scene : or a head alone, which gets studio light and the camera of a portrait
     settings : those of `Settings`: size, atlas, samples, technique, exposure, ...
     """
-    return Renderer(adapter).render(scene, **settings)
+    if not isinstance(adapter, str):
+        remedy = "Write dermis.Renderer().draw(scene, settings).linear() for a Settings object"
+        refuse("adapter", "its name, and settings by name", f"{shown_value(adapter)} came", remedy)
+    return Renderer(adapter).render(Scene.of(scene), **settings)

@@ -17,12 +17,13 @@ from dermis.frame.curvature import Curvature, make_curvature, no_curvature
 from dermis.frame.geometry import HeadResources, upload_geometry
 from dermis.frame.gutters import Walks, make_walks, with_lists
 from dermis.frame.inputs import Resources, view_record
-from dermis.frame.levels import Blur, Levels
+from dermis.frame.levels import Blur, Halvings, Levels
 from dermis.frame.limits import check_limits
 from dermis.frame.maps import fine_detail, upload_maps
-from dermis.frame.passes import bloom, post, shade, shadows, surface_texels, visibility_buffer
+from dermis.frame.passes import shade, shadows, surface_texels, visibility_buffer
 from dermis.frame.passes.moving_occlusion import Sky, make_map, make_sky
 from dermis.frame.passes.shape import still_shape
+from dermis.frame.picture_resources import picture_resources
 from dermis.frame.resting import resting
 from dermis.frame.shape import Shape, ShapeTables, make_shape, shape_tables
 from dermis.frame.strands import (
@@ -61,20 +62,20 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     strands = _strands(memo, device, asked)
     shared = _shared(memo, device, asked, shadow_maps, curvature, strands)
     atlases = [_atlas(memo, device, asked, name, k) for k, name in enumerate(asked.atlases.layouts)]
-    uploaded: dict[str, Any] = memo.wait(maps)
-    shared |= uploaded | keep(fine_detail, device, asked.finely_painted)
+    shared |= memo.wait(maps) | keep(fine_detail, device, asked.finely_painted)
     layouts = [_layout(memo, device, asked, one, shape, person, shared, k) for k, one in enumerate(atlases)]
+    blurs = tuple(_blur(asked, textures) for _, textures in atlases) if asked.count else ()
     own, view = _shading(memo, device, asked)
     return Resources(
         shape=shape,
         person=person,
-        face=uploaded.get("face"),
+        face=shared.get("face"),
         head=layouts[0].head,
         layouts=tuple(layouts),
         shadow_maps=shadow_maps,
         scatters=asked.count > 0,
-        levels=_levels(memo, device, asked),
-        blurs=tuple(_blur(asked, textures) for _, textures in atlases) if asked.count else (),
+        levels=_levels(memo, device, asked, blurs),
+        blurs=blurs,
         scattered=_sum(memo, device, asked, settings.atlas, "both") if layouts[1:] else layouts[0].scattered,
         curvature=curvature,
         own=own,
@@ -85,9 +86,8 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         sky=_sky(memo, device, asked, layouts[0], tables) if asked.occlusion_moves else None,
         gaussians=len(asked.profile.variance_mm2),
         strands=strands,
-        picture=keep(post.make_picture, device, settings.size),
-        glow=keep(bloom.make_glow, device, settings.size) if settings.bloom else None,
         unscattered=keep(atlases[0][0].unscattered, asked.head.mesh),
+        **picture_resources(memo, device, asked),
     )
 
 
@@ -111,7 +111,7 @@ def _strands(memo: Memo, device: Device, asked: Asked) -> StrandResources | None
         return None
     tables = memo.keep(make_tables, device, asked.head.bare)
     picture = memo.keep(make_strand_picture, device, tables, asked.settings.size)
-    shadows = memo.keep(make_strand_shadows, device, asked.shadow_layers, of=asked.view)
+    shadows = memo.keep(make_strand_shadows, device, asked.shadow_layers, tables, of=asked.view)
     return StrandResources(tables, picture, shadows, memo.keep(skin_under, asked.head))
 
 
@@ -208,9 +208,9 @@ def _sum(memo: Memo, device: Device, asked: Asked, side: int, role: str) -> Any:
     return memo.keep(_make_sum, device, asked.technique, side, asked.light_of, of=of)
 
 
-def _levels(memo: Memo, device: Device, asked: Asked) -> Levels:
-    side = asked.settings.atlas if asked.count else 1
-    return memo.keep(_make_levels, device, asked.technique, side, asked.count, asked.light_of, of=asked.view)
+def _levels(memo: Memo, device: Device, asked: Asked, blurs: tuple[Blur, ...]) -> Levels:
+    side, halvings = asked.settings.atlas if blurs else 1, tuple(blur.halvings for blur in blurs) or ((0,),)
+    return memo.keep(_make_levels, device, asked.technique, side, halvings, asked.light_of, of=asked.view)
 
 
 def _blur(asked: Asked, atlas: AtlasTextures) -> Blur:
@@ -241,8 +241,8 @@ def _albedo(device: Device, model: str, fresnel: str) -> Any:
     return texture_from(device, albedo_table(model, fresnel), "rg32float")
 
 
-def _make_levels(device: Device, technique: Technique, side: int, count: int, _: str) -> Levels:
-    return technique.make_levels(device, side, count)
+def _make_levels(device: Device, technique: Technique, side: int, halvings: Halvings, _: str) -> Levels:
+    return technique.make_levels(device, side, halvings)
 
 
 def _make_sum(device: Device, technique: Technique, side: int, _: str) -> Any:

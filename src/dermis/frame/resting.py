@@ -20,6 +20,6 @@ def resting(
     index : of the atlas among several
     """
     own = person is None
-    positions, of = (head.positions_mm, "head") if own else (person, "person")
+    positions, of = (head.control.positions_mm, "head") if own else (person, "person")
     shape = memo.keep(rest_shape, device, tables, positions, of=of)
     return memo.keep(HeadResources.shaped, held, shape, of=f"{of} {index}")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.gpu import Device, make_texture
+from dermis.mesh.contact import Contact
 from dermis.mesh.geometry import vertex_normals
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
@@ -35,6 +36,7 @@ class ShapeTables:
     surface : the mesh, as shape_vertices.wgsl reads it
     control, points, vertices : counts
     targets, bones : counts
+    slides : whether some points stay off eyeballs
     """
 
     morphs: dict[str, Any]
@@ -45,6 +47,7 @@ class ShapeTables:
     vertices: int
     targets: int
     bones: int
+    slides: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +86,7 @@ def shape_tables(device: Device, head: Head) -> ShapeTables:
         vertices=len(mesh.positions),
         targets=len(rig.targets.names),
         bones=bones,
+        slides=rig.contact is not None,
     )
 
 
@@ -131,7 +135,12 @@ def _morph_tables(rig: Rig) -> dict[str, NDArray[Any]]:
     """Displacements and influences point by point."""
     count = len(rig.positions_mm)
     first, displacements = _by_point(rig.targets, count)
-    return {"first": first, "displacements": displacements, "influences": _influences(rig.skeleton, count)}
+    return {
+        "first": first,
+        "displacements": displacements,
+        "influences": _influences(rig.skeleton, count),
+        "contacts": _contacts(rig.contact, count),
+    }
 
 
 def _by_point(targets: MorphTargets, count: int) -> tuple[Words, NDArray[np.float32]]:
@@ -150,6 +159,16 @@ def _influences(skeleton: Skeleton | None, count: int) -> Words:
         return np.zeros((1, 8), np.uint32)
     weight = np.ascontiguousarray(skeleton.weight, np.float32).view(np.uint32)
     return np.ascontiguousarray(np.concatenate([skeleton.bone.astype(np.uint32), weight], axis=1))
+
+
+def _contacts(contact: Contact | None, count: int) -> Words:
+    """(p, 3) two points of the eyeball that each point stays off, and the least distance."""
+    if contact is None:
+        return np.zeros((1, 3), np.uint32)
+    found = np.zeros((count, 3), np.uint32)
+    clear = np.ascontiguousarray(contact.clear_mm, np.float32).view(np.uint32)
+    found[contact.point] = np.stack([contact.apex[contact.ball], contact.back[contact.ball], clear], axis=1)
+    return found
 
 
 def _stencil_tables(stencils: Stencils) -> dict[str, NDArray[Any]]:

@@ -10,7 +10,7 @@ from dermis.gpu import ComputeProgram
 from dermis.gpu.shader_types import struct_dtype
 from dermis.gpu.wgsl_source import Member
 from dermis.human import teeth
-from dermis.mesh.eyes import LIMBUS_MM, cornea_centre_mm, iris_mm
+from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_mm
 from dermis.mesh.maps import Maps
 from dermis.optics.directions import directions
 from dermis.optics.gaussians import GaussianSum
@@ -46,6 +46,9 @@ def eye_numbers() -> dict[str, float]:
     return {
         "cornea_at": cornea_centre_mm(),
         "limbus_mm": LIMBUS_MM,
+        "sclera_mm": SCLERA_MM,
+        "cornea_mm": CORNEA_MM,
+        "apex_at": apex_mm(),
         "iris_at": iris_mm(),
         "arch_mm": teeth.ARCH_MM,
         "crown_mm": teeth.CROWN_MM,

@@ -58,7 +58,9 @@ def _barycentric(scene: Scene, view: NDArray[np.void], triangle: Index, mask: ND
     height, width = mask.shape
     rows, columns = np.nonzero(mask)
     x, y = 2.0 * (columns + 0.5) / width - 1.0, 1.0 - 2.0 * (rows + 0.5) / height
-    forward, right, up, eye = (view[name].astype(np.float64) for name in ("forward", "right", "up", "eye"))
+    names = ("forward", "right", "up", "eye", "shift")
+    forward, right, up, eye, shift = (view[name].astype(np.float64) for name in names)
+    x, y = x + shift[0], y + shift[1]
     ray = forward + x[:, None] * right + y[:, None] * up
     mesh, motion = scene.head.mesh, scene.motion
     places = mesh.positions if motion is None else scene.head.control.points_mm(motion)[mesh.point]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.cached import cached_occlusion
-from dermis.environment.panorama import Sun
+from dermis.environment.panorama import Sun, load_panorama
 from dermis.environment.prefilter import equivalent_mirrors, prefilter
 from dermis.frame.lights import sun_lights
 from dermis.frame.passes.occlusion import FORM, bake_occlusion, whole_map
@@ -25,6 +26,7 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 
 _BRIGHTEST = 65504.0  # of 16-bit floats
+_SHARPEST_ROWS = 2048  # of a panorama that is looked at
 _FINEST_OCCLUSION = 1024  # texels a side: it is smooth, and a texel of it is under a millimetre
 
 
@@ -50,12 +52,23 @@ def load_surroundings(device: Device, name: str | None) -> Surroundings:
     if name is None:
         return Surroundings(make_texture(device, (1, 1), "rgba16float", layers=2, use="map"), ())
     made = prefilter(name)
-    count, height, width, _ = made.layers.shape
-    texture = make_texture(device, (width + 2, height + 2), "rgba16float", layers=count, use="map")
-    for index, layer in enumerate(made.layers):
-        texels = np.dstack([_bordered(layer), np.ones((height + 2, width + 2))])
+    return Surroundings(_layered(device, made.layers), made.suns, float(made.layers[0].max()))
+
+
+def sharp(device: Device, name: str) -> Any:
+    """A panorama as it is, suns included, as the first of two layers."""
+    radiance = load_panorama(name, most_rows=_SHARPEST_ROWS).astype(np.float32)
+    return _layered(device, [radiance, np.zeros_like(radiance)])
+
+
+def _layered(device: Device, layers: Sequence[NDArray[np.float32]] | NDArray[np.float32]) -> Any:
+    height, width = layers[0].shape[:2]
+    size = width + 2, height + 2
+    texture = make_texture(device, size, "rgba16float", layers=len(layers), use="map")
+    for index, layer in enumerate(layers):
+        texels = np.dstack([_bordered(layer), np.ones(size[::-1])])
         upload(device, texture, np.minimum(texels, _BRIGHTEST), layer=index)
-    return Surroundings(texture, made.suns, float(made.layers[0].max()))
+    return texture
 
 
 def _bordered(layer: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -99,7 +112,6 @@ def environment_record(
         exposure=environment.exposure,
         albedo=np.minimum(total, 1.0),
         occluded=int(occluded),
-        visible=int(environment.visible),
         mirrors=np.pad(equivalent_mirrors(model_of(skin)).reshape(-1, 3), ((0, 0), (0, 1))),
     )
 

@@ -112,7 +112,7 @@ def _facts(picture: Picture) -> str:
     facts += [f"{width}×{height}"] if width else []
     facts += [f"{_rounded(picture.frame_ms)} ms a frame"] if picture.frame_ms else []
     facts += [f"{picture.seconds:.0f} s in all"]
-    facts += [f'<a href="#{row}">{row}</a>' for row in script.deck]
+    facts += [f'<a href="#{row}" title="row {row[1:]} of the talk, below">{row}</a>' for row in script.deck]
     facts += [f'<a href="#{key}">{key}</a>' for key in script.sources]
     return " · ".join(facts)
 

@@ -82,8 +82,9 @@ class Studio:
         chosen = self.settings(**settings)
         self._draw(scene, 1.0, settings)
         inputs = self.renderer.prepare(scene, chosen)
-        stack, blur = inputs.resources.levels.stack, inputs.blurs[0]
-        light = download(self.renderer.device, stack, mip=blur.halvings[level], layer=level)
+        levels, blur = inputs.resources.levels, inputs.blurs[0]
+        halved = blur.halvings[level]
+        light = download(self.renderer.device, levels.stacks[halved], layer=level - levels.first[halved])
         return np.asarray(light, np.float32)[..., :3] / np.float32(blur.scale)
 
     def settings(self, scale: float = 1.0, **settings: Any) -> Settings:

@@ -185,7 +185,7 @@ class Device:
         return self.handle.create_buffer_with_data(data=np.ascontiguousarray(data), usage=flags)
 
     def space(self, size: int) -> Any:
-        """A new buffer that shaders write [byte]."""
+        """A new buffer of zeros that shaders write [byte]."""
         import wgpu
 
         flags = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_DST | wgpu.BufferUsage.COPY_SRC

@@ -15,7 +15,7 @@ from dermis.errors import DermisError
 from dermis.gpu.access import Access, new_number, slot_of
 from dermis.gpu.by_resources import ByResources, key_of
 from dermis.gpu.device import Device
-from dermis.gpu.shader_types import Binding, bindings, members_read, struct_dtype
+from dermis.gpu.shader_types import Binding, bindings, members_read, record_of
 from dermis.gpu.uniforms import Uniforms
 from dermis.gpu.wgsl_source import Folder, Source, compose
 
@@ -67,7 +67,7 @@ class Program:
     ) -> None:
         self.device, self.name = device, path.stem
         self.constants = dict(constants or {})
-        self.source: Source = compose(path, (*folders, _TOOLKIT_SHADERS))
+        self.source = source_of(path, folders)
         self.bindings: tuple[Binding, ...] = bindings(self.source.text)
         self._module = self._compile(path)
         self._uniforms = [b for b in self.bindings if _is_uniform(b)]
@@ -81,10 +81,7 @@ class Program:
 
     def record(self, struct: str, **values: Any) -> np.ndarray[Any, Any]:
         """A zeroed record of one of the shader's structs with the given members filled in."""
-        record = np.zeros((), dtype=struct_dtype(self.source.text, struct))
-        for member, value in values.items():
-            record[member] = value
-        return record
+        return record_of(self.source.text, struct, **values)
 
     def places(self, resources: Resources, uniforms: Uniforms) -> tuple[int, ...]:
         """Where the records are among the uniforms."""
@@ -221,5 +218,10 @@ def compiled(device: Device, shader: Hashable, constants: Constants, make: Calla
 
 def declared(path: Path, folders: Sequence[Folder], constants: Constants) -> dict[str, float]:
     """Those of some pipeline constants that the shader has."""
-    text = compose(path, (*folders, _TOOLKIT_SHADERS)).text
+    text = source_of(path, folders).text
     return {name: value for name, value in constants if f"override {name}:" in text}
+
+
+def source_of(path: Path, folders: Sequence[Folder]) -> Source:
+    """The composed text of a shader, which may include the toolkit's own."""
+    return compose(path, (*folders, _TOOLKIT_SHADERS))

@@ -74,6 +74,14 @@ def struct_dtype(text: str, name: str) -> np.dtype[np.void]:
     return dtype
 
 
+def record_of(text: str, struct: str, **values: Any) -> np.ndarray[Any, Any]:
+    """A zeroed record of one of a text's structs with the given members filled in."""
+    record = np.zeros((), dtype=struct_dtype(text, struct))
+    for member, value in values.items():
+        record[member] = value
+    return record
+
+
 def members_read(text: str, name: str) -> Callable[[bytes], Hashable]:
     """Takes out of the bytes of a record bound by that name the members that the shader's text names.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from numbers import Integral
 from typing import Any
 
@@ -10,10 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
+from dermis.human.hair.look import HairLook
+from dermis.human.hair.usual import drawn_hair, shaved_shows, usual_hair, usual_recession
 from dermis.human.published import OLD, YOUNG, human_targets
+from dermis.human.skin.look import SkinLook
 from dermis.human.skin.usual import Origin, drawn_eyes, drawn_look
 
 _MOST_SEED = 2**32 - 1
+_BEARDED = 0.6  # shadow of shaved hair below a beard
 _ALIKE = 0.35  # of the Dirichlet distribution of ancestries: most people have mostly one
 _BETWEEN = 0.08  # standard deviation of the sex from its ends
 _WAYS = (("decr", "incr"), ("down", "up"), ("in", "out"), ("backward", "forward"), ("concave", "convex"))
@@ -58,21 +63,33 @@ def drawn(seed: int) -> dict[str, Any]:
         "weight": float(np.clip(weight, -0.7, 0.8)),
         "muscle": float(np.clip(muscle, -0.6, 0.6)),
         "targets": dict(_details(rng)),
-        **_hair(np.random.default_rng((int(seed), 1)), np.array([african, asian, caucasian])),
     }
     origin = Origin(african, asian, caucasian, sex, age)
-    return found | {"skin": drawn_look(rng, origin), "eyes": drawn_eyes(rng, origin)}
+    skin, eyes = drawn_look(rng, origin), drawn_eyes(rng, origin)
+    brown, red = _hair(np.random.default_rng((int(seed), 1)), np.array([african, asian, caucasian]))
+    found |= {"hair_eumelanin": brown, "hair_pheomelanin": red, "eyes": eyes}
+    usual = usual_hair(origin, brown, red)
+    return found | _hairdo(np.random.default_rng((int(seed), 2)), origin, usual, skin)
 
 
-def _hair(rng: np.random.Generator, shares: NDArray[np.float64]) -> dict[str, float]:
-    """Pigments of the hair: near to black but for people of mostly European descent.
+def _hairdo(rng: np.random.Generator, origin: Origin, usual: HairLook, skin: SkinLook) -> dict[str, Any]:
+    """Hair, and the skin with what shows of it there."""
+    hair, recession = drawn_hair(rng, origin, usual), usual_recession(rng, origin)
+    shown = shaved_shows(hair)
+    beard = shown * max(skin.beard, _BEARDED if hair.beard_mm else 0.0)
+    seen = replace(skin, stubble=shown * skin.stubble, beard=beard, recession=recession)
+    return {"hair": hair, "skin": seen}
+
+
+def _hair(rng: np.random.Generator, shares: NDArray[np.float64]) -> tuple[float, float]:
+    """Eumelanin and pheomelanin of the hair: near to black but for people of mostly European descent.
 
     shares : (3,) of the ancestries
     """
     fair = np.exp(rng.uniform(np.log(0.4), np.log(5.0)))
     brown = float(np.exp(shares @ np.log([8.0, 7.0, fair])) * rng.lognormal(0.0, 0.1))
     red = float(shares[2] * rng.exponential(0.35) + 0.1)
-    return {"hair_eumelanin": min(brown, 10.0), "hair_pheomelanin": min(red, 4.0)}
+    return min(brown, 10.0), min(red, 4.0)
 
 
 def _details(rng: np.random.Generator) -> Iterator[tuple[str, float]]:

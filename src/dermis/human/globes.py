@@ -2,69 +2,22 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.mesh.eyes import profile_mm
+from dermis.human.lids import FORWARD_MM, SPLINE, Socket
+from dermis.mesh.globe import globe as true_globe
 
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-SIDE = 10
-"""Quads along each edge of the cube that a ball is made from; an even number, for a point on the axis."""
-_BALL_MM = 15.4
-"""Mean radius of the published ball, which lids lie on, where the eye is of usual size [mm]."""
-_RIM = 0.49  # of the layout, around its middle
-_SPLINE = 1.0045
-"""By how much the smooth surface lies within its control points."""
 
-
-@cache
 def globe() -> tuple[Doubles, Index]:
-    """(n, 3) points of an eyeball around its centre, looking along +Z [mm], and (q, 4) quads."""
-    places, quads = list[Doubles](), list[Index]()
-    grid = np.tan(np.linspace(-np.pi / 4, np.pi / 4, SIDE + 1))  # even in angle
-    u, v = (part.ravel() for part in np.meshgrid(grid, grid))
-    corner = np.arange((SIDE + 1) ** 2).reshape(SIDE + 1, SIDE + 1)
-    face = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], axis=-1).reshape(
-        -1, 4
-    )
-    ones = np.ones_like(u)
-    for turn in range(3):
-        for way in (1.0, -1.0):
-            places.append(np.roll(np.stack([way * u, v, way * ones], axis=-1), turn, axis=1))
-            quads.append(face + sum(map(len, places[:-1])))
-    every = np.concatenate(places)
-    _, first, welded = np.unique(np.rint(1e6 * every), axis=0, return_index=True, return_inverse=True)
-    along = every[first] / np.linalg.norm(every[first], axis=1, keepdims=True)
-    radius = profile_mm(np.arccos(np.clip(along[:, 2], -1.0, 1.0)))
-    return _SPLINE * radius[:, None] * along, welded.reshape(-1)[np.concatenate(quads)]
+    """(n, 3) control points of an eyeball around its centre, looking along +Z [mm], and (q, 4) quads."""
+    return true_globe(swell=SPLINE)
 
 
-def layout() -> Doubles:
-    """(n, 2) uv of an eyeball's points: seen along its axis, by the angle from there; the back is the rim."""
-    points, _ = globe()
-    along = points / np.linalg.norm(points, axis=1, keepdims=True)
-    angle, turn = np.arccos(np.clip(along[:, 2], -1.0, 1.0)), np.arctan2(along[:, 1], along[:, 0])
-    radius = _RIM * angle / np.pi
-    return 0.5 + np.stack([radius * np.cos(turn), -radius * np.sin(turn)], axis=-1)
-
-
-def marks() -> tuple[int, int, int]:
-    """Points of an eyeball: the cornea's apex, the one opposite, and the one of the equator along +X."""
-    points, _ = globe()
-    along = points / np.linalg.norm(points, axis=1, keepdims=True)
-    apex, back, side = (int(np.argmax(along @ np.array(way))) for way in ((0, 0, 1), (0, 0, -1), (1, 0, 0)))
-    return apex, back, side
-
-
-def placed(balls: Doubles) -> tuple[Doubles, Doubles]:
-    """(n, 3) points of a person's eyeball, and its centre (3,) [mm].
-
-    balls : (b, 3) of the published ball there
-    """
-    middle = (balls.min(axis=0) + balls.max(axis=0)) / 2
-    size = float(np.linalg.norm(balls - middle, axis=1).mean()) / _BALL_MM
-    return middle + size * globe()[0], middle
+def placed(eye: Socket) -> tuple[Doubles, Doubles]:
+    """(n, 3) points of a person's eyeball, and its centre (3,) [mm]."""
+    centre = eye.middle + eye.size * FORWARD_MM * np.array([0.0, 0.0, 1.0])
+    return centre + eye.size * globe()[0], centre

@@ -9,9 +9,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.human import globes, teeth
+from dermis.human import globes, lids, teeth
 from dermis.human.movement import expressions, gaze, skeleton
 from dermis.human.published import Points, count, data, places_mm
+from dermis.mesh import globe
 from dermis.mesh.eyes import EyeLook, Eyes
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
@@ -53,8 +54,9 @@ def human_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: E
     weights : of published targets
     """
     places, laid = places_mm(weights), _layout(layout)
-    (left, left_centre), (right, right_centre) = _globes(places)
-    points = np.concatenate([places[: count()], left, right])
+    sockets = _sockets(places)
+    (left, left_centre), (right, right_centre) = map(globes.placed, sockets)
+    points = np.concatenate([lids.conformed(places, sockets)[: count()], left, right])
     pairs, vertex = np.unique(
         np.stack([laid.quads, laid.corner], axis=-1).reshape(-1, 2), axis=0, return_inverse=True
     )
@@ -69,19 +71,24 @@ def human_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: E
         quads=np.arange(2 * len(faces)).reshape(-1, 2),
     )
     bones = skeleton(places[count() :], (left_centre, right_centre), len(left))
-    rig = Rig(points.astype(np.float32), expressions(), bones, turns=gaze())
+    moved = expressions(lids.conformed_targets(places, sockets))
+    apex, back, _ = globe.marks()
+    contact = lids.contact(count(), len(left), apex, back)
+    rig = Rig(points.astype(np.float32), moved, bones, turns=gaze(), contact=contact)
     return Head("human", mesh, maps, THANKS, rig, _eyes(eyes))
 
 
 def control_mm(weights: Mapping[str, float]) -> NDArray[np.float32]:
     """(p, 3) where the control points of a person lie, see `Human.positions_mm` [mm]."""
     places = places_mm(weights)
-    return np.concatenate([places[: count()], *(ball for ball, _ in _globes(places))]).astype(np.float32)
+    sockets = _sockets(places)
+    balls = [globes.placed(eye)[0] for eye in sockets]
+    return np.concatenate([lids.conformed(places, sockets)[: count()], *balls]).astype(np.float32)
 
 
-def _globes(places: Points) -> tuple[tuple[Points, Points], tuple[Points, Points]]:
-    """Points of the left and of the right eyeball, and their centres [mm]."""
-    left, right = (globes.placed(places[_ball(name)]) for name in (LEFT_EYE, RIGHT_EYE))
+def _sockets(places: Points) -> tuple[lids.Socket, lids.Socket]:
+    """The left and the right eye."""
+    left, right = (lids.socket(places[_ball(name)]) for name in (LEFT_EYE, RIGHT_EYE))
     return left, right
 
 
@@ -95,9 +102,7 @@ def _ball(name: str) -> Index:
 
 def _eyes(look: EyeLook) -> Eyes:
     size = len(globes.globe()[0])
-    apex, back, side = (
-        np.array([count() + mark, count() + size + mark], np.int32) for mark in globes.marks()
-    )
+    apex, back, side = (np.array([count() + mark, count() + size + mark], np.int32) for mark in globe.marks())
     material = np.array([list(MATERIALS).index(name) for name in (LEFT_EYE, RIGHT_EYE)], np.int32)
     return Eyes(apex, back, side, material, look)
 
@@ -122,7 +127,7 @@ def _layout(layout: Layout) -> _Laid:
         uv = np.concatenate([uv, places])
     eyes = [np.full(len(quads), list(MATERIALS).index(name)) for name in (LEFT_EYE, RIGHT_EYE)]
     return _Laid(
-        np.concatenate([uv, globes.layout()]),
+        np.concatenate([uv, globe.layout()]),
         np.concatenate([points[stays], count() + quads, count() + size + quads]),
         np.concatenate([corner[stays], len(uv) + quads, len(uv) + quads]),
         np.concatenate([material[stays], *eyes]),

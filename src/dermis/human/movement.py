@@ -44,16 +44,18 @@ def gaze() -> tuple[Turn, ...]:
     )
 
 
-@cache
-def expressions() -> MorphTargets:
-    """The ARKit blend shapes of the skin, the teeth and the tongue; eyeballs turn by `gaze` instead."""
+def expressions(delta_mm: NDArray[np.float32]) -> MorphTargets:
+    """The ARKit blend shapes of the skin, the teeth and the tongue; eyeballs turn by `gaze` instead.
+
+    delta_mm : (m, 3) of all published targets
+    """
     moved, chosen = moves(), list[tuple[str, slice]]()
     for index, name in enumerate(moved.names):
         if name.startswith(EXPRESSIONS):
             chosen.append((name.removeprefix(EXPRESSIONS), slice(*moved.first[index : index + 2])))
     kept = [_moving()[moved.point[part]] for _, part in chosen]
     points = [moved.point[part][those] for (_, part), those in zip(chosen, kept, strict=True)]
-    deltas = [moved.delta_mm[part][those] for (_, part), those in zip(chosen, kept, strict=True)]
+    deltas = [delta_mm[part][those] for (_, part), those in zip(chosen, kept, strict=True)]
     first = np.cumsum([0, *map(len, points)])
     names = tuple(name for name, _ in chosen)
     point = np.concatenate(points).astype(np.int32)

@@ -14,6 +14,7 @@ from dermis.errors import refuse
 from dermis.human.drawing import drawn
 from dermis.human.hair.groom import groomed
 from dermis.human.hair.look import HairLook
+from dermis.human.hair.usual import shaved_shows, usual_hair
 from dermis.human.model import Layout, control_mm, human_head
 from dermis.human.published import OLD, YOUNG
 from dermis.human.skin.look import SkinLook
@@ -47,10 +48,10 @@ class Human:
     sex : from 0, female, to 1, male [-]
     age : 25 to 90 [years]
     weight, muscle : from -1, least, to 1, most; 0 is the average [-]
-    hair_eumelanin, hair_pheomelanin : of brows and lashes: 0.3 of the first is blond, 1.3 brown,
+    hair_eumelanin, hair_pheomelanin : of hair as it usually is: 0.3 of the first is blond, 1.3 brown,
         4 dark, 8 black; red has 0.3 and 2
     targets : weights of published targets, such as {"nose/nose-hump-incr": 0.5}; mostly 0 to 1
-    skin, eyes : what they look like; what usually goes with the person when left out
+    skin, eyes, hair : what they look like; what usually goes with the person when left out
 
     Raises DermisError for values out of range; names of targets are checked when the head is made.
     """
@@ -67,16 +68,20 @@ class Human:
     targets: Mapping[str, float] = field(default_factory=lambda: _NONE)
     skin: SkinLook | None = None
     eyes: EyeLook | None = None
+    hair: HairLook | None = None
 
     def __post_init__(self) -> None:
         for one in fields(self):
             if one.name in _RANGES:
                 low, high = _RANGES[one.name]
                 value = getattr(self, one.name)
-                if not low <= value <= high:
+                if not isinstance(value, int | float | np.number) or not low <= value <= high:
                     refuse(one.name, f"a number from {low:g} to {high:g}", f"{value!r} came", "Choose within")
         if not self.african + self.asian + self.caucasian > 0:
             refuse("ancestry", "a share of african, asian or caucasian", "all are 0", "Raise one")
+        if not isinstance(self.targets, Mapping):
+            expected, came = "weights of targets by name", f"{self.targets!r:.60} came"
+            refuse("targets", expected, came, 'Write targets={"nose/nose-hump-incr": 0.5}')
         for name, weight in self.targets.items():
             if not (math.isfinite(weight) and abs(weight) <= _MOST_WEIGHT):
                 expected = f"a weight from {-_MOST_WEIGHT:g} to {_MOST_WEIGHT:g}"
@@ -104,7 +109,8 @@ class Human:
         painted = maps or PaintedMaps(look=self.look)
         plain = human_head(self.weights(), painted, layout, self.iris)
         head = subdivide_head(plain, subdivide)
-        return groomed(head, plain, control_mm(_MEAN.weights()).astype(np.float64), subdivide, self._hair)
+        mean_mm = control_mm(_MEAN.weights()).astype(np.float64)
+        return groomed(head, plain, mean_mm, subdivide, self.hairdo, self.look.recession)
 
     def on(self, head: Head) -> Head:
         """The head of another person with this one's skin and eyes.
@@ -122,12 +128,22 @@ class Human:
     @property
     def look(self) -> SkinLook:
         """The person's skin: its own, or what usually goes with such a person."""
-        return usual_look(self._origin) if self.skin is None else self.skin
+        if self.skin is not None:
+            return self.skin
+        usual, shown = usual_look(self._origin), shaved_shows(self.hairdo)
+        return replace(usual, stubble=shown * usual.stubble, beard=shown * usual.beard)
 
     @property
     def iris(self) -> EyeLook:
         """The person's eyes: its own, or what usually goes with such a person."""
         return usual_eyes(self._origin) if self.eyes is None else self.eyes
+
+    @property
+    def hairdo(self) -> HairLook:
+        """The person's hair: its own, or what usually goes with such a person."""
+        if self.hair is not None:
+            return self.hair
+        return usual_hair(self._origin, self.hair_eumelanin, self.hair_pheomelanin)
 
     @property
     def _origin(self) -> Origin:
@@ -145,13 +161,6 @@ class Human:
         Raises DermisError for targets that nobody knows.
         """
         return control_mm(self.weights())
-
-    @property
-    def _hair(self) -> HairLook:
-        old = (self.age - YOUNG) / (OLD - YOUNG)
-        bushy = min(1.0, 0.25 + 0.5 * self.sex + 0.25 * old * self.sex)
-        grey = max(0.0, 0.9 * old - 0.25)
-        return HairLook(self.hair_eumelanin, self.hair_pheomelanin, bushy, grey)
 
     def weights(self) -> dict[str, float]:
         """Weights of published targets by name, those of 0 left out."""

@@ -9,19 +9,21 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from dermis.errors import refuse
+from dermis.human.hair.look import HairLook
 from dermis.human.person import Human
 from dermis.human.skin.look import SkinLook
 from dermis.mesh.eyes import EyeLook
 from dermis.outputs import replacing
 
 _LARGEST = 1 << 20  # bytes
-T = TypeVar("T", Human, SkinLook, EyeLook)
+T = TypeVar("T", Human, SkinLook, EyeLook, HairLook)
 
 
 def numbers_of(person: Human) -> dict[str, Any]:
-    """All that a person is made from, by name; skin and eyes too that only usually go with it."""
+    """All that a person is made from, by name; skin, eyes and hair too that only usually go with it."""
     found = {one.name: getattr(person, one.name) for one in fields(person)}
-    return found | {"targets": dict(person.targets), "skin": asdict(person.look), "eyes": asdict(person.iris)}
+    found |= {"targets": dict(person.targets), "skin": asdict(person.look)}
+    return found | {"eyes": asdict(person.iris), "hair": asdict(person.hairdo)}
 
 
 def write_numbers(path: Path, person: Human) -> int:
@@ -49,7 +51,7 @@ def read_person(path: Path) -> Human:
     person = told.get("person") if isinstance(told, dict) else None
     if not isinstance(person, dict):
         refuse(path, expected, "there is none", "Write one with dermis head -o person.json")
-    parts: tuple[tuple[str, Any], ...] = (("skin", SkinLook), ("eyes", EyeLook))
+    parts: tuple[tuple[str, Any], ...] = (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook))
     made = {name: _made(path, kind, person[name]) for name, kind in parts if person.get(name) is not None}
     return _made(path, Human, person | made)
 

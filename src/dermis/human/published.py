@@ -41,7 +41,8 @@ def places_mm(weights: Mapping[str, float]) -> Points:
     Raises DermisError for targets that nobody knows.
     """
     found, moved = data(), moves()
-    places = found["positions_mm"].astype(np.float64)
+    points = [np.arange(len(found["positions_mm"]))]
+    deltas: list[NDArray[np.floating]] = [found["positions_mm"].astype(np.float64)]
     known = {name: index for index, name in enumerate(moved.names)}
     for name, weight in weights.items():
         if name not in known:
@@ -49,7 +50,10 @@ def places_mm(weights: Mapping[str, float]) -> Points:
             hint = f"Did you mean {' or '.join(close)}?" if close else "List: dermis head --list-targets"
             refuse(f"target {name!r}", "a published target", "there is none of this name", hint)
         part = slice(*moved.first[known[name] : known[name] + 2])
-        places[moved.point[part]] += weight * moved.delta_mm[part]
+        points.append(moved.point[part])
+        deltas.append(weight * moved.delta_mm[part])
+    point, delta = np.concatenate(points), np.concatenate(deltas)
+    places = np.stack([np.bincount(point, column) for column in delta.T], axis=1)
     eyes = [list(map(str, found["joint_names"])).index(name) for name in ("l-eye", "r-eye")]
     return np.asarray(places - places[count() :][eyes].mean(axis=0))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -83,9 +84,27 @@ def check_output(path: str | Path) -> Path:
 def write_image(path: str | Path, linear: NDArray[np.floating[Any]]) -> None:
     """Write a linear picture: .png as 8-bit sRGB rounded to nearest, .exr as linear float32.
 
-    linear : (H, W, 3) or (H, W, 4), Rec. 709; alpha is stored as it is, not through the sRGB curve
+    linear : (H, W, 3) or (H, W, 4), Rec. 709; alpha is stored as it is, not through the sRGB curve. Bytes
+        are sRGB already, and go to a .png as they are
     DermisError : as for `check_output`, or the disk is full; nothing half-written stays behind
     """
+    if not isinstance(path, str | os.PathLike):
+        came = f"a {type(path).__name__} came first"
+        refuse(
+            "write_image", "the file's name, then the picture", came, 'Write write_image("face.png", image)'
+        )
+    linear = np.asarray(linear)
+    if linear.ndim not in (2, 3) or linear.dtype.kind not in "fu":
+        came = f"shape {linear.shape} and type {linear.dtype} came"
+        refuse(path, "a picture (H, W, 3 or 4) of floats", came, "Check what is to be written")
+    if linear.dtype.kind == "u":
+        if linear.dtype != np.uint8 or check_output(path).suffix.lower() == ".exr":
+            came = f"{linear.dtype} came, which is encoded already"
+            refuse(
+                path, "linear floats", came, "Take render_many(..., linear=True), or write a .png of bytes"
+            )
+        write_png(path, linear)
+        return
     if check_output(path).suffix.lower() == ".exr":
         write_exr(path, linear)
         return

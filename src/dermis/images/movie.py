@@ -53,7 +53,7 @@ def check_movie(path: str | Path, size: tuple[int, int], crf: int = DEFAULT_CRF)
 
     DermisError : the path cannot be written to, a side is odd, the factor is none, or there is no encoder
     """
-    target = outputs.check_output(path, (SUFFIX,), f"Name it something{SUFFIX}")
+    target = outputs.check_output(path, (SUFFIX,), f"Give it the suffix {SUFFIX}")
     if size[0] % 2 or size[1] % 2:
         even = f"{size[0] + size[0] % 2}x{size[1] + size[1] % 2}"
         came = f"{size[0]}x{size[1]} came"

@@ -40,7 +40,7 @@ class ImageWriter:
     def write(self, path: str | Path, picture: NDArray[Any]) -> None:
         """Queue a picture to be written, whole or not at all; waits only while the queue is full.
 
-        picture : (H, W, 3) uint8 sRGB for .png, or linear floats for .exr; do not change it afterwards
+        picture : (H, W, 3 or 4) uint8 sRGB for .png, or linear floats for .exr; do not change it afterwards
 
         Raises DermisError for a path that cannot be written to, or when an earlier picture failed.
         """
@@ -49,8 +49,8 @@ class ImageWriter:
         came = f"they have shape {picture.shape} and type {picture.dtype}"
         if exr and not np.issubdtype(picture.dtype, np.floating):
             refuse(path, "linear floats", came, "Take the renderer's linear picture, or write .png")
-        if not exr and (picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] != 3):
-            refuse(path, "pixels (H, W, 3) of uint8", came, "Take the renderer's bytes, or write .exr")
+        if not exr and (picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] not in (3, 4)):
+            refuse(path, "pixels (H, W, 3 or 4) of uint8", came, "Take the renderer's bytes, or write .exr")
         write = partial(write_exr, swift=True) if exr else partial(write_png, effort=_FAST)
         self._waiting.append(self._pool.submit(write, path, picture))
         while len(self._waiting) > self._most or (self._waiting and self._waiting[0].done()):

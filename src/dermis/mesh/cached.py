@@ -16,7 +16,7 @@ from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.outline import Outline
 from dermis.mesh.rig import MorphTargets, Rig, Skeleton
 
-_FORM = 3  # raise when `load_rigged` gives other results for the same file
+_FORM = 4  # raise when `load_rigged` gives other results for the same file
 _MESH = [field.name for field in fields(Mesh) if field.name != "materials"]
 _TARGETS = [field.name for field in fields(MorphTargets) if field.name != "names"]
 _SKELETON = [field.name for field in fields(Skeleton) if field.name != "names"]
@@ -72,7 +72,7 @@ def _fields(thing: Any, kind: str, names: list[str]) -> Arrays:
 
 def _unpacked(found: Arrays) -> Rigged:
     told = json.loads(found["told"].tobytes())
-    kinds = [Material(one["name"], one["kind"], tuple(one["colour"])) for one in told["materials"]]
+    kinds = [Material(**one | {"colour": tuple(one["colour"])}) for one in told["materials"]]
     mesh = Mesh(**{name: found[name] for name in _MESH}, materials=tuple(kinds))
     vars(mesh)["outline"] = Outline(found["outline"])  # finding it imports scipy, which is slower
     if "targets" not in told:

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
+from dermis.mesh.eyeball import SCLERA_MM, apex_mm
 from dermis.mesh.rig import Motion, Rig
 
 Doubles = NDArray[np.float64]
 
-SCLERA_MM, CORNEA_MM, LIMBUS_MM = 14.2, 7.8, 5.85
-"""Radii of the ball, of the cornea's front, and of the circle where they meet [mm].
-
-Cornea and iris are those of an adult. A ball is 12 mm in truth; here it has the curve that the published lids
-are shaped for, so that none of them stands off it."""
-IRIS_BEHIND_MM = 3.0
-"""Depth of the plane of the iris behind the cornea's apex [mm]."""
 PUPIL_MM = 1.0, 4.0
 
 
@@ -54,12 +48,15 @@ class EyeLook:
 
 @dataclass(frozen=True)
 class Eyes:
-    """The eyeballs of a head, in their true shape: a ball with a cornea, see `profile_mm`.
+    """The eyeballs of a head, in their true shape: a ball with a cornea, see mesh/eyeball.py.
 
     apex, back, side : (k,) control points of each: the cornea's apex, the one opposite, one of the equator to
         the right of who looks out of it
     material : (k,) index of what its triangles are made of
     look : of both
+    ball_mm, middle_mm : (k,) radius of each ball, and where on the axis its middle lies, in mm of a usual
+        eye, whose cornea it has; 0 for the middle of one of usual size
+    sight : (k, 3) the way each looks in its own space: along the axis, unless lids show it elsewhere
     """
 
     apex: NDArray[np.int32]
@@ -67,15 +64,22 @@ class Eyes:
     side: NDArray[np.int32]
     material: NDArray[np.int32]
     look: EyeLook
+    ball_mm: Doubles = field(default_factory=lambda: np.full(2, SCLERA_MM))
+    middle_mm: Doubles = field(default_factory=lambda: np.zeros(2))
+    sight: Doubles = field(default_factory=lambda: np.tile([0.0, 0.0, 1.0], (2, 1)))
 
     def frames(self, rig: Rig, motion: Motion) -> Doubles:
-        """(k, 4, 4) from the head's space [mm] to each eye's own: in mm of a usual eye, z along its axis."""
+        """(k, 4, 4) from the head's space [mm] to each eye's own: in mm of a usual eye, z along its axis.
+
+        The cornea lies in all spaces where a usual eye has it, whatever the size of the ball behind.
+        """
         count = len(self.apex)
         points = rig.some_posed(np.concatenate([self.apex, self.back, self.side]), motion)
         apex, back, side = points.reshape(3, count, 3)
         length = np.linalg.norm(apex - back, axis=1, keepdims=True)
-        axis, scale = (apex - back) / length, (apex_mm() + SCLERA_MM) / length
-        middle = back + axis * SCLERA_MM / scale
+        behind = (self.ball_mm - self.middle_mm)[:, None]
+        axis, scale = (apex - back) / length, (apex_mm() + behind) / length
+        middle = back + axis * behind / scale
         across = side - middle
         across -= (across * axis).sum(axis=1, keepdims=True) * axis
         across /= np.linalg.norm(across, axis=1, keepdims=True)
@@ -88,26 +92,3 @@ class Eyes:
     def with_look(self, look: EyeLook) -> Eyes:
         """The same eyes of another look."""
         return replace(self, look=look)
-
-
-def cornea_centre_mm() -> float:
-    """Where on the axis the centre of the cornea's front lies, from the ball's [mm]."""
-    return float(np.sqrt(SCLERA_MM**2 - LIMBUS_MM**2) - np.sqrt(CORNEA_MM**2 - LIMBUS_MM**2))
-
-
-def apex_mm() -> float:
-    """Where on the axis the cornea's apex lies [mm]."""
-    return cornea_centre_mm() + CORNEA_MM
-
-
-def iris_mm() -> float:
-    """Where on the axis the plane of the iris lies [mm]."""
-    return apex_mm() - IRIS_BEHIND_MM
-
-
-def profile_mm(angle: Doubles) -> Doubles:
-    """Distance from the ball's centre to its surface, by the angle from its axis [rad] [mm]."""
-    centre = cornea_centre_mm()
-    within = np.maximum(CORNEA_MM**2 - (centre * np.sin(angle)) ** 2, 0.0)
-    edge = np.arctan2(LIMBUS_MM, np.sqrt(SCLERA_MM**2 - LIMBUS_MM**2))
-    return np.where(angle < edge, centre * np.cos(angle) + np.sqrt(within), SCLERA_MM)

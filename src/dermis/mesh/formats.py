@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
+from dermis.mesh.mtl import read_materials
 from dermis.mesh.quads import find_pairs, obj_sides, ply_sides
 
 Colour = tuple[float, float, float]
@@ -108,14 +109,12 @@ def obj_model(path: Path, text: str) -> Model:
     if re.search(r"^f[^\n]*[ /]-\d", text, re.MULTILINE):
         came = "it has relative (negative) ones"
         refuse(path, "faces by absolute index", came, "Export it again, in Blender")
-    libraries = re.findall(r"^[ \t]*mtllib[ \t]+(.*?)[ \t]*$", text, re.MULTILINE)
-    colours: dict[str, Colour] = {}
-    for library in libraries:
-        colours.update(_mtl_colours(path.parent / library))
+    materials = read_materials(path, text).materials
+    colours = {name: colour_of(one.kd) for name, one in materials.items() if len(one.kd) >= 3}
     text, groups = _mark_obj(text, colours)
-    materials = "\n".join(f"newmtl {k}" for k in range(len(groups)))
+    numbers = "\n".join(f"newmtl {k}" for k in range(len(groups)))
     # trimesh pops groups from the end: file order again
-    parts = list(_parts(text.encode(), "obj", groups, resolver={"marked.mtl": materials.encode()}))[::-1]
+    parts = list(_parts(text.encode(), "obj", groups, resolver={"marked.mtl": numbers.encode()}))[::-1]
     faces = {id(group): sides for group, sides in zip(groups, obj_sides(text, len(groups)), strict=True)}
     parts = [replace(part, quads=find_pairs(faces[id(part.group)], part.triangles)) for part in parts]
     full, none = [part.group for part in parts], np.empty((0, 3))
@@ -137,20 +136,6 @@ def _mark_obj(text: str, colours: dict[str, Colour]) -> tuple[str, list[Group]]:
     names = [tuple(dict.fromkeys(name for name in key if name)) for key in numbers]
     groups = [Group(name, colours.get(key[0], GREY)) for name, key in zip(names, numbers, strict=True)]
     return f"mtllib marked.mtl\nusemtl 0\n{marked}", groups
-
-
-def _mtl_colours(path: Path) -> dict[str, Colour]:
-    """Kd of each material; nothing when there is no such file, as is common."""
-    if not path.is_file():
-        return {}
-    colours, name = {}, ""
-    for line in path.read_bytes().decode("utf-8", errors="replace").splitlines():
-        key, _, value = line.strip().partition(" ")
-        if key == "newmtl":
-            name = value.strip()
-        elif key == "Kd":
-            colours[name] = colour_of(value.split())
-    return colours
 
 
 def read_ply(path: Path) -> Model:

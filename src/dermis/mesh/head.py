@@ -24,7 +24,9 @@ class Head:
     attribution : whom to credit when a picture of it is shown, empty when that is not required
     rig : what moves it; None for a head whose points move only if all their places are given
     eyes : its eyeballs, where they are of true shape
-    strands : its hairs, None for none
+    strands : its brows and lashes, None for none
+    hair : of head and beard, in no order: from afar the first few, wider, stand for all; None for none
+    note : what could not be made of its file, and why; empty for nothing
     """
 
     name: str
@@ -34,6 +36,8 @@ class Head:
     rig: Rig | None = None
     eyes: Eyes | None = None
     strands: Strands | None = None
+    hair: Strands | None = None
+    note: str = ""
 
     @cached_property
     def control(self) -> Rig:
@@ -54,8 +58,12 @@ class Head:
 
     @property
     def positions_mm(self) -> Floats:
-        """(n, 3) the unique points of the mesh as it was loaded, before any subdivision [mm]."""
-        return self.control.positions_mm
+        """(n, 3) the unique points of the mesh as it was loaded, before any subdivision [mm].
+
+        Without those of eyeballs that are not the file's own, see `Rig.carried`.
+        """
+        places = self.control.positions_mm
+        return places[: self.control.of_file] if self.control.carried else places
 
     @property
     def targets(self) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from dermis.errors import DermisError, refuse
 from dermis.mesh.cached import Rigged, cached_rigged
 from dermis.mesh.check import UV_TOLERANCE, check_arrays, check_mesh
+from dermis.mesh.eye_names import names_eye
 from dermis.mesh.formats import Array, Group, Model, Part, default_unit_mm, is_gltf, read_obj, read_ply
 from dermis.mesh.geometry import build_mesh, weld
 from dermis.mesh.gltf.geometry import read_gltf
@@ -40,9 +41,12 @@ def load_mesh(
     v_origin: Origin = "auto",
     up: Up = "y",
     opaque: tuple[str, ...] = (),
+    eye_groups: tuple[str, ...] = (),
 ) -> Mesh:
     """The mesh of a file alone; see `load_rigged`."""
-    return load_rigged(path, unit_mm=unit_mm, v_origin=v_origin, up=up, opaque=opaque).mesh
+    return load_rigged(
+        path, unit_mm=unit_mm, v_origin=v_origin, up=up, opaque=opaque, eye_groups=eye_groups
+    ).mesh
 
 
 def load_rigged(
@@ -52,6 +56,7 @@ def load_rigged(
     v_origin: Origin = "auto",
     up: Up = "y",
     opaque: tuple[str, ...] = (),
+    eye_groups: tuple[str, ...] = (),
 ) -> Rigged:
     """The mesh of a .glb, .gltf, .obj or .ply file, in millimetres, Y up, v down, and what moves it.
 
@@ -64,6 +69,7 @@ def load_rigged(
         it; "auto" takes the format's standard
     up : the file's axis that points up; with "z" the face looks along -Y, as in Blender
     opaque : names of groups that are not skin, whatever they are called
+    eye_groups : names of groups that hold eyeballs, beside those that are called so (`names_eye`)
 
     Raises `DermisError` when the file is missing, damaged or not a mesh, has no uv, or fails `check_mesh`.
     """
@@ -71,15 +77,22 @@ def load_rigged(
     unit = default_unit_mm(source) if unit_mm is None else float(unit_mm)
     check_options(source, unit, v_origin, up)
 
-    load = partial(_loaded, source, unit, v_origin, up, opaque)
+    load = partial(_loaded, source, unit, v_origin, up, opaque, eye_groups)
     data = source.read_bytes() if source.suffix.lower() == ".glb" and source.is_file() else b""
     if not data or b'"uri"' in data:  # parts of it lie in other files
         return load()
     named = source.stem  # as a group without a name is
-    return cached_rigged(data, repr((named, unit, v_origin, up, opaque)), load)
+    return cached_rigged(data, repr((named, unit, v_origin, up, opaque, eye_groups)), load)
 
 
-def _loaded(source: Path, unit: float, v_origin: Origin, up: Up, opaque: tuple[str, ...]) -> Rigged:
+def _loaded(
+    source: Path,
+    unit: float,
+    v_origin: Origin,
+    up: Up,
+    opaque: tuple[str, ...],
+    eye_groups: tuple[str, ...],
+) -> Rigged:
     """The mesh and the rig as they are in the file."""
     with np.errstate(all="ignore"):
         model = read_model(source)
@@ -89,7 +102,7 @@ def _loaded(source: Path, unit: float, v_origin: Origin, up: Up, opaque: tuple[s
         place, normals = upright(unit * part.positions, up).astype(np.float32), upright(part.normals, up)
         flat = _v_down(part.uv, source, v_origin).astype(np.float32)
         check_arrays(place, flat, part.triangles, source)
-        material, materials = _materials(model.parts, opaque, source)
+        material, materials = _materials(model.parts, opaque, eye_groups, source)
         used, compact = np.unique(part.triangles, return_inverse=True)
         kept, point = taken(part, used), weld(np.column_stack((place, _company(model.parts)))[used])
         if model.moves:
@@ -157,25 +170,32 @@ def _v_down(uv: Array, source: Path, v_origin: Origin) -> Array:
 
 
 def _materials(
-    parts: list[Part], opaque: tuple[str, ...], source: Path
+    parts: list[Part], opaque: tuple[str, ...], eye_groups: tuple[str, ...], source: Path
 ) -> tuple[NDArray[np.int32], tuple[Material, ...]]:
     """Material of each triangle (f,) and the materials, in the order of the file."""
     groups = [part.group if part.group.names else Group((source.stem,), part.group.colour) for part in parts]
-    unwanted = {name.casefold() for name in opaque}
-    unknown = unwanted - {name.casefold() for group in groups for name in group.names}
-    if unknown:
-        known = ", ".join(dict.fromkeys(name for group in groups for name in group.names))
-        expected = f"opaque to name groups of the file ({known})"
-        refuse(source, expected, f"{sorted(unknown)[0]!r} is none", "Check the spelling")
+    unwanted = _chosen(groups, opaque, "opaque", source)
+    eyes = _chosen(groups, eye_groups, "eye_groups", source)
     named = any(_has(group, "skin") for group in groups)
     index: dict[Material, int] = {}
     per_part = []
-    for group in groups:
-        chosen = any(name.casefold() in unwanted for name in group.names)
+    for group, chosen, eye in zip(groups, unwanted, eyes, strict=True):
         kind = "opaque" if chosen or (named and not _has(group, "skin")) else "skin"
-        per_part.append(index.setdefault(Material(group.names[0], kind, group.colour), len(index)))
+        made = Material(group.names[0], kind, group.colour, eye=eye or names_eye(group.names))
+        per_part.append(index.setdefault(made, len(index)))
     counts = [len(part.triangles) for part in parts]
     return np.repeat(np.array(per_part, dtype=np.int32), counts), tuple(index)
+
+
+def _chosen(groups: list[Group], names: tuple[str, ...], option: str, source: Path) -> list[bool]:
+    """Whether each group is among those that an option names."""
+    wanted = {name.casefold() for name in names}
+    unknown = wanted - {name.casefold() for group in groups for name in group.names}
+    if unknown:
+        known = ", ".join(dict.fromkeys(name for group in groups for name in group.names))
+        expected = f"{option} to name groups of the file ({known})"
+        refuse(source, expected, f"{sorted(unknown)[0]!r} is none", "Check the spelling")
+    return [any(name.casefold() in wanted for name in group.names) for group in groups]
 
 
 def _has(group: Group, word: str) -> bool:

@@ -22,7 +22,7 @@ Floats = NDArray[np.float32]
 PathLike = str | Path | Picture
 Load = Callable[[PathLike], NDArray[Any]]
 
-MIN_SIZE, MAX_SIZE = 16, 16384
+_MAX_SIZE = 16384
 _MIN_NORMAL_Z = 0.05  # slopes steeper than 87 degrees are capped; nothing real leans further
 _LARGE = 1 << 14  # bytes; maps of larger files are kept on disk, to be read faster than decoded
 _MEAN_TEXELS, _MOST_APART = 64, 16  # for means: fewest samples a side, largest stride
@@ -186,8 +186,8 @@ def _kept(path: PathLike | None, how: str, load: Load) -> Any:
 def _read(path: PathLike, role: str) -> NDArray[Any]:
     image = read_image(path)
     rows, columns = image.shape[:2]
-    if min(rows, columns) < MIN_SIZE or max(rows, columns) > MAX_SIZE:
-        expected = f"{role} of {MIN_SIZE} to {MAX_SIZE} texels a side"
+    if max(rows, columns) > _MAX_SIZE:
+        expected = f"{role} of at most {_MAX_SIZE} texels a side"
         refuse(path, expected, f"it has {columns} x {rows}", "Resize it")
     if image.dtype == np.float32 and not np.isfinite(image).all():
         refuse(path, f"{role} of finite numbers", "it holds infinities or NaN", "Export it again")

@@ -27,12 +27,14 @@ class Material:
     kind : "skin" gets the whole technique, "opaque" plain diffuse and specular (eyeballs, teeth)
     colour : diffuse albedo where no map gives one, linear Rec. 709 [-]
     part : of a mouth whose layout tells where its teeth are, see mouth.wgsl
+    eye : whether the file says that eyeballs are made of it
     """
 
     name: str
     kind: str = "skin"
     colour: tuple[float, float, float] = (0.8, 0.8, 0.8)
     part: Part | None = None
+    eye: bool = False
 
 
 @dataclass(frozen=True)

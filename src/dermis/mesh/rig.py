@@ -10,15 +10,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.disk import cached_array
+from dermis.mesh.contact import Contact
 from dermis.mesh.morph_targets import MorphTargets, no_targets
 from dermis.mesh.rig_outline import RigOutline, corners_of, outline_of, outline_points
 from dermis.mesh.skeleton import INFLUENCES, Skeleton
+from dermis.mesh.turns import rigid_motion
 
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-__all__ = ["INFLUENCES", "MorphTargets", "Motion", "Rig", "Skeleton", "Stencils", "Turn", "no_targets"]
+__all__ = [
+    "INFLUENCES",
+    "Carried",
+    "MorphTargets",
+    "Motion",
+    "Rig",
+    "Skeleton",
+    "Stencils",
+    "Turn",
+    "no_targets",
+]
 
 _FORM = "outline 6"  # another number when other points are found
 
@@ -66,6 +78,17 @@ class Turn(NamedTuple):
     degrees: tuple[float, float, float]
 
 
+class Carried(NamedTuple):
+    """Points that lie where others of the file take them, as one rigid body.
+
+    others : (n,) of the file
+    points : (m,) those that go with them
+    """
+
+    others: Ints
+    points: Ints
+
+
 @dataclass(frozen=True, eq=False)
 class Rig:
     """The control points of a head and what moves them: morph targets first, then bones.
@@ -75,6 +98,8 @@ class Rig:
     stencils : from the control points to those of the mesh; None where they are the same
     corner : (v,) the control point of each vertex of the file's mesh; None where `Mesh.point` tells it
     turns : of bones, by targets
+    carried : points that the file has not, after all of its own
+    contact : points that stay off the eyes; None for none
     """
 
     positions_mm: Floats
@@ -83,12 +108,28 @@ class Rig:
     stencils: Stencils | None = None
     corner: Ints | None = None
     turns: tuple[Turn, ...] = ()
+    carried: tuple[Carried, ...] = ()
+    contact: Contact | None = None
 
     @cached_property
     def rest(self) -> Motion:
         """That of a rig which nothing moves."""
         bones = np.zeros((0, 3, 4), np.float32) if self.skeleton is None else self.skeleton.resting
         return Motion(np.zeros(len(self.targets.names), np.float32), bones, self.positions_mm)
+
+    @property
+    def of_file(self) -> int:
+        """How many points are the file's own; they come first."""
+        return len(self.positions_mm) - sum(len(one.points) for one in self.carried)
+
+    def completed(self, places_mm: Floats) -> Floats:
+        """(p, 3) where all points rest, of those of the file [mm]."""
+        both = np.concatenate([places_mm, self.positions_mm[len(places_mm) :]])
+        for others, points in self.carried:
+            before, after = self.positions_mm[others], places_mm[others]
+            matrix, shift = rigid_motion(before.astype(np.float64), after.astype(np.float64))
+            both[points] = self.positions_mm[points] @ matrix.T + shift
+        return both
 
     @property
     def target_index(self) -> dict[str, int]:
@@ -138,14 +179,53 @@ class Rig:
         control = resting.posed(motion.weights.astype(np.float64), motion.matrices.astype(np.float64))
         return control if self.stencils is None else self.stencils.points(control)
 
+    def edges_mm(self, motion: Motion) -> Doubles:
+        """(k, r, 3) the edges of the lids around each eye, on the surface, in a motion [mm]."""
+        assert self.contact is not None
+        points, share, outline = self._edges
+        rest = np.vstack([motion.positions_mm[points].T, outline.rest_mm[3]])
+        posed = replace(outline, rest_mm=rest).posed(motion.weights, motion.matrices)
+        return np.asarray(share @ posed).reshape(*self.contact.edge.shape, 3)
+
+    @cached_property
+    def _edges(self) -> tuple[NDArray[np.intp], Doubles, RigOutline]:
+        """Control points around edges of lids, their shares in these, and what moves them."""
+        assert self.contact is not None
+        edge = self.contact.edge.ravel().astype(np.intp)
+        points, share = edge, np.eye(len(edge))
+        if self.stencils is not None:  # whose first points are the control points, on the surface
+            parts = [slice(*self.stencils.first[one : one + 2]) for one in edge]
+            points = np.unique(np.concatenate([self.stencils.point[part] for part in parts])).astype(np.intp)
+            share = np.zeros((len(edge), len(points)))
+            for row, part in zip(share, parts, strict=True):
+                row[np.searchsorted(points, self.stencils.point[part])] = self.stencils.weight[part]
+        return points, share, outline_of(self.positions_mm, self.targets, self.skeleton, points)
+
     def some_posed(self, points: Ints, motion: Motion) -> Doubles:
-        """(n, 3) some points, which no target moves, in a motion [mm]."""
+        """(n, 3) some points in a motion [mm]."""
         places = motion.positions_mm[points].astype(np.float64)
+        if self._moved[points].any():
+            places += np.einsum("t,tpk->pk", motion.weights, self._dense(points))
         if self.skeleton is None:
             return places
         whole = np.concatenate([places, np.ones((len(places), 1))], axis=1)
         weight, matrices = self.skeleton.weight[points], motion.matrices[self.skeleton.bone[points]]
         return np.asarray(np.einsum("pk,pkij,pj->pi", weight, matrices, whole))
+
+    @cached_property
+    def _moved(self) -> NDArray[np.bool_]:
+        """(p,) whether a target moves a point."""
+        moved = np.zeros(len(self.positions_mm), bool)
+        moved[self.targets.point] = True
+        return moved
+
+    def _dense(self, points: Ints) -> Floats:
+        """(t, n, 3) displacements of some points; the last ones are kept."""
+        asked, found = vars(self).get("_last", (None, None))
+        if found is None or not np.array_equal(asked, points):
+            found = self.targets.dense(points.astype(np.intp), len(self.positions_mm))
+            vars(self)["_last"] = points, found
+        return np.asarray(found)
 
     def posed(self, weights: Doubles, matrices: Doubles | None = None) -> Doubles:
         """(p, 3) the points in a pose, as the device computes them [mm].
@@ -156,8 +236,8 @@ class Rig:
         targets, points = self.targets, self.positions_mm.astype(np.float64)
         each = np.repeat(weights, np.diff(targets.first))
         np.add.at(points, targets.point, each[:, None] * targets.delta_mm)
-        if self.skeleton is None or matrices is None:
-            return points
-        whole = np.concatenate([points, np.ones((len(points), 1))], axis=1)
-        blended = np.einsum("pk,pkij->pij", self.skeleton.weight, matrices[self.skeleton.bone])
-        return np.asarray(np.einsum("pij,pj->pi", blended, whole))
+        if self.skeleton is not None and matrices is not None:
+            whole = np.concatenate([points, np.ones((len(points), 1))], axis=1)
+            blended = np.einsum("pk,pkij->pij", self.skeleton.weight, matrices[self.skeleton.bone])
+            points = np.asarray(np.einsum("pij,pj->pi", blended, whole))
+        return points if self.contact is None else self.contact.kept_off(points)

@@ -33,12 +33,14 @@ class Strands:
     knots_mm : (n, k, 3) from the root, along the quad, beside that, and along its normal; from root to tip
     radius_mm : (n, k) of the fibre
     absorption : (n, 3) of its inside [1/mm]
+    cover : (n,) of each root by the hair that stands around it, over each other; None for next to nothing [-]
     """
 
     roots: Roots
     knots_mm: Floats
     radius_mm: Floats
     absorption: Floats
+    cover: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.roots.quad)
@@ -47,6 +49,10 @@ class Strands:
         """(n, k, 3) the knots where the points of the mesh (p, 3) are [mm]."""
         root, frame = frames(mesh, self.roots, points_mm)
         return np.asarray(root[:, None] + np.einsum("nic,nki->nkc", frame, self.knots_mm))
+
+    def middle_mm(self, mesh: Mesh) -> Doubles:
+        """(3,) the mean of the roots on a mesh at rest [mm]."""
+        return np.asarray(frames(mesh, self.roots, points_of(mesh))[0].mean(axis=0))
 
     def refined(self, mesh: Mesh, finer: Mesh, levels: int) -> Strands:
         """The same hairs on the mesh refined by Catmull's and Clark's rules."""

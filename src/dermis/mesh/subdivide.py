@@ -38,8 +38,8 @@ def subdivide_head(head: Head, levels: int) -> Head:
     mesh, stencils = subdivide(head.mesh, levels)
     if stencils is None:
         return head
-    strands = head.strands and head.strands.refined(head.mesh, mesh, levels)
-    return replace(head, mesh=mesh, rig=replace(head.control, stencils=stencils), strands=strands)
+    strands, hair = (part and part.refined(head.mesh, mesh, levels) for part in (head.strands, head.hair))
+    return replace(head, mesh=mesh, rig=replace(head.control, stencils=stencils), strands=strands, hair=hair)
 
 
 def subdivide(mesh: Mesh, levels: int) -> Subdivided:
@@ -52,7 +52,7 @@ def subdivide(mesh: Mesh, levels: int) -> Subdivided:
 
     levels : 0 to 3, each takes four times the triangles
     """
-    if levels not in range(MAX_LEVELS + 1):
+    if not isinstance(levels, int | np.integer) or levels not in range(MAX_LEVELS + 1):
         refuse("subdivide", f"0 to {MAX_LEVELS} levels", f"{levels} came", "Each level takes 4x the memory")
     if levels == 0:
         return Subdivided(mesh, None)

@@ -65,6 +65,18 @@ def matrix_angles(matrix: Doubles) -> tuple[float, float, float]:
     return math.degrees(x), math.degrees(y), math.degrees(z)
 
 
+def rigid_motion(before: Doubles, after: Doubles) -> tuple[Doubles, Doubles]:
+    """The rotation (3, 3) and the shift (3,) after it that take points nearest to others, both (n, 3).
+
+    Kabsch's, by the singular values of the covariance.
+    """
+    middle, end = before.mean(axis=0), after.mean(axis=0)
+    u, _, vh = np.linalg.svd((before - middle).T @ (after - end))
+    mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(vh.T @ u.T)) or 1.0])
+    matrix = vh.T @ mirror @ u.T
+    return np.asarray(matrix), np.asarray(end - matrix @ middle)
+
+
 def slerp(a: Doubles, b: Doubles, s: float | Doubles) -> Doubles:
     """(..., 4) on the shorter arc between unit quaternions (..., 4), a share s of the way from a to b."""
     cosine = np.sum(a * b, axis=-1, keepdims=True)

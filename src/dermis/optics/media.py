@@ -77,7 +77,7 @@ class Medium:
     """A stack of layers under a smooth surface, topmost first. Below the last one there is air.
 
     name : preset or file
-    layers : at least one; only the last may be infinitely thick
+    layers : at least one; only the last may be semi-infinite
     eta : index of refraction of all layers against the air; 1 is an index-matched surface [-]
     notes : what a reader must know of the numbers
     sources : citation keys
@@ -106,7 +106,7 @@ class Medium:
 
     @property
     def semi_infinite(self) -> bool:
-        """Whether the last layer has no bottom."""
+        """Whether the last layer goes on without end below."""
         return bool(np.isinf(self.layers[-1].thickness_mm))
 
     def with_eta(self, eta: float) -> Medium:

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.hankel import STILL
 from dermis.optics.diffusion.models import transform
-from dermis.optics.media import Floats, Layer, Medium
-from dermis.optics.pigments.skin import SkinParameters, spectral_medium
+from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium
+from dermis.optics.pigments.skin import SkinParameters, mixed_layers
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
 _NODES = 65
+_PARTS = 13  # of a table, small enough for a processor's cache
 _COEFFICIENTS = ("sigma_a", "sigma_s_prime")
 
 
@@ -52,21 +53,17 @@ def _split(share: Floats, nodes: int) -> tuple[NDArray[np.int64], Floats]:
 
 def colour_table(parameters: SkinParameters) -> ColourTable:
     """The colours of all skins like this one, by layered diffusion; its own melanin and blood are ignored."""
-    shares = np.linspace(0.0, 1.0, _NODES) ** 2
-    media = [spectral_medium("dj2006", replace(parameters, melanin=share, blood=share)) for share in shares]
-    epidermis, dermis = (_stacked([medium.layers[k] for medium in media]) for k in (0, 1))
-    n = _NODES
-    pairs = _picked(epidermis, np.repeat(np.arange(n), n)), _picked(dermis, np.tile(np.arange(n), n))
-    total = transform(Medium("skins", pairs, media[0].eta), "layered", "layer", STILL)[0]
-    spectra = total.reshape(n * n, len(WAVELENGTHS_NM))
-    colours = (1.0 - normal_reflectance(media[0].eta)) * spectra @ rgb_weights(WAVELENGTHS_NM).T
-    return ColourTable(np.maximum(colours, 0.0).reshape(n, n, 3))
-
-
-def _stacked(layers: list[Layer]) -> Layer:
-    """Layers of one thickness as one, with coefficients (k, c)."""
-    sigma_a, sigma_s_prime = (np.array([getattr(layer, name) for layer in layers]) for name in _COEFFICIENTS)
-    return replace(layers[0], sigma_a=sigma_a, sigma_s_prime=sigma_s_prime)
+    epidermis, dermis = mixed_layers(parameters, np.linspace(0.0, 1.0, _NODES) ** 2)
+    bloods = np.arange(_NODES)
+    spectra = []
+    for melanins in np.array_split(np.arange(_NODES), _PARTS):
+        rows, columns = np.repeat(melanins, _NODES), np.tile(bloods, len(melanins))
+        medium = Medium("skins", (_picked(epidermis, rows), _picked(dermis, columns)), SKIN_ETA)
+        total = transform(medium, "layered", "layer", STILL)[0]
+        spectra.append(total.reshape(-1, len(WAVELENGTHS_NM)))
+    entering = 1.0 - normal_reflectance(SKIN_ETA)
+    colours = entering * np.concatenate(spectra) @ rgb_weights(WAVELENGTHS_NM).T
+    return ColourTable(np.maximum(colours, 0.0).reshape(_NODES, _NODES, 3))
 
 
 def _picked(layer: Layer, rows: NDArray[np.int64]) -> Layer:

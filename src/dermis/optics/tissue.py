@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.errors import refuse
@@ -34,6 +35,33 @@ class Tissue:
     medium: Medium
     rgb: Floats | None = None
     parameters: SkinParameters | None = None
+
+    def __repr__(self) -> str:
+        """What it is, its layers and its coefficients, on three lines."""
+        layers = self.medium.layers
+        a = np.array([layer.sigma_a for layer in layers])
+        s = np.array([layer.sigma_s_prime for layer in layers])
+        kind = "red, green, blue" if self.rgb is None else f"{a.shape[1]} wavelengths"
+        thick = ", ".join(
+            f"{layer.name} {layer.thickness_mm:.3g} mm"
+            if np.isfinite(layer.thickness_mm)
+            else f"{layer.name} (semi-infinite)"
+            for layer in layers
+        )
+        both = {"mu_a": a, "mu_s'": s}
+        ranges = (f"{name} {one.min():.3g} to {one.max():.3g} /mm" for name, one in both.items())
+        first = f"Tissue {self.medium.name}: {kind}, index of refraction {self.medium.eta:g}"
+        return "\n".join([first, f"  {thick}", f"  {', '.join(ranges)}"])
+
+    def spectrum(self, model: Model = "layered", clamp: Clamp = "layer") -> Floats | None:
+        """Total diffuse reflectance R at `WAVELENGTHS_NM`, (31,), per incident light [-].
+
+        None for a medium that has colours, not wavelengths. What the surface mirrors is not in it.
+        """
+        if self.rgb is None:
+            return None
+        entering = 1.0 - normal_reflectance(self.medium.eta)
+        return np.asarray(entering * diffusion_profile(self.medium, model, clamp).total)
 
     def with_layers(self, layers: Sequence[Layer]) -> Tissue:
         """A medium of other layers under the same surface.

@@ -19,9 +19,7 @@ from numpy.typing import NDArray
 
 from dermis.errors import DermisError, refuse
 from dermis.images.io import read_image
-from dermis.optics.media import Medium
-from dermis.reference.cycles_scene import FALLOFFS, describe
-from dermis.reference.mitsuba_scene import Lambertian
+from dermis.reference.cycles_scene import FALLOFFS, Below, describe
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
@@ -77,7 +75,7 @@ class CyclesPass:
 
 def cycles_render(
     scene: Scene,
-    medium: Medium | Lambertian,
+    medium: Below,
     samples: int = 64,
     settings: Settings | None = None,
     *,
@@ -104,7 +102,7 @@ def cycles_render(
 
 def cycles_passes(
     scene: Scene,
-    medium: Medium | Lambertian,
+    medium: Below,
     samples: Sequence[int],
     settings: Settings | None = None,
     *,
@@ -118,6 +116,7 @@ def cycles_passes(
 
     medium : of one layer; its eta is ignored, because Cycles' walks end at an index-matched surface. Its
         colour in Cycles is its diffuse reflectance, its radius 4 pi mean free paths. Or a `Lambertian`
+        or `Facets`
     samples : paths through each pixel, for each pass
     settings : only the size counts
     seed : of the first pass; each further pass takes the next

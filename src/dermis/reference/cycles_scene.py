@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,18 +11,33 @@ from numpy.typing import NDArray
 from dermis.errors import refuse
 from dermis.mesh.head import Head
 from dermis.optics.media import Medium
-from dermis.reference.described import UNIT_MM, cycles_looking, world
+from dermis.reference.described import UNIT_MM, check_lens, cycles_looking, world
 from dermis.reference.half_space import diffuse_albedo
 from dermis.reference.lights import lamp
 from dermis.reference.mitsuba_scene import Lambertian
 from dermis.scene.model import Scene
+from dermis.specular.fresnel import SKIN_ETA
 
+
+@dataclass(frozen=True)
+class Facets:
+    """A surface alone, over black: a boundary of index 1.4 cut into Beckmann's facets.
+
+    The head's normal map is on it.
+
+    roughness : Beckmann's m [-]
+    """
+
+    roughness: float
+
+
+Below = Medium | Lambertian | Facets
 FALLOFFS = {"random-walk": "RANDOM_WALK", "burley": "BURLEY"}
 """Our names of Cycles' methods of subsurface scattering."""
 
 
 def describe(
-    scene: Scene, medium: Medium | Lambertian, method: str, size: tuple[int, int]
+    scene: Scene, medium: Below, method: str, size: tuple[int, int]
 ) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     """What goes into scene.json, less the passes, and the arrays beside it."""
     around, panorama = world(scene.environment)
@@ -31,7 +47,7 @@ def describe(
         "world": around,
         "camera": _camera(scene),
         "size": list(size),
-        "direct": isinstance(medium, Lambertian),
+        "direct": isinstance(medium, Lambertian | Facets),
     }
     mesh = scene.head.mesh
     arrays: dict[str, NDArray[Any]] = {
@@ -40,10 +56,19 @@ def describe(
         "triangles": mesh.triangles,
         "material": mesh.material,
     }
+    if isinstance(medium, Facets) and scene.head.maps.normal is not None:
+        arrays |= {"uv": mesh.uv, "normal_map": _normal_map(scene.head.maps.normal)}
     return described, arrays | panorama
 
 
-def _materials(head: Head, medium: Medium | Lambertian, method: str) -> list[dict[str, Any]]:
+def _normal_map(slopes: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(h, w, 3) normals in tangent space as colours, of slopes (h, w, 2)."""
+    normal = np.dstack([-slopes, np.ones(slopes.shape[:2], np.float32)])
+    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+    return np.asarray(0.5 + 0.5 * normal, np.float32)
+
+
+def _materials(head: Head, medium: Below, method: str) -> list[dict[str, Any]]:
     skin = _skin(medium, method)
     return [
         {"name": material.name, **(skin if material.kind == "skin" else _diffuse(material.colour))}
@@ -55,7 +80,7 @@ def _diffuse(colour: Any) -> dict[str, Any]:
     return {"method": "DIFFUSE", "colour": [float(part) for part in colour]}
 
 
-def _skin(medium: Medium | Lambertian, method: str) -> dict[str, Any]:
+def _skin(medium: Below, method: str) -> dict[str, Any]:
     """Colour: what a half-space of the medium reflects of diffuse light. Radius: 4 pi mean free paths.
 
     Cycles divides radii by 4 pi, and finds the walk's albedo from the colour by a fit whose inverse is
@@ -65,6 +90,9 @@ def _skin(medium: Medium | Lambertian, method: str) -> dict[str, Any]:
     """
     if isinstance(medium, Lambertian):
         return _diffuse(medium.albedo)
+    if isinstance(medium, Facets):
+        # Blender's number is the root of Beckmann's
+        return {"method": "FACETS", "roughness": float(np.sqrt(medium.roughness)), "ior": SKIN_ETA}
     if len(medium.layers) != 1:
         came = f"it has {len(medium.layers)}"
         refuse(medium.name, "one layer, for Cycles", came, "Take a medium of one layer, such as skin1")
@@ -76,8 +104,9 @@ def _skin(medium: Medium | Lambertian, method: str) -> dict[str, Any]:
 
 def _camera(scene: Scene) -> dict[str, Any]:
     camera = scene.camera
+    check_lens(camera, "Cycles")
     path = np.subtract(camera.target, camera.position)
     return {
         "to_world": cycles_looking(camera.position, path, camera.up),
-        "half_tangent": 0.5 * camera.frame_mm / float(np.linalg.norm(path)),
+        "half_tangent": camera.half_tangent,
     }

@@ -24,7 +24,7 @@ def main(folder: Path) -> None:
         arrays = dict(stored)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.preferences.addon_enable(module="cycles")
-    materials = [make_material(one) for one in described["materials"]]
+    materials = [make_material(one, arrays.get("normal_map")) for one in described["materials"]]
     add_mesh(arrays, materials)
     for light in described["lights"]:
         add_light(light)
@@ -48,18 +48,28 @@ def add_mesh(arrays: dict[str, Any], materials: list[Any]) -> None:
     for material in materials:
         mesh.materials.append(material)
     mesh.polygons.foreach_set("material_index", arrays["material"])
+    if "uv" in arrays:
+        places = arrays["uv"][corners.ravel()] * [1, -1] + [0, 1]  # its first row is the lowest
+        mesh.uv_layers.new(name="uv").uv.foreach_set("vector", places.astype(np.float32).ravel())
     mesh.update(calc_edges=True)
     mesh.shade_smooth()
     mesh.normals_split_custom_set_from_vertices(arrays["normals"].tolist())
     add_object("head", mesh)
 
 
-def make_material(described: dict[str, Any]) -> Any:
+def make_material(described: dict[str, Any], normal_map: Any) -> Any:
     material = bpy.data.materials.new(described["name"])
     material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
-    if described["method"] == "DIFFUSE":
+    if described["method"] == "FACETS":
+        shader = nodes.new("ShaderNodeBsdfGlass")  # what it lets through ends there: one bounce
+        shader.distribution = "BECKMANN"
+        shader.inputs["Roughness"].default_value = described["roughness"]
+        shader.inputs["IOR"].default_value = described["ior"]
+        if normal_map is not None:
+            links.new(add_normals(nodes, links, normal_map), shader.inputs["Normal"])
+    elif described["method"] == "DIFFUSE":
         shader = nodes.new("ShaderNodeBsdfDiffuse")
     else:
         shader = nodes.new("ShaderNodeSubsurfaceScattering")
@@ -68,9 +78,28 @@ def make_material(described: dict[str, Any]) -> Any:
         shader.inputs["Radius"].default_value = described["radius"]
         if "Roughness" in shader.inputs:
             shader.inputs["Roughness"].default_value = 1.0
-    shader.inputs["Color"].default_value = (*described["colour"], 1.0)
+    shader.inputs["Color"].default_value = (*described.get("colour", (1.0, 1.0, 1.0)), 1.0)
     links.new(shader.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
     return material
+
+
+def add_normals(nodes: Any, links: Any, normal_map: Any) -> Any:
+    texture, node = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeNormalMap")
+    texture.image = packed_image("normals", normal_map)
+    links.new(texture.outputs["Color"], node.inputs["Color"])
+    node.uv_map = "uv"
+    return node.outputs["Normal"]
+
+
+def packed_image(name: str, rows: Any) -> Any:
+    """Linear numbers (h, w, 3), the highest row first, as a picture in the file."""
+    height, width, _ = rows.shape
+    image = bpy.data.images.new(name, width, height, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
+    pixels = np.concatenate((rows, np.ones((height, width, 1))), axis=2)[::-1]
+    image.pixels.foreach_set(np.ascontiguousarray(pixels, dtype=np.float32).ravel())
+    image.pack()
+    return image
 
 
 def add_light(described: dict[str, Any]) -> None:
@@ -133,14 +162,8 @@ def set_world(described: dict[str, Any], panorama: Any) -> None:
     background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
     if panorama is None:
         return
-    height, width, _ = panorama.shape
-    image = bpy.data.images.new("panorama", width, height, float_buffer=True)
-    image.colorspace_settings.name = "Non-Color"
-    pixels = np.concatenate((panorama, np.ones((height, width, 1))), axis=2)[::-1]
-    image.pixels.foreach_set(np.ascontiguousarray(pixels, dtype=np.float32).ravel())
-    image.pack()
     texture, mapping = nodes.new("ShaderNodeTexEnvironment"), nodes.new("ShaderNodeMapping")
-    texture.image = image
+    texture.image = packed_image("panorama", panorama)
     mapping.inputs["Rotation"].default_value = Matrix(described["turn"]).to_euler()
     links.new(nodes.new("ShaderNodeTexCoord").outputs["Generated"], mapping.inputs["Vector"])
     links.new(mapping.outputs["Vector"], texture.inputs["Vector"])

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.environment.panorama import UNIFORM, load_panorama
+from dermis.errors import refuse
+from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 
 Floats = NDArray[np.float64]
@@ -16,6 +18,14 @@ UNIT_MM = 100.0
 """Cycles' unit: a head is a few of them, as its sampling expects."""
 
 _TO_CYCLES = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+
+
+def check_lens(camera: Camera, who: str) -> None:
+    """Refuse a camera that only this package has."""
+    if camera.principal_point != (0.5, 0.5) or camera.pixel_aspect != 1.0:
+        expected = f"a principal point in the middle and square pixels, for {who}"
+        came = f"principal_point {camera.principal_point} and pixel_aspect {camera.pixel_aspect:g} came"
+        refuse("camera", expected, came, "Render with such a camera, and crop or resample the picture")
 
 
 def rgb(values: Any) -> Described:

@@ -14,7 +14,7 @@ from dermis.errors import refuse
 from dermis.extras import needed
 from dermis.mesh.head import Head
 from dermis.optics.media import Layer, Medium
-from dermis.reference.described import rgb, surroundings
+from dermis.reference.described import check_lens, rgb, surroundings
 from dermis.reference.lights import emitter
 from dermis.reference.mitsuba_solid import Solid, inwards, skin_solid
 from dermis.scene.camera import Camera
@@ -78,13 +78,18 @@ def radiance_scene(mi: Any, scene: Scene, medium: Medium | Lambertian, size: tup
     direct = {"max_depth": _DIRECT_DEPTH} if isinstance(medium, Lambertian) else {}
     # Spectral MIS: extinction differs between channels, and sampling one of them makes the others noisy.
     integrator = {"type": "volpathmis", "rr_depth": ROULETTE_DEPTH, "hide_emitters": True, **direct}
+    return lit_scene(mi, scene, integrator, shapes, size), notes
+
+
+def lit_scene(
+    mi: Any, scene: Scene, integrator: dict[str, Any], shapes: dict[str, Any], size: tuple[int, int]
+) -> Any:
+    """Mitsuba's scene of some shapes, in the lights and surroundings of ours and before its camera."""
     lights = {f"light_{k}": emitter(mi, light, k) for k, light in enumerate(scene.lights, start=1)}
     if scene.environment is not None:
         lights["environment"] = surroundings(mi, scene.environment)
-    sensor = _sensor(mi, scene.camera, size)
-    return mi.load_dict(
-        {"type": "scene", "integrator": integrator, "sensor": sensor, **shapes, **lights}
-    ), notes
+    sensor = sensor_of(mi, scene.camera, size)
+    return mi.load_dict({"type": "scene", "integrator": integrator, "sensor": sensor, **shapes, **lights})
 
 
 def mask_scene(mi: Any, scene: Scene, size: tuple[int, int]) -> Any:
@@ -93,21 +98,22 @@ def mask_scene(mi: Any, scene: Scene, size: tuple[int, int]) -> Any:
         {
             "type": "scene",
             "integrator": {"type": "path", "max_depth": 1},
-            "sensor": _sensor(mi, scene.camera, size, sampler="multijitter"),
+            "sensor": sensor_of(mi, scene.camera, size, sampler="multijitter"),
             **_mask_shapes(mi, scene.head),
         }
     )
 
 
-def _sensor(mi: Any, camera: Camera, size: tuple[int, int], sampler: str = "independent") -> dict[str, Any]:
+def sensor_of(mi: Any, camera: Camera, size: tuple[int, int], sampler: str = "independent") -> dict[str, Any]:
+    """Mitsuba's description of a camera whose pixels are even squares."""
     width, height = size
-    distance = float(np.linalg.norm(np.subtract(camera.target, camera.position)))
+    check_lens(camera, "Mitsuba")
     view = ([float(c) for c in v] for v in (camera.position, camera.target, camera.up))
     film = {"width": width, "height": height, "pixel_format": "rgb", "component_format": "float32"}
     return {
         "type": "perspective",
         "fov_axis": "y",
-        "fov": float(2.0 * np.degrees(np.arctan(0.5 * camera.frame_mm / distance))),
+        "fov": float(2.0 * np.degrees(np.arctan(camera.half_tangent))),
         "to_world": mi.ScalarTransform4f().look_at(*view),
         "near_clip": 0.5,
         "far_clip": 1e7,
@@ -156,7 +162,7 @@ def _sheet(mi: Any, head: Head, index: int, **given: Any) -> Any:
     mesh = head.mesh
     used, corners = np.unique(mesh.triangles[mesh.material == index], return_inverse=True)
     places = mesh.positions[used] - np.array(head.centre_mm)
-    return _mesh(mi, places, corners.reshape(-1, 3), mesh.normals[used], **given)
+    return mesh_shape(mi, places, corners.reshape(-1, 3), mesh.normals[used], **given)
 
 
 def _bodies(mi: Any, head: Head, medium: Medium) -> tuple[dict[str, Any], tuple[str, ...]]:
@@ -164,7 +170,7 @@ def _bodies(mi: Any, head: Head, medium: Medium) -> tuple[dict[str, Any], tuple[
     skin = skin_solid(head.mesh, head.name)
     skin = replace(skin, positions=(skin.positions - np.array(head.centre_mm)).astype(np.float32))
     notes = [f"{skin.caps} openings shut, {skin.cap_area:.0f} mm2"] if skin.caps else []
-    gap = _GAP * (1.0 + np.abs(skin.positions).max(axis=1)) * mi.math.RayEpsilon
+    gap = gap_of(mi, skin)
     media: list[Any] = [None, *(mi.load_dict(_homogeneous(layer)) for layer in medium.layers), None]
     shapes = {}
     depth = -gap
@@ -173,12 +179,17 @@ def _bodies(mi: Any, head: Head, medium: Medium) -> tuple[dict[str, Any], tuple[
             break
         for side, where in (("upper", depth), ("lower", depth + gap)):
             surface, folded = inwards(skin, where, head.name)
-            shapes[f"face_{k}_{side}"] = _shell(mi, surface, {"exterior": above, "interior": below})
+            shapes[f"face_{k}_{side}"] = shell(mi, surface, {"exterior": above, "interior": below})
         if folded > _NOTABLE_FOLD:
             notes.append(f"{folded:.1%} of the face under layer {k} is folded")
         if k < len(medium.layers):
             depth = depth + gap + medium.layers[k].thickness_mm
     return shapes, tuple(notes)
+
+
+def gap_of(mi: Any, skin: Solid) -> Any:
+    """(p,) distance between the two surfaces that stand for a face of a solid about the origin [mm]."""
+    return _GAP * (1.0 + np.abs(skin.positions).max(axis=1)) * mi.math.RayEpsilon
 
 
 def _homogeneous(layer: Layer) -> dict[str, Any]:
@@ -193,21 +204,33 @@ def _homogeneous(layer: Layer) -> dict[str, Any]:
     }
 
 
-def _shell(mi: Any, solid: Solid, media: dict[str, Any]) -> Any:
+def shell(mi: Any, solid: Solid, media: dict[str, Any]) -> Any:
+    """A surface that is there only to part media: exterior and interior, None for none."""
     filled = {side: medium for side, medium in media.items() if medium is not None}
-    return _mesh(mi, solid.positions, solid.triangles, None, bsdf=mi.load_dict({"type": "null"}), **filled)
+    return mesh_shape(
+        mi, solid.positions, solid.triangles, None, bsdf=mi.load_dict({"type": "null"}), **filled
+    )
 
 
-def _mesh(mi: Any, places: Any, triangles: Any, normals: Any, **given: Any) -> Any:
+def mesh_shape(
+    mi: Any, places: Any, triangles: Any, normals: Any = None, uv: Any = None, **given: Any
+) -> Any:
+    """Triangles as Mitsuba has them.
+
+    places, normals, uv : (v, 3), (v, 3), (v, 2); None for facets, and for no pictures on them
+    given : BSDF, emitter and media
+    """
     properties = mi.Properties()
     for name, value in given.items():
         properties[name] = value
-    mesh = mi.Mesh("", len(places), len(triangles), has_vertex_normals=normals is not None, props=properties)
+    more = {"has_vertex_normals": normals is not None, "has_vertex_texcoords": uv is not None}
+    mesh = mi.Mesh("", len(places), len(triangles), props=properties, **more)
     parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = _flat(places, np.float32)
+    arrays = {"vertex_positions": places, "vertex_normals": normals, "vertex_texcoords": uv}
+    for name, values in arrays.items():
+        if values is not None:
+            parameters[name] = _flat(values, np.float32)
     parameters["faces"] = _flat(triangles, np.uint32)
-    if normals is not None:
-        parameters["vertex_normals"] = _flat(normals, np.float32)
     parameters.update()
     return mesh
 

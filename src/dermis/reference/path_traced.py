@@ -88,18 +88,22 @@ def path_trace(
 
     Sources: [Jakob2022], [Miller2019].
     """
-    _check(samples)
+    wanted = passes_for(samples)
     check_traceable(medium)
     mi, size = load_mitsuba(), (settings or Settings()).size
     form = f"{mi.__version__} {variant} {SAMPLES_PER_PASS} {ROULETTE_DEPTH}"
     key = scene_key(scene, medium, size, form) if keep else None
-    wanted = max(_LEAST_PASSES, -(-samples // SAMPLES_PER_PASS))
     passes = kept_passes(key, size) if key else None
     if passes is None or passes.count < wanted:
         with variant_of(mi, variant):
             built, notes = radiance_scene(mi, scene, medium, size)
             passes = passes or Passes.none(size, _mask(mi, scene, size), notes)
-            _add_passes(mi, built, passes, wanted, key, report)
+            add_passes(mi, built, passes, wanted, key, report)
+    return traced(passes)
+
+
+def traced(passes: Passes) -> PathTraced:
+    """The mean of some passes, as an image."""
     return PathTraced(
         passes.mean.astype(np.float32),
         passes.variance.astype(np.float32),
@@ -110,9 +114,14 @@ def path_trace(
     )
 
 
-def _check(samples: int) -> None:
+def passes_for(samples: int) -> int:
+    """How many passes have at least so many samples.
+
+    Raises DermisError for none and for too many.
+    """
     if not (isinstance(samples, int | np.integer) and 1 <= samples <= _MOST_SAMPLES):
         refuse("samples", f"a whole number from 1 to {_MOST_SAMPLES}", f"{samples} came", "Correct it")
+    return max(_LEAST_PASSES, -(-samples // SAMPLES_PER_PASS))
 
 
 def _mask(mi: Any, scene: Scene, size: tuple[int, int]) -> Floats:
@@ -120,10 +129,10 @@ def _mask(mi: Any, scene: Scene, size: tuple[int, int]) -> Floats:
     return np.clip(share, 0.0, 1.0)
 
 
-def _add_passes(
+def add_passes(
     mi: Any, built: Any, passes: Passes, wanted: int, key: str | None, report: Report | None
 ) -> None:
-    """Add passes up to the number wanted; with a key those done are stored, whatever happens."""
+    """Add passes of Mitsuba's scene up to the number wanted; with a key those done are stored in any case."""
     stored = time.perf_counter()
     try:
         while passes.count < wanted:

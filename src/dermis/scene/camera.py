@@ -3,29 +3,57 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
 from dermis.errors import refuse
 from dermis.mesh.head import Head
+from dermis.scene.opencv import OpenCvCamera, extrinsics, from_opencv, intrinsics
 from dermis.scene.plain import Direction, Plain, Vector
 
 _DISTANCE_MM = 1100.0  # a portrait lens' distance: closer makes noses large
 
 
+_Fraction = Annotated[float, Field(ge=-10, le=10)]
+
+
+class Window(NamedTuple):
+    """What a picture shows of a plane at distance 1 before the eye.
+
+    Its x, from -1 at the left to 1, and its y, from -1 at the bottom to 1, are (x + shift) half there.
+    """
+
+    half: tuple[float, float]
+    shift: tuple[float, float]
+
+
 class Camera(Plain):
     """Where the picture is taken from."""
+
+    meant: ClassVar[Mapping[str, str]] = {
+        "eye": "position",
+        "location": "position",
+        "look_at": "target",
+        "field_of_view": "frame_mm (height of what is shown at the target)",
+        "fov": "frame_mm (height of what is shown at the target)",
+    }
 
     position: Vector
     """Place of the eye [mm]."""
     target: Vector = (0.0, 0.0, 0.0)
-    """The point in the middle of the picture [mm]."""
+    """The point on the optical axis that is looked at: as a rule the middle of the picture [mm]."""
     up: Direction = (0.0, 1.0, 0.0)
     """The direction that is upwards in the picture."""
     frame_mm: Annotated[float, Field(ge=0.01, le=1e5)] = 340.0
     """Height of what the picture shows at the target's distance [mm]."""
+    principal_point: tuple[_Fraction, _Fraction] = (0.5, 0.5)
+    """Where the optical axis meets the picture, from its upper left corner, in widths and heights of it."""
+    pixel_aspect: Annotated[float, Field(ge=0.1, le=10)] = 1.0
+    """Width of a pixel over its height."""
 
     @model_validator(mode="after")
     def _looks_somewhere(self) -> Camera:
@@ -33,6 +61,38 @@ class Camera(Plain):
         if np.linalg.norm(np.cross(view, self.up)) < 1e-6 * np.linalg.norm(self.up):
             raise ValueError("a position away from the target, and not along up from it")
         return self
+
+    @classmethod
+    def from_opencv(cls, K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int]) -> Camera:
+        """The camera of a calibration by OpenCV, for pictures of a size; see `to_opencv`.
+
+        Lens distortion is not in these: undistort pictures first.
+
+        Raises DermisError for a K with skew, an R that is no rotation, and numbers of another shape.
+        """
+        return cls(**from_opencv(K, R, t, size))
+
+    def to_opencv(self, size: tuple[int, int]) -> OpenCvCamera:
+        """K, R and t as OpenCV has them: X_cam = R X + t, x to the right, y down, z forward.
+
+        size : width and height of the picture [pixel]
+
+        X and t are in mm, X from the head's centre, as all places of a scene. The middles of pixels have
+        whole coordinates: the upper left one is at (0, 0), the corner of the picture at (-0.5, -0.5).
+        """
+        seen = self.half_tangent, self.principal_point, self.pixel_aspect
+        return OpenCvCamera(intrinsics(seen, size), *extrinsics(self.position, self.target, self.up))
+
+    @property
+    def half_tangent(self) -> float:
+        """Tangent of half the vertical angle of view, were the axis in the middle."""
+        return 0.5 * self.frame_mm / math.dist(self.position, self.target)
+
+    def window(self, aspect: float) -> Window:
+        """What a picture of this width over height shows."""
+        across, down = self.principal_point
+        half = self.half_tangent
+        return Window((half * aspect * self.pixel_aspect, half), (1.0 - 2.0 * across, 2.0 * down - 1.0))
 
 
 def portrait(head: Head) -> Camera:

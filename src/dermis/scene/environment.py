@@ -19,5 +19,3 @@ class Environment(Plain):
     """Turn of the environment about the upward axis, counter-clockwise as seen from above [degrees]."""
     exposure: Annotated[float, Field(ge=0, le=1e6, json_schema_extra=slider(0.02, 10, log=True))] = 1.0
     """Factor of the environment's radiance."""
-    visible: bool = False
-    """Show the environment behind the head, out of focus and without its sun-like peaks."""

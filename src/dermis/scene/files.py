@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from collections.abc import Mapping
-from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,7 +16,7 @@ from dermis.scene.camera import PRESETS, Camera, preset
 from dermis.scene.environment import Environment
 from dermis.scene.head_table import NO_REGIONS, HeadTable, names_regions
 from dermis.scene.heads import load_head
-from dermis.scene.lights import LIGHTS, Light, preset_lights
+from dermis.scene.lights import LIGHTS, NO_LIGHTS, Light, light_presets, preset_lights
 from dermis.scene.model import Scene
 from dermis.scene.plain import ImpossibleError, Plain
 from dermis.scene.pose import Pose
@@ -26,31 +26,27 @@ from dermis.scene.skin import PRESETS as SKINS
 from dermis.scene.skin import Skin
 
 P = TypeVar("P", bound=Plain)
-NO_LIGHTS = "none"
-"""Name of the rig without lights, for an environment alone."""
 _PARTS = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
 _MAPS = ("colour", "normal", "height", "specular", "roughness")
 
 
-def load_lights(name: str) -> tuple[Light, ...]:
+def load_lights(name: str | Path) -> tuple[Light, ...]:
     """The lights of a preset ("studio", "window", ...) or of a TOML file with [[lights]] tables."""
     known = light_presets()
-    if name == NO_LIGHTS:
-        return ()
-    if name in known:
-        return preset_lights(name)
-    return _lights(name, _read(Path(name), f"a preset ({', '.join(known)}) or a TOML file").get("lights"))
+    if str(name) in known:
+        return preset_lights(str(name))
+    return _lights(name, _read(name, f"a preset ({', '.join(known)}) or a TOML file").get("lights"))
 
 
-def load_camera(name: str, head: Head) -> Camera:
+def load_camera(name: str | Path, head: Head) -> Camera:
     """A camera preset for the head, or the [camera] table of a TOML file."""
-    if name in PRESETS:
-        return preset(name, head)
-    table = _read(Path(name), f"a preset ({', '.join(PRESETS)}) or a TOML file").get("camera")
+    if str(name) in PRESETS:
+        return preset(str(name), head)
+    table = _read(name, f"a preset ({', '.join(PRESETS)}) or a TOML file").get("camera")
     return _made(Camera, name, "camera", table)
 
 
-def load_scene(path: Path, known: Head | None = None) -> tuple[Scene, Settings]:
+def load_scene(path: str | Path, known: Head | None = None) -> tuple[Scene, Settings]:
     """Scene and settings of a TOML file; what it leaves out keeps its default.
 
     Tables: [head] (file or sample under `name`, the options of `load_head`, and `regions`, a table as for
@@ -60,6 +56,7 @@ def load_scene(path: Path, known: Head | None = None) -> tuple[Scene, Settings]:
 
     known : the head of the file's [head], when the caller has it already
     """
+    path = _path(path, "a scene in TOML")
     table = _read(path, "a scene in TOML")
     for part in table.keys() - _PARTS:
         refuse(path, f"only the parts {', '.join(sorted(_PARTS))}", f"{part!r} came", "Correct its name")
@@ -127,10 +124,9 @@ def _skin(path: Path, told: Any) -> Skin:
 
 
 def _check_said_once(path: Path, table: HeadTable, skin: Skin) -> None:
-    for name in ("rho_s", "roughness"):
-        if names_regions(vars(table)) and name in skin.model_fields_set:
-            came = "it came beside the head's regions, which say it for each region"
-            refuse(f"{path}: skin: {name}", "one or the other", came, "Leave one out, or use oiliness")
+    if names_regions(vars(table)) and "rho_s" in skin.model_fields_set:
+        came = "it came beside the head's regions, which say it for each region"
+        refuse(f"{path}: skin: rho_s", "one or the other", came, "Leave one out, or use oiliness")
 
 
 def _pose(path: Path, table: Any, head: Head) -> Pose:
@@ -141,6 +137,9 @@ def _pose(path: Path, table: Any, head: Head) -> Pose:
 
 
 def _environment(path: Path, table: Any) -> Environment:
+    if isinstance(table, dict) and "visible" in table:
+        remedy = 'Write background = "environment" into [render]'
+        refuse(f"{path}: environment: visible", "what is behind the head elsewhere", "it came", remedy)
     environment = _made(Environment, path, "environment", table)
     return environment.model_copy(update={"name": _beside(path.parent, environment.name)})
 
@@ -149,12 +148,6 @@ def _beside(folder: Path, name: str) -> str:
     """The file of that name in a scene's folder if there is one, else the name, of a preset mostly."""
     file = folder / name
     return str(file) if file.is_file() else name
-
-
-def light_presets() -> list[str]:
-    """Names of the rigs of the package."""
-    names = [entry.name for entry in (resources.files("dermis.scene") / "presets").iterdir()]
-    return sorted([NO_LIGHTS, *(name.removesuffix(".toml") for name in names if name.endswith(".toml"))])
 
 
 def _lights(culprit: object, tables: Any) -> tuple[Light, ...]:
@@ -182,7 +175,14 @@ def _made(kind: type[P], culprit: object, part: str, table: Any) -> P:
         raise ImpossibleError(f"{culprit}: {part}", error.findings) from None
 
 
-def _read(path: Path, expected: str) -> dict[str, Any]:
+def _path(name: object, expected: str) -> Path:
+    if not isinstance(name, str | os.PathLike):
+        refuse("file", f"the name of {expected}", f"a {type(name).__name__} came", "Write its name")
+    return Path(name)
+
+
+def _read(name: str | Path, expected: str) -> dict[str, Any]:
+    path = _path(name, expected)
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from dermis.mesh.eyes import PUPIL_MM
 from dermis.scene.plain import Plain
 
 _Length = Annotated[float | None, Field(gt=0, allow_inf_nan=False)]
@@ -14,6 +15,20 @@ VOrigin = Literal["auto", "top", "bottom"]
 Up = Literal["y", "z"]
 NormalY = Literal["up", "down"]
 AUTO, NO_REGIONS = "auto", "none"
+Eyes = Literal["fitted", "plain"]
+
+
+class EyeTable(Plain):
+    """What replaces the look of a head's eyes; None leaves their own."""
+
+    eumelanin: Annotated[float | None, Field(ge=0, le=1)] = None
+    """Of the iris, from none, which leaves it blue, to the darkest brown."""
+    pupil_mm: Annotated[float | None, Field(ge=PUPIL_MM[0], le=PUPIL_MM[1])] = None
+    """Radius of the pupil [mm]."""
+    redness: Annotated[float | None, Field(ge=0, le=1)] = None
+    """Of the white of the eye."""
+    seed: Annotated[int | None, Field(ge=0, le=2**32 - 1)] = None
+    """Which fibres and vessels."""
 
 
 class HeadTable(Plain):
@@ -43,6 +58,12 @@ class HeadTable(Plain):
     """Way in which green points in the normal map: "up" (OpenGL) or "down" (DirectX)."""
     opaque: tuple[str, ...] = ()
     """Groups of the file that are not skin, whatever they are called."""
+    eyes: Eyes = "fitted"
+    """Eyeballs of a file (groups called eyes, Eye_L, cornea ...): replaced by the package's, or plain."""
+    eye_groups: tuple[str, ...] = ()
+    """Groups of the file that hold eyeballs, whatever they are called, be it with all of the head."""
+    eye: EyeTable | None = None
+    """What the eyes look like, where it is not as usual."""
     subdivide: Annotated[int, Field(ge=0, le=3)] = 0
     """Levels of subdivision: Catmull-Clark for a file of quads (.obj, .ply), else Loop."""
     regions: str = AUTO

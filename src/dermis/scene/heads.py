@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
-from dermis.errors import refuse
+from dermis.errors import notify, refuse
 from dermis.human.regions.usual import with_usual_regions
 from dermis.mesh.check import check_head_height
+from dermis.mesh.eyes import EyeLook
+from dermis.mesh.fitted_eyes.fit import with_fitted_eyes
 from dermis.mesh.formats import is_gltf
 from dermis.mesh.gltf.pictures import embedded_maps
 from dermis.mesh.head import Head
 from dermis.mesh.load import load_rigged
-from dermis.mesh.maps import load_maps
+from dermis.mesh.maps import Maps, load_maps
+from dermis.mesh.obj_maps import obj_maps
 from dermis.mesh.samples import SAMPLES, Sample, fetch
 from dermis.mesh.subdivide import subdivide_head
-from dermis.scene.head_table import AUTO, NormalY, Up, VOrigin
+from dermis.scene.head_checks import check_given, check_relief, named
+from dermis.scene.head_table import AUTO, Eyes, NormalY, Up, VOrigin
 
 if TYPE_CHECKING:
     from dermis.human.person import Human
@@ -43,7 +47,10 @@ def load_head(
     v_origin: VOrigin = "auto",
     up: Up = "y",
     normal_y: NormalY = "up",
-    opaque: Sequence[str] = (),
+    opaque: Sequence[str] | str = (),
+    eyes: Eyes = "fitted",
+    eye_groups: Sequence[str] | str = (),
+    eye: Mapping[str, float] | None = None,
     subdivide: int = 0,
     regions: Literal["auto", "none"] = "auto",
 ) -> Head:
@@ -51,8 +58,8 @@ def load_head(
 
     "human:7" is the person drawn by the seed 7, and a .json file of `dermis head` one by its numbers.
 
-    Options replace what a sample or a glTF file has of its own. Morph targets and bones of a glTF file move
-    the head (`Pose`); it rests as the file has it, at the default weights of its targets.
+    Options replace what a sample, a glTF file or an OBJ file's .mtl has of its own. Morph targets and bones
+    of a glTF file move the head (`Pose`); it rests as the file has it, at the default weights of its targets.
 
     colour, normal, height, specular, roughness : image files; see `load_maps`
     height_mm : relief of one grey level of an 8-bit height map [mm]
@@ -61,51 +68,104 @@ def load_head(
     up : the file's upward axis
     normal_y : way in which green points in the normal map: "up" (OpenGL) or "down" (DirectX)
     opaque : groups of the file that are not skin, whatever they are called
+    eyes : "fitted" puts the package's own eyes where a file has two balls called so, see `with_fitted_eyes`;
+        "plain" keeps the file's
+    eye_groups : groups of the file that hold eyeballs, whatever they are called, be it with all of the head
+    eye : what the eyes look like where it is not as usual: fields of `EyeLook`
     subdivide : levels of subdivision, 0 to 3: Catmull-Clark for a file of quads, else Loop; the human has one
         at least
     regions : "auto" for gloss by region of the face where the package knows the head and no map says the
         roughness; "none" for one roughness all over
 
-    Raises DermisError for files that cannot be rendered as a head.
+    Raises DermisError for files that cannot be rendered as a head; warns with DermisWarning of pictures of
+    an .mtl that are left out.
     """
-    name, path = str(head), Path(head)
+    opaque, eye_groups = ((one,) if isinstance(one, str) else one for one in (opaque, eye_groups))
+    name, path = named(head), Path(head)
     own = {"colour": colour, "normal": normal, "height": height}
     own |= {"specular": specular, "roughness": roughness}
+    check_given(own, unit_mm=unit_mm, height_mm=height_mm)
+    told: dict[str, Any] = {"unit_mm": unit_mm, "v_origin": v_origin, "up": up, "opaque": tuple(opaque)}
+    told["eye_groups"] = tuple(eye_groups)
     if name == HUMAN or name.startswith(f"{HUMAN}:") or path.suffix.lower() == ".json":
-        told = {"unit_mm": unit_mm, "v_origin": v_origin, "up": up, "opaque": opaque}
-        return _human(name, own, height_mm, normal_y, told, subdivide)
-    if name in REPLACED and not path.is_file():
-        came = f"this mannequin was replaced by the parametric human, {HUMAN!r}"
-        refuse(name, f"one of {', '.join(_head_names())} or a mesh file", came, f"Write {HUMAN} instead")
+        return _with_look(_human(name, own, height_mm, normal_y, told | {"eyes": eyes}, subdivide), eye)
     sample, files = SAMPLES.get(name), dict[str, Any]()
     if sample is not None:
         _check_kind(sample)
         files = fetch(name)
         path = files["mesh"]
-        unit_mm = sample.unit_mm if unit_mm is None else unit_mm
-        v_origin = sample.v_origin or v_origin if v_origin == "auto" else v_origin
+        told["unit_mm"] = sample.unit_mm if unit_mm is None else unit_mm
+        told["v_origin"] = sample.v_origin or v_origin if v_origin == "auto" else v_origin
         height_mm = sample.height_mm if height_mm is None else height_mm
     elif not path.is_file():
-        known = ", ".join(_head_names())
-        refuse(name or "head", f"a mesh file or a sample ({known})", f"{name!r} is neither", "Check the name")
-    if sample is None and is_gltf(path):
+        _refuse_name(name)
+    elif is_gltf(path):
         files = embedded_maps(path)
     chosen = _chosen(own, files)
     if height is None and height_mm is None:
         height_mm = files.get("height_mm")
-    if height_mm is not None and chosen["height"] is None:
-        came = f"{height_mm} came without a height map"
-        refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
+    obj = path if sample is None and path.suffix.lower() == ".obj" else None
     with ThreadPoolExecutor(1) as beside:
-        reading = beside.submit(load_maps, **chosen, height_mm=height_mm, normal_y=normal_y)
-        rigged = load_rigged(path, unit_mm=unit_mm, v_origin=v_origin, up=up, opaque=tuple(opaque))
-        check_head_height(rigged.mesh, name, unit_mm)
-        maps = reading.result()
+        reading = beside.submit(_read_maps, obj, chosen, told["opaque"], height_mm, normal_y)
+        rigged = load_rigged(path, **told)
+        check_head_height(rigged.mesh, name, told["unit_mm"])
+        maps, notice = reading.result()
+    check_relief(height_mm, maps.height)
+    if notice:
+        notify(notice)
     thanks = f"{sample.attribution}, {sample.licence}" if sample else ""
-    made = subdivide_head(Head(name, rigged.mesh, maps, thanks, rigged.rig), subdivide)
-    if subdivide and made.rig is not None:  # sequences of files have places for the file's own vertices
-        made = replace(made, rig=replace(made.rig, corner=rigged.mesh.point))
-    return with_usual_regions(made) if regions == AUTO else made
+    made = _subdivided(Head(name, rigged.mesh, maps, thanks, rigged.rig), subdivide)
+    made = with_usual_regions(made) if regions == AUTO else made
+    return _with_look(with_fitted_eyes(made, rigged.mesh) if eyes == "fitted" else made, eye)
+
+
+def _subdivided(head: Head, levels: int) -> Head:
+    """The head on a finer mesh; sequences of files have places for the file's own vertices."""
+    made = subdivide_head(head, levels)
+    if levels and made.rig is not None:
+        return replace(made, rig=replace(made.rig, corner=head.mesh.point))
+    return made
+
+
+def _with_look(head: Head, look: Mapping[str, float] | None) -> Head:
+    """The head with eyes that look as told.
+
+    Raises DermisError where it has none of true shape, and for looks that no eyes have.
+    """
+    if not look:
+        return head
+    known = [one.name for one in fields(EyeLook)]
+    for name in look.keys() - set(known):
+        refuse("eye", f"one of {', '.join(known)}", f"{name!r} came", "Correct its name")
+    if head.eyes is None:
+        came = head.note or "nothing in its file is called eyes"
+        remedy = "Name the groups that hold eyeballs (eye_groups)"
+        refuse("eye", "a head with the package's eyes", f"{head.name} has none: {came}", remedy)
+    return replace(head, eyes=head.eyes.with_look(replace(head.eyes.look, **dict[str, Any](look))))
+
+
+def _read_maps(
+    obj: Path | None,
+    chosen: dict[str, Any],
+    opaque: tuple[str, ...],
+    height_mm: float | None,
+    normal_y: NormalY,
+) -> tuple[Maps, str]:
+    """The maps that are given, and those that an OBJ file's materials name for other roles; a notice."""
+    given = {role: file for role, file in chosen.items() if file is not None}
+    loaded = load_maps(**given, height_mm=height_mm, normal_y=normal_y)
+    if obj is None:
+        return loaded, ""
+    named, notice = obj_maps(obj, opaque=opaque, given=given, height_mm=height_mm, normal_y=normal_y)
+    return replace(named, **{role: getattr(loaded, role) for role in given}), notice
+
+
+def _refuse_name(name: str) -> NoReturn:
+    known = ", ".join(_head_names())
+    if name in REPLACED:
+        came = f"this mannequin was replaced by the parametric human, {HUMAN!r}"
+        refuse(name, f"one of {known} or a mesh file", came, f"Write {HUMAN} instead")
+    refuse(name or "head", f"a mesh file or a sample ({known})", f"{name!r} is neither", "Check the name")
 
 
 def _check_kind(sample: Sample) -> None:
@@ -127,12 +187,11 @@ def _human(
     name : "human", or with a seed: "human:7", or a file of numbers
     told : what is told of files alone
     """
-    for option, usual in (("unit_mm", None), ("v_origin", "auto"), ("up", "y"), ("opaque", ())):
-        if told[option] not in (usual, list(usual or ())):
+    usual = {"unit_mm": None, "v_origin": "auto", "up": "y", "opaque": (), "eye_groups": (), "eyes": "fitted"}
+    for option, value in told.items():
+        if value != usual[option]:
             refuse(option, "a file that it tells of", f"it came with {HUMAN!r}", "Leave it out")
-    if height_mm is not None and maps["height"] is None:
-        came = f"{height_mm} came without a height map"
-        refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
+    check_relief(height_mm, maps["height"])
     given: dict[str, Any] = {role: file for role, file in maps.items() if file is not None}
     loaded = load_maps(**given, height_mm=height_mm, normal_y=normal_y) if given else None
     made = _person(name).head(subdivide=subdivide or 1)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from importlib import resources
-from typing import Annotated, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from dermis.registry import Registry
 from dermis.scene.plain import Colour, Direction, Plain, Vector, slider
@@ -21,7 +22,9 @@ __all__ = [
     "SphereLight",
     "SpotLight",
     "StripeLight",
+    "light_presets",
     "preset_lights",
+    "preset_text",
     "studio",
 ]
 
@@ -29,10 +32,20 @@ _Degrees = Annotated[float, Field(gt=0, lt=89, json_schema_extra=slider(0.5, 88,
 _Length = Annotated[float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 3000, log=True))]
 
 
+_BRIGHTNESS = ("brightness", "color", "colour", "energy", "intensity", "power", "strength")
+
+
+def _grey(value: Any) -> Any:
+    """A number as that of all three channels."""
+    return (value,) * 3 if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
 class _Source(Plain):
     """What every light has."""
 
-    irradiance: Colour = (3.14, 3.14, 3.14)
+    meant: ClassVar[Mapping[str, str]] = dict.fromkeys(_BRIGHTNESS, "irradiance")
+
+    irradiance: Annotated[Colour, BeforeValidator(_grey)] = (3.14, 3.14, 3.14)
     """Irradiance of a surface at the target that faces the light, linear Rec. 709; pi makes white skin 1."""
     shadows: bool = True
     """Whether it casts shadows."""
@@ -164,10 +177,26 @@ LIGHTS: Registry[type[Light]] = Registry(
 Cycles take in its place in `dermis.reference.lights`."""
 
 
+NO_LIGHTS = "none"
+"""Name of the rig without lights, for an environment alone."""
+
+
+def light_presets() -> list[str]:
+    """Names of the rigs of the package."""
+    names = [entry.name for entry in (resources.files("dermis.scene") / "presets").iterdir()]
+    return sorted([NO_LIGHTS, *(name.removesuffix(".toml") for name in names if name.endswith(".toml"))])
+
+
 def preset_lights(name: str) -> tuple[Light, ...]:
-    """The lights of a preset of the package."""
-    text = (resources.files("dermis.scene") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
-    return tuple(LIGHTS[table["kind"]](**table) for table in tomllib.loads(text)["lights"])
+    """The lights of a rig of the package, by its name."""
+    if name == NO_LIGHTS:
+        return ()
+    return tuple(LIGHTS[table["kind"]](**table) for table in tomllib.loads(preset_text(name))["lights"])
+
+
+def preset_text(name: str) -> str:
+    """The file of a rig of the package."""
+    return (resources.files("dermis.scene") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
 
 
 def studio() -> tuple[Light, ...]:

@@ -10,6 +10,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.rig import Motion
 from dermis.scene.camera import Camera, portrait
 from dermis.scene.environment import Environment
+from dermis.scene.given import given_camera, given_environment, given_head, given_lights, given_plain
 from dermis.scene.lights import Light, studio
 from dermis.scene.pose import Pose
 from dermis.scene.skin import Skin
@@ -19,11 +20,17 @@ from dermis.scene.skin import Skin
 class Scene:
     """A head, its skin, the light on it and the camera before it.
 
-    lights : when left out the studio preset, or none with an environment
-    camera : the portrait of the head when left out
+    head : or what `load_head` takes, or a `Human`
+    lights : several, one or the name of a preset; the studio preset when left out, or none with an
+        environment
+    camera : or the name of a preset; the portrait of the head when left out
+    skin : or its values by name
+    environment : or its name
     pose : how the head is moved, or weights of its morph targets by name; at rest when left out
 
-    Raises DermisError for a pose that the head cannot take.
+    A scene does not change; `dataclasses.replace(scene, skin=...)` is another one.
+
+    Raises DermisError for a pose that the head cannot take, and for parts of another kind.
     """
 
     head: Head
@@ -34,13 +41,29 @@ class Scene:
     pose: Pose | Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
+        self._set("head", given_head(self.head))
+        self._set("environment", given_environment(self.environment))
+        self._set("skin", given_plain(Skin, self.skin, "skin", 'profile="medium"'))
         if self.lights is None:
-            object.__setattr__(self, "lights", () if self.environment else studio())
-        if self.camera is None:
-            object.__setattr__(self, "camera", portrait(self.head))
+            self._set("lights", () if self.environment else studio())
+        else:
+            self._set("lights", given_lights(self.lights))
+        camera = portrait(self.head) if self.camera is None else given_camera(self.camera, self.head)
+        self._set("camera", camera)
         if self.pose is not None:
-            object.__setattr__(self, "pose", Pose.of(self.pose))
+            self._set("pose", Pose.of(self.pose))
             self.motion  # noqa: B018 checks the pose
+
+    @classmethod
+    def of(cls, given: object) -> Scene:
+        """A scene that is one, or that of a head alone.
+
+        Raises DermisError for anything else.
+        """
+        return given if isinstance(given, Scene) else cls(given)  # type: ignore[arg-type]
+
+    def _set(self, part: str, value: object) -> None:
+        object.__setattr__(self, part, value)
 
     @cached_property
     def motion(self) -> Motion | None:

@@ -109,7 +109,7 @@ class Pose:
             places = np.ascontiguousarray(self.positions_mm, np.float32)
         except (TypeError, ValueError):
             places = np.zeros(0, np.float32)
-        expected = rig.positions_mm.shape
+        expected = (rig.of_file, 3)
         if places.shape != expected:
             came = f"{np.shape(self.positions_mm)} came"
             remedy = "Give as many points as Head.positions_mm lists, in its order"
@@ -120,7 +120,7 @@ class Pose:
                 came = f"{len(lost)} are NaN, infinite or farther, first {lost[0]}"
                 expected_mm = f"points within {FARTHEST_MM:g} mm"
                 refuse(f"{culprit}: positions_mm", expected_mm, came, "Correct them")
-        return places
+        return rig.completed(places) if rig.carried else places
 
 
 def _changes(

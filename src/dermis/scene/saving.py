@@ -19,7 +19,7 @@ from dermis.scene.pose import Pose
 from dermis.scene.settings import Settings
 
 _HEADER = "# A scene of dermis: lengths in mm from the head's centre, colours linear Rec. 709."
-_SAID_BY_REGIONS = {"rho_s", "roughness"}
+_SAID_BY_REGIONS = {"rho_s"}
 _FILES = {"profile", "name"}  # of skins and environments, where they are no presets
 
 
@@ -89,6 +89,8 @@ def _value(value: Any) -> str:
         return str(value).lower()
     if isinstance(value, int | float):
         return repr(value)
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{key} = {_value(one)}' for key, one in value.items())}}}"
     if isinstance(value, Sequence) and not isinstance(value, str):
         return f"[{', '.join(map(_value, value))}]"
     return json.dumps(str(value), ensure_ascii=False).replace("\x7f", "\\u007f")  # which JSON leaves as it is

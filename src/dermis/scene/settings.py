@@ -2,23 +2,62 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import re
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from dermis.registry import Named
-from dermis.scene.plain import Colour, Plain, slider
+from dermis.scene.plain import Colour, Plain, Words, slider
 from dermis.scene.techniques import TECHNIQUES
 
 _Side = Annotated[int, Field(ge=1, le=16384)]
 _MOST_SAMPLES = 64
 MOST_WORK = 2**27
+_HEX = re.compile(r"#[0-9a-fA-F]{6}")
+
+
+def _decoded(value: Any) -> Any:
+    """#rrggbb and "red,green,blue" as linear Rec. 709."""
+    if not isinstance(value, str):
+        return value
+    if not _HEX.fullmatch(value):
+        try:
+            red, green, blue = map(float, value.split(","))
+        except ValueError:
+            raise ValueError("a colour: three linear numbers, or #rrggbb") from None
+        return red, green, blue
+    import numpy as np
+
+    from dermis.images.colour import decode_srgb_levels
+
+    levels = np.frombuffer(bytes.fromhex(value[1:]), np.uint8)
+    return tuple(float(one) for one in decode_srgb_levels(levels))
+
+
+if TYPE_CHECKING:
+    Exposure = float | Literal["auto"]
+    Background = Colour | Literal["none", "gradient", "environment"]
+else:
+    Exposure = Annotated[
+        float, Field(ge=1e-6, le=1e6, json_schema_extra=slider(0.05, 20, log=True)), Words("auto")
+    ]
+    Background = Annotated[Colour, BeforeValidator(_decoded), Words("none", "gradient", "environment")]
+
+
+def _square(value: Any) -> Any:
+    """A number as both sides."""
+    return (value, value) if isinstance(value, int) else value
 
 
 class Settings(Plain):
     """Sizes, quality, and what leaves linear light."""
 
-    size: tuple[_Side, _Side] = (1024, 1024)
+    meant: ClassVar[Mapping[str, str]] = {"resolution": "size", "spp": "samples"}
+
+    size: Annotated[tuple[_Side, _Side], BeforeValidator(_square)] = (1024, 1024)
     """Width and height of the picture [pixel]."""
     atlas: Annotated[int, Field(ge=64)] = 2048
     """Side of the atlas, the map in which light scatters [texel]."""
@@ -41,18 +80,22 @@ class Settings(Plain):
     occlusion: Literal["baked", "rest", "none"] = "baked"
     """Ambient occlusion, which dims the environment's light where the head is in its way: "baked" follows a
     head that moves, "rest" leaves it as the head rests, "none" for none."""
-    exposure: Annotated[float, Field(ge=1e-6, le=1e6, json_schema_extra=slider(0.05, 20, log=True))] = 1.0
-    """Factor from radiance to the picture."""
+    exposure: Exposure = 1.0
+    """Factor from radiance to the picture; "auto" meters the light that falls on the skin in view."""
     bloom: Annotated[float, Field(ge=0, le=1, json_schema_extra=slider(0, 0.5))] = 0.0
     """Share of the light that the lens scatters around."""
     tone: Literal["none", "filmic", "neutral"] = "none"
     """Tone curve before the encoding as bytes; "neutral" is the Khronos group's."""
     gamma: Literal["right", "wrong"] = "right"
     """Colour space: "wrong" takes the colour map to be linear and leaves the encoding out, for comparison."""
-    background: Colour = (0.0, 0.0, 0.0)
-    """Colour behind the head, linear Rec. 709."""
+    background: Background = "none"
+    """What is behind the head, which sheds no light: "none", so that pictures have alpha, a studio's grey
+    "gradient", the "environment", or a colour, linear Rec. 709 or #rrggbb."""
+    background_blur: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Roughness of the mirror in which the environment behind the head is seen, at least 0.05; 0 for none, so
+    that it is sharp."""
     strands: bool = True
-    """Hairs of heads that have them, as the human's brows and lashes."""
+    """Hairs of heads that have them, as the human's hair, beard, brows and lashes."""
     parts: Literal["all", "diffuse", "specular"] = "all"
     """Which light is shown: "all", only the "diffuse" from below the surface, or the "specular" off it."""
 
@@ -61,3 +104,7 @@ class Settings(Plain):
         if self.size[0] * self.size[1] * self.samples > MOST_WORK:
             raise ValueError(f"width times height times samples of at most {MOST_WORK // 10**6} million")
         return self
+
+
+PHOTOGRAPHED: Mapping[str, Any] = MappingProxyType({"exposure": "auto", "background": "gradient"})
+"""Settings that `dermis render`, `animate` and `view` choose where nothing is said."""

@@ -52,6 +52,7 @@ class Model:
 MODELS: Registry[Model] = Registry(
     "surface model",
     {
+        "two-lobe": "dermis.specular.two_lobe:TWO_LOBE",
         "kelemen": "dermis.specular.kelemen:KELEMEN",
         "torrance-sparrow": "dermis.specular.torrance_sparrow:TORRANCE_SPARROW",
         "torrance-sparrow-smith": "dermis.specular.torrance_sparrow:TORRANCE_SPARROW_SMITH",
@@ -59,11 +60,10 @@ MODELS: Registry[Model] = Registry(
         "blinn-phong-plain": "dermis.specular.blinn_phong:BLINN_PHONG_PLAIN",
         "phong": "dermis.specular.phong:PHONG",
         "phong-plain": "dermis.specular.phong:PHONG_PLAIN",
-        "two-lobe": "dermis.specular.two_lobe:TWO_LOBE",
         "kelemen-direct": "dermis.specular.kelemen:KELEMEN_DIRECT",
     },
 )
-"""By the names that scenes use; imported when needed, so that a command's help is quick."""
+"""By the names that scenes use, the default first; imported when needed: a command's help is quick."""
 
 SpecularName = Annotated[str, Named(MODELS, "none")]
 FresnelName = Literal["schlick", "exact"]

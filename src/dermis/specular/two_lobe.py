@@ -33,6 +33,6 @@ TWO_LOBE = Model(
     two_lobe,
     "a narrow and a wide Kelemen lobe",
     reciprocal=True,
-    sources=("Kelemen2001", "EpicGames2025"),
+    sources=("Kelemen2001", "Beckmann1963", "EpicGames2025"),
     numbers={"narrow": NARROW, "wide": WIDE, "share_of_narrow": SHARE_OF_NARROW},
 )

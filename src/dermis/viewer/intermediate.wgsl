@@ -15,6 +15,7 @@ struct Look {
     right: vec3f,
     scale: f32, // of light to the display, or the mean texels per mm
     up: vec3f,
+    shift: vec2f, // of the picture's middle from the axis, in half pictures
     jitter: array<vec4f, 64>,
 }
 
@@ -67,7 +68,7 @@ fn point_under(index: u32, place: vec2f, size: vec2f) -> Point {
     let eb = b.position - look.eye;
     let ec = c.position - look.eye;
     let ndc = vec2f(2.0, -2.0) * place / size + vec2f(-1.0, 1.0);
-    let ray = look.forward + ndc.x * look.right + ndc.y * look.up;
+    let ray = look.forward + (ndc.x + look.shift.x) * look.right + (ndc.y + look.shift.y) * look.up;
     let w = vec3f(dot(cross(eb, ec), ray), dot(cross(ec, ea), ray), dot(cross(ea, eb), ray));
     let inside = max(w * sign(w.x + w.y + w.z), vec3f(0.0));
     let weights = inside / max(inside.x + inside.y + inside.z, 1e-20);

@@ -91,11 +91,13 @@ def between(a: Camera, b: Camera, t: float) -> Camera:
     up = _mixed(a.up, b.up, t)
     distance = lengths[0] * (lengths[1] / lengths[0]) ** t
     frame = a.frame_mm * (b.frame_mm / a.frame_mm) ** t
-    mixed = Camera(
+    mixed = changed(
+        b,
         position=_vector(target + distance * _unit(direction)),
         target=_vector(target),
         up=_vector(up) if np.linalg.norm(np.cross(up, direction)) > 1e-3 else b.up,
         frame_mm=frame,
+        principal_point=tuple(_mixed(a.principal_point, b.principal_point, t).tolist()),
     )
     return b if _same(mixed, b) else mixed
 
@@ -111,8 +113,8 @@ def pick(scene: Scene, camera: Camera, x: float, y: float, aspect: float) -> Flo
     Source: [MollerTrumbore1997].
     """
     right, up, forward = axes(camera)
-    half = 0.5 * camera.frame_mm / float(np.linalg.norm(np.subtract(camera.target, camera.position)))
-    ray = forward + half * (aspect * x * right + y * up)
+    half, shift = camera.window(aspect)
+    ray = forward + (x + shift[0]) * half[0] * right + (y + shift[1]) * half[1] * up
     head, places = scene.head, posed_positions(scene)
     eye = np.array(camera.position) + head.centre_mm
     a, b, c = (places[head.mesh.triangles[:, k]].astype(np.float64) for k in range(3))
@@ -158,6 +160,7 @@ def orbit_light(light: Light, camera: Camera, right: float, up: float) -> Light:
 def _same(a: Camera, b: Camera) -> bool:
     """Whether the difference between two cameras is too small to see."""
     off = [np.abs(np.subtract(getattr(a, name), getattr(b, name))).max() for name in ("position", "target")]
+    off += np.abs(np.subtract(a.principal_point, b.principal_point) * b.frame_mm).tolist()
     return max(off) < 5e-4 * b.frame_mm and abs(a.frame_mm - b.frame_mm) < 5e-4 * b.frame_mm
 
 

@@ -14,16 +14,16 @@ from dermis.mesh.head import Head
 from dermis.scene.camera import Camera
 from dermis.scene.clips.clip import Clip
 from dermis.scene.environment import Environment
-from dermis.scene.files import NO_LIGHTS, head_table, load_lights, load_scene
+from dermis.scene.files import head_table, load_lights, load_scene
 from dermis.scene.head_table import names_regions
 from dermis.scene.heads import load_head
-from dermis.scene.lights import Light
+from dermis.scene.lights import NO_LIGHTS, Light
 from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
 from dermis.scene.plain import Plain
 from dermis.scene.pose import Pose
 from dermis.scene.saving import save_scene
-from dermis.scene.settings import Settings
+from dermis.scene.settings import PHOTOGRAPHED, Settings
 from dermis.scene.skin import Pigments
 from dermis.viewer.chart import Chart
 from dermis.viewer.posing import same_pose, with_moves
@@ -161,7 +161,7 @@ def named_state(name: str) -> ViewerState:
     if Path(name).suffix.lower() == ".toml":
         return load_state(Path(name))
     path = str(Path(name).resolve()) if Path(name).is_file() else name
-    return ViewerState(Scene(load_head(name)), head={"name": path})
+    return ViewerState(Scene(load_head(name)), Settings(**PHOTOGRAPHED), {"name": path})
 
 
 def state_of(shown: Head | Human | Scene | ViewerState | str | os.PathLike[str]) -> ViewerState:
@@ -172,11 +172,11 @@ def state_of(shown: Head | Human | Scene | ViewerState | str | os.PathLike[str])
     if isinstance(shown, ViewerState):
         return shown
     if isinstance(shown, Human):
-        return ViewerState(Scene(shown.head(), skin=skin_of(shown)))
+        return ViewerState(Scene(shown.head(), skin=skin_of(shown)), Settings(**PHOTOGRAPHED))
     if isinstance(shown, Head):
-        return ViewerState(Scene(shown))
+        return ViewerState(Scene(shown), Settings(**PHOTOGRAPHED))
     if isinstance(shown, Scene):
-        return ViewerState(shown, rig="")
+        return ViewerState(shown, Settings(**PHOTOGRAPHED), rig="")
     if not isinstance(shown, str | os.PathLike):
         came = f"a {type(shown).__name__} came"
         refuse("view", "a head, a person, a scene or a name", came, "Try dermis.Human()")
@@ -190,7 +190,8 @@ def load_state(path: Path, before: ViewerState | None = None) -> ViewerState:
     """
     table = head_table(path)
     known = before.scene.head if before and before.head == table and not names_regions(table) else None
-    scene, settings = load_scene(path, known)
+    scene, described = load_scene(path, known)
+    settings = Settings(**{**PHOTOGRAPHED, **described.model_dump(exclude_unset=True)})
     return opened(scene, settings, table, rig="" if scene.lights else NO_LIGHTS)
 
 

@@ -126,10 +126,18 @@ class Studio:
         """
         image = self._draw(state.with_settings(size=size))
         self._shown = None
-        if path.suffix.lower() == ".exr" and self.rendered and state.view in (PICTURE, *PARTS):
-            write_image(path, self.rendered.linear())
-        else:
+        linear, made = path.suffix.lower() == ".exr", self.rendered
+        if not made or state.view not in (PICTURE, *PARTS):
             write_png(path, self.read(image))
+        elif state.settings.background == "none":
+            write_image(path, made.linear_rgba()) if linear else write_png(path, made.rgba8())
+        else:
+            write_image(path, made.linear()) if linear else write_png(path, self.read(image))
+
+    @property
+    def exposure(self) -> float:
+        """That of the last frame, metered or given."""
+        return self.rendered.exposure if self.rendered else 1.0
 
     def read(self, image: Any) -> NDArray[np.uint8]:
         """(h, w, 3) bytes of an image."""

@@ -12,6 +12,7 @@ from dermis.errors import refuse
 from dermis.frame.atlas_layout import PairBuffers, Translucency
 from dermis.frame.inputs import Inputs
 from dermis.frame.passes import each, program
+from dermis.frame.passes.meter import read_meter
 from dermis.frame.renderer import Renderer
 from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture, upload
 from dermis.gpu.device import gpu_failures
@@ -52,11 +53,11 @@ class Views:
         Raises DermisError for what the technique does not make.
         """
         inputs = self._renderer.prepare(scene, settings, side)
-        around = ("ENVIRONMENT", "HALF_SPACE", "STRANDS")  # which the shader has not
+        around = ("ENVIRONMENT", "HALF_SPACE", "STRANDS", "STRAND_WINDOW")  # which the shader has not
         constants = tuple(switch for switch in inputs.light_constants if switch[0] not in around)
         shader = program(self._renderer.device, _INTERMEDIATE, constants)
         layer, scale = self._layer(inputs, view, settings)
-        looked = ("eye", "forward", "right", "up", "samples", "jitter")
+        looked = ("eye", "forward", "right", "up", "shift", "samples", "jitter")
         record = shader.record("Look", **{name: inputs.view[name] for name in looked})
         record["what"], record["scale"] = _NUMBERS.get(view, 0), scale
         bound = {
@@ -95,11 +96,16 @@ class Views:
             if layer >= count:
                 refuse(f"view {view}", "a level of light on the atlas", f"there are {count}", _ATLAS_NEEDED)
             halvings, scale = blurs[0].halvings[layer], blurs[0].scale
-            return inputs.resources.levels.layer(layer, halvings), settings.exposure / scale
+            return inputs.resources.levels.layer(layer, halvings), self._exposure(inputs) / scale
         if view == "stretch":
             stretch = inputs.layouts[0].atlas.resources["stretch_map"]
             return stretch, self._mean_density(stretch)
         return self._thickness(inputs) if view == "thickness" else self._nothing, 1.0
+
+    def _exposure(self, inputs: Inputs) -> float:
+        """Of the frame drawn last."""
+        meter, given = inputs.resources.meter, inputs.settings.exposure
+        return read_meter(self._renderer.device, meter) if meter else float(given)
 
     def _thickness(self, inputs: Inputs) -> Any:
         thin = inputs.layouts[0].translucency

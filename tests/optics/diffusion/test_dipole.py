@@ -99,7 +99,7 @@ def test_better_dipole_converges_in_its_sources() -> None:
 
 @pytest.mark.parametrize("model", ["dipole", "better-dipole"])
 def test_stacks_are_refused(model: str) -> None:
-    with pytest.raises(DermisError, match=r"one layer without a bottom.*3 layers.*multipole or layered"):
+    with pytest.raises(DermisError, match=r"one semi-infinite layer.*3 layers.*multipole or layered"):
         diffusion_profile(media()["dj3"], model)  # type: ignore[arg-type]
-    with pytest.raises(DermisError, match="one layer without a bottom"):
+    with pytest.raises(DermisError, match="one semi-infinite layer"):
         diffusion_profile(slab(0.9, 2.0), model)  # type: ignore[arg-type]

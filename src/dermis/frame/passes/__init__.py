@@ -10,6 +10,7 @@ from dermis.frame.atlas_textures import atlas_numbers
 from dermis.frame.levels import FLOATS, HALVES, usual_texel
 from dermis.frame.lights import light_numbers
 from dermis.frame.lights.kind import light_shaders
+from dermis.frame.metering import meter_numbers
 from dermis.frame.painting import painting_numbers, texture_names
 from dermis.frame.strands import strand_numbers
 from dermis.frame.surface import eye_numbers, lobe_shaders, surface_numbers
@@ -32,6 +33,7 @@ SHARED_SHADERS = ShaderFolder(
         **painting_numbers(),
         **eye_numbers(),
         **strand_numbers(),
+        **meter_numbers(),
     },
 )
 TILE = 16

@@ -31,11 +31,11 @@ def draw(graph: Recorder, levels: Levels, blur: Blur, into: Any, transmitted: An
         padded = np.zeros((MOST_GAUSSIANS, 4), np.float32)
         padded[:count, :3] = blur.weight[first : first + count]
         padded[0, 3] = 1.0
-        layers = {"first": 1 + first, "count": count, "mip": mip, "weight": padded}
+        layers = {"first": 1 + first - levels.first[mip], "count": count, "weight": padded}
         scales = {"scale": 1.0, "through": blur.scale} if mip else {"scale": 1.0 / blur.scale, "through": 1.0}
         bound = {
             "weights": shader.record("Weights", **layers, **scales),
-            "levels": levels.stack,
+            "levels": levels.stacks[mip],
             "source": levels.spare(mip + 1) if mip < coarsest else levels.layer(0),
             "transmitted": nothing(device) if through is None else through,
             "linear": device.sampler(mag_filter="linear", min_filter="linear"),

@@ -9,7 +9,6 @@ override TRANSMITTED: bool = false; // whether light comes through thin parts
 struct Weights {
     first: u32, // first layer
     count: u32,
-    mip: i32, // of these layers
     scale: f32, // factor from the layers to what is stored
     through: f32, // factor of the transmitted light
     weight: array<vec4f, 24>,
@@ -22,14 +21,14 @@ struct Weights {
 
 @compute @workgroup_size(16, 16)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let size = textureDimensions(levels, weights.mip);
+    let size = textureDimensions(levels);
     if (any(id.xy >= size)) {
         return;
     }
     var sum = vec4f(0.0);
     var k = 0u;
     loop { // with its test at the end, as in lighting.wgsl
-        sum += weights.weight[k] * textureLoad(levels, id.xy, weights.first + k, weights.mip);
+        sum += weights.weight[k] * textureLoad(levels, id.xy, weights.first + k, 0);
         k++;
         if (k >= weights.count) {
             break;

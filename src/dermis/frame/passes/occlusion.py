@@ -44,7 +44,7 @@ def bake_occlusion(
     texels : texture of the atlas' texels, of which side x side are baked, then the vertices, row by row
     """
     mesh, frame = head.mesh, Frame(device)
-    shape = rest_shape(device, shape_tables(device, head), head.positions_mm)
+    shape = rest_shape(device, shape_tables(device, head), head.control.positions_mm)
     resting = upload_geometry(device, mesh, atlas, shape)
     shader, towards = program(device, "occlusion.wgsl"), fibonacci_sphere(directions)
     rows = side - (-len(mesh.positions) // side)

@@ -1,4 +1,4 @@
-"""Packs the finished picture for readback: three bytes or three floats per pixel."""
+"""Packs the finished picture for readback: three or four bytes or floats per pixel."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from dermis.errors import refuse
 from dermis.frame.passes import program
-from dermis.frame.passes.post import Picture
+from dermis.frame.passes.post import Picture, encoding_of
 from dermis.gpu import Device, Graph
 from dermis.gpu.readback import Fetched
+from dermis.scene.settings import Settings
 
 _ROW = 1024  # as in the shaders
 _PIXELS, _WORDS = 4, 3  # read and written by one invocation that packs bytes
-_CHANNELS = 3
 
 
 @dataclass(frozen=True)
@@ -25,38 +25,46 @@ class Leaving:
 
     size : (width, height) [pixel]
     kind : dtype of its numbers
+    channels : 3, or 4 with alpha
     """
 
     fetched: Fetched
     size: tuple[int, int]
     kind: type[np.uint8] | type[np.float32]
+    channels: int
 
     def image(self) -> NDArray[Any]:
-        """(h, w, 3) sRGB bytes or linear floats; waits for them. To be called once."""
+        """(h, w, 3 or 4) sRGB bytes or linear floats; waits for them. To be called once."""
         width, height = self.size
-        count = _CHANNELS * width * height
+        count = self.channels * width * height
         numbers = self.fetched.array()[: count * np.dtype(self.kind).itemsize].view(self.kind)
-        return numbers.reshape(height, width, _CHANNELS)
+        return numbers.reshape(height, width, self.channels)
 
 
-def draw(graph: Graph, picture: Picture, *, linear: bool = False) -> Leaving:
+def draw(graph: Graph, picture: Picture, *, linear: bool = False, alpha: Settings | None = None) -> Leaving:
     """Pack the picture and start reading it back to NumPy.
 
     linear : floats rather than bytes
+    alpha : settings of the picture where the head's coverage is wanted too: light times coverage as floats,
+        colours that are to be multiplied by it as bytes
 
     Raises DermisError for more than the device has in one buffer.
     """
     device, pixels = graph.device, picture.size[0] * picture.size[1]
+    channels = 4 if alpha else 3
     if linear:
-        shader, count, words = program(device, "pack_linear.wgsl"), pixels, _CHANNELS * pixels
-        bound = {"exposed": picture.exposed}
+        shader = program(device, "pack_linear.wgsl", (("CHANNELS", channels),))
+        count, words, bound = pixels, channels * pixels, {"exposed": picture.exposed}
+    elif alpha:
+        shader, count, words = program(device, "pack_straight.wgsl"), pixels, pixels
+        bound = {"exposed": picture.exposed, "settings": shader.record("Straight", **encoding_of(alpha))}
     else:
         count = -(-pixels // _PIXELS)
         shader, words, bound = program(device, "pack.wgsl"), _WORDS * count, {"bytes": picture.bytes}
     _check(device, 4 * words, pixels)
     packed = _packed(device, picture, words)
     graph.compute("pack", shader, bound | {"packed": packed}, (_ROW, -(-count // _ROW)))
-    return Leaving(graph.fetch(packed), picture.size, np.float32 if linear else np.uint8)
+    return Leaving(graph.fetch(packed), picture.size, np.float32 if linear else np.uint8, channels)
 
 
 def _check(device: Device, size: int, pixels: int) -> None:

@@ -1,4 +1,6 @@
-// Pixels of four floats as rows of three, without gaps, so that fewer bytes are read back and none is copied again.
+// Pixels of four floats as rows of three or four, without gaps, so that no more is read back than is wanted.
+
+override CHANNELS: u32 = 3u;
 
 const ROW: u32 = 1024u; // invocations a row
 
@@ -13,7 +15,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let colour = textureLoad(exposed, vec2u(index % size.x, index / size.x), 0);
-    packed[3u * index] = colour.r;
-    packed[3u * index + 1u] = colour.g;
-    packed[3u * index + 2u] = colour.b;
+    for (var k = 0u; k < CHANNELS; k += 1u) {
+        packed[CHANNELS * index + k] = colour[k];
+    }
 }

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dermis.frame.passes import program
+from dermis.frame.passes.meter import Meter, exposed_by
 from dermis.gpu import Device, Recorder, make_texture
 from dermis.scene.settings import Settings
 
@@ -32,14 +33,21 @@ def make_picture(device: Device, size: tuple[int, int]) -> Picture:
     return Picture(radiance, exposed, make_texture(device, size, "rgba8uint"), size)
 
 
-def draw(graph: Recorder, radiance: Any, picture: Picture, settings: Settings) -> None:
-    """Expose, apply the tone curve and encode: fill the picture's linear and byte images."""
+def draw(
+    graph: Recorder, radiance: Any, picture: Picture, settings: Settings, meter: Meter | None = None
+) -> None:
+    """Expose, apply the tone curve and encode: fill the picture's linear and byte images.
+
+    meter : None where the exposure is given
+    """
     shader = program(graph.device, "post.wgsl")
-    record = shader.record(
-        "Post",
-        exposure=settings.exposure,
-        tone=_TONES.index(settings.tone),
-        encoded=int(settings.gamma == "right"),
-    )
-    bound = {"settings": record, "image": radiance, "exposed": picture.exposed, "bytes": picture.bytes}
+    exposure, metered = exposed_by(graph.device, settings, meter)
+    record = shader.record("Post", exposure=exposure, **encoding_of(settings))
+    bound = {"settings": record, "image": radiance, "metered": metered}
+    bound |= {"exposed": picture.exposed, "bytes": picture.bytes}
     graph.compute("post", shader, bound, picture.size)
+
+
+def encoding_of(settings: Settings) -> dict[str, int]:
+    """Members of the shaders' records: tone curve, and whether colours are encoded."""
+    return {"tone": _TONES.index(settings.tone), "encoded": int(settings.gamma == "right")}

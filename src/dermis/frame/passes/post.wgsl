@@ -1,9 +1,9 @@
 // From radiance to the display's bytes: exposure, tone curve and sRGB encoding.
-//#include "srgb.wgsl"
-//#include "tone.wgsl"
+//#include "encoding.wgsl"
+//#include "exposure.wgsl"
 
 struct Post {
-    exposure: f32,
+    exposure: f32, // 0 for the meter's
     tone: u32,
     encoded: u32, // 0 leaves the encoding out, which is wrong
 }
@@ -19,10 +19,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let texel = textureLoad(image, id.xy, 0);
-    let linear = texel.rgb * settings.exposure;
+    let linear = texel.rgb * exposure_of(settings.exposure);
     textureStore(exposed, id.xy, vec4f(linear, texel.a));
-    let shown = toned(linear, settings.tone);
-    let levels = select(clamp(shown, vec3f(0.0), vec3f(1.0)), encode_srgb(shown), settings.encoded != 0u);
     // Integers, because a store to a normalised format may round either way.
-    textureStore(bytes, id.xy, vec4u(vec3u(round(255.0 * levels)), u32(round(255.0 * texel.a))));
+    let levels = levels_of(linear, settings.tone, settings.encoded);
+    textureStore(bytes, id.xy, vec4u(levels, u32(round(255.0 * texel.a))));
 }

@@ -1,6 +1,7 @@
 // The image: light scattered below the skin, relit at its finest level, under the white lobe of the surface.
 //#include "lighting.wgsl"
 //#include "mouth.wgsl"
+//#include "lids.wgsl"
 //#include "pre_integrated.wgsl"
 //#include "sample_bits.wgsl"
 //#include "shaded.wgsl"
@@ -19,14 +20,15 @@ struct Shade {
     eye: vec3f,
     samples: u32,
     forward: vec3f,
-    right: vec3f, // scaled so that forward + x right + y up spans the image for x, y in -1..1
+    right: vec3f, // scaled so that forward + (x + shift) right + (y + shift) up spans the image for x, y in -1..1
     up: vec3f,
+    shift: vec2f, // of the picture's middle from the axis
     relit: vec3f, // weight of the level that is not blurred
     total: vec3f, // weight of all levels
     shown: vec2f, // factors of the light from below and of the reflected light
     pre: PreIntegrated,
-    background: vec3f,
     eyes: array<Eye, 2>,
+    lids: array<vec4f, 112>, // edges of the lids around each eye, in its own space, half of them each; see human/lid_rings.csv
     material_colour: array<vec4f, 64>,
     jitter: array<vec4f, 64>, // sample places in the pixel, 0..1
 }
@@ -77,7 +79,7 @@ fn shaded_plain(surface: Surface, lit: Lit, out: f32) -> Shaded {
 
 fn ray_through(place: vec2f, size: vec2f) -> vec3f {
     let ndc = vec2f(2.0, -2.0) * place / size + vec2f(-1.0, 1.0);
-    return shade.forward + ndc.x * shade.right + ndc.y * shade.up;
+    return shade.forward + (ndc.x + shade.shift.x) * shade.right + (ndc.y + shade.shift.y) * shade.up;
 }
 
 // share: part of the pixel that is shaded at once; maps are filtered over it.
@@ -124,7 +126,8 @@ fn shaded(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Shaded {
                 break;
             }
             if (shade.eyes[k].material == (point.flags >> 8u)) {
-                let eye = eye_at(shade.eyes[k], point, v);
+                let own = (shade.eyes[k].to_own * vec4f(point.position, 1.0)).xyz;
+                let eye = eye_at(shade.eyes[k], own, lids_around(k, own), v);
                 surface = eye.surface;
                 film = eye.film;
                 point.lit_position += SCATTERED_MM * film.normal;
@@ -213,9 +216,7 @@ fn finish(pixel: Pixel) {
         textureStore(apart, pixel.at, 0, vec4f(skin.below, skin.depth) / held);
         textureStore(apart, pixel.at, 1, vec4f(skin.leaving, 0.0));
     }
-    let size = vec2f(textureDimensions(image));
-    let behind = seen_behind(ray_through(vec2f(pixel.at) + 0.5, size), shade.background);
-    textureStore(image, pixel.at, vec4f(sum.rgb + (1.0 - sum.a) * behind, sum.a));
+    textureStore(image, pixel.at, sum);
 }
 
 @compute @workgroup_size(8, 8)

@@ -68,7 +68,8 @@ def resting(rig: Rig) -> MotionBytes:
 def _evaluate(graph: Recorder, shape: Shape) -> None:
     tables = shape.tables
     if shape.morphs:
-        _each(graph, "shape_pose.wgsl", shape.morphs, tables.control, (("BONED", tables.bones > 0),))
+        moving = ("BONED", tables.bones > 0), ("SLIDES", tables.slides)
+        _each(graph, "shape_pose.wgsl", shape.morphs, tables.control, moving)
     if shape.stencils:
         _each(graph, "shape_refine.wgsl", shape.stencils, tables.points)
     least = (("LEAST_UV", MIN_UV_CROSS), ("LEAST_ACROSS", LEAST_ACROSS))

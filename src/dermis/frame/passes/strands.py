@@ -4,33 +4,51 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from dermis.frame.geometry import HeadResources
 from dermis.frame.passes import each, program
 from dermis.frame.shape import Shape
-from dermis.frame.strands import StrandResources, StrandTables
+from dermis.frame.strands import TILE, StrandResources, StrandTables, drawn_of
 from dermis.gpu import Constants, Device, Recorder
 from dermis.gpu.program import Resources
 
 Look = tuple[Resources, Any, Constants]
 
 _ROWS, _ROUNDS = 8, 60_000
+_HEAD_MM = 100.0  # side of a square that has no more hair than a head seen from anywhere
+_CROWDED = 6.0  # pieces that a tile may list, over their mean
 _CLEARING = 64  # workgroups that empty the shadows of hairs, one for each light at least
 
 
 def pose(graph: Recorder, made: StrandTables, shape: Shape) -> None:
     """Put the hairs where the skin is."""
-    bound = {"points": shape.surface["points"], "strands": made.strands, "knots": made.knots}
-    count = made.hairs + made.pieces
+    bound = {
+        "points": shape.surface["points"],
+        "strands": made.strands,
+        "knots": made.knots,
+        "hairs": made.record,
+    }
+    count = made.fine.hairs * made.fine.knots + made.coarse.hairs * made.coarse.knots
     _each(graph, "strands_pose.wgsl", bound | {"posed": made.posed}, count, made.constants)
 
 
 def shadow(graph: Recorder, strands: StrandResources, lit: Resources) -> None:
     """Find what the hairs hold back of each light that casts shadows."""
     made = strands.tables
-    bound = {**lit, "posed": made.posed, "windows": strands.shadows, "splatted": strands.shadows}
-    shader = program(graph.device, "strands_window.wgsl", made.constants)
+    bound = {
+        **lit,
+        "posed": made.posed,
+        "windows": strands.shadows,
+        "splatted": strands.shadows,
+        "hairs": made.record,
+    }
+    pieces = made.fine.pieces() + made.coarse.pieces(made.shading)
+    constants = made.constants + made.window
+    shader = program(graph.device, "strands_window.wgsl", constants)
     graph.dispatch("strands", shader, bound, (_CLEARING, 1, 1))
-    _each(graph, "strands_shadow.wgsl", bound, made.pieces, made.constants)
+    for covers in (0, 1):
+        _each(graph, "strands_shadow.wgsl", bound, pieces, (*constants, ("COVERS", covers)))
 
 
 def draw(
@@ -43,15 +61,21 @@ def draw(
     """
     made, picture, (lit, view, lights) = strands.tables, strands.picture, look
     light = program(graph.device, "strands_light.wgsl", made.constants + lights)
-    looked = ("eye", "forward", "right", "up", "samples", "jitter", "shown")
+    looked = ("eye", "forward", "right", "up", "shift", "samples", "jitter", "shown")
     record = light.record("StrandView", **{name: view[name] for name in looked})
-    record["hairs"], record["size"], record["skin"] = made.hairs, picture.result.size[:2], strands.skin
-    seen = {"strand_view": record, "drawn": made.drawn}
-    graph.dispatch("strands", light, {**lit, **seen, "posed": made.posed}, each(made.hairs + made.pieces))
+    size = picture.result.size[:2]
+    pixel_mm = _pixel_mm(view, made, size[1])
+    coarse = drawn_of(made, pixel_mm)
+    record["coarse"], record["size"], record["skin"] = coarse, size, strands.skin
+    record["wider"] = made.coarse.hairs / max(1, coarse)
+    seen = {"strand_view": record, "drawn": made.drawn, "hairs": made.record}
+    knots = made.fine.hairs * made.fine.knots + coarse * made.coarse.knots
+    pieces = made.fine.pieces() + made.coarse.pieces(coarse)
+    graph.dispatch("strands", light, {**lit, **seen, "posed": made.posed}, each(knots))
     listed = {"chains": picture.chains, "links": picture.links}
     _each(graph, "strands_empty.wgsl", listed, picture.chains.size // 4)
     ways = (("WAYS", picture.ways),)
-    _each(graph, "strands_bin.wgsl", seen | listed, made.pieces, made.constants + ways)
+    _each(graph, "strands_bin.wgsl", seen | listed, pieces, made.constants + ways)
     bound = head.resources | seen | listed
     bound |= {"visibility_buffer": visibility, "behind": radiance, "image": picture.result}
     width, height = picture.result.size[:2]
@@ -59,17 +83,31 @@ def draw(
         shader = program(graph.device, "strands_draw_tiles.wgsl", made.constants + ways)
         graph.compute("strands", shader, bound, (width, height))
         return picture.result
-    rows = rows_of(graph.device, made.pieces)
+    rows = rows_of(graph.device, _most_in_tile(made, pieces, pixel_mm))
     shader = program(graph.device, "strands_draw.wgsl", (*made.constants, ("ROWS", rows)))
     graph.compute("strands", shader, bound, (width, -(-height // rows)))
     return picture.result
 
 
+def _pixel_mm(view: Any, made: StrandTables, height: int) -> float:
+    """Side of a pixel where the coarse hairs are [mm]."""
+    deep = float(np.dot(made.middle_mm - view["eye"], view["forward"]))
+    return 2.0 * float(np.linalg.norm(view["up"])) * max(deep, 1.0) / height
+
+
+def _most_in_tile(made: StrandTables, pieces: int, pixel_mm: float) -> int:
+    """Pieces that a tile may list: all the fine ones, and several times the mean of the coarse ones."""
+    tiles = max(1.0, (_HEAD_MM / (TILE * pixel_mm)) ** 2)
+    return int(made.fine.pieces() + min(1.0, _CROWDED / tiles) * (pieces - made.fine.pieces()))
+
+
 def rows_of(device: Device, pieces: int) -> int:
     """Pixels that an invocation draws one below the other.
 
+    pieces : in a tile, at most
+
     Software adapters run the whole shader for pixels without hairs too, unless a loop skips these. They also
-    leave a shader's loops, all together, after 65,535 rounds, and all hairs may lie in one tile.
+    leave a shader's loops, all together, after 65,535 rounds.
     """
     return max(1, min(_ROWS, _ROUNDS // max(1, pieces))) if device.adapter.kind == "CPU" else 1
 

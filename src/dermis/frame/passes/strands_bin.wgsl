@@ -5,7 +5,7 @@
 
 @group(0) @binding(30) var<storage, read> drawn: array<Drawn>;
 @group(0) @binding(31) var<storage, read_write> chains: array<atomic<u32>>; // links in use, then the first link + 1 of each chain
-@group(0) @binding(32) var<storage, read_write> links: array<vec2u>; // a piece, the next link + 1
+@group(0) @binding(32) var<storage, read_write> links: array<vec2u>; // a piece, see strand_knots.wgsl, and the next link + 1
 
 // A piece on its way through the tiles.
 struct Piece {
@@ -33,10 +33,11 @@ fn covers(piece: Piece, tile: vec2f) -> bool {
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
     let piece = number_of(group, groups, lane);
-    if (piece >= strand_view.hairs * (KNOTS - 1u)) {
+    if (piece >= pieces_of(strand_view.coarse)) {
         return;
     }
-    let begin = piece_begin(piece);
+    let hair = hair_of_piece(piece);
+    let begin = piece + hair;
     let a = drawn[begin];
     let b = drawn[begin + 1u];
     if (a.width < 0.0 || b.width < 0.0) {
@@ -57,7 +58,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
         for (var x = one.low.x; x <= one.high.x; x += 1.0) {
             if (link < arrayLength(&links) && covers(one, vec2f(x, y))) {
                 let tile = u32(y) * tiles_across(strand_view.size) + u32(x);
-                links[link] = vec2u(piece, atomicExchange(&chains[1u + tile * WAYS + piece % WAYS], link + 1u));
+                links[link] = vec2u(listed_piece(begin, hair), atomicExchange(&chains[1u + tile * WAYS + piece % WAYS], link + 1u));
                 link += 1u;
             }
         }

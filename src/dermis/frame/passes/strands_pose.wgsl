@@ -5,7 +5,7 @@
 struct Strand {
     corner: vec4u, // points of its quad, in a round
     share: vec4f, // of each in the root's place
-    absorption: vec3f, // of its inside [1/mm]
+    absorption: vec4f, // of its inside [1/mm], and what hair around covers of its root
 }
 
 @group(0) @binding(0) var<storage, read> points: array<f32>; // three of each [mm]
@@ -23,7 +23,8 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     if (index >= arrayLength(&knots)) {
         return;
     }
-    let strand = strands[index / KNOTS];
+    let hair = hair_of_knot(index);
+    let strand = strands[hair];
     let a = point_at(strand.corner.x);
     let b = point_at(strand.corner.y);
     let c = point_at(strand.corner.z);
@@ -33,10 +34,10 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let across = cross(c - a, d - b);
     let normal = normalize(across - dot(across, along) * along);
     let knot = knots[index];
-    let row = index / KNOTS * rows_of_strand();
-    posed[row + KNOTS_FROM + index % KNOTS] = vec4f(root + mat3x3f(along, cross(normal, along), normal) * knot.xyz, knot.w);
-    if (index % KNOTS == 0u) {
+    posed[row_of_knot(index, hair)] = vec4f(root + mat3x3f(along, cross(normal, along), normal) * knot.xyz, knot.w);
+    if (index == first_knot(hair)) {
+        let row = row_of_hair(hair);
         posed[row] = vec4f(normal, 0.0);
-        posed[row + 1u] = vec4f(strand.absorption, 0.0);
+        posed[row + 1u] = strand.absorption;
     }
 }

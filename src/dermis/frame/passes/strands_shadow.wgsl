@@ -1,5 +1,5 @@
-// How much of each light hairs hold back: what they cover of coarse texels, and how deep they lie on average.
-// Whole numbers are added up, so that the order does not matter.
+// How much of each light hairs hold back: first how deep the nearest of each coarse texel lies, then what those of each layer
+// behind that cover. Whole numbers are added up, so that the order does not matter.
 //#include "each.wgsl"
 //#include "geometry.wgsl"
 //#include "surface.wgsl"
@@ -8,6 +8,8 @@
 
 @group(0) @binding(30) var<storage, read> posed: array<vec4f>;
 @group(0) @binding(31) var<storage, read_write> splatted: array<atomic<u32>>; // see strand_window.wgsl
+
+override COVERS: bool = false; // whether the nearest are known
 
 const STEP: f32 = 1.0; // between places along a hair, at most [texel]
 
@@ -19,15 +21,20 @@ fn window_at(layer: i32) -> Window {
 }
 
 fn add(layer: i32, texel: vec2i, cover: f32, depth: f32) {
-    if (all(texel >= vec2i(0)) && all(texel < vec2i(WINDOW))) {
-        let word = window_word(layer, vec2u(texel));
-        let much = u32(cover * DENSE + 0.5);
-        atomicAdd(&splatted[word], much);
-        atomicAdd(&splatted[word + 1u], u32(f32(much) * DEEP * max(depth, 0.0) + 0.5));
+    if (any(texel < vec2i(0)) || any(texel >= vec2i(window_size()))) {
+        return;
     }
+    let word = window_word(layer, vec2u(texel));
+    if (!COVERS) {
+        atomicMin(&splatted[word], u32(DEEP * max(depth, 0.0)));
+        return;
+    }
+    let behind = depth - f32(atomicLoad(&splatted[word])) / DEEP;
+    let which = min(u32(layers_before(behind)), HAIR_LAYERS - 1u);
+    atomicAdd(&splatted[word + 1u + which], u32(cover * DENSE + 0.5));
 }
 
-fn splat(light: Light, a: vec4f, b: vec4f) {
+fn splat(light: Light, a: vec4f, b: vec4f, wider: f32) {
     let window = window_at(light.layer);
     let begin = in_window(window, on_map(light, a.xyz));
     let end = in_window(window, on_map(light, b.xyz));
@@ -36,7 +43,7 @@ fn splat(light: Light, a: vec4f, b: vec4f) {
     let way = b.xyz - a.xyz;
     let across = length(vec2f(dot(way, light.map_right), dot(way, light.map_up)));
     let count = max(1u, u32(ceil(distance(begin.xy, end.xy) / STEP)));
-    let cover = (a.w + b.w) * across * abs(right * up) / f32(count);
+    let cover = wider * (a.w + b.w) * across * abs(right * up) / f32(count);
     for (var k = 0u; k < count; k += 1u) {
         let at = mix(begin, end, (f32(k) + 0.5) / f32(count));
         let place = at.xy - 0.5;
@@ -52,14 +59,15 @@ fn splat(light: Light, a: vec4f, b: vec4f) {
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
     let index = number_of(group, groups, lane);
-    let strand = index / (KNOTS - 1u);
-    if (strand >= arrayLength(&posed) / rows_of_strand()) {
+    if (index >= pieces_of(hairs.shading)) {
         return;
     }
-    let row = strand * rows_of_strand() + KNOTS_FROM + index % (KNOTS - 1u);
+    let hair = hair_of_piece(index);
+    let row = row_of_knot(index + hair, hair);
+    let wider = select(1.0, hairs.wider, is_coarse(hair));
     for (var i = 0u; i < skin.light_count; i += 1u) {
         if (lights.light[i].layer >= 0) {
-            splat(lights.light[i], posed[row], posed[row + 1u]);
+            splat(lights.light[i], posed[row], posed[row + 1u], wider);
         }
     }
 }

@@ -15,10 +15,11 @@ var<workgroup> lows: array<vec3f, LANES>;
 var<workgroup> highs: array<vec3f, LANES>;
 
 fn empty_texels(first: u32, step: u32) {
-    let words = WINDOW_HEAD + 2u * WINDOW.x * WINDOW.y;
+    let words = window_begin(1);
     for (var word = first; word < arrayLength(&windows); word += step) {
-        if (word % words >= WINDOW_HEAD) {
-            windows[word] = 0u;
+        let of_texel = word % words;
+        if (of_texel >= WINDOW_HEAD) {
+            windows[word] = select(0u, NO_HAIR, (of_texel - WINDOW_HEAD) % TEXEL_WORDS == 0u);
         }
     }
 }
@@ -32,9 +33,9 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     let light = lights.light[group.x];
     var low = vec3f(1e30);
     var high = vec3f(-1e30);
-    let rows = rows_of_strand();
-    for (var k = lane; k < arrayLength(&posed) / rows * KNOTS; k += LANES) {
-        let at = on_map(light, posed[k / KNOTS * rows + KNOTS_FROM + k % KNOTS].xyz);
+    let knots = hairs.fine * KNOTS + hairs.shading * COARSE_KNOTS;
+    for (var k = lane; k < knots; k += LANES) {
+        let at = on_map(light, posed[row_of_knot(k, hair_of_knot(k))].xyz);
         low = min(low, at);
         high = max(high, at);
     }
@@ -49,7 +50,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     }
     if (lane == 0u) {
         let span = highs[0].xy - lows[0].xy;
-        let wide = max(span, vec2f(NARROWEST * max(span.x, span.y) + 1e-6)) * vec2f(WINDOW) / (vec2f(WINDOW) - 2.0 * BORDER);
+        let wide = max(span, vec2f(NARROWEST * max(span.x, span.y) + 1e-6)) * vec2f(window_size()) / (vec2f(window_size()) - 2.0 * BORDER);
         let corner = bitcast<vec2u>(0.5 * (highs[0].xy + lows[0].xy - wide));
         let size = bitcast<vec2u>(wide);
         let word = window_begin(light.layer);

@@ -21,18 +21,19 @@ def draw(graph: Recorder, levels: Levels, blur: Blur, thin: Translucency, consta
 
     Source: [JensenBuhler2002; dEonLuebke2007].
     """
-    device, pairs, layer = graph.device, thin.pairs, 1 + thin.layer
+    device, pairs, level = graph.device, thin.pairs, 1 + thin.layer
+    halved = blur.halvings[level]
     gather = program(device, "translucency_gather.wgsl")
     record = gather.record(
         "Entering",
-        layer=layer,
+        layer=level - levels.first[halved],
         sources=pairs.sources[1],
-        mip=blur.halvings[layer],
+        halved=halved,
         scale=1.0 / blur.scale,
     )
     entering = {
         "entering": record,
-        "levels": levels.stack,
+        "levels": levels.stacks[halved],
         "source_points": thin.source_points,
         "gathered": thin.gathered,
     }

@@ -4,9 +4,9 @@
 //#include "translucent_pair.wgsl"
 
 struct Entering {
-    layer: u32, // blurred level that the sources read
+    layer: u32, // of the blurred level that the sources read
     sources: u32,
-    mip: u32, // that holds the level
+    halved: u32, // how often the level's resolution is
     scale: f32, // factor from what the level holds to light
 }
 
@@ -18,8 +18,8 @@ struct Entering {
 const SIZE: u32 = 64u; // of a workgroup
 
 fn level_at(at: vec2i) -> vec4f {
-    let most = vec2i(textureDimensions(levels, entering.mip)) - 1;
-    return textureLoad(levels, clamp(at, vec2i(0), most), entering.layer, entering.mip);
+    let most = vec2i(textureDimensions(levels)) - 1;
+    return textureLoad(levels, clamp(at, vec2i(0), most), entering.layer, 0);
 }
 
 @compute @workgroup_size(SIZE)
@@ -33,7 +33,7 @@ fn main(
         return;
     }
     let texel = source_points[index].texel;
-    let place = (vec2f(f32(texel & 0xffffu), f32(texel >> 16u)) + 0.5) / f32(1u << entering.mip) - 0.5;
+    let place = (vec2f(f32(texel & 0xffffu), f32(texel >> 16u)) + 0.5) / f32(1u << entering.halved) - 0.5;
     let a = vec2i(floor(place));
     let w = entering.scale * bilinear_weights(place);
     let light = w.x * level_at(a) + w.y * level_at(a + vec2i(1, 0)) + w.z * level_at(a + vec2i(0, 1))

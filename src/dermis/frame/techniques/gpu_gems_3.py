@@ -9,7 +9,7 @@ import numpy as np
 
 from dermis.frame.atlas_textures import AtlasTextures
 from dermis.frame.inputs import Split
-from dermis.frame.levels import HALVES, Blur, Levels, make_levels
+from dermis.frame.levels import HALVES, Blur, Halvings, Levels, make_levels
 from dermis.frame.passes import TECHNIQUES, program
 from dermis.frame.techniques.technique import AtlasTechnique
 from dermis.gpu import Device, make_texture
@@ -32,11 +32,11 @@ class GpuGems3(AtlasTechnique):
     stitches = False
     transmits = True
 
-    def make_levels(self, device: Device, side: int, count: int) -> Levels:
+    def make_levels(self, device: Device, side: int, halvings: Halvings) -> Levels:
         """Space for light, its blurred levels and a blurred stretch map."""
-        made = make_levels(device, side, count, HALVES, halved=False)
+        made = make_levels(device, side, halvings, HALVES)
         first, second = (make_texture(device, (side, side), HALVES) for _ in range(2))
-        return StretchedLevels(made.stack, made.scratch, side, HALVES, stretch=(first, second))
+        return StretchedLevels(made.stacks, made.first, made.scratch, side, HALVES, stretch=(first, second))
 
     def texel_bytes(self, levels: int) -> float:
         """Memory for each texel of the atlas."""

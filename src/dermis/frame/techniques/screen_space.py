@@ -15,6 +15,7 @@ from dermis.gpu import Device, Graph, Memo, Recorder, make_texture
 from dermis.gpu.textures import texture_from
 from dermis.optics.fits.separable import SeparableKernel, preintegrate
 from dermis.optics.gaussians import GaussianSum
+from dermis.scene.camera import Window
 from dermis.scene.settings import Settings
 
 _TAIL = 5e-4  # of the light that goes to one side: no channel has more beyond the kernel's reach
@@ -71,7 +72,7 @@ class ScreenSpace(Technique):
     def finish(self, graph: Graph, inputs: Inputs, radiance: Any) -> Any:
         """The picture with the light below the skin spread over it."""
         apart, kernel = inputs.resources.own
-        return draw(graph, apart, kernel, inputs.half, radiance)
+        return draw(graph, apart, kernel, inputs.seen, radiance)
 
 
 TECHNIQUE = ScreenSpace()
@@ -93,15 +94,15 @@ def make_kernel(device: Device, profile: GaussianSum) -> Kernel:
     return Kernel(texture_from(device, shares, "rgba32float"), reach_mm)
 
 
-def draw(graph: Recorder, apart: Apart, kernel: Kernel, half: tuple[float, float], over: Any) -> Any:
+def draw(graph: Recorder, apart: Apart, kernel: Kernel, seen: Window, over: Any) -> Any:
     """The picture, a texture of `apart`.
 
-    half : tangents of the half angles of view
+    seen : what the picture shows of a plane before the eye
     over : the shaded picture without the light below the skin
     """
     device, size = graph.device, over.size[:2]
     along = [program(device, TECHNIQUES / "screen_space.wgsl", (("AXIS", axis),)) for axis in (0, 1)]
-    record = along[0].record("Spread", half=half, reach=kernel.reach_mm)
+    record = along[0].record("Spread", half=seen.half, shift=seen.shift, reach=kernel.reach_mm)
     passes = ((apart.below, apart.between), (apart.between, apart.below))
     for shader, (source, blurred) in zip(along, passes, strict=True):
         bound = {"spread": record, "source": source, "kernel": kernel.texture, "blurred": blurred}

@@ -6,7 +6,8 @@ const TAPS: u32 = 16u; // on each side, on neighbouring pixels where these reach
 const STEEPEST: f32 = 4.0; // largest change of depth over width within one surface
 
 struct Spread {
-    half: vec2f, // tangents of the half angles of view
+    half: vec2f, // of the picture on a plane at distance 1 before the eye
+    shift: vec2f, // of its middle there, in these
     reach: f32, // of the kernel [mm]
 }
 
@@ -18,7 +19,7 @@ struct Spread {
 // Position of a pixel's surface in camera space [mm].
 fn place_of(pixel: vec2i, depth: f32) -> vec3f {
     let ndc = vec2f(2.0, -2.0) * (vec2f(pixel) + 0.5) / vec2f(textureDimensions(source)) + vec2f(-1.0, 1.0);
-    return depth * vec3f(ndc * spread.half, 1.0);
+    return depth * vec3f((ndc + spread.shift) * spread.half, 1.0);
 }
 
 // Share of the light that goes to one side, up to a distance.

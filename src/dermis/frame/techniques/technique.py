@@ -9,7 +9,16 @@ from numpy.typing import NDArray
 
 from dermis.frame.atlas_textures import AtlasTextures
 from dermis.frame.inputs import Inputs, Split
-from dermis.frame.levels import FLOATS, MOST_HALVINGS, Blur, Levels, halvings_of, make_levels, usual_texel
+from dermis.frame.levels import (
+    FLOATS,
+    MOST_HALVINGS,
+    Blur,
+    Halvings,
+    Levels,
+    halvings_of,
+    make_levels,
+    usual_texel,
+)
 from dermis.frame.passes import (
     blend,
     combine,
@@ -63,9 +72,9 @@ class Technique:
         """How blurs follow the map's stretch, one of `Settings.stretch`."""
         return settings.stretch
 
-    def make_levels(self, device: Device, side: int, count: int) -> Levels:
+    def make_levels(self, device: Device, side: int, halvings: Halvings) -> Levels:
         """Textures for light and its blurred levels; of the least size where no light is on the atlas."""
-        return make_levels(device, side, count, FLOATS)
+        return make_levels(device, side, halvings, FLOATS)
 
     def make_sum(self, device: Device, side: int) -> Any:
         """Space for the light that leaves below the surface."""
@@ -120,14 +129,14 @@ class AtlasTechnique(Technique):
             return Split(weight[0], total, profile.variance_mm2[1:], weight[1:])
         return Split(np.zeros(3), total, profile.variance_mm2, weight)
 
-    def make_levels(self, device: Device, side: int, count: int) -> Levels:
+    def make_levels(self, device: Device, side: int, halvings: Halvings) -> Levels:
         """Space for light and its blurred levels."""
-        return make_levels(device, side, count, usual_texel(device))
+        return make_levels(device, side, halvings, usual_texel(device))
 
     def texel_bytes(self, levels: int) -> float:
-        """Memory for each texel of the atlas on a software adapter, with the space between passes."""
+        """Most memory for a texel of the atlas on a software adapter, with the space between passes."""
         mips = sum(0.25**halving for halving in range(MOST_HALVINGS + 1))
-        return FORMAT_BYTES[FLOATS] * (levels + 2) * mips
+        return FORMAT_BYTES[FLOATS] * (levels + 2 * mips)  # where none is halved that could be
 
     def halvings(self, split: Split, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
         """How often the resolution of each level is halved, that of the unblurred one first."""

@@ -12,7 +12,6 @@ struct Environment {
     exposure: f32,
     albedo: vec3f, // of skin whose colour map is white
     occluded: u32, // whether the occlusion map holds anything
-    visible: u32, // whether it is seen behind the head
     mirrors: array<vec4f, 64>, // by roughness and cosine: sine and cosine of where the lobe points, its roughness
 }
 
@@ -43,14 +42,6 @@ fn reflection(direction: vec3f, m: f32) -> vec3f {
     let layer = (LAYERS - 1.0) * clamp(log(m / SMOOTHEST) / log(ROUGHEST / SMOOTHEST), 0.0, 1.0);
     let low = min(u32(layer), u32(LAYERS) - 2u);
     return mix(panorama_at(direction, 1u + low), panorama_at(direction, 2u + low), layer - f32(low));
-}
-
-// Background along a ray from the eye: the panorama, out of focus as behind a head in focus, or a colour.
-fn seen_behind(ray: vec3f, colour: vec3f) -> vec3f {
-    if (!ENVIRONMENT || environment.visible == 0u) {
-        return colour;
-    }
-    return panorama_at(normalize(ray), 1u);
 }
 
 // Irradiance of a surface that sees the open share of the sky; the rest is skin, which bounces light: a fit to

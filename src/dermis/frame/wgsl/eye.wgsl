@@ -1,8 +1,7 @@
 // An eye as light finds it: the white, the iris seen through the cornea, the film of tears over both.
 //#include "lighting.wgsl"
+//#include "eyeball.wgsl"
 
-//#fill const CORNEA_AT: f32 = {cornea_at}; // centre of the cornea's front on the axis [mm]
-//#fill const LIMBUS_MM: f32 = {limbus_mm};
 //#fill const IRIS_AT: f32 = {iris_at}; // plane of the iris on the axis [mm]
 
 const EYE_ETA: f32 = 1.336; // of the cornea's front and what is behind, as one surface
@@ -10,13 +9,23 @@ const IRIS_MM: f32 = 6.0; // radius
 const CONCAVE: f32 = 0.45; // light is gathered on the side of the iris opposite to it: slope at its rim
 const LIMBUS_SOFT_MM: f32 = 0.55; // half of the width over which the white turns clear
 // The white scatters light over some mm, and lids that touch it do so too: shadows are those of a point above it.
-const SCATTERED_MM: f32 = 2.2;
-const SCATTERED: f32 = 0.2; // share of a light that comes into such a shadow
+const SCATTERED_MM: f32 = 0.5;
+const AROUND: f32 = 1.0; // how far normals of the white turn to its front by that
+const SCATTERED: f32 = 0.35; // share of a light that comes into such a shadow
+// Artist's values: what the lids, which lie close, keep of the light from all around.
+const UPPER_SHADE: f32 = 0.6;
+const UPPER_SHADE_MM: f32 = 2.2;
+const LOWER_SHADE: f32 = 0.3;
+const LOWER_SHADE_MM: f32 = 1.3;
+const MENISCUS: f32 = 1.1; // how steep tears rise to the lower lid
+const MENISCUS_ROUGHNESS: f32 = 0.16; // over its curve, which is finer than pixels
+const MENISCUS_FROM_MM: f32 = 0.15; // from its edge, within which it lies on the eye
+const MENISCUS_TO_MM: f32 = 0.6;
 const TEARS: f32 = 0.06; // roughness of their film
 // Artist's values, linear.
 const STROMA: vec3f = vec3f(0.20, 0.27, 0.33); // without pigment, which scatters blue
 const PIGMENT: vec3f = vec3f(0.085, 0.040, 0.018); // of eumelanin
-const WHITE: vec3f = vec3f(0.56, 0.52, 0.49);
+const WHITE: vec3f = vec3f(0.52, 0.465, 0.435);
 const VESSEL: vec3f = vec3f(0.62, 0.20, 0.17);
 
 struct Eye {
@@ -26,6 +35,14 @@ struct Eye {
     pupil_mm: f32,
     redness: f32,
     seed: f32,
+    middle_mm: f32, // where on the axis the middle of the ball lies: 0 for one of usual size
+}
+
+// Distances from the edges of the lids [mm], and the way from the lower one, unit.
+struct Lids {
+    above: f32,
+    below: f32,
+    from_below: vec3f,
 }
 
 struct EyeLit {
@@ -100,21 +117,40 @@ fn white_colour(eye: Eye, p: vec3f) -> vec3f {
     return mix(WHITE * yellow, VESSEL, clamp(red, 0.0, 0.8));
 }
 
-// v: towards the viewer
-fn eye_at(eye: Eye, point: Point, v: vec3f) -> EyeLit {
+// Share of the light that lids leave.
+fn lid_shade(lids: Lids) -> f32 {
+    let upper = UPPER_SHADE * exp(-pow(lids.above / UPPER_SHADE_MM, 2.0));
+    let lower = LOWER_SHADE * exp(-pow(lids.below / LOWER_SHADE_MM, 2.0));
+    return (1.0 - upper) * (1.0 - lower);
+}
+
+// How much a place belongs to the tears along the lower lid.
+fn meniscus_at(lids: Lids) -> f32 {
+    let lies = 1.0 - smoothstep(MENISCUS_FROM_MM, MENISCUS_TO_MM, lids.below);
+    return lies * smoothstep(0.3, 2.0, lids.above); // it runs out towards the corners
+}
+
+// The surface of the tears: along the lower lid they rise to it in a curve.
+fn tears_at(smooth_film: vec3f, lids: Lids) -> vec3f {
+    return normalize(smooth_film + MENISCUS * meniscus_at(lids) * lids.from_below);
+}
+
+// p: in its own space; v: towards the viewer
+fn eye_at(eye: Eye, p: vec3f, lids: Lids, v: vec3f) -> EyeLit {
     let turned = mat3x3f(eye.to_own[0].xyz, eye.to_own[1].xyz, eye.to_own[2].xyz);
-    let p = (eye.to_own * vec4f(point.position, 1.0)).xyz;
     let d = normalize(turned * -v);
     let off = length(p.xy);
     let clear = (1.0 - smoothstep(LIMBUS_MM - LIMBUS_SOFT_MM, LIMBUS_MM + LIMBUS_SOFT_MM, off)) * step(0.0, p.z);
-    let ball = normalize(p);
+    let ball = normalize(p - vec3f(0.0, 0.0, eye.middle_mm));
     let cornea = normalize(p - vec3f(0.0, 0.0, CORNEA_AT));
     let q = seen_on_iris(p, d);
     let on_iris = q * min(1.0, IRIS_MM / max(length(q), 1e-3));
     let gathered = normalize(vec3f(-CONCAVE * on_iris / IRIS_MM, 1.0));
-    let film = normalize(mix(ball, cornea, clear));
-    let below = normalize(mix(ball, gathered, clear));
-    let colour = mix(white_colour(eye, p), iris_colour(eye, on_iris), clear);
+    let film = tears_at(normalize(mix(ball, cornea, clear)), lids);
+    // the white scatters light around its curve
+    let below = normalize(mix(ball + vec3f(0.0, 0.0, AROUND), gathered, clear));
+    let colour = mix(white_colour(eye, p), iris_colour(eye, on_iris), clear) * lid_shade(lids);
     let back = transpose(turned); // a turn and a scale: normals come back by it
-    return EyeLit(Surface(normalize(back * below), colour, TEARS, 1.0), Film(normalize(back * film), SCATTERED));
+    let film_roughness = mix(TEARS, MENISCUS_ROUGHNESS, meniscus_at(lids));
+    return EyeLit(Surface(normalize(back * below), colour, film_roughness, 1.0), Film(normalize(back * film), SCATTERED));
 }

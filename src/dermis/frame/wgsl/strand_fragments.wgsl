@@ -15,7 +15,7 @@ const BRIGHTEST: f32 = 16.0; // radiance of pieces behind those kept
 // A piece of hair over a pixel.
 struct Fragment {
     depth: f32, // [mm]
-    piece: u32,
+    begin: u32, // knot of the piece
     along: f32, // of the piece, 0 to 1
     cover: f32, // of the pixel
 }
@@ -32,7 +32,7 @@ fn depth_at(triangle: u32, place: vec2f) -> f32 {
     let a = position_of(t.x);
     let n = cross(position_of(t.y) - a, position_of(t.z) - a);
     let ndc = vec2f(2.0, -2.0) * place / strand_view.size + vec2f(-1.0, 1.0);
-    let ray = strand_view.forward + ndc.x * strand_view.right + ndc.y * strand_view.up;
+    let ray = strand_view.forward + (ndc.x + strand_view.shift.x) * strand_view.right + (ndc.y + strand_view.shift.y) * strand_view.up;
     return dot(n, a - strand_view.eye) / dot(n, ray);
 }
 
@@ -69,28 +69,27 @@ struct Held {
     first: vec2f,
     last: vec2f,
     ends: vec4f, // widths, then depths
-    piece: u32,
+    begin: u32, // its first knot
 }
 
 fn unit(way: vec2f) -> vec2f {
     return way / max(length(way), 1e-6);
 }
 
-fn hold(piece: u32) -> Held {
-    let begin = piece_begin(piece);
-    let k = piece % (KNOTS - 1u);
+fn hold(listed: u32) -> Held {
+    let begin = begin_of(listed);
     let a = drawn[begin];
     let b = drawn[begin + 1u];
     let way = (b.place - a.place) / max(distance(a.place, b.place), 1e-4);
     var first = way;
     var last = way;
-    if (k > 0u) {
+    if ((listed & FIRST_PIECE) == 0u) {
         first += unit(a.place - drawn[begin - 1u].place);
     }
-    if (k + 2u < KNOTS) {
+    if ((listed & LAST_PIECE) == 0u) {
         last += unit(drawn[begin + 2u].place - b.place);
     }
-    return Held(a.place, b.place, first, last, vec4f(a.width, b.width, a.depth, b.depth), piece);
+    return Held(a.place, b.place, first, last, vec4f(a.width, b.width, a.depth, b.depth), begin);
 }
 
 // A hair narrower than a pixel is drawn a pixel wide and covers less of it.
@@ -110,16 +109,15 @@ fn fragment_of(place: vec2f, one: Held) -> Fragment {
         return none;
     }
     let cover = clamp(0.5 * shown + 0.5 - beside, 0.0, 1.0) * width / shown;
-    return Fragment(mix(one.ends.z, one.ends.w, along), one.piece, along, cover);
+    return Fragment(mix(one.ends.z, one.ends.w, along), one.begin, along, cover);
 }
 
 fn in_front(a: Fragment, b: Fragment) -> bool {
-    return a.depth < b.depth || (a.depth == b.depth && a.piece < b.piece);
+    return a.depth < b.depth || (a.depth == b.depth && a.begin < b.begin);
 }
 
 fn radiance_at(one: Fragment) -> vec3f {
-    let begin = piece_begin(one.piece);
-    return mix(drawn[begin].radiance, drawn[begin + 1u].radiance, one.along);
+    return mix(drawn[one.begin].radiance, drawn[one.begin + 1u].radiance, one.along);
 }
 
 // What a pixel shows of hairs.

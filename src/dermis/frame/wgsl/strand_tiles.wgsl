@@ -8,8 +8,3 @@ override WAYS: u32 = 1u; // chains of a tile: GPUs follow many side by side
 fn tiles_across(size: vec2f) -> u32 {
     return (u32(size.x) + STRAND_TILE - 1u) / STRAND_TILE;
 }
-
-// Knots at the beginning of a piece.
-fn piece_begin(piece: u32) -> u32 {
-    return piece / (KNOTS - 1u) * KNOTS + piece % (KNOTS - 1u);
-}

@@ -4,11 +4,13 @@ struct StrandView {
     eye: vec3f,
     samples: u32, // in a pixel
     forward: vec3f,
-    hairs: u32, // how many
+    coarse: u32, // coarse hairs that stand for all
     right: vec3f, // scaled as in shade.wgsl
     up: vec3f,
+    shift: vec2f, // of the picture's middle from the axis, in half pictures
     shown: vec2f, // factors of light from below the skin and of reflected light, which that of hairs counts as
     size: vec2f, // of the picture [pixel]
+    wider: f32, // than they are, for coarse hairs to cover what all do
     skin: vec3f, // albedo of the skin under the hairs
     jitter: array<vec4f, 64>, // sample places in the pixel, 0..1
 }
@@ -29,7 +31,7 @@ fn seen_at(p: vec3f, radius: f32) -> Drawn {
     let right = strand_view.right;
     let up = strand_view.up;
     let ndc = vec2f(dot(way, right) / dot(right, right), dot(way, up) / dot(up, up)) / max(depth, 1e-3);
-    let place = (0.5 + vec2f(0.5, -0.5) * ndc) * strand_view.size;
+    let place = (0.5 + vec2f(0.5, -0.5) * (ndc - strand_view.shift)) * strand_view.size;
     let width = radius * strand_view.size.y / (length(up) * max(depth, 1e-3));
     return Drawn(place, depth, select(-1.0, width, depth > 1.0), vec3f(0.0));
 }

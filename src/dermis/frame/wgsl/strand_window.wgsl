@@ -1,10 +1,16 @@
-// The part of each light's shadow map that hairs lie in, and what they hold back there.
+// The part of each light's shadow map that hairs lie in, and what they hold back there, by depth: a deep opacity map.
+// Source: [YukselKeyser2008].
 //#include "lights.wgsl"
 
-//#fill const WINDOW: vec2u = vec2u({strand_window}, {strand_window} / 2); // texels across and down
+override STRAND_WINDOW: u32 = 256u; // texels across, half as many down
+
 //#fill const WINDOW_HEAD: u32 = {strand_window_words}; // words of a light before its texels: a Window, as bits
-const DENSE: f32 = 4096.0; // a texel's first word for hairs that cover it once; its second has their depths
-const DEEP: f32 = 4.0; // steps of depth in a millimetre
+//#fill const HAIR_LAYERS: u32 = {strand_layers}; // of depth behind the nearest hair of a texel
+const TEXEL_WORDS: u32 = 1u + HAIR_LAYERS; // depth of the nearest, then what hairs of each layer cover
+const FIRST_LAYER_MM: f32 = 1.0; // thickness; each further one is twice as thick
+const DENSE: f32 = 4096.0; // a word for hairs that cover a texel once
+const DEEP: f32 = 256.0; // steps of depth in a millimetre
+const NO_HAIR: u32 = 0xffffffffu; // depth of the nearest where there are none
 
 // Where hairs are on a light's map.
 struct Window {
@@ -13,13 +19,22 @@ struct Window {
     depth: f32, // of the nearest [mm]
 }
 
+fn window_size() -> vec2u {
+    return vec2u(STRAND_WINDOW, STRAND_WINDOW / 2u);
+}
+
 // Words before those of a light.
 fn window_begin(layer: i32) -> u32 {
-    return u32(layer) * (WINDOW_HEAD + 2u * WINDOW.x * WINDOW.y);
+    return u32(layer) * (WINDOW_HEAD + TEXEL_WORDS * STRAND_WINDOW * STRAND_WINDOW / 2u);
 }
 
 fn window_word(layer: i32, texel: vec2u) -> u32 {
-    return window_begin(layer) + WINDOW_HEAD + 2u * (texel.y * WINDOW.x + texel.x);
+    return window_begin(layer) + WINDOW_HEAD + TEXEL_WORDS * (texel.y * STRAND_WINDOW + texel.x);
+}
+
+// How many layers lie before a depth behind a texel's nearest hair.
+fn layers_before(behind_mm: f32) -> f32 {
+    return log2(1.0 + max(behind_mm, 0.0) / FIRST_LAYER_MM);
 }
 
 // Place on a light's map, in its clip space, and depth [mm].
@@ -30,5 +45,5 @@ fn on_map(light: Light, p: vec3f) -> vec3f {
 
 // Place in a window [texel], and depth beyond its nearest [mm].
 fn in_window(window: Window, at: vec3f) -> vec3f {
-    return vec3f((at.xy - window.low) / window.size * vec2f(WINDOW), at.z - window.depth);
+    return vec3f((at.xy - window.low) / window.size * vec2f(window_size()), at.z - window.depth);
 }

@@ -1,13 +1,14 @@
-"""Brows and lashes of a person, rooted in the same places of everyone's skin."""
+"""Hair, beard, brows and lashes of a person, rooted in the same places of everyone's skin."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from dermis.human.hair import brows, lashes
+from dermis.human.hair.grown import Grown
+from dermis.human.hair.head_hair import Ground, beard_hair, scalp_hair
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.skin import Skin, beside_edges, front_places, mirrored
 from dermis.mesh.head import Head
@@ -15,31 +16,41 @@ from dermis.mesh.strands import Doubles, Roots, Strands, finer_roots, frames, po
 from dermis.specular.hair import absorption_per_mm
 
 _LASHES_DARKER = 1.6
+_ALIKE = 5  # hairs of head and beard whose mean one that is drawn has the colour of
+_LEAST_EUMELANIN = 0.07  # white hair is not quite white
 
 
-class _Grown(NamedTuple):
-    """Hairs of one kind on one side; all but `roots` in the space of the person."""
-
-    roots: Roots
-    knots: Doubles
-    radius: Doubles
-    darker: float
-
-
-def groomed(head: Head, plain: Head, mean_mm: Doubles, levels: int, look: HairLook) -> Head:
-    """The head with brows and lashes.
+def groomed(
+    head: Head, plain: Head, mean_mm: Doubles, levels: int, look: HairLook, recession: float = 0.0
+) -> Head:
+    """The head with hair, beard, brows and lashes.
 
     plain : the head before it was subdivided `levels` times
     mean_mm : (p, 3) control points of the person whose brows are where the artist has them
+    recession : see `SkinLook`
     """
-    skin, parts = Skin(head.mesh), list[_Grown]()
+    skin, parts = Skin(head.mesh), list[Grown]()
     eyes = _eyes(plain)
     for side, eye in zip((1.0, -1.0), eyes, strict=True):
         rng = np.random.default_rng((look.seed, int(side > 0)))
         parts.append(_brow(head, plain, mean_mm, levels, look, skin, side, rng))
         for lid in (lashes.UPPER, lashes.LOWER):
             parts.append(_lashes(head, plain, mean_mm, levels, lid, side, eye, rng))
-    return replace(head, strands=_joined(head, parts, look))
+    head = replace(head, strands=_joined(head, parts, _absorption(parts, look)))
+    ground = Ground(head, plain, levels, skin)
+    hair = [*scalp_hair(ground, look, recession), *beard_hair(ground, look)]
+    if not hair:
+        return head
+    joined = _joined(head, hair, _mixed_absorption(hair, look))
+    return replace(head, hair=_shuffled(joined, look.seed))
+
+
+def _shuffled(strands: Strands, seed: int) -> Strands:
+    """The same hairs in no order, so that the first few are like all."""
+    order = np.random.default_rng((seed, 5)).permutation(len(strands))
+    roots = Roots(strands.roots.quad[order], strands.roots.place[order])
+    parts = {name: getattr(strands, name)[order] for name in ("knots_mm", "radius_mm", "absorption", "cover")}
+    return replace(strands, roots=roots, **parts)
 
 
 def _brow(
@@ -51,13 +62,13 @@ def _brow(
     skin: Skin,
     side: float,
     rng: np.random.Generator,
-) -> _Grown:
+) -> Grown:
     u, v, x, y = brows.places(rng)
     roots, there = front_places(plain.mesh, mean_mm, side * x, y)
     kept = np.flatnonzero(there)[: brows.count(look)]
     roots = finer_roots(plain.mesh, Roots(roots.quad[kept], roots.place[kept]), levels)
     root, _ = frames(head.mesh, roots, points_of(head.mesh))
-    return _Grown(roots, *brows.grown(skin, root, side, u[kept], v[kept], rng, look), 1.0)
+    return Grown(roots, *brows.grown(skin, root, side, u[kept], v[kept], rng, look), 1.0)
 
 
 def _lashes(
@@ -69,13 +80,13 @@ def _lashes(
     side: float,
     eye: Doubles,
     rng: np.random.Generator,
-) -> _Grown:
+) -> Grown:
     u, across = lashes.places(lid, rng)
     loop = np.array(lid.loop)
     loop = loop if side > 0 else mirrored(mean_mm, loop)
     roots = finer_roots(plain.mesh, beside_edges(plain.mesh, mean_mm, loop, u, across, eye), levels)
     root, _ = frames(head.mesh, roots, points_of(head.mesh))
-    return _Grown(roots, *lashes.grown(lid, root, eye, side, u, rng), _LASHES_DARKER)
+    return Grown(roots, *lashes.grown(lid, root, eye, side, u, rng), _LASHES_DARKER)
 
 
 def _eyes(plain: Head) -> list[Doubles]:
@@ -88,13 +99,41 @@ def _eyes(plain: Head) -> list[Doubles]:
     return found
 
 
-def _joined(head: Head, parts: list[_Grown], look: HairLook) -> Strands:
+def _joined(head: Head, parts: list[Grown], absorption: Doubles) -> Strands:
+    """All hairs of some kinds.
+
+    absorption : (n, 3) of single hairs [1/mm]
+    """
     roots = Roots(*(np.concatenate(each) for each in zip(*(part.roots for part in parts), strict=True)))
     knots, radius = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
-    darker = np.concatenate([np.full(len(part.radius), part.darker) for part in parts])
-    rng = np.random.default_rng((look.seed, 2))
-    much = darker * rng.lognormal(0.0, 0.15, len(darker)) * (rng.random(len(darker)) >= look.grey)
-    absorption = absorption_per_mm(much * look.eumelanin, much * look.pheomelanin)
+    bundle, cover = (_each(parts, name) for name in ("bundle", "cover"))
     root, _ = frames(head.mesh, roots, points_of(head.mesh))
     ways = seen_from(head.mesh, roots, knots - root[:, None])
-    return Strands(roots, ways, radius.astype(np.float32), absorption.astype(np.float32))
+    numbers = radius, absorption / bundle[:, None], cover
+    return Strands(roots, ways, *(one.astype(np.float32) for one in numbers))
+
+
+def _each(parts: list[Grown], name: str) -> Doubles:
+    """(n,) a number of the kinds, for each of their hairs."""
+    return np.concatenate([np.full(len(part.radius), getattr(part, name)) for part in parts])
+
+
+def _absorption(parts: list[Grown], look: HairLook) -> Doubles:
+    """(n, 3) of brows and lashes, of which some have no pigment [1/mm]."""
+    rng, darker = np.random.default_rng((look.seed, 2)), _each(parts, "darker")
+    n = len(darker)
+    much = darker * rng.lognormal(0.0, 0.15, n) * (rng.random(n) >= look.grey)
+    return absorption_per_mm(much * look.eumelanin, much * look.pheomelanin)
+
+
+def _mixed_absorption(parts: list[Grown], look: HairLook) -> Doubles:
+    """(n, 3) of hairs that stand for some, of which some have no pigment [1/mm].
+
+    The mean of white and of brown hairs is grey, where brown hair with less pigment would be blond.
+    """
+    rng, n = np.random.default_rng((look.seed, 6)), sum(len(part.radius) for part in parts)
+    white = rng.binomial(_ALIKE, look.grey, n)[:, None] / _ALIKE
+    much = rng.lognormal(0.0, 0.12, n)
+    dark = absorption_per_mm(much * look.eumelanin, much * look.pheomelanin)
+    mixed = (1.0 - white) * dark + white * dark.mean(axis=1, keepdims=True)
+    return np.asarray(np.maximum((1.0 - white) ** 2 * mixed, absorption_per_mm(_LEAST_EUMELANIN, 0.0)))

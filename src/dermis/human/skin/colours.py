@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +16,17 @@ EPIDERMIS_MM = 0.05
 """Thickness of the epidermis of the face, an artist's value within what is measured, 0.05 to 0.1 [mm]."""
 LIP_EPIDERMIS_MM = 0.03
 """What stands over the blood of the lips, which shows through more than elsewhere [mm]."""
+_ALONE = Lock()  # the frame and the painting ask for the same table at the same time
+
+
+def colours(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
+    """Colour of skin by its shares of melanin and of blood."""
+    with _ALONE:
+        return _colours(eumelanin, oxygen, epidermis_mm)
 
 
 @lru_cache(maxsize=64)
-def colours(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
-    """Colour of skin by its shares of melanin and of blood."""
+def _colours(eumelanin: float, oxygen: float, epidermis_mm: float) -> ColourTable:
     return colour_table(SkinParameters(eumelanin=eumelanin, oxygen=oxygen, epidermis_mm=epidermis_mm))
 
 

@@ -18,14 +18,20 @@ FULL_MM = 0.2
 
 
 @cache
-def detail_slopes() -> NDArray[np.float32]:
-    """(SIDE, SIDE, 4) slopes of pores along +u and down, and of furrows; it goes on over the edges [-]."""
+def detail_heights_mm() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """(SIDE, SIDE) heights of pores and of furrows; they go on over the edges [mm]."""
     from PIL import Image
 
     file = resources.files("dermis.human").joinpath("data", "detail.png")
-    heights = np.asarray(Image.open(BytesIO(file.read_bytes())), np.float32)[..., :2] * np.float32(
-        FULL_MM / 255
-    )
+    levels = np.asarray(Image.open(BytesIO(file.read_bytes())), np.float32)
+    pores, furrows = np.moveaxis(levels[..., :2] * np.float32(FULL_MM / 255), -1, 0)
+    return pores, furrows
+
+
+@cache
+def detail_slopes() -> NDArray[np.float32]:
+    """(SIDE, SIDE, 4) slopes of pores along +u and down, and of furrows; it goes on over the edges [-]."""
+    heights = np.stack(detail_heights_mm(), axis=-1)
     per_mm = np.float32(SIDE / TILE_MM / 2)
     across, down = (per_mm * (np.roll(heights, -1, axis) - np.roll(heights, 1, axis)) for axis in (1, 0))
     return np.stack([across[..., 0], down[..., 0], across[..., 1], down[..., 1]], axis=-1)

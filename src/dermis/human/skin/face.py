@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from functools import cache
+from functools import cache, lru_cache
 from itertools import groupby
 from typing import NamedTuple
 
@@ -24,24 +24,43 @@ DEGREES = 2
 """Angle between the heights of `hairline`."""
 _EDGES = 180 // DEGREES + 1
 _PIECES = 4
+_MOST_KEPT = 32  # tables of receding hair
 
 
-@cache
-def zones() -> Floats:
-    """(k, 20) of each zone its centre and 0, one over its radii and 0 [mm], and its amounts."""
+_CROWN = "crown"  # zone that thin hair leaves
+_TEMPLES_MM, _FOREHEAD_MM = 22.0, 16.0  # by which hair recedes at most, there and all over the forehead
+_TEMPLES, _TEMPLES_WIDE, _FOREHEAD_WIDE = 33.0, 15.0, 38.0  # where these are and how wide [degrees]
+
+
+@lru_cache(maxsize=_MOST_KEPT)
+def zones(recession: float = 0.0) -> Floats:
+    """(k, 20) of each zone its centre and 0, one over its radii and 0 [mm], and its amounts.
+
+    recession : see `SkinLook`
+    """
     rows = read_rows(__package__, "zones")
+    for row in rows:
+        if row["zone"] == _CROWN:
+            row["hair"] = str(recession * float(row["hair"]))
     centres, radii, amounts = (numbers(rows, names) for names in ("x y z", "rx ry rz", " ".join(AMOUNTS)))
     none = np.zeros((len(rows), 1))
     return np.hstack([centres, none, 1.0 / radii, none, amounts]).astype(np.float32)
 
 
-@cache
-def hairline() -> Floats:
-    """(91,) height of the edge of the hair, by the angle from the front [mm]."""
+@lru_cache(maxsize=_MOST_KEPT)
+def hairline(recession: float = 0.0) -> Floats:
+    """(91,) height of the edge of the hair, by the angle from the front [mm].
+
+    recession : see `SkinLook`; hair leaves the temples first
+    """
     from scipy.interpolate import PchipInterpolator
 
     angle, height = numbers(read_rows(__package__, "hairline"), "angle height").T
-    return np.asarray(PchipInterpolator(angle, height)(DEGREES * np.arange(_EDGES)), np.float32)
+    edges = DEGREES * np.arange(_EDGES)
+    temples = np.exp(-(((edges - _TEMPLES) / _TEMPLES_WIDE) ** 2))
+    forehead = np.exp(-((edges / _FOREHEAD_WIDE) ** 4))
+    gone = recession * (_TEMPLES_MM * temples + recession * _FOREHEAD_MM * forehead)
+    return np.asarray(PchipInterpolator(angle, height)(edges) + gone, np.float32)
 
 
 class Folds(NamedTuple):

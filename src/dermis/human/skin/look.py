@@ -25,6 +25,7 @@ class SkinLook:
     tan : how much darker skin is that the sun has seen than that under clothes, 0 to 1 [-]
     veins : how much they shine through at temples, lids and neck, 0 to 1 [-]
     stubble : shadow of the shaved hair of the head, from bald to dark, 0 to 1 [-]
+    recession : how far that hair has left temples, forehead and crown, 0 to 1 [-]
     beard : shadow of a shaved beard, 0 to 1 [-]
     oil : how much the skin shines, 0 to 1 [-]
     age : depth of folds and lines, from youth to old age, 0 to 1 [-]
@@ -44,6 +45,7 @@ class SkinLook:
     tan: float = 0.3
     veins: float = 0.3
     stubble: float = 0.7
+    recession: float = 0.0
     beard: float = 0.0
     oil: float = 0.4
     age: float = 0.1

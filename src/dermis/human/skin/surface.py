@@ -14,24 +14,46 @@ from numpy.typing import NDArray
 from dermis.mesh.geometry import triangle_areas, vertex_normals
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.rig import Stencils
+from dermis.tables import numbers, read_rows
 
 Floats = NDArray[np.float32]
 
 FIELDS = ("lips", "mouth", "lids")
-"""Distances from borders [mm]: of the lips, positive inside; of the mouth, negative inside; from the edges of
-the lids."""
+"""Distances from borders [mm]: of the lips, positive inside; of the mouth, negative inside; of the lids,
+negative where they face the eye."""
 _UNIT_MM = 0.01
+_LIDS_MM = -2.0, -0.6  # of the first columns of lid_rings.csv
+_CREST_MM = 0.15, 0.8  # least and most of the third
+_HIGHEST_MM, _WRAPPED_MM = 200.0, 655.36  # 16 bits end above the edge of the breast, and begin anew
 
 
 @cache
 def average() -> tuple[Floats, Floats]:
     """(p, 3) the average person's control points, and (p, 3) the fields there, see `FIELDS` [mm]."""
+    places, fields = _stored("places"), _stored("fields")
+    rings = lid_rings()
+    fields[rings[..., :2], 2] = _LIDS_MM
+    fields[rings[..., 2], 2] = fields[rings[..., 2], 2].clip(*_CREST_MM)
+    return places, fields
+
+
+@cache
+def lid_rings() -> NDArray[np.int64]:
+    """(2, r, 4) control points of the left and the right eye's lids, see human/lid_rings.csv."""
+    left = numbers(read_rows("dermis.human", "lid_rings"), "wall edge crest skin").astype(np.int64)
+    places = _stored("places")
+    wanted = places[left.ravel()] * np.array([-1.0, 1.0, 1.0], np.float32)
+    opposite = np.array([np.abs(places - place).sum(axis=1).argmin() for place in wanted])
+    return np.stack([left, opposite.reshape(left.shape)])
+
+
+def _stored(name: str) -> Floats:
     file = resources.files("dermis.human").joinpath("data", "average.npz")
     with resources.as_file(file) as path, np.load(path) as found:
-        places, fields = (
-            found[name].astype(np.float32) * np.float32(_UNIT_MM) for name in ("places", "fields")
-        )
-    return places, fields
+        stored = np.asarray(found[name].astype(np.float32) * np.float32(_UNIT_MM))
+    if name == "places":
+        stored[stored[:, 1] > _HIGHEST_MM, 1] -= _WRAPPED_MM
+    return stored
 
 
 _KEPT: dict[bytes, Painting] = {}

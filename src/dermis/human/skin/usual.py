@@ -56,7 +56,7 @@ def usual_look(origin: Origin) -> SkinLook:
         veins=0.2 + 0.5 * old,
         beard=0.45 * max(2.0 * origin.sex - 1.0, 0.0),
         oil=0.45 - 0.25 * old,
-        age=0.04 + (_MOST_LINED - 0.04) * old**1.1,
+        age=0.04 + (_MOST_LINED - 0.04) * old**1.5,
     )
 
 

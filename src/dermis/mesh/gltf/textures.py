@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.images.codecs import encode_png
 from dermis.images.colour import encode_srgb8
-from dermis.mesh.maps import MIN_SIZE, Maps
+from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Material
 
 Floats = NDArray[np.float32]
@@ -28,25 +28,25 @@ def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, b
     found: dict[str, bytes] = {}
     roles: dict[str, Any] = {}
     if maps.colour is not None:
-        found["colour"] = encode_png(_enlarged(encode_srgb8(maps.colour)))
+        found["colour"] = encode_png(encode_srgb8(maps.colour))
     shown = slopes if maps.normal is None else maps.normal
     if shown is not None:
-        found["normal"] = encode_png(_enlarged(_normals(shown)))
+        found["normal"] = encode_png(_normals(shown))
     if maps.normal is not None:
         roles["normal"] = {"index": "normal"}
     if maps.height is not None:
         low, span = float(maps.height.min()), float(np.ptp(maps.height)) or 1.0
         grey = np.rint((maps.height.astype(np.float64) - low) / span * 65535).astype(np.uint16)
-        found["height"], roles["height_mm"] = encode_png(_enlarged(grey[..., None])), span / 255
+        found["height"], roles["height_mm"] = encode_png(grey[..., None]), span / 255
     if maps.roughness is not None:
         perceptual = np.zeros((*maps.roughness.shape, 3), np.float32)
         perceptual[..., 1] = np.sqrt(np.clip(maps.roughness, 0.0, 1.0))
-        found["metallic roughness"] = encode_png(_enlarged(_bytes(perceptual)))
+        found["metallic roughness"] = encode_png(_bytes(perceptual))
     for role in ("specular", "roughness"):
         if (grey_map := getattr(maps, role)) is not None:
-            found[role] = encode_png(_enlarged(_bytes(grey_map)[..., None]))
+            found[role] = encode_png(_bytes(grey_map)[..., None])
     if maps.region is not None:
-        found["region"] = encode_png(_enlarged(maps.region[..., None]))
+        found["region"] = encode_png(maps.region[..., None])
     own = (role for role in ("height", "specular", "roughness", "region") if role in found)
     return found, roles | {role: {"index": role} for role in own}
 
@@ -77,12 +77,6 @@ def material_of(
 def _plain(one: Material, roughness: float) -> dict[str, Any]:
     factor = [*(float(value) for value in one.colour), 1.0]
     return {"baseColorFactor": factor, "metallicFactor": 0.0, "roughnessFactor": round(roughness, 4)}
-
-
-def _enlarged(levels: NDArray[Any]) -> NDArray[Any]:
-    """A picture (h, w, c) with each texel repeated where it would be too small for a map."""
-    times = -(-MIN_SIZE // min(levels.shape[:2]))
-    return levels if times <= 1 else levels.repeat(times, axis=0).repeat(times, axis=1)
 
 
 def _normals(slopes: Floats) -> NDArray[np.uint8]:

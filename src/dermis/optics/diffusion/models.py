@@ -84,7 +84,7 @@ def _need_half_space(medium: Medium, model: Model) -> None:
     if len(medium.layers) > 1 or not medium.semi_infinite:
         last = f"the last {medium.layers[-1].thickness_mm:g} mm thick"
         came = f"{medium.name} has {len(medium.layers)} layers, {last}"
-        refuse(f"model {model}", "one layer without a bottom", came, "Take the model multipole or layered")
+        refuse(f"model {model}", "one semi-infinite layer", came, "Take the model multipole or layered")
 
 
 def _pointwise(medium: Medium, model: Model, clamp: Clamp, radius_mm: Floats) -> Floats:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final, Literal, get_args
 
+import numpy as np
+
 from dermis.errors import refuse
 from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium
 from dermis.optics.pigments.chromophores import (
@@ -140,16 +142,35 @@ def _epidermis(
     p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, perfused: float = 0.0
 ) -> Layer:
     """Melanosomes, blood in a share of the volume, and tissue in the rest."""
-    melanin = p.melanin * melanosome(wavelength_nm, p.eumelanin)
-    rest = (1.0 - p.melanin - perfused) * baseline(wavelength_nm)
-    sigma_a = melanin + perfused * blood(wavelength_nm, p.oxygen) + rest
+    sigma_a = _epidermal_absorption(p, p.melanin, wavelength_nm, perfused)
     return Layer(sigma_a, sigma_s_prime, p.epidermis_mm, "epidermis")
+
+
+def _epidermal_absorption(
+    p: SkinParameters, melanin: float | Floats, wavelength_nm: Floats, perfused: float = 0.0
+) -> Floats:
+    rest = (1.0 - melanin - perfused) * baseline(wavelength_nm)
+    brown = melanin * melanosome(wavelength_nm, p.eumelanin)
+    return np.asarray(brown + perfused * blood(wavelength_nm, p.oxygen) + rest)
 
 
 def _dermis(p: SkinParameters, wavelength_nm: Floats, sigma_s_prime: Floats, name: str = "dermis") -> Layer:
     """Blood, and tissue in the rest of the volume; semi-infinite."""
-    sigma_a = p.blood * blood(wavelength_nm, p.oxygen) + (1.0 - p.blood) * baseline(wavelength_nm)
+    sigma_a = _dermal_absorption(p, p.blood, wavelength_nm)
     return Layer(sigma_a, DERMIS_SHARE * sigma_s_prime, name=name)
+
+
+def _dermal_absorption(p: SkinParameters, red: float | Floats, wavelength_nm: Floats) -> Floats:
+    return np.asarray(red * blood(wavelength_nm, p.oxygen) + (1.0 - red) * baseline(wavelength_nm))
+
+
+def mixed_layers(parameters: SkinParameters, shares: Floats) -> tuple[Layer, Layer]:
+    """The two layers of "dj2006" with other shares (n,) of melanin and of blood; coefficients (n, 31)."""
+    column, scattered = shares[:, None], donner_jensen_2006(WAVELENGTHS_NM)
+    brown = _epidermal_absorption(parameters, column, WAVELENGTHS_NM)
+    red = _dermal_absorption(parameters, column, WAVELENGTHS_NM)
+    epidermis, dermis = (np.broadcast_to(k * scattered, brown.shape) for k in (1.0, DERMIS_SHARE))
+    return Layer(brown, epidermis, parameters.epidermis_mm, "epidermis"), Layer(red, dermis, name="dermis")
 
 
 def _option(name: str) -> str:

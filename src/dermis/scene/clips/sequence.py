@@ -110,7 +110,7 @@ class _Frames:
         self._check_topology(file, vertices)
         control = self.head.control
         point = self.head.mesh.point if control.corner is None else control.corner
-        places = np.empty_like(control.positions_mm)
+        places = np.empty_like(self.head.positions_mm)
         places[point] = vertices.positions_mm
         apart = np.abs(places[point] - vertices.positions_mm).max(axis=1)
         if apart.max() > PARTED_MM:
@@ -135,9 +135,7 @@ class _Frames:
             refuse(file, "frames of one topology", came, "Export all of them from the same mesh")
 
     def _check_size(self, file: Path, places: Floats) -> None:
-        sizes = [
-            float(np.linalg.norm(np.ptp(one, axis=0))) for one in (places, self.head.control.positions_mm)
-        ]
+        sizes = [float(np.linalg.norm(np.ptp(one, axis=0))) for one in (places, self.head.positions_mm)]
         if not _LIKELY[0] <= sizes[0] / sizes[1] <= _LIKELY[1]:
             came = f"it is {sizes[0] / sizes[1]:.3g} times as large"
             refuse(file, "a frame about as large as the head", came, "Set the files' unit (unit_mm)")

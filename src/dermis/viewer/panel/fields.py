@@ -10,7 +10,7 @@ from typing import Any
 from imgui_bundle import imgui
 
 from dermis.errors import DermisError
-from dermis.scene.plain import Colour, Plain, Range, choices_of, help_of, range_of
+from dermis.scene.plain import Colour, Plain, Range, choices_of, help_of, range_of, words_of
 from dermis.viewer.session import Session
 from dermis.viewer.state import ViewerState
 
@@ -22,6 +22,7 @@ _FORMS = {"_per_mm": "%.3g", "_mm": "%.4g mm", "_degrees": "%.4g°"}  # by the u
 _ALL_NAMES = int(imgui.ComboFlags_.height_largest)
 _TOOLTIP_WIDTH = 260.0
 _AS_THEY_ARE: Mapping[str, str] = MappingProxyType({})
+_OWN = "own"
 _MOST_ROWS = 14  # that are seen of many like controls
 
 
@@ -35,6 +36,7 @@ class Style:
     form : printf format of the numbers shown
     options : the whole numbers to choose from
     called : what people call the field's words
+    own : makes the first value of one's own where a field may also be a word
     """
 
     label: str = ""
@@ -43,6 +45,7 @@ class Style:
     form: str = ""
     options: tuple[int, ...] = ()
     called: Mapping[str, str] = field(default_factory=dict)
+    own: Callable[[Session], Any] | None = None
 
 
 _PLAIN = Style()
@@ -75,6 +78,11 @@ def _draw_field(session: Session, values: Plain, name: str, apply: Apply, style:
     def put(found: Any) -> ViewerState:
         return apply(**{name: found})
 
+    if words := words_of(kind, name):
+        _draw_words(session, label, value, words, put, style)
+        explain(help_of(kind, name))
+        if isinstance(value, str):
+            return
     if isinstance(value, bool):
         hold(session, label, imgui.checkbox(label, value), put)
     elif style.options:
@@ -95,6 +103,19 @@ def _draw_field(session: Session, values: Plain, name: str, apply: Apply, style:
     else:
         return
     explain(help_of(kind, name))
+
+
+def _draw_words(
+    session: Session, label: str, value: Any, words: tuple[str, ...], put: Put, style: Style
+) -> None:
+    """A list of the words that a number or a colour may be instead."""
+    own = style.own
+
+    def choose(word: str) -> ViewerState:
+        return put(own(session) if own and word == _OWN else word)
+
+    chosen = value if isinstance(value, str) else _OWN
+    combo(session, f"{label} from", chosen, (*words, _OWN) if own else words, choose)
 
 
 def _label_of(name: str) -> str:

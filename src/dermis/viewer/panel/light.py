@@ -9,8 +9,7 @@ from imgui_bundle import imgui
 
 from dermis.mesh.samples import SAMPLES
 from dermis.scene.environment import Environment
-from dermis.scene.files import light_presets
-from dermis.scene.lights import LIGHTS, Light, SpotLight
+from dermis.scene.lights import LIGHTS, Light, SpotLight, light_presets
 from dermis.scene.plain import Range
 from dermis.viewer.panel.fields import Style, attempt, button, combo, draw_fields, slider
 from dermis.viewer.panel.words import LIGHT, LIGHT_KINDS

@@ -32,8 +32,10 @@ _SETTINGS = {
     "atlas": Style(options=_SIDES),
     "shadow_size": Style("shadow map", options=_SIDES),
     "samples": Style(options=(1, 2, 4, 8, 16)),
+    "exposure": Style(own=lambda session: session.studio.exposure),
+    "background": Style(own=lambda session: (0.2, 0.2, 0.2)),
 }
-_PICTURE = ("exposure", "tone", "gamma", "bloom", "background")
+_PICTURE = ("exposure", "tone", "gamma", "bloom", "background", "background_blur")
 _NOWHERE = ("size", "parts")  # the window's, and a view
 
 

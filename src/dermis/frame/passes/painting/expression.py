@@ -39,7 +39,7 @@ def make_face(
     into : textures of colour and relief
     """
     colour, relief = into
-    heights = device.buffer(np.zeros(at_rest.size // 4, np.float32), "STORAGE")
+    heights = device.space(at_rest.size)
     bound = {"resting": resting, "at_rest": at_rest, "moved": moved, "heights": heights}
     return Face(bound | {"colour": colour.levels[0]}, heights, colour, relief)
 

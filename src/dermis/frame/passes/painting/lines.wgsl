@@ -51,7 +51,7 @@ fn folded(spot: Spot) -> f32 {
         let own = fold.size.x;
         let width = sqrt(own * own + 0.64 * spot.texel_mm * spot.texel_mm);
         if (distance(p, fold.ball.xyz) < fold.ball.w + FOLD_REACH * width) {
-            let near = nearest(p, k);
+            let near = nearest(p, fold.knots);
             let square = near.x / (width * width);
             let shape = (0.35 * exp(-square / 7.0) - exp(-square)) * (1.0 - smoothstep(0.6 * 36.0, 36.0, square));
             let ends = 1.0 - pow(2.0 * near.y - 1.0, 4.0);
@@ -66,16 +66,24 @@ fn folded(spot: Spot) -> f32 {
 }
 
 // Squared distance to a fold [mm2], and how far along it that is.
-fn nearest(p: vec3f, fold: u32) -> vec2f {
+fn nearest(p: vec3f, knots: vec4f) -> vec2f {
     var found = vec2f(1e9, 0.0);
-    for (var k = u32(tables.firsts[fold]); k + 1u < u32(tables.firsts[fold + 1u]); k++) {
-        let along = tables.knots[k + 1u] - tables.knots[k];
-        let off = p - tables.knots[k].xyz;
+    var k = u32(knots.x);
+    var knot = tables.knots[k];
+    loop { // with its test at the end, as in lighting.wgsl
+        k++;
+        let next = tables.knots[k];
+        let along = next - knot;
+        let off = p - knot.xyz;
         let t = saturate(dot(off, along.xyz) / dot(along.xyz, along.xyz));
         let away = off - t * along.xyz;
         let square = dot(away, away);
         if (square < found.x) {
-            found = vec2f(square, tables.knots[k].w + t * along.w);
+            found = vec2f(square, knot.w + t * along.w);
+        }
+        knot = next;
+        if (k >= u32(knots.y)) {
+            break;
         }
     }
     return found;

@@ -33,6 +33,8 @@ const LIP_STRENGTH: f32 = 0.28;
 const LIP_ROUGHNESS: f32 = -0.07;
 const WET_STRENGTH: f32 = 0.55; // of the inside of the mouth and the lids' edges
 const WET_ROUGHNESS: f32 = -0.12;
+const INNER_LID: vec3f = vec3f(0.46, 0.19, 0.155); // where lids face the eye, and the caruncle
+const TEARS: f32 = 0.11; // roughness there
 const UNEVEN: f32 = 0.15; // of the oil
 
 // The table's colour for shares of melanin and blood, bilinear in their roots.
@@ -57,6 +59,11 @@ fn veins() -> f32 {
     return near * saturate(zone[ZONE_VEINS]) * paint.veins;
 }
 
+// Where lids face the eye, pink and covered by tears.
+fn inner_lid(spot: Spot) -> f32 {
+    return smoothstep(0.1, -0.45, spot.fields.z);
+}
+
 fn pigments(spot: Spot, lip: f32, mucosa: f32) -> vec2f {
     var brown = zone[ZONE_MELANIN] * (1.0 - lip) + LIP_MELANIN * lip + PATCHES * noise[NOISE_PATCHES];
     brown += FRECKLE * smoothstep(0.02, 0.3, dotted[DOT_FRECKLES] + 0.7 * dotted[DOT_SMALL_FRECKLES]);
@@ -76,14 +83,14 @@ fn over(below: vec3f, above: vec3f, share: f32) -> vec3f {
 }
 
 // Strength, in parts of the usual one, and roughness.
-fn gloss(lip: f32, wet: f32, hair: f32) -> vec2f {
+fn gloss(lip: f32, wet: f32, hair: f32, tears: f32) -> vec2f {
     let film = noise[NOISE_OIL_FILM] + 0.7 * noise[NOISE_FINE_FILM];
     let zones = 0.5 + 1.25 * paint.oil;
     var strength = STRENGTH + OILY_STRENGTH * paint.oil + zones * zone[ZONE_STRENGTH] + LIP_STRENGTH * lip + WET_STRENGTH * wet;
     strength *= (1.0 + UNEVEN * film) * (1.0 - 0.4 * hair);
     var m = ROUGHNESS + OILY_ROUGHNESS * paint.oil + zones * zone[ZONE_ROUGHNESS] + LIP_ROUGHNESS * lip + WET_ROUGHNESS * wet;
     m *= 1.0 - 0.5 * UNEVEN * film;
-    return vec2f(clamp(strength, 0.3, 2.2), clamp(m, 0.15, 0.6));
+    return vec2f(clamp(strength, 0.3, 2.2), mix(clamp(m, 0.15, 0.6), TEARS, tears));
 }
 
 // flush, pressed: where blood comes to, and where it is pressed out
@@ -118,6 +125,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let mucosa = smoothstep(0.5, -2.5, spot.fields.y);
     let scalp = scalp_at(spot);
     scatter_dots(spot, scalp, lip);
+    let inner = inner_lid(spot);
     let p = pigments(spot, lip, mucosa);
     var rgb = mix(colour_of(0u, p.x, p.y), colour_of(1u, p.x, p.y), lip);
     rgb *= mix(vec3f(1.0), VEIN_COLOUR, veins());
@@ -126,12 +134,13 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     rgb = over(rgb, STUBBLE_COLOUR, paint.stubble * scalp * bristles);
     rgb = over(rgb, BEARD_COLOUR, beard);
     let wet = max(mucosa, 1.0 - smoothstep(0.2, 1.2, spot.fields.z));
+    rgb = mix(rgb, INNER_LID * (1.0 + 0.15 * noise[NOISE_BLOTCHES]), 0.85 * inner);
     let away = f32(NEAREST - (owner >> ID_BITS)) / STEPS;
     let runs_out = 1.0 - smoothstep(0.5 * MARGIN, MARGIN, away); // beside the charts
-    let height = relief(spot, lip) * runs_out;
+    let height = relief(spot, lip) * runs_out * (1.0 - inner);
     keep_moved(id.xy, runs_out, saturate(zone[ZONE_BLOOD]) * (1.0 - lip), lip);
-    let bare = (1.0 - lip) * (1.0 - mucosa);
+    let bare = (1.0 - lip) * (1.0 - mucosa) * (1.0 - inner);
     let pores = saturate(0.45 + zone[ZONE_PORES]) * bare;
     let furrows = max(1.0 + zone[ZONE_FURROWS], 0.2) * bare * (0.8 + 2.2 * paint.age * paint.age);
-    keep(id.xy, rgb, gloss(lip, wet, max(scalp * paint.stubble, beard)), height, vec3f(pores, furrows, spot.density));
+    keep(id.xy, rgb, gloss(lip, wet, max(scalp * paint.stubble, beard), inner), height, vec3f(pores, furrows, spot.density));
 }

@@ -11,7 +11,6 @@
 //#fill const AMOUNTS: u32 = {amounts}u;
 //#fill const ZONES: u32 = {zones}u;
 //#fill const FOLDS: u32 = {folds}u;
-//#fill const KNOTS: u32 = {knots}u;
 //#fill const FOLDING: u32 = {folding}u;
 //#fill const EDGES: u32 = {edges}u;
 //#fill const DEGREES: f32 = {degrees};
@@ -26,25 +25,25 @@ struct Noise {
 struct Zone {
     centre: vec4f, // [mm]
     reach: vec4f, // one over the radii
-    amounts: array<f32, AMOUNTS>,
+    //#fill amounts: array<vec4f, {amount_rows}>,
 }
 
 struct Fold {
     ball: vec4f, // centre and radius [mm]
     size: vec4f, // width, depth in a young and in an old face [mm], movement
+    knots: vec4f, // its first one and its last
 }
 
 struct Tables {
-    noises: array<Noise, NOISE_ROWS>,
-    dot_kinds: array<Dots, DOTS>,
-    zones: array<Zone, ZONES>,
-    folds: array<Fold, FOLDS>,
-    knots: array<vec4f, KNOTS>, // places [mm], how far along
-    firsts: array<f32, FOLDS + 1u>, // where folds begin in the knots
-    hairline: array<f32, EDGES>, // heights [mm]
+    //#fill noises: array<Noise, {noise_rows}>,
+    //#fill dot_kinds: array<Dots, {dots}>,
+    //#fill zones: array<Zone, {zones}>,
+    //#fill folds: array<Fold, {folds}>,
+    //#fill knots: array<vec4f, {knots}>, // places [mm], how far along
+    //#fill hairline: array<vec4f, {edges}>, // height, and that of the next [mm]
 }
 
-@group(0) @binding(4) var<storage, read> tables: Tables;
+@group(0) @binding(4) var<uniform> tables: Tables; // software adapters read storage more slowly
 
 // Artist's values.
 const WANDER_MM: f32 = 5.0; // of the zones' borders
@@ -130,7 +129,7 @@ fn sum_zones(spot: Spot) {
         if (away < 14.0) {
             let weight = exp(-away);
             for (var c = 0u; c < AMOUNTS; c++) {
-                zone[c] += weight * tables.zones[k].amounts[c];
+                zone[c] += weight * tables.zones[k].amounts[c / 4u][c % 4u];
             }
         }
     }
@@ -162,7 +161,8 @@ fn scalp_at(spot: Spot) -> f32 {
     }
     let angle = degrees(atan2(p.x, p.z - HEAD_AXIS_Z)) / DEGREES;
     let before = min(u32(angle), EDGES - 2u);
-    let edge = mix(tables.hairline[before], tables.hairline[before + 1u], angle - f32(before));
+    let heights = tables.hairline[before];
+    let edge = mix(heights.x, heights.y, angle - f32(before));
     let above = p.y - edge + 5.0 * noise[NOISE_HAIRLINE] + 4.0 * noise[NOISE_FINE_HAIRLINE];
     return smoothstep(-9.0, 16.0, above) * saturate(1.0 + zone[ZONE_HAIR]);
 }

@@ -1,0 +1,66 @@
+"""The exposure meter, an incident one: it goes by the light on the skin, so that dark skin stays dark."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.frame.metering import SIDE
+from dermis.frame.passes import program
+from dermis.gpu import Constants, Device, Recorder
+from dermis.gpu.program import Resources
+from dermis.scene.settings import Settings
+
+
+@dataclass(frozen=True, eq=False)
+class Meter:
+    """Buffers of what is metered at each point, and of the exposure that follows."""
+
+    points: Any
+    exposure: Any
+
+
+def make_meter(device: Device) -> Meter:
+    """Space for the meter."""
+    return Meter(device.space(8 * SIDE * SIDE), device.buffer(np.ones(1, np.float32), "STORAGE"))
+
+
+def draw(
+    graph: Recorder, meter: Meter, look: tuple[Resources, Any, Constants], visibility: Any, image: Any
+) -> None:
+    """Meter the skin that a picture shows.
+
+    look : resources and record of the shading, and pipeline constants of the lights
+    visibility : texture of the triangles that samples see
+    image : texture of the picture's radiance
+    """
+    lit, view, constants = look
+    shader, key = program(graph.device, "meter.wgsl", constants), program(graph.device, "meter_key.wgsl")
+    record = shader.record("Look", rays=rays_of(shader, view), place=view["jitter"][0, :2])
+    bound = {**lit, "look": record, "visibility_buffer": visibility, "image": image, "points": meter.points}
+    graph.compute("meter", shader, bound, (SIDE, SIDE))
+    graph.dispatch("meter", key, {"points": meter.points, "exposure": meter.exposure}, (1, 1, 1))
+
+
+def rays_of(shader: Any, view: Any) -> NDArray[Any]:
+    """A record of a shader's struct Rays from that of the shading."""
+    names = ("eye", "forward", "right", "up", "shift")
+    record: NDArray[Any] = shader.record("Rays", **{name: view[name] for name in names})
+    return record
+
+
+def exposed_by(device: Device, settings: Settings, meter: Meter | None) -> tuple[float, Any]:
+    """The exposure for exposure.wgsl, 0 where it is metered, and the buffer that it reads."""
+    if settings.exposure == "auto":
+        assert meter is not None
+        return 0.0, meter.exposure
+    none = device.shared("no meter", lambda: device.buffer(np.ones(1, np.float32), "STORAGE"))
+    return settings.exposure, none
+
+
+def read_meter(device: Device, meter: Meter) -> float:
+    """The exposure that the last frame was metered for; waits for it."""
+    return float(np.frombuffer(device.handle.queue.read_buffer(meter.exposure), np.float32)[0])

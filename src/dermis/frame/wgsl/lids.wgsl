@@ -1,0 +1,32 @@
+// Distances of places of an eye from the edges of the lids, for whoever has these as `shade.lids`.
+//#include "eye.wgsl"
+
+const LID_POINTS: u32 = 56u; // around an eye, of which some are of the lower lid
+const LOWER_LID: vec2u = vec2u(27u, 49u); // first and last
+const FARTHEST_LID: f32 = 1e6;
+
+// How far the lids' edges are from a place of an eye, in its own space; seen from its centre, on the ball.
+fn lids_around(eye: u32, p: vec3f) -> Lids {
+    let q = SCLERA_MM * normalize(p);
+    var lids = Lids(FARTHEST_LID, FARTHEST_LID, vec3f(0.0));
+    var a = SCLERA_MM * normalize(shade.lids[eye * LID_POINTS + LID_POINTS - 1u].xyz);
+    var i = 0u;
+    loop {
+        let b = SCLERA_MM * normalize(shade.lids[eye * LID_POINTS + i].xyz);
+        let t = clamp(dot(q - a, b - a) / dot(b - a, b - a), 0.0, 1.0);
+        let off = q - mix(a, b, t);
+        let far = length(off);
+        if (i < LOWER_LID.x || i > LOWER_LID.y) {
+            lids.above = min(lids.above, far);
+        } else if (far < lids.below) {
+            lids.below = far;
+            lids.from_below = off / max(far, 1e-4);
+        }
+        a = b;
+        i++;
+        if (i >= LID_POINTS) {
+            break;
+        }
+    }
+    return lids;
+}

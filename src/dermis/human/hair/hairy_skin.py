@@ -1,0 +1,125 @@
+"""Where hair grows: how much of it at places of the average person, and roots drawn from that."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from dermis.human.hair.skin import Index
+from dermis.human.skin.face import AMOUNTS, DEGREES, hairline, zones
+from dermis.human.skin.surface import FIELDS, average
+from dermis.mesh.mesh import Floats, Mesh
+from dermis.mesh.strands import Doubles, Roots, corners, weights
+from dermis.tables import read_rows
+
+HEAD_AXIS_Z = -72.0
+"""Of the axis around which the hairline is told [mm]."""
+_STEPS = np.array([0.7548776662, 0.5698402909])  # of places that fill a square evenly
+_LOWEST = -80.0  # of the hair of the head [mm]
+_SOFT_MM = (-3.0, 11.0)  # beside the hairline, between which hair gets as dense as it is
+_LIPS_MM = (1.5, 4.5)  # beside the lips, between which the beard does
+_BEARDED = (0.25, 0.75)  # amount of the zones between which it does
+_RAGGED = np.array([[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]])  # waves of the hairline [rad/mm]
+
+Amount = Callable[[Doubles], Doubles]
+
+
+class Rooted(NamedTuple):
+    """Roots in no order, and where they are on the average person (n, 3) [mm]."""
+
+    roots: Roots
+    places: Doubles
+
+
+def rooted(plain: Mesh, amount: Amount, per_cm2: float, rng: np.random.Generator) -> Rooted:
+    """Roots on the skin, evenly but for chance; none on ears, lips and in the mouth.
+
+    plain : the person's mesh of control points
+    amount : share of the density (n,) at places (n, 4): on the average person, and how far inside the lips
+        these are [mm]
+    per_cm2 : density where the share is 1
+    """
+    quad = _hairy_quads(plain)
+    around = corners(plain, quad)
+    many = np.floor(per_cm2 * areas_cm2(plain, quad) + rng.random(len(quad))).astype(np.int64)
+    which = np.repeat(np.arange(len(quad)), many)
+    step = np.arange(len(which)) - np.repeat(np.cumsum(many) - many, many)
+    place = np.mod(rng.random((len(quad), 2))[which] + step[:, None] * _STEPS, 1.0)
+    told = np.einsum("nk,nkc->nc", weights(place), _told()[around[which]])
+    kept = np.flatnonzero(rng.random(len(which)) < amount(told))
+    rng.shuffle(kept)
+    return Rooted(Roots(quad[which[kept]].astype(np.int32), place[kept].astype(np.float32)), told[kept, :3])
+
+
+def above_hairline(places: Doubles, recession: float = 0.0) -> Doubles:
+    """How far (n,) places (n, 3 or more) are above the edge of the hair, on the average person [mm].
+
+    recession : see `SkinLook`
+    """
+    angle = np.degrees(np.arctan2(np.abs(places[:, 0]), places[:, 2] - HEAD_AXIS_Z))
+    edge = hairline(recession)
+    return np.asarray(places[:, 1] - np.interp(angle, DEGREES * np.arange(len(edge)), edge))
+
+
+def scalp(recession: float) -> Amount:
+    """Hair of the head, see `rooted`."""
+
+    def amount(places: Doubles) -> Doubles:
+        above = above_hairline(places, recession) + np.sin(places[:, :3] @ _RAGGED.T).sum(axis=1)
+        share = smoothstep(*_SOFT_MM, above) * (places[:, 1] > _LOWEST)
+        thinned = _amount("hair", zones(recession), places) - _amount("hair", zones(), places)
+        return np.asarray(share * np.clip(1.0 + thinned, 0.0, 1.0))
+
+    return amount
+
+
+def beard(places: Doubles) -> Doubles:
+    """Hair of the beard, see `rooted`."""
+    bare = smoothstep(*_LIPS_MM, -places[:, 3])
+    return np.asarray(smoothstep(*_BEARDED, _amount("beard", zones(), places)) * bare)
+
+
+def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
+    """From 0 at `low` to 1 at `high`."""
+    t = np.clip((x - low) / (high - low), 0.0, 1.0)
+    return np.asarray(t * t * (3.0 - 2.0 * t))
+
+
+def areas_cm2(plain: Mesh, quad: Index) -> Doubles:
+    """(n,) area of quads [cm2]."""
+    first, second = plain.quads[quad].T
+    around = np.column_stack([plain.triangles[first], plain.triangles[second, 1]])
+    a, b, c, d = plain.positions[around].astype(np.float64).transpose(1, 0, 2)
+    return np.asarray(np.linalg.norm(np.cross(c - a, d - b), axis=1) / 200.0)
+
+
+def _amount(name: str, rows: Floats, places: Doubles) -> Doubles:
+    """Sum (n,) of an amount of zones, see zones.csv."""
+    column, found = 8 + AMOUNTS.index(name), np.zeros(len(places))
+    left = np.column_stack([np.abs(places[:, 0]), places[:, 1:3]])
+    for zone in rows[rows[:, column] != 0.0].astype(np.float64):
+        found += zone[column] * np.exp(-(((left - zone[:3]) * zone[4:7]) ** 2).sum(axis=1))
+    return found
+
+
+@cache
+def _told() -> Doubles:
+    """(p, 4) of control points their place on the average person, and how far inside the lips [mm]."""
+    places, told = average()
+    return np.column_stack([places, told[:, FIELDS.index("lips")]]).astype(np.float64)
+
+
+@cache
+def _bare() -> Index:
+    """Quads on which no hair grows: ears, lips, the mouth."""
+    rows = read_rows("dermis.human.regions", "parts")
+    return np.concatenate([np.arange(int(row["first"]), int(row["last"]) + 1) for row in rows])
+
+
+def _hairy_quads(plain: Mesh) -> Index:
+    skin = np.array([one.kind == "skin" for one in plain.materials])[plain.material[plain.quads[:, 0]]]
+    skin[_bare()] = False
+    return np.flatnonzero(skin)

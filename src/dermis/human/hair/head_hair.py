@@ -1,0 +1,110 @@
+"""Hair of the head and beards: tens of thousands of hairs, each of which stands for some."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dermis.human.hair import hairy_skin
+from dermis.human.hair.combing import combed, combed_beard
+from dermis.human.hair.grown import Grown
+from dermis.human.hair.growth import Roughness, grown, guides
+from dermis.human.hair.hairy_skin import Rooted
+from dermis.human.hair.look import HairLook
+from dermis.human.hair.skin import Skin
+from dermis.mesh.head import Head
+from dermis.mesh.strands import Doubles, finer_roots, frames, points_of
+
+MOST_PER_CM2 = 200.0
+"""Hairs of the densest heads."""
+BEARD_PER_CM2 = 60.0
+"""Hairs of beards."""
+_GUIDES_PER_CM2 = 1.6
+_HAIR_MM, _BEARD_MM = 0.034, 0.048  # radius of a hair
+_STRAIGHT_KNOTS, _BENT_KNOTS, _COILED_KNOTS = 5, 7, 9
+_TIGHT = 0.5  # curl from which on there are coils
+_LONG_BEARD_MM = 8.0
+
+
+class Ground(NamedTuple):
+    """What hair grows on: the head as it is drawn, and before it was subdivided so many times."""
+
+    head: Head
+    plain: Head
+    levels: int
+    skin: Skin
+
+    def rooted(self, where: Rooted) -> tuple[Doubles, Doubles]:
+        """Roots and the skin's normals there (n, 3) [mm]."""
+        roots = finer_roots(self.plain.mesh, where.roots, self.levels)
+        place, frame = frames(self.head.mesh, roots, points_of(self.head.mesh))
+        return place, frame[:, 2]
+
+
+def knots_of(look: HairLook) -> int:
+    """Of each hair: few for what is hardly bent."""
+    if look.curl > _TIGHT:
+        return _COILED_KNOTS
+    return _BENT_KNOTS if look.style == "short" or look.beard_mm > _LONG_BEARD_MM else _STRAIGHT_KNOTS
+
+
+def scalp_hair(ground: Ground, look: HairLook, recession: float) -> list[Grown]:
+    """The hair of the head; none for a bald one."""
+    if look.style == "none" or look.density == 0.0:
+        return []
+    rng, where = np.random.default_rng((look.seed, 3)), hairy_skin.scalp(recession)
+    drawn = 22.0 + 53.0 * look.density
+    few, many = (hairy_skin.rooted(ground.plain.mesh, where, n, rng) for n in (_GUIDES_PER_CM2, drawn))
+    few_mm, few_normal = ground.rooted(few)
+    lie = combed(few.places, few_normal, look, recession)
+    ways = guides(ground.skin, few_mm, lie, knots_of(look))
+    root, normal = ground.rooted(many)
+    found = grown(root, normal, few_mm, ways, _roughness(look), rng)
+    return [_stranded(ground, many, root, found, drawn, MOST_PER_CM2 * look.density, _HAIR_MM, rng)]
+
+
+def beard_hair(ground: Ground, look: HairLook) -> list[Grown]:
+    """The beard; none for a shaved one."""
+    if look.beard_mm == 0.0:
+        return []
+    rng, mesh = np.random.default_rng((look.seed, 4)), ground.plain.mesh
+    few, many = (hairy_skin.rooted(mesh, hairy_skin.beard, n, rng) for n in (_GUIDES_PER_CM2, BEARD_PER_CM2))
+    few_mm, few_normal = ground.rooted(few)
+    lie = combed_beard(few.places, few_normal, look)
+    ways = guides(ground.skin, few_mm, lie, knots_of(look))
+    root, normal = ground.rooted(many)
+    tight = max(look.curl - _TIGHT, 0.0) * 2
+    rough = Roughness(0.3, 0.22, 0.2, 0.05 + 0.1 * look.curl, 0.5 * tight, 1.5)
+    found = grown(root, normal, few_mm, ways, rough, rng)
+    return [_stranded(ground, many, root, found, BEARD_PER_CM2, BEARD_PER_CM2, _BEARD_MM, rng)]
+
+
+def _stranded(
+    ground: Ground,
+    where: Rooted,
+    root: Doubles,
+    ways: Doubles,
+    drawn: float,
+    true: float,
+    radius_mm: float,
+    rng: np.random.Generator,
+) -> Grown:
+    """Hairs with their width; fewer than there are, and wider.
+
+    drawn, true : how many are made and how many there are on a square centimetre
+    """
+    bundle, t = true / drawn, np.linspace(0.0, 1.0, ways.shape[1])
+    thick = bundle * radius_mm * rng.uniform(0.8, 1.2, len(root))
+    radius = thick[:, None] * np.where(t < 1.0, 1.0, 0.6)
+    length = np.linalg.norm(np.diff(ways, axis=1), axis=2).sum(axis=1)
+    area = float(np.mean(2.0 * radius.mean(axis=1) * length))  # seen from the side; halved as hair leans
+    roots = finer_roots(ground.plain.mesh, where.roots, ground.levels)
+    return Grown(roots, root[:, None] + ways, radius, 1.0, bundle, 0.5 * area * drawn / 100.0)
+
+
+def _roughness(look: HairLook) -> Roughness:
+    tight = max(look.curl - _TIGHT, 0.0) * 2
+    if look.style == "cropped":
+        return Roughness(0.25, 0.12, 0.1 + 0.2 * tight, 0.04 + 0.06 * look.curl, 0.9 * tight, 2.0)
+    return Roughness(0.14, 0.14, 0.5, 0.025 + 0.04 * look.curl, 1.6 * tight, 2.0)

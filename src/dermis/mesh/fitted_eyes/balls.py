@@ -1,0 +1,132 @@
+"""The two eyeballs of a head, among the pieces that its file calls eyes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.mesh.components import components
+from dermis.mesh.fitted_eyes.spheres import Sphere, corneal_axis, fit_sphere
+from dermis.mesh.geometry import triangle_areas
+from dermis.mesh.mesh import Mesh
+
+Doubles = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+RADIUS_MM = 8.0, 20.0
+"""Radii of eyeballs: 12 in truth, and what artists make of them [mm]."""
+MISS = 0.06
+"""Of the radius, by which most of an eyeball lies off a sphere at most."""
+_FEWEST = 20  # points
+_COVERED = 0.25  # of the sphere
+_BELONGS = 1.2  # radii from the middle, within which cornea, iris and pupil lie
+_MEETING_MM = 1000.0  # before the eyes, where those that show no other way look
+
+
+@dataclass(frozen=True, eq=False)
+class Ball:
+    """An eyeball of a file.
+
+    sphere : that of its white
+    sight : (3,) unit vector along which it looks
+    cornea : whether a cornea shows that; else it is straight ahead
+    points : (n,) the mesh's points that it is made of
+    """
+
+    sphere: Sphere
+    sight: Doubles
+    cornea: bool
+    points: Index
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    points: Index
+    area: Doubles  # around each point [mm2]
+    sphere: Sphere
+
+    @property
+    def covered(self) -> float:
+        return float(self.area.sum() / (4 * np.pi * self.sphere.radius**2))
+
+    @property
+    def fault(self) -> str:
+        """Why it is no eyeball; empty where it is one."""
+        (low, high), (_, radius, miss) = RADIUS_MM, self.sphere
+        if len(self.points) < _FEWEST:
+            return f"has only {len(self.points)} points"
+        if miss > MISS:
+            return f"lies off the nearest ball by {miss:.0%} of its radius, where {MISS:.0%} pass"
+        if not low <= radius <= high:
+            return f"is a ball of {radius:.1f} mm, where {low:g} to {high:g} pass"
+        return "" if self.covered >= _COVERED else f"is only {self.covered:.0%} of a ball"
+
+
+def find_balls(mesh: Mesh) -> tuple[tuple[Ball, Ball] | None, str]:
+    """The left and the right eyeball among what the file calls eyes, and why there are none of them.
+
+    Nothing is said where the file calls nothing so.
+    """
+    called = np.flatnonzero(np.array([material.eye for material in mesh.materials])[mesh.material])
+    if not len(called):
+        return None, ""
+    pieces = sorted(_pieces(mesh, called), key=lambda piece: -float(piece.area.sum()))
+    chosen: list[_Piece] = []
+    for piece in pieces:
+        nested = any(_far(piece.sphere.middle, one) < 1.0 for one in chosen)
+        if not piece.fault and not nested:
+            chosen.append(piece)
+    if len(chosen) == 2:
+        left, right = sorted(chosen, key=lambda piece: -float(piece.sphere.middle[0]))
+        return _looking(mesh, left, right, pieces), ""
+    names = ", ".join(sorted({repr(one.name) for one in mesh.materials if one.eye}))
+    count = f"{len(chosen)} ball{'s' * (len(chosen) > 1)}, where two are eyes"
+    return None, f"eyes: {names} stay plain: {count if chosen else f'the largest piece {pieces[0].fault}'}"
+
+
+def _pieces(mesh: Mesh, called: Index) -> list[_Piece]:
+    """Connected pieces of some triangles."""
+    corners = mesh.point[mesh.triangles[called]].astype(np.int64)
+    points, own = np.unique(corners, return_inverse=True)
+    own = own.reshape(-1, 3)
+    label = components(len(points), own[:, [0, 1]].ravel(), own[:, [1, 2]].ravel())
+    thirds = np.repeat(triangle_areas(mesh.positions[mesh.triangles[called]]) / 3, 3)
+    area = np.bincount(own.ravel(), thirds, minlength=len(points))
+    places = _places(mesh)[points]
+    found = []
+    for piece in range(int(label.max()) + 1):
+        inside = label == piece
+        sphere = fit_sphere(places[inside], area[inside])
+        found.append(_Piece(points[inside], area[inside], sphere))
+    return found
+
+
+def _places(mesh: Mesh) -> Doubles:
+    """(p, 3) where the mesh's points lie [mm]."""
+    places = np.zeros((int(mesh.point.max()) + 1, 3))
+    places[mesh.point] = mesh.positions
+    return places
+
+
+def _far(places: Doubles, piece: _Piece) -> Doubles:
+    """How many radii places (..., 3) lie from the middle of a ball."""
+    return np.asarray(np.linalg.norm(places - piece.sphere.middle, axis=-1) / piece.sphere.radius)
+
+
+def _looking(mesh: Mesh, left: _Piece, right: _Piece, pieces: list[_Piece]) -> tuple[Ball, Ball]:
+    """The balls with all that lies in them, each with its own way of looking or straight ahead."""
+    places = _places(mesh)
+    middle = (left.sphere.middle + right.sphere.middle) / 2
+    ahead = np.cross(left.sphere.middle - right.sphere.middle, (0.0, 1.0, 0.0))
+    ahead /= np.linalg.norm(ahead)
+    found = []
+    for ball in (left, right):
+        those = [one for one in pieces if one is ball or _far(places[one.points], ball).max() < _BELONGS]
+        points = np.concatenate([one.points for one in those])
+        area = np.concatenate([one.area for one in those])
+        shown = corneal_axis(places[points], area, ball.sphere, ahead)
+        sight = middle + _MEETING_MM * ahead - ball.sphere.middle if shown is None else shown
+        found.append(Ball(ball.sphere, sight / np.linalg.norm(sight), shown is not None, points))
+    return found[0], found[1]

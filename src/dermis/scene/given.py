@@ -1,0 +1,125 @@
+"""The parts of a scene as callers give them: what is meant clearly is taken, the rest is refused."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from dermis.errors import notify, refuse
+from dermis.mesh.head import Head
+from dermis.scene.camera import Camera, preset
+from dermis.scene.environment import Environment
+from dermis.scene.lights import Light, PointLight, light_presets, preset_lights
+from dermis.scene.plain import Plain, Vector
+
+P = TypeVar("P", bound=Plain)
+_INSIDE_MM = 5.0  # from the middle of any head, where nothing but a mistake stands
+
+
+def given_head(head: object) -> Head:
+    """A head, by itself or by what `load_head` takes; a `Human` too.
+
+    Raises DermisError for anything else.
+    """
+    if isinstance(head, Head):
+        return head
+    from dermis.human.person import Human
+    from dermis.scene.heads import load_head
+
+    if isinstance(head, Human):
+        return head.head()
+    if not isinstance(head, str | os.PathLike) or str(head).endswith(".toml"):
+        remedy = 'Write dermis.load_head("human"), or dermis.load_scene(FILE), which gives scene and settings'
+        refuse("scene", "a head to show, or a scene", f"{shown_value(head)} came", remedy)
+    return load_head(head)
+
+
+def given_lights(lights: object) -> Sequence[Light]:
+    """Several lights, one, or a preset's name.
+
+    Raises DermisError for anything else.
+    """
+    remedy = "Write lights=[dermis.PointLight(position=(0, 300, 900))], or dermis.load_lights(FILE)"
+    if isinstance(lights, Light):
+        return _placed((lights,))
+    if isinstance(lights, str):
+        if lights not in light_presets():
+            expected = f"lights, or one of the presets {', '.join(light_presets())}"
+            refuse("lights", expected, f"{lights!r} came", remedy)
+        return preset_lights(lights)
+    if not isinstance(lights, Iterable) or isinstance(lights, Mapping | Plain):
+        refuse("lights", "a list of lights", f"{shown_value(lights)} came", remedy)
+    made = lights if isinstance(lights, list | tuple) else tuple(lights)
+    for number, light in enumerate(made):
+        if not isinstance(light, Light):
+            refuse(f"lights[{number}]", "a light", f"{shown_value(light)} came", remedy)
+    return _placed(made)
+
+
+def given_camera(camera: object, head: Head) -> Camera:
+    """A camera, a preset's name, or a function such as `portrait`.
+
+    Raises DermisError for anything else.
+    """
+    if isinstance(camera, str):
+        return preset(camera, head)
+    if callable(camera) and not isinstance(camera, type):
+        camera = camera(head)
+    remedy = "Write camera=dermis.portrait(head), or dermis.Camera(position=(0, 0, 1100))"
+    if not isinstance(camera, Camera):
+        refuse("camera", "a camera", f"{shown_value(camera)} came", remedy)
+    _check_place("camera", camera.position)
+    return camera
+
+
+def given_environment(environment: object) -> Environment | None:
+    """An environment, or its name.
+
+    Raises DermisError for anything else.
+    """
+    if environment is None or isinstance(environment, Environment):
+        return environment
+    if not isinstance(environment, str | os.PathLike):
+        remedy = 'Write environment=dermis.Environment("lebombo")'
+        refuse("environment", "an environment", f"{shown_value(environment)} came", remedy)
+    return Environment(name=str(environment))
+
+
+def given_plain(kind: type[P], values: object, part: str, example: str) -> P:
+    """Plain data of a kind, or their values by name.
+
+    Raises DermisError for anything else.
+    """
+    if isinstance(values, kind):
+        return values
+    if not isinstance(values, Mapping):
+        came, remedy = f"{shown_value(values)} came", f"Write {part}=dermis.{kind.__name__}({example})"
+        refuse(part, f"a {kind.__name__}", came, remedy)
+    return kind(**values)
+
+
+def _placed(lights: Sequence[Light]) -> Sequence[Light]:
+    for light in lights:
+        if isinstance(light, PointLight):
+            _check_place("light", light.position)
+    return lights
+
+
+def _check_place(what: str, position: Vector) -> None:
+    away = float(np.linalg.norm(position))
+    if 0.0 < away < _INSIDE_MM:
+        notify(
+            f"{what}: expected a place around the head in mm, but this one is {away:g} mm from its middle. "
+            "Write 1100 for 1.1 m."
+        )
+
+
+def shown_value(value: object) -> str:
+    """What came, short: a class by its name, other things as they print or by their kind."""
+    if isinstance(value, type):
+        return f"the class {value.__name__}"
+    text = repr(value)
+    return text if len(text) <= 60 else f"a {type(value).__name__}"

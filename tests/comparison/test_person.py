@@ -1,0 +1,130 @@
+"""A person beside its path-traced likeness: what is painted, which views there are, what is found."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+
+import numpy as np
+import pytest
+
+from dermis.comparison.person import Pair, compare_person, drawn, pair_of
+from dermis.comparison.person_iris import iris_of
+from dermis.comparison.person_paint import paint_of
+from dermis.comparison.person_views import EYE_MM, VIEWS, scene_of, softbox
+from dermis.errors import DermisError
+from dermis.frame.renderer import Renderer
+from dermis.human.person import Human
+from dermis.mesh.eyes import EyeLook
+from dermis.mesh.head import Head
+from dermis.reference.path_traced import PathTraced
+from dermis.reference.person import medium
+from dermis.reference.person.traced import Paint
+from dermis.scene.lights import PointLight, RectangleLight, SphereLight
+from dermis.scene.settings import Settings
+
+PUPIL_MM = 2.0
+SIDE = 256
+
+
+@cache
+def head() -> Head:
+    return Human(eyes=EyeLook(eumelanin=0.6, pupil_mm=PUPIL_MM)).head()
+
+
+@pytest.fixture(scope="module")
+def renderer() -> Renderer:
+    return Renderer(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
+
+
+@pytest.fixture(scope="module")
+def paint(renderer: Renderer) -> Paint:
+    return paint_of(renderer, scene_of(head(), VIEWS["portrait"]), SIDE)
+
+
+def test_the_iris_is_painted_around_its_pupil(paint: Paint) -> None:
+    side = len(paint.iris)
+    along = ((np.arange(side) + 0.5) / side * 2 - 1) * paint.reach_mm
+    off = np.hypot(*np.meshgrid(along, along))
+    assert paint.iris[off < PUPIL_MM - 0.2].max() < 0.005
+    ring = paint.iris[(off > PUPIL_MM + 0.5) & (off < 5.0)]
+    assert ring[:, 0].mean() > 1.5 * ring[:, 2].mean() > 0.01  # brown
+
+
+def test_the_white_is_white_and_teeth_stand_in_gums(paint: Paint) -> None:
+    middle = paint.white[480:544, 480:544].mean(axis=(0, 1))
+    assert 0.45 < middle[2] < middle[0] < 0.65
+    upper, lower = paint.teeth
+    enamel, gum = upper[100, 450:580].max(axis=0), upper[600].mean(axis=0)
+    assert enamel[1] > 0.4 and gum[0] > 2 * gum[1]
+    assert not np.array_equal(upper, lower)  # whose widths differ
+
+
+def test_skin_is_painted_as_the_frame_paints_it(paint: Paint) -> None:
+    assert paint.colour.shape == (SIDE, SIDE, 3) and paint.roughness.shape == (SIDE, SIDE)
+    assert 0.2 < paint.colour[..., 0].mean() < 0.7 and 0.1 < paint.roughness.min() < paint.roughness.max()
+    assert 0.01 < np.ptp(paint.height_mm) < 5.0
+
+
+@pytest.mark.parametrize("name", [name for name, view in VIEWS.items() if view.light in ("studio", "window")])
+def test_lights_of_all_views_have_a_size(name: str) -> None:
+    scene = scene_of(head(), VIEWS[name])
+    assert scene.lights
+    assert all(isinstance(light, RectangleLight) for light in scene.lights)
+
+
+def test_only_points_become_softboxes() -> None:
+    ball, point = SphereLight(position=(0, 0, 900)), PointLight(position=(0, 500, 900), irradiance=(1, 2, 3))
+    assert softbox(ball) is ball
+    found = softbox(point)
+    assert isinstance(found, RectangleLight)
+    assert (found.position, found.irradiance) == (point.position, point.irradiance)
+
+
+def test_a_picture_is_the_mean_of_one_twice_as_large(renderer: Renderer) -> None:
+    scene, small = scene_of(head(), VIEWS["portrait"]), Settings(size=(24, 24), atlas=128, shadow_size=256)
+    large = renderer.render(scene, size=(48, 48), atlas=128, shadow_size=256)
+    found = drawn(renderer, scene, small)
+    np.testing.assert_allclose(found[5, 7], large[10:12, 14:16].mean(axis=(0, 1)), rtol=1e-5, atol=1e-7)
+
+
+def test_an_eye_is_much_like_its_likeness(
+    renderer: Renderer, paint: Paint, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mitsuba")
+    monkeypatch.setattr(medium, "VOXELS", 8)
+    pair = compare_person(renderer, head(), paint, "eye", side=32, samples=8, atlas=256, keep=False)
+    assert pair.samples == 16  # eyes take twice as many
+    assert 0.6 < pair.energy.value < 1.6 and pair.energy.standard_error > 0.0
+    assert pair.shown(pair.ours).shape == (32, 32, 3)
+    pupil = pair.truth[15:17, 15:17].mean()
+    assert pupil < 0.3 * pair.truth[pair.mask].mean() and pair.ours[15:17, 15:17].mean() < 0.1
+
+
+def test_unknown_views_are_refused(renderer: Renderer, paint: Paint) -> None:
+    with pytest.raises(DermisError, match="expected one of portrait"):
+        compare_person(renderer, head(), paint, "aura")
+
+
+def made(shift: int, gain: float) -> Pair:
+    """A dark pupil in an uneven iris, ours and a truth that lies further to the right and is brighter."""
+    side = 128
+    along = (np.arange(side) + 0.5 - 0.5 * side) * EYE_MM / side
+    x, y = np.meshgrid(along, along)
+    off = np.hypot(x, y)
+    ours = np.repeat((0.1 + 0.02 * np.sin(5 * np.arctan2(y, x)))[..., None], 3, axis=2)
+    ours[off < 2.0] = 0.001
+    rng = np.random.default_rng(0)
+    truth = gain * np.roll(ours, shift, axis=1) + rng.normal(0.0, 0.002, ours.shape)
+    variance = np.full(ours.shape, 0.002**2, np.float32)
+    path = PathTraced(truth.astype(np.float32), variance, np.ones((side, side), np.float32), 8, 1.0, ())
+    return pair_of("eye", ours, path, np.ones((side, side), bool))
+
+
+def test_an_iris_is_found_where_it_is() -> None:
+    found = iris_of(made(1, 0.5), EYE_MM)
+    assert found.right.value == pytest.approx(1.0, abs=0.15) and abs(found.down.value) < 0.1
+    assert found.brightness.value == pytest.approx(2.0, abs=0.05)
+    assert found.left.value == pytest.approx(2.0, abs=0.1)
+    assert found.beside.value == pytest.approx(2.0, abs=0.1)
+    assert 0.0 < found.brightness.standard_error < 0.05

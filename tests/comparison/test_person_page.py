@@ -1,0 +1,51 @@
+"""The page of people beside their likenesses: its lines, its picture and its words."""
+
+from __future__ import annotations
+
+import io
+import string
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from dermis.comparison.person import Pair
+from dermis.comparison.person_views import VIEWS
+from dermis.reference.metrics import Estimate
+
+ROOT = Path(__file__).parents[2]
+ONE = Estimate(1.0, 0.01)
+
+
+@pytest.fixture
+def page(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    return __import__("accuracy_person")
+
+
+def noisy(name: str, side: int) -> Pair:
+    """A view of nothing but noise, which compresses worst."""
+    rng = np.random.default_rng(len(name))
+    image, mask = rng.random((side, side, 3)), np.ones((side, side), bool)
+    return Pair(name, image, image, 0 * image, mask, ONE, ONE, (ONE,) * 3, 40, 12.0)
+
+
+def test_a_line_tells_view_light_and_errors(page: ModuleType) -> None:
+    line = page.row(noisy("eye", 8))
+    assert line == "| eye | window | 40 | 1.000 ± 0.010 | 1.000 ± 0.010 | 1.00, 1.00, 1.00 |"
+
+
+def test_the_picture_is_small_and_shows_all_views(page: ModuleType) -> None:
+    data = page.pictures([noisy(name, 96) for name in VIEWS])
+    assert len(data) <= page.MOST_BYTES
+    width, height = Image.open(io.BytesIO(data)).size
+    assert width >= page.COLUMNS * 96 and height >= -(-2 * len(VIEWS) // page.COLUMNS) * 96
+
+
+def test_the_page_names_what_is_filled_in() -> None:
+    text = (ROOT / "docs" / "path_traced.in.md").read_text(encoding="utf-8")
+    names = {name for _, name, _, _ in string.Formatter().parse(text) if name}
+    assert {"rows", "right", "down", "brightness", "left", "beside", "side", "adapter"} <= names
+    assert "{rows}" not in (ROOT / "docs" / "path_traced.md").read_text(encoding="utf-8")

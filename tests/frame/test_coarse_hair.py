@@ -1,0 +1,100 @@
+"""Hair of the head in the frame: few wide hairs for many, deep opacity, and light that hairs pass on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from setups import front_camera, frontal, run_frame, scene_of
+from strand_setups import hairy
+from tolerances import FURNACE_OF_HAIR
+
+from dermis.frame import strands as hairs
+from dermis.frame.passes import strands as drawing
+from dermis.frame.renderer import Renderer
+from dermis.gpu import download
+from dermis.mesh.head import Head
+from dermis.scene.environment import Environment
+from dermis.scene.model import Scene
+
+FRAME_MM, SIZE = 40.0, 40  # a pixel is a millimetre
+BLACK = 1e5  # absorption [1/mm]
+
+
+def picture(renderer: Renderer, scene: Scene, **settings: Any) -> NDArray[np.float64]:
+    """(h, w, 4) picture and coverage."""
+    given = {"size": (SIZE, SIZE), "technique": "none"} | settings
+    made = run_frame(renderer, scene, **given).resources.picture
+    return download(renderer.device, made.exposed).astype(float)
+
+
+def lit(head: Head, **more: Any) -> Scene:
+    return scene_of(head, frontal(), camera=front_camera(head, frame_mm=FRAME_MM), **more)
+
+
+def wool(count: int, absorption: float, cover: float = 0.0) -> Head:
+    """Coarse hairs that stand on the sheet, and stand for each other."""
+    rng = np.random.default_rng(5)
+    begins = np.column_stack([rng.uniform(-9, 9, (count, 2)), np.full(count, 0.05)])
+    ends = begins + np.column_stack([rng.normal(0, 0.8, (count, 2)), rng.uniform(1.5, 3.0, count)])
+    head = hairy(begins, ends, 0.03, absorption)
+    assert head.strands is not None
+    strands = replace(head.strands, cover=np.full(count, cover, np.float32))
+    return replace(head, strands=None, hair=strands)
+
+
+@pytest.mark.parametrize("absorption", [0.5, 20.0])
+def test_brightness_does_not_depend_on_how_many_hairs_are_drawn(
+    renderer: Renderer, absorption: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A quarter of them, four times as wide."""
+    scene = replace(lit(wool(6000, absorption)), lights=(frontal(shadows=True),))
+    shown = []
+    for share in (1, 4):
+        monkeypatch.setattr(drawing, "drawn_of", lambda made, _, share=share: made.coarse.hairs // share)
+        renderer.forget()
+        shown.append(picture(renderer, scene, size=(48, 48))[..., :3])
+    renderer.forget()
+    bare = picture(renderer, scene, size=(48, 48), strands=False)[..., :3]
+    middle = np.s_[18:30, 18:30]
+    assert shown[1][middle].mean() == pytest.approx(shown[0][middle].mean(), rel=0.06)
+    assert np.abs(shown[0][middle].mean() / bare[middle].mean() - 1.0) > 0.1
+
+
+def test_coarse_hairs_are_drawn_as_wide_as_pixels_are(renderer: Renderer) -> None:
+    tables = hairs.make_tables(renderer.device, wool(20_000, 1.0))
+    near, far = (hairs.drawn_of(tables, pixel_mm) for pixel_mm in (0.01, 0.5))
+    assert near == 20_000 and hairs._LEAST_DRAWN <= far < 12_000
+    assert tables.coarse == (20_000, 5) and tables.fine.hairs == 0
+
+
+@pytest.mark.parametrize("absorption", [0.0, 4.0])
+def test_a_white_head_of_hair_gains_no_light(renderer: Renderer, absorption: float) -> None:
+    head = wool(4000, absorption, cover=2.0)
+    scene = replace(lit(head, rho_s=0.0), lights=(), environment=Environment(name="uniform"))
+    made = picture(renderer, scene, occlusion="none", samples=4)[..., :3]
+    assert made.max() <= FURNACE_OF_HAIR
+    if absorption == 0.0:
+        assert made[8:32, 8:32].mean() == pytest.approx(1.0, abs=0.02)
+    else:
+        assert made[16:24, 16:24].mean() < 0.9
+
+
+@pytest.mark.parametrize(("absorption", "low", "high"), [(0.0, 0.3, 0.95), (BLACK, 0.0, 0.3)])
+def test_hair_shades_hair(renderer: Renderer, absorption: float, low: float, high: float) -> None:
+    """A hair below a roof of others: white ones pass on what black ones keep."""
+    y = np.linspace(-4, 4, 80)
+    roof = np.column_stack([np.full(80, -14.0), y, np.full(80, 9.0)])
+    seen = []
+    for above in (roof[:1] + np.array([0.0, 40.0, 0.0]), roof):
+        begins = np.concatenate([[[-12.0, 0.0, 0.6]], above])
+        head = hairy(begins, begins * [-1, 1, 1], 0.1, absorption)
+        scene = replace(lit(head), lights=(frontal(shadows=True),))
+        made = run_frame(renderer, scene, technique="none", size=(SIZE, SIZE)).resources.strands
+        assert made is not None
+        raw = renderer.device.handle.queue.read_buffer(made.tables.drawn)
+        seen.append(np.frombuffer(raw, np.float32).reshape(-1, 5, 8)[0, 2, 4:7].mean())
+    assert low <= seen[1] / seen[0] < high

@@ -1,0 +1,130 @@
+"""The exposure meter: its number by hand, what it depends on and what not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from setups import front_camera, frontal, head_of, joined, scene_of, settings_of
+from tolerances import HALVES
+
+from dermis.frame.metering import CLIPPING, KEY, SIDE, STOPPED_DOWN
+from dermis.frame.renderer import Renderer
+from dermis.mesh.primitives import plane, uv_sphere
+from dermis.scene.environment import Environment
+from dermis.scene.model import Scene
+from dermis.scene.techniques import TECHNIQUES
+
+FLAT = head_of(plane(100.0), colour=np.full((8, 8, 3), 0.3))
+DULL = {"rho_s": 0.0}
+
+
+def metered(renderer: Renderer, scene: Scene, **settings: Any) -> float:
+    return renderer.draw(scene, settings_of(**({"exposure": "auto"} | settings))).exposure
+
+
+def points(renderer: Renderer, scene: Scene) -> NDArray[np.float64]:
+    """(n, 2) light and brightness at the points that were metered last."""
+    meter = renderer.prepare(scene, settings_of(exposure="auto")).resources.meter
+    assert meter is not None
+    raw = np.frombuffer(renderer.device.handle.queue.read_buffer(meter.points), np.float32)
+    found = raw.reshape(SIDE * SIDE, 2).astype(float)
+    return found[found[:, 0] >= 0]
+
+
+def test_a_lit_plane_is_exposed_for_the_key(renderer: Renderer) -> None:
+    """Irradiance 3 makes a white surface 3 / pi, which the exposure brings to the key."""
+    scene = scene_of(FLAT, frontal(3.0), **DULL)
+    assert metered(renderer, scene) == pytest.approx(KEY * np.pi / 3.0, rel=1e-5)
+    assert metered(renderer, scene_of(FLAT, frontal(30.0), **DULL)) == pytest.approx(
+        KEY * np.pi / 30, rel=1e-5
+    )
+    assert metered(renderer, scene, exposure=0.4) == pytest.approx(0.4)
+
+
+def test_uneven_light_is_metered_by_its_root_mean_square(renderer: Renderer) -> None:
+    ball = head_of(uv_sphere(30.0, 48, 24), colour=np.full((8, 8, 3), 0.3))
+    scene = scene_of(ball, frontal(np.pi), camera=front_camera(ball, frame_mm=80.0), **DULL)
+    found = metered(renderer, scene)
+    light = points(renderer, scene)[:, 0]
+    assert 500 < len(light) < SIDE * SIDE and light.std() > 0.1
+    assert found == pytest.approx(KEY / np.sqrt((light**2).mean()), rel=1e-4)
+    assert found == pytest.approx(KEY * np.sqrt(2.0), rel=0.05)  # the cosine's mean square over a disc is 1/2
+
+
+@pytest.mark.parametrize("technique", TECHNIQUES)
+def test_it_is_an_incident_meter(renderer: Renderer, technique: str) -> None:
+    """Dark skin is metered as light skin is, so that it stays dark, whatever spreads the light."""
+    dark = head_of(plane(100.0), colour=np.full((8, 8, 3), 0.05))
+    both = [
+        metered(renderer, scene_of(head, frontal(3.0), **DULL), technique=technique) for head in (FLAT, dark)
+    ]
+    assert both[0] == pytest.approx(both[1], rel=1e-6)
+    assert both[0] == pytest.approx(KEY * np.pi / 3.0, rel=1e-5)
+
+
+def test_surroundings_count_as_the_light_that_falls_in(renderer: Renderer) -> None:
+    scene = Scene(FLAT, (), front_camera(FLAT), environment=Environment(name="uniform", exposure=4.0))
+    assert metered(renderer, scene, occlusion="none") == pytest.approx(KEY / 4.0, rel=HALVES)
+
+
+def glossy(irradiance: float, share: float) -> Scene:
+    """A plane with a bright strip in the picture that takes a share of it."""
+    bright = np.full((8, 200, 3), 0.1)
+    bright[:, : round(200 * (0.1 + 0.8 * share))] = 40.0 / irradiance
+    head = head_of(plane(100.0), colour=bright)
+    return scene_of(head, frontal(irradiance), mix=0.0, **DULL)
+
+
+def test_highlights_stop_it_down_by_one_stop_at_most(renderer: Renderer) -> None:
+    for irradiance in (1.0, 9.0):
+        usual, scene = KEY * np.pi / irradiance, glossy(irradiance, 0.2)
+        found = metered(renderer, scene, technique="none")
+        bright = np.sort(points(renderer, scene)[:, 1])[::-1]
+        limit = 1.0 / bright[int(CLIPPING * len(bright))]
+        assert limit < usual
+        assert found == pytest.approx(max(limit, STOPPED_DOWN * usual), rel=1e-3)
+
+
+def test_only_skin_is_metered(renderer: Renderer) -> None:
+    """Beside a plain plane the light is the same, so is the exposure; plain things alone tell nothing."""
+    mesh = plane(50.0)
+    parts = ((mesh, (-25, 0, 0), (0.0, 0.0, 0.5)), (mesh, (25, 0, 0), (0.5, 0.0, 0.5)))
+    both = head_of(joined(*parts, kinds=["skin", "opaque"]))
+    count = {}
+    for name, head in (("both", both), ("plain", head_of(joined(*parts, kinds=["opaque"] * 2)))):
+        scene = scene_of(head, frontal(3.0), **DULL)
+        count[name] = metered(renderer, scene), len(points(renderer, scene))
+    assert count["both"][0] == pytest.approx(KEY * np.pi / 3.0, rel=1e-5)
+    assert 0.1 < count["both"][1] / SIDE**2 < 0.6
+    assert count["plain"] == (1.0, 0)
+
+
+def test_it_has_no_memory(renderer: Renderer) -> None:
+    """The same after other scenes, and next to the same at another size."""
+    scene = scene_of(FLAT, frontal(2.0))
+    first = metered(renderer, scene)
+    metered(renderer, scene_of(FLAT, frontal(20.0)))
+    assert metered(renderer, scene) == first
+    assert metered(renderer, scene, size=(90, 90)) == pytest.approx(first, rel=0.01)
+    dark = replace(scene, lights=(frontal(0.0),))
+    assert metered(renderer, dark) == 1.0
+
+
+def test_the_picture_is_that_of_the_same_exposure_by_hand(renderer: Renderer) -> None:
+    scene = scene_of(FLAT, frontal(0.7))
+    auto = renderer.draw(scene, settings_of(exposure="auto", background="gradient"))
+    bytes_, exposure = auto.srgb8(), auto.exposure
+    given = renderer.draw(scene, settings_of(exposure=exposure, background="gradient"))
+    assert np.array_equal(given.srgb8(), bytes_)
+
+
+def test_clipping_is_counted_over_the_head(renderer: Renderer) -> None:
+    ball = head_of(uv_sphere(30.0, 48, 24), colour=np.full((8, 8, 3), 0.5))
+    scene = scene_of(ball, frontal(np.pi), camera=front_camera(ball, frame_mm=120.0), **DULL)
+    white = renderer.draw(scene, settings_of(background=(1.0, 1.0, 1.0)))
+    assert white.clipped() == 0.0
+    assert 0.2 < renderer.draw(scene, settings_of(exposure=3.0, technique="none")).clipped() < 1.0

@@ -1,0 +1,161 @@
+"""Hair of the head and beards of the parametric human: where they grow, how dense, and on whom."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dermis import Human, Pose
+from dermis.errors import DermisError
+from dermis.human.hair import hairy_skin
+from dermis.human.hair.head_hair import MOST_PER_CM2
+from dermis.human.hair.look import HairLook
+from dermis.human.hair.skin import Skin
+from dermis.mesh.head import Head
+from dermis.mesh.strands import Strands, points_of
+
+Floats = NDArray[np.float64]
+LOOKS = {
+    "cropped": HairLook(style="cropped"),
+    "short": HairLook(style="short", length_mm=32.0, beard_mm=10.0),
+    "coiled": HairLook(style="cropped", curl=1.0, beard_mm=3.0),
+}
+
+
+@cache
+def grown(style: str) -> Head:
+    return Human(sex=1.0, hair=LOOKS[style]).head(subdivide=0)
+
+
+def hair(head: Head) -> Strands:
+    assert head.hair is not None
+    return head.hair
+
+
+def knots(head: Head, **pose: float) -> Floats:
+    """(n, k, 3) in space [mm]."""
+    points = points_of(head.mesh) if not pose else head.control.points_mm(Pose.of(pose).motion(head.control))
+    return hair(head).places_mm(head.mesh, points)
+
+
+def everywhere(places: Floats) -> Floats:
+    return np.ones(len(places))
+
+
+def test_the_same_seed_has_the_same_hair() -> None:
+    one, other, another = (
+        hair(Human(hair=HairLook(style="cropped", seed=seed)).head(subdivide=0)) for seed in (3, 3, 4)
+    )
+    for name in ("knots_mm", "radius_mm", "absorption", "cover"):
+        assert np.array_equal(getattr(one, name), getattr(other, name))
+    assert np.array_equal(one.roots.quad, other.roots.quad)
+    assert len(another) != len(one) or not np.array_equal(another.roots.place, one.roots.place)
+
+
+def test_roots_are_as_dense_as_is_said() -> None:
+    mesh, rng = Human().head(subdivide=0).mesh, np.random.default_rng(0)
+    found = hairy_skin.rooted(mesh, everywhere, 40.0, rng).roots
+    quads, count = np.unique(found.quad, return_counts=True)
+    area = hairy_skin.areas_cm2(mesh, quads.astype(np.int64))
+    assert count.sum() / area.sum() == pytest.approx(40.0, rel=0.02)
+    large = area > np.percentile(area, 70)
+    assert count[large] / area[large] == pytest.approx(np.full(large.sum(), 40.0), rel=0.5)
+
+
+@pytest.mark.parametrize("density", [0.3, 1.0])
+def test_fewer_hairs_stand_for_all_there_are(density: float) -> None:
+    """Summed over a square centimetre of the crown they are as wide as 200 hairs are, times the density."""
+    head = Human(hair=HairLook(style="cropped", density=density)).head(subdivide=0)
+    strands, place = hair(head), knots(head)[:, 0]
+    top = place[:, 1] > 85.0
+    quads = np.unique(strands.roots.quad[top])
+    inside = np.isin(strands.roots.quad, quads)
+    area = hairy_skin.areas_cm2(head.mesh, quads.astype(np.int64)).sum()
+    assert strands.radius_mm[inside, 0].sum() / area == pytest.approx(
+        0.034 * MOST_PER_CM2 * density, rel=0.05
+    )
+
+
+@pytest.mark.parametrize("style", LOOKS)
+def test_no_hair_grows_on_ears_lips_and_face(style: str) -> None:
+    head = grown(style)
+    assert not np.isin(hair(head).roots.quad, hairy_skin._bare()).any()
+    x, y, z = knots(head)[:, 0].T
+    assert not ((np.abs(x) < 40) & (y < 55) & (y > -35) & (z > 0)).any()  # forehead, eyes, nose
+    if LOOKS[style].beard_mm == 0.0:
+        assert not ((y < 30) & (z > -20)).any()
+
+
+@pytest.mark.parametrize("style", LOOKS)
+def test_no_hair_enters_the_head(style: str) -> None:
+    head = Human(sex=1.0, hair=LOOKS[style]).head(subdivide=2)
+    places = knots(head)
+    some = places[:: max(1, len(places) // 4000)]
+    foot, normal = Skin(head.mesh).foot(some.reshape(-1, 3))
+    over = ((some.reshape(-1, 3) - foot) * normal).sum(axis=1).reshape(some.shape[:2])
+    assert np.abs(over[:, 0]).max() < 1.2  # they begin at the skin
+    assert (over[:, 1:] > -0.5).mean() > 0.995 and np.percentile(over[:, 1:], 0.1) > -1.0
+
+
+def test_hair_is_as_long_as_is_said() -> None:
+    for millimetres in (4.0, 9.0):
+        head = Human(hair=HairLook(style="cropped", length_mm=millimetres)).head(subdivide=0)
+        length = np.linalg.norm(np.diff(knots(head), axis=1), axis=2).sum(axis=1)
+        assert 0.7 * millimetres < np.median(length) < 1.2 * millimetres
+        assert np.percentile(length, 99.9) < 2.2 * millimetres
+
+
+def test_it_moves_with_the_head_and_stays_with_the_face() -> None:
+    head = grown("short")
+    still, open_ = knots(head), knots(head, jawOpen=1.0)
+    chin = (still[:, 0, 1] < -85) & (still[:, 0, 2] > -20)
+    moved = np.linalg.norm(open_ - still, axis=2)
+    assert np.median(moved[chin]) > 5.0 and moved[still[:, 0, 1] > 60].max() < 0.5
+
+
+def test_recession_bares_temples_and_crown() -> None:
+    temple, crown = np.array([[33.0, 75.0, -12.0, -50.0]]), np.array([[0.0, 95.0, -122.0, -50.0]])
+    middle = np.array([[0.0, 100.0, -50.0, -50.0]])
+    full, thin = hairy_skin.scalp(0.0), hairy_skin.scalp(1.0)
+    assert full(temple) > 0.4 > 0.05 > thin(temple)
+    assert full(crown) > 0.95 and thin(crown) < 0.3 and thin(middle) > 0.9 * full(middle)
+
+
+def test_who_has_which_hair() -> None:
+    people = [Human.drawn(seed) for seed in range(200)]
+    men, women = ([one for one in people if (one.sex > 0.5) == man] for man in (True, False))
+    bald = [np.mean([one.hairdo.style == "none" for one in group]) for group in (men, women)]
+    assert 0.04 < bald[0] < 0.25 and bald[1] < 0.1
+    assert not any(one.hairdo.beard_mm for one in women) and any(one.hairdo.beard_mm > 3 for one in men)
+    assert all(one.hairdo.style != "short" for one in people if one.african > 0.85)
+    assert all(one.look.recession == 0.0 for one in women)
+    assert np.mean([one.look.recession for one in men if one.age > 55]) > np.mean(
+        [one.look.recession for one in men if one.age < 40]
+    )
+    assert Human(age=85).hairdo.grey > 0.5 > Human(age=30).hairdo.grey == 0.0
+    assert Human(hair=HairLook()).head(subdivide=0).hair is None
+
+
+def test_grey_hair_is_grey_and_fair_hair_is_not() -> None:
+    grey, blond = (
+        hair(Human(hair=HairLook(style="cropped", eumelanin=dark, grey=share)).head(subdivide=0)).absorption
+        for dark, share in ((6.0, 0.7), (0.5, 0.0))
+    )
+    warmth = [np.median(one[:, 2] / one[:, 0]) for one in (grey, blond)]
+    assert warmth[0] < 1.9 < 2.4 < warmth[1]
+
+
+@pytest.mark.parametrize("bad", [{"style": "bob"}, {"length_mm": 100.0}, {"density": -1.0}, {"seed": 0.5}])
+def test_what_is_no_hair_is_refused(bad: dict[str, object]) -> None:
+    with pytest.raises(DermisError):
+        HairLook(**bad)  # type: ignore[arg-type]
+
+
+def test_places_on_the_average_person_are_below_the_crown() -> None:
+    """The edge of the breast, too, which its file stores as far above."""
+    places = hairy_skin._told()[:, :3]
+    assert places[:, 1].max() < 130.0 and places[:, 1].min() < -330.0
+    assert (knots(grown("cropped"))[:, 0, 1] > -110.0).all()

@@ -1,0 +1,135 @@
+"""Lids on eyes of true size: they touch them, slide over them and close, on whoever has them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dermis import Human
+from dermis.human.lids import conformed
+from dermis.human.model import human_head
+from dermis.human.published import places_mm
+from dermis.human.skin.surface import lid_rings
+from dermis.mesh.eyeball import SCLERA_MM, apex_mm, clearance_mm
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.subdivide import subdivide_head
+from dermis.scene.pose import Pose
+
+Floats = NDArray[np.float64]
+PEOPLE = [None, 3, 7, 12, 21]
+ON_BALL = slice(3, 24)
+"""Rows of the lids' rings that lie on the ball, not beside the caruncle."""
+EDGE, CREST, SKIN = 1, 2, 3
+TOUCHES_MM = -0.3, 0.5
+"""Of the surface's edge from the ball."""
+UP, LOW = slice(3, 12), slice(14, 24)
+POSES: list[Mapping[str, float]] = [
+    *({"eyeBlinkLeft": weight} for weight in (0.0, 0.25, 0.5, 0.75, 1.0)),
+    {"eyeLookDownLeft": 1.0},
+    {"eyeLookUpLeft": 1.0},
+    {"eyeLookOutLeft": 1.0, "eyeBlinkLeft": 0.6},
+    {"eyeWideLeft": 1.0},
+    {"eyeSquintLeft": 1.0, "eyeBlinkLeft": 0.3},
+]
+
+
+def person_of(seed: int | None) -> Human:
+    return Human() if seed is None else Human.drawn(seed)
+
+
+@cache
+def head_of(seed: int | None) -> Head:
+    person = person_of(seed)
+    return subdivide_head(human_head(person.weights(), Maps(), "own", person.iris), 1)
+
+
+def rings(seed: int | None, weights: Mapping[str, float]) -> tuple[Floats, Floats]:
+    """(28, 4, 3) the left eye's rings in the eye's own space, and how far each is from it [mm]."""
+    head = head_of(seed)
+    assert head.eyes is not None
+    motion = Pose(weights).motion(head.control)
+    points = head.control.points_mm(motion)[lid_rings()[0]]
+    frame = head.eyes.frames(head.control, motion)[0]
+    own = points @ frame[:3, :3].T + frame[:3, 3]
+    far, surface = clearance_mm(own, np.array([0.0, 0.0, 1.0]))
+    return own, far - surface
+
+
+def test_the_ball_is_of_true_size() -> None:
+    assert SCLERA_MM == 12.0 and 24.0 < SCLERA_MM + apex_mm() < 25.5  # an adult's eye is 24 to 25 mm long
+
+
+@pytest.mark.parametrize("seed", PEOPLE)
+@pytest.mark.parametrize("weights", POSES, ids=str)
+def test_lids_touch_the_eye_and_none_pokes_through(seed: int | None, weights: Mapping[str, float]) -> None:
+    _, off = rings(seed, weights)
+    edges = off[ON_BALL, EDGE]
+    assert TOUCHES_MM[0] < edges.min() and edges.max() < TOUCHES_MM[1]
+    assert off[ON_BALL, CREST].min() > 0.2 and off[:, SKIN].min() > 0.4
+
+
+@pytest.mark.parametrize("seed", PEOPLE)
+def test_targets_together_take_no_lid_into_the_eye(seed: int | None) -> None:
+    _, off = rings(seed, {"eyeLookDownLeft": 1.0, "eyeBlinkLeft": 0.7, "eyeSquintLeft": 0.5})
+    assert off[ON_BALL, CREST].min() > 0.2 and off[ON_BALL, EDGE].max() < 1.5
+
+
+@pytest.mark.parametrize("seed", PEOPLE)
+def test_without_contact_a_lid_that_travels_straight_cuts_into_the_eye(seed: int | None) -> None:
+    head = head_of(seed)
+    rig = head.control
+    assert rig.contact is not None
+    motion = Pose({"eyeBlinkLeft": 0.5}).motion(rig)
+    straight = rig.positions_mm.astype(float)
+    each = np.repeat(motion.weights, np.diff(rig.targets.first))
+    np.add.at(straight, rig.targets.point, each[:, None] * rig.targets.delta_mm)
+    moved = np.linalg.norm(rig.contact.kept_off(straight) - straight, axis=1)
+    assert 0.4 < moved.max() < 2.5
+
+
+@pytest.mark.parametrize("seed", [*PEOPLE, *range(30, 40)])
+def test_closed_lids_meet(seed: int | None) -> None:
+    """The upper crest ends below the lower one, and not far below."""
+    own, _ = rings(seed, {"eyeBlinkLeft": 1.0})
+    lower = own[LOW, CREST][::-1]
+    over = np.interp(own[UP, CREST, 0], lower[:, 0], lower[:, 1]) - own[UP, CREST, 1]
+    assert over.min() > 0.3 and over.max() < 3.0
+
+
+@pytest.mark.parametrize("seed", PEOPLE)
+def test_seen_from_the_front_the_opening_stays_as_published(seed: int | None) -> None:
+    person = person_of(seed)
+    places = places_mm(person.weights())
+    head = head_of(seed)
+    crest = lid_rings()[..., CREST]
+    off = head.positions_mm[crest] - places[crest]
+    assert np.abs(off[:, 1:12, 1]).max() < 0.5 and np.abs(off[..., :2]).max() < 2.0
+    assert off[..., 2].min() < -1.0  # they were drawn back
+
+
+def test_skin_far_from_the_eyes_stays_where_it_is() -> None:
+    from dermis.human.model import _sockets
+
+    places = places_mm({})
+    moved = np.abs(conformed(places, _sockets(places)) - places).max(axis=1)
+    middle = places[lid_rings()].reshape(2, -1, 3).mean(axis=1)
+    far = np.linalg.norm(places[:, None] - middle, axis=-1).min(axis=1)
+    assert moved[far > 32].max() == 0.0 and moved.max() > 2.0
+    edge = moved[(far > 24) & (far < 32)]
+    assert edge.max() < 1.0
+
+
+def test_lids_follow_who_has_another_head() -> None:
+    """Contact goes by where that person's eyes are."""
+    head, other = head_of(None), Human.drawn(7)
+    motion = Pose({"eyeBlinkLeft": 0.5}, positions_mm=other.positions_mm).motion(head.control)
+    assert head.eyes is not None
+    points = head.control.points_mm(motion)[lid_rings()[0]]
+    frame = head.eyes.frames(head.control, motion)[0]
+    far, surface = clearance_mm(points @ frame[:3, :3].T + frame[:3, 3], np.array([0.0, 0.0, 1.0]))
+    assert (far - surface)[ON_BALL, CREST].min() > 0.0

@@ -1,0 +1,124 @@
+"""Eyes for path tracing: what the cornea shows of the iris, and what of the ball is clear."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from painted_ball import ball, paint
+
+from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_mm
+from dermis.mesh.eyes import PUPIL_MM
+from dermis.reference.mitsuba_scene import load_mitsuba, mesh_shape, sensor_of, variant_of
+from dermis.reference.person import eyes
+from dermis.reference.person.subject import Person
+from dermis.scene.camera import Camera
+
+pytest.importorskip("mitsuba")
+SIDE, FRAME_MM, FAR_MM = 24, 9.0, 300.0
+
+
+def ramps() -> NDArray[np.float32]:
+    """Red grows with x, green with y, blue is even."""
+    along = (np.arange(512, dtype=np.float32) + 0.5) / 512
+    return np.stack([*np.meshgrid(along, along), np.ones((512, 512), np.float32)], axis=-1)
+
+
+def seen(degrees: float) -> Any:
+    """(n, n, 2) places of a glowing iris that a camera sees, from the front or from the side [mm]."""
+    mi, reach = load_mitsuba(), 6.5
+    turn = np.radians(degrees)
+    middle = np.array([0.0, 0.0, cornea_centre_mm()])
+    position = middle + FAR_MM * np.array([np.sin(turn), 0.0, np.cos(turn)])
+    camera = Camera(position=tuple(position), target=tuple(middle), frame_mm=FRAME_MM)
+    with variant_of(mi, "scalar_rgb"):
+        person = replace(ball(), eyes=np.eye(4)[None], paint=replace(paint(), reach_mm=reach))
+        clear = eyes.eye_shapes(mi, person)["eye_0"]
+        flat, fans, _ = eyes.disc()
+        glow = {"type": "bitmap", "bitmap": mi.Bitmap(ramps()), "raw": True, "wrap_mode": "clamp"}
+        shines = mi.load_dict({"type": "area", "radiance": glow})
+        iris = mesh_shape(mi, flat, fans, None, 0.5 + 0.5 * flat[:, :2] / reach, emitter=shines)
+        described = {"type": "scene", "integrator": {"type": "path"}, "eye": clear, "iris": iris}
+        built = mi.load_dict({**described, "sensor": sensor_of(mi, camera, (SIDE, SIDE))})
+        image = np.array(mi.render(built, spp=1024), np.float64)
+    rays = pixels(camera)
+    return reach * (2.0 * image[..., :2] / np.maximum(image[..., 2:], 1e-9) - 1.0), rays
+
+
+def pixels(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where rays through the middles of pixels meet the cornea's sphere, and their ways."""
+    eye, target = np.array(camera.position), np.array(camera.target)
+    ahead = (target - eye) / np.linalg.norm(target - eye)
+    right = np.cross(ahead, (0.0, 1.0, 0.0))
+    right /= np.linalg.norm(right)
+    up = np.cross(right, ahead)
+    along = ((np.arange(SIDE) + 0.5) / SIDE - 0.5) * FRAME_MM / FAR_MM
+    x, y = np.meshgrid(along, -along)
+    ways = ahead + x[..., None] * right + y[..., None] * up
+    ways /= np.linalg.norm(ways, axis=-1, keepdims=True)
+    off = eye - [0.0, 0.0, cornea_centre_mm()]
+    b = ways @ off
+    root = b**2 - off @ off + CORNEA_MM**2
+    places = eye + ways * (-b - np.sqrt(np.maximum(root, 0.0)))[..., None]
+    return places, ways
+
+
+def by_snell(places: NDArray[np.float64], ways: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, n, 2) where refracted rays meet the plane of the iris [mm]."""
+    n = (places - [0.0, 0.0, cornea_centre_mm()]) / CORNEA_MM
+    cosine = -(ways * n).sum(axis=-1, keepdims=True)
+    inner = np.sqrt(1.0 - (1.0 - cosine**2) / eyes.INDEX**2)
+    bent = ways / eyes.INDEX + (cosine / eyes.INDEX - inner) * n
+    far = (iris_mm() - places[..., 2:]) / bent[..., 2:]
+    return np.asarray((places + far * bent)[..., :2])
+
+
+@pytest.mark.parametrize("degrees", [0.0, 40.0])
+def test_the_iris_is_seen_where_snell_says(degrees: float) -> None:
+    found, (places, ways) = seen(degrees)
+    expected = by_snell(places, ways)
+    clear = np.hypot(places[..., 0], places[..., 1]) < LIMBUS_MM - eyes.SOFT_MM - 0.5
+    clear &= np.hypot(*np.moveaxis(expected, -1, 0)) < 4.5
+    assert clear.sum() > 60
+    assert np.abs(found - expected)[clear].max() < 0.08  # a fifth of a pixel; paths are few
+
+
+def test_the_ball_is_whole_and_has_the_published_shape() -> None:
+    places, triangles, normals, uv = eyes.ball()
+    assert np.linalg.norm(places, axis=1).min() >= SCLERA_MM - 1e-9
+    assert places[:, 2].max() == pytest.approx(apex_mm())
+    corners = places[triangles]
+    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert ((facing * corners.mean(axis=1)).sum(axis=1) >= 0.0).all()
+    assert (np.einsum("vc,vc->v", normals, places) > 0.0).all()
+    assert np.linalg.norm(uv - 0.5, axis=1).max() == pytest.approx(eyes.RIM)
+
+
+def test_the_white_turns_clear_at_the_limbus() -> None:
+    found = eyes.clear_picture()
+    middle = len(found) // 2
+    assert found[middle, middle] == 1.0 and found[0, 0] == 0.0
+    row = found[middle, middle:]
+    half = np.arcsin(LIMBUS_MM / SCLERA_MM) / np.pi * eyes.RIM * len(found)
+    assert abs(int(np.argmin(np.abs(row - 0.5))) - half) < 8
+
+
+def test_the_iris_reaches_the_ball_and_is_wider_than_a_pupil() -> None:
+    flat, _, radius = eyes.disc()
+    assert np.linalg.norm(flat, axis=1).max() < SCLERA_MM
+    assert radius > LIMBUS_MM - 0.2 > PUPIL_MM[1]
+
+
+def test_eyes_stand_where_their_frames_say() -> None:
+    mi = load_mitsuba()
+    frame = np.eye(4)
+    frame[:3, :3] *= 2.0  # half as large
+    frame[:3, 3] = -2.0 * np.array([30.0, 5.0, 60.0])
+    with variant_of(mi, "scalar_rgb"):
+        person: Person = replace(ball(), eyes=frame[None])
+        box = eyes.eye_shapes(mi, person)["eye_0"].bbox()
+    np.testing.assert_allclose(np.array(box.max)[:2], [30.0 + SCLERA_MM / 2, 5.0 + SCLERA_MM / 2], atol=0.02)
+    np.testing.assert_allclose(np.array(box.max)[2], 60.0 + apex_mm() / 2, atol=0.02)

@@ -1,0 +1,67 @@
+"""Hairs as curves of Mitsuba: through their knots, as thick and as dark as they are."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dermis.reference.mitsuba_scene import load_mitsuba, variant_of
+from dermis.reference.person.hairs import COLOURS, control_points, groups, hair_shapes, write_curves
+from dermis.reference.person.subject import Hairs
+from dermis.specular.hair import fibre, scattered
+
+pytest.importorskip("mitsuba")
+STEPS = 400
+
+
+def straight(radius_mm: float, absorption: tuple[float, float, float]) -> Hairs:
+    """A hair along x."""
+    knots = np.zeros((1, 5, 3))
+    knots[0, :, 0] = np.linspace(-20.0, 20.0, 5)
+    radius = np.full((1, 5), radius_mm, np.float32)
+    return Hairs(knots, radius, np.array([absorption], np.float32))
+
+
+def test_curves_go_through_their_knots() -> None:
+    knots = np.random.default_rng(2).normal(size=(4, 9, 3))
+    points = control_points(knots)
+    through = (points[:, :-2] + 4 * points[:, 1:-1] + points[:, 2:]) / 6
+    np.testing.assert_allclose(through, knots, atol=1e-12)
+
+
+def test_files_hold_a_block_for_each_curve(tmp_path: Path) -> None:
+    write_curves(tmp_path / "a.txt", np.zeros((3, 4, 3)), np.full((3, 4), 0.05, np.float32))
+    blocks = (tmp_path / "a.txt").read_text("ascii").strip().split("\n\n")
+    assert len(blocks) == 3
+    assert all(len(block.splitlines()) == 6 for block in blocks)
+
+
+def test_hairs_are_parted_by_what_they_absorb() -> None:
+    depth = np.random.default_rng(1).random((100, 3))
+    parts = groups(depth)
+    assert len(parts) == COLOURS and sorted(np.concatenate(parts)) == list(range(100))
+    ends = [(depth[part].sum(axis=1).min(), depth[part].sum(axis=1).max()) for part in parts]
+    assert all(first[1] <= second[0] for first, second in itertools.pairwise(ends))
+    assert len(groups(depth[:1])) == 1
+
+
+@pytest.mark.parametrize("radius_mm", [0.04, 0.5])
+def test_a_hair_under_even_light_shines_as_our_lobe_does(radius_mm: float) -> None:
+    depth = np.array([0.0, 0.2, 1.0])
+    mi, r = load_mitsuba(), 0.999 * radius_mm
+    with variant_of(mi, "scalar_rgb"):
+        shapes = hair_shapes(mi, straight(radius_mm, tuple(depth / radius_mm)))
+        to_world = mi.ScalarTransform4f().look_at([0, 0, 10], [0, 0, 0], [0, 1, 0]).scale([r, r, 1])
+        film = {"type": "hdrfilm", "width": 1, "height": 1, "rfilter": {"type": "box"}}
+        sensor = {"type": "orthographic", "to_world": to_world, "film": film}
+        described = {"type": "scene", "integrator": {"type": "path"}, "all": {"type": "constant"}}
+        found = np.array(mi.render(mi.load_dict({**described, "sensor": sensor, **shapes}), spp=4096))
+    sines = (np.arange(STEPS) + 0.5) * 2 / STEPS - 1
+    around = (np.arange(STEPS) + 0.5) * 2 * np.pi / STEPS
+    s, phi = np.meshgrid(sines, around)
+    lobe = scattered(s, 0.0 * s, phi, depth, fibre())
+    expected = lobe.sum(axis=(0, 1)) * (2 / STEPS) * (2 * np.pi / STEPS)
+    np.testing.assert_allclose(found[0, 0, :3], expected, rtol=0.04)

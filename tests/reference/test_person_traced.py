@@ -1,0 +1,101 @@
+"""A person path-traced: kept on disk by all that the picture depends on, posed, with eyes and hairs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from painted_ball import ball, paint
+from painted_ball import scene as ball_scene
+
+from dermis.errors import DermisError
+from dermis.human.person import Human
+from dermis.mesh.head import Head
+from dermis.reference.path_traced import PathTraced
+from dermis.reference.person import medium
+from dermis.reference.person.subject import person_of
+from dermis.reference.person.traced import person_key, trace_person
+from dermis.scene.camera import portrait
+from dermis.scene.lights import RectangleLight
+from dermis.scene.model import Scene
+
+pytest.importorskip("mitsuba")
+WAY, COLOUR = np.array([0.2, 0.1, 0.1]), np.array([0.5, 0.3, 0.2])
+LIGHT = RectangleLight(position=(-300.0, 300.0, 900.0))
+
+
+@pytest.fixture(autouse=True)
+def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(medium, "VOXELS", 8)
+
+
+@cache
+def head() -> Head:
+    return Human().head()
+
+
+def scene(**given: Any) -> Scene:
+    return Scene(head(), lights=(LIGHT,), camera=portrait(head()), **given)
+
+
+def traced(samples: int, **painted: Any) -> PathTraced:
+    return trace_person(scene(), paint(**painted), WAY, COLOUR, (24, 24), samples)
+
+
+def test_more_samples_are_added_to_those_that_are_kept() -> None:
+    first, more = traced(8), traced(12)
+    assert (first.samples, more.samples) == (8, 12)
+    assert more.seconds > first.seconds > 0.0
+    difference = (12 * more.image.astype(float) - 8 * first.image) / 4  # of the four that came
+    assert difference.min() > -1e-3
+    covered = more.mask > 0.999
+    assert 0.2 < covered.mean() < 0.8 and np.isfinite(more.image).all()
+    assert 0.01 < more.image[covered].mean() < 1.0 and more.variance[covered].mean() > 0.0
+    assert np.median(more.image[more.mask == 0.0]) == 0.0
+
+
+def test_pictures_are_kept_by_what_they_depend_on() -> None:
+    person, path = person_of(scene(), paint()), np.ones(3)
+    hairs = person.hairs
+    assert hairs is not None
+    thicker = replace(person, hairs=replace(hairs, radius_mm=2 * hairs.radius_mm))
+    others = [
+        person_key(scene(), person, path, "form"),
+        person_key(scene(), person, 2 * path, "form"),
+        person_key(scene(), person, path, "another"),
+        person_key(scene(), thicker, path, "form"),
+        person_key(scene(), replace(person, eyes=2 * person.eyes), path, "form"),
+        person_key(scene(), replace(person, paint=paint(colour=(0.4, 0.3, 0.2))), path, "form"),
+        person_key(replace(scene(), lights=()), person, path, "form"),
+    ]
+    assert len(set(others)) == len(others)
+    assert others[0] == person_key(scene(), person_of(scene(), paint()), path, "form")
+
+
+def test_a_pose_moves_skin_eyes_and_hairs() -> None:
+    rest = person_of(scene(), paint())
+    posed = person_of(scene(pose={"jawOpen": 1.0, "eyeLookUpLeft": 1.0, "browInnerUp": 1.0}), paint())
+    moved = np.linalg.norm(posed.mesh.positions - rest.mesh.positions, axis=1)
+    assert 10.0 < moved.max() < 60.0 and np.median(moved) < 0.5
+    assert np.abs(posed.eyes[0, :3, :3] - rest.eyes[0, :3, :3]).max() > 0.1
+    np.testing.assert_allclose(posed.eyes[1], rest.eyes[1], atol=1e-6)
+    assert posed.hairs is not None and rest.hairs is not None
+    assert 1.0 < np.linalg.norm(posed.hairs.knots_mm - rest.hairs.knots_mm, axis=-1).max() < 20.0
+
+
+def test_eyes_look_out_of_the_head() -> None:
+    person = person_of(scene(), paint())
+    back = np.linalg.inv(person.eyes)
+    balls = person.mesh.material[:, None] == np.array(person.eye_materials)
+    for k, matrix in enumerate(back):
+        middle = person.mesh.positions[np.unique(person.mesh.triangles[balls[:, k]])].mean(axis=0)
+        assert np.linalg.norm(matrix[:3, 3] - middle) < 2.0
+        assert matrix[2, 2] > 0.9 * np.cbrt(np.linalg.det(matrix[:3, :3]))
+
+
+def test_heads_without_true_eyes_are_refused() -> None:
+    with pytest.raises(DermisError, match="eyes of true shape"):
+        trace_person(ball_scene(), ball().paint, WAY, COLOUR, (8, 8), 4)

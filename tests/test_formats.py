@@ -1,0 +1,78 @@
+"""Every example of the page of files is one that the package reads, and every key of a light stands there."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dermis
+from dermis.human.person_file import read_person
+from dermis.human.regions.average import average_head
+from dermis.human.regions.labels import average_landmarks, load_landmarks, to_average
+from dermis.human.regions.table import load_table
+from dermis.optics.profiles import find_table
+from dermis.optics.tissue import load_tissue
+from dermis.scene.lights import LIGHTS
+
+PAGE = (Path(__file__).parents[1] / "docs" / "formats.md").read_text("utf-8")
+FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """All files of the page, under the names in their first lines."""
+    for kind, text in FENCE.findall(PAGE):
+        name = "person.json" if kind == "json" else text.splitlines()[0].removeprefix("# ")
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    assert len(list(tmp_path.iterdir())) == len(FENCE.findall(PAGE)) == 7
+    return tmp_path
+
+
+def test_the_scene(folder: Path) -> None:
+    scene, settings = dermis.load_scene(folder / "scene.toml")
+    assert scene.lights == dermis.load_lights("window") and settings.atlas == 256
+    assert scene.camera.frame_mm == 320 and scene.skin.profile == "medium"
+    assert isinstance(scene.pose, dermis.Pose) and scene.pose.weights["mouthSmileLeft"] == 0.6
+
+
+def test_the_lights_are_one_of_each_kind(folder: Path) -> None:
+    lights = dermis.load_lights(folder / "lights.toml")
+    assert {light.kind for light in lights} == set(LIGHTS)
+
+
+def test_every_key_of_a_light_is_explained() -> None:
+    section = PAGE.partition("## Lights")[2].partition("```")[0]
+    rows = [row.split("|") for row in section.splitlines() if row.startswith("| `")]
+    told = {key for row in rows for key in re.findall(r"`(\w+)`", row[1])}
+    for kind in LIGHTS.values():
+        assert set(kind.model_fields) <= told
+
+
+def test_the_table_of_regions_and_its_landmarks(folder: Path) -> None:
+    table = load_table(folder / "regions.toml")
+    assert table.landmarks == folder / "landmarks.csv"
+    places, head = load_landmarks(folder / "landmarks.csv"), average_head()
+    points = np.array(list(places.values())) + head.centre_mm
+    found = to_average(head, places, points)
+    expected = [average_landmarks()[name] for name in places]
+    np.testing.assert_allclose(found, expected, atol=0.2)
+    section = " ".join(PAGE.partition("## Landmarks")[2].split())
+    assert all(name.removeprefix("left ").removeprefix("right ") in section for name in average_landmarks())
+
+
+def test_the_tissue_and_the_profile(folder: Path) -> None:
+    medium = load_tissue(str(folder / "tissue.toml")).medium
+    assert medium.name == "thin over thick" and len(medium.layers) == 2 and medium.semi_infinite
+    table = find_table(folder / "profile.csv")
+    published = find_table("gpu-gems-3")
+    assert table is not None and published is not None
+    np.testing.assert_allclose(table.weight, published.weight)
+
+
+def test_the_person(folder: Path) -> None:
+    assert read_person(folder / "person.json").age == 62
+    assert json.loads((folder / "person.json").read_text())["person"]["sex"] == 1

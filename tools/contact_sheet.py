@@ -1,0 +1,67 @@
+"""Every rig and environment on several heads, exposed as `dermis render` does, on one sheet to look at.
+
+python tools/contact_sheet.py sheet.png [--side 160] [--camera portrait]
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from dermis.frame.renderer import Renderer
+from dermis.human.person import Human
+from dermis.images.io import write_png
+from dermis.mesh.head import Head
+from dermis.mesh.samples import SAMPLES, cached
+from dermis.scene import Environment, Scene, Settings, load_lights
+from dermis.scene.camera import preset
+from dermis.scene.heads import HUMAN, load_head
+from dermis.scene.lights import NO_LIGHTS, light_presets
+from dermis.scene.settings import PHOTOGRAPHED
+
+TURNS = (0.0, 90.0, 180.0, -90.0)
+
+
+def heads() -> dict[str, Head]:
+    """The package's own with light and with dark skin, and sample heads that lie on the disk."""
+    own = {"usual": load_head(HUMAN)}
+    own["light"] = Human(african=0.0, asian=0.0, caucasian=1.0).head()
+    own["dark"] = Human(african=1.0, asian=0.0, caucasian=0.0).head()
+    samples = [name for name, sample in SAMPLES.items() if sample.kind == "head" and cached(name)]
+    return own | {name: load_head(name, subdivide=1) for name in samples}
+
+
+def lit() -> Iterator[dict[str, object]]:
+    """Each rig alone, each environment turned, and a rig in each environment."""
+    for rig in light_presets():
+        if rig != NO_LIGHTS:
+            yield {"lights": load_lights(rig)}
+    rooms = [name for name, sample in SAMPLES.items() if sample.kind == "environment" and cached(name)]
+    yield {"lights": (), "environment": Environment(name="uniform")}
+    for room in rooms:
+        for turn in TURNS:
+            yield {"lights": (), "environment": Environment(name=room, rotation_degrees=turn)}
+        yield {"lights": load_lights("rim"), "environment": Environment(name=room)}
+
+
+def main() -> None:
+    """Draw the sheet: a row for each light, a column for each head."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("output", type=Path)
+    parser.add_argument("--side", type=int, default=160)
+    parser.add_argument("--camera", default="portrait")
+    parser.add_argument("--adapter", default="auto")
+    asked = parser.parse_args()
+    settings = Settings(size=(asked.side, asked.side), atlas=512, shadow_size=1024, **PHOTOGRAPHED)
+    renderer, columns = Renderer(asked.adapter), []
+    for head in heads().values():
+        scenes = [Scene(head, camera=preset(asked.camera, head), **light) for light in lit()]  # type: ignore[arg-type]
+        columns.append(np.concatenate([renderer.draw(scene, settings).srgb8() for scene in scenes]))
+    write_png(asked.output, np.concatenate(columns, axis=1))
+
+
+if __name__ == "__main__":
+    main()
