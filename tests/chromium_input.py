@@ -3,15 +3,66 @@
 from __future__ import annotations
 
 import io
+import shutil
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+SIZE = {"width": 400, "height": 480}
 PATIENCE_S = 25.0
+_QUIET = (
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+_GET_IMAGE = "() => { const i = document.querySelector('img'); return i && i.complete && i.naturalWidth > 0 }"
 Place = tuple[float, float]
+
+
+@contextmanager
+def opened_browser() -> Iterator[Any]:
+    """Chromium, without a window."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play:
+        one = play.chromium.launch(executable_path=CHROMIUM, args=list(_QUIET))
+        yield one
+        one.close()
+
+
+@contextmanager
+def visited(browser: Any, url: str, expected: str = "no error", **given: Any) -> Iterator[Any]:
+    """The page, showing something; an error in its console fails the test unless it was expected."""
+    one = browser.new_page(**{"viewport": SIZE} | given)
+    errors: list[str] = []
+    one.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+    one.on("pageerror", lambda error: errors.append(str(error)))
+    one.goto(url)
+    wait_for_picture(one)
+    yield one
+    one.close()
+    assert [text for text in errors if expected not in text] == []
+
+
+def wait_for_picture(page: Any) -> None:
+    page.wait_for_function(_GET_IMAGE, timeout=1000 * PATIENCE_S)
+
+
+def wait(page: Any, reached: Callable[[], Any]) -> bool:
+    """Whether something comes to be; the page goes on meanwhile."""
+    end = time.monotonic() + PATIENCE_S
+    while not reached() and time.monotonic() < end:
+        page.wait_for_timeout(50)
+    return bool(reached())
 
 
 def pixels(page: Any) -> NDArray[np.int64]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dermis.scene.settings import Settings
 
 ADAPTER = os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
+_EDGE, _MOST_TURNS = 10.0, 20  # logical pixels; of the wheel
 SETTINGS = Settings(atlas=128, samples=2, shadow_size=256)
 
 
@@ -57,10 +58,17 @@ class InputDriver:
         self.drag(place, place)
 
     def position(self, label: str) -> tuple[float, float]:
-        """Where a control of the panel is; the panel must be drawn."""
+        """Where a control of the panel is, which scrolls as far as it must; the panel must be drawn."""
         self.frame()
-        found: tuple[float, float] = self.viewer.session.positions[label]
-        return found
+        height = self.canvas.get_logical_size()[1]
+        for _ in range(_MOST_TURNS):
+            x, y = self.viewer.session.positions[label]
+            if _EDGE < y < height - _EDGE:
+                break
+            self.event("wheel", x=3.0, y=0.5 * height, dx=0.0, dy=100.0 if y > 0.5 * height else -100.0)
+            self.frame()
+            self.frame()
+        return float(x), float(y)
 
     def press(self, label: str) -> None:
         """Click on a control of the panel."""

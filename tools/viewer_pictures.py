@@ -24,8 +24,8 @@ SCENE = ("--atlas", "1024", "--samples", "4")
 PATIENCE_S = 300.0
 REFINED_S = 45.0  # without a change: a software adapter takes long for a still picture
 ANSWERED_S = 2.0
-VIEW_LIST, IRRADIANCE = (30, 68), (30, 151)
-COMPARE, FREEZE = (100, 143), (30, 168)
+VIEW_LIST, IRRADIANCE = (30, 168), (30, 251)
+COMPARE, FREEZE = (100, 243), (30, 268)
 CHROMIUM = "chromium", "chromium-browser", "google-chrome"
 
 

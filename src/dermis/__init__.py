@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from dermis.scene.pose import Pose
     from dermis.scene.settings import Settings
     from dermis.scene.skin import Skin
+    from dermis.viewer.windows import view
 
 _HOME = {
     "Head": "mesh.head",
@@ -75,6 +76,7 @@ _HOME = {
     "Pose": "scene.pose",
     "Settings": "scene.settings",
     "Skin": "scene.skin",
+    "view": "viewer.windows",
 }
 
 __all__ = [
@@ -109,6 +111,7 @@ __all__ = [
     "render",
     "studio",
     "three_quarter",
+    "view",
     "with_regions",
     "write_image",
 ]

@@ -157,7 +157,7 @@ def test_a_notebook_displays_the_same_viewer(folder: Path, monkeypatch: pytest.M
     from rendercanvas.offscreen import OffscreenRenderCanvas
 
     from dermis.scene.heads import load_head
-    from dermis.viewer.windows import notebook_viewer
+    from dermis.viewer.windows import view
 
     class Canvas(OffscreenRenderCanvas):  # type: ignore[misc]
         def _repr_mimebundle_(self, **options: Any) -> dict[str, str]:
@@ -167,6 +167,6 @@ def test_a_notebook_displays_the_same_viewer(folder: Path, monkeypatch: pytest.M
         monkeypatch.setitem(sys.modules, name, ModuleType(name))
     monkeypatch.setattr("dermis.viewer.windows._notebook_canvas", lambda backend: Canvas)
     state = ViewerState(Scene(load_head(folder / "head.obj"))).with_settings(atlas=64, samples=1)
-    viewer = notebook_viewer(state, "cpu", (64, 48))
-    assert viewer._repr_mimebundle_() == {"text/plain": "shown"}
-    assert viewer.canvas.draw().shape == (48, 64, 4)
+    widget = view(state, "cpu", (64, 48))
+    assert widget._repr_mimebundle_() == {"text/plain": "shown"}
+    assert widget.draw().shape == (48, 64, 4)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+from chromium_input import opened_browser
 from offscreen_input import ADAPTER, SETTINGS, InputDriver
 from rigged_head import write_rigged_head
+from served_viewer import served
 from small_head import write_head
 
 from dermis.mesh.head import Head
@@ -46,6 +49,21 @@ def rigged_head(rigged_file: Path) -> Head:
 def rigged(rigged_head: Head, rigged_file: Path) -> ViewerState:
     """A head with expressions and bones."""
     return ViewerState(Scene(rigged_head), SETTINGS, {"name": str(rigged_file)})
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with opened_browser() as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
+def shown(head: Head, head_file: Path) -> Iterator[Any]:
+    """A viewer that a server in this process shows, `shown.url` is its page."""
+    pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
+    with served(ViewerState(Scene(head), SETTINGS, {"name": str(head_file)}), (400, 480)) as one:
+        yield one
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -12,7 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 from chromium_input import (
+    CHROMIUM,
     PATIENCE_S,
+    SIZE,
     differs_from,
     drag,
     head,
@@ -22,26 +23,13 @@ from chromium_input import (
     shows_head,
     still,
     touch,
+    visited,
+    wait_for_picture,
 )
 from numpy.typing import NDArray
 from offscreen_input import ADAPTER, InputDriver
 
-SIZE = {"width": 400, "height": 480}
-_CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-_QUIET = (
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-)
-_GET_IMAGE = (
-    "() => { const i = document.querySelector('img'); return i && i.complete && i.naturalWidth === 400 }"
-)
-
-pytestmark = pytest.mark.skipif(_CHROMIUM is None, reason="there is no Chromium here")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
 
 
 @pytest.fixture(scope="module")
@@ -58,28 +46,11 @@ def url(head_file: Path) -> Iterator[str]:
     assert "Traceback" not in errors and "rror" not in errors, errors
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    sync = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    with sync.sync_playwright() as play:
-        one = play.chromium.launch(executable_path=_CHROMIUM, args=list(_QUIET))
-        yield one
-        one.close()
-
-
 @pytest.fixture
 def page(browser: Any, url: str) -> Iterator[Any]:
-    """The page, showing something; an error in its console fails the test."""
-    one = browser.new_page(viewport=SIZE)
-    errors: list[str] = []
-    one.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
-    one.on("pageerror", lambda error: errors.append(str(error)))
-    one.goto(url)
-    one.wait_for_function(_GET_IMAGE, timeout=1000 * PATIENCE_S)
-    one.keyboard.press("1")  # the portrait, wherever the test before left the camera
-    yield one
-    one.close()
-    assert errors == []
+    with visited(browser, url) as one:
+        one.keyboard.press("1")  # the portrait, wherever the test before left the camera
+        yield one
 
 
 def test_the_page_shows_the_head_and_a_drag_turns_it(page: Any) -> None:
@@ -118,7 +89,7 @@ def test_a_lost_connection_comes_back_by_itself(page: Any) -> None:
 def test_a_reloaded_page_shows_the_head_again(page: Any) -> None:
     still(page, shows_head)
     page.reload()
-    page.wait_for_function(_GET_IMAGE, timeout=1000 * PATIENCE_S)
+    wait_for_picture(page)
     still(page, shows_head)
 
 
@@ -133,7 +104,7 @@ def watcher(browser: Any) -> Iterator[Any]:
 def test_a_second_page_watches_and_does_not_touch(page: Any, watcher: Any, url: str) -> None:
     before = still(page, shows_head)
     watcher.goto(url)
-    watcher.wait_for_function(_GET_IMAGE, timeout=1000 * PATIENCE_S)
+    wait_for_picture(watcher)
     assert "watching" in watcher.inner_text("#notice")
     drag(watcher, (320, 240), (230, 240))
     watcher.wait_for_timeout(700)
@@ -147,7 +118,7 @@ def test_a_second_page_watches_and_does_not_touch(page: Any, watcher: Any, url: 
 def test_one_finger_turns_the_head_and_two_come_nearer_and_pan(browser: Any, url: str) -> None:
     page = browser.new_context(viewport=SIZE, has_touch=True).new_page()
     page.goto(url)
-    page.wait_for_function(_GET_IMAGE, timeout=1000 * PATIENCE_S)
+    wait_for_picture(page)
     before = still(page, shows_head)
     touch(page, [(320, 240)], [(300, 240)], [(270, 250)], [(240, 260)])
     turned = still(page, differs_from(before))
@@ -187,14 +158,14 @@ def test_a_window_that_changes_its_size_is_filled(page: Any) -> None:
     page.set_viewport_size({"width": 500, "height": 300})
     page.wait_for_function("() => document.querySelector('img').naturalWidth === 500")
     page.set_viewport_size(SIZE)
-    page.wait_for_function(_GET_IMAGE, timeout=1000 * PATIENCE_S)
+    wait_for_picture(page)
 
 
 def test_a_watcher_of_another_size_takes_over_with_its_own(page: Any, watcher: Any, url: str) -> None:
     still(page, shows_head)
     watcher.set_viewport_size({"width": 520, "height": 320})
     watcher.goto(url)
-    watcher.wait_for_function(_GET_IMAGE, timeout=1000 * PATIENCE_S)
+    wait_for_picture(watcher)
     page.close()
     watcher.wait_for_function(
         "() => document.querySelector('img').naturalWidth === 520", timeout=1000 * PATIENCE_S

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import io
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,20 +13,25 @@ import pytest
 from numpy.typing import NDArray
 from offscreen_input import ADAPTER
 
-from dermis.viewer.state import ViewerState
-from dermis.viewer.windows import notebook_viewer
+import dermis
+from dermis.mesh.head import Head
+from dermis.scene.camera import preset
+from dermis.scene.model import Scene
+from dermis.scene.people import skin_of
+from dermis.viewer.state import ViewerState, state_of
+from dermis.viewer.windows import view
 
 pytest.importorskip("anywidget", reason="the extra `notebook` is not installed")
 pytest.importorskip("imgui_bundle", reason="the extra `viewer` is not installed")
 
-SIZE = (320, 200)
+SIZE = (480, 200)
 
 
 class Page:
     """What the notebook's page does: it tells its size, sends events, shows frames and confirms them."""
 
-    def __init__(self, viewer: Any) -> None:
-        self.canvas, self.frames, self.sent = viewer.canvas, [], 0
+    def __init__(self, widget: Any) -> None:
+        self.canvas, self.frames, self.sent = widget, [], 0
         self.canvas.send = self._show
 
     def _show(self, message: dict[str, Any], buffers: list[bytes]) -> None:
@@ -54,23 +60,42 @@ class Page:
 
 def test_the_widget_shows_the_head_and_a_drag_turns_it(state: ViewerState) -> None:
     async def visit() -> None:
-        viewer = notebook_viewer(state, ADAPTER, SIZE)
-        assert "application/vnd.jupyter.widget-view+json" in str(viewer._repr_mimebundle_())
-        page = Page(viewer)
+        widget = view(state, ADAPTER, SIZE)
+        assert "application/vnd.jupyter.widget-view+json" in str(widget._repr_mimebundle_())
+        page = Page(widget)
         page.open()
         before = await page.still()
-        assert before.shape == (*SIZE[::-1], 3) and before[80:120, 225:255].mean() > 20.0
+        assert before.shape == (*SIZE[::-1], 3) and before[80:120, 345:375].mean() > 20.0
         button = {"button": 1, "buttons": [1], "modifiers": []}
-        page.tell("pointer_down", x=240.0, y=100.0, **button)
-        page.tell("pointer_move", x=200.0, y=100.0, **button)
-        page.tell("pointer_up", x=200.0, y=100.0, **button)
+        page.tell("pointer_down", x=360.0, y=100.0, **button)
+        page.tell("pointer_move", x=320.0, y=100.0, **button)
+        page.tell("pointer_up", x=320.0, y=100.0, **button)
         after = await page.still()
-        assert np.abs(after[:150, 165:] - before[:150, 165:]).mean() > 0.5
+        assert np.abs(after[:150, 245:] - before[:150, 245:]).mean() > 0.5
 
     asyncio.run(visit())
 
 
 def test_a_closed_widget_is_closed_once(head_file: Path) -> None:
-    viewer = notebook_viewer(str(head_file), ADAPTER, SIZE)
-    viewer.canvas.close()
-    assert viewer.canvas.get_closed()
+    widget = view(str(head_file), ADAPTER, SIZE)
+    widget.close()
+    assert widget.get_closed()
+
+
+def test_heads_people_and_scenes_are_shown(head: Head) -> None:
+    scene = Scene(head, lights=(), camera=preset("profile", head))
+    assert dermis.view(scene, ADAPTER, SIZE).viewer.session.state.scene is scene
+    assert dermis.view(head, ADAPTER, SIZE).viewer.session.state.scene.head is head
+    person = dermis.Human(age=60)
+    assert state_of(person).scene.skin == skin_of(person)
+
+
+def test_something_else_is_refused_by_name() -> None:
+    with pytest.raises(dermis.DermisError, match=r"a head, a person, a scene or a name, but a list came"):
+        dermis.view([1, 2])  # type: ignore[arg-type]
+
+
+def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "anywidget", None)
+    with pytest.raises(dermis.DermisError, match=r'pip install "dermis\[notebook\]"'):
+        dermis.view()

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from dermis.errors import DermisError
-from dermis.viewer.browser.server import Address, Guard, acceptable, bind, is_local
+from dermis.viewer.browser.guard import Guard, acceptable, is_local
+from dermis.viewer.browser.server import Address, bind
 
 HOST = "127.0.0.1:8765"
 

@@ -21,7 +21,7 @@ from dermis.viewer.panel.sections import SECTIONS
 from dermis.viewer.state import ViewerState, same
 
 BUTTONS = {"undo", "redo", "help", "hide", "save", "load", "screenshot", "reset", "freeze"}
-BUTTONS |= {"open", "search", "bones"}
+BUTTONS |= {"open", "search", "bones", "size", "head", "seed", "dice", "path", "open file"}
 CAMERAS = {f"{name}##camera" for name in ("portrait", "three-quarter", "profile", "ear", "cheek")}
 NO_STATE = BUTTONS | CAMERAS | {section.title for section in SECTIONS} | {"regions"}
 STARTS: dict[str, Callable[[ViewerState], ViewerState]] = {
@@ -34,7 +34,7 @@ STARTS: dict[str, Callable[[ViewerState], ViewerState]] = {
 }
 EXPECTED = {
     "table": "show, profile, colour from, mix, roughness, rho_s, oiliness, BRDF, Fresnel, energy, "
-    "reflection, rig, strength, irradiance, inner cone, outer cone, softness, shadows, copy, remove, "
+    "reflection, rig, strength, irradiance, inner cone, outer cone, softness, shadows, copy, remove, add, "
     "environment, rotation, brightness, technique, stretch, seams, transmission, occlusion, atlas, "
     "shadow map, samples, exposure from, exposure, tone, gamma, bloom, background from, background, "
     "background blur",
@@ -53,7 +53,7 @@ def tall(make_driver: Callable[[], InputDriver]) -> InputDriver:
     studio: Any = driver.viewer.session.studio
     image = studio.last_image
     studio.pictures = lambda *_: (image, None)
-    driver.canvas.set_logical_size(400, 1500)
+    driver.canvas.set_logical_size(500, 1500)
     for section in SECTIONS:
         if section.applies(driver.viewer.session) and not section.is_open and section.title != "Timing":
             driver.press(section.title)

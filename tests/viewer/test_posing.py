@@ -14,6 +14,7 @@ from dermis.mesh.turns import angles_matrix
 from dermis.scene import Scene
 from dermis.scene.heads import load_head
 from dermis.scene.pose import Pose
+from dermis.viewer.history import History
 from dermis.viewer.posing import (
     angles_of,
     at_rest,
@@ -25,7 +26,7 @@ from dermis.viewer.posing import (
     with_moves,
     with_weight,
 )
-from dermis.viewer.state import History, ViewerState, load_state, same, save_state
+from dermis.viewer.state import ViewerState, load_state, same, save_state
 
 
 def test_a_slider_changes_its_own_weight(rigged_head: Head) -> None:

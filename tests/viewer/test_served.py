@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from offscreen_input import ADAPTER, SETTINGS
+from offscreen_input import SETTINGS
+from served_viewer import served
 
 from dermis.mesh.head import Head
 from dermis.scene.model import Scene
@@ -95,23 +96,8 @@ class Page:
 
 @pytest.fixture(scope="module")
 def viewer(head: Head) -> Iterator[Any]:
-    """One that a server shows, in a thread of its own; `viewer.url` is its page."""
-    from dermis.viewer.browser.canvas import PageCanvas
-    from dermis.viewer.browser.server import bind, server
-    from dermis.viewer.viewer import Viewer
-
-    listener, address = bind("127.0.0.1", 0)
-    with listener:
-        one: Any = Viewer(ViewerState(Scene(head), SETTINGS), PageCanvas(size=SIZE, max_fps=60), ADAPTER)
-        one.url = address.url
-        running = server(address)
-        thread = threading.Thread(target=running.run, kwargs={"sockets": [listener]}, daemon=True)
-        thread.start()
-        while not running.started:
-            time.sleep(0.05)
+    with served(ViewerState(Scene(head), SETTINGS), SIZE) as one:
         yield one
-        running.should_exit = True
-        thread.join(20.0)
 
 
 def visit(viewer: Any) -> Any:

@@ -12,7 +12,8 @@ from dermis.mesh.head import Head
 from dermis.scene import Environment, Scene, load_scene
 from dermis.scene.files import preset_lights
 from dermis.scene.skin import Pigments
-from dermis.viewer.state import History, ViewerState, load_state, same, save_state
+from dermis.viewer.history import History
+from dermis.viewer.state import ViewerState, load_state, same, save_state
 
 
 def full_state(state: ViewerState) -> ViewerState:

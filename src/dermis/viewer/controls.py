@@ -8,8 +8,9 @@ from typing import Any
 
 from dermis.scene.camera import preset
 from dermis.viewer.chart import ATLAS, Chart
+from dermis.viewer.history import History
 from dermis.viewer.navigation import dolly, drag_light, focus, orbit, pan, pick
-from dermis.viewer.state import History, ViewerState
+from dermis.viewer.state import ViewerState
 
 Event = Mapping[str, Any]
 Pair = tuple[float, float]
@@ -46,8 +47,7 @@ class Controls:
         elif kind == "pointer_move" and self._button:
             self._drag(event, size)
         elif kind == "pointer_up":
-            self._button, self._pinch = 0, None
-            self.history.end_gesture()
+            self._end(event, size)
         elif kind == "wheel":
             self._zoom(math.exp(_WHEEL * event["dy"]), (event["x"], event["y"]), size, "wheel")
         elif kind == "double_click":
@@ -67,6 +67,13 @@ class Controls:
         self._button = int(event.get("button", 0)) or _LEFT
         self._at = event["x"], event["y"]
         self._pinch = _pinch(event)
+
+    def _end(self, event: Event, size: Pair) -> None:
+        """Let go where the pointer is, to which no move may have led."""
+        if self._button and not self._pinch and (event["x"], event["y"]) != self._at:
+            self._drag(event, size)
+        self._button, self._pinch = 0, None
+        self.history.end_gesture()
 
     def _drag(self, event: Event, size: Pair) -> None:
         pinch, (x0, y0) = _pinch(event), self._at
@@ -153,10 +160,9 @@ class Split:
         kind = event["event_type"]
         if kind == "pointer_down" and self.before:
             self.held = abs(event["x"] - self.share * width) <= _GRAB
-        elif kind == "pointer_move" and self.held:
+        elif kind in ("pointer_move", "pointer_up") and self.held:
             self.share = min(1.0, max(0.0, event["x"] / max(1.0, width)))
-        elif kind == "pointer_up" and self.held:
-            self.held = False
+            self.held = kind == "pointer_move"
             return True
         return self.held
 

@@ -10,7 +10,8 @@ from dermis.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.scene.clips.clip import Clip
 from dermis.scene.clips.load import load_motion
-from dermis.viewer.state import History, ViewerState
+from dermis.viewer.history import History
+from dermis.viewer.state import ViewerState
 
 
 class MotionFile:

@@ -5,14 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from dermis.errors import refuse
+from dermis.errors import DermisError, refuse
 from dermis.scene.files import head_and_skin
 from dermis.scene.head_table import AUTO, HeadTable
 from dermis.scene.skin import Skin
 from dermis.viewer.controls import Controls, Split
+from dermis.viewer.heads import Heads
+from dermis.viewer.history import History
 from dermis.viewer.player import MotionFile, Player
-from dermis.viewer.state import PARTS, PICTURE, History, ViewerState, load_state, save_state
+from dermis.viewer.state import PARTS, PICTURE, ViewerState, load_state, save_state
 from dermis.viewer.studio import Studio
 
 
@@ -24,7 +27,11 @@ class Session:
 
     split : the before/after comparison
     status, message : text over the picture: the adapter's state, and the result of the last action
-    scene_file, picture_file, picture_size : what the panel's buttons write [pixel]
+    scene_file, picture_file : what the panel's buttons write
+    picture_size, view_size : of a screenshot, (0, 0) for that of the view; and of the view [pixel]
+    heads, head_file : what opens other heads, and the file that it is to open
+    ask_for_file : asks a page for a file; None where files have paths
+    offer : takes name and bytes of a file that a page offers as a download; None where files are written
     motion_file, search : what is opened, and which expressions the panel shows
     positions : of the panel's controls in the window, by label
     """
@@ -42,7 +49,11 @@ class Session:
         self.studio = studio
         self.split = Split()
         self.status = self.message = ""
-        self.scene_file, self.picture_file, self.picture_size = "scene.toml", "dermis.png", (1920, 1080)
+        self.scene_file, self.picture_file = "scene.toml", "dermis.png"
+        self.picture_size = self.view_size = 0, 0
+        self.heads, self.head_file = Heads(), ""
+        self.ask_for_file: Callable[[], None] | None = None
+        self.offer: Callable[[str, bytes], None] | None = None
         self.motion_file, self.search = motion.path if motion else "", ""
         self.positions: dict[str, tuple[float, float]] = {}
 
@@ -62,11 +73,11 @@ class Session:
         self.message = ""
 
     def save(self, path: Path) -> None:
-        """Write the scene file.
+        """Write the scene file, or offer it as a download.
 
         Raises DermisError when that is not possible.
         """
-        save_state(path, self.shown)
+        self._write(path, lambda target: save_state(target, self.shown))
         self.message = f"saved {path}"
 
     def load(self, path: Path) -> None:
@@ -79,6 +90,17 @@ class Session:
         self.change(state)
         self.message = f"loaded {path}"
 
+    def take_head(self) -> None:
+        """Show the head that was opened meanwhile, if there is one, or tell why it cannot be."""
+        try:
+            state = self.heads.take(self.state)
+        except DermisError as error:
+            self.message = str(error)
+            return
+        if state is not None:
+            self.player.stop()
+            self.change(state)
+
     def open_motion(self, path: str) -> None:
         """Play the motion of a file.
 
@@ -88,7 +110,7 @@ class Session:
         self.message = f"opened {path}"
 
     def screenshot(self, path: Path, size: tuple[int, int]) -> None:
-        """Write the picture at any size: .png with the tone curve or .exr, linear.
+        """Write the picture at any size, or offer it as a download: .png with the tone curve or .exr, linear.
 
         Raises DermisError when that is not possible.
         """
@@ -97,8 +119,17 @@ class Session:
             refuse(f"picture {path}", "a name that ends in .png or .exr", f"{path.name!r} came", "Change it")
         if kind == ".exr" and view not in (PICTURE, *PARTS):
             refuse(f"view {view} as .exr", "a view of linear light", "its numbers are colours", "Take .png")
-        self.studio.screenshot(path, self.shown, size)
+        self._write(path, lambda target: self.studio.screenshot(target, self.shown, size))
         self.message = f"wrote {path}, {size[0]} x {size[1]}"
+
+    def _write(self, path: Path, write: Callable[[Path], None]) -> None:
+        if self.offer is None:
+            write(path)
+            return
+        with TemporaryDirectory(prefix="dermis-") as folder:
+            target = Path(folder) / path.name
+            write(target)
+            self.offer(path.name, target.read_bytes())
 
 
 def apply_regions(state: ViewerState, name: str, known: Iterable[ViewerState] = ()) -> ViewerState:

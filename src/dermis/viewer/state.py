@@ -1,13 +1,15 @@
-"""What the viewer shows, as immutable data: every change makes a new state, which the undo history keeps."""
+"""What the viewer shows, as immutable data: every change makes a new state."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 from dermis.errors import refuse
+from dermis.human.person import Human
 from dermis.mesh.head import Head
 from dermis.scene.camera import Camera
 from dermis.scene.clips.clip import Clip
@@ -17,6 +19,7 @@ from dermis.scene.head_table import names_regions
 from dermis.scene.heads import load_head
 from dermis.scene.lights import NO_LIGHTS, Light
 from dermis.scene.model import Scene
+from dermis.scene.people import skin_of
 from dermis.scene.plain import Plain
 from dermis.scene.pose import Pose
 from dermis.scene.saving import save_scene
@@ -29,7 +32,6 @@ P = TypeVar("P", bound=Plain)
 PICTURE = "picture"
 PARTS = {"diffuse": "diffuse", "specular": "specular"}
 """Views that are the picture with part of its light, by the value of `Settings.parts`."""
-_MOST_STEPS = 200  # of the undo history
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +161,26 @@ def named_state(name: str) -> ViewerState:
     if Path(name).suffix.lower() == ".toml":
         return load_state(Path(name))
     path = str(Path(name).resolve()) if Path(name).is_file() else name
-    return ViewerState(Scene(load_head(name)), head={"name": path})
+    return ViewerState(Scene(load_head(name)), Settings(**PHOTOGRAPHED), {"name": path})
+
+
+def state_of(shown: Head | Human | Scene | ViewerState | str | os.PathLike[str]) -> ViewerState:
+    """What is to be seen first: a head or a person in studio light, a scene, or one of them by name.
+
+    Raises DermisError for anything else.
+    """
+    if isinstance(shown, ViewerState):
+        return shown
+    if isinstance(shown, Human):
+        return ViewerState(Scene(shown.head(), skin=skin_of(shown)), Settings(**PHOTOGRAPHED))
+    if isinstance(shown, Head):
+        return ViewerState(Scene(shown), Settings(**PHOTOGRAPHED))
+    if isinstance(shown, Scene):
+        return ViewerState(shown, Settings(**PHOTOGRAPHED), rig="")
+    if not isinstance(shown, str | os.PathLike):
+        came = f"a {type(shown).__name__} came"
+        refuse("view", "a head, a person, a scene or a name", came, "Try dermis.Human()")
+    return named_state(os.fspath(shown))
 
 
 def load_state(path: Path, before: ViewerState | None = None) -> ViewerState:
@@ -178,63 +199,3 @@ def opened(scene: Scene, settings: Settings, head: Mapping[str, Any], rig: str) 
     """The first state of a scene: `Settings.parts` becomes the view."""
     view = settings.parts if settings.parts in PARTS else PICTURE
     return ViewerState(scene, changed(settings, parts="all"), head, view, rig)
-
-
-class History:
-    """Undo history of states.
-
-    A gesture (a drag, a slider held down) changes the state many times and is undone in one step.
-    """
-
-    def __init__(self, state: ViewerState) -> None:
-        self._past = [state]
-        self._undone: list[ViewerState] = []
-        self._gesture = ""
-
-    @property
-    def state(self) -> ViewerState:
-        """The current state."""
-        return self._past[-1]
-
-    @property
-    def states(self) -> list[ViewerState]:
-        """All states, those that were undone included."""
-        return [*self._past, *self._undone]
-
-    @property
-    def can_undo(self) -> bool:
-        """Whether there is an earlier state."""
-        return len(self._past) > 1
-
-    @property
-    def can_redo(self) -> bool:
-        """Whether the last step was an undo."""
-        return bool(self._undone)
-
-    def change(self, state: ViewerState, gesture: str = "") -> None:
-        """Add a state; during one gesture it replaces the last one."""
-        if same(state, self.state):
-            return
-        if gesture and gesture == self._gesture:
-            self._past[-1] = state
-        else:
-            self._past.append(state)
-            del self._past[: -_MOST_STEPS - 1]
-        self._gesture = gesture
-        self._undone.clear()
-
-    def end_gesture(self) -> None:
-        """Make the next change a step of its own."""
-        self._gesture = ""
-
-    def undo(self) -> None:
-        """Go back one step."""
-        self.end_gesture()
-        if self.can_undo:
-            self._undone.append(self._past.pop())
-
-    def redo(self) -> None:
-        """Repeat the step undone last."""
-        self.end_gesture()
-        if self._undone:
-            self._past.append(self._undone.pop())

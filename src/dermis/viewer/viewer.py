@@ -53,6 +53,7 @@ class Viewer:
         self._adapter, self._clock = adapter, clock
         self._context = canvas.get_wgpu_context()
         self.session = Session(state, Studio(adapter), motion, clock)
+        self._connect()
         self.session.player.play()
         self.panel = Panel(self.session)
         self._easing = Easing(state.scene.camera)
@@ -62,7 +63,7 @@ class Viewer:
         self._refused: ViewerState | None = None
         self._failures = self._panel_frames = 0
         self.failure: Exception | None = None
-        self._on_panel = False
+        self._on_panel, self._pressed_left = False, 0.0
         self._open()
         canvas.add_event_handler(self._on_event, *_POINTER, *_KEYS)
         canvas.request_draw(self.draw)
@@ -88,19 +89,16 @@ class Viewer:
         final = studio.is_current or self._refused is state
         return arrived and final and not self._is_moving(self._clock())
 
-    def _repr_mimebundle_(self, **options: Any) -> Any:
-        """What a notebook displays."""
-        return self.canvas._repr_mimebundle_(**options)
-
     def _draw(self, now: float) -> None:
         session, size = self.session, self._picture_size()
+        session.take_head()
         session.player.advance()
         state, elapsed = session.shown, min(now - self._last_draw, _LONGEST_STEP_S)
         before = self._easing.camera
         camera = self._easing.advance(state.scene.camera, elapsed)
         if state is not self._last_state or camera != before or size != self._last_size:
             self._last_change, self._last_state, self._last_size = now, state, size
-        self._last_draw = now
+        self._last_draw, session.view_size = now, size
         images = self._images(state, camera, size, self._is_moving(now))
         session.status = self._status(size)
         target = self._context.get_current_texture().create_view()
@@ -174,10 +172,13 @@ class Viewer:
         self.canvas.request_draw()
 
     def _on_picture(self, event: dict[str, Any]) -> None:
-        """Handle an event over the picture, which begins where the panel ends."""
+        """Handle an event over the picture, which begins where the panel ended at the press."""
         width, height = self.canvas.get_logical_size()
         left = self.panel.width((width, height))
-        moved, size = shifted(event, left), (max(1.0, width - left), height)
+        if event["event_type"] == "pointer_down":
+            self._pressed_left = left
+        start = self._pressed_left if event["event_type"] in ("pointer_move", "pointer_up") else left
+        moved, size = shifted(event, start), (max(1.0, width - left), height)
         if not self.session.split.handle(moved, size[0]):
             self.session.controls.handle(moved, size)
 
@@ -188,6 +189,16 @@ class Viewer:
         self._context.configure(device=device.handle, format=format_)
         self._blit = Blit(device, format_)
         self.panel.open(device, format_)
+
+    def _connect(self) -> None:
+        """Let files come from and go to a page, which may be on another machine."""
+        canvas, session = self.canvas, self.session
+        session.offer = getattr(canvas, "offer", None)
+        session.ask_for_file = getattr(canvas, "ask_for_file", None)
+        if session.ask_for_file:
+            canvas.on_file = lambda path: session.heads.open(str(path))
+        loop = canvas._rc_canvas_group.get_loop()
+        session.heads.wake = lambda: loop and loop.call_soon_threadsafe(canvas.request_draw)
 
     def _recover(self, error: Exception) -> None:
         """Open the device again after it was lost or ran out of memory."""

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import importlib
+import os
 import warnings
 from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NoReturn
 
 from dermis.errors import refuse
+from dermis.human.person import Human
+from dermis.mesh.head import Head
+from dermis.scene.model import Scene
 from dermis.viewer.player import MotionFile
-from dermis.viewer.state import ViewerState, named_state
+from dermis.viewer.state import ViewerState, state_of
 from dermis.viewer.viewer import Viewer
 
 Size = tuple[int, int]
@@ -61,35 +67,46 @@ def serve(
     """
     _backend("http", ("uvicorn", "websockets"), "viewer")
     from dermis.viewer.browser.canvas import PageCanvas
-    from dermis.viewer.browser.server import bind, is_local, server
+    from dermis.viewer.browser.guard import is_local
+    from dermis.viewer.browser.server import bind, server
 
     listener, address = bind(host, port, secret=secret)
-    with listener:
+    with listener, TemporaryDirectory(prefix="dermis-") as folder:
         canvas = PageCanvas(size=size, title=_TITLE, max_fps=_MOST_FPS)
         viewer = Viewer(state, canvas, adapter, motion=motion)
         viewer.canvas._size_info.set_physical_size(*size, 1.0)
         announce(address.url, not is_local(host))
-        pages = server(address)
+        pages = server(address, canvas, Path(folder))
         # rendercanvas handles Ctrl+C by closing the canvas; without this the server would keep running.
         viewer.canvas.add_event_handler(lambda event: setattr(pages, "should_exit", True), "close")
         pages.run(sockets=[listener])
     _raise_failure(viewer)
 
 
-def notebook_viewer(
-    shown: ViewerState | str = "human", adapter: str = "auto", size: Size = (720, 540), motion: str = ""
-) -> Viewer:
-    """A viewer for a notebook cell to display.
+def view(
+    shown: Head | Human | Scene | ViewerState | str | os.PathLike[str] = "human",
+    adapter: str = "auto",
+    size: Size = (720, 540),
+    motion: str = "",
+) -> Any:
+    """A widget that shows a head in a notebook, to turn it and to change skin and light.
 
-    shown : a state, or what `dermis view` takes: a built-in head, a sample, a mesh file, a TOML scene
+    shown : a head, a person, a scene, or what `dermis view` takes: human, a sample, a mesh file, a TOML scene
+    adapter : "auto", "cpu" or part of an adapter's name
+    size : of the widget, logical
     motion : a file that `load_motion` takes, empty for none
+
+    The widget is an anywidget, to be displayed as the last line of a cell, and its `viewer` the `Viewer`
+    behind it, with the current state in `viewer.session.state`.
 
     Raises DermisError for anything else, and without the extra `notebook`.
     """
     canvas = _notebook_canvas(_backend("anywidget", ("anywidget",), "notebook"))
-    state = shown if isinstance(shown, ViewerState) else named_state(shown)
+    state = state_of(shown)
     played = MotionFile(motion) if motion else None
-    return Viewer(state, canvas(size=size, max_fps=_MOST_FPS), adapter, motion=played)
+    widget = canvas(size=size, max_fps=_MOST_FPS)
+    widget.viewer = Viewer(state, widget, adapter, motion=played)
+    return widget
 
 
 def _notebook_canvas(backend: Any) -> Any:

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import asyncio
 import io
+import secrets
 import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rendercanvas.http import HttpRenderCanvas
+from rendercanvas.http import HttpRenderCanvas, asgi
+
+from dermis.viewer.heads import HEAD_FILES
 
 _QUALITY = 88
 _LOSSLESS_AFTER_S = 0.3
+_TICKET_BYTES = 18
 _ENCODERS = 2  # frames encoded at the same time, while the next one is drawn
 
 
@@ -26,7 +32,24 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         self._encoding = 0  # lossy frames being encoded
         self._drawn = self._sent = 0  # numbers of the last frame drawn and of the last one sent
         self._lossless = 0  # number of the current lossless frame, 0 when a newer frame has replaced it
+        self._ticket_holder = 0
+        self.ticket = ""  # of the page that has control, for files that it sends
+        self.on_file: Callable[[Path], None] = lambda path: None
         super().__init__(**given)
+
+    def ask_for_file(self) -> None:
+        """Let the page that has control choose a file to send."""
+        asgi.send_to({"type": "choose", "kinds": ",".join(HEAD_FILES)}, [], self._active_client)
+
+    def _update_active_states(self) -> None:
+        super()._update_active_states()
+        if self._active_client != self._ticket_holder:
+            self.ticket, self._ticket_holder = secrets.token_urlsafe(_TICKET_BYTES), self._active_client
+            asgi.send_to({"type": "ticket", "value": self.ticket}, [], self._active_client)
+
+    def offer(self, name: str, data: bytes) -> None:
+        """Send a file to the page that has control, which offers it as a download."""
+        asgi.send_to({"type": "download", "name": name, "nbuffers": 1}, [data], self._active_client)
 
     def _on_event(self, event: dict[str, Any], id: int) -> None:
         kind = str(event.get("type"))

@@ -1,6 +1,8 @@
 // What rendercanvas' page lacks: it reconnects, works behind https, sends pinch gestures, and reports its size when
 // it becomes active.
 
+import { take } from './files.js'
+
 const RETRY_MS = 1000
 const TAPS_MS = 350
 const TAPS_PX = 24
@@ -8,6 +10,12 @@ const WATCHING = 'watching: another page has control'
 const LOST = 'connection lost, reconnecting …'
 const OUR_KEYS = ['Tab', 'F1']
 const OUR_KEYS_WITH_CONTROL = ['z', 'y', 's']
+
+// Moves are sent at once, for one that waits would come after the release; the server merges those that queue.
+window.BaseRenderView.prototype.setThrottle = function (throttle) {
+  this._moveThrottle = 0
+  this._wheelThrottle = throttle
+}
 
 const notice = document.getElementById('notice')
 
@@ -32,7 +40,8 @@ setInterval(() => {
 }, RETRY_MS)
 
 function hear (event) {
-  const message = typeof event.data === 'string' ? JSON.parse(event.data) : {}
+  const message = typeof event.data === 'string' ? JSON.parse(event.data) : { bytes: event.data }
+  take(message)
   if (message.type !== 'active') { return }
   notice.textContent = message.value ? '' : WATCHING
   if (message.value) {

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 from imgui_bundle import imgui
@@ -20,6 +21,7 @@ _HDR = int(imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.hdr)
 _FORMS = {"_per_mm": "%.3g", "_mm": "%.4g mm", "_degrees": "%.4g°"}  # by the unit that a name ends in
 _ALL_NAMES = int(imgui.ComboFlags_.height_largest)
 _TOOLTIP_WIDTH = 260.0
+_AS_THEY_ARE: Mapping[str, str] = MappingProxyType({})
 _OWN = "own"
 _MOST_ROWS = 14  # that are seen of many like controls
 
@@ -28,11 +30,12 @@ _MOST_ROWS = 14  # that are seen of many like controls
 class Style:
     """How a field is shown where the panel departs from the model.
 
-    label : instead of the field's name
+    label : instead of the field's name; in "shown###name" the name is what positions and undo know it by
     span : range of the slider, instead of the model's
     unit : of the numbers shown, in units of the field
     form : printf format of the numbers shown
     options : the whole numbers to choose from
+    called : what people call the field's words
     own : makes the first value of one's own where a field may also be a word
     """
 
@@ -41,6 +44,7 @@ class Style:
     unit: float = 1.0
     form: str = ""
     options: tuple[int, ...] = ()
+    called: Mapping[str, str] = field(default_factory=dict)
     own: Callable[[Session], Any] | None = None
 
 
@@ -95,7 +99,7 @@ def _draw_field(session: Session, values: Plain, name: str, apply: Apply, style:
         result = imgui.slider_float3(label, list(value), span.low, span.high, "%.3g", _LOG)
         hold(session, label, result, lambda found: put(tuple(clamped(one, span) for one in found)))
     elif len(words := choices_of(kind, name)) > 1:
-        combo(session, label, str(value), words, put)
+        combo(session, label, str(value), words, put, called=style.called)
     else:
         return
     explain(help_of(kind, name))
@@ -168,14 +172,28 @@ def hold(session: Session, label: str, result: tuple[bool, Any], put: Put) -> No
         session.history.end_gesture()
 
 
-def combo(session: Session, label: str, current: str, names: Iterable[str], put: Put) -> None:
-    """One of some names."""
-    if not imgui.begin_combo(label, current, _ALL_NAMES):
+def combo(
+    session: Session,
+    label: str,
+    current: str,
+    names: Iterable[str],
+    put: Put,
+    called: Mapping[str, str] = _AS_THEY_ARE,
+) -> None:
+    """One of some names.
+
+    names : "" is a line between two groups
+    called : what is shown instead of a name
+    """
+    if not imgui.begin_combo(label, called.get(current, current), _ALL_NAMES):
         record_position(session, label)
         return
     for name in names:
-        clicked, _ = imgui.selectable(name, name == current)
-        record_position(session, f"{label}/{name}")
+        if not name:
+            imgui.separator()
+            continue
+        clicked, _ = imgui.selectable(f"{called.get(name, name)}###{name}", name == current)
+        record_position(session, f"{_key(label)}/{name}")
         if clicked and name != current:
             attempt(session, lambda chosen=name: session.change(put(chosen)))  # type: ignore[misc]
     imgui.end_combo()
@@ -189,10 +207,17 @@ def button(session: Session, label: str) -> bool:
 
 
 def record_position(session: Session, label: str) -> None:
-    """Record where the item drawn last is: a point in its left part, which is never its label."""
+    """Record where the item drawn last is: a point in its left part, which is never its label.
+
+    label : of which the part after "###", if it has one, is the key
+    """
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
     x = float(low.x) + min(20.0, 0.5 * float(high.x - low.x))
-    session.positions[label] = x, 0.5 * float(low.y + high.y)
+    session.positions[_key(label)] = x, 0.5 * float(low.y + high.y)
+
+
+def _key(label: str) -> str:
+    return label.rpartition("###")[2]
 
 
 def attempt(session: Session, act: Callable[[], None]) -> None:

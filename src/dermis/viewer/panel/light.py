@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from imgui_bundle import imgui
 
 from dermis.mesh.samples import SAMPLES
 from dermis.scene.environment import Environment
-from dermis.scene.lights import Light, SpotLight, light_presets
+from dermis.scene.lights import LIGHTS, Light, SpotLight, light_presets
 from dermis.scene.plain import Range
 from dermis.viewer.panel.fields import Style, attempt, button, combo, draw_fields, slider
+from dermis.viewer.panel.words import LIGHT, LIGHT_KINDS
 from dermis.viewer.session import Session
 from dermis.viewer.state import ViewerState, changed
 
 _CUSTOM = "custom"
 _NO_ENVIRONMENT = "none"
 _STOPS = Range(-6.0, 4.0)
+_PLACE = (-500.0, 400.0, 800.0)  # of a new light, from the upper left of the portrait [mm]
 _FADE = 0.5  # least width over which a cone fades [degrees]
 _ENVIRONMENT = {"exposure": Style("brightness")}
 
@@ -25,10 +28,22 @@ def draw_lights(session: Session) -> None:
     """The rig, the light that Shift and drag moves, and the environment."""
     combo(session, "rig", session.state.rig or _CUSTOM, light_presets(), session.state.with_rig)
     _select(session)
+    combo(session, "add", "a light", LIGHTS, lambda kind: _added(session, kind), LIGHT_KINDS)
     lights, index = session.state.scene.lights, session.controls.light
     if index < len(lights):
         _light(session, index, lights[index])
     _environment(session)
+
+
+def _added(session: Session, kind: str) -> ViewerState:
+    """The state with a light of that kind more, which is selected."""
+    places = {"position": _PLACE, "direction": tuple(-one for one in _PLACE)}
+    required = {name for name, field in LIGHTS[kind].model_fields.items() if field.is_required()}
+    told: dict[str, Any] = {name: place for name, place in places.items() if name in required}
+    lights = session.state.scene.lights
+    made = session.state.with_lights([*lights, LIGHTS[kind](**told)])
+    session.controls.light = len(lights)
+    return made
 
 
 def _select(session: Session) -> None:
@@ -53,9 +68,9 @@ def _light(session: Session, index: int, light: Light) -> None:
         factor = 2.0**stops * math.pi / strength
         return apply(irradiance=tuple(factor * c for c in light.irradiance))
 
-    imgui.text_disabled(f"{light.kind}, Shift and drag to move")
+    imgui.text_disabled(f"{LIGHT_KINDS.get(light.kind, light.kind)}, Shift and drag to move")
     slider(session, "strength", math.log2(strength / math.pi), scale, _STOPS, "%.2f stops")
-    draw_fields(session, light, apply, _cone(light))
+    draw_fields(session, light, apply, LIGHT | _cone(light))
     if button(session, "copy"):  # refused when there are too many
         lights = session.state.scene.lights
         attempt(session, lambda: session.change(session.state.with_lights([*lights, light])))

@@ -37,7 +37,8 @@ def can_move(session: Session) -> bool:
 def draw_expressions(session: Session) -> None:
     """Sliders of the morph targets whose names hold what is searched for, and of the bones."""
     head = session.state.scene.head
-    _, session.search = imgui.input_text_with_hint("##search", "search", session.search)
+    cleared = int(imgui.InputTextFlags_.escape_clears_all)
+    _, session.search = imgui.input_text_with_hint("##search", "search", session.search, cleared)
     record_position(session, "search")
     imgui.same_line()
     if button(session, "rest"):

@@ -26,6 +26,7 @@ SHORTCUTS = (
     ("Ctrl and click", "type a slider's value"),
     ("Ctrl+S", "save the scene"),
     ("Tab", "hide or show the panel"),
+    ("Escape", "close a list or this help, clear the search"),
     ("? or H", "hide or show this help"),
 )
 _MARGIN, _NARROWEST_TEXT = 10.0, 80.0

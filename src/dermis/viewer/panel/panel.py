@@ -6,50 +6,41 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import imgui_bundle
 from imgui_bundle import imgui, implot
-from wgpu.utils.imgui import ImguiRenderer, ImguiWgpuBackend
+from wgpu.utils.imgui import ImguiWgpuBackend
 
 from dermis.gpu import Device
+from dermis.viewer.panel.feeding import POINTER, feed_key, feed_pointer
 from dermis.viewer.panel.fields import attempt, button, record_position
 from dermis.viewer.panel.overlay import HELP_KEYS, PLAY_KEY, draw_divider, draw_help, draw_messages
 from dermis.viewer.panel.sections import SECTIONS
+from dermis.viewer.panel.style import set_style
 from dermis.viewer.session import Session
 
-_WIDTH, _FONT_SIZE = 290.0, 15.0
+_WIDTH, _CONTROLS = 330.0, 0.5  # of the panel, and their share of it
 _MOST_OF_WINDOW, _LEAST_SCALE = 0.5, 0.8  # of text in a narrow panel
+_NARROW, _PHONE = 400.0, 480.0  # less wide windows have a drawer; the latter is for phones held upright
+_UPRIGHT = 1.4  # height over width, at least
+_DRAWER = 0.86  # of the window's width
+_FINGER = 8.0  # room around text for a finger
 _MARGIN, _FAINT = 8.0, 0.6  # of the button that brings the panel back
-_WHEEL = 0.01
-_POINTER = ("pointer_down", "pointer_move", "pointer_up", "double_click", "wheel")
-_GREYS = (  # without hues, which would affect how the skin beside them is judged
-    ("window_bg", 0.08),
-    ("frame_bg", 0.18),
-    ("frame_bg_hovered", 0.26),
-    ("frame_bg_active", 0.32),
-    ("slider_grab", 0.42),  # dark enough for the number over it
-    ("slider_grab_active", 0.55),
-    ("check_mark", 0.8),
-    ("checkbox_selected_bg", 0.26),
-    ("button", 0.26),
-    ("button_hovered", 0.36),
-    ("button_active", 0.46),
-    ("header", 0.22),
-    ("header_hovered", 0.32),
-    ("header_active", 0.4),
-    ("text_selected_bg", 0.4),
-    ("nav_cursor", 0.6),
-)
 
 
 class Panel:
-    """Draws the sections, and decides which events are for the panel."""
+    """Draws the sections, and decides which events are for the panel.
+
+    visible : whether it is there in a window of some width
+    opened : whether it is there in a narrow window, as a drawer over the picture
+    """
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self.visible, self.shows_help = True, False
+        self.visible, self.opened, self.shows_help = True, False, False
+        self._size = (0.0, 0.0)
         self._is_new = self._has_popup = self._scrolls = False
         self._button_end = (0.0, 0.0)
         self._context: Any = None
+        self.label_width = 0.0  # right of the controls, logical
 
     def open(self, device: Device, target: str) -> None:
         """Create the resources for drawing into textures of a format."""
@@ -57,33 +48,44 @@ class Panel:
         self._context = imgui.create_context()
         self._plots = implot.create_context()
         self._enter()
-        _set_style()
+        set_style()
         self._is_new = True
         self._device = device
         self._backend = ImguiWgpuBackend(device.handle, target)
 
     def width(self, size: tuple[float, float]) -> float:
-        """Of the panel in a window of that size, logical; 0 when it is hidden."""
-        return round(min(_WIDTH, _MOST_OF_WINDOW * size[0])) if self.visible else 0.0
+        """Of what the panel takes from the picture in a window of that size, logical."""
+        return 0.0 if is_drawer(size) else self._reach(size)
+
+    def _reach(self, size: tuple[float, float]) -> float:
+        """Of what it covers, logical; 0 when it is hidden."""
+        share, there = (_DRAWER, self.opened) if is_drawer(size) else (_MOST_OF_WINDOW, self.visible)
+        return round(min(_WIDTH, share * size[0])) if there else 0.0
+
+    def toggle(self) -> None:
+        """Hide or show it."""
+        if is_drawer(self._size):
+            self.opened = not self.opened
+        else:
+            self.visible = not self.visible
 
     def feed(self, event: Mapping[str, Any], size: tuple[float, float]) -> bool:
         """Process an event; returns whether it was for the panel, not for the picture."""
         self._enter()
+        self._size = size
         io, kind = imgui.get_io(), event["event_type"]
         if kind == "key_down" and not io.want_text_input and self._shortcut(event):
             return True
-        if kind == "pointer_down" and event["x"] >= self.width(size):
+        if kind == "pointer_down" and event["x"] >= self._reach(size):
             self.shows_help = False
-        if kind in _POINTER:
-            _feed_pointer(io, event)
-            return self._covers(event["x"], event["y"], size)
+        if kind in POINTER:
+            covers = self._covers(event["x"], event["y"], size)  # before a press closes a list
+            feed_pointer(event, lambda: self._frame(size))
+            return covers
         if kind == "pointer_leave":
             io.add_mouse_pos_event(-1e6, -1e6)
             return False
-        if kind == "char":
-            io.add_input_characters_utf8(event.get("data") or event.get("char_str") or "")
-        else:
-            _feed_key(io, str(event["key"]), kind == "key_down")
+        feed_key(event, lambda: self._frame(size))
         return bool(io.want_text_input)
 
     def draw(self, target: Any, size: tuple[float, float], pixel_ratio: float) -> None:
@@ -92,9 +94,19 @@ class Panel:
         size : of the window, logical
         """
         self._enter()
-        io = imgui.get_io()
-        io.display_size = imgui.ImVec2(*size)
-        io.display_framebuffer_scale = imgui.ImVec2(pixel_ratio, pixel_ratio)
+        imgui.get_io().display_framebuffer_scale = imgui.ImVec2(pixel_ratio, pixel_ratio)
+        self._frame(size)
+        encoder = self._device.handle.create_command_encoder()
+        attachment = {"view": target, "load_op": "load", "store_op": "store"}
+        render_pass = encoder.begin_render_pass(label="panel", color_attachments=[attachment])
+        self._backend.render(imgui.get_draw_data(), render_pass)
+        render_pass.end()
+        self._device.handle.queue.submit([encoder.finish()])
+
+    def _frame(self, size: tuple[float, float]) -> None:
+        """Let Dear ImGui see the events so far, and lay out what `draw` draws."""
+        self._size = size
+        imgui.get_io().display_size = imgui.ImVec2(*size)
         for _ in range(2 if self._is_new else 1):  # the first frame of a window only measures it
             self._is_new = False
             imgui.new_frame()
@@ -102,12 +114,6 @@ class Panel:
                 self._draw_windows(size)
             finally:
                 imgui.render()
-        encoder = self._device.handle.create_command_encoder()
-        attachment = {"view": target, "load_op": "load", "store_op": "store"}
-        render_pass = encoder.begin_render_pass(label="panel", color_attachments=[attachment])
-        self._backend.render(imgui.get_draw_data(), render_pass)
-        render_pass.end()
-        self._device.handle.queue.submit([encoder.finish()])
 
     def _shortcut(self, event: Mapping[str, Any]) -> bool:
         """Whether a key was a shortcut of the panel."""
@@ -117,11 +123,26 @@ class Panel:
                 return False
             attempt(session, lambda: session.save(Path(session.scene_file)))
         elif key == "Tab":
-            self.visible = not self.visible
-        elif key in HELP_KEYS or (key == "Escape" and self.shows_help):
+            self.toggle()
+        elif key == "Escape":
+            return self._escape()
+        elif key in HELP_KEYS:
             self.shows_help = not self.shows_help
         elif key == PLAY_KEY and session.player.clip is not None:
             session.player.toggle()
+        else:
+            return False
+        return True
+
+    def _escape(self) -> bool:
+        """Close what is open, the topmost first; returns whether there was something."""
+        if self._has_popup:
+            imgui.internal.close_popup_to_level(0, False)
+            self._has_popup = False
+        elif self.shows_help:
+            self.shows_help = False
+        elif self._session.search:
+            self._session.search = ""
         else:
             return False
         return True
@@ -132,20 +153,26 @@ class Panel:
 
     def _covers(self, x: float, y: float, size: tuple[float, float]) -> bool:
         """Whether a pointer there is over the panel; Dear ImGui would know it only a frame later."""
-        on_button = not self.visible and x < self._button_end[0] and y < self._button_end[1]
-        return x < self.width(size) or on_button or self._has_popup or bool(imgui.is_any_item_active())
+        reach = self._reach(size)
+        on_button = not reach and x < self._button_end[0] and y < self._button_end[1]
+        return x < reach or on_button or self._has_popup or bool(imgui.is_any_item_active())
 
     def _draw_windows(self, size: tuple[float, float]) -> None:
         """The panel, or the button that brings it back, and the overlay."""
-        if self.visible:
+        room = _FINGER if is_drawer(size) else imgui.get_style().frame_padding.y
+        padding = imgui.ImVec2(imgui.get_style().frame_padding.x, room)
+        imgui.push_style_var(int(imgui.StyleVar_.frame_padding), padding)
+        if self._reach(size):
             self._draw_panel(size)
         else:
             self._draw_button()
+        imgui.pop_style_var()
         left, session = self.width(size), self._session
         if self.shows_help:
             draw_help(left, size)
         draw_divider(session.split, left, size)
-        draw_messages([line for line in (session.message, session.status) if line], left, size)
+        lines = session.message, session.heads.note, "" if self._reach(size) > left else session.status
+        draw_messages([line for line in lines if line], left, size)
 
     def _draw_button(self) -> None:
         """A button in the corner of the picture."""
@@ -154,21 +181,24 @@ class Panel:
         flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_background
         imgui.push_style_var(int(imgui.StyleVar_.alpha), _FAINT)
         imgui.begin("corner", None, int(flags | imgui.WindowFlags_.always_auto_resize))
-        self.visible = button(self._session, "panel")
+        if button(self._session, "panel"):
+            self.toggle()
         end = imgui.get_item_rect_max()
         self._button_end = float(end.x) + _MARGIN, float(end.y) + _MARGIN
         imgui.end()
         imgui.pop_style_var()
 
     def _draw_panel(self, size: tuple[float, float]) -> None:
-        session, width = self._session, self.width(size)
+        session, width = self._session, self._reach(size)
         imgui.get_style().font_scale_main = max(_LEAST_SCALE, min(1.0, width / _WIDTH))
         imgui.set_next_window_pos(imgui.ImVec2(0.0, 0.0))
         imgui.set_next_window_size(imgui.ImVec2(width, size[1]))
         fixed = imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_collapse
         imgui.begin("dermis", None, int(fixed | imgui.WindowFlags_.no_title_bar))
         self._draw_toolbar()
-        imgui.push_item_width(0.58 * width)
+        imgui.push_item_width(_CONTROLS * width)
+        gap = imgui.get_style().item_inner_spacing.x
+        self.label_width = imgui.get_content_region_avail().x - _CONTROLS * width - gap
         for section in (one for one in SECTIONS if one.applies(session)):
             flags = int(imgui.TreeNodeFlags_.default_open) if section.is_open else 0
             is_open = imgui.collapsing_header(section.title, flags)
@@ -192,7 +222,8 @@ class Panel:
             imgui.same_line()
         self.shows_help ^= button(self._session, "help")
         imgui.same_line()
-        self.visible = not button(self._session, "hide")
+        if button(self._session, "hide"):
+            self.toggle()
 
     def _scroll_by_touch(self) -> None:
         """Scroll with a drag that began beside all controls: fingers have no wheel."""
@@ -202,34 +233,7 @@ class Panel:
             imgui.set_scroll_y(imgui.get_scroll_y() - imgui.get_io().mouse_delta.y)
 
 
-def _feed_pointer(io: Any, event: Mapping[str, Any]) -> None:
-    kind = event["event_type"]
-    io.add_mouse_pos_event(event["x"], event["y"])
-    if kind in ("pointer_down", "pointer_up"):
-        io.add_mouse_button_event(max(0, event["button"] - 1), kind == "pointer_down")
-    elif kind == "wheel":
-        io.add_mouse_wheel_event(-_WHEEL * event["dx"], -_WHEEL * event["dy"])
-
-
-def _feed_key(io: Any, name: str, down: bool) -> None:
-    key = ImguiRenderer.KEY_MAP.get(name)
-    if key is None and len(name) == 1 and name.isascii() and name.isalnum():
-        key = getattr(imgui.Key, f"_{name}" if name.isdigit() else name.lower(), None)
-    if key is not None:
-        io.add_key_event(key, down)
-    if name in ImguiRenderer.KEY_MAP_MOD:
-        io.add_key_event(ImguiRenderer.KEY_MAP_MOD[name], down)
-
-
-def _set_style() -> None:
-    """A legible font on a dark ground."""
-    io, style = imgui.get_io(), imgui.get_style()
-    font = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "Roboto" / "Roboto-Regular.ttf"
-    if font.is_file():
-        io.fonts.add_font_from_file_ttf(str(font), _FONT_SIZE)
-    imgui.style_colors_dark()
-    io.fonts.flags |= int(imgui.ImFontAtlasFlags_.no_baked_lines)  # some backends cannot draw them
-    style.window_rounding, style.frame_rounding, style.window_border_size = 0.0, 3.0, 0.0
-    for name, grey in _GREYS:
-        if hasattr(imgui.Col_, name):  # some need a newer version
-            style.set_color_(int(getattr(imgui.Col_, name)), imgui.ImVec4(grey, grey, grey, 1.0))
+def is_drawer(size: tuple[float, float]) -> bool:
+    """Whether a window of that size is too narrow for the panel beside the picture, as a phone is."""
+    width, height = size
+    return width < (_PHONE if height > _UPRIGHT * width else _NARROW)

@@ -15,17 +15,20 @@ from imgui_bundle import imgui
 from dermis.scene.plain import choices_of
 from dermis.viewer.chart import ATLAS
 from dermis.viewer.controls import CAMERAS
-from dermis.viewer.panel.fields import Style, attempt, button, combo, draw_fields
+from dermis.viewer.panel.fields import Style, attempt, button, combo, draw_fields, record_position
+from dermis.viewer.panel.heads import draw_head
 from dermis.viewer.panel.light import draw_lights
 from dermis.viewer.panel.movement import can_move, draw_expressions, draw_motion, has_expressions
 from dermis.viewer.panel.plots import draw_timing
 from dermis.viewer.panel.skin import draw_profile, draw_surface
+from dermis.viewer.panel.words import TECHNIQUE
 from dermis.viewer.session import Session
 from dermis.viewer.views import LAYERS, VIEWS
 
 _BUTTONS_PER_ROW = 3
 _SIDES = (256, 512, 1024, 2048, 4096)
 _SETTINGS = {
+    **TECHNIQUE,
     "atlas": Style(options=_SIDES),
     "shadow_size": Style("shadow map", options=_SIDES),
     "samples": Style(options=(1, 2, 4, 8, 16)),
@@ -100,7 +103,7 @@ def draw_picture(session: Session) -> None:
 
 
 def draw_files(session: Session) -> None:
-    """The scene file, and screenshots of any size."""
+    """The scene file, and screenshots of any size, that of the view unless told."""
     _, session.scene_file = imgui.input_text("scene", session.scene_file)
     if button(session, "save"):
         attempt(session, lambda: session.save(Path(session.scene_file)))
@@ -108,13 +111,21 @@ def draw_files(session: Session) -> None:
     if button(session, "load"):
         attempt(session, lambda: session.load(Path(session.scene_file)))
     _, session.picture_file = imgui.input_text("picture", session.picture_file)
-    _, sides = imgui.input_int2("size", list(session.picture_size))
-    session.picture_size = max(1, sides[0]), max(1, sides[1])
+    size = session.picture_size if any(session.picture_size) else session.view_size
+    told, sides = imgui.input_int2("size", list(size))
+    record_position(session, "size")
+    if told:
+        session.picture_size = max(1, sides[0]), max(1, sides[1])
     if button(session, "screenshot"):
-        attempt(session, lambda: session.screenshot(Path(session.picture_file), session.picture_size))
+        attempt(session, lambda: session.screenshot(Path(session.picture_file), size))
+    if any(session.picture_size):
+        imgui.same_line()
+        if button(session, "size of the view"):
+            session.picture_size = 0, 0
 
 
 SECTIONS = (
+    Section("Head", draw_head, is_open=True),
     Section("View", draw_view, is_open=True),
     Section("Before and after", draw_comparison),
     Section("Expressions", draw_expressions, is_open=True, applies=has_expressions),

@@ -9,13 +9,14 @@ from imgui_bundle import imgui
 from dermis.errors import DermisError
 from dermis.human.regions.table import DEFAULT
 from dermis.optics.pigments.skin import EXAMPLES, SkinParameters
-from dermis.optics.profiles import preset_names
+from dermis.optics.profiles import PUBLISHED, preset_names
 from dermis.optics.tissue import SPECTRAL
 from dermis.scene.head_table import AUTO, NO_REGIONS, names_regions
 from dermis.scene.skin import MOST_LAYERS, Pigments, Skin, TissueLayer
 from dermis.scene.tissue import layers_of
 from dermis.viewer.panel.fields import Style, attempt, button, combo, draw_fields, record_position
 from dermis.viewer.panel.plots import plot_profile
+from dermis.viewer.panel.words import ALBEDO, LAYER, PROFILES, SURFACE
 from dermis.viewer.session import Session, apply_regions
 from dermis.viewer.state import ViewerState, changed
 
@@ -27,15 +28,12 @@ _DERMIS = ("blood", "oxygen")
 _PERCENT = {name: Style(unit=0.01, form="%.2f %%") for name in Pigments.model_fields if "_" not in name}
 _PIGMENTS = _PERCENT | {
     "structure": Style("layers"),
+    "eumelanin": Style("eumelanin share###eumelanin", unit=0.01, form="%.2f %%"),
+    "oxygen": Style("oxygen saturation###oxygen", unit=0.01, form="%.2f %%"),
     "epidermis_mm": Style("thickness"),
     "epidermal_blood": Style("blood##epidermis", unit=0.01, form="%.2f %%"),
 }
-_SURFACE = {
-    "rho_s": Style("rho_s"),
-    "specular": Style("BRDF"),
-    "fresnel": Style("Fresnel"),
-    "specular_colour": Style("reflection"),
-}
+_SKINS = (PUBLISHED, "skin1", "skin2", "dj3", SPECTRAL, *EXAMPLES)
 _NEW_MM = 0.2
 
 
@@ -46,8 +44,9 @@ def draw_profile(session: Session) -> None:
     def take(name: str) -> ViewerState:
         return with_skin(profile=name, pigments=None, layers=())
 
-    combo(session, "profile", skin.profile, preset_names(), take)
-    draw_fields(session, skin, with_skin, {"albedo": Style("colour from")}, ["albedo"])
+    foods = (name for name in preset_names() if name not in _SKINS)  # and other materials
+    combo(session, "profile", skin.profile, (*_SKINS, "", *foods), take, PROFILES)
+    draw_fields(session, skin, with_skin, ALBEDO, ["albedo"])
     if skin.profile in (SPECTRAL, *EXAMPLES):
         _pigments(session, skin)
     elif layers := skin.layers or _named_layers(skin.profile):
@@ -73,7 +72,7 @@ def draw_surface(session: Session) -> None:
         if text := replaced.get(name):
             imgui.text_disabled(text)
         elif name not in _PROFILE_FIELDS:
-            draw_fields(session, state.scene.skin, state.with_skin, _SURFACE, [name])
+            draw_fields(session, state.scene.skin, state.with_skin, SURFACE, [name])
 
 
 def _pigments(session: Session, skin: Skin) -> None:
@@ -118,7 +117,7 @@ def _layer(session: Session, layers: Layers, index: int) -> None:
     def apply(**fields: object) -> ViewerState:
         return _with_layers(session, layers, index, changed(layer, **fields))
 
-    draw_fields(session, layer, apply, {}, suffix=suffix)
+    draw_fields(session, layer, apply, LAYER, suffix=suffix)
     imgui.text_disabled("red, green, blue [1/mm]")
     if len(layers) < MOST_LAYERS and button(session, f"add above{suffix}"):
         copy = changed(layer, thickness_mm=layer.thickness_mm or _NEW_MM)

@@ -1,0 +1,47 @@
+"""A viewer that a server in this process shows to pages."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from offscreen_input import ADAPTER
+
+from dermis.viewer.state import ViewerState
+
+
+@contextmanager
+def served(state: ViewerState, size: tuple[int, int] = (400, 300)) -> Iterator[Any]:
+    """The viewer, in a thread of its own; `viewer.url` is its page."""
+    from dermis.viewer.browser.canvas import PageCanvas
+    from dermis.viewer.browser.server import bind, server
+    from dermis.viewer.viewer import Viewer
+
+    listener, address = bind("127.0.0.1", 0)
+    made: list[Any] = []
+
+    def run() -> None:  # in whose event loop the canvas belongs
+        one: Any = Viewer(state, PageCanvas(size=size, max_fps=60), ADAPTER)
+        one.folder = folder
+        one.url, running = address.url, server(address, one.canvas, Path(folder))
+        made.extend((one, running))
+        running.run(sockets=[listener])
+
+    with listener, TemporaryDirectory() as folder:
+        thread = threading.Thread(target=run, daemon=True)
+        thread.start()
+        while not (made and made[1].started):
+            assert thread.is_alive()
+            time.sleep(0.05)
+        yield made[0]
+        end = time.monotonic() + 5.0
+        while made[0].canvas._frame_info_per_client and time.monotonic() < end:
+            time.sleep(0.05)
+        time.sleep(0.2)  # what is on its way to pages that left
+        made[1].should_exit = True
+        thread.join(20.0)

@@ -1,0 +1,106 @@
+"""What a page may send: heads and scenes, from the page that has control, of bounded size."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rendercanvas", reason="the extra `viewer` is not installed")
+
+from dermis.viewer.browser import uploads
+from dermis.viewer.browser.guard import Guard
+from dermis.viewer.browser.uploads import Uploads
+
+
+async def _app(scope: Any, receive: Any, send: Any) -> None:
+    await send({"type": "http.response.start", "status": 204, "headers": []})
+    await send({"type": "http.response.body", "body": b""})
+
+
+class Server:
+    def __init__(self, folder: Path) -> None:
+        self.got: list[Path] = []
+        canvas = SimpleNamespace(ticket="secret", on_file=self.got.append)
+        self.app = Guard(Uploads(_app, canvas, folder), "")
+
+    def send(
+        self, name: str, *pieces: bytes, ticket: str = "secret", whole: bool = True, **headers: str
+    ) -> tuple[int, str]:
+        """Status and text of the answer."""
+        count = len(pieces)
+        coming: list[Any] = [
+            {"type": "http.request", "body": piece, "more_body": k + 1 < count or not whole}
+            for k, piece in enumerate(pieces)
+        ]
+        coming.append({"type": "http.disconnect"})
+        answers: list[Any] = []
+
+        async def receive() -> Any:
+            return coming.pop(0)
+
+        async def send(message: Any) -> None:
+            answers.append(message)
+
+        told = {"host": "127.0.0.1:8765", "x-dermis-ticket": ticket} | headers
+        listed = [(key.replace("_", "-").encode(), value.encode()) for key, value in told.items()]
+        scope = {"type": "http", "method": "POST", "path": f"/upload/{name}", "headers": listed}
+        asyncio.run(self.app(scope, receive, send))
+        return answers[0]["status"], answers[1]["body"].decode()
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Server:
+    return Server(tmp_path)
+
+
+def test_a_file_comes_whole_under_a_name_without_a_path(server: Server, tmp_path: Path) -> None:
+    assert server.send("a head.obj", b"v 0 0", b" 0\n") == (200, "")
+    (path,) = server.got
+    assert path.read_bytes() == b"v 0 0 0\n" and path.name == "a_head.obj" and tmp_path in path.parents
+    assert server.send("..%2f.obj", b"x")[0] == 200
+    assert all(one.resolve().is_relative_to(tmp_path) for one in server.got)
+
+
+@pytest.mark.parametrize("name", ["a.exe", "a.zip", "a", "a.obj.py", ".obj/../b.html"])
+def test_other_files_are_refused_with_a_sentence(name: str, server: Server) -> None:
+    status, said = server.send(name, b"x")
+    assert status != 200 and server.got == []
+    if status == 400:
+        assert ".glb, .obj, .ply, .json, .toml" in said
+
+
+@pytest.mark.parametrize("ticket", ["", "other", "secret2"])
+def test_only_the_page_that_has_control_may_send(ticket: str, server: Server, tmp_path: Path) -> None:
+    status, said = server.send("a.obj", b"x", ticket=ticket)
+    assert status == 400 and "control" in said and not any(tmp_path.iterdir())
+
+
+def test_another_site_may_not(server: Server) -> None:
+    assert server.send("a.obj", b"x", origin="http://evil.example")[0] == 404
+    assert server.send("a.obj", b"x", origin="null")[0] == 404
+    assert server.got == []
+
+
+def test_large_files_are_refused_before_and_while_they_come(
+    server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(uploads, "MOST_BYTES", 1 << 20)
+    assert server.send("a.obj", b"x", content_length=str(1 << 21)) == (400, server.send("a.obj", *_MUCH)[1])
+    assert "at most 1 MB" in server.send("a.obj", *_MUCH)[1]
+    monkeypatch.setattr(uploads, "MOST_BYTES_IN_ALL", 1 << 20)
+    for status in (200, 400):
+        assert server.send("a.obj", bytes(600_000))[0] == status
+    assert [path.stat().st_size for path in tmp_path.rglob("*.obj")] == [600_000]
+
+
+_MUCH = [bytes(1 << 19)] * 3
+
+
+def test_nothing_is_left_of_a_file_that_ends_early(server: Server, tmp_path: Path) -> None:
+    status, said = server.send("a.obj", b"v 0", whole=False)
+    assert status == 400 and "whole" in said and server.got == [] and not list(tmp_path.rglob("*.obj"))
+    assert server.send("a.obj", b"v")[0] == 200
