@@ -18,6 +18,8 @@ from dermis.viewer.state import ViewerState
 @contextmanager
 def served(state: ViewerState, size: tuple[int, int] = (400, 300)) -> Iterator[Any]:
     """The viewer, in a thread of its own; `viewer.url` is its page."""
+    from rendercanvas.http import asgi
+
     from dermis.viewer.browser.canvas import PageCanvas
     from dermis.viewer.browser.server import bind, server
     from dermis.viewer.viewer import Viewer
@@ -39,9 +41,7 @@ def served(state: ViewerState, size: tuple[int, int] = (400, 300)) -> Iterator[A
             assert thread.is_alive()
             time.sleep(0.05)
         yield made[0]
-        end = time.monotonic() + 5.0
-        while made[0].canvas._frame_info_per_client and time.monotonic() < end:
-            time.sleep(0.05)
-        time.sleep(0.2)  # what is on its way to pages that left
         made[1].should_exit = True
         thread.join(20.0)
+        asgi._websockets.clear()
+        made[0].canvas.close()  # when it is collected, it would close the pages of the next one

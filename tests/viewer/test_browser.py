@@ -37,7 +37,18 @@ def url(head_file: Path) -> Iterator[str]:
     """Of a page that `dermis view --browser` serves."""
     pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
     words = ["view", str(head_file), "--browser", "--port", "0", "--size", "400x480", "--adapter", ADAPTER]
-    command = [sys.executable, "-m", "dermis", *words, "--atlas", "128", "--samples", "1"]
+    command = [
+        sys.executable,
+        "-m",
+        "dermis",
+        *words,
+        "--atlas",
+        "128",
+        "--samples",
+        "1",
+        "--background",
+        "#000000",
+    ]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert server.stdout is not None
     yield server.stdout.readline().split()[0]

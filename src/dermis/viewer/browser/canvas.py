@@ -41,6 +41,10 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         """Let the page that has control choose a file to send."""
         asgi.send_to({"type": "choose", "kinds": ",".join(HEAD_FILES)}, [], self._active_client)
 
+    def _rc_close(self) -> None:
+        if not self._is_closed:  # collected later, it would close the pages of a newer canvas
+            super()._rc_close()
+
     def _update_active_states(self) -> None:
         super()._update_active_states()
         if self._active_client != self._ticket_holder:
