@@ -107,7 +107,7 @@ def reflected(layers: Array, towards: Array, m: float) -> Array:
 def furnace(renderer: dermis.Renderer, head: Head, energy: str, **chosen: str) -> Array:
     """Least, mean and largest outgoing over incoming radiance of a white head under uniform light."""
     white = replace(head, maps=replace(head.maps, colour=np.ones((4, 4, 3), np.float32)))
-    skin = Skin(energy=energy)  # type: ignore[arg-type]
+    skin = Skin.preset("deck-2007").replace(energy=energy)
     scene = Scene(white, environment=Environment(name="uniform"), skin=skin)
     settings = Settings.model_validate({"size": (384, 384), "atlas": 1024, "samples": 1, **chosen})
     shown = renderer.draw(scene, settings)
@@ -119,7 +119,7 @@ def furnaces(renderer: dermis.Renderer) -> str:
     """Rows of the furnace table."""
     ball = dermis.Head("ball", uv_sphere(115.0), dermis.load_head("lee_perry_smith").maps)
     ball = replace(ball, maps=replace(ball.maps, normal=None, height=None, specular=None, roughness=None))
-    heads = {"sphere": ball, "scan": dermis.load_head("lee_perry_smith")}
+    heads = {"sphere": ball, "scan": dermis.load_head("lee_perry_smith", regions="none")}
     rows = []
     for name, head in heads.items():
         for energy, occlusion, transmission in (
