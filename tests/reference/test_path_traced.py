@@ -179,7 +179,7 @@ def test_caller_keeps_the_variant() -> None:
 
 def test_missing_mitsuba_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mitsuba", None)
-    with pytest.raises(DermisError, match=r"pip install dermis\[truth\]"):
+    with pytest.raises(DermisError, match=r"package mitsuba.*dermis\[truth\]"):
         path_trace(ball_scene(), SKIN1, 8, SMALL)
 
 

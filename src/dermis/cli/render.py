@@ -100,12 +100,12 @@ def _draw_and_report(
         why = "their uv is collapsed, mirrored onto other skin, or thinner than a texel of the atlas"
         note(f"note: {share} are lit without scattering: {why}")
     _note_light(scene, settings, rendered.suns)
-    _note_clipped(rendered)
     with_alpha = settings.background == "none"
     if output.suffix.lower() == ".png":
         write_png(output, rendered.rgba8() if with_alpha else rendered.srgb8())
     else:
         write_image(output, rendered.linear_rgba() if with_alpha else rendered.linear())
+    _note_clipped(rendered)
     report = {
         "image": str(output),
         "adapter": renderer.device.adapter.name,

@@ -7,7 +7,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from dermis.mesh.eyes import PUPIL_MM
 from dermis.scene.plain import Plain
 
 _Length = Annotated[float | None, Field(gt=0, allow_inf_nan=False)]
@@ -23,7 +22,7 @@ class EyeTable(Plain):
 
     eumelanin: Annotated[float | None, Field(ge=0, le=1)] = None
     """Of the iris, from none, which leaves it blue, to the darkest brown."""
-    pupil_mm: Annotated[float | None, Field(ge=PUPIL_MM[0], le=PUPIL_MM[1])] = None
+    pupil_mm: Annotated[float | None, Field(ge=1, le=4)] = None
     """Radius of the pupil [mm]."""
     redness: Annotated[float | None, Field(ge=0, le=1)] = None
     """Of the white of the eye."""
