@@ -151,11 +151,12 @@ class EyesSeen(NamedTuple):
     """How eyes of true shape stand in a motion.
 
     frames : (2, 4, 4) from the head's space to each eye's
-    edges_mm : (2, r, 3) the edges of the lids around each; between two, a point of a smooth curve is put
+    edges_mm : (2, r, 3) the edges of the lids around each; between two, a point of a smooth curve is put;
+        None where they are unknown, as in files
     """
 
     frames: NDArray[np.float64]
-    edges_mm: NDArray[np.float64]
+    edges_mm: NDArray[np.float64] | None
 
 
 @dataclass(frozen=True)
@@ -229,6 +230,7 @@ def seen_by(view: Any, pinhole: Pinhole, eyes: EyesSeen | None) -> Any:
     record["shift"] = shift
     if eyes is not None:
         record["eyes"]["to_own"] = eyes.frames.transpose(0, 2, 1)  # by columns
+    if eyes is not None and eyes.edges_mm is not None:
         edges = eyes.edges_mm
         a, b, c = (np.roll(edges, -k, axis=1) for k in (-1, 1, 2))
         both = np.stack([edges, (9.0 * (edges + b) - a - c) / 16.0], axis=2).reshape(2, -1, 3)

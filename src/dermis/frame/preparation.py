@@ -126,7 +126,9 @@ def _resting(head: Head) -> Moved:
 def _eyes(head: Head, motion: Motion) -> EyesSeen | None:
     if head.eyes is None:
         return None
-    return EyesSeen(head.eyes.frames(head.control, motion), head.control.edges_mm(motion))
+    rig = head.control
+    edges = None if rig.contact is None else rig.edges_mm(motion)
+    return EyesSeen(head.eyes.frames(rig, motion), edges)
 
 
 def _posed(head: Head, motion: Motion, at_rest: MotionBytes) -> Moved:
