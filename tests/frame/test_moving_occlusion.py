@@ -87,7 +87,7 @@ def baked_anew(renderer: Renderer, head: Head, points: Floats, side: int) -> NDA
     mesh = head.mesh
     places = points[mesh.point].astype(np.float32)
     moved = build_mesh(places, mesh.uv, mesh.triangles, mesh.material, mesh.materials, point=mesh.point)
-    anew = replace(head, mesh=moved, rig=None, strands=None)
+    anew = replace(head, mesh=moved, rig=None, strands=None, hair=None)
     inputs = renderer.prepare(scene_of(anew), settings_of(atlas=side))
     texels, atlas = inputs.layouts[0].atlas.resources["atlas"], cached_atlas(anew.mesh, side)
     return bake_occlusion(renderer.device, anew, atlas, inputs.lit, texels, side)

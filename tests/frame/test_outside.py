@@ -107,7 +107,7 @@ def test_what_else_knows_the_light(tmp_path: Path) -> None:
 def test_its_name_is_unknown_without_it(tmp_path: Path) -> None:
     with pytest.raises(DermisError, match=r"a kind of point, .*'after-glow' came"):
         from_file(tmp_path)
-    with pytest.raises(DermisError, match=r"one of kelemen, .*none, but 'blue-chalk' came"):
+    with pytest.raises(DermisError, match=r"one of two-lobe, kelemen, .*none, but 'blue-chalk' came"):
         Skin(specular="blue-chalk")
 
 

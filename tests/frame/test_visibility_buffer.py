@@ -150,6 +150,7 @@ def test_steps_of_depth() -> None:
     assert visibility_buffer._depth_range_mm(parallel.clip) == pytest.approx(parallel.far - parallel.near)
 
 
+@pytest.mark.filterwarnings("ignore:camera. expected a place around the head")
 @pytest.mark.parametrize(("eye", "ahead"), [((1, 0, 0), (0, 0, -50)), ((30, 120, 1), (0, -50, 0))])
 def test_corners_on_the_plane_of_the_eye(renderer: Renderer, eye: Any, ahead: Any) -> None:
     """No triangle goes on beyond the edge opposite a corner beside the eye: the rasteriser's silhouettes."""

@@ -152,7 +152,7 @@ class EyesSeen(NamedTuple):
 
     frames : (2, 4, 4) from the head's space to each eye's
     edges_mm : (2, r, 3) the edges of the lids around each; between two, a point of a smooth curve is put;
-        None where nobody knows them, as of files
+        None where they are unknown, as in files
     """
 
     frames: NDArray[np.float64]
@@ -230,18 +230,10 @@ def seen_by(view: Any, pinhole: Pinhole, eyes: EyesSeen | None) -> Any:
     record["shift"] = shift
     if eyes is not None:
         record["eyes"]["to_own"] = eyes.frames.transpose(0, 2, 1)  # by columns
-        record["lids"] = _lids(eyes, len(record["lids"]) // 2).reshape(-1, 4)
+    if eyes is not None and eyes.edges_mm is not None:
+        edges = eyes.edges_mm
+        a, b, c = (np.roll(edges, -k, axis=1) for k in (-1, 1, 2))
+        both = np.stack([edges, (9.0 * (edges + b) - a - c) / 16.0], axis=2).reshape(2, -1, 3)
+        whole = np.concatenate([both, np.ones((*both.shape[:2], 1))], axis=-1)
+        record["lids"] = np.einsum("kij,krj->kri", eyes.frames, whole).reshape(-1, 4)
     return record
-
-
-def _lids(eyes: EyesSeen, count: int) -> NDArray[np.float64]:
-    """(2, count, 4) points along the edges of the lids in each eye's own space."""
-    edges = eyes.edges_mm
-    if edges is None:  # a ring behind each eye, where they shade nothing
-        turn = 2.0 * np.pi * np.arange(count) / count
-        ring = np.stack([np.cos(turn), np.sin(turn), np.full(count, -20.0), np.ones(count)], axis=1)
-        return np.stack([ring, ring])
-    a, b, c = (np.roll(edges, -k, axis=1) for k in (-1, 1, 2))
-    both = np.stack([edges, (9.0 * (edges + b) - a - c) / 16.0], axis=2).reshape(2, -1, 3)
-    whole = np.concatenate([both, np.ones((*both.shape[:2], 1))], axis=-1)
-    return np.asarray(np.einsum("kij,krj->kri", eyes.frames, whole))

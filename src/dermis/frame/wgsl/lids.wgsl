@@ -5,13 +5,18 @@ const LID_POINTS: u32 = 56u; // around an eye, of which some are of the lower li
 const LOWER_LID: vec2u = vec2u(27u, 49u); // first and last
 const FARTHEST_LID: f32 = 1e6;
 
-// How far the lids' edges are from a place of an eye, in its own space; seen from its centre, on the ball.
+// How far the lids' edges are from a place of an eye, in its own space; seen from its centre, on the ball. They are far
+// where nobody knows them, which zeros say.
 fn lids_around(eye: u32, p: vec3f) -> Lids {
     let q = SCLERA_MM * normalize(p);
     var lids = Lids(FARTHEST_LID, FARTHEST_LID, vec3f(0.0));
     var a = SCLERA_MM * normalize(shade.lids[eye * LID_POINTS + LID_POINTS - 1u].xyz);
+    let known = select(0u, LID_POINTS, shade.lids[eye * LID_POINTS].w > 0.0);
     var i = 0u;
     loop {
+        if (i >= known) {
+            break;
+        }
         let b = SCLERA_MM * normalize(shade.lids[eye * LID_POINTS + i].xyz);
         let t = clamp(dot(q - a, b - a) / dot(b - a, b - a), 0.0, 1.0);
         let off = q - mix(a, b, t);
@@ -24,9 +29,6 @@ fn lids_around(eye: u32, p: vec3f) -> Lids {
         }
         a = b;
         i++;
-        if (i >= LID_POINTS) {
-            break;
-        }
     }
     return lids;
 }
