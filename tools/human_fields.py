@@ -6,6 +6,7 @@ python tools/human_fields.py FOLDER, where FOLDER holds the published human.npz 
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from scipy.sparse.linalg import lsqr
 from scipy.spatial import cKDTree
 
 from dermis.human.person import Human
-from dermis.human.published import DELTA_MM, count
+from dermis.human.published import DELTA_MM, count, places_mm
 from dermis.human.skin.surface import FIELDS
 from dermis.mesh.mesh import Mesh
 
@@ -40,7 +41,9 @@ def main() -> None:
     folder = Path(sys.argv[1])
     head = AVERAGE.head(layout="hm08", subdivide=LEVEL)
     assert head.rig is not None and head.rig.stencils is not None
-    mesh, stencils = head.mesh, head.rig.stencils
+    stencils, control = head.rig.stencils, head.positions_mm.astype(np.float64)
+    control[: count()] = places_mm(AVERAGE.weights())[: count()]  # lids as published: lashes touch these
+    mesh = replace(head.mesh, positions=stencils.points(control)[head.mesh.point].astype(np.float32))
     skin = skin_vertices(mesh)
     masks = {name: mask(folder, name, mesh.uv) for name in ("lips", "inside-mouth")}
     inside = masks["inside-mouth"]
@@ -54,7 +57,7 @@ def main() -> None:
     first, point, weight = stencils.first, stencils.point, stencils.weight
     matrix = csr_array((weight, point, first), shape=(len(first) - 1, len(head.positions_mm)))
     fields = fit(matrix, mesh.point[skin].astype(np.int64), values[skin])
-    places, fields = head.positions_mm[: count()], fields[: count()]  # without eyeballs
+    places, fields = control[: count()], fields[: count()]  # without eyeballs
     np.savez_compressed(OUT, places=hundredths(places), fields=hundredths(fields))
     sys.stdout.write(f"{OUT}  {OUT.stat().st_size / 1e3:.0f} kB\n")
 
