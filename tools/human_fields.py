@@ -41,9 +41,10 @@ def main() -> None:
     folder = Path(sys.argv[1])
     head = AVERAGE.head(layout="hm08", subdivide=LEVEL)
     assert head.rig is not None and head.rig.stencils is not None
-    stencils, control = head.rig.stencils, head.positions_mm.astype(np.float64)
-    control[: count()] = places_mm(AVERAGE.weights())[: count()]  # lids as published: lashes touch these
-    mesh = replace(head.mesh, positions=stencils.points(control)[head.mesh.point].astype(np.float32))
+    stencils = head.rig.stencils
+    places = places_mm(AVERAGE.weights())[: count()]  # with the published lids: strips of lashes fit them
+    points = stencils.points(np.concatenate([places, head.positions_mm[count() :]]))
+    mesh = replace(head.mesh, positions=points[head.mesh.point].astype(np.float32))
     skin = skin_vertices(mesh)
     masks = {name: mask(folder, name, mesh.uv) for name in ("lips", "inside-mouth")}
     inside = masks["inside-mouth"]
@@ -57,14 +58,14 @@ def main() -> None:
     first, point, weight = stencils.first, stencils.point, stencils.weight
     matrix = csr_array((weight, point, first), shape=(len(first) - 1, len(head.positions_mm)))
     fields = fit(matrix, mesh.point[skin].astype(np.int64), values[skin])
-    places, fields = control[: count()], fields[: count()]  # without eyeballs
+    fields = fields[: count()]  # without eyeballs
     np.savez_compressed(OUT, places=hundredths(places), fields=hundredths(fields))
     sys.stdout.write(f"{OUT}  {OUT.stat().st_size / 1e3:.0f} kB\n")
 
 
-def hundredths(values_mm: NDArray[np.floating]) -> NDArray[np.int16]:
-    """The same in units of the published displacements."""
-    return np.asarray(np.rint(values_mm / DELTA_MM), np.int16)
+def hundredths(values_mm: NDArray[np.floating]) -> NDArray[np.int32]:
+    """The same in units of the published displacements; the breast is too far down for 16 bits."""
+    return np.asarray(np.rint(values_mm / DELTA_MM), np.int32)
 
 
 def skin_vertices(mesh: Mesh) -> Index:

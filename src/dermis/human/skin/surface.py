@@ -24,7 +24,6 @@ negative where they face the eye."""
 _UNIT_MM = 0.01
 _LIDS_MM = -2.0, -0.6  # of the first columns of lid_rings.csv
 _CREST_MM = 0.15, 0.8  # least and most of the third
-_HIGHEST_MM, _WRAPPED_MM = 200.0, 655.36  # 16 bits end above the edge of the breast, and begin anew
 
 
 @cache
@@ -50,10 +49,7 @@ def lid_rings() -> NDArray[np.int64]:
 def _stored(name: str) -> Floats:
     file = resources.files("dermis.human").joinpath("data", "average.npz")
     with resources.as_file(file) as path, np.load(path) as found:
-        stored = np.asarray(found[name].astype(np.float32) * np.float32(_UNIT_MM))
-    if name == "places":
-        stored[stored[:, 1] > _HIGHEST_MM, 1] -= _WRAPPED_MM
-    return stored
+        return np.asarray(found[name].astype(np.float32) * np.float32(_UNIT_MM))
 
 
 _KEPT: dict[bytes, Painting] = {}
