@@ -58,16 +58,21 @@ class Passes:
         self.spread = self.spread + before * (image - self.mean)
 
 
+def digest_surroundings(digest: Any, scene: Scene) -> None:
+    """Add camera, lights and environment of a scene to a hash."""
+    for part in (scene.camera, *scene.lights, *filter(None, [scene.environment])):
+        digest.update(f"{type(part).__name__} {part.model_dump_json()}".encode())
+    if scene.environment is not None:  # the file of that name may change
+        digest.update(np.ascontiguousarray(load_panorama(scene.environment.name)).tobytes())
+
+
 def scene_key(scene: Scene, medium: Medium | Lambertian, size: tuple[int, int], form: str) -> str:
     """A hash of all that the image depends on.
 
     form : versions, and how it is traced
     """
     digest = hashlib.sha256(f"{_FORM} {form} {size} {scene.head.centre_mm}".encode())
-    for part in (scene.camera, *scene.lights, *filter(None, [scene.environment])):
-        digest.update(f"{type(part).__name__} {part.model_dump_json()}".encode())
-    if scene.environment is not None:  # the file of that name may change
-        digest.update(np.ascontiguousarray(load_panorama(scene.environment.name)).tobytes())
+    digest_surroundings(digest, scene)
     mesh = scene.head.mesh
     digest.update(repr([(material.kind, material.colour) for material in mesh.materials]).encode())
     for array in (mesh.positions, mesh.normals, mesh.point, mesh.triangles, mesh.material):

@@ -1,5 +1,6 @@
 // The meter's points, a grid over the picture: light that falls on the skin that is seen there, and how bright it is shown.
 //#include "lighting.wgsl"
+//#include "open_sky.wgsl"
 //#include "seen_point.wgsl"
 
 //#fill const METER_SIDE: u32 = {meter_side}u; // points along each side of the grid
@@ -15,16 +16,6 @@ struct Look {
 @group(0) @binding(31) var visibility_buffer: texture_2d_array<u32>;
 @group(0) @binding(32) var image: texture_2d<f32>; // radiance
 @group(0) @binding(33) var<storage, read_write> points: array<vec2f>; // luminance of white skin; largest part of the radiance
-
-fn open_sky(point: Point, t: vec4u, w: vec3f) -> f32 {
-    if (!ENVIRONMENT) {
-        return 1.0;
-    }
-    if ((t.w & MAPPED) != 0u) {
-        return open_at(point.place);
-    }
-    return dot(w, vec3f(open_at_vertex(t.x), open_at_vertex(t.y), open_at_vertex(t.z)));
-}
 
 fn metered_at(triangle: u32, pixel: vec2u, size: vec2f) -> vec2f {
     let t = triangle_at(triangle);

@@ -1,6 +1,7 @@
 // The image: light scattered below the skin, relit at its finest level, under the white lobe of the surface.
 //#include "lighting.wgsl"
 //#include "mouth.wgsl"
+//#include "open_sky.wgsl"
 //#include "lids.wgsl"
 //#include "pre_integrated.wgsl"
 //#include "sample_bits.wgsl"
@@ -38,17 +39,6 @@ struct Shade {
 @group(0) @binding(32) var scattered: texture_2d<f32>; // light on the atlas, blurred and combined; or pre-integrated tables
 @group(0) @binding(33) var image: texture_storage_2d<rgba32float, write>;
 @group(0) @binding(34) var apart: texture_storage_2d_array<rgba32float, write>; // light below, depth; share of it that leaves
-
-// t: corners of the triangle, w: barycentric weights
-fn open_sky(point: Point, t: vec4u, w: vec3f) -> f32 {
-    if (!ENVIRONMENT) {
-        return 1.0;
-    }
-    if ((t.w & MAPPED) != 0u) {
-        return open_at(point.place);
-    }
-    return dot(w, vec3f(open_at_vertex(t.x), open_at_vertex(t.y), open_at_vertex(t.z)));
-}
 
 fn shaded_skin(point: Point, surface: Surface, lit: Lit, out: f32, footprint: f32, open: f32) -> Shaded {
     let share = share_of(surface.colour, skin.mix);

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.environment.panorama import load_panorama
 from dermis.reference.described import rgb
-from dermis.reference.mitsuba_passes import Passes, kept_passes
+from dermis.reference.mitsuba_passes import Passes, digest_surroundings, kept_passes
 from dermis.reference.mitsuba_scene import (
     ROULETTE_DEPTH,
     lit_scene,
@@ -146,10 +145,7 @@ def person_key(scene: Scene, person: Person, mean_free_path_mm: NDArray[np.float
     form : versions, and how it is traced
     """
     digest = hashlib.sha256(f"{form} {person.paint.reach_mm} {person.eye_materials}".encode())
-    for part in (scene.camera, *scene.lights, *filter(None, [scene.environment])):
-        digest.update(f"{type(part).__name__} {part.model_dump_json()}".encode())
-    if scene.environment is not None:  # the file of that name may change
-        digest.update(np.ascontiguousarray(load_panorama(scene.environment.name)).tobytes())
+    digest_surroundings(digest, scene)
     digest.update(repr(person.mesh.materials).encode())
     for array in (*person.arrays(), mean_free_path_mm):
         digest.update(f"{array.shape} {array.dtype}".encode())
