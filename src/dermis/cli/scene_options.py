@@ -33,13 +33,14 @@ if TYPE_CHECKING:
     SkinOptions = dict[str, Any]
     SettingsOptions = dict[str, Any]
     EnvironmentOptions = dict[str, Any]
+    SkinPreset = str | None
 
-SkinPreset = Literal["default", "deck-2007"] | None
 HEAD = {"specular": "specular_map", "roughness": "roughness_map"}
 AROUND = {field: f"env_{field}" for field in Environment.model_fields}
 AROUND |= {"name": "env", "rotation_degrees": "env_rotation"}
 
 if not TYPE_CHECKING:
+    SkinPreset = Literal[tuple(PRESETS)] | None
     HeadOptions = options_of(HeadTable, without=("name",), names=HEAD)
     SkinOptions, SettingsOptions = options_of(Skin), options_of(Settings, defaults=PHOTOGRAPHED)
     EnvironmentOptions = options_of(Environment, names=AROUND)
