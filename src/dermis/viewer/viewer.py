@@ -77,6 +77,9 @@ class Viewer:
             self._failures = 0
         except (wgpu.GPUError, DermisError) as error:
             self._recover(error)
+        except Exception as error:
+            self.session.tell_fault("This frame cannot be drawn", error)
+            return  # the next event draws another one
         if not self.is_still or self._panel_frames:
             self._panel_frames = max(0, self._panel_frames - 1)
             self.canvas.request_draw()
@@ -141,9 +144,19 @@ class Viewer:
             except DermisError as error:
                 if session.studio.last_image is None or isinstance(error.__cause__, wgpu.GPUError):
                     raise
-                self._refused = state
-                session.message = str(error)
+                self._refuse(state, str(error))
+            except wgpu.GPUError:
+                raise
+            except Exception as error:
+                if session.studio.last_image is None:
+                    raise
+                self._refuse(state)
+                session.tell_fault("This cannot be drawn", error)
         return session.studio.last_image, None
+
+    def _refuse(self, state: ViewerState, message: str = "") -> None:
+        self._refused = state
+        self.session.message = message
 
     def _is_moving(self, now: float) -> bool:
         return self.session.player.is_playing or now - self._last_change < _QUIET_S
