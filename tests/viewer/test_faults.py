@@ -56,7 +56,7 @@ def test_a_section_that_fails_spares_the_others(
 ) -> None:
     from imgui_bundle import imgui
 
-    from dermis.viewer.panel import panel
+    from dermis.viewer.panel.sections import SECTIONS
 
     def fail(session: Session) -> None:
         imgui.push_style_var(int(imgui.StyleVar_.alpha), 0.2)
@@ -66,8 +66,8 @@ def test_a_section_that_fails_spares_the_others(
         raise ZeroDivisionError("no\nnumber")
 
     before, session = calm.settled(), calm.viewer.session
-    first, *others = panel.SECTIONS
-    monkeypatch.setattr(panel, "SECTIONS", (first._replace(draw=fail), *others))
+    first, *others = SECTIONS
+    monkeypatch.setattr("dermis.viewer.panel.panel.SECTIONS", (first._replace(draw=fail), *others))
     session.positions.clear()
     for _ in range(3):
         calm.frame()

@@ -48,6 +48,7 @@ class Server:
         told = {"host": "127.0.0.1:8765", "x-dermis-ticket": ticket} | headers
         listed = [(key.replace("_", "-").encode(), value.encode()) for key, value in told.items()]
         scope = {"type": "http", "method": "POST", "path": f"/upload/{name}", "headers": listed}
+        scope |= {"scheme": "http", "query_string": b""}
         asyncio.run(self.app(scope, receive, send))
         return answers[0]["status"], answers[1]["body"].decode()
 
@@ -80,8 +81,8 @@ def test_only_the_page_that_has_control_may_send(ticket: str, server: Server, tm
 
 
 def test_another_site_may_not(server: Server) -> None:
-    assert server.send("a.obj", b"x", origin="http://evil.example")[0] == 404
-    assert server.send("a.obj", b"x", origin="null")[0] == 404
+    assert server.send("a.obj", b"x", origin="http://evil.example")[0] == 403
+    assert server.send("a.obj", b"x", origin="null")[0] == 403
     assert server.got == []
 
 

@@ -17,7 +17,13 @@ window.BaseRenderView.prototype.setThrottle = function (throttle) {
   this._wheelThrottle = throttle
 }
 
+// A cookie has the token from here on; in the address it would be kept in the history and seen on screenshots.
+if (window.location.search) { window.history.replaceState(null, '', window.location.pathname) }
+
 const notice = document.getElementById('notice')
+
+// As a style of its own, without which rendercanvas would choose a size; pages may not write styles into elements.
+Object.assign(document.getElementById('canvas').style, { width: '100%', height: '100%' })
 
 // The socket opened last, perhaps still connecting: with two of them this page would be watching itself.
 let latest = null
