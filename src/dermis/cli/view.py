@@ -77,14 +77,16 @@ def view(
         refuse("--motion-fps", "a motion with it", "there is none", "Add --motion")
     from dermis.viewer.windows import serve, show_window
 
-    window = scene.settings.get("size", _WINDOW)
-    with working_on("loading"):
+    def load() -> tuple[ViewerState, MotionFile | None]:
         state = _state(head, scene, adapter)
-        played = _motion(motion, motion_fps, state)
+        return state, _motion(motion, motion_fps, state)
+
+    window = scene.settings.get("size", _WINDOW)
     if browser:
-        where = host or _HOST, _PORT if port is None else port
-        serve(state, adapter, window, *where, _announce, secret=token, motion=played)
+        serve(load, adapter, window, host or _HOST, _PORT if port is None else port, _announce, secret=token)
     else:
+        with working_on("loading"):
+            state, played = load()
         show_window(state, adapter, window, motion=played)
     return 0
 

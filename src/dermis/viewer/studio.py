@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from dermis.viewer.state import PARTS, PICTURE, ViewerState, changed, same
 from dermis.viewer.views import Views
 
 _SIZES = 2  # of everything: for frames in motion and for still ones
+_SMALL = (96, 64)  # a picture that needs all shaders and little time
 _TIMED_FRAMES = 120
 _BEFORE = "before"  # the frozen state's own light, so that a camera that moves lights neither again
 
@@ -54,6 +56,19 @@ class Studio:
         self.times: deque[dict[str, float]] = deque(maxlen=_TIMED_FRAMES)
         self._frozen: Frozen | None = None
         self._lit: tuple[ViewerState, str] | None = None
+
+    def prepare(self, state: ViewerState, go_on: Callable[[], None]) -> None:
+        """Make what the first pictures of a state take long for, in motion and still.
+
+        go_on : called when the head's resources are there
+
+        Raises DermisError for states that cannot be rendered and when the device fails.
+        """
+        for moving in (True, False):
+            self.renderer.prepare(state.scene, self._settings(state, _SMALL, moving))
+        go_on()
+        for moving in (True, False):
+            self.image(state, state.scene.camera, _SMALL, moving)
 
     def pictures(
         self,

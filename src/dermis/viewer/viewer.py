@@ -33,6 +33,7 @@ class Viewer:
     adapter : "auto", "cpu" or part of an adapter's name
     clock : time [s]
     motion : played from the beginning
+    studio : one on the adapter that has prepared the state already
 
     `failure` is the error that closed the canvas when the device could not be opened again.
 
@@ -46,13 +47,14 @@ class Viewer:
         adapter: str = "auto",
         clock: Callable[[], float] = time.perf_counter,
         motion: MotionFile | None = None,
+        studio: Studio | None = None,
     ) -> None:
         from dermis.viewer.panel.panel import Panel  # whose packages are in the extra `viewer`
 
         self.canvas = canvas
         self._adapter, self._clock = adapter, clock
         self._context = canvas.get_wgpu_context()
-        self.session = Session(state, Studio(adapter), motion, clock)
+        self.session = Session(state, studio or Studio(adapter), motion, clock)
         self._connect()
         self.session.player.play()
         self.panel = Panel(self.session)

@@ -2,6 +2,7 @@
 // it becomes active.
 
 import { take } from './files.js'
+import { follow } from './stage.js'
 
 const RETRY_MS = 1000
 const TAPS_MS = 350
@@ -48,6 +49,7 @@ setInterval(() => {
 function hear (event) {
   const message = typeof event.data === 'string' ? JSON.parse(event.data) : { bytes: event.data }
   take(message)
+  follow(message)
   if (message.type !== 'active') { return }
   notice.textContent = message.value ? '' : WATCHING
   if (message.value) {
@@ -94,7 +96,7 @@ let pinching = false
 let began = null // where the last finger touched
 let tapped = null // where and when the last tap ended
 
-function follow (event) {
+function count (event) {
   if (event.pointerType !== 'touch') { return }
   if (event.type === 'pointerdown') { began = { x: event.clientX, y: event.clientY } }
   if (event.type === 'pointerdown' || fingers.has(event.pointerId)) {
@@ -132,5 +134,5 @@ function leave (event) {
   if (fingers.size === 0) { pinching = false }
 }
 
-for (const type of ['pointerdown', 'pointermove']) { window.addEventListener(type, follow, { capture: true }) }
+for (const type of ['pointerdown', 'pointermove']) { window.addEventListener(type, count, { capture: true }) }
 for (const type of ['pointerup', 'pointercancel']) { window.addEventListener(type, leave, { capture: true }) }

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import asyncio
 import secrets
 import socket
+from collections.abc import Callable, Coroutine
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from dermis.errors import refuse
 from dermis.viewer.browser.canvas import PageCanvas
 from dermis.viewer.browser.guard import Guard, is_local
 from dermis.viewer.browser.uploads import Uploads
 
+T = TypeVar("T")
 _TOKEN_BYTES = 18
 _MOST_MESSAGE_BYTES = 1 << 16
 _SHUTDOWN_S = 1
-_OWN = {"page.css": "css", "page.js": "javascript", "files.js": "javascript"}
+_OWN = {"page.css": "css", "page.js": "javascript", "files.js": "javascript", "stage.js": "javascript"}
 HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
     "img-src blob: data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
@@ -93,3 +96,20 @@ def server(address: Address, canvas: PageCanvas, folder: Path) -> Any:
         server_header=False,
     )
     return uvicorn.Server(config)
+
+
+def run_until(pages: Any, listener: socket.socket, begin: Callable[[], Coroutine[Any, Any, T]]) -> T | None:
+    """Run a server until it is told to exit, and something beside it: what that returned, if it has ended.
+
+    Raises what it raises.
+    """
+
+    async def run() -> T | None:
+        beside = asyncio.create_task(begin())
+        await pages.serve(sockets=[listener])
+        if beside.done():  # not awaited: after Ctrl+C that would be an interrupt again
+            return beside.result()
+        beside.cancel()
+        return None
+
+    return asyncio.run(run())
