@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -90,7 +91,10 @@ class Session:
 
         Raises DermisError when that is not possible.
         """
-        self._write(path, lambda target: save_state(target, self.shown))
+        shown = self.shown
+        if "name" in shown.head:  # a file that a page has sent is to lie beside the scene
+            shown = replace(shown, head={**shown.head, "name": self.heads.sent_as(str(shown.head["name"]))})
+        self._write(path, lambda target: save_state(target, shown))
         self.message = f"saved {path}"
 
     def load(self, path: Path) -> None:

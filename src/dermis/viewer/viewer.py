@@ -211,7 +211,7 @@ class Viewer:
         session.offer = getattr(canvas, "offer", None)
         session.ask_for_file = getattr(canvas, "ask_for_file", None)
         if session.ask_for_file:
-            canvas.on_file = lambda path: session.heads.open(str(path))
+            canvas.on_file = lambda path, name: session.heads.open(str(path), name)
         loop = canvas._rc_canvas_group.get_loop()
         session.heads.wake = lambda: loop and loop.call_soon_threadsafe(canvas.request_draw)
 
