@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import threading
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 from dermis.viewer.browser.canvas import PageCanvas
 from dermis.viewer.player import MotionFile
+from dermis.viewer.preparing import begun
 from dermis.viewer.state import ViewerState
 from dermis.viewer.studio import Studio
 from dermis.viewer.viewer import Viewer
 
-T = TypeVar("T")
 Load = Callable[[], tuple[ViewerState, MotionFile | None]]
 
 STAGES = (
@@ -55,7 +53,7 @@ async def shown(pages: Any, canvas: PageCanvas, load: Load, adapter: str) -> Vie
         return state, studio, motion
 
     try:
-        state, studio, motion = await _in_thread(prepare)
+        state, studio, motion = await asyncio.wrap_future(begun(prepare))
         canvas.tell_stage(STAGES[-1], len(STAGES), len(STAGES))
         return Viewer(state, canvas, adapter, motion=motion, studio=studio)
     except Exception as error:
@@ -63,25 +61,3 @@ async def shown(pages: Any, canvas: PageCanvas, load: Load, adapter: str) -> Vie
         await asyncio.sleep(_LAST_WORDS_S)
         pages.should_exit = True
         raise
-
-
-def _in_thread(work: Callable[[], T]) -> asyncio.Future[T]:
-    """What `work` returns; an interpreter that ends does not wait for it."""
-    loop = asyncio.get_running_loop()
-    coming: asyncio.Future[T] = loop.create_future()
-
-    def settle(put: Callable[[Any], None], found: Any) -> None:
-        if not coming.done():
-            put(found)
-
-    def run() -> None:
-        put: Callable[[Any], None] = coming.set_result
-        try:
-            found: Any = work()
-        except Exception as error:
-            put, found = coming.set_exception, error
-        with contextlib.suppress(RuntimeError):  # the loop has ended
-            loop.call_soon_threadsafe(settle, put, found)
-
-    threading.Thread(target=run, name="opening", daemon=True).start()
-    return coming
