@@ -7,7 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, TypeVar
 
-from dermis.mesh.head import Head
+from dermis.mesh.mesh import Mesh
 from dermis.viewer.state import ViewerState
 from dermis.viewer.studio import Studio, copied
 
@@ -22,9 +22,9 @@ class Preparation:
 
     def __init__(self, wake: Callable[[], None]) -> None:
         self._wake = wake
-        self._ready: Head | None = None
+        self._ready: Mesh | None = None  # with other maps it takes little more than a frame
         self._coming: Future[None] | None = None
-        self._head: Head | None = None  # that is coming
+        self._next: Mesh | None = None
         self._kept: Any = None
 
     @property
@@ -34,7 +34,7 @@ class Preparation:
 
     def forget(self) -> None:
         """Leave what was begun, for another studio."""
-        self._ready = self._coming = self._head = self._kept = None
+        self._ready = self._coming = self._next = self._kept = None
 
     def picture(self, studio: Studio, state: ViewerState) -> Any:
         """The last picture while the head of a state is prepared; None when the state may be drawn.
@@ -45,13 +45,14 @@ class Preparation:
             if not self._coming.done():
                 return self._kept
             coming, self._coming, self._kept = self._coming, None, None
-            self._ready = self._head
+            self._ready = self._next
             coming.result()
-        if studio.last_image is None or state.scene.head is self._ready:
-            self._ready = state.scene.head
+        mesh = state.scene.head.mesh
+        if studio.last_image is None or mesh is self._ready:
+            self._ready = mesh
             return None
         self._kept = copied(studio.renderer.device, studio.last_image)
-        self._head, studio.is_preparing = state.scene.head, True
+        self._next, studio.is_preparing = mesh, True
         self._coming = begun(lambda: studio.prepare(state))
         self._coming.add_done_callback(lambda _: self._wake())
         return self._kept
