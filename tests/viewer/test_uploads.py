@@ -25,7 +25,7 @@ class Server:
     def __init__(self, folder: Path) -> None:
         self.got: list[Path] = []
         self.names: list[str] = []
-        canvas = SimpleNamespace(ticket="secret", on_file=self._take)
+        self.canvas = canvas = SimpleNamespace(ticket="secret", on_file=self._take)
         self.app = Guard(Uploads(_app, canvas, folder), "")
 
     def _take(self, path: Path, name: str) -> None:
@@ -158,3 +158,9 @@ def test_a_full_disk_is_told(server: Server, monkeypatch: pytest.MonkeyPatch) ->
     assert status == 400 and "No space left" in said
     monkeypatch.undo()
     assert server.send("a.obj", b"v")[0] == 200
+
+
+def test_nothing_is_taken_before_there_is_a_viewer(server: Server, tmp_path: Path) -> None:
+    server.canvas.on_file = None
+    status, said = server.send("a.obj", b"v")
+    assert status == 400 and "being prepared" in said and not any(tmp_path.iterdir())

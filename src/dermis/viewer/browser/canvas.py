@@ -34,7 +34,7 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         self._lossless = 0  # number of the current lossless frame, 0 when a newer frame has replaced it
         self._ticket_holder = 0
         self.ticket = ""  # of the page that has control, for files that it sends
-        self.on_file: Callable[[Path, str], None] = lambda path, name: None
+        self.on_file: Callable[[Path, str], None] | None = None  # takes them when there is a viewer
         self._said: dict[str, Any] | None = None  # to pages that have nothing to show yet
         super().__init__(**given)
 

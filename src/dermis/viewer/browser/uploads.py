@@ -70,6 +70,8 @@ class Uploads:
         if kind is None:
             kinds = ", ".join(HEAD_FILES)
             refuse(name, f"a mesh, a person or a scene ({kinds})", "it ends otherwise", "Convert it")
+        if self._canvas.on_file is None:
+            refuse(name, "a page that shows a head", "the first one is being prepared", "Send it again soon")
         if self._is_busy:
             refuse(name, "one file at a time", "another one is on its way", "Wait for it")
         if self._count >= MOST_FILES:
