@@ -156,6 +156,15 @@ def test_a_place_that_cannot_be_a_folder_costs_only_time(
     assert _kept() == (".." in name)
 
 
+def test_a_user_without_a_home_keeps_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And makes no folder called ~ in the current one."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("DERMIS_CACHE", "HOME", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("pwd.getpwuid", lambda number: {}[number])
+    assert not _kept() and not list(tmp_path.iterdir())
+
+
 def test_a_full_disk_costs_only_time(place: Path) -> None:
     resource = pytest.importorskip("resource")
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import notify
-from dermis.private import make_private, open_private, stranger
+from dermis.private import cache_folder, make_private, open_private, stranger
 
 Array = NDArray[Any]
 Arrays = dict[str, Array]
@@ -38,13 +38,6 @@ _BLOCK = 2 << 20  # bytes that a thread reads, or tells the hash of, at once
 _MOST_HEAD = 1 << 20  # bytes of a line
 _LARGE = 4 << 20  # bytes that more than one thread takes
 _MOST_THREADS = 4
-
-
-def cache_folder() -> Path:
-    """Where files lie that can all be had again: DERMIS_CACHE, else the user's cache folder."""
-    import platformdirs
-
-    return Path(os.environ.get("DERMIS_CACHE") or platformdirs.user_cache_dir("dermis"))
 
 
 def cached_array(sources: Array | Sequence[Array], form: str, make: Callable[[], Array]) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import io
 import os
@@ -14,6 +15,19 @@ _READING = os.O_RDONLY | sum(
 )
 _MOST_LINKS = 40  # as Linux follows
 _OTHERS = stat.S_IWGRP | stat.S_IWOTH
+
+
+def cache_folder() -> Path:
+    """Where files lie that can all be had again: DERMIS_CACHE, else the user's cache folder.
+
+    For a user without a home it is a place that can hold nothing.
+    """
+    import platformdirs
+
+    try:
+        return Path(os.environ.get("DERMIS_CACHE") or platformdirs.user_cache_dir("dermis")).absolute()
+    except RuntimeError:
+        return Path(os.devnull)
 
 
 def make_private(folder: Path) -> None:
@@ -35,7 +49,9 @@ def stranger(folder: Path) -> str:
     """
     if os.name != "posix":
         return ""  # profiles are their user's there
-    above_home = set(Path.home().parents)
+    above_home: set[Path] = set()
+    with contextlib.suppress(RuntimeError):  # there is none
+        above_home = set(Path.home().parents)
     steps = [one for one in _steps(folder) if one not in above_home]
     for one in steps:
         try:

@@ -115,3 +115,20 @@ with Streams() as streams:
         with os.fdopen(reading, "rb") as file:
             assert len(file.read()) == 300_000
     assert ran.returncode == 0
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are POSIX's")
+def test_a_reader_that_does_not_read_holds_up_no_end() -> None:
+    code = """
+import dermis.cli, sys
+from dermis.cli.console import print_lines
+dermis.cli._run = lambda: print_lines("x" * 300_000)
+dermis.cli.main()
+"""
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as ran:
+        assert ran.stdout is not None and ran.stderr is not None
+        assert ran.stdout.read(1) == b"x"
+        ran.terminate()
+        assert ran.wait(timeout=30) == 143 and ran.stderr.read() == b""

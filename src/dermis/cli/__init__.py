@@ -41,6 +41,7 @@ def main() -> None:
                 code = _fail(f"stdout: expected a place to write to, but {came}. Write it elsewhere.")
         except KeyboardInterrupt:
             code = _INTERRUPTED
+            streams.drop()
         except Exception:  # some libraries make one of their own of it
             if not (code := interruption.code):
                 raise

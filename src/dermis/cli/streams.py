@@ -44,6 +44,12 @@ class Streams:
         faults = [raw.fault for raw in self._raw if raw.number == 1]
         return next((one for one in faults if not isinstance(one, BrokenPipeError)), None)
 
+    def drop(self) -> None:
+        """Write no more to stdout: it may be held up, and nobody wants the rest of an interrupted command."""
+        for raw in self._raw:
+            if raw.number == 1:
+                raw.fault = raw.fault or BrokenPipeError()
+
     def _guarded(self, usual: TextIO | None, number: int) -> TextIO:
         inner: Any = usual.buffer if usual else io.FileIO(number, "w", closefd=False)
         raw = _Guarded(getattr(inner, "raw", inner), number)

@@ -14,9 +14,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, NoReturn
 
-from dermis.disk import cache_folder
 from dermis.errors import DermisError, refuse
-from dermis.private import make_private
+from dermis.private import cache_folder, make_private
 
 DATA_VARIABLE = "DERMIS_DATA"
 
