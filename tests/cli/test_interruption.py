@@ -162,6 +162,15 @@ class Lost:
     def __del__(self): os.kill(os.getpid(), signal.SIGTERM); time.sleep(0.1)
 Lost()
 time.sleep(60)""",
+    "a task of a loop": """
+import asyncio
+async def drawn():
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(0.1)
+async def shown():
+    task = asyncio.create_task(drawn())
+    await asyncio.sleep(60)
+asyncio.run(shown())""",
     "a module half imported": """
 import importlib.abc, importlib.util
 class Swallows(importlib.abc.Loader):

@@ -69,11 +69,14 @@ class Interruption:
         self.code = self.code or _SHELLS + number
         if self._is_raised:
             return
-        if _would_be_lost(frame):
+        if (loop := _running_loop()) is not None:  # from one of its tasks asyncio would print it
+            self._is_raised = True
+            loop.call_soon_threadsafe(_interrupt)
+        elif _would_be_lost(frame):
             self._raise_later()
         else:
             self._is_raised = True
-            raise KeyboardInterrupt
+            _interrupt()
 
     def _raise_later(self) -> None:
         self._is_raised, self._is_late = False, True
@@ -114,6 +117,20 @@ class Interruption:
             signal.pthread_kill(threading.main_thread().ident or 0, number)
         else:
             signal.raise_signal(number)
+
+
+def _interrupt() -> None:
+    raise KeyboardInterrupt
+
+
+def _running_loop() -> Any:
+    """asyncio's, if the main thread is in one."""
+    if (asyncio := sys.modules.get("asyncio")) is None:
+        return None
+    try:
+        return asyncio.get_running_loop()
+    except RuntimeError:
+        return None
 
 
 def _would_be_lost(frame: FrameType | None) -> bool:
