@@ -48,6 +48,14 @@ def read_file(path: str | Path, expected: str, most: int, name: object = None) -
     return data
 
 
+def is_file(path: str | Path) -> bool:
+    """Whether a regular file of this name is there; none is of a name that no file can have."""
+    try:
+        return Path(path).is_file()
+    except (OSError, ValueError):  # too long, or with a NUL
+        return False
+
+
 def read_text(path: str | Path, expected: str, most: int = MOST_TEXT) -> str:
     """A file's text, UTF-8 with or without a mark of its order.
 
@@ -122,5 +130,6 @@ def _megabytes(size: int) -> str:
 
 def _reason(fault: BaseException) -> str:
     """What a fault says, short enough for one line."""
-    text = " ".join(str(fault).split()) or type(fault).__name__
+    text = " ".join(str(fault)[:1000].split())
+    text = text if text and isinstance(fault, ValueError) else f"{type(fault).__name__}: {text}"
     return text if len(text) <= 200 else f"{text[:197]}..."

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Collection
 from dataclasses import replace
@@ -11,8 +10,10 @@ from typing import Any, Literal
 
 from dermis.errors import DermisError
 from dermis.images.io import read_image
+from dermis.mesh.beside import beside
 from dermis.mesh.maps import Maps, load_maps
-from dermis.mesh.mtl import MtlMaterial, Texture, beside, read_materials
+from dermis.mesh.mtl import MtlMaterial, Texture, read_materials
+from dermis.mesh.obj_text import groups_of_faces, read_obj_text
 
 _RELIEF = ("normal", "height")
 _ENOUGH = 256  # texels a side
@@ -36,7 +37,7 @@ def obj_maps(
     given : roles of maps that are not wanted
     height_mm, normal_y : see `load_maps`
     """
-    text = path.read_bytes().decode("utf-8", errors="replace").replace("\r\n", "\n")
+    text = read_obj_text(path)
     library, faults = read_materials(path, text), list[str]()
     faults += [f"mtllib: {name} is not in its folder" for name in library.missing]
     wanted = _skin(text, library.materials, opaque).textures
@@ -92,12 +93,7 @@ def _is_grey(file: Path) -> bool:
 
 def _skin(text: str, materials: dict[str, MtlMaterial], opaque: Collection[str]) -> MtlMaterial:
     """The material of the skin: of groups called so, else of all, the one with the most faces."""
-    current, faces = {"usemtl": "", "g": ""}, Counter[tuple[str, str]]()
-    for key, value in re.findall(r"^[ \t]*(usemtl|g|f)\b[ \t]*([^\n]*?)[ \t]*$", text, re.MULTILINE):
-        if key == "f":
-            faces[current["usemtl"], current["g"]] += 1
-        else:
-            current[key] = value
+    faces = Counter(groups_of_faces(text))
     unwanted = {name.casefold() for name in opaque}
     left = {names: count for names, count in faces.items() if not unwanted & set(map(str.casefold, names))}
     named = {names: count for names, count in left.items() if "skin" in " ".join(names).casefold()}
