@@ -10,6 +10,7 @@ import json
 import math
 import os
 import stat
+import struct
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,6 +19,8 @@ from typing import Any, NoReturn
 
 from dermis.errors import DermisError, refuse
 
+BROKEN = (LookupError, TypeError, AttributeError, ArithmeticError, struct.error)
+"""What code raises that trusts the form of what it is given, see `understood`."""
 MOST_TEXT = 4 << 20  # bytes of settings: scenes, lights, tables
 _PAGE = 1 << 16
 _NONBLOCKING = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)

@@ -9,15 +9,19 @@ MOST_TRIANGLES = 1_250_000
 MOST_VERTICES = 1_250_000
 MOST_CORNERS = 4096
 """Of one polygon."""
-MOST_GROUPS = 1024
+MOST_GROUPS = 4096
 """Materials, groups, and the primitives of a glTF file's scene."""
-MOST_NODES = 1 << 16
+MOST_NODES, DEEPEST_NODE = 1 << 16, 1024
+MOST_INFLUENCES = 16
+"""Of bones on a vertex, of which the four strongest are kept."""
+MOST_DISPLACEMENTS = 12_000_000
+"""Of vertices by all targets."""
 MOST_BONES = 2048
 MOST_TARGETS = 4096
 MOST_CHANNELS = 1 << 14
 """Curves of an animation clip."""
 MOST_NUMBERS = 1 << 27
-"""That a glTF file's accessors stand for, each counted as often as it is used."""
+"""That a glTF file's accessors stand for, each counted as often as it is used, and for 512 at least."""
 MOST_JSON = 1 << 21
 """Values in a glTF file's JSON."""
 MOST_MTL_BYTES = 16 << 20

@@ -15,8 +15,10 @@ from typing import Any, Literal, NoReturn
 
 from dermis.disk import cache_folder
 from dermis.errors import DermisError, refuse
+from dermis.reading import read_file
 
 DATA_VARIABLE = "DERMIS_DATA"
+_MOST_BYTES = 1 << 30
 
 
 @dataclass(frozen=True)
@@ -112,15 +114,14 @@ def _is_right(path: Path, file: SampleFile) -> bool:
     try:
         status = path.stat()
         return _sha256(path, status.st_size, status.st_mtime_ns) == file.sha256
-    except OSError:
+    except (OSError, DermisError):
         return False
 
 
 @lru_cache(maxsize=256)
 def _sha256(path: Path, size: int, mtime_ns: int) -> str:
     """Hash of a file, computed once for each size and time of change."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    return hashlib.sha256(read_file(path, "a file of a sample", _MOST_BYTES)).hexdigest()
 
 
 def _download(sample: Sample, roles: list[str]) -> None:

@@ -11,6 +11,7 @@ from dermis.errors import refuse
 from dermis.mesh.formats import Array, Index
 from dermis.mesh.gltf.document import Document, Tree
 from dermis.mesh.gltf.nodes import Nodes
+from dermis.mesh.limits import MOST_TARGETS
 
 
 class Displaced(NamedTuple):
@@ -29,8 +30,11 @@ def target_names(mesh: Tree) -> tuple[str, ...]:
     counts = [len(primitive.get("targets", [])) for primitive in mesh["primitives"]]
     extras = mesh.get("extras")
     told = extras.get("targetNames") if isinstance(extras, dict) else None
-    given = [str(name) for name in told] if isinstance(told, list) else []
-    return tuple(given[k] if k < len(given) else f"target {k}" for k in range(max(counts, default=0)))
+    most = max(counts, default=0)
+    if most > MOST_TARGETS:
+        raise ValueError(f"a mesh has {most:,} morph targets, more than {MOST_TARGETS:,}")
+    given = [str(name) for name in told[:most]] if isinstance(told, list) else []
+    return tuple(given[k] if k < len(given) else f"target {k}" for k in range(most))
 
 
 def read_targets(document: Document, mesh: Tree, primitive: Tree, count: int) -> dict[str, Displaced]:
@@ -62,11 +66,14 @@ def resting_weights(document: Document, nodes: Nodes) -> dict[str, float]:
     A node's weights go before its mesh's. Of a name in several meshes the first counts: it is one target.
     """
     found: dict[str, float] = {}
+    names: dict[int, tuple[str, ...]] = {}
     for index in nodes.shown or ():
-        node = document.tree["nodes"][index]
-        mesh = document.tree["meshes"][node["mesh"]] if "mesh" in node else {"primitives": []}
+        node = document.all("nodes")[index]
+        mesh: Tree = document.one("meshes", node["mesh"]) if "mesh" in node else {"primitives": []}
         weights = node.get("weights", mesh.get("weights", []))
-        for name, weight in zip(target_names(mesh), weights, strict=False):
+        if weights and id(mesh) not in names:
+            names[id(mesh)] = target_names(mesh)
+        for name, weight in zip(names[id(mesh)] if weights else (), weights, strict=False):
             found.setdefault(name, float(weight))
     if not np.isfinite(list(found.values())).all():
         refuse(document.path, "finite weights of targets", "some are not", "Export the file again")
