@@ -138,7 +138,7 @@ class Document:
         if uri.startswith("data:"):
             data = base64.b64decode(uri.partition(",")[2])
         else:
-            data = read_file(named_by_uri(self.path, uri), f"a buffer of {self.path}", left)
+            data = read_file(named_by_uri(self.path, uri), "a buffer", left, f"{self.path}, {uri[:80]!r}")
         if len(data) > left:
             came = "they have more"
             refuse(self.path, f"buffers of at most {MOST_BYTES >> 20} MiB", came, "Make them smaller")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -70,7 +70,7 @@ def resting_weights(document: Document, nodes: Nodes) -> dict[str, float]:
     for index in nodes.shown or ():
         node = document.all("nodes")[index]
         mesh: Tree = document.one("meshes", node["mesh"]) if "mesh" in node else {"primitives": []}
-        weights = node.get("weights", mesh.get("weights", []))
+        weights: Any = node.get("weights", mesh.get("weights", []))
         if weights and id(mesh) not in names:
             names[id(mesh)] = target_names(mesh)
         for name, weight in zip(names[id(mesh)] if weights else (), weights, strict=False):
