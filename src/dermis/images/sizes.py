@@ -6,6 +6,8 @@ MOST_BYTES = 256 << 20
 """Of a picture's file."""
 MOST_PIXELS = 8192**2
 """Of a picture: a map of the largest side that a device must take, or a panorama of 11585 columns."""
+MOST_TOGETHER = 2 * MOST_PIXELS
+"""Of all pictures that a mesh file names."""
 
 
 class TooLargeError(ValueError):

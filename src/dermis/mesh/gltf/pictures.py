@@ -10,12 +10,11 @@ import numpy as np
 
 from dermis.errors import refuse
 from dermis.images.io import Picture, read_size
-from dermis.images.sizes import MOST_PIXELS
+from dermis.images.sizes import MOST_TOGETHER
 from dermis.mesh.beside import named_by_uri
 from dermis.mesh.gltf.document import Document, read_document
 from dermis.reading import BROKEN, is_file, understood
 
-_MOST_TEXELS = 2 * MOST_PIXELS
 _READABLE = {"image/png", "image/jpeg"}
 ROLES = ("normal", "height", "specular", "roughness", "region")
 
@@ -35,12 +34,12 @@ def embedded_maps(path: Path) -> dict[str, Any]:
     for picture in (one for one in found.values() if isinstance(one, Picture) or is_file(str(one))):
         width, height = read_size(picture)
         texels += width * height
-    if texels > _MOST_TEXELS:
+    if texels > MOST_TOGETHER:
         came, remedy = (
             f"they have {texels / 1e6:.0f} million",
             "Resize them, or name them yourself (--colour, ...)",
         )
-        refuse(path, f"textures of at most {_MOST_TEXELS / 1e6:.0f} million texels together", came, remedy)
+        refuse(path, f"textures of at most {MOST_TOGETHER / 1e6:.0f} million texels together", came, remedy)
     return found
 
 
