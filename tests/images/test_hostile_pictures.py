@@ -1,4 +1,4 @@
-"""Pictures that ask for more than they hold: refused by their headers, or decoded in little memory and time."""
+"""Pictures that ask for more than they hold: refused by their headers, or decoded in little memory."""
 
 from __future__ import annotations
 

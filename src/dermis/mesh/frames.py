@@ -91,7 +91,8 @@ class FrameReader:
         return Vertices(place[used], corners.astype(np.int32), part.uv[used].astype(np.float32))
 
     def _in_head(self, places: NDArray[np.float64]) -> Floats:
-        return upright(places, self.up).astype(np.float32)
+        with np.errstate(over="ignore"):  # what is infinite then is refused
+            return upright(places, self.up).astype(np.float32)
 
 
 def _split(data: bytes) -> tuple[list[tuple[bytes, bytes, bytes]], bytes]:

@@ -85,7 +85,7 @@ def _tracks(document: Document, index: int, name: str) -> list[Track]:
         came = f"{name!r} has {len(clip['channels']):,}"
         refuse(document.path, f"clips of at most {MOST_CHANNELS:,} channels", came, "Export it again")
     groups: dict[tuple[object, ...], list[tuple[str, _Keys]]] = {}
-    found = []
+    found, names = [], dict[int, tuple[str, ...]]()
     for number, channel in enumerate(clip["channels"]):
         target, culprit = channel["target"], f"{document.path}: clip {name!r}, channel {number}"
         if "node" not in target or target["path"] not in (*_WIDTH, "weights"):
@@ -93,7 +93,7 @@ def _tracks(document: Document, index: int, name: str) -> list[Track]:
         _check_node(nodes, target["node"], culprit)
         sampler = clip["samplers"][numbered(channel["sampler"], len(clip["samplers"]), "samplers")]
         if target["path"] == "weights":
-            found.append(_weights(document, target["node"], sampler, culprit))
+            found.append(_weights(document, target["node"], sampler, culprit, names))
             continue
         keys = _keys(document, sampler, _WIDTH[target["path"]], culprit)
         if target["path"] == "rotation" and not keys.plain.any(axis=-1).all():
@@ -108,9 +108,14 @@ def _check_node(nodes: Nodes, node: int, culprit: str) -> None:
         refuse(culprit, f"nodes from 0 to {len(nodes.names) - 1}", f"it moves node {node}", _DAMAGED)
 
 
-def _weights(document: Document, node: int, sampler: Tree, culprit: str) -> Track:
+def _weights(
+    document: Document, node: int, sampler: Tree, culprit: str, known: dict[int, tuple[str, ...]]
+) -> Track:
+    """Weights of a node's targets; known : names by mesh, of those that were met."""
     mesh = document.all("nodes")[node].get("mesh")
-    names = () if mesh is None else target_names(document.one("meshes", mesh))
+    if mesh is not None and mesh not in known:
+        known[mesh] = target_names(document.one("meshes", mesh))
+    names = () if mesh is None else known[mesh]
     if not names:
         came = f"node {node} has no morph targets"
         refuse(culprit, "weights of a mesh with morph targets", came, _DAMAGED)

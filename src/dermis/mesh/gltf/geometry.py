@@ -14,7 +14,7 @@ from dermis.mesh.formats import GREY, Array, Group, Index, Model, Part, colour_o
 from dermis.mesh.gltf.document import Document, Tree, read_document
 from dermis.mesh.gltf.nodes import Nodes, read_nodes
 from dermis.mesh.gltf.skins import Armature, Followed, read_armature, read_followed
-from dermis.mesh.gltf.targets import Displaced, displaced, read_targets, resting_weights
+from dermis.mesh.gltf.targets import Displaced, displaced, read_targets, resting_weights, target_names
 from dermis.mesh.limits import MOST_DISPLACEMENTS, MOST_GROUPS, MOST_TRIANGLES, MOST_VERTICES
 from dermis.mesh.quads import find_pairs
 
@@ -83,13 +83,14 @@ class _Reader:
                 yield from self._mesh(mesh, None)
 
     def _mesh(self, mesh: Tree, node: int | None) -> Iterator[Part]:
+        names = target_names(mesh)
         for primitive in mesh["primitives"]:
             if primitive.get("mode", _TRIANGLES) in (_TRIANGLES, _STRIP, _FAN):
-                yield self._part(mesh, primitive, node)
+                yield self._part(mesh, names, primitive, node)
 
-    def _part(self, mesh: Tree, primitive: Tree, node: int | None) -> Part:
+    def _part(self, mesh: Tree, names: tuple[str, ...], primitive: Tree, node: int | None) -> Part:
         """A primitive where its node, or the joints of its skin, take it."""
-        part, targets = self._unplaced(mesh, primitive)
+        part, targets = self._unplaced(mesh, names, primitive)
         if node is None:
             return _placed(part, targets, np.eye(4))
         if "skin" in self.document.tree["nodes"][node] and self.armature:
@@ -102,7 +103,9 @@ class _Reader:
         count = len(part.positions)
         return replace(placed, bone=np.full((count, 1), bone), weight=np.ones((count, 1)))
 
-    def _unplaced(self, mesh: Tree, primitive: Tree) -> tuple[Part, dict[str, Displaced]]:
+    def _unplaced(
+        self, mesh: Tree, names: tuple[str, ...], primitive: Tree
+    ) -> tuple[Part, dict[str, Displaced]]:
         """A primitive in its mesh's space, with targets at their default weights, and all its targets."""
         given = primitive["attributes"]
         self._check_most("vertices", self.document.one("accessors", given["POSITION"])["count"])
@@ -111,7 +114,7 @@ class _Reader:
             fractions(self.document.numbers(given[name])) if name in given else None
             for name in ("TEXCOORD_0", "NORMAL")
         )
-        targets = read_targets(self.document, mesh, primitive, len(positions))
+        targets = read_targets(self.document, mesh, names, primitive, len(positions))
         moved = displaced(positions, targets, self.weights)
         if moved is not positions:
             normals = None  # they belong to another shape

@@ -37,15 +37,18 @@ def target_names(mesh: Tree) -> tuple[str, ...]:
     return tuple(given[k] if k < len(given) else f"target {k}" for k in range(most))
 
 
-def read_targets(document: Document, mesh: Tree, primitive: Tree, count: int) -> dict[str, Displaced]:
+def read_targets(
+    document: Document, mesh: Tree, names: tuple[str, ...], primitive: Tree, count: int
+) -> dict[str, Displaced]:
     """Displacements of a primitive's vertices by name, in the mesh's space.
 
-    count : of its vertices
+    names : of the mesh's targets
+    count : of the primitive's vertices
 
     Raises DermisError for a target of another count, or with numbers that are none.
     """
     found: dict[str, Displaced] = {}
-    for name, target in zip(target_names(mesh), primitive.get("targets", []), strict=False):
+    for name, target in zip(names, primitive.get("targets", []), strict=False):
         if "POSITION" not in target:
             continue
         delta = document.real(target["POSITION"])
