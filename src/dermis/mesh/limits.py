@@ -14,7 +14,7 @@ MOST_GROUPS = 4096
 MOST_NODES, DEEPEST_NODE = 1 << 16, 1024
 MOST_INFLUENCES = 16
 """Of bones on a vertex, of which the four strongest are kept."""
-MOST_DISPLACEMENTS = 12_000_000
+MOST_DISPLACEMENTS = 6_000_000
 """Of vertices by all targets."""
 MOST_BONES = 2048
 MOST_TARGETS = 4096
