@@ -59,7 +59,7 @@ class Maps:
         return self.roughness is not None
 
     @cached_property
-    def meancolour_map(self) -> NDArray[np.float64] | None:
+    def mean_colour(self) -> NDArray[np.float64] | None:
         """(3,) of the colour map, without the black texels of empty space [-]."""
         if self.colour is None:
             return None
