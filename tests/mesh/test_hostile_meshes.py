@@ -79,6 +79,13 @@ def test_a_material_of_spaces_and_digits_takes_no_time(tmp_path: Path) -> None:
     assert time.process_time() - began < SOON_S
 
 
+def test_libraries_are_limited_together(tmp_path: Path) -> None:
+    (tmp_path / "a.mtl").write_text("newmtl skin\n" + "#\n" * 1_000_000)
+    (tmp_path / "a.obj").write_text(f"mtllib a.mtl\nmtllib ./a.mtl\nmtllib ././a.mtl\n{obj_text()}")
+    with pytest.raises(DermisError, match=r"a\.mtl: expected material libraries of at most"):
+        load_mesh(tmp_path / "a.obj")
+
+
 @pytest.mark.parametrize("colour", ["nan 0 0", "0 nan 0", "0 0 nan"])
 def test_colours_that_are_none_are_refused(tmp_path: Path, colour: str) -> None:
     (tmp_path / "a.mtl").write_text(f"newmtl skin\nKd {colour}\n")

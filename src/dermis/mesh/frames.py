@@ -17,7 +17,7 @@ from dermis.mesh.geometry import compacted
 from dermis.mesh.joined import joined
 from dermis.mesh.limits import MOST_BYTES
 from dermis.mesh.load import Up, check_options, read_model, upright
-from dermis.reading import is_file, read_file, understood
+from dermis.reading import BROKEN, is_file, read_file, understood
 
 Floats = NDArray[np.float32]
 
@@ -82,7 +82,7 @@ class FrameReader:
         return vertices
 
     def _parsed(self, path: Path, unit: float) -> Vertices:
-        with np.errstate(all="ignore"), understood(path, "a mesh"):
+        with np.errstate(all="ignore"), understood(path, "a mesh", *BROKEN):
             part = joined(read_model(path).parts, path)
             place = self._in_head(unit * part.positions)
             assert part.uv is not None

@@ -24,6 +24,7 @@ MOST_NUMBERS = 1 << 27
 """That a glTF file's accessors stand for, each counted as often as it is used, and for 512 at least."""
 MOST_JSON = 1 << 21
 """Values in a glTF file's JSON."""
-MOST_MTL_BYTES = 16 << 20
+MOST_MTL_BYTES = 4 << 20
+"""Of all .mtl files that an OBJ file names."""
 MOST_LIBRARIES = 64
 """Names of .mtl files."""

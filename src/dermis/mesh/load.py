@@ -23,7 +23,7 @@ from dermis.mesh.joined import joined, taken
 from dermis.mesh.limits import MOST_BYTES
 from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.rigging import build_rig, part_points
-from dermis.reading import is_file, read_file, understood
+from dermis.reading import BROKEN, is_file, read_file, understood
 
 Origin = Literal["auto", "top", "bottom"]
 Up = Literal["y", "z"]
@@ -97,7 +97,7 @@ def _loaded(
     eye_groups: tuple[str, ...],
 ) -> Rigged:
     """The mesh and the rig as they are in the file."""
-    with np.errstate(all="ignore"), understood(source, "a mesh", np.linalg.LinAlgError):
+    with np.errstate(all="ignore"), understood(source, "a mesh", *BROKEN):
         model = read_model(source)
         part, to_head = joined(model.parts, source), np.eye(4)
         assert part.uv is not None and part.normals is not None

@@ -61,14 +61,15 @@ def read_materials(path: Path, text: str) -> Library:
 
     text : of the OBJ file
     """
-    found = Library()
+    found, left = Library(), MOST_MTL_BYTES
     for told in libraries(text)[:MOST_LIBRARIES]:
         for name in [told] if beside(path, told) else told.split(".mtl ")[:MOST_LIBRARIES]:
             file = beside(path, name) or beside(path, f"{name}.mtl")
             if file is None:
                 found.missing.append(name)
             else:
-                data = read_file(file, "a material library", MOST_MTL_BYTES)
+                data = read_file(file, "material libraries", left)
+                left -= len(data)
                 found.materials |= _materials(data.decode("utf-8", errors="replace"))
     return found
 
