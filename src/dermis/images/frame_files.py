@@ -12,7 +12,7 @@ from dermis.errors import DermisError, refuse
 from dermis.images.codecs import png_size
 from dermis.images.exr import decode_exr
 from dermis.images.io import OUTPUT_SUFFIXES, check_output, read_bytes
-from dermis.reading import read_text
+from dermis.reading import read_file
 
 _NUMBER = re.compile(r"%(?:0(\d+))?d")
 
@@ -53,7 +53,7 @@ class FrameFiles:
 
         made_of : a text that two frames of one number share if they look the same
         """
-        if anew or self._recorded() != made_of:
+        if anew or not self._says(made_of):
             with outputs.replacing(self._record) as trial:
                 trial.write_text(made_of, encoding="utf-8")
 
@@ -62,12 +62,13 @@ class FrameFiles:
         begun_ns = self._record.stat().st_mtime_ns
         return [number for number in numbers if not _stands(self.path(number), size, begun_ns)]
 
-    def _recorded(self) -> str | None:
-        """What the frames from before are made of; None where nothing sound says so."""
+    def _says(self, made_of: str) -> bool:
+        """Whether frames are there of which the record says this; a damaged one says nothing."""
+        text = made_of.encode()
         try:
-            return read_text(self._record, "what frames are made of")
+            return read_file(self._record, "a record of frames", len(text)) == text
         except DermisError:
-            return None
+            return False
 
     @property
     def _record(self) -> Path:
@@ -77,7 +78,7 @@ class FrameFiles:
 def _stands(path: Path, size: tuple[int, int], begun_ns: int) -> bool:
     """Whether a picture of this size lies there whole, written since a time."""
     try:
-        if path.stat().st_mtime_ns < begun_ns:
+        if not path.is_file() or path.stat().st_mtime_ns < begun_ns:
             return False
         if path.suffix.lower() == ".png":
             return png_size(read_bytes(path)) == size
