@@ -81,8 +81,7 @@ def _above_all(bones: Bones) -> Bones:
 def _animated(document: Document) -> set[int]:
     channels = [channel for clip in document.all("animations") for channel in clip["channels"]]
     targets = [channel["target"] for channel in channels]
-    moved = [target["node"] for target in targets if target["path"] in _MOVES and "node" in target]
-    return {numbered(node, len(document.all("nodes")), "nodes") for node in moved}
+    return {target["node"] for target in targets if target["path"] in _MOVES and "node" in target}
 
 
 def _skin(document: Document, node: int) -> Tree:
