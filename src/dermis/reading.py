@@ -10,6 +10,7 @@ import json
 import math
 import os
 import stat
+import struct
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,6 +19,8 @@ from typing import Any, NoReturn
 
 from dermis.errors import DermisError, refuse
 
+BROKEN = (LookupError, TypeError, AttributeError, ArithmeticError, struct.error)
+"""What code raises that trusts the form of what it is given, see `understood`."""
 MOST_TEXT = 4 << 20  # bytes of settings: scenes, lights, tables
 _PAGE = 1 << 16
 _NONBLOCKING = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
@@ -46,6 +49,14 @@ def read_file(path: str | Path, expected: str, most: int, name: object = None) -
             culprit, f"{expected} of at most {_megabytes(most)}", came, "Check its name, or make it smaller"
         )
     return data
+
+
+def is_file(path: str | Path) -> bool:
+    """Whether a regular file of this name is there; none is of a name that no file can have."""
+    try:
+        return Path(path).is_file()
+    except (OSError, ValueError):  # too long, or with a NUL
+        return False
 
 
 def read_text(path: str | Path, expected: str, most: int = MOST_TEXT) -> str:
@@ -122,5 +133,6 @@ def _megabytes(size: int) -> str:
 
 def _reason(fault: BaseException) -> str:
     """What a fault says, short enough for one line."""
-    text = " ".join(str(fault).split()) or type(fault).__name__
+    text = " ".join(str(fault)[:1000].split())
+    text = text if text and isinstance(fault, ValueError) else f"{type(fault).__name__}: {text}"
     return text if len(text) <= 200 else f"{text[:197]}..."

@@ -9,8 +9,9 @@ from pathlib import Path
 
 from dermis import outputs
 from dermis.errors import DermisError, refuse
-from dermis.images.codecs import decode_exr, png_size
-from dermis.images.io import OUTPUT_SUFFIXES, check_output
+from dermis.images.codecs import png_size
+from dermis.images.exr import decode_exr
+from dermis.images.io import OUTPUT_SUFFIXES, check_output, read_bytes
 from dermis.reading import read_file
 
 _NUMBER = re.compile(r"%(?:0(\d+))?d")
@@ -80,8 +81,8 @@ def _stands(path: Path, size: tuple[int, int], begun_ns: int) -> bool:
         if not path.is_file() or path.stat().st_mtime_ns < begun_ns:
             return False
         if path.suffix.lower() == ".png":
-            return png_size(path.read_bytes()) == size
-        height, width = decode_exr(path).shape[:2]
+            return png_size(read_bytes(path)) == size
+        height, width = decode_exr(read_bytes(path)).shape[:2]
     except (OSError, ValueError, RuntimeError, DermisError):
         return False
     return (width, height) == size
