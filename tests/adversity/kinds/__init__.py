@@ -1,0 +1,30 @@
+"""All kinds of input."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+
+from adversity.kind import Kind
+from adversity.kinds import clips, meshes, pictures, scenes
+
+KINDS: dict[str, Kind] = {
+    kind.name: kind for part in (meshes, pictures, scenes, clips) for kind in part.KINDS
+}
+_WARMED = 24  # sound inputs of each kind: all that it can begin with
+
+
+def prepare(kinds: dict[str, Kind] = KINDS) -> None:
+    """Take sound inputs here: what they import and build once is there for the processes that follow."""
+    before = Path.cwd()
+    for kind in kinds.values():
+        for number in range(_WARMED):
+            with TemporaryDirectory() as folder:
+                plan = kind.sound(Random(number)).write(Path(folder))
+                os.chdir(folder)
+                try:
+                    kind.take(plan)
+                finally:
+                    os.chdir(before)
