@@ -17,7 +17,7 @@ from typing import Any
 
 from adversity import case
 from adversity.case import FoundError, Plan
-from adversity.hostile import PIPE
+from adversity.hostile import NAMES, NUMBERS, PIPE
 from adversity.kind import Kind
 
 from dermis.errors import DermisError
@@ -25,6 +25,7 @@ from dermis.errors import DermisError
 FORM = re.compile(r".+?: expected .+, but .+\. \S.+[.?]", re.DOTALL)
 _TOLD, _PRINTED = ".told.json", ".printed"
 _UNFINISHED = re.compile(r"\.dermis-|\.part$")
+_HELD = tuple(one for one in (*NAMES, *NUMBERS) if one.strip())
 _LOOK_S = 0.02
 _TICK_S = 1 / os.sysconf("SC_CLK_TCK")
 _PAGE = os.sysconf("SC_PAGE_SIZE")
@@ -90,7 +91,7 @@ def _told(kind: Kind, plan: Plan) -> tuple[str, str, str]:
     try:
         kind.take(plan)
     except DermisError as refusal:
-        return _of_refusal(str(refusal), plan)
+        return _of_refusal(refusal, plan)
     except FoundError as found:
         return found.outcome, f"{found.outcome}: {str(found)[:60]}", str(found)
     except BaseException as fault:
@@ -99,19 +100,21 @@ def _told(kind: Kind, plan: Plan) -> tuple[str, str, str]:
     return case.ACCEPTED, "", ""
 
 
-def _of_refusal(message: str, plan: Plan) -> tuple[str, str, str]:
-    """A refusal has the package's form and names what is at fault."""
-    if not FORM.fullmatch(message):
-        return case.UNCLEAR, "form", message[:3000]
-    if plan.get("culprits") and not any(one in message for one in plan["culprits"]):
-        return case.UNCLEAR, "names no file", message[:3000]
-    return case.REFUSED, "", message[:300]
+def _of_refusal(refusal: DermisError, plan: Plan) -> tuple[str, str, str]:
+    """A refusal has the package's form, and begins with a file of the input or a name that one holds."""
+    message = str(refusal)
+    culprit = message.partition(": expected ")[0]
+    names = any(one in culprit for one in plan["culprits"]) or culprit.strip("'\"").endswith(_HELD)
+    if FORM.fullmatch(message) and (names or not plan["culprits"]):
+        return case.REFUSED, "", message[:300]
+    what = "names no file" if FORM.fullmatch(message) else "has another form"
+    return case.UNCLEAR, f"{what}: {_place(refusal)}", message[:3000]
 
 
 def _place(fault: BaseException) -> str:
     """The last line of the package that a fault went through, and its kind."""
     frames = [one for one in traceback.extract_tb(fault.__traceback__) if f"/{_OWN}/" not in one.filename]
-    ours = [one for one in frames if "/dermis/" in one.filename]
+    ours = [one for one in frames if "/dermis/" in one.filename and one.name != "refuse"]
     last = next(reversed(ours or frames), None)
     where = f"{last.filename.rpartition('/dermis/')[2]}:{last.lineno} {last.name}" if last else "?"
     return f"{type(fault).__name__} at {where}"

@@ -30,6 +30,12 @@ def damaged(sound: Input, rng: Random) -> Input:
     return replace(sound, files=files)
 
 
+def scarred(sound: Input, rng: Random) -> Input:
+    """The input with bytes of one of its files changed, as by a disk: checksums tell."""
+    name = rng.choice(sound.changed or tuple(sound.files))
+    return replace(sound, files={**sound.files, name: changed_bytes(sound.files[name], rng)})
+
+
 def _or_bytes(how: Callable[[bytes, Random], bytes], data: bytes, rng: Random) -> bytes:
     """What was damaged once may not be parted any more."""
     try:

@@ -8,10 +8,10 @@ from random import Random
 from tempfile import TemporaryDirectory
 
 from adversity.kind import Kind
-from adversity.kinds import clips, meshes, pictures, scenes
+from adversity.kinds import caches, clips, frames, meshes, pages, pictures, scenes
 
 KINDS: dict[str, Kind] = {
-    kind.name: kind for part in (meshes, pictures, scenes, clips) for kind in part.KINDS
+    kind.name: kind for part in (meshes, pictures, scenes, clips, caches, frames, pages) for kind in part.KINDS
 }
 _WARMED = 24  # sound inputs of each kind: all that it can begin with
 

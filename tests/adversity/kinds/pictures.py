@@ -35,7 +35,8 @@ def _with_pillow(pixels: Any, form: str, mode: str | None = None, **how: Any) ->
     return file.getvalue()
 
 
-def _exr(channels: int, rows: int = _SIDE, columns: int = _SIDE) -> bytes:
+def exr_bytes(channels: int, rows: int = _SIDE, columns: int = _SIDE) -> bytes:
+    """A picture of one grey."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "picture.exr"
         write_exr(path, np.full((rows, columns, channels), 0.5, np.float32))
@@ -73,8 +74,8 @@ _MADE: Mapping[str, Callable[[], bytes]] = {
     "lzw.tif": lambda: _with_pillow(_levels(np.uint8, 3), "TIFF", compression="tiff_lzw"),
     "grey16.tif": lambda: _with_pillow(_levels(np.uint16, 1)[..., 0], "TIFF"),
     "float.tif": lambda: _with_pillow(np.full((_SIDE, _SIDE), 0.5, np.float32), "TIFF"),
-    "rgb.exr": lambda: _exr(3),
-    "rgba.exr": lambda: _exr(4),
+    "rgb.exr": lambda: exr_bytes(3),
+    "rgba.exr": lambda: exr_bytes(4),
     "plain.hdr": lambda: _hdr(_SIDE, _SIDE, coded=False),
     "coded.hdr": lambda: _hdr(_SIDE, 2 * _SIDE, coded=True),
     "labels.png": lambda: encode_png(_levels(np.uint8, 1) % 10),
@@ -82,7 +83,7 @@ _MADE: Mapping[str, Callable[[], bytes]] = {
 _SKIES: Mapping[str, Callable[[], bytes]] = {
     "sky.hdr": lambda: _hdr(_SKY, 2 * _SKY, coded=True),
     "plain.hdr": lambda: _hdr(_SKY, 2 * _SKY, coded=False),
-    "sky.exr": lambda: _exr(3, _SKY, 2 * _SKY),
+    "sky.exr": lambda: exr_bytes(3, _SKY, 2 * _SKY),
 }
 
 

@@ -1,0 +1,90 @@
+"""What is kept on disk, damaged there: it is made again, to the bit."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from adversity.campaign import caches
+from adversity.case import Input, Plan
+from adversity.checks import check_equal
+from adversity.damage import scarred
+from adversity.kind import Kind
+from adversity.kinds.meshes import moving_files
+
+_FOLDER = "cache"
+_SOURCE = np.arange(12.0)
+
+
+def _made() -> dict[str, Any]:
+    return {"points": np.linspace(0.0, 1.0, 300).reshape(100, 3), "faces": np.arange(60, dtype=np.int32)}
+
+
+def _truth() -> bytes:
+    return bytes(range(200))
+
+
+def _fill() -> None:
+    """All caches, as they are filled on a first run."""
+    from dermis.disk import cached_arrays, stored_file
+    from dermis.scene.heads import load_head
+
+    cached_arrays(_SOURCE, "campaign", list(_made()), _made)
+    stored_file("files", "campaign.bin", _truth)
+    Path("head.glb").write_bytes(moving_files()[1])
+    load_head("head.glb")
+
+
+@cache
+def _stored() -> dict[str, bytes]:
+    """What lies in the caches then, and the head."""
+    before = Path.cwd()
+    with TemporaryDirectory() as folder, caches(Path(folder) / _FOLDER):
+        os.chdir(folder)
+        try:
+            _fill()
+        finally:
+            os.chdir(before)
+        found = [one for one in Path(folder).rglob("*") if one.is_file()]
+        return {str(one.relative_to(folder)): one.read_bytes() for one in found}
+
+
+@cache
+def _head() -> Any:
+    from dermis.scene.heads import load_head
+
+    with TemporaryDirectory() as folder, caches(Path(folder) / _FOLDER):
+        path = Path(folder) / "head.glb"
+        path.write_bytes(moving_files()[1])
+        return load_head(path)
+
+
+def _sound(rng: Random) -> Input:
+    changed = tuple(name for name in _stored() if name.startswith(_FOLDER))
+    return Input(_stored(), {"culprits": []}, changed)
+
+
+def _take(plan: Plan) -> None:
+    """Everything as it was, whatever lies there, twice: what was made again is stored again."""
+    from dermis.disk import cached_arrays, stored_file
+    from dermis.scene.heads import load_head
+
+    os.environ["DERMIS_CACHE"] = _FOLDER
+    for _ in range(2):
+        arrays = cached_arrays(_SOURCE, "campaign", list(_made()), _made)
+        for name, truth in _made().items():
+            check_equal(arrays[name], truth, f"cached {name}")
+        path = stored_file("files", "campaign.bin", _truth)
+        check_equal(*(np.frombuffer(one, np.uint8) for one in (path.read_bytes(), _truth())), "stored file")
+        head, truth = load_head("head.glb"), _head()
+        check_equal(head.mesh.positions, truth.mesh.positions, "cached positions")
+        check_equal(head.mesh.triangles, truth.mesh.triangles, "cached triangles")
+        check_equal(head.rig.skeleton.weight, truth.rig.skeleton.weight, "cached weights of bones")
+
+
+KINDS = (Kind("cache", _sound, _take, scarred, share=10),)
