@@ -9,12 +9,15 @@ import os
 import re
 import select
 import signal
+import sys
 import time
 import traceback
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from adversity import case
 from adversity.case import FoundError, Plan
 from adversity.hostile import NAMES, NUMBERS, PIPE
@@ -78,8 +81,11 @@ def _take(kind: Kind, plan: Plan, folder: Path, idle: int) -> None:
         printed = os.open(folder / _PRINTED, os.O_WRONLY | os.O_CREAT)
         for target, source in enumerate((idle, printed, printed)):
             os.dup2(source, target)
+        sys.stdin, sys.stdout, sys.stderr = open(0), open(1, "w", 1), open(2, "w", 1)  # noqa: SIM115, PTH123
         os.chdir(folder)
         faulthandler.enable(all_threads=False)
+        np.seterr(all="warn", under="ignore")  # as users have it, and not tests
+        warnings.simplefilter("default")
         told = _told(kind, plan)
         Path(_TOLD).write_text(json.dumps(told))
     finally:
@@ -167,7 +173,7 @@ def _state(process: int) -> tuple[float, int, bool]:
 
 def _listed(folder: Path) -> set[str]:
     """Names of all files in a folder, but for those of the campaign."""
-    found = (str(one.relative_to(folder)) for one in folder.rglob("*"))
+    found = (str(one.relative_to(folder)) for one in folder.rglob("*") if not one.is_dir())
     return {one for one in found if one not in (_TOLD, _PRINTED)}
 
 
@@ -182,4 +188,4 @@ def _left_behind(outcome: str, plan: Plan, before: set[str], after: set[str]) ->
 def _outputs(plan: Plan, new: set[str]) -> set[str]:
     """Those of new files that the input was asked to write."""
     wanted: list[Any] = plan.get("outputs", [])
-    return {one for one in new if any(one == name or one.startswith(name + "/") for name in wanted)}
+    return {one for one in new if any(one.startswith(name) for name in wanted)}

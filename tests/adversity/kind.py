@@ -21,6 +21,7 @@ class Kind:
     change : damages an input
     share : inputs of this kind in each round of a campaign
     cpu_s : time for one on processors [s]
+    opens_device : whether it may, which the process that others are forked from must not
     """
 
     name: str
@@ -29,6 +30,7 @@ class Kind:
     change: Callable[[Input, Random], Input] = damaged
     share: int = 10
     cpu_s: float = 10.0
+    opens_device: bool = False
 
     def make(self, folder: Path, seed: int, number: int) -> Plan:
         """Write an input's files into a folder; its plan."""

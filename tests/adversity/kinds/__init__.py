@@ -8,10 +8,10 @@ from random import Random
 from tempfile import TemporaryDirectory
 
 from adversity.kind import Kind
-from adversity.kinds import caches, clips, frames, meshes, pages, pictures, scenes
+from adversity.kinds import caches, clips, commands, frames, meshes, pages, pictures, scenes
 
 KINDS: dict[str, Kind] = {
-    kind.name: kind for part in (meshes, pictures, scenes, clips, caches, frames, pages) for kind in part.KINDS
+    kind.name: kind for part in (meshes, pictures, scenes, clips, caches, frames, pages, commands) for kind in part.KINDS
 }
 _WARMED = 24  # sound inputs of each kind: all that it can begin with
 
@@ -19,7 +19,7 @@ _WARMED = 24  # sound inputs of each kind: all that it can begin with
 def prepare(kinds: dict[str, Kind] = KINDS) -> None:
     """Take sound inputs here: what they import and build once is there for the processes that follow."""
     before = Path.cwd()
-    for kind in kinds.values():
+    for kind in (one for one in kinds.values() if not one.opens_device):
         for number in range(_WARMED):
             with TemporaryDirectory() as folder:
                 plan = kind.sound(Random(number)).write(Path(folder))

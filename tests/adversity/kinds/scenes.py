@@ -81,15 +81,21 @@ def _scene_trees() -> tuple[dict[str, Any], ...]:
 
 
 @cache
-def _beside() -> Mapping[str, bytes]:
+def files_of_scenes() -> Mapping[str, bytes]:
     """Files that the scenes name."""
     own = {"sky.hdr": picture_bytes("sky.hdr"), "profile.csv": _PROFILE.encode(), "head.glb": moving_files()[0]}
     lights, camera = {"lights": _lights_tree()}, {"camera": _scene_trees()[0]["camera"]}
     return {**head_files(), **own, "lights.toml": _toml(lights), "camera.toml": _toml(camera)}
 
 
+@cache
+def scene_files() -> tuple[bytes, ...]:
+    """Scenes that name them."""
+    return tuple(map(_toml, _scene_trees()))
+
+
 def _scene(rng: Random) -> Input:
-    files = {**_beside(), "scene.toml": _toml(rng.choice(_scene_trees()))}
+    files = {**files_of_scenes(), "scene.toml": rng.choice(scene_files())}
     return Input(files, {"file": "scene.toml", "words": ["scene.toml"]}, ("scene.toml",))
 
 
@@ -105,7 +111,7 @@ def _take_scene(plan: Plan) -> None:
 
 def _lights(rng: Random) -> Input:
     words = ["head.obj", "--lights", "lights.toml"]
-    return Input({"lights.toml": _beside()["lights.toml"]}, {"file": "lights.toml", "words": words})
+    return Input({"lights.toml": files_of_scenes()["lights.toml"]}, {"file": "lights.toml", "words": words})
 
 
 def _take_lights(plan: Plan) -> None:
@@ -116,7 +122,7 @@ def _take_lights(plan: Plan) -> None:
 
 def _camera(rng: Random) -> Input:
     words = ["head.obj", "--camera", "camera.toml"]
-    return Input({"camera.toml": _beside()["camera.toml"]}, {"file": "camera.toml", "words": words})
+    return Input({"camera.toml": files_of_scenes()["camera.toml"]}, {"file": "camera.toml", "words": words})
 
 
 def _take_camera(plan: Plan) -> None:
