@@ -29,12 +29,12 @@ def main() -> int:
     told = _arguments()
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as folder, caches(Path(folder)):
-        prepare()
         if told.replay:
             outcome = tried_again(KINDS, told.replay)
             print(f"{outcome.kind}: {outcome.outcome}: {outcome.place}\n{outcome.last}")
             return int(outcome.failed)
         chosen = {name: KINDS[name] for name in told.only or KINDS}
+        prepare(chosen)
         until = time.monotonic() + 60 * told.minutes
         progress = _Progress(began)
         tally = run(

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel
-
 from adversity.case import NAN, WRONG, FoundError
+from pydantic import BaseModel
 
 _BRIGHTEST = 1e12  # of radiance
 

@@ -32,7 +32,7 @@ _HELD = tuple(one for one in (*NAMES, *NUMBERS) if one.strip())
 _LOOK_S = 0.02
 _TICK_S = 1 / os.sysconf("SC_CLK_TCK")
 _PAGE = os.sysconf("SC_PAGE_SIZE")
-_OWN = Path(__file__).parent.name
+_OWN = str(Path(__file__).parent)
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def _take(kind: Kind, plan: Plan, folder: Path, idle: int) -> None:
         printed = os.open(folder / _PRINTED, os.O_WRONLY | os.O_CREAT)
         for target, source in enumerate((idle, printed, printed)):
             os.dup2(source, target)
-        sys.stdin, sys.stdout, sys.stderr = open(0), open(1, "w", 1), open(2, "w", 1)  # noqa: SIM115, PTH123
+        sys.stdin, sys.stdout, sys.stderr = open(0), open(1, "w", 1), open(2, "w", 1)  # noqa: SIM115
         os.chdir(folder)
         faulthandler.enable(all_threads=False)
         np.seterr(all="warn", under="ignore")  # as users have it, and not tests
@@ -119,7 +119,7 @@ def _of_refusal(refusal: DermisError, plan: Plan) -> tuple[str, str, str]:
 
 def _place(fault: BaseException) -> str:
     """The last line of the package that a fault went through, and its kind."""
-    frames = [one for one in traceback.extract_tb(fault.__traceback__) if f"/{_OWN}/" not in one.filename]
+    frames = [one for one in traceback.extract_tb(fault.__traceback__) if not one.filename.startswith(_OWN)]
     ours = [one for one in frames if "/dermis/" in one.filename and one.name != "refuse"]
     last = next(reversed(ours or frames), None)
     where = f"{last.filename.rpartition('/dermis/')[2]}:{last.lineno} {last.name}" if last else "?"

@@ -16,11 +16,41 @@ PIPE = "pipe"
 """A FIFO without a writer that lies beside every input."""
 NAMES = (
     *("/dev/zero", "/dev/stdin", "/dev/full", "/proc/kmsg", "/proc/self/mem", "/proc/self/environ", "/"),
-    *(PIPE, f"../{PIPE}", ".", "..", "", " ", "../../../../etc/passwd", "/etc/passwd", "~", "%s%d%n", "*", "#"),
+    *(
+        PIPE,
+        f"../{PIPE}",
+        ".",
+        "..",
+        "",
+        " ",
+        "../../../../etc/passwd",
+        "/etc/passwd",
+        "~",
+        "%s%d%n",
+        "*",
+        "#",
+    ),
     *("a" * 300, "a" * 5000, "a/" * 3000, "nobody.png", "a\0b", "a\nb", "\u202e\u0301\U0001f9b4", "\ud800"),
     *("http://127.0.0.1:9/a.png", "file:///etc/passwd", "data:,", "data:image/png;base64,@@@@"),
 )
-WHOLE = (0, 1, 2, 127, 128, 255, 256, 32767, 65535, 65536, 2**24, 2**31 - 1, 2**31, 2**32 - 1, 2**63, 2**64 - 1)
+WHOLE = (
+    0,
+    1,
+    2,
+    127,
+    128,
+    255,
+    256,
+    32767,
+    65535,
+    65536,
+    2**24,
+    2**31 - 1,
+    2**31,
+    2**32 - 1,
+    2**63,
+    2**64 - 1,
+)
 """Counts, sizes and offsets for fields of bytes."""
 DEPTHS = (50, 1000, 20_000, 200_000)
 LENGTHS = (300, 70_000, 1_000_000)

@@ -36,7 +36,7 @@ def _exchange(lines: list[str], k: int, rng: Random) -> None:
 
 def _stretch(lines: list[str], k: int, rng: Random) -> None:
     """Long runs of one letter before, in or after a line."""
-    run = rng.choice("  \t/#,\\\0-e9\"[{") * rng.choice((*LENGTHS[:2], DEPTHS[-1]))
+    run = rng.choice('  \t/#,\\\0-e9"[{') * rng.choice((*LENGTHS[:2], DEPTHS[-1]))
     place = rng.choice((0, len(lines[k]), lines[k].find(" ") + 1))
     lines[k] = lines[k][:place] + run + lines[k][place:]
 

@@ -11,9 +11,32 @@ from typing import Any, Literal, Union, get_args, get_origin
 
 from adversity.hostile import NAMES, NUMBERS, number
 
-_COSTLY = ("--size", "--atlas", "--samples", "--shadow-size", "--photons", "--subdivide", "--fit", "--motion-fps", "--fps")
+_COSTLY = (
+    "--size",
+    "--atlas",
+    "--samples",
+    "--shadow-size",
+    "--photons",
+    "--subdivide",
+    "--fit",
+    "--motion-fps",
+    "--fps",
+)
 """More of these is a longer wait for what was asked: they get small numbers, and ones that cannot be."""
-_IMPOSSIBLE = ("nan", "inf", "-1", "0", "1e308", "9" * 5000, "0x10", "1e", "x", "-0.0", "99999999999999999999", "")
+_IMPOSSIBLE = (
+    "nan",
+    "inf",
+    "-1",
+    "0",
+    "1e308",
+    "9" * 5000,
+    "0x10",
+    "1e",
+    "x",
+    "-0.0",
+    "99999999999999999999",
+    "",
+)
 _USUAL: Mapping[str, tuple[str, ...]] = {
     "--size": ("64x64", "1x1", "33x17", "0x0", "64x-1", "99999x99999", "64x64x64", "٣x٣"),
     "--atlas": ("64", "96", "128"),

@@ -42,4 +42,7 @@ def as_text(tally: Tally, seed: int, seconds: float) -> str:
 
 
 def _cells(row: tuple[str, ...], widths: list[int]) -> list[str]:
-    return [f"{row[0]:<{widths[0]}}", *(f"{one:>{width}}" for one, width in zip(row[1:], widths[1:], strict=True))]
+    return [
+        f"{row[0]:<{widths[0]}}",
+        *(f"{one:>{width}}" for one, width in zip(row[1:], widths[1:], strict=True)),
+    ]

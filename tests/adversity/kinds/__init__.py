@@ -11,7 +11,9 @@ from adversity.kind import Kind
 from adversity.kinds import caches, clips, commands, frames, meshes, pages, pictures, scenes
 
 KINDS: dict[str, Kind] = {
-    kind.name: kind for part in (meshes, pictures, scenes, clips, caches, frames, pages, commands) for kind in part.KINDS
+    kind.name: kind
+    for part in (meshes, pictures, scenes, clips, caches, frames, pages, commands)
+    for kind in part.KINDS
 }
 _WARMED = 24  # sound inputs of each kind: all that it can begin with
 

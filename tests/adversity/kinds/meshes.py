@@ -34,7 +34,12 @@ norm normal.png
 newmtl eye_L
 Kd 1 1 1
 """
-_MAPS = {"skin.png": "rgb8.png", "height.png": "grey16.png", "grey.png": "grey8.png", "normal.png": "normal.png"}
+_MAPS = {
+    "skin.png": "rgb8.png",
+    "height.png": "grey16.png",
+    "grey.png": "grey8.png",
+    "normal.png": "normal.png",
+}
 _INSTANCES, _APART_M = 30, 0.2
 
 
@@ -43,7 +48,13 @@ def head_files() -> Mapping[str, bytes]:
     """An OBJ head with its materials and maps, by name."""
     before, sign, faces = obj_text().partition("usemtl skin\n")
     lines = faces.splitlines()
-    parts = [f"mtllib head.mtl\n{before}g face\n{sign.rstrip()}", *lines[:-4], "usemtl eye_L", *lines[-4:], ""]
+    parts = [
+        f"mtllib head.mtl\n{before}g face\n{sign.rstrip()}",
+        *lines[:-4],
+        "usemtl eye_L",
+        *lines[-4:],
+        "",
+    ]
     pictures = {name: picture_bytes(kind) for name, kind in _MAPS.items()}
     return {"head.obj": "\n".join(parts).encode(), "head.mtl": _MTL.encode(), **pictures}
 

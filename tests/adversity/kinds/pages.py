@@ -16,7 +16,15 @@ from small_head import obj_text
 
 _EVENTS: tuple[dict[str, Any], ...] = (
     {"type": "resize", "width": 400.0, "height": 300.0, "pwidth": 800, "pheight": 600, "ratio": 2.0},
-    {"type": "pointer_down", "x": 10, "y": 20, "button": 1, "buttons": [1], "modifiers": ["Shift"], "touches": {}},
+    {
+        "type": "pointer_down",
+        "x": 10,
+        "y": 20,
+        "button": 1,
+        "buttons": [1],
+        "modifiers": ["Shift"],
+        "touches": {},
+    },
     {"type": "pointer_move", "x": 10, "y": 20, "button": 0, "buttons": [], "modifiers": [], "touches": {}},
     {"type": "wheel", "x": 10, "y": 20, "dx": 0.0, "dy": 100.0, "buttons": [], "modifiers": []},
     {"type": "key_down", "key": "Tab", "modifiers": []},
@@ -88,7 +96,12 @@ def _take_upload(plan: Plan) -> None:
 def _scope(request: Any) -> dict[str, Any]:
     """A request as a server tells it: bytes for headers, text for the rest."""
     headers = [(str(key).encode(), str(value).encode()) for key, value in request["headers"].items()]
-    return {"type": "http", "path": str(request["path"]), "method": str(request["method"]), "headers": headers}
+    return {
+        "type": "http",
+        "path": str(request["path"]),
+        "method": str(request["method"]),
+        "headers": headers,
+    }
 
 
 def _receiver(coming: list[Any]) -> Any:

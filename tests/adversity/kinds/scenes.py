@@ -25,7 +25,9 @@ _MEDIUM: Mapping[str, Any] = {
         {"absorption_per_mm": [0.16, 0.19, 0.3], "scattering_per_mm": [32.0, 40.0, 46.0]},
     ],
 }
-_PIGMENTS: Mapping[str, Any] = {"skin": {"structure": "dj2006", "melanin": 0.05, "blood": 0.02, "oxygen": 0.7}}
+_PIGMENTS: Mapping[str, Any] = {
+    "skin": {"structure": "dj2006", "melanin": 0.05, "blood": 0.02, "oxygen": 0.7}
+}
 _GAUSSIANS: Mapping[str, Any] = {"variances_mm2": [0.01, 0.5], "weights": [[0.4, 0.5, 0.6], [0.6, 0.5, 0.4]]}
 
 
@@ -49,7 +51,11 @@ def _lights_tree() -> list[dict[str, Any]]:
 
 def _dump(model: Any) -> dict[str, Any]:
     """A model's defaults, and numbers where it has none."""
-    needed = {"irradiance": (1.0, 1.0, 1.0), "position": (100.0, 200.0, 900.0), "direction": (0.0, -1.0, -1.0)}
+    needed = {
+        "irradiance": (1.0, 1.0, 1.0),
+        "position": (100.0, 200.0, 900.0),
+        "direction": (0.0, -1.0, -1.0),
+    }
     given = {key: value for key, value in needed.items() if key in model.model_fields}
     return {key: one for key, one in model(**given).model_dump().items() if key != "kind"}
 
@@ -62,9 +68,21 @@ def _scene_trees() -> tuple[dict[str, Any], ...]:
     from dermis.scene.skin import Skin
 
     camera = Camera(position=(0.0, 0.0, 900.0), target=(0.0, 0.0, 0.0)).model_dump()
-    files = {"name": "head.obj", "colour": "skin.png", "height": "height.png", "height_mm": 0.02, "unit_mm": 1.0}
+    files = {
+        "name": "head.obj",
+        "colour": "skin.png",
+        "height": "height.png",
+        "height_mm": 0.02,
+        "unit_mm": 1.0,
+    }
     parts = {
-        "head": {**files, "normal": "normal.png", "specular": "grey.png", "roughness": "grey.png", "opaque": ["eye_L"]},
+        "head": {
+            **files,
+            "normal": "normal.png",
+            "specular": "grey.png",
+            "roughness": "grey.png",
+            "opaque": ["eye_L"],
+        },
         "skin": {**Skin().model_dump(), "profile": "profile.csv"},
         "environment": {"name": "sky.hdr", "exposure": 1.0, "rotation_degrees": 10.0},
         "camera": camera,
@@ -83,7 +101,11 @@ def _scene_trees() -> tuple[dict[str, Any], ...]:
 @cache
 def files_of_scenes() -> Mapping[str, bytes]:
     """Files that the scenes name."""
-    own = {"sky.hdr": picture_bytes("sky.hdr"), "profile.csv": _PROFILE.encode(), "head.glb": moving_files()[0]}
+    own = {
+        "sky.hdr": picture_bytes("sky.hdr"),
+        "profile.csv": _PROFILE.encode(),
+        "head.glb": moving_files()[0],
+    }
     lights, camera = {"lights": _lights_tree()}, {"camera": _scene_trees()[0]["camera"]}
     return {**head_files(), **own, "lights.toml": _toml(lights), "camera.toml": _toml(camera)}
 
