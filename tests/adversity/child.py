@@ -99,7 +99,7 @@ def _told(kind: Kind, plan: Plan) -> tuple[str, str, str]:
     except DermisError as refusal:
         return _of_refusal(refusal, plan)
     except FoundError as found:
-        return found.outcome, f"{found.outcome}: {str(found)[:60]}", str(found)
+        return found.outcome, re.split(r"[. ]", str(found))[0], str(found)
     except BaseException as fault:
         text = "".join(traceback.format_exception(fault, limit=-40))
         return case.TRACEBACK, _place(fault), text[-3000:]

@@ -1,4 +1,4 @@
-"""Changes to trees of tables, lists and values, and trees as JSON or TOML with texts that no library writes."""
+"""Changes to trees of tables, lists and values, written as JSON or TOML with texts that no library writes."""
 
 from __future__ import annotations
 

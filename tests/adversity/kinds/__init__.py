@@ -8,11 +8,11 @@ from random import Random
 from tempfile import TemporaryDirectory
 
 from adversity.kind import Kind
-from adversity.kinds import caches, clips, commands, frames, meshes, pages, pictures, scenes
+from adversity.kinds import caches, clips, commands, frames, large, meshes, pages, pictures, scenes
 
 KINDS: dict[str, Kind] = {
     kind.name: kind
-    for part in (meshes, pictures, scenes, clips, caches, frames, pages, commands)
+    for part in (meshes, pictures, scenes, clips, caches, frames, pages, large, commands)
     for kind in part.KINDS
 }
 _WARMED = 24  # sound inputs of each kind: all that it can begin with

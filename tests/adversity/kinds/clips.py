@@ -28,7 +28,7 @@ def _mediapipe() -> bytes:
 
 
 @cache
-def _files() -> dict[str, dict[str, bytes]]:
+def files_of_motions() -> dict[str, dict[str, bytes]]:
     """Files by the name of the motion; those of a sequence lie in a folder."""
     angles = "\n".join(
         line + rest
@@ -48,10 +48,10 @@ def _files() -> dict[str, dict[str, bytes]]:
 
 
 def _clip(rng: Random) -> Input:
-    motion = rng.choice(tuple(_files()))
+    motion = rng.choice(tuple(files_of_motions()))
     head = "head.obj" if motion.startswith("frames") else "head.glb"
     heads = {"head.obj": obj_text().encode(), "head.glb": moving_files()[1]}
-    files = _files()[motion]
+    files = files_of_motions()[motion]
     words = [head, "--motion", motion]
     return Input({head: heads[head], **files}, {"file": motion, "head": head, "words": words}, tuple(files))
 

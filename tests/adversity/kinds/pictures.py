@@ -43,7 +43,7 @@ def exr_bytes(channels: int, rows: int = _SIDE, columns: int = _SIDE) -> bytes:
         return path.read_bytes()
 
 
-def _hdr(rows: int, columns: int, *, coded: bool) -> bytes:
+def hdr_bytes(rows: int, columns: int, *, coded: bool) -> bytes:
     """A Radiance picture, in run-length code where its rows are long enough."""
     head = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=1.0\n\n-Y {rows} +X {columns}\n".encode()
     if not coded:
@@ -76,13 +76,13 @@ _MADE: Mapping[str, Callable[[], bytes]] = {
     "float.tif": lambda: _with_pillow(np.full((_SIDE, _SIDE), 0.5, np.float32), "TIFF"),
     "rgb.exr": lambda: exr_bytes(3),
     "rgba.exr": lambda: exr_bytes(4),
-    "plain.hdr": lambda: _hdr(_SIDE, _SIDE, coded=False),
-    "coded.hdr": lambda: _hdr(_SIDE, 2 * _SIDE, coded=True),
+    "plain.hdr": lambda: hdr_bytes(_SIDE, _SIDE, coded=False),
+    "coded.hdr": lambda: hdr_bytes(_SIDE, 2 * _SIDE, coded=True),
     "labels.png": lambda: encode_png(_levels(np.uint8, 1) % 10),
 }
 _SKIES: Mapping[str, Callable[[], bytes]] = {
-    "sky.hdr": lambda: _hdr(_SKY, 2 * _SKY, coded=True),
-    "plain.hdr": lambda: _hdr(_SKY, 2 * _SKY, coded=False),
+    "sky.hdr": lambda: hdr_bytes(_SKY, 2 * _SKY, coded=True),
+    "plain.hdr": lambda: hdr_bytes(_SKY, 2 * _SKY, coded=False),
     "sky.exr": lambda: exr_bytes(3, _SKY, 2 * _SKY),
 }
 
