@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import time
-import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -135,9 +134,7 @@ def _kind(take: Callable[[Plan], None]) -> Kind:
 def prepared(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Everything imported, and a cache for all inputs."""
     with caches(tmp_path_factory.mktemp("cache")):
-        with np.errstate(all="ignore"), warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # as users have it
-            prepare()
+        prepare()
         yield
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import os
+import warnings
+from contextlib import chdir
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
 
+import numpy as np
 from adversity.kind import Kind
 from adversity.kinds import caches, clips, commands, frames, large, meshes, pages, pictures, scenes
 
@@ -20,13 +22,9 @@ _WARMED = 24  # sound inputs of each kind: all that it can begin with
 
 def prepare(kinds: dict[str, Kind] = KINDS) -> None:
     """Take sound inputs here: what they import and build once is there for the processes that follow."""
-    before = Path.cwd()
-    for kind in (one for one in kinds.values() if not one.opens_device):
-        for number in range(_WARMED):
-            with TemporaryDirectory() as folder:
-                plan = kind.sound(Random(number)).write(Path(folder))
-                os.chdir(folder)
-                try:
-                    kind.take(plan)
-                finally:
-                    os.chdir(before)
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for kind in (one for one in kinds.values() if not one.opens_device):
+            for number in range(_WARMED):
+                with TemporaryDirectory() as folder, chdir(folder):
+                    kind.take(kind.sound(Random(number)).write(Path(folder)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 from pathlib import Path
 from random import Random
 from types import SimpleNamespace
@@ -12,6 +13,7 @@ from typing import Any
 from adversity.case import WRONG, FoundError, Input, Plan
 from adversity.hostile import name
 from adversity.kind import Kind
+from offscreen_input import SETTINGS, InputDriver
 from small_head import obj_text
 
 _EVENTS: tuple[dict[str, Any], ...] = (
@@ -29,32 +31,94 @@ _EVENTS: tuple[dict[str, Any], ...] = (
     {"type": "wheel", "x": 10, "y": 20, "dx": 0.0, "dy": 100.0, "buttons": [], "modifiers": []},
     {"type": "key_down", "key": "Tab", "modifiers": []},
     {"type": "char", "data": "a", "is_composing": False},
-    {"type": "_framefeedback", "index": 3, "timestamp": 1.0, "localtime": 1.0},
+    {"type": "_framefeedback", "index": 3, "localtime": 1.0},
 )
 _TICKET = "ticket"
+_SIZE = 400, 480
+_COUNT = 8  # events for one viewer
+
+
+def _texts(rng: Random, count: int) -> dict[str, bytes]:
+    return {f"{k}.json": json.dumps({"timestamp": 1.0} | rng.choice(_EVENTS)).encode() for k in range(count)}
 
 
 def _message(rng: Random) -> Input:
-    return Input({"message.json": json.dumps(rng.choice(_EVENTS)).encode()}, {"culprits": []})
+    return Input(_texts(rng, 1), {"culprits": []})
 
 
 def _take_message(plan: Plan) -> None:
-    """Through the guard to a canvas, as the server gives it on; the next sound message still gets through."""
+    """A damaged message does not keep the guard from letting the next sound one through."""
+    sound = {"timestamp": 1.0, **_EVENTS[1], "x": 321.0}
+    passed = _passed([*_damaged(), json.dumps(sound)])
+    if not passed or passed[-1].get("x") != sound["x"]:
+        raise FoundError(WRONG, "a sound message was lost after this one")
+
+
+def _damaged() -> list[str]:
+    found = sorted(Path().glob("*.json"))
+    return [one.read_bytes().decode("utf-8", "replace") for one in found]
+
+
+def _passed(texts: list[str]) -> list[dict[str, Any]]:
+    """The events that a server's guard lets through of what a page sends."""
     from dermis.viewer.browser.guard import Guard
 
-    sound, got = json.dumps(_EVENTS[1]), list[str]()
-    text = Path("message.json").read_bytes().decode("utf-8", "replace")
-    coming = [{"type": "websocket.receive", "text": one} for one in (text, sound)]
+    got = list[dict[str, Any]]()
+    coming = [{"type": "websocket.receive", "text": text} for text in texts]
     coming.append({"type": "websocket.disconnect", "text": ""})
 
     async def app(scope: Any, receive: Any, send: Any) -> None:
         while (message := await receive())["type"] != "websocket.disconnect":
-            got.append(message["text"])
+            got.append(json.loads(message["text"]))
 
-    scope = {"type": "websocket", "path": "/", "headers": [(b"host", b"127.0.0.1:8765")]}
+    headers = [(b"host", b"127.0.0.1:8765")]
+    scope = {"type": "websocket", "scheme": "ws", "path": "/", "headers": headers}
     asyncio.run(Guard(app, "")(scope, _receiver(coming), _ignore))
-    if got[-1:] != [sound]:
-        raise FoundError(WRONG, "a sound message was lost after this one")
+    return got
+
+
+def _events(rng: Random) -> Input:
+    return Input(_texts(rng, _COUNT), {"culprits": [], "outputs": ["head.obj"]})
+
+
+def _take_events(plan: Plan) -> None:
+    """A viewer that gets such events tells of no error, and shows the same as before when they are over."""
+    from rendercanvas.http import HttpRenderCanvas
+    from rendercanvas.offscreen import OffscreenRenderCanvas
+
+    from dermis.scene.heads import load_head
+    from dermis.scene.model import Scene
+    from dermis.viewer.state import ViewerState
+    from dermis.viewer.viewer import Viewer
+
+    Path("head.obj").write_text(obj_text())
+    canvas = OffscreenRenderCanvas(size=_SIZE)
+    canvas._active_client = 0
+    driver, errors = InputDriver(None, canvas), _Errors()
+    logging.getLogger().addHandler(errors)
+    state = ViewerState(Scene(load_head("head.obj")), SETTINGS, {"name": "head.obj"})
+    driver.viewer = Viewer(state, canvas, "cpu", clock=lambda: driver.now)
+    driver.settled()
+    for event in _passed(_damaged()):
+        if not event["type"].startswith("_"):
+            HttpRenderCanvas._on_event(canvas, event, 0)
+            driver.frame()
+    canvas._size_info.set_physical_size(*_SIZE, 1.0)
+    shown = driver.settled()
+    if errors.told or shown.shape[:2] != _SIZE[::-1] or not shown.any():
+        raise FoundError(WRONG, f"viewer: {errors.told or 'nothing is shown'}")
+
+
+class _Errors(logging.Handler):
+    """What is logged as an error."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.ERROR)
+        self.told: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep it."""
+        self.told.append(record.getMessage())
 
 
 def _upload(rng: Random) -> Input:
@@ -98,6 +162,7 @@ def _scope(request: Any) -> dict[str, Any]:
     headers = [(str(key).encode(), str(value).encode()) for key, value in request["headers"].items()]
     return {
         "type": "http",
+        "scheme": "http",
         "path": str(request["path"]),
         "method": str(request["method"]),
         "headers": headers,
@@ -115,4 +180,8 @@ async def _ignore(message: Any) -> None:
     """What a page would be sent."""
 
 
-KINDS = (Kind("message", _message, _take_message, share=10), Kind("upload", _upload, _take_upload, share=4))
+KINDS = (
+    Kind("message", _message, _take_message, share=10),
+    Kind("upload", _upload, _take_upload, share=4),
+    Kind("viewer", _events, _take_events, share=1, cpu_s=40.0, opens_device=True),
+)
