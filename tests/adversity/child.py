@@ -110,11 +110,19 @@ def _of_refusal(refusal: DermisError, plan: Plan) -> tuple[str, str, str]:
     """A refusal has the package's form, and begins with a file of the input or a name that one holds."""
     message = str(refusal)
     culprit = message.partition(": expected ")[0]
-    names = any(one in culprit for one in plan["culprits"]) or culprit.strip("'\"").endswith(_HELD)
+    names = any(one in culprit for one in plan["culprits"]) or _is_held(culprit.strip("'\""))
     if FORM.fullmatch(message) and (names or not plan["culprits"]):
         return case.REFUSED, "", message[:300]
     what = "names no file" if FORM.fullmatch(message) else "has another form"
     return case.UNCLEAR, f"{what}: {_place(refusal)}", message[:3000]
+
+
+def _is_held(culprit: str) -> bool:
+    """Whether it is a name that a damaged file may hold, as it is or shortened."""
+    begin, shortened, _ = culprit.partition(" ... ")
+    if shortened:
+        return any(begin in one for one in _HELD)
+    return not culprit.strip() or culprit.endswith(_HELD)
 
 
 def _place(fault: BaseException) -> str:

@@ -10,13 +10,21 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from adversity.kind import Kind
-from adversity.kinds import caches, clips, commands, frames, large, meshes, pages, pictures, scenes
+from adversity.kinds import (
+    caches,
+    clips,
+    commands,
+    frames,
+    large,
+    machine_code,
+    meshes,
+    pages,
+    pictures,
+    scenes,
+)
 
-KINDS: dict[str, Kind] = {
-    kind.name: kind
-    for part in (meshes, pictures, scenes, clips, caches, frames, pages, large, commands)
-    for kind in part.KINDS
-}
+_PARTS = meshes, pictures, scenes, clips, caches, machine_code, frames, pages, large, commands
+KINDS: dict[str, Kind] = {kind.name: kind for part in _PARTS for kind in part.KINDS}
 _WARMED = 24  # sound inputs of each kind: all that it can begin with
 
 
