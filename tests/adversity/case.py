@@ -13,7 +13,7 @@ NAN, WRONG, HALF_WRITTEN = "NaN", "wrong", "half-written"
 FAILURES = (TRACEBACK, UNCLEAR, HANG, MEMORY, SIGNAL, NAN, WRONG, HALF_WRITTEN)
 
 Plan = dict[str, Any]
-"""What is done with an input besides its files, as JSON: `words` of a command, a `file`, a `seed`."""
+"""What is done with an input besides its files, as JSON."""
 
 
 class FoundError(Exception):
@@ -30,7 +30,8 @@ class Input:
 
     files : bytes by name
     plan : for the kind's `take`, as JSON; what messages must name one of under "culprits", the files where it
-        is not there; names that may be written under "outputs"
+        is not there; how names begin that may be written under "outputs", and that may stay after a refusal
+        under "kept"
     changed : files that are to be damaged, all where empty
     """
 

@@ -15,7 +15,6 @@ import traceback
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from adversity import case
@@ -26,6 +25,7 @@ from adversity.kind import Kind
 from dermis.errors import DermisError
 
 FORM = re.compile(r".+?: expected .+, but .+\. \S.+[.?]", re.DOTALL)
+_CACHE = "cache"
 _TOLD, _PRINTED = ".told.json", ".printed"
 _UNFINISHED = re.compile(r"\.dermis-|\.part$")
 _HELD = tuple(one for one in (*NAMES, *NUMBERS) if one.strip())
@@ -187,13 +187,7 @@ def _listed(folder: Path) -> set[str]:
 
 def _left_behind(outcome: str, plan: Plan, before: set[str], after: set[str]) -> list[str]:
     """Files that should not be there: unfinished ones, and any beside a refusal."""
-    new = {one for one in after - before if not one.startswith(tuple(plan.get("caches", ("cache",))))}
-    if outcome == case.ACCEPTED:
-        new = {one for one in new if _UNFINISHED.search(Path(one).name) or one not in _outputs(plan, new)}
-    return sorted(new) if outcome in (case.ACCEPTED, case.REFUSED) else []
-
-
-def _outputs(plan: Plan, new: set[str]) -> set[str]:
-    """Those of new files that the input was asked to write."""
-    wanted: list[Any] = plan.get("outputs", [])
-    return {one for one in new if any(one.startswith(name) for name in wanted)}
+    new = {one for one in after - before if not one.startswith(_CACHE)}
+    allowed = tuple(plan.get("outputs" if outcome == case.ACCEPTED else "kept", ()))
+    left = {one for one in new if _UNFINISHED.search(Path(one).name) or not one.startswith(allowed)}
+    return sorted(left) if outcome in (case.ACCEPTED, case.REFUSED) else []

@@ -51,6 +51,11 @@ _USUAL: Mapping[str, tuple[str, ...]] = {
     "--env": ("uniform", "sky.hdr", "head.obj"),
     "--camera": ("portrait", "ear", "camera.toml"),
     "--profile": ("gpu-gems-3", "profile.csv", "scene.toml"),
+    "--colour": ("skin.png", "grey.png"),
+    "--normal": ("normal.png", "skin.png"),
+    "--height": ("height.png", "grey.png"),
+    "--specular-map": ("grey.png", "height.png"),
+    "--roughness-map": ("grey.png", "skin.png"),
     "--background": ("none", "environment", "0,0,0", "0.1,0.2,nan"),
     "--regions": ("auto", "none", "default", "scene.toml"),
     "--motion": ("take.csv", "head.glb", "head.obj"),
@@ -66,6 +71,7 @@ _USUAL: Mapping[str, tuple[str, ...]] = {
     "--adapter": ("cpu", "nobody"),
     "--output": ("out.png", "out.exr", "out.mp4", "out.toml", "frames/%03d.png", "nobody/out.png", "out.jpg"),
 }
+_EXTREMES = ("0.5", "1", "2", "0.1", "0", "1e-6", "1000", "1e6", "1e30")  # that many quantities can be
 _TEXTS = tuple(one.replace("\0", "").replace("\ud800", "\udc80") for one in NAMES)  # as a shell can pass
 
 
@@ -96,7 +102,7 @@ class Option:
 
     def _usual(self, rng: Random) -> str:
         known = _USUAL.get(self.names[0]) or tuple(map(str, _choices(self.kind)))
-        return rng.choice(known) if known else rng.choice(("0.5", "1", "2", "0.1"))
+        return rng.choice(known or _EXTREMES)
 
     def _hostile(self, rng: Random) -> str:
         if self.names[0] in _COSTLY:
