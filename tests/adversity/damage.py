@@ -31,9 +31,7 @@ def damaged(sound: Input, rng: Random) -> Input:
 
 
 def scarred(sound: Input, rng: Random) -> Input:
-    """The input with bytes of one of its files changed, as by a disk: checksums tell. None may be there."""
-    if not sound.files:
-        return sound
+    """The input with bytes of one of its files changed, as by a disk: checksums tell."""
     name = rng.choice(sound.changed or tuple(sound.files))
     return replace(sound, files={**sound.files, name: changed_bytes(sound.files[name], rng)})
 
