@@ -30,8 +30,6 @@ _TOLD, _PRINTED = ".told.json", ".printed"
 _UNFINISHED = re.compile(r"\.dermis-|\.part$")
 _HELD = tuple(one for one in (*NAMES, *NUMBERS) if one.strip())
 _LOOK_S = 0.02
-_TICK_S = 1 / os.sysconf("SC_CLK_TCK")
-_PAGE = os.sysconf("SC_PAGE_SIZE")
 _OWN = str(Path(__file__).parent)
 
 
@@ -176,7 +174,8 @@ def _state(process: int) -> tuple[float, int, bool]:
         stat = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
     except (OSError, ProcessLookupError):
         return 0.0, 0, True
-    return (int(stat[11]) + int(stat[12])) * _TICK_S, int(stat[21]) * _PAGE, stat[0] in "RD"
+    cpu_s = (int(stat[11]) + int(stat[12])) / os.sysconf("SC_CLK_TCK")
+    return cpu_s, int(stat[21]) * os.sysconf("SC_PAGE_SIZE"), stat[0] in "RD"
 
 
 def _listed(folder: Path) -> set[str]:

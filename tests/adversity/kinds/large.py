@@ -8,6 +8,7 @@ import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
 
@@ -40,8 +41,7 @@ def _exr() -> bytes:
     how = {"compression": OpenEXR.ZIPS_COMPRESSION, "type": OpenEXR.scanlineimage}
     with TemporaryDirectory() as folder:
         OpenEXR.File(how, {"Y": np.ones((side, 2 * side), np.float16)}).write(f"{folder}/sky.exr")
-        with open(f"{folder}/sky.exr", "rb") as file:  # noqa: PTH123
-            return file.read()
+        return (Path(folder) / "sky.exr").read_bytes()
 
 
 def _obj() -> bytes:
