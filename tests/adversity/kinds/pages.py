@@ -149,7 +149,7 @@ def _take_upload(plan: Plan) -> None:
     async def send(message: Any) -> None:
         answers.append(message)
 
-    canvas = SimpleNamespace(ticket=_TICKET, on_file=got.append)
+    canvas = SimpleNamespace(ticket=_TICKET, on_file=lambda path, *_: got.append(path))
     coming = [{"type": "http.request", "body": Path("head.obj").read_bytes()}]
     asyncio.run(Guard(Uploads(app, canvas, folder), "")(scope, _receiver(coming), send))
     outside = [path for path in got if not path.resolve().is_relative_to(folder.resolve())]
