@@ -40,7 +40,7 @@ def torrance_sparrow_smith(angles: Cosines, m: ArrayLike, fresnel: Fresnel = sch
 def masked_lobe(
     angles: Cosines, slopes: Floats, fresnel: Fresnel, masking: Callable[[Floats], Floats]
 ) -> Floats:
-    """BRDF of slopes distributed like `slopes` over pi, of which `masking` tells the share seen by cosine [1/sr]."""
+    """BRDF of slopes distributed as `slopes` over pi; `masking` is the share seen by cosine [1/sr]."""
     n_l, n_v = _raised(angles)
     return _lobe(angles, slopes, fresnel, masking(n_l) * masking(n_v))
 

@@ -23,7 +23,7 @@ LEAST_M, MOST_M = 0.05, 1.0
 
 
 def two_lobe(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
-    """BRDF of a random surface with slopes of two kinds about the roughness m: a sharp core in a wide veil [1/sr].
+    """BRDF of a random surface with slopes of two kinds about m: a sharp core in a wide veil [1/sr].
 
     m : roughness, broadcast against the angles [-]; both kinds' stay within 0.05 to 1
 
@@ -36,7 +36,7 @@ def two_lobe(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Float
 def two_lobe_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
     """Share of the facets seen from a direction, G1 [-].
 
-    Smith's integral is linear in the slopes' distribution and gives 1 / G1 - 1, so that 1 / G1 mixes as they do.
+    Smith's integral, 1 / G1 - 1, is linear in the distribution of slopes: 1 / G1 mixes as they do.
     """
     return np.asarray(1.0 / _mean(lambda rough: 1.0 / smith_masking(cos_theta, rough), m))
 

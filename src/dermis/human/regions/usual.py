@@ -20,8 +20,8 @@ _FORM = 2  # increment when `with_regions` gives other maps for the same head
 def with_usual_regions(head: Head) -> Head:
     """The head with the package's table by region, where it knows the regions and no map says the roughness.
 
-    Strengths are relative to each other: a skin's rho_s is their mean, as of every map. A map of the head's own
-    stays: it knows the person, and the table is an artist's.
+    Strengths are relative to each other: a skin's rho_s is their mean, as of every map. A map of the head's
+    own stays: it knows the person, and the table is an artist's.
     """
     if head.maps.rough or known_landmarks(head) is None:
         return head
