@@ -108,7 +108,7 @@ def test_passes_have_seeds_of_their_own_and_repeat() -> None:
 
 @blender
 def test_a_coat_reflects_and_keeps_that_from_the_skin() -> None:
-    """Index 1.4 reflects 3 to 6 % of even light away from the edge; the rest enters, and the colour tells what comes back."""
+    """Index 1.4 reflects 3 to 6 % of even light off the edge; of the rest the colour's share comes back."""
     scene = ball_scene(environment=Environment(name="uniform"))
     grey = Coated(np.full((2, 2, 3), 0.5, np.float32), (0.5, 0.5, 0.5), 0.3)
     means = []
