@@ -7,6 +7,7 @@ from pathlib import Path
 
 import accuracy_highlight as highlight
 import accuracy_light as light
+import accuracy_look as look
 import accuracy_optics as optics
 import accuracy_specular as specular
 import accuracy_surface as surface
@@ -93,6 +94,8 @@ def main() -> None:
             rounding=half_store_rounding(device),
             highlights=highlight.table(),
             highlight_paths=highlight.PATHS,
+            looks=look.table(),
+            look_paths=look.PATHS,
             **specular.tables(),
             **light.tables(*sys.argv[1:2]),
             **optics.tables(),

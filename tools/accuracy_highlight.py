@@ -23,12 +23,15 @@ from dermis.mesh.maps import Maps
 from dermis.reference.cycles import cycles_passes
 from dermis.reference.cycles_scene import Facets
 from dermis.scene import PointLight, Scene, Settings, Skin, load_camera
+from dermis.specular.two_lobe import NARROW, SHARE_OF_NARROW, WIDE
 
 RESULTS = Path(__file__).parent.parent / "benchmarks" / "results" / "highlights.json"
-MODELS = ("torrance-sparrow-smith", "kelemen")
+MODELS = ("torrance-sparrow-smith", "kelemen", "two-lobe")
 VIEWS = ("cheek", "portrait")
 ROUGHNESS, PATHS = 0.3, 64
 LIGHT = PointLight(position=(-300, 250, 600), irradiance=(3, 3, 3))
+ONE_KIND = ((1.0, ROUGHNESS),)
+TWO_KINDS = ((SHARE_OF_NARROW, NARROW * ROUGHNESS), (1.0 - SHARE_OF_NARROW, WIDE * ROUGHNESS))
 BRIGHT = 0.6  # share of the lit pixels that are darker than those that count
 GRAIN = 6.0  # standard deviation of what counts as the picture without its grain [pixel]
 
@@ -52,15 +55,27 @@ def grain(picture: Picture, lit: NDArray[np.bool_]) -> float:
     return float(np.sqrt((((picture - smooth) / np.maximum(smooth, 1e-9))[lit] ** 2).mean()))
 
 
+def traced(scene: Scene, settings: Settings, kinds: tuple[tuple[float, float], ...]) -> Picture:
+    """Green light that facets reflect, path-traced.
+
+    kinds : share and roughness of each kind of facets
+    """
+    picture = np.zeros(settings.size[::-1], np.float32)
+    for share, roughness in kinds:
+        (passed,) = cycles_passes(scene, Facets(roughness), [PATHS], settings)
+        picture += share * passed.image[..., 1]
+    return picture
+
+
 def measured(renderer: dermis.Renderer, head: Head, view: str) -> list[dict[str, Any]]:
     """A row for each model: energy and contrast over Cycles', and how alike they are."""
-    camera, facets = load_camera(view, head), Facets(ROUGHNESS)
+    camera = load_camera(view, head)
     settings = Settings(size=(384, 384), atlas=512, samples=16, parts="specular", transmission="none")
-    (passed,) = cycles_passes(Scene(head, [LIGHT], camera), facets, [PATHS], settings)
-    truth = passed.image[..., 1]
-    lit = truth > np.quantile(truth[truth > 0], BRIGHT)
-    rows = []
+    scene, rows = Scene(head, [LIGHT], camera), list[dict[str, Any]]()
+    alike, mixed = (traced(scene, settings, kinds) for kinds in (ONE_KIND, TWO_KINDS))
     for model in MODELS:
+        truth = mixed if model == "two-lobe" else alike
+        lit = truth > np.quantile(truth[truth > 0], BRIGHT)
         skin = Skin.model_validate(
             {"specular": model, "fresnel": "exact", "rho_s": 1.0, "roughness": ROUGHNESS}
         )

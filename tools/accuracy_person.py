@@ -21,6 +21,7 @@ from dermis.comparison.person_views import EYE_MM, VIEWS, scene_of
 from dermis.frame.renderer import Renderer
 from dermis.gallery.picture import sheet
 from dermis.gallery.run import encode_webp
+from dermis.gallery.script import Panels
 from dermis.reference.metrics import Estimate
 from dermis.scene.heads import load_head
 
@@ -56,7 +57,12 @@ def pictures(pairs: Sequence[Pair]) -> bytes:
     for pair in pairs:
         panels[pair.name] = pair.shown(pair.ours)
         panels[f"{pair.name}, traced"] = pair.shown(pair.truth)
-    drawn = np.asarray(sheet(panels, COLUMNS))
+    return sheet_bytes(panels, COLUMNS)
+
+
+def sheet_bytes(panels: Panels, columns: int) -> bytes:
+    """Panels on a sheet, as WebP of at most `MOST_BYTES`."""
+    drawn = np.asarray(sheet(panels, columns))
     for quality in (80, 65, 50, 35, 20):
         data = encode_webp(drawn, quality)
         if len(data) <= MOST_BYTES:

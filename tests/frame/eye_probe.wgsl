@@ -1,4 +1,4 @@
-// Where rays that meet the cornea see the plane of the iris, in an eye's own space.
+// Where rays that meet the cornea see the plane of the iris, in an eye's own space, and what share of its colour shows.
 //#include "lighting.wgsl"
 //#include "eye.wgsl"
 
@@ -10,6 +10,6 @@
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if (all(id.xy < textureDimensions(places))) {
         let p = textureLoad(places, id.xy, 0).xyz;
-        textureStore(seen, id.xy, vec4f(seen_on_iris(p, textureLoad(ways, id.xy, 0).xyz), 0.0, 0.0));
+        textureStore(seen, id.xy, vec4f(seen_on_iris(p, textureLoad(ways, id.xy, 0).xyz), UNDER_WATER, 0.0));
     }
 }

@@ -74,15 +74,31 @@ def test_the_cornea_magnifies(renderer: Renderer) -> None:
     assert 1.7 < seen[0, 0, 0] < 1.9
 
 
+def test_the_cornea_dims_the_iris(renderer: Renderer) -> None:
+    """A disc in water shows 1/n^2 of what it does in air, and the cornea draws beams together."""
+    off = 0.05
+    p = np.zeros((SIZE, SIZE, 3))
+    p[..., 0], p[..., 2] = off, cornea_centre_mm() + np.sqrt(CORNEA_MM**2 - off**2)
+    straight = np.tile(np.array([0.0, 0.0, -1.0]), (SIZE, SIZE, 1))
+    drawn_to = traced(p[:1, :1], straight[:1, :1])[0, 0, 0] / off
+    shown = probed(renderer, p, straight)[0, 0, 2]
+    assert shown == pytest.approx(1 / (ETA * drawn_to) ** 2, rel=1e-3)
+
+
 def on_iris(renderer: Renderer, places: Floats, ways: Floats) -> Floats:
-    """(n, n, 2) what the shader finds."""
+    """(n, n, 2) where the shader finds the plane of the iris."""
+    return probed(renderer, places, ways)[..., :2]
+
+
+def probed(renderer: Renderer, places: Floats, ways: Floats) -> Floats:
+    """(n, n, 4) what the shader finds."""
     lit = run_frame(renderer, scene_of(head_of(plane(50.0)), frontal())).lit
     bound = {
         name: texture_from(renderer.device, np.dstack([one, np.ones((SIZE, SIZE))]), "rgba32float")
         for name, one in (("places", places), ("ways", ways))
     }
     (seen,) = probe(renderer.device, "eye_probe", (SIZE, SIZE), ["seen"], **lit, **bound)
-    return np.asarray(seen[..., :2], np.float64)
+    return np.asarray(seen, np.float64)
 
 
 def axes(head: Head, pose: Pose) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from lit_balls import BALL, LIGHTS, ball_scene
 from dermis.errors import DermisError
 from dermis.optics.media import media
 from dermis.reference.cycles import PYTHON_VARIABLE, Method, cycles_passes, cycles_render
-from dermis.reference.cycles_scene import describe
+from dermis.reference.cycles_scene import Coated, describe
 from dermis.reference.half_space import diffuse_albedo
 from dermis.reference.path_traced import Lambertian, path_trace
 from dermis.scene.environment import Environment
@@ -103,3 +104,17 @@ def test_passes_have_seeds_of_their_own_and_repeat() -> None:
     assert (first[1].image != first[2].image).any()
     other = cycles_passes(scene, SKIN1, [4], settings, seed=8)[0]
     assert (other.image == first[1].image).all() and other.core_seconds > 0.0
+
+
+@blender
+def test_a_coat_reflects_and_keeps_that_from_the_skin() -> None:
+    """Index 1.4 reflects 3 to 6 % of even light off the edge; of the rest the colour's share comes back."""
+    scene = ball_scene(environment=Environment(name="uniform"))
+    grey = Coated(np.full((2, 2, 3), 0.5, np.float32), (0.5, 0.5, 0.5), 0.3)
+    means = []
+    for skin in (grey, replace(grey, colour=np.zeros((2, 2, 3), np.float32))):
+        (one,) = cycles_passes(scene, skin, [64], Settings(size=(24, 24)))
+        means.append(float(one.image[one.coverage > 0.999].mean()))
+    whole, surface = means
+    assert 0.03 < surface < 0.06
+    assert whole - surface == pytest.approx(0.5 * (1.0 - surface), rel=0.1)

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from tolerances import PUBLISHED, RECIPROCAL
 
 from dermis import cite
+from dermis.specular.beckmann import beckmann
 from dermis.specular.comparison import peak, reciprocity_error
 from dermis.specular.cosines import Cosines, cosines
 from dermis.specular.energy import ENERGY
 from dermis.specular.fresnel import FRESNEL, SKIN_F0, schlick
 from dermis.specular.models import MODELS, EnergyName, FresnelName
 from dermis.specular.torrance_sparrow import smith_masking
-from dermis.specular.two_lobe import NARROW, WIDE
+from dermis.specular.two_lobe import NARROW, WIDE, two_lobe_masking
 
 Floats = NDArray[np.float64]
 Z = np.array([0.0, 0.0, 1.0])
@@ -111,6 +112,27 @@ def test_smith_masking_at_its_limits() -> None:
     assert (np.diff(seen) >= 0).all() and seen[-1] == 1.0
     # nearly level views see 2 a sqrt(pi) of the facets, a = cot(theta) / m
     assert smith_masking(1e-4, 0.4) == pytest.approx(2 * np.sqrt(np.pi) * 1e-4 / 0.4, rel=1e-3)
+
+
+@pytest.mark.parametrize("degrees", [30.0, 70.0, 85.0])
+def test_facets_of_both_kinds_that_are_seen_fill_just_what_the_surface_fills(degrees: float) -> None:
+    """Seen facets' areas across the view add up to the surface's own, cos theta."""
+    m, step = 0.3, np.pi / 400
+    theta, phi = np.meshgrid(step * (np.arange(200) + 0.5), step * np.arange(800))
+    cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    facing = sine * np.sin(theta) * np.cos(phi) + cosine * np.cos(theta)
+    kinds = ((0.85, NARROW * m), (0.15, WIDE * m))
+    slopes = sum(share * beckmann(np.cos(theta), rough) / np.pi for share, rough in kinds)
+    areas = (slopes * np.maximum(facing, 0) * np.sin(theta)).sum() * step**2
+    assert areas * two_lobe_masking(cosine, m) == pytest.approx(cosine, rel=1e-3)
+
+
+def test_two_lobes_alike_are_torrance_and_sparrows(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dermis.specular.two_lobe.NARROW", 1.0)
+    monkeypatch.setattr("dermis.specular.two_lobe.WIDE", 1.0)
+    angles = cosines(Z, towards(np.array([75.0]), np.zeros(1)), towards(np.array([60.0]), np.array([170.0])))
+    one, other = (MODELS[name].lobe(angles, 0.3) for name in ("two-lobe", "torrance-sparrow-smith"))
+    assert one == pytest.approx(other, rel=1e-12)
 
 
 def test_each_model_takes_a_reflectance_of_its_own() -> None:

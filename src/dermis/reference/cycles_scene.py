@@ -31,7 +31,23 @@ class Facets:
     roughness: float
 
 
-Below = Medium | Lambertian | Facets
+@dataclass(frozen=True, eq=False)
+class Coated:
+    """Skin as a Blender user makes it: Principled, a random walk under a rough boundary of index 1.4.
+
+    The head's normal map is on it. Cycles has GGX's facets there; what they reflect does not enter.
+
+    colour : (h, w, 3) of the light that comes back from below, linear Rec. 709 [-]
+    radius_mm : (3,) Cycles' radius, 4 pi mean free paths [mm]
+    roughness : m [-]
+    """
+
+    colour: NDArray[np.float32]
+    radius_mm: tuple[float, float, float]
+    roughness: float
+
+
+Below = Medium | Lambertian | Facets | Coated
 FALLOFFS = {"random-walk": "RANDOM_WALK", "burley": "BURLEY"}
 """Our names of Cycles' methods of subsurface scattering."""
 
@@ -56,8 +72,10 @@ def describe(
         "triangles": mesh.triangles,
         "material": mesh.material,
     }
-    if isinstance(medium, Facets) and scene.head.maps.normal is not None:
+    if isinstance(medium, Facets | Coated) and scene.head.maps.normal is not None:
         arrays |= {"uv": mesh.uv, "normal_map": _normal_map(scene.head.maps.normal)}
+    if isinstance(medium, Coated):
+        arrays |= {"uv": mesh.uv, "colour_map": medium.colour}
     return described, arrays | panorama
 
 
@@ -93,13 +111,21 @@ def _skin(medium: Below, method: str) -> dict[str, Any]:
     if isinstance(medium, Facets):
         # Blender's number is the root of Beckmann's
         return {"method": "FACETS", "roughness": float(np.sqrt(medium.roughness)), "ior": SKIN_ETA}
+    if isinstance(medium, Coated):
+        radius = [part / UNIT_MM for part in medium.radius_mm]
+        return {
+            "method": "COATED",
+            "roughness": float(np.sqrt(medium.roughness)),
+            "ior": SKIN_ETA,
+            "radius": radius,
+        }
     if len(medium.layers) != 1:
         came = f"it has {len(medium.layers)}"
         refuse(medium.name, "one layer, for Cycles", came, "Take a medium of one layer, such as skin1")
     (layer,) = medium.layers
-    radius = 4.0 * np.pi * layer.mean_free_path_mm / UNIT_MM
+    walk = 4.0 * np.pi * layer.mean_free_path_mm / UNIT_MM
     colour = [diffuse_albedo(float(alpha)) for alpha in layer.alpha_prime]
-    return {"method": FALLOFFS[method], "colour": colour, "radius": radius.tolist()}
+    return {"method": FALLOFFS[method], "colour": colour, "radius": walk.tolist()}
 
 
 def _camera(scene: Scene) -> dict[str, Any]:

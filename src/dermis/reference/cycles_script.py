@@ -24,7 +24,8 @@ def main(folder: Path) -> None:
         arrays = dict(stored)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.preferences.addon_enable(module="cycles")
-    materials = [make_material(one, arrays.get("normal_map")) for one in described["materials"]]
+    maps = {name: arrays[name] for name in ("normal_map", "colour_map") if name in arrays}
+    materials = [make_material(one, maps) for one in described["materials"]]
     add_mesh(arrays, materials)
     for light in described["lights"]:
         add_light(light)
@@ -57,7 +58,7 @@ def add_mesh(arrays: dict[str, Any], materials: list[Any]) -> None:
     add_object("head", mesh)
 
 
-def make_material(described: dict[str, Any], normal_map: Any) -> Any:
+def make_material(described: dict[str, Any], maps: dict[str, Any]) -> Any:
     material = bpy.data.materials.new(described["name"])
     material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
@@ -67,8 +68,10 @@ def make_material(described: dict[str, Any], normal_map: Any) -> Any:
         shader.distribution = "BECKMANN"
         shader.inputs["Roughness"].default_value = described["roughness"]
         shader.inputs["IOR"].default_value = described["ior"]
-        if normal_map is not None:
-            links.new(add_normals(nodes, links, normal_map), shader.inputs["Normal"])
+        add_normals(nodes, links, maps, shader)
+    elif described["method"] == "COATED":
+        shader = add_coated(nodes, links, maps, described)
+        add_normals(nodes, links, maps, shader)
     elif described["method"] == "DIFFUSE":
         shader = nodes.new("ShaderNodeBsdfDiffuse")
     else:
@@ -78,17 +81,37 @@ def make_material(described: dict[str, Any], normal_map: Any) -> Any:
         shader.inputs["Radius"].default_value = described["radius"]
         if "Roughness" in shader.inputs:
             shader.inputs["Roughness"].default_value = 1.0
-    shader.inputs["Color"].default_value = (*described.get("colour", (1.0, 1.0, 1.0)), 1.0)
+    if "Color" in shader.inputs:
+        shader.inputs["Color"].default_value = (*described.get("colour", (1.0, 1.0, 1.0)), 1.0)
     links.new(shader.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
     return material
 
 
-def add_normals(nodes: Any, links: Any, normal_map: Any) -> Any:
+def add_coated(nodes: Any, links: Any, maps: dict[str, Any], described: dict[str, Any]) -> Any:
+    shader = nodes.new("ShaderNodeBsdfPrincipled")
+    shader.distribution = "GGX"
+    shader.subsurface_method = "RANDOM_WALK"
+    numbers = {"Subsurface Weight": 1.0, "Subsurface Scale": 1.0, "Specular IOR Level": 0.5}
+    numbers |= {"IOR": described["ior"], "Roughness": described["roughness"]}
+    for name, value in numbers.items():
+        shader.inputs[name].default_value = value
+    shader.inputs["Subsurface Radius"].default_value = described["radius"]
+    texture, node = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeUVMap")
+    node.uv_map = "uv"
+    links.new(node.outputs["UV"], texture.inputs["Vector"])
+    texture.image = packed_image("colours", maps["colour_map"])
+    links.new(texture.outputs["Color"], shader.inputs["Base Color"])
+    return shader
+
+
+def add_normals(nodes: Any, links: Any, maps: dict[str, Any], shader: Any) -> None:
+    if "normal_map" not in maps:
+        return
     texture, node = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeNormalMap")
-    texture.image = packed_image("normals", normal_map)
+    texture.image = packed_image("normals", maps["normal_map"])
     links.new(texture.outputs["Color"], node.inputs["Color"])
     node.uv_map = "uv"
-    return node.outputs["Normal"]
+    links.new(node.outputs["Normal"], shader.inputs["Normal"])
 
 
 def packed_image(name: str, rows: Any) -> Any:

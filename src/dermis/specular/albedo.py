@@ -52,7 +52,7 @@ def directional_albedo(
     n_h = 1.0 / np.sqrt(1.0 + x**2 + y**2)
     v_h = c * (1.0 + tangent * x) * n_h
     n_l = np.maximum(2.0 * v_h * n_h - c, 0.0)
-    reflected = n_l * lobe(Cosines(n_l, np.broadcast_to(c, n_l.shape), n_h, v_h), m, fresnel)
+    reflected = n_l * lobe(Cosines(n_l, c, n_h, v_h), m, fresnel)
     # A half vector's solid angle is n_h^3 dx dy, the light's 4 v_h times that; both sides of the plane count.
     albedo: Floats = (8.0 * reflected * v_h * n_h**3 * dx * dy).sum(axis=(-2, -1))
     return albedo

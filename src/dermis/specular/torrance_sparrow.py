@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -22,7 +24,7 @@ def torrance_sparrow(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) 
     """
     n_l, n_v = _raised(angles)
     groove = 2.0 * angles.n_h * np.minimum(n_l, n_v) / np.maximum(angles.v_h, _GRAZING)
-    return _lobe(angles, m, fresnel, np.minimum(1.0, groove))
+    return _lobe(angles, beckmann(angles.n_h, m), fresnel, np.minimum(1.0, groove))
 
 
 def torrance_sparrow_smith(angles: Cosines, m: ArrayLike, fresnel: Fresnel = schlick) -> Floats:
@@ -32,8 +34,15 @@ def torrance_sparrow_smith(angles: Cosines, m: ArrayLike, fresnel: Fresnel = sch
 
     Source: [Walter2007] section 5; [Smith1967].
     """
+    return masked_lobe(angles, beckmann(angles.n_h, m), fresnel, lambda cosine: smith_masking(cosine, m))
+
+
+def masked_lobe(
+    angles: Cosines, slopes: Floats, fresnel: Fresnel, masking: Callable[[Floats], Floats]
+) -> Floats:
+    """BRDF of slopes distributed as `slopes` over pi; `masking` is the share seen by cosine [1/sr]."""
     n_l, n_v = _raised(angles)
-    return _lobe(angles, m, fresnel, smith_masking(n_l, m) * smith_masking(n_v, m))
+    return _lobe(angles, slopes, fresnel, masking(n_l) * masking(n_v))
 
 
 def smith_masking(cos_theta: ArrayLike, m: ArrayLike) -> Floats:
@@ -53,10 +62,10 @@ def _raised(angles: Cosines) -> tuple[Floats, Floats]:
     return np.maximum(angles.n_l, _GRAZING), np.maximum(angles.n_v, _GRAZING)
 
 
-def _lobe(angles: Cosines, m: ArrayLike, fresnel: Fresnel, masking: Floats) -> Floats:
+def _lobe(angles: Cosines, slopes: Floats, fresnel: Fresnel, masking: Floats) -> Floats:
     n_l, n_v = _raised(angles)
-    slopes = beckmann(angles.n_h, m) / np.pi
-    return np.where(angles.above, slopes * fresnel(angles.v_h) * masking / (4.0 * n_l * n_v), 0.0)
+    lobe = slopes / np.pi * fresnel(angles.v_h) * masking / (4.0 * n_l * n_v)
+    return np.where(angles.above, lobe, 0.0)
 
 
 TORRANCE_SPARROW = Model(

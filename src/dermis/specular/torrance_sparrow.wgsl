@@ -12,16 +12,16 @@ fn torrance_sparrow(a: Angles, m: f32) -> f32 {
 }
 
 fn torrance_sparrow_smith(a: Angles, m: f32) -> f32 {
-    let masked = smith_over_cosine(a.n_l, m) * smith_over_cosine(a.n_v, m);
-    return beckmann(a, m) * fresnel(a.v_h) / (4.0 * PI) * masked;
+    return beckmann(a, m) * fresnel(a.v_h) / (4.0 * PI * smith_area(a.n_l, m) * smith_area(a.n_v, m));
 }
 
-// G1(c) / c, exact but for erf, which is within 2e-7 [AbramowitzStegun1964] 7.1.26.
-fn smith_over_cosine(c: f32, m: f32) -> f32 {
-    let tangent = sqrt(max(1.0 - c * c, 1e-12)) / c;
-    let x = 1.0 / (m * tangent);
+// c / G1(c), the area that the facets would fill in a direction if none hid another, exact but for erf, which is
+// within 2e-7 [AbramowitzStegun1964] 7.1.26.
+fn smith_area(c: f32, m: f32) -> f32 {
+    let across = m * sqrt(max(1.0 - c * c, 1e-12));
+    let x = c / across;
     let bell = exp(-x * x);
     let t = 1.0 / (1.0 + 0.3275911 * x);
     let tail = ((((1.061405429 * t - 1.453152027) * t + 1.421413741) * t - 0.284496736) * t + 0.254829592) * t * bell;
-    return 2.0 / (c * (2.0 - tail) + bell * m * tangent * c / ROOT_PI);
+    return 0.5 * (c * (2.0 - tail) + bell * across / ROOT_PI);
 }

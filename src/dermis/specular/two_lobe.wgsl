@@ -1,5 +1,5 @@
-// Two Kelemen lobes of two roughnesses, as engines shade skin [EpicGames2025].
-//#include "kelemen.wgsl"
+// Slopes of two roughnesses, as engines shade skin [EpicGames2025], masked after Smith [Smith1967].
+//#include "torrance_sparrow.wgsl"
 
 // factors of the roughness
 //#fill const NARROW: f32 = {narrow};
@@ -7,6 +7,11 @@
 //#fill const SHARE_OF_NARROW: f32 = {share_of_narrow};
 
 fn two_lobe(a: Angles, m: f32) -> f32 {
-    let slopes = mix(beckmann(a, clamp(WIDE * m, 0.05, 1.0)), beckmann(a, clamp(NARROW * m, 0.05, 1.0)), SHARE_OF_NARROW);
-    return slopes * fresnel(a.v_h) / (4.0 * PI * max(a.v_h * a.v_h, 1e-12));
+    let narrow = clamp(NARROW * m, 0.05, 1.0);
+    let wide = clamp(WIDE * m, 0.05, 1.0);
+    let slopes = mix(beckmann(a, wide), beckmann(a, narrow), SHARE_OF_NARROW);
+    // Masking integrates over slopes: areas mix as they do.
+    let to_light = mix(smith_area(a.n_l, wide), smith_area(a.n_l, narrow), SHARE_OF_NARROW);
+    let to_eye = mix(smith_area(a.n_v, wide), smith_area(a.n_v, narrow), SHARE_OF_NARROW);
+    return slopes * fresnel(a.v_h) / (4.0 * PI * to_light * to_eye);
 }

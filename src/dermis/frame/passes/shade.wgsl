@@ -101,7 +101,7 @@ fn shaded(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Shaded {
     } else {
         surface = surface_at(point, footprint);
     }
-    var film = Film(surface.normal, 0.0);
+    var film = Film(surface.normal, vec3f(0.0));
     if (EYES) {
         // A loop, because software adapters run both sides of a branch for all pixels, and a loop only while one needs it.
         var k = 0u;

@@ -6,16 +6,21 @@
 
 const EYE_ETA: f32 = 1.336; // of the cornea's front and what is behind, as one surface
 const IRIS_MM: f32 = 6.0; // radius
-const CONCAVE: f32 = 0.45; // light is gathered on the side of the iris opposite to it: slope at its rim
+const CONCAVE: f32 = 0.30; // light is gathered on the side of the iris opposite to it: slope at its rim
+// What a diffuse disc under the cornea shows of its colour: light that leaves water spreads over a wider cone, by the index
+// squared, and a lens of that curvature draws what arrives together on its way to the iris.
+const FOCUS_MM: f32 = EYE_ETA * CORNEA_MM / (EYE_ETA - 1.0); // behind the apex
+const DRAWN_TO: f32 = 1.0 - (CORNEA_AT + CORNEA_MM - IRIS_AT) / FOCUS_MM; // part of a beam's width
+const UNDER_WATER: f32 = 1.0 / (EYE_ETA * EYE_ETA * DRAWN_TO * DRAWN_TO);
 const LIMBUS_SOFT_MM: f32 = 0.55; // half of the width over which the white turns clear
 // The white scatters light over some mm, and lids that touch it do so too: shadows are those of a point above it.
 const SCATTERED_MM: f32 = 0.5;
 const AROUND: f32 = 1.0; // how far normals of the white turn to its front by that
-const SCATTERED: f32 = 0.35; // share of a light that comes into such a shadow
+const SCATTERED: vec3f = vec3f(0.32, 0.28, 0.26); // share of a light that comes into such a shadow, through lids and white
 // Artist's values: what the lids, which lie close, keep of the light from all around.
-const UPPER_SHADE: f32 = 0.6;
+const UPPER_SHADE: vec3f = vec3f(0.58, 0.68, 0.72); // they give red back
 const UPPER_SHADE_MM: f32 = 2.2;
-const LOWER_SHADE: f32 = 0.3;
+const LOWER_SHADE: vec3f = vec3f(0.28, 0.36, 0.40);
 const LOWER_SHADE_MM: f32 = 1.3;
 const MENISCUS: f32 = 1.1; // how steep tears rise to the lower lid
 const MENISCUS_ROUGHNESS: f32 = 0.16; // over its curve, which is finer than pixels
@@ -118,7 +123,7 @@ fn white_colour(eye: Eye, p: vec3f) -> vec3f {
 }
 
 // Share of the light that lids leave.
-fn lid_shade(lids: Lids) -> f32 {
+fn lid_shade(lids: Lids) -> vec3f {
     let upper = UPPER_SHADE * exp(-pow(lids.above / UPPER_SHADE_MM, 2.0));
     let lower = LOWER_SHADE * exp(-pow(lids.below / LOWER_SHADE_MM, 2.0));
     return (1.0 - upper) * (1.0 - lower);
@@ -149,7 +154,7 @@ fn eye_at(eye: Eye, p: vec3f, lids: Lids, v: vec3f) -> EyeLit {
     let film = tears_at(normalize(mix(ball, cornea, clear)), lids);
     // the white scatters light around its curve
     let below = normalize(mix(ball + vec3f(0.0, 0.0, AROUND), gathered, clear));
-    let colour = mix(white_colour(eye, p), iris_colour(eye, on_iris), clear) * lid_shade(lids);
+    let colour = mix(white_colour(eye, p), UNDER_WATER * iris_colour(eye, on_iris), clear) * lid_shade(lids);
     let back = transpose(turned); // a turn and a scale: normals come back by it
     let film_roughness = mix(TEARS, MENISCUS_ROUGHNESS, meniscus_at(lids));
     return EyeLit(Surface(normalize(back * below), colour, film_roughness, 1.0), Film(normalize(back * film), SCATTERED));

@@ -21,7 +21,7 @@ struct Lit {
 // What lies over a surface and reflects.
 struct Film {
     normal: vec3f,
-    scattered: f32, // share of a light that arrives in its shadow, by scattering in what is around
+    scattered: vec3f, // share of a light that arrives in its shadow, by scattering in what is around
 }
 
 // The normal, turned back to the eye's horizon where the relief faces away: beyond it a lobe is undefined, and unbounded with
@@ -54,7 +54,7 @@ fn next_that_may_shine(first: u32, p: vec3f, n: vec3f) -> u32 {
 
 // open: share of the sky that the point sees
 fn light_up(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
-    return light_through(point, surface, Film(surface.normal, 0.0), v, open);
+    return light_through(point, surface, Film(surface.normal, vec3f(0.0)), v, open);
 }
 
 fn light_through(point: Point, surface: Surface, film: Film, v: vec3f, open: f32) -> Lit {
@@ -82,7 +82,7 @@ fn light_through(point: Point, surface: Surface, film: Film, v: vec3f, open: f32
                     seen = visibility(light, point, arriving.direction) * past_strands(light, point.position);
                 }
                 let e = arriving.irradiance * seen;
-                let filled = arriving.irradiance * max(seen, film.scattered);
+                let filled = arriving.irradiance * max(vec3f(seen), film.scattered);
                 var entering = filled * (cosine * enters(cosine, surface.roughness, surface.rho_s));
                 if (by_direction) {
                     lit.directional += entering * beyond_mean(cosine, facing);

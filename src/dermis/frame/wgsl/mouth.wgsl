@@ -20,7 +20,7 @@ const NECK: vec3f = vec3f(0.56, 0.45, 0.31);
 const CLEAR_EDGE: vec3f = vec3f(0.36, 0.38, 0.40);
 const GUM: vec3f = vec3f(0.42, 0.15, 0.14);
 const SALIVA: f32 = 0.12; // roughness of what is wet here
-const MOUTH_SCATTERED: f32 = 0.10; // share of a light that comes in through cheeks and lips
+const MOUTH_SCATTERED: vec3f = vec3f(0.04, 0.014, 0.008); // share of a light that comes in through cheeks and lips, some 8 mm
 
 fn tooth_width(kind: f32, index: u32) -> f32 {
     return select(LOWER_MM[index], UPPER_MM[index], kind == UPPER_TEETH);
