@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import weakref
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 from typing import Any
@@ -52,6 +53,7 @@ DEFAULT_LIMITS = {
     "max-immediate-size": 0,
 }
 """Limits that WebGPU guarantees on every machine ("Limits" in its specification)."""
+_LOSS_NOTES = "DEVICE LOST!", "The WGPU device was lost"  # in wgpu's log; DeviceLostError says so too
 _RAISED_LIMITS = ("max-texture-dimension-2d", "max-storage-buffer-binding-size", "max-buffer-size")
 
 
@@ -93,6 +95,7 @@ class Device:
         self.ffi, self.lib, self.checked, self._encoder = ffi, lib, libf, GPUCommandEncoder
         self.adapter = adapter
         self.reason = reason
+        logging.getLogger("wgpu").addFilter(_is_news)
         features = [] if bare else list(adapter.features)
         limits = _limits(adapter.handle.limits, () if bare else _RAISED_LIMITS)
         try:
@@ -117,6 +120,7 @@ class Device:
         self._staging: dict[int, list[Any]] = {}
         self.fetching: set[Any] = set()
         self._samplers: dict[tuple[tuple[str, str], ...], Any] = {}
+        self._unwritten = self.space(4)
 
     def shared(self, name: str, make: Callable[[], Any]) -> Any:
         """A small object by its name, made on first use and kept as long as the device."""
@@ -135,10 +139,14 @@ class Device:
         return self._encoder("", made, self.handle)
 
     def submit(self, encoder: Any) -> int:
-        """Submit what an encoder has recorded; returns the number of the submission, for `wait`."""
+        """Submit what an encoder has recorded; returns the number of the submission, for `wait`.
+
+        Raises GPUError, of a device that is lost too: the library would end the process.
+        """
         done = self.checked.wgpuCommandEncoderFinish(encoder._internal, self.ffi.NULL)
         commands = self.ffi.gc(done, self.lib.wgpuCommandBufferRelease)
         listed = self.ffi.new("WGPUCommandBuffer[]", [commands])
+        self._touch()
         # wgpu's own submit returns no number, without which one can only wait for all submissions.
         return int(self.checked.wgpuQueueSubmitForIndex(self.handle.queue._internal, 1, listed))
 
@@ -146,6 +154,21 @@ class Device:
         """Wait for all submissions up to the one with this number from `submit`, or for all."""
         number = self.ffi.NULL if submitted is None else self.ffi.new("WGPUSubmissionIndex *", submitted)
         self.checked.wgpuDevicePoll(self.handle._internal, True, number)
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether its driver lost it, or it was destroyed."""
+        import wgpu
+
+        try:
+            self._touch()
+        except wgpu.GPUError:
+            return True
+        return False
+
+    def _touch(self) -> None:
+        """Write nothing, which the library refuses where the device is lost."""
+        self.write(self._unwritten, b"", 0)
 
     @cached_property
     def timestamp_period_ns(self) -> float:
@@ -209,6 +232,10 @@ class Device:
         return self._timestamps
 
 
+def _is_news(record: logging.LogRecord) -> bool:
+    return not record.getMessage().startswith(_LOSS_NOTES)
+
+
 def _limits(offered: Mapping[str, int], raised: Sequence[str]) -> dict[str, int]:
     """WebGPU's default limits; the adapter's own where it offers less or the limit is to be raised."""
     fitting = {
@@ -216,17 +243,3 @@ def _limits(offered: Mapping[str, int], raised: Sequence[str]) -> dict[str, int]
         for name, default in DEFAULT_LIMITS.items()
     }
     return fitting | {name: offered[name] for name in raised}
-
-
-@contextlib.contextmanager
-def gpu_failures(device: Device) -> Iterator[None]:
-    """Turn the driver's errors (out of memory, device lost, invalid call) into a DermisError."""
-    import wgpu
-
-    try:
-        yield
-    except (wgpu.GPUError, MemoryError) as error:
-        raise DermisError(
-            f"{device.adapter.name}: expected the frame to run, but the driver says: {error}. "
-            "Lower --size, --samples or --atlas, close other programs that use the GPU, or try --adapter cpu."
-        ) from error
