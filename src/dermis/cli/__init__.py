@@ -51,6 +51,8 @@ def main() -> None:
         _fail(str(error))
     except CycloptsError as error:
         _fail(explain(error))
+    except MemoryError as error:
+        _fail(f"memory: expected enough for this, but there is no more ({error}). Ask for smaller sizes.")
     except KeyboardInterrupt:
         sys.exit(130)
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from dermis.errors import DermisError
 from dermis.gpu.adapters import Adapter, fitting_adapters
+from dermis.gpu.address_space import check_software
 
 _TIMED_PASSES = 2048
 _STAGING_STEP = 4096
@@ -96,6 +97,8 @@ class Device:
         self.adapter = adapter
         self.reason = reason
         logging.getLogger("wgpu").addFilter(_is_news)
+        if adapter.kind == "CPU":
+            check_software()
         features = [] if bare else list(adapter.features)
         limits = _limits(adapter.handle.limits, () if bare else _RAISED_LIMITS)
         try:
