@@ -63,7 +63,7 @@ class Fetched:
         return copied
 
     def _check(self) -> None:
-        """Raise DeviceLostError without a device: the library ends the process when asked for a buffer of one."""
+        """Raise DeviceLostError without a device, for whose buffers the library ends the process."""
         if self.device.is_lost:
             raise DeviceLostError(self.device)
 
