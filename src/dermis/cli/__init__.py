@@ -20,6 +20,7 @@ COMMANDS = {
     "doctor": "Show what this machine can do and render a test frame.",
     "cite": "Print BibTeX entries of the works behind a picture.",
 }
+_NO_MEMORY = "failed to map segment", "allocate memory"  # of a library that is loaded
 
 
 def main() -> None:
@@ -51,7 +52,9 @@ def main() -> None:
         _fail(str(error))
     except CycloptsError as error:
         _fail(explain(error))
-    except MemoryError as error:
+    except (MemoryError, ImportError) as error:
+        if isinstance(error, ImportError) and not any(words in str(error) for words in _NO_MEMORY):
+            raise
         _fail(f"memory: expected enough for this, but there is no more ({error}). Ask for smaller sizes.")
     except KeyboardInterrupt:
         sys.exit(130)
