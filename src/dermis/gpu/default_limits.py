@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from dermis.errors import refuse
+
 DEFAULT_LIMITS = {
     "max-texture-dimension-1d": 8192,
     "max-texture-dimension-2d": 8192,
@@ -38,6 +40,23 @@ DEFAULT_LIMITS = {
     "max-immediate-size": 0,
 }
 """Limits that WebGPU guarantees on every machine ("Limits" in its specification)."""
+_NEEDED = tuple(
+    name for name in DEFAULT_LIMITS if any(word in name for word in ("stage", "compute", "group", "layout"))
+)
+"""What programs rely on; sizes of textures and buffers may be smaller."""
+
+
+def check_limits(adapter: str, offered: Mapping[str, int]) -> None:
+    """Raises DermisError for an adapter that cannot run the programs of a frame.
+
+    adapter, offered : its name and its limits
+    """
+    for name in _NEEDED:
+        least = DEFAULT_LIMITS[name]
+        if offered.get(name, least) < least:
+            expected = f"{name} of at least {least}, as WebGPU promises"
+            remedy = "Choose another adapter, which dermis doctor lists, or update its driver"
+            refuse(f"adapter {adapter}", expected, f"it has {offered[name]}", remedy)
 
 
 def limits_within(offered: Mapping[str, int], raised: Sequence[str]) -> dict[str, int]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dermis.errors import DermisError
 from dermis.gpu.adapters import Adapter, fitting_adapters
 from dermis.gpu.address_space import check_software
-from dermis.gpu.default_limits import limits_within
+from dermis.gpu.default_limits import check_limits, limits_within
 from dermis.gpu.no_room import room_for
 
 _TIMED_PASSES = 2048
@@ -67,6 +67,7 @@ class Device:
         logging.getLogger("wgpu").addFilter(_is_news)
         if adapter.kind == "CPU":
             check_software()
+        check_limits(adapter.name, adapter.handle.limits)
         features = [] if bare else list(adapter.features)
         limits = limits_within(adapter.handle.limits, () if bare else _RAISED_LIMITS)
         try:
@@ -92,7 +93,6 @@ class Device:
         self._staging: dict[int, list[Any]] = {}
         self.fetching: set[Any] = set()
         self._samplers: dict[tuple[tuple[str, str], ...], Any] = {}
-        self._unwritten = self.space(4)
 
     def shared(self, name: str, make: Callable[[], Any]) -> Any:
         """A small object by its name, made on first use and kept as long as the device."""
@@ -140,7 +140,7 @@ class Device:
 
     def _touch(self) -> None:
         """Write nothing, which the library refuses where the device is lost."""
-        self.write(self._unwritten, b"", 0)
+        self.write(self.shared("unwritten", lambda: self.space(4)), b"", 0)
 
     @cached_property
     def timestamp_period_ns(self) -> float:
