@@ -55,7 +55,7 @@ def chosen(text: str, settings: Settings) -> Settings:
 @pytest.mark.parametrize(
     ("asked", "what", "option"),
     [
-        ({"atlas": 512}, "map of the atlas of 512x512x1 ", "--atlas"),
+        ({"atlas": 512}, "blurred light of 512x512x6 ", "--atlas"),
         ({"size": (1024, 512), "samples": 16}, "picture of 1024x512x1 rgba32float", "--size"),
         ({"shadow_size": 4096}, "shadow maps of 4096x4096x2 ", "--shadow-size 2048"),
     ],
@@ -65,7 +65,7 @@ def test_what_is_told_to_fit_does(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, asked: dict[str, Any], what: str, option: str
 ) -> None:
     settings = settings_of(**({"transmission": "none"} | asked))
-    Small(renderer, monkeypatch, 6e6 if "atlas" in asked else 50e6)
+    Small(renderer, monkeypatch, 24e6 if "atlas" in asked else 50e6)
     with pytest.raises(DermisError, match=re.escape(what)) as caught:
         renderer.draw(LIT, settings)
     said = SAID.fullmatch(str(caught.value))

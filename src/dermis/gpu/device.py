@@ -74,6 +74,7 @@ class Device:
             self.handle: Any = adapter.handle.request_device_sync(
                 label="dermis", required_features=features, required_limits=limits
             )
+            self._unwritten = self.handle.create_buffer(size=4, usage="COPY_DST")
         except Exception as error:
             raise DermisError(
                 f"adapter {adapter.name}: expected it to open, but its driver says: {error}. "
@@ -140,7 +141,7 @@ class Device:
 
     def _touch(self) -> None:
         """Write nothing, which the library refuses where the device is lost."""
-        self.write(self.shared("unwritten", lambda: self.space(4)), b"", 0)
+        self.write(self._unwritten, b"", 0)
 
     @cached_property
     def timestamp_period_ns(self) -> float:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable
+from typing import Any
 
 from dermis.errors import refuse
 from dermis.gpu.address_space import room
@@ -46,11 +46,15 @@ def check_memory(
 
 
 def found_room(device: Device, most: float) -> float:
-    """Bytes, at least, that a device has room for where it had none for `most`: found by trying halves."""
-    size = min(int(most) // 2, device.max_storage_bytes)
-    while size >= _LEAST_PROBED:
-        with contextlib.suppress(NoRoomError):
-            device.space(size // 4 * 4, "probe").destroy()
-            return float(size)
-        size //= 2
-    return 0.0
+    """Bytes, up to `most`, that a device has room for: found by taking them, and given back."""
+    taken: list[Any] = []
+    total, size = 0, min(int(most), device.max_storage_bytes) // 4 * 4
+    while size >= _LEAST_PROBED and total < most:
+        try:
+            taken.append(device.space(size, "probe"))
+            total += size
+        except NoRoomError:
+            size = size // 8 * 4
+    for buffer in taken:
+        buffer.destroy()
+    return float(total)
