@@ -25,6 +25,7 @@ from dermis.frame import resources as resources_module
 from dermis.frame.passes import pack
 from dermis.frame.passes.painting import paint
 from dermis.frame.renderer import Renderer
+from dermis.frame.surface_points import surface_points
 from dermis.gpu import Device, Frame
 from dermis.human.person import Human
 from dermis.images.io import read_image
@@ -135,6 +136,15 @@ def many(renderer: Renderer) -> Any:
     return renderer.draw(scene(), DRAWN).linear()
 
 
+def beside_frames(renderer: Renderer) -> Any:
+    """What else works on the renderer's device, as comparisons do."""
+    known = surface_points(renderer, scene(), DRAWN)
+    with losing(Frame, "submit"):
+        found = surface_points(renderer, scene(), DRAWN)
+    assert np.array_equal(found.triangle, known.triangle) and len(known.triangle)
+    return renderer.draw(scene(), DRAWN).linear()
+
+
 STAGES: tuple[Stage, ...] = (
     loading,
     recording,
@@ -145,6 +155,7 @@ STAGES: tuple[Stage, ...] = (
     begun_to_read,
     painting,
     many,
+    beside_frames,
 )
 
 

@@ -22,6 +22,7 @@ STAGES = (
     "begun_to_read",
     "painting",
     "many",
+    "beside_frames",
     "animate",
 )
 TWICE = re.compile(r"dermis: device: expected .+ to last for a frame, but it was lost twice\. Close .+\.\n")
