@@ -60,8 +60,9 @@ def test_a_picture_under_a_limit_is_drawn_or_refused(folder: Path, limit: float)
 @pytest.mark.parametrize("limit", [1.0, 1.8])
 def test_a_machine_under_a_limit_is_not_healthy(folder: Path, limit: float) -> None:
     ended = limited(limit * GB, folder, "doctor", "--adapter", "cpu")
-    assert ended.returncode == 2 and not ended.stderr
-    assert "NOT healthy: address space (ulimit -v): expected at least 2." in ended.stdout
+    said = ended.stdout + ended.stderr  # as adapters are listed, or as one is opened
+    assert ended.returncode == 2 and "Traceback" not in said
+    assert "address space (ulimit -v): expected at least 2." in said
 
 
 @pytest.mark.parametrize("words", [["--help"], ["cite"], ["lights", "window"], ["profile", "skin1"]])

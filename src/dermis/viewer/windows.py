@@ -5,7 +5,8 @@ from __future__ import annotations
 import importlib
 import os
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NoReturn
@@ -40,8 +41,20 @@ def show_window(state: ViewerState, adapter: str, size: Size, *, motion: MotionF
     except Exception as error:  # glfw has no class of its own for a missing display
         _refuse_display(error)
     viewer = Viewer(state, canvas, adapter, motion=motion)
-    backend.loop.run()
+    with _untouched_signals():
+        backend.loop.run()
     _raise_failure(viewer)
+
+
+@contextmanager
+def _untouched_signals() -> Iterator[None]:
+    """rendercanvas would close the window at a signal, in the middle of a frame that then fails."""
+    loops: Any = importlib.import_module("rendercanvas.core.loop")
+    usual, loops.HANDLED_SIGNALS = loops.HANDLED_SIGNALS, ()
+    try:
+        yield
+    finally:
+        loops.HANDLED_SIGNALS = usual
 
 
 def serve(
