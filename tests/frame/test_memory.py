@@ -58,8 +58,9 @@ class Held:
 
         return counted
 
-    def bytes(self) -> int:
-        gc.collect()
+    def bytes(self, collected: bool = True) -> int:
+        if collected:
+            gc.collect()
         return sum(size for made, size in self._alive if made() is not None)
 
 

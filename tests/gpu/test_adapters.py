@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
 from importlib import import_module
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,6 +16,7 @@ from dermis.errors import DermisError
 from dermis.gpu import adapters as module
 from dermis.gpu import list_adapters, open_device
 from dermis.gpu.adapters import INSTALL_HINT, WANTED_FEATURES, fitting_adapters
+from dermis.gpu.default_limits import DEFAULT_LIMITS
 
 
 def fake(name: str, kind: str, backend: str = "Vulkan", features: tuple[str, ...] = WANTED_FEATURES) -> Any:
@@ -102,15 +106,52 @@ def test_a_name_that_is_none_lists_those_that_are() -> None:
     assert all(adapter.name in str(caught.value) for adapter in list_adapters())
 
 
-def test_a_driver_that_fails_to_open_is_told(machine: Any) -> None:
+def broken(**limits: int) -> Any:
+    """An adapter that does not open."""
+
     def fail(**_: Any) -> None:
         raise RuntimeError("out of everything")
 
-    broken = fake("GeForce", "DiscreteGPU")
-    broken.limits = dict.fromkeys(
-        ("max-texture-dimension-2d", "max-storage-buffer-binding-size", "max-buffer-size"), 1
-    )
-    broken.request_device_sync = fail
-    machine(broken)
+    made = fake("GeForce", "DiscreteGPU")
+    made.limits = DEFAULT_LIMITS | {name.replace("_", "-"): value for name, value in limits.items()}
+    made.request_device_sync = fail
+    return made
+
+
+def test_a_driver_that_fails_to_open_is_told(machine: Any) -> None:
+    machine(broken())
     with pytest.raises(DermisError, match=r"GeForce.*out of everything.*--adapter cpu"):
         open_device("auto")
+
+
+def test_small_textures_are_no_reason_to_refuse_an_adapter(machine: Any) -> None:
+    machine(broken(max_texture_dimension_2d=2048, max_buffer_size=1 << 20))
+    with pytest.raises(DermisError, match="out of everything"):
+        open_device("auto")
+
+
+@pytest.mark.parametrize(
+    "name", ["max_storage_textures_per_shader_stage", "max_compute_invocations_per_workgroup"]
+)
+def test_an_adapter_that_cannot_run_the_programs_is_refused(machine: Any, name: str) -> None:
+    machine(broken(**{name: 2}))
+    named = name.replace("_", "-")
+    with pytest.raises(DermisError, match=rf"adapter GeForce: expected {named} of .+, but it has 2\. Choose"):
+        open_device("auto")
+
+
+@pytest.mark.parametrize("words", [["render", "-o", "a.png"], ["doctor"], ["head", "-o", "a.glb"]])
+def test_a_machine_without_drivers_is_told_what_to_install(tmp_path: Path, words: list[str]) -> None:
+    nowhere = dict.fromkeys(("VK_ICD_FILENAMES", "VK_DRIVER_FILES"), "/nowhere")
+    ended = subprocess.run(
+        [sys.executable, "-m", "dermis", *words],
+        env=os.environ | nowhere,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+    said = ended.stdout + ended.stderr
+    assert ended.returncode == 2 and "Traceback" not in said and not list(tmp_path.iterdir())
+    assert "adapter: expected a Vulkan, Metal or DX12 adapter, but" in said and INSTALL_HINT in said

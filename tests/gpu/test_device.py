@@ -10,7 +10,7 @@ import pytest
 
 from dermis.gpu import ComputeProgram, Device, open_device
 from dermis.gpu.adapters import WANTED_FEATURES
-from dermis.gpu.device import DEFAULT_LIMITS
+from dermis.gpu.default_limits import DEFAULT_LIMITS
 
 RAISED = {"max-texture-dimension-2d", "max-storage-buffer-binding-size", "max-buffer-size"}
 

@@ -13,7 +13,7 @@ import pytest
 from dermis.errors import DermisError
 from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture
 from dermis.gpu.by_resources import ByResources, key_of
-from dermis.gpu.device import gpu_failures
+from dermis.gpu.failures import gpu_failures
 from dermis.gpu.frame import Timed
 from dermis.gpu.probe import half_store_rounding
 from dermis.gpu.textures import texture_from

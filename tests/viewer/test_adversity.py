@@ -9,10 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+import wgpu
 from offscreen_input import InputDriver
 
+from dermis.errors import DermisError
+from dermis.frame import renderer as renderer_module
+from dermis.gpu import Device
 from dermis.gpu.memory import held_bytes
 from dermis.viewer.chart import ATLAS
+from dermis.viewer.windows import _raise_failure
 
 SIZE, ON_HEAD = (400, 480), (300.0, 240.0)
 PICTURE = slice(0, 380), slice(205, 400)  # neither the panel nor the text at the lower edge
@@ -141,8 +146,6 @@ def test_devices_that_go_one_after_the_other_leave_nothing_behind(
 def test_a_device_that_never_works_again_closes_the_window(
     make_driver: Callable[[], InputDriver], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import wgpu
-
     driver = make_driver()
     driver.settled()
 
@@ -153,7 +156,54 @@ def test_a_device_that_never_works_again_closes_the_window(
     for _ in range(6):
         if not driver.canvas.get_closed():
             driver.viewer.draw()
-    assert driver.canvas.get_closed() and isinstance(driver.viewer.failure, wgpu.GPUError)
+    assert driver.canvas.get_closed() and "lost" in str(driver.viewer.failure)
+
+
+@pytest.mark.parametrize("how", ["twice", "never again"])
+def test_a_device_that_is_not_to_be_had_again_closes_the_window_with_a_word(
+    make_driver: Callable[[], InputDriver], monkeypatch: pytest.MonkeyPatch, how: str
+) -> None:
+    driver = make_driver()
+    driver.settled()
+    lose_device(driver)
+    opened = renderer_module.open_device
+
+    def opening(adapter: str) -> Device:
+        if how == "never again":
+            raise DermisError(f"adapter {adapter}: expected it to open, but it does not. Wait.")
+        device = opened(adapter)
+        lost.append(device)
+        return device
+
+    lost: list[Device] = []
+    monkeypatch.setattr(renderer_module, "open_device", opening)
+    driver.viewer.session.change(driver.viewer.session.state.with_skin(mix=0.4))
+    driver.viewer.draw()
+    for device in lost:
+        device.handle.destroy()
+        driver.viewer.draw()
+    assert driver.canvas.get_closed()
+    said = "lost twice" if how == "twice" else "expected it to open"
+    with pytest.raises(DermisError, match=said):
+        _raise_failure(driver.viewer)
+
+
+def test_a_state_that_takes_too_much_memory_leaves_the_last_picture(
+    driver: InputDriver, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is no loss: another device would have no more."""
+    before, session = driver.settled(), driver.viewer.session
+    studio = session.studio
+
+    def fail(*_: Any, **__: Any) -> Any:
+        raise wgpu.GPUOutOfMemoryError("Out of memory")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("dermis.frame.renderer.Renderer._submit", fail)
+        session.change(session.state.with_skin(mix=0.4))
+        after = driver.settled()
+    assert session.studio is studio and "memory" in session.message
+    assert np.array_equal(after[:100, 205:], before[:100, 205:])
 
 
 def test_input_during_a_frame_is_in_the_next_one(

@@ -13,7 +13,7 @@ from dermis.benchmark.cases import FRAGMENTS, Case, scenes_of, settings_of
 from dermis.benchmark.floor import moved_by, stage_bytes
 from dermis.benchmark.gpu_gems_3_fragments import FRAGMENTS as AS_FRAGMENTS
 from dermis.frame.renderer import Renderer
-from dermis.gpu.device import gpu_failures
+from dermis.gpu.failures import gpu_failures
 from dermis.gpu.frame import Timed
 from dermis.gpu.memory import held_bytes
 from dermis.mesh.head import Head

@@ -20,7 +20,7 @@ COMMANDS = {
     "doctor": "Show what this machine can do and render a test frame.",
     "cite": "Print BibTeX entries of the works behind a picture.",
 }
-
+_NO_MEMORY = "failed to map segment", "allocate memory"  # of a library that is loaded
 _INTERRUPTED = 130
 
 
@@ -78,6 +78,10 @@ def _run() -> int:
         return _fail(str(error))
     except CycloptsError as error:
         return _fail(explain(error))
+    except (MemoryError, ImportError) as error:
+        if isinstance(error, ImportError) and not any(words in str(error) for words in _NO_MEMORY):
+            raise
+        return _fail(f"memory: expected enough for this, but there is no more ({error}). Ask for less.")
 
 
 def _show_notes() -> None:

@@ -36,16 +36,13 @@ def compare_specular(output: Path | None, roughness: float, adapter: str, as_jso
 def _specular(adapter: str) -> dict[str, Any]:
     """All findings as one JSON-ready object."""
     from dermis.benchmark.lobe_cost import lobe_cost_ns
-    from dermis.gpu import open_device
-    from dermis.gpu.device import gpu_failures
+    from dermis.gpu.failures import on_device
     from dermis.specular.comparison import albedo_rows, reciprocity_error
     from dermis.specular.fresnel import FRESNEL, hemispherical_reflectance
 
-    device = open_device(adapter)
-    with gpu_failures(device):
-        cost = lobe_cost_ns(device)
+    name, cost = on_device(adapter, lambda device: (device.adapter.name, lobe_cost_ns(device)))
     return {
-        "adapter": device.adapter.name,
+        "adapter": name,
         "hemispherical_fresnel": {name: hemispherical_reflectance(curve) for name, curve in FRESNEL.items()},
         "models": {
             name: {

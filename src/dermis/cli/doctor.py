@@ -61,7 +61,7 @@ def _try_out(wanted: str) -> dict[str, Any]:
 
     try:
         renderer = Renderer(wanted)
-        rounding = half_store_rounding(renderer.device)
+        rounding = renderer.kept_open.run(lambda: half_store_rounding(renderer.device))
         test = _self_test(renderer)
     except DermisError as error:
         return {"healthy": False, "used": None, "problem": str(error)}

@@ -126,7 +126,7 @@ def head(
         Print the names of the published targets, and write nothing.
     """
     from dermis.frame.painted import with_painted_maps
-    from dermis.gpu import open_device
+    from dermis.gpu.failures import on_device
     from dermis.human.person_file import write_numbers
     from dermis.outputs import check_output
 
@@ -145,7 +145,7 @@ def head(
     with working_on("making the head"):
         made = person.head(layout=layout, **given(subdivide=subdivide))
         made = _with_maps(made, given(colour=colour, normal=normal, roughness=roughness))
-        made = with_painted_maps(open_device(adapter), made, size)
+        made = on_device(adapter, lambda device: with_painted_maps(device, made, size))
         length = _write(output, person, made, parse_weights(expression or [], EXPRESSION))
     _report(output, person, made, as_json, bytes=length, seconds=round(time.perf_counter() - started, 3))
     return 0

@@ -63,7 +63,9 @@ def render(
 
     check_output(output)
     from dermis.frame.renderer import Renderer
+    from dermis.gpu.address_space import check_listing
 
+    check_listing()  # before the head, which takes memory too
     with _uncollected(), ThreadPoolExecutor(1) as beside:
         opening = beside.submit(Renderer, adapter)  # its driver starts and compiles while the head loads
         with working_on("loading"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from dermis.frame.passes.painting import paint
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Frame, download, make_texture
 from dermis.human.skin.detail import TILE_MM, detail_heights_mm
+from dermis.human.skin.look import SkinLook
 from dermis.human.skin.painted import PaintedMaps
 from dermis.human.skin.surface import painting
 from dermis.mesh.eyeball import SCLERA_MM, iris_mm
@@ -40,8 +42,13 @@ def paint_of(renderer: Renderer, scene: Scene, side: int = 2048) -> Paint:
     head = scene.head
     if not isinstance(head.maps, PaintedMaps) or head.eyes is None:
         refuse(head.name, "a head of the parametric human with painted skin", "it is none", "Load human")
+    return renderer.kept_open.run(partial(_painted, renderer, scene, head.maps.look, side))
+
+
+def _painted(renderer: Renderer, scene: Scene, look: SkinLook, side: int) -> Paint:
+    head = scene.head
     surface, device = painting(head.mesh, head.control.stencils), renderer.device
-    colour, gloss, rough, height = paint.painted_texels(device, surface, head.maps.look, side)
+    colour, gloss, rough, height = paint.painted_texels(device, surface, look, side)
     height = height + _detail(gloss[..., 1], rough[..., 1], gloss[..., 2])
     roughness = np.maximum(scene.skin.smoothing * rough[..., 0], _LEAST_ROUGH)
     reach = float(np.sqrt(SCLERA_MM**2 - iris_mm() ** 2))

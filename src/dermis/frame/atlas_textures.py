@@ -20,6 +20,7 @@ from dermis.gpu.textures import texture_from
 _HALVING = "halved 2"  # raise when `halved` gives other results
 ENTRY_BYTES = 16
 """Of a texel in a list of gutters, as gutter.wgsl reads it."""
+_NAME = "map of the atlas"
 _LIGHT = 16  # bytes of what a texel beyond a chart shows
 _GUTTER_BIT = 1 << 15  # of the first number of a texel's reach, see reach.wgsl
 
@@ -71,9 +72,9 @@ def upload_atlas(
     texels = packed_texels(atlas.triangle, atlas.barycentric)
     own = atlas.own
     texels[~own] = 0
-    resources = {"atlas": texture_from(device, texels, "rg32uint")}
+    resources = {"atlas": texture_from(device, texels, "rg32uint", _NAME)}
     if remedy.feathered or len(remedy.layouts) > 1:
-        resources["edge_map"] = texture_from(device, edge_texels(atlas), "r32float")
+        resources["edge_map"] = texture_from(device, edge_texels(atlas), "r32float", _NAME)
     even = _even(atlas.stretch[own]) if stretch == "none" else 0.0
     feather = FEATHER_MM if remedy.feathered else 0.0
     sheet = Sheet(atlas.coverage, own, atlas.reach, atlas.gutter, atlas.source)
@@ -113,8 +114,8 @@ def _uploaded(device: Device, sheet: Sheet, resources: dict[str, Any], **more: A
     reach = sheet.reach.copy()
     reach[..., 0] |= np.where(sheet.covered & ~sheet.own, _GUTTER_BIT, 0).astype(np.uint16)
     resources = resources | {
-        "reach_map": texture_from(device, reach, "rgba16uint"),
-        "stretch_map": make_texture(device, (reach.shape[1], reach.shape[0]), "rgba16float"),
+        "reach_map": texture_from(device, reach, "rgba16uint", _NAME),
+        "stretch_map": make_texture(device, (reach.shape[1], reach.shape[0]), "rgba16float", name=_NAME),
     }
     if not len(sheet.gutter):
         return AtlasTextures(resources, **more)

@@ -81,10 +81,12 @@ def make_levels(device: Device, size: int, halvings: Halvings, texel: str) -> Le
     """Space for the light that enters and the blurred levels, of the format `texel`."""
     held = layers_of(halvings)
     stacks = tuple(
-        make_texture(device, (size >> times,) * 2, texel, layers=len(levels))
+        make_texture(device, (size >> times,) * 2, texel, layers=len(levels), name="blurred light")
         for times, levels in enumerate(held)
     )
-    between = scratch(device, make_texture(device, (size, size), texel, mips=len(held)))
+    between = scratch(
+        device, make_texture(device, (size, size), texel, mips=len(held), name="light between two blurs")
+    )
     return Levels(stacks, tuple(levels.start for levels in held), between, size, texel)
 
 

@@ -1,13 +1,22 @@
-"""Refuses frames that exceed the limits of a device, before anything is allocated."""
+"""Refuses frames that exceed the limits of a device, and tells what would fit."""
 
 from __future__ import annotations
 
+import traceback
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
 from dermis.errors import refuse
+from dermis.frame.asked import Asked
+from dermis.frame.passes.shadows import SHADOW_BYTES
 from dermis.frame.passes.surface_texels import SURFACE_BYTES
-from dermis.frame.seams import LaidOut
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Device
-from dermis.gpu.memory import check_memory
+from dermis.gpu.memory import check_memory, found_room, held_bytes
+from dermis.gpu.no_room import NoRoomError, in_words
 from dermis.scene.settings import Settings
 
 _DISTANCE = 4  # bytes of a texel: distance to the edge of its chart
@@ -15,26 +24,78 @@ _FLOATS = 16  # bytes of a texel: four floats
 _GEOMETRY = 8 + 8 + 8  # bytes of an atlas texel: place on the mesh, stretch, reach
 _PICTURE = 36  # bytes of a pixel
 _SAMPLE = 8
+_FEW_SAMPLES = 4  # of a pixel, below which edges are rough
+_SHARE = 0.75  # of the room that was found: the head, its maps and programs take some
+_LEAST = 64  # of a side, below which nothing is won
 
 
-def check_limits(
-    device: Device, technique: Technique, settings: Settings, atlases: LaidOut, levels: int
-) -> None:
-    """Raises DermisError for sizes over the device's limits.
-
-    levels : number of Gaussians that blur light over the atlas
-    """
-    limit, name = device.max_texture_size, device.adapter.name
-    sides = {"size": max(settings.size), "atlas": atlases.side, "shadow_size": settings.shadow_size}
+def check_limits(device: Device, asked: Asked) -> None:
+    """Raises DermisError for sizes over the device's limits."""
+    limit, name, settings = device.max_texture_size, device.adapter.name, asked.settings
+    sides = {"size": max(settings.size), "atlas": asked.atlases.side, "shadow_size": settings.shadow_size}
     for option, side in sides.items():
         if side > limit:
             name_limit = f"at most {limit} (the limit of {name})"
             refuse(option, name_limit, f"it is {side}", "Choose a smaller one")
+    needed = frame_bytes(asked)
+    width, height = settings.size
+    sizes = f"{asked.atlases.side} texels and {width}x{height} pixels"
+    of_both = needed["atlas"] + needed["size"]
+    check_memory(device, of_both, "atlas and size", sizes, partial(fitting, asked))
+
+
+def no_room(error: NoRoomError, device: Device, asked: Asked) -> NoRoomError:
+    """The same error, with what would fit in place of what did not; what was made of that is released."""
+    for one in filter(None, (error, error.__cause__)):
+        traceback.clear_frames(one.__traceback__)
+    most = held_bytes() + found_room(device, sum(frame_bytes(asked).values()))
+    return NoRoomError(error.expected, error.came, error.size, fitting(asked, _SHARE * most))
+
+
+def fitting(asked: Asked, most: float) -> str:
+    """What to write for a frame to take no more than a number of bytes: halves of what takes most of it."""
+    smaller, changed = asked, dict[str, str]()
+    needed = frame_bytes(asked)
+    while sum(needed.values()) > most:
+        option = max(needed, key=lambda name: needed[name])
+        halved = _halved(smaller.settings, option)
+        if halved is None:
+            break
+        smaller = replace(smaller, settings=halved)
+        needed, changed = frame_bytes(smaller), changed | _written(halved, option)
+    if not changed or sum(needed.values()) > most:
+        return "Close other programs that use the memory, or try --adapter cpu"
+    return f"With {' '.join(changed.values())} it takes about {in_words(sum(needed.values()))}"
+
+
+def frame_bytes(asked: Asked) -> dict[str, float]:
+    """Bytes that a frame takes, by the option that they follow from; the head and its maps aside."""
+    technique, settings, atlases = asked.technique, asked.settings, asked.atlases
     width, height = settings.size
     pixel = _PICTURE + _SAMPLE * settings.samples + technique.pixel_bytes
-    texel = atlas_texel_bytes(technique, levels, len(atlases.layouts))
-    sizes = f"{atlases.side} texels and {width}x{height} pixels"
-    check_memory(device, texel * atlases.side**2 + pixel * width * height, "atlas and size", sizes)
+    texel = atlas_texel_bytes(technique, asked.count, len(atlases.layouts))
+    return {
+        "atlas": texel * atlases.side**2,
+        "size": float(pixel * width * height),
+        "shadow_size": float(SHADOW_BYTES * asked.shadow_layers * settings.shadow_size**2),
+    }
+
+
+def _halved(settings: Settings, option: str) -> Settings | None:
+    """Settings with half of an option, None where that is too little: of the size, samples first."""
+    if option == "size" and settings.samples > _FEW_SAMPLES:
+        return settings.model_copy(update={"samples": settings.samples // 2})
+    value: Any = getattr(settings, option)
+    half: Any = tuple(side // 2 for side in value) if option == "size" else value // 2
+    return settings.model_copy(update={option: half}) if np.min(half) >= _LEAST else None
+
+
+def _written(settings: Settings, option: str) -> dict[str, str]:
+    """Options of the command line, by their names."""
+    if option != "size":
+        return {option: f"--{option.replace('_', '-')} {getattr(settings, option)}"}
+    width, height = settings.size
+    return {"size": f"--size {width}x{height} --samples {settings.samples}"}
 
 
 def atlas_texel_bytes(technique: Technique, levels: int, layouts: int) -> float:

@@ -13,6 +13,7 @@ from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.inputs import EyesSeen, Inputs, camera_views, pinhole, seen_by
 from dermis.frame.levels import Blur, scale_of
 from dermis.frame.lights import light_constants, light_records, light_views
+from dermis.frame.limits import no_room
 from dermis.frame.passes.moving_occlusion import sky_record
 from dermis.frame.passes.shade import shade_program
 from dermis.frame.passes.shape import MotionBytes, resting
@@ -24,6 +25,7 @@ from dermis.frame.strands import strand_constants
 from dermis.frame.surroundings import brightest, load_surroundings, with_suns
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Device, Memo
+from dermis.gpu.no_room import NoRoomError
 from dermis.human.skin.movements import movements
 from dermis.mesh.head import Head
 from dermis.mesh.outline import Outline
@@ -77,7 +79,11 @@ class Preparation:
         who = scene.head, scene.skin, profile, _person(scene)
         counts = parts, len(layers.clips), scene.motion is not None
         asked = Asked(*who, settings, around, surroundings, technique, *counts, view)
-        resources = keep(make_resources, self.memo, device, asked)
+        try:
+            resources = keep(make_resources, self.memo, device, asked)
+        except NoRoomError as error:
+            self.memo.forget()
+            raise no_room(error, device, asked) from error
         seen_from = pinhole(scene.camera, head, settings)
         shone_on = light_constants(scene) + strand_constants(head, settings)
         scale = scale_of(resources.levels.texel, brightest(scene, surroundings))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,22 @@ from dermis.frame.passes.meter import Meter, read_meter
 from dermis.frame.passes.pack import Leaving
 from dermis.frame.passes.post import Picture
 from dermis.gpu import Device, download
-from dermis.gpu.device import gpu_failures
 from dermis.scene.settings import Settings
 
+T = TypeVar("T")
 _MOST = 255
+
+
+@dataclass(eq=False)
+class Shown:
+    """Where a frame is; it moves when its device is lost and the frame drawn again.
+
+    meter : what metered the exposure, None where it was given
+    """
+
+    device: Device
+    picture: Picture
+    meter: Meter | None
 
 
 @dataclass(frozen=True)
@@ -31,11 +43,10 @@ class Rendered:
     suns : sun-like peaks of the environment that shine as lights of their own
     settings : what it was drawn with
     leave : starts reading the picture back, as `pack.draw` does
-    meter : what metered the exposure, None where it was given
+    kept : does a job for which the frame has to be on a device, and returns what that returns
     """
 
-    device: Device
-    picture: Picture
+    shown: Shown
     gpu_ms: dict[str, float] | None
     frame_ms: float
     setup_ms: float
@@ -44,20 +55,24 @@ class Rendered:
     suns: int
     settings: Settings
     leave: Callable[..., Leaving]
-    meter: Meter | None
+    kept: Callable[[Callable[[], Any]], Any]
     is_current: Callable[[], bool]
+
+    @property
+    def picture(self) -> Picture:
+        """Its textures."""
+        return self.shown.picture
 
     @property
     def exposure(self) -> float:
         """Factor from radiance to the picture, metered or given."""
-        if self.meter is None:
+        if self.settings.exposure != "auto":
             return float(self.settings.exposure)
-        self._check_current()
-        return read_meter(self.device, self.meter)
+        return self._read(lambda at: read_meter(at.device, at.meter) if at.meter else 1.0)
 
     def linear(self) -> NDArray[np.float32]:
         """(h, w, 3) linear Rec. 709 after bloom and exposure, float32."""
-        return np.ascontiguousarray(self._read(self.picture.exposed)[..., :3])
+        return np.ascontiguousarray(self._exposed()[..., :3])
 
     def srgb8(self) -> NDArray[np.uint8]:
         """(h, w, 3) sRGB bytes, with the tone curve, encoded on the device."""
@@ -72,26 +87,24 @@ class Rendered:
 
     def linear_rgba(self) -> NDArray[np.float32]:
         """(h, w, 4) float32 over the background "none", multiplied by alpha as OpenEXR has it."""
-        return self._read(self.picture.exposed)
+        return self._exposed()
 
     def clipped(self) -> float:
         """Share of the head's pixels with a part that is brighter than the picture's bytes can show."""
-        levels = self._read(self.picture.bytes)
+        levels = self._read(lambda at: download(at.device, at.picture.bytes))
         head = levels[levels[..., 3] == _MOST]
         return float((head[:, :3].max(axis=1) == _MOST).mean()) if len(head) else 0.0
 
+    def _exposed(self) -> NDArray[np.float32]:
+        return self._read(lambda at: download(at.device, at.picture.exposed))
+
     def _leave(self, **how: Any) -> NDArray[Any]:
-        self._check_current()
-        with gpu_failures(self.device):
-            return self.leave(self.picture, **how).image()
+        return self._read(lambda at: self.leave(at.picture, **how).image())
 
-    def _read(self, texture: Any) -> NDArray[Any]:
-        self._check_current()
-        with gpu_failures(self.device):
-            return download(self.device, texture)
-
-    def _check_current(self) -> None:
+    def _read(self, read: Callable[[Shown], T]) -> T:
         if not self.is_current():
             raise RuntimeError(
                 "a newer frame has taken this image's place: read each before drawing the next"
             )
+        found: T = self.kept(lambda: read(self.shown))
+        return found

@@ -18,9 +18,9 @@ from dermis.frame.passes import pack, warm_up
 from dermis.frame.passes.pack import Leaving
 from dermis.frame.passes.post import Picture
 from dermis.frame.preparation import Preparation
-from dermis.frame.rendered import Rendered
-from dermis.gpu import Frame, Graph, open_device
-from dermis.gpu.device import gpu_failures
+from dermis.frame.rendered import Rendered, Shown
+from dermis.gpu import Device, Frame, Graph, open_device
+from dermis.gpu.failures import KeptOpen
 from dermis.gpu.frame import Timed
 from dermis.mesh.head import Head
 from dermis.scene.given import given_plain, shown_value
@@ -36,22 +36,35 @@ _IN_FLIGHT = 3  # frames submitted and not done: Python and the device overlap, 
 class Renderer:
     """Renders scenes on one device; what does not change between two frames is not computed again.
 
+    A device that its driver loses is opened again, and the frame drawn anew.
+
     adapter : "auto", "cpu" or part of an adapter's name
     depth : how many variants of each resource are kept, for callers that alternate between a few
+    reopens : False raises DeviceLostError instead, for callers that keep resources of their own on the device
     """
 
-    def __init__(self, adapter: str = "auto", depth: int = 1) -> None:
-        started = time.perf_counter()
-        self.device = open_device(adapter)
-        with gpu_failures(self.device):
-            warm_up(self.device)
-        self.graph = Graph(self.device)
-        self._preparation = Preparation(self.device, depth)
-        self.memo, self.prepare = self._preparation.memo, self._preparation.inputs
-        self.profile_of = self._preparation.profile_of
-        self._frames = 0
+    device: Device
+    graph: Graph
+
+    def __init__(self, adapter: str = "auto", depth: int = 1, *, reopens: bool = True) -> None:
+        self._adapter, self._depth, self._opening_ms = adapter, depth, 0.0
+        self._last: Shown | None = None
         self._in_flight: deque[int] = deque()
-        self._opening_ms = 1e3 * (time.perf_counter() - started)
+        self.kept_open = KeptOpen(self._open, self._adopt, reopens=reopens)
+
+    def _open(self) -> Device:
+        self._opening_began = time.perf_counter()
+        return open_device(self._adapter)
+
+    def _adopt(self, device: Device) -> None:
+        """Make what is kept from frame to frame on a device that was just opened."""
+        warm_up(device)
+        self.device, self.graph = device, Graph(device)
+        preparation = Preparation(device, self._depth)
+        self.memo, self.prepare = preparation.memo, preparation.inputs
+        self.profile_of = preparation.profile_of
+        self._in_flight.clear()
+        self._opening_ms = 1e3 * (time.perf_counter() - self._opening_began)
 
     def forget(self) -> None:
         """Forget all that is kept; the next frame makes it again."""
@@ -78,35 +91,52 @@ class Renderer:
         Raises DermisError for sizes over the device's limits and when the device fails.
         """
         settings = given_plain(Settings, settings or {}, "settings", "size=(512, 512)")
-        scene = Scene.of(scene)
-        with gpu_failures(self.device):
-            started = time.perf_counter()
-            inputs = self.prepare(scene, settings, view)
-            ready = time.perf_counter()
-            frame, _ = self._submit(inputs, timed, anew)
-            if timed:
-                frame.wait()
-            else:
-                self._keep_pace(frame)
-            done = time.perf_counter()
-            times = frame.stage_ms() if timed else None
-        setup_ms = 1e3 * (ready - started) + self._opening_ms
+        draw = partial(self._draw, Scene.of(scene), settings, anew, timed, view)
+        return self.kept_open.run(draw)
+
+    def _draw(self, scene: Scene, settings: Settings, anew: bool, timed: Timed, view: str) -> Rendered:
+        started = time.perf_counter()
+        inputs = self.prepare(scene, settings, view)
+        ready = time.perf_counter()
+        frame, _ = self._submit(inputs, timed, anew)
+        if timed:
+            frame.wait()
+        else:
+            self._keep_pace(frame)
+        done = time.perf_counter()
+        times = frame.stage_ms() if timed else None
+        setup_ms, made = 1e3 * (ready - started) + self._opening_ms, inputs.resources
         self._opening_ms = 0.0
-        number, frame_ms, made = self._frames, 1e3 * (done - ready), inputs.resources
+        shown = self._last = Shown(self.device, made.picture, made.meter)
+
+        def again() -> None:
+            now = self._draw(scene, settings, anew, timed, view).shown
+            shown.device, shown.picture, shown.meter = now.device, now.picture, now.meter
+            self._last = shown
+
         return Rendered(
-            self.device,
-            made.picture,
+            shown,
             times,
-            frame_ms,
+            1e3 * (done - ready),
             setup_ms,
             made.gaussians,
             made.unscattered,
             made.suns,
             inputs.settings,
             self._leave,
-            made.meter,
-            is_current=lambda: number == self._frames,
+            partial(self._on_device, shown, again),
+            is_current=lambda: self._last is shown,
         )
+
+    def _on_device(self, shown: Shown, again: Callable[[], None], job: Callable[[], T]) -> T:
+        """Do a job for which a frame has to be on the device, where it is drawn again after a loss."""
+
+        def do() -> T:
+            if shown.device is not self.device:
+                again()
+            return job()
+
+        return self.kept_open.run(do)
 
     def draw_warm(self, scene: Scene, settings: Settings | None = None) -> Rendered:
         """A frame timed on a device at work: a GPU that was idle runs at a fraction of its clock rate."""
@@ -130,8 +160,7 @@ class Renderer:
         self.graph.begin()
         draw_frame(self.graph, inputs, TECHNIQUES[inputs.settings.technique])
         leaving = leave(self.graph, inputs.resources.picture) if leave else None
-        frame = self.graph.submit(timed)
-        self._frames += 1
+        frame, self._last = self.graph.submit(timed), None
         return frame, leaving
 
     def _keep_pace(self, frame: Frame) -> None:
@@ -171,24 +200,28 @@ class Renderer:
 
         Raises DermisError as `draw` does.
         """
-        chosen, leaving = Settings(**settings), deque[Leaving]()
+        chosen, sent = Settings(**settings), deque[tuple[Leaving, Callable[[], Leaving]]]()
         for scene in scenes:
-            leaving.append(self._send(scene, chosen, linear, alpha))
-            if len(leaving) >= _IN_FLIGHT:
-                yield self._arrived(leaving.popleft())
-        while leaving:
-            yield self._arrived(leaving.popleft())
+            send = partial(self._send, scene, chosen, linear, alpha)
+            sent.append((self.kept_open.run(send), send))
+            if len(sent) >= _IN_FLIGHT:
+                yield self._arrived(*sent.popleft())
+        while sent:
+            yield self._arrived(*sent.popleft())
 
-    def _arrived(self, leaving: Leaving) -> NDArray[Any]:
-        with gpu_failures(self.device):
-            return leaving.image()
+    def _arrived(self, sent: Leaving, send: Callable[[], Leaving]) -> NDArray[Any]:
+        """The picture of a frame that was sent; it is sent again where its device was lost meanwhile."""
+
+        def image() -> NDArray[Any]:
+            return (sent if sent.fetched.device is self.device else send()).image()
+
+        return self.kept_open.run(image)
 
     def _send(self, scene: Scene, settings: Settings, linear: bool, alpha: bool) -> Leaving:
         """Submit a frame and start reading its picture back."""
-        with gpu_failures(self.device):
-            inputs = self.prepare(Scene.of(scene), settings)
-            leave = partial(pack.draw, linear=linear, alpha=settings if alpha else None)
-            _, leaving = self._submit(inputs, False, False, leave)
+        inputs = self.prepare(Scene.of(scene), settings)
+        leave = partial(pack.draw, linear=linear, alpha=settings if alpha else None)
+        _, leaving = self._submit(inputs, False, False, leave)
         assert leaving is not None
         return leaving
 

@@ -51,7 +51,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     Raises DermisError for sizes over the device's limits.
     """
     settings, keep, technique = asked.settings, memo.keep, asked.technique
-    check_limits(device, technique, settings, asked.atlases, asked.count)
+    check_limits(device, asked)
     reading = device, asked.head, asked.white, settings.gamma == "right", asked.painted_side, asked.moving
     maps = memo.soon(device.executor, upload_maps, *reading)  # which take long to read
     shadow_maps = _shadows(memo, device, asked)

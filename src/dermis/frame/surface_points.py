@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,10 @@ def surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> Surf
 
     settings : technique and samples do not matter
     """
+    return renderer.kept_open.run(partial(_surface_points, renderer, scene, settings))
+
+
+def _surface_points(renderer: Renderer, scene: Scene, settings: Settings) -> SurfacePoints:
     single = settings.model_copy(update={"samples": 1, "technique": "none"})
     inputs = renderer.prepare(scene, single)
     frame = Frame(renderer.device)
@@ -86,7 +91,12 @@ def irradiance_at(
     weights = np.zeros((side * side, 2))
     weights[: len(triangle)] = barycentric[:, 1:]
     records = packed_texels(places.reshape(side, side), np.rint(65535 * weights).reshape(side, side, 2))
-    device = renderer.device
+    return renderer.kept_open.run(partial(_lit, renderer, scene, settings, records))[: len(triangle)]
+
+
+def _lit(renderer: Renderer, scene: Scene, settings: Settings, records: NDArray[np.uint32]) -> Floats:
+    """(n * n, 3) light at the (n, n) places of an atlas."""
+    device, side = renderer.device, len(records)
     inputs = renderer.prepare(scene, settings)
     first = inputs.layouts[0]
     listed = AtlasTextures({"atlas": texture_from(device, records, "rg32uint")})
@@ -100,4 +110,4 @@ def irradiance_at(
     irradiance.draw(frame, layout, inputs.light_constants, lit, side)
     frame.submit()
     renderer.graph.forget()  # it does not know of this frame
-    return download(device, lit).reshape(-1, 4)[: len(triangle), :3].astype(np.float64)
+    return download(device, lit).reshape(-1, 4)[:, :3].astype(np.float64)

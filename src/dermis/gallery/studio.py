@@ -71,21 +71,27 @@ class Studio:
 
         if view in ("picture", *PARTS):
             return self.render(scene, scale, parts=PARTS.get(view, "all"), **settings)
-        self._draw(scene, scale, settings)
-        texture = Views(self.renderer).draw(scene, self.settings(scale, **settings), view)
-        return np.asarray(download(self.renderer.device, texture), np.uint8)[..., :3]
+
+        def seen() -> NDArray[np.uint8]:
+            self._draw(scene, scale, settings)
+            texture = Views(self.renderer).draw(scene, self.settings(scale, **settings), view)
+            return np.asarray(download(self.renderer.device, texture), np.uint8)[..., :3]
+
+        return self.renderer.kept_open.run(seen)
 
     def light_map(self, scene: Scene, level: int, **settings: Any) -> NDArray[np.float32]:
         """(n, n, 3) light on the atlas, irradiance over pi: level 0 as it enters, higher levels blurred."""
         from dermis.gpu import download
 
-        chosen = self.settings(**settings)
-        self._draw(scene, 1.0, settings)
-        inputs = self.renderer.prepare(scene, chosen)
-        levels, blur = inputs.resources.levels, inputs.blurs[0]
-        halved = blur.halvings[level]
-        light = download(self.renderer.device, levels.stacks[halved], layer=level - levels.first[halved])
-        return np.asarray(light, np.float32)[..., :3] / np.float32(blur.scale)
+        def light() -> NDArray[np.float32]:
+            self._draw(scene, 1.0, settings)
+            inputs = self.renderer.prepare(scene, self.settings(**settings))
+            levels, blur = inputs.resources.levels, inputs.blurs[0]
+            halved = blur.halvings[level]
+            found = download(self.renderer.device, levels.stacks[halved], layer=level - levels.first[halved])
+            return np.asarray(found, np.float32)[..., :3] / np.float32(blur.scale)
+
+        return self.renderer.kept_open.run(light)
 
     def settings(self, scale: float = 1.0, **settings: Any) -> Settings:
         """A panel's settings."""

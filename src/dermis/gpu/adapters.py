@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dermis.errors import refuse
+from dermis.gpu.address_space import check_listing
 from dermis.gpu.native_types import tell_wgpus_types
 
 WANTED_FEATURES = ("timestamp-query",)
@@ -43,7 +44,11 @@ class Adapter:
 
 
 def list_adapters() -> list[Adapter]:
-    """Every adapter, the best first: real GPUs before software, then the one with more features."""
+    """Every adapter, the best first: real GPUs before software, then the one with more features.
+
+    Raises DermisError where drivers fail, or would for want of address space.
+    """
+    check_listing()
     try:
         import wgpu
     except (ImportError, OSError) as error:

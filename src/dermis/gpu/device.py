@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import weakref
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -15,43 +16,13 @@ from numpy.typing import NDArray
 
 from dermis.errors import DermisError
 from dermis.gpu.adapters import Adapter, fitting_adapters
+from dermis.gpu.address_space import check_software
+from dermis.gpu.default_limits import check_limits, limits_within
+from dermis.gpu.no_room import room_for
 
 _TIMED_PASSES = 2048
 _STAGING_STEP = 4096
-DEFAULT_LIMITS = {
-    "max-texture-dimension-1d": 8192,
-    "max-texture-dimension-2d": 8192,
-    "max-texture-dimension-3d": 2048,
-    "max-texture-array-layers": 256,
-    "max-bind-groups": 4,
-    "max-bindings-per-bind-group": 1000,
-    "max-dynamic-uniform-buffers-per-pipeline-layout": 8,
-    "max-dynamic-storage-buffers-per-pipeline-layout": 4,
-    "max-sampled-textures-per-shader-stage": 16,
-    "max-samplers-per-shader-stage": 16,
-    "max-storage-buffers-per-shader-stage": 8,
-    "max-storage-textures-per-shader-stage": 4,
-    "max-uniform-buffers-per-shader-stage": 12,
-    "max-uniform-buffer-binding-size": 65536,
-    "max-storage-buffer-binding-size": 128 << 20,
-    "max-buffer-size": 256 << 20,
-    "min-uniform-buffer-offset-alignment": 256,
-    "min-storage-buffer-offset-alignment": 256,
-    "max-vertex-buffers": 8,
-    "max-vertex-attributes": 16,
-    "max-vertex-buffer-array-stride": 2048,
-    "max-inter-stage-shader-variables": 16,
-    "max-color-attachments": 8,
-    "max-color-attachment-bytes-per-sample": 32,
-    "max-compute-workgroup-storage-size": 16384,
-    "max-compute-invocations-per-workgroup": 256,
-    "max-compute-workgroup-size-x": 256,
-    "max-compute-workgroup-size-y": 256,
-    "max-compute-workgroup-size-z": 64,
-    "max-compute-workgroups-per-dimension": 65535,
-    "max-immediate-size": 0,
-}
-"""Limits that WebGPU guarantees on every machine ("Limits" in its specification)."""
+_LOSS_NOTES = "DEVICE LOST!", "The WGPU device was lost"  # in wgpu's log; DeviceLostError says so too
 _RAISED_LIMITS = ("max-texture-dimension-2d", "max-storage-buffer-binding-size", "max-buffer-size")
 
 
@@ -93,18 +64,24 @@ class Device:
         self.ffi, self.lib, self.checked, self._encoder = ffi, lib, libf, GPUCommandEncoder
         self.adapter = adapter
         self.reason = reason
+        logging.getLogger("wgpu").addFilter(_is_news)
+        if adapter.kind == "CPU":
+            check_software()
+        check_limits(adapter.name, adapter.handle.limits)
         features = [] if bare else list(adapter.features)
-        limits = _limits(adapter.handle.limits, () if bare else _RAISED_LIMITS)
+        limits = limits_within(adapter.handle.limits, () if bare else _RAISED_LIMITS)
         try:
             self.handle: Any = adapter.handle.request_device_sync(
                 label="dermis", required_features=features, required_limits=limits
             )
+            self._unwritten = self.handle.create_buffer(size=4, usage="COPY_DST")
         except Exception as error:
             raise DermisError(
                 f"adapter {adapter.name}: expected it to open, but its driver says: {error}. "
                 "Close other programs that use the GPU or choose --adapter cpu."
             ) from error
-        self.max_texture_size, self.max_storage_bytes = (int(limits[name]) for name in _RAISED_LIMITS[:2])
+        raised = (int(limits[name]) for name in _RAISED_LIMITS)
+        self.max_texture_size, self.max_storage_bytes, self.max_buffer_bytes = raised
         self.has_timestamps = "timestamp-query" in features
         self.executor = ThreadPoolExecutor(os.cpu_count())
         weakref.finalize(self, self.executor.shutdown, wait=False, cancel_futures=True)
@@ -135,10 +112,14 @@ class Device:
         return self._encoder("", made, self.handle)
 
     def submit(self, encoder: Any) -> int:
-        """Submit what an encoder has recorded; returns the number of the submission, for `wait`."""
+        """Submit what an encoder has recorded; returns the number of the submission, for `wait`.
+
+        Raises GPUError, of a device that is lost too: the library would end the process.
+        """
         done = self.checked.wgpuCommandEncoderFinish(encoder._internal, self.ffi.NULL)
         commands = self.ffi.gc(done, self.lib.wgpuCommandBufferRelease)
         listed = self.ffi.new("WGPUCommandBuffer[]", [commands])
+        self._touch()
         # wgpu's own submit returns no number, without which one can only wait for all submissions.
         return int(self.checked.wgpuQueueSubmitForIndex(self.handle.queue._internal, 1, listed))
 
@@ -146,6 +127,21 @@ class Device:
         """Wait for all submissions up to the one with this number from `submit`, or for all."""
         number = self.ffi.NULL if submitted is None else self.ffi.new("WGPUSubmissionIndex *", submitted)
         self.checked.wgpuDevicePoll(self.handle._internal, True, number)
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether its driver lost it, or it was destroyed."""
+        import wgpu
+
+        try:
+            self._touch()
+        except wgpu.GPUError:
+            return True
+        return False
+
+    def _touch(self) -> None:
+        """Write nothing, which the library refuses where the device is lost."""
+        self.write(self._unwritten, b"", 0)
 
     @cached_property
     def timestamp_period_ns(self) -> float:
@@ -164,12 +160,13 @@ class Device:
 
     def staging(self, size: int) -> Any:
         """A staging buffer of at least `size` bytes, one given back if there is any."""
-        import wgpu
-
         size = -(-size // _STAGING_STEP) * _STAGING_STEP
         spare = self._staging.get(size)
-        usage = wgpu.BufferUsage.COPY_DST | wgpu.BufferUsage.MAP_READ
-        return spare.pop() if spare else self.handle.create_buffer(size=size, usage=usage)
+        if spare:
+            return spare.pop()
+        return self._buffer(
+            "copy for reading", size, "MAP_READ", partial(self.handle.create_buffer, size=size)
+        )
 
     def give_back(self, buffer: Any) -> None:
         """Keep a buffer from `staging` for reuse at its size; the first of another size drops the others."""
@@ -177,19 +174,28 @@ class Device:
             self._staging.clear()
         self._staging.setdefault(buffer.size, []).append(buffer)
 
-    def buffer(self, data: NDArray[Any], usage: str) -> Any:
-        """A new buffer with the array's bytes; usage is wgpu's name ("STORAGE", "UNIFORM")."""
-        import wgpu
+    def buffer(self, data: NDArray[Any], usage: str, name: str = "buffer") -> Any:
+        """A new buffer with the array's bytes.
 
-        flags = getattr(wgpu.BufferUsage, usage) | wgpu.BufferUsage.COPY_DST | wgpu.BufferUsage.COPY_SRC
-        return self.handle.create_buffer_with_data(data=np.ascontiguousarray(data), usage=flags)
+        usage : wgpu's name ("STORAGE", "UNIFORM")
+        name : to be told where there is no room for it, as of `space`
+        """
+        data = np.ascontiguousarray(data)
+        create = partial(self.handle.create_buffer_with_data, data=data)
+        return self._buffer(name, data.nbytes, usage, create)
 
-    def space(self, size: int) -> Any:
+    def space(self, size: int, name: str = "buffer") -> Any:
         """A new buffer of zeros that shaders write [byte]."""
+        return self._buffer(name, size, "STORAGE", partial(self.handle.create_buffer, size=size))
+
+    def _buffer(self, name: str, size: int, usage: str, create: Callable[..., Any]) -> Any:
         import wgpu
 
-        flags = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_DST | wgpu.BufferUsage.COPY_SRC
-        return self.handle.create_buffer(size=size, usage=flags)
+        flags = getattr(wgpu.BufferUsage, usage) | wgpu.BufferUsage.COPY_DST
+        flags |= 0 if usage == "MAP_READ" else wgpu.BufferUsage.COPY_SRC
+        most = self.max_storage_bytes if usage == "STORAGE" else self.max_buffer_bytes
+        with room_for(self.adapter.name, name, size, most):
+            return create(usage=flags)
 
     def sampler(self, **options: str) -> Any:
         """A sampler with wgpu's options; made once for each set of them."""
@@ -209,24 +215,5 @@ class Device:
         return self._timestamps
 
 
-def _limits(offered: Mapping[str, int], raised: Sequence[str]) -> dict[str, int]:
-    """WebGPU's default limits; the adapter's own where it offers less or the limit is to be raised."""
-    fitting = {
-        name: (max if name.startswith("min-") else min)(default, offered.get(name, default))
-        for name, default in DEFAULT_LIMITS.items()
-    }
-    return fitting | {name: offered[name] for name in raised}
-
-
-@contextlib.contextmanager
-def gpu_failures(device: Device) -> Iterator[None]:
-    """Turn the driver's errors (out of memory, device lost, invalid call) into a DermisError."""
-    import wgpu
-
-    try:
-        yield
-    except (wgpu.GPUError, MemoryError) as error:
-        raise DermisError(
-            f"{device.adapter.name}: expected the frame to run, but the driver says: {error}. "
-            "Lower --size, --samples or --atlas, close other programs that use the GPU, or try --adapter cpu."
-        ) from error
+def _is_news(record: logging.LogRecord) -> bool:
+    return not record.getMessage().startswith(_LOSS_NOTES)

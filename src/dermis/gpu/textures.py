@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.errors import DermisError
 from dermis.gpu.device import Device
+from dermis.gpu.no_room import room_for
 
 _FORMATS: dict[str, tuple[type[np.generic], int]] = {
     "r8unorm": (np.uint8, 1),
@@ -42,18 +44,22 @@ def make_texture(
     layers: int = 1,
     mips: int = 1,
     use: str = "compute",
+    name: str = "texture",
 ) -> Any:
     """An empty 2-D texture (an array when `layers` > 1).
 
     size : (width, height) [texel]
     texel : wgpu's format name
     use : "compute" (stored to and read), "raster" (drawn to and read), "map" (uploaded and read)
+    name : to be told where there is no room for it
+
+    Raises DermisError for sizes over the device's limit, NoRoomError where its memory has no room.
     """
     import wgpu
 
     if max(size) > device.max_texture_size or min(size) < 1:
         raise DermisError(
-            f"texture of {size[0]}x{size[1]}: expected sides from 1 to {device.max_texture_size} "
+            f"{name} of {size[0]}x{size[1]}: expected sides from 1 to {device.max_texture_size} "
             f"(the limit of {device.adapter.name}), but that is outside. Choose a smaller size."
         )
     usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_SRC
@@ -62,9 +68,12 @@ def make_texture(
         "raster": wgpu.TextureUsage.RENDER_ATTACHMENT,
         "map": wgpu.TextureUsage.COPY_DST,
     }[use]
-    return device.handle.create_texture(
-        size=(*size, layers), format=texel, usage=usage, mip_level_count=mips, dimension="2d"
-    )
+    described = f"{name} of {size[0]}x{size[1]}x{layers} {texel}"
+    texels = layers * sum(max(1, size[0] >> mip) * max(1, size[1] >> mip) for mip in range(mips))
+    with room_for(device.adapter.name, described, FORMAT_BYTES[texel] * texels, math.inf):
+        return device.handle.create_texture(
+            size=(*size, layers), format=texel, usage=usage, mip_level_count=mips, dimension="2d"
+        )
 
 
 def upload(device: Device, texture: Any, array: NDArray[Any], *, mip: int = 0, layer: int = 0) -> None:
@@ -87,9 +96,9 @@ def texel_bytes(texture: Any) -> int:
     return FORMAT_BYTES[texture.format]
 
 
-def texture_from(device: Device, array: NDArray[Any], texel: str) -> Any:
+def texture_from(device: Device, array: NDArray[Any], texel: str, name: str = "texture") -> Any:
     """A texture for reading that holds the (h, w) or (h, w, c) array."""
-    texture = make_texture(device, (array.shape[1], array.shape[0]), texel, use="map")
+    texture = make_texture(device, (array.shape[1], array.shape[0]), texel, use="map", name=name)
     upload(device, texture, array)
     return texture
 

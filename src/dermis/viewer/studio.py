@@ -49,7 +49,7 @@ class Studio:
 
     def __init__(self, adapter: str = "auto") -> None:
         self.is_preparing = False
-        self.renderer = Renderer(adapter, depth=_SIZES)
+        self.renderer = Renderer(adapter, depth=_SIZES, reopens=False)
         self.pace = Pace(software=self.renderer.device.adapter.kind == "CPU")
         self.rendered: Rendered | None = None
         self.settings: Settings | None = None

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from dermis.errors import DermisError
+from dermis.gpu.failures import DeviceLostError, gpu_failures
 from dermis.scene.camera import Camera
 from dermis.viewer.blit import Blit, Patch
 from dermis.viewer.controls import shifted
@@ -20,7 +21,7 @@ from dermis.viewer.studio import Studio
 
 _QUIET_S = 0.25  # without a change, after which the picture is refined
 _LONGEST_STEP_S = 0.2
-_MOST_FAILURES = 3
+_MOST_FAILURES = 1  # in a row
 _PANEL_FRAMES = 3  # that the panel needs to settle after an event
 _POINTER = "pointer_down", "pointer_move", "pointer_up", "pointer_leave", "double_click", "wheel"
 _KEYS = "key_down", "key_up", "char"
@@ -36,7 +37,7 @@ class Viewer:
     motion : played from the beginning
     studio : one on the adapter that has prepared the state already
 
-    `failure` is the error that closed the canvas when the device could not be opened again.
+    `failure` is the error that closed the canvas when the device failed twice or could not be opened again.
 
     Raises DermisError without an adapter, ImportError without the extra `viewer`.
     """
@@ -65,7 +66,7 @@ class Viewer:
         self._last_size = (0, 0)
         self._refused: ViewerState | None = None
         self._failures = self._panel_frames = 0
-        self.failure: Exception | None = None
+        self.failure: DermisError | None = None
         self._on_panel, self._pressed_left = False, 0.0
         self._open()
         canvas.add_event_handler(self._on_event, *_POINTER, *_KEYS)
@@ -73,12 +74,11 @@ class Viewer:
 
     def draw(self) -> None:
         """Draw a frame into the canvas; a lost device is opened again."""
-        import wgpu
-
         try:
-            self._draw(self._clock())
+            with gpu_failures(self.session.studio.renderer.device):
+                self._draw(self._clock())
             self._failures = 0
-        except (wgpu.GPUError, DermisError) as error:
+        except DermisError as error:
             self._recover(error)
         except Exception as error:
             self.session.tell_fault("This frame cannot be drawn", error)
@@ -149,11 +149,11 @@ class Viewer:
                     self._refused, session.message = None, ""
                 return images
             except DermisError as error:
-                if session.studio.last_image is None or isinstance(error.__cause__, wgpu.GPUError):
+                if session.studio.last_image is None or isinstance(error, DeviceLostError):
                     raise
                 self._refuse(state, str(error))
             except wgpu.GPUError:
-                raise
+                raise  # `draw` tells what it means for the device
             except Exception as error:
                 if session.studio.last_image is None:
                     raise
@@ -223,19 +223,22 @@ class Viewer:
         session.heads.wake = lambda: loop and loop.call_soon_threadsafe(canvas.request_draw)
         return session.heads.wake
 
-    def _recover(self, error: Exception) -> None:
+    def _recover(self, error: DermisError) -> None:
         """Open the device again after it was lost or ran out of memory."""
         import wgpu
 
         self._failures += 1
-        if self._failures > _MOST_FAILURES:
-            self.failure = error
-            self.canvas.close()
-            return
         with contextlib.suppress(wgpu.GPUError):  # releases the texture of the old device
             self._context.unconfigure()
-        self.session.studio = Studio(self._adapter)
-        self._preparation.forget()
-        self._open()
+        try:
+            if self._failures > _MOST_FAILURES:
+                raise error.again() if isinstance(error, DeviceLostError) else error
+            self.session.studio = Studio(self._adapter)
+            self._preparation.forget()
+            self._open()
+        except DermisError as final:
+            self.failure = final
+            self.canvas.close()
+            return
         self.session.message = "the graphics device was lost and opened again"
         self.canvas.request_draw()

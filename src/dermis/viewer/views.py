@@ -15,7 +15,7 @@ from dermis.frame.passes import each, program
 from dermis.frame.passes.meter import read_meter
 from dermis.frame.renderer import Renderer
 from dermis.gpu import ComputeProgram, Device, Frame, download, make_texture, upload
-from dermis.gpu.device import gpu_failures
+from dermis.gpu.failures import gpu_failures
 from dermis.gpu.textures import texture_from
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings

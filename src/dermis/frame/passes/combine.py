@@ -14,7 +14,7 @@ from dermis.optics.gaussians import MOST_GAUSSIANS
 
 def make_sum(device: Device, side: int) -> Any:
     """Space for the sum."""
-    return make_texture(device, (side, side), FLOATS)
+    return make_texture(device, (side, side), FLOATS, name="sum of blurred light")
 
 
 def draw(graph: Recorder, levels: Levels, blur: Blur, into: Any, transmitted: Any = None) -> None:

@@ -115,7 +115,7 @@ def _flat(device: Device) -> Any:
 def empty(device: Device, shape: tuple[int, ...]) -> Mipped:
     """Space for an (h, w) map with all its mips."""
     mips = max(shape[:2]).bit_length()
-    texture = make_texture(device, (shape[1], shape[0]), HALVES, mips=mips)
+    texture = make_texture(device, (shape[1], shape[0]), HALVES, mips=mips, name="painted map")
     views = (
         texture.create_view(dimension="2d", base_mip_level=mip, mip_level_count=1) for mip in range(mips)
     )

@@ -29,8 +29,8 @@ class Picture:
 
 def make_picture(device: Device, size: tuple[int, int]) -> Picture:
     """Space for an image of size (width, height)."""
-    radiance, exposed = (make_texture(device, size, "rgba32float") for _ in range(2))
-    return Picture(radiance, exposed, make_texture(device, size, "rgba8uint"), size)
+    radiance, exposed = (make_texture(device, size, "rgba32float", name="picture") for _ in range(2))
+    return Picture(radiance, exposed, make_texture(device, size, "rgba8uint", name="picture"), size)
 
 
 def draw(

@@ -12,7 +12,7 @@ from dermis.frame.projection import Views
 from dermis.gpu import Device, make_texture
 from dermis.gpu.memory import check_memory
 
-_DEPTH_BYTES = 4
+SHADOW_BYTES = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ def make_shadow_maps(device: Device, layers: int, size: int) -> ShadowMaps:
 
     Raises DermisError when they do not fit into memory.
     """
-    needed = _DEPTH_BYTES * layers * size**2
+    needed = SHADOW_BYTES * layers * size**2
     check_memory(device, needed, "shadow_size", f"{layers} maps of {size} texels")
     side = _squares(size)
     bounds = make_texture(device, (side + side // 2, side), "r32float", layers=max(2, layers))

@@ -80,7 +80,8 @@ def draw(graph: Drawer, visibility: Layers, views: Views, head: HeadResources) -
 
 
 def _compute_layers(device: Device, size: tuple[int, int], count: int, triangles: bool) -> Layers:
-    texture = make_texture(device, size, "r32uint" if triangles else "r32float", layers=max(2, count))
+    texel, name = ("r32uint", "visibility buffer") if triangles else ("r32float", "shadow maps")
+    texture = make_texture(device, size, texel, layers=max(2, count), name=name)
     across, down = _tiles(size)
     counts = size[0] * size[1] * count, 1, across * down * count
     nearness, found, tiles = (_words(device, number) for number in counts)
@@ -92,8 +93,10 @@ def _words(device: Device, count: int) -> Any:
 
 
 def _raster_layers(device: Device, size: tuple[int, int], count: int, triangles: bool) -> Layers:
+    name = "visibility buffer" if triangles else "shadow maps"
+
     def layered(texel: str, number: int) -> tuple[Any, list[Any]]:
-        texture = make_texture(device, size, texel, layers=max(2, number), use="raster")
+        texture = make_texture(device, size, texel, layers=max(2, number), use="raster", name=name)
         options = {"dimension": "2d", "array_layer_count": 1}
         return texture, [texture.create_view(base_array_layer=k, **options) for k in range(number)]
 

@@ -1,0 +1,207 @@
+"""Loses the device at each stage of a frame, in a process of its own, as the library may end it.
+
+python lost_device.py ADAPTER FOLDER: a line for each stage with "same" where the picture is the same to the
+bit, else what came. FOLDER is for files.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+from moving_head import write_moving_head
+from setups import settings_of
+
+from dermis.cli import main
+from dermis.frame import renderer as renderer_module
+from dermis.frame import resources as resources_module
+from dermis.frame.passes import pack
+from dermis.frame.passes.painting import paint
+from dermis.frame.renderer import Renderer
+from dermis.frame.surface_points import surface_points
+from dermis.gpu import Device, Frame
+from dermis.human.person import Human
+from dermis.images.io import read_image
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.primitives import uv_sphere
+from dermis.scene import Scene
+
+MANY = 5  # scenes, more than are in flight
+SMALL = ("--size", "32x32", "--atlas", "64", "--samples", "1", "--shadow-size", "64")
+DRAWN = settings_of(size=(48, 48), atlas=128, exposure="auto")
+Stage = Callable[[Renderer], Any]
+
+
+def scene(mix: float = 0.5) -> Scene:
+    return Scene(Head("ball", uv_sphere(90.0, 24, 12), Maps()), skin={"mix": mix})
+
+
+@contextmanager
+def losing(target: Any, name: str, calls: int = 1) -> Iterator[None]:
+    """Within it the device is lost as a function of that name is called for that time, before it runs."""
+    usual, left = getattr(target, name), [calls]
+
+    def call(*given: Any, **named: Any) -> Any:
+        left[0] -= 1
+        if left[0] == 0:
+            opened[-1].handle.destroy()
+        return usual(*given, **named)
+
+    with patch.object(target, name, call):
+        yield
+    assert left[0] <= 0, f"{name} was not called"
+
+
+opened: list[Device] = []
+_open_device = renderer_module.open_device
+
+
+def open_noted(adapter: str) -> Device:
+    opened.append(_open_device(adapter))
+    return opened[-1]
+
+
+def loading(renderer: Renderer) -> Any:
+    renderer.forget()
+    with losing(resources_module, "upload_maps"):
+        return renderer.draw(scene(), DRAWN).linear()
+
+
+def recording(renderer: Renderer) -> Any:
+    with losing(Frame, "run", 3):
+        return renderer.draw(scene(), DRAWN, anew=True).linear()
+
+
+def between_passes(renderer: Renderer) -> Any:
+    with losing(Frame, "_end_pass", 2):
+        return renderer.draw(scene(), DRAWN, anew=True).linear()
+
+
+def submitting(renderer: Renderer) -> Any:
+    with losing(Frame, "_flush"):
+        return renderer.draw(scene(), DRAWN, anew=True, timed=False).linear()
+
+
+def waiting(renderer: Renderer) -> Any:
+    with losing(Device, "wait"):
+        return renderer.draw(scene(), DRAWN, anew=True).linear()
+
+
+def reading(renderer: Renderer) -> Any:
+    """Each way of reading, one after the other."""
+    rendered = renderer.draw(scene(), DRAWN)
+    ways = (lambda: rendered.exposure, rendered.clipped, rendered.srgb8)
+    known = [read() for read in ways]
+    for way, before in zip(ways, known, strict=True):
+        opened[-1].handle.destroy()
+        assert np.array_equal(way(), before)
+    return rendered.linear()
+
+
+def begun_to_read(renderer: Renderer) -> Any:
+    """The copy is mapped or about to be."""
+    rendered = renderer.draw(scene(), DRAWN)
+    known = rendered.srgb8()
+    with losing(pack.Leaving, "image"):
+        assert np.array_equal(rendered.srgb8(), known)
+    return rendered.linear()
+
+
+def painting(renderer: Renderer) -> Any:
+    """A person, whose skin the device paints."""
+    person, small = Scene(Human().head()), settings_of(size=(32, 32), atlas=256)
+    with losing(paint, "draw"):
+        found = renderer.draw(person, small).linear()
+    renderer.forget()
+    assert np.array_equal(renderer.draw(person, small).linear(), found)
+    return renderer.draw(scene(), DRAWN).linear()
+
+
+def many(renderer: Renderer) -> Any:
+    """Some frames are in flight when the device goes, wherever that is."""
+    mixes, drawn = np.linspace(0.0, 1.0, MANY), DRAWN.model_dump()
+    known = list(renderer.render_many(map(scene, mixes), **drawn))
+    for target, name, calls in ((Frame, "submit", 4), (pack.Leaving, "image", 2)):
+        with losing(target, name, calls):
+            found = list(renderer.render_many(map(scene, mixes), **drawn))
+        assert len(found) == MANY and all(map(np.array_equal, found, known))
+    return renderer.draw(scene(), DRAWN).linear()
+
+
+def beside_frames(renderer: Renderer) -> Any:
+    """What else works on the renderer's device, as comparisons do."""
+    known = surface_points(renderer, scene(), DRAWN)
+    with losing(Frame, "submit"):
+        found = surface_points(renderer, scene(), DRAWN)
+    assert np.array_equal(found.triangle, known.triangle) and len(known.triangle)
+    return renderer.draw(scene(), DRAWN).linear()
+
+
+STAGES: tuple[Stage, ...] = (
+    loading,
+    recording,
+    between_passes,
+    submitting,
+    waiting,
+    reading,
+    begun_to_read,
+    painting,
+    many,
+    beside_frames,
+)
+
+
+def commands(folder: Path, adapter: str) -> Iterator[tuple[str, str]]:
+    """The command line, whose device is lost in the second frame of a movie, and then always."""
+    os.chdir(folder)
+    write_moving_head(Path("face.glb"))
+    words = ["animate", "face.glb", *SMALL, "--adapter", adapter, "-o"]
+    assert command(*words, "whole/%d.exr") == 0
+    with losing(Frame, "submit", 2):
+        assert command(*words, "lost/%d.exr") == 0
+    pictures = [(read_image(f"whole/{k}.exr"), read_image(f"lost/{k}.exr")) for k in range(4)]
+    yield "animate", "same" if all(np.array_equal(*two) for two in pictures) else "other pictures"
+
+    def open_lost(adapter: str) -> Device:
+        device = open_noted(adapter)
+        device.handle.destroy()
+        return device
+
+    with patch.object(renderer_module, "open_device", open_lost):
+        for name, *rest in (("animate", "f/%d.exr"), ("render", "a.png")):
+            yield f"{name} twice", str(command(name, "face.glb", *SMALL, "--adapter", adapter, "-o", *rest))
+
+
+def command(*words: str) -> Any:
+    with patch.object(sys, "argv", ["dermis", *words]):
+        try:
+            main()
+        except SystemExit as ended:
+            return ended.code
+
+
+def outcomes(adapter: str, folder: Path) -> Iterator[tuple[str, str]]:
+    renderer = Renderer(adapter)
+    known = renderer.draw(scene(), DRAWN).linear()
+    for stage in STAGES:
+        try:
+            yield stage.__name__, "same" if np.array_equal(stage(renderer), known) else "another picture"
+        except Exception as error:
+            yield stage.__name__, f"{type(error).__name__}: {error}"
+    yield from commands(folder, adapter)
+
+
+if __name__ == "__main__":
+    warnings.simplefilter("ignore")
+    renderer_module.open_device = open_noted
+    for stage, outcome in outcomes(sys.argv[1], Path(sys.argv[2])):
+        sys.stdout.write(f"{stage}: {outcome}\n")
+        sys.stdout.flush()

@@ -1,0 +1,93 @@
+"""Too little address space is told before a driver is loaded: those end the process where they get none."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from dermis.errors import DermisError
+from dermis.gpu import address_space
+
+resource = pytest.importorskip("resource", reason="Windows limits no address space")
+
+GB = 1_000_000_000
+TOLD = re.compile(
+    r"dermis: address space \(ulimit -v\): expected at least 2\.\d GB for .+, but the limit is [\d.]+ GB, "
+    r"of which [\d.]+ GB are taken\. Raise it: ulimit -v unlimited\.\n"
+)
+ENOUGH = 2.5 * GB  # with the two threads of the software adapter that the test allows
+DRAW = "render", "ball.obj", "--size", "32x32", "--atlas", "64", "--shadow-size", "64", "--adapter", "cpu"
+
+
+def limited(limit: float, folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """`dermis` with these words under a limit of address space [bytes]."""
+    return subprocess.run(
+        [sys.executable, "-m", "dermis", *words],
+        env=os.environ | {"LP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2"},
+        cwd=folder,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (int(limit), int(limit))),
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from small_head import obj_text
+
+    made = tmp_path_factory.mktemp("limited")
+    (made / "ball.obj").write_text(obj_text())
+    return made
+
+
+@pytest.mark.parametrize("limit", [0.6, 1.4, 2.5])
+def test_a_picture_under_a_limit_is_drawn_or_refused(folder: Path, limit: float) -> None:
+    ended = limited(limit * GB, folder, *DRAW, "-o", f"{limit}.png")
+    drawn = limit * GB >= ENOUGH
+    assert ended.returncode == (0 if drawn else 2), ended.stderr[-1000:]
+    assert drawn == (folder / f"{limit}.png").exists()
+    assert drawn or TOLD.fullmatch(ended.stderr), ended.stderr[-1000:]
+
+
+@pytest.mark.parametrize("limit", [1.0, 1.8])
+def test_a_machine_under_a_limit_is_not_healthy(folder: Path, limit: float) -> None:
+    ended = limited(limit * GB, folder, "doctor", "--adapter", "cpu")
+    said = ended.stdout + ended.stderr  # as adapters are listed, or as one is opened
+    assert ended.returncode == 2 and "Traceback" not in said
+    assert "address space (ulimit -v): expected at least 2." in said
+
+
+@pytest.mark.parametrize("words", [["--help"], ["cite"], ["lights", "window"], ["profile", "skin1"]])
+def test_what_takes_no_device_works_under_a_limit(folder: Path, words: list[str]) -> None:
+    ended = limited(0.6 * GB, folder, *words)
+    assert ended.returncode == 0 and ended.stdout, ended.stderr[-1000:]
+
+
+def test_more_threads_take_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(address_space, "_limit", lambda: 3.0 * GB)
+    monkeypatch.setattr(address_space, "_taken", lambda: 0.5 * GB)
+    monkeypatch.setenv("LP_NUM_THREADS", "2")
+    address_space.check_software()
+    monkeypatch.setenv("LP_NUM_THREADS", "16")
+    assert address_space.room() <= 2.5 * GB
+    with pytest.raises(DermisError, match=r"at least 5\.\d GB for graphics drivers"):
+        address_space.check_software()
+
+
+def test_a_group_has_less_than_the_machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """As in containers: the system kills a process that takes more than its control group may."""
+    machine, group = address_space.main_memory(), tmp_path / "job"
+    group.mkdir()
+    (tmp_path / "memory.max").write_text("max\n")
+    (group / "memory.max").write_text("1000000\n")
+    monkeypatch.setattr(address_space, "_GROUPS", tmp_path)
+    monkeypatch.setattr(address_space, "_own_groups", lambda: ["job"])
+    assert address_space.main_memory() == 1e6 < machine < math.inf
