@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.errors import refuse, shown_value
 from dermis.frame.frame import draw_frame
 from dermis.frame.inputs import Inputs
 from dermis.frame.passes import pack, warm_up
@@ -23,7 +23,7 @@ from dermis.gpu import Frame, Graph, open_device
 from dermis.gpu.device import gpu_failures
 from dermis.gpu.frame import Timed
 from dermis.mesh.head import Head
-from dermis.scene.given import given_plain, shown_value
+from dermis.scene.given import given_plain
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -25,7 +24,6 @@ _DJ3_NOTE = (
     "travel 0.02083 mm between events in the epidermis and nearly all of it would leave within 0.1 mm. The "
     "published sum of six Gaussians follows from neither reading: it is the preset gpu-gems-3"
 )
-_MOST_LETTERS = 1_000_000
 _KEYS = ("absorption_per_mm", "scattering_per_mm")
 
 
@@ -163,28 +161,6 @@ def medium_from_toml(path: Path, document: Mapping[str, Any]) -> Medium:
     if unknown:
         refuse(path, "name, eta and [[layers]]", f"{', '.join(unknown)} came", "Take them out")
     return Medium(str(document.get("name", path.stem)), layers, _number(path, document, "eta", SKIN_ETA))
-
-
-def read_toml(path: Path) -> dict[str, Any]:
-    """A TOML file's contents; DermisError when it cannot be read."""
-    text = read_text(path, "a TOML file")
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        refuse(path, "a TOML file", f"it cannot be read: {error}", "Check its contents")
-
-
-def read_text(path: Path, form: str) -> str:
-    """The text of a small file; DermisError, which names the form expected, when it cannot be read."""
-    try:
-        with path.open(encoding="utf-8") as file:
-            text = file.read(_MOST_LETTERS + 1)  # some devices never end
-    except (OSError, UnicodeDecodeError) as error:
-        came = getattr(error, "strerror", None) or "it is not text"
-        refuse(path, form, f"it cannot be read: {came}", "Check its name and its contents")
-    if len(text) > _MOST_LETTERS:
-        refuse(path, form, f"it has more than {_MOST_LETTERS:,} letters", "Check its name")
-    return text
 
 
 def _layer(place: str, table: Mapping[str, Any]) -> Layer:

@@ -14,9 +14,10 @@ import numpy as np
 from dermis.errors import refuse
 from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.media import Floats, read_text, read_toml
+from dermis.optics.media import Floats
 from dermis.optics.tissue import Tissue, load_tissue, names
 from dermis.outputs import replacing
+from dermis.reading import read_text, read_toml
 
 PUBLISHED = "gpu-gems-3"
 TERMS = 6
@@ -84,7 +85,7 @@ def _written(path: Path) -> tuple[int, ...]:
     """Time of writing, size and inode of a file; empty when there is none."""
     try:
         found = path.stat()
-    except OSError:  # no such file, a name too long, or a folder without access
+    except (OSError, ValueError):  # no such file, a name that none can have, or a folder without access
         return ()
     return found.st_mtime_ns, found.st_size, found.st_ino
 

@@ -14,10 +14,11 @@ from dermis.errors import refuse
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.models import Model, diffusion_profile, through_slab
 from dermis.optics.diffusion.multipole import Clamp
-from dermis.optics.media import Floats, Layer, Medium, media, medium_from_toml, read_toml
+from dermis.optics.media import Floats, Layer, Medium, media, medium_from_toml
 from dermis.optics.pigments.skin import EXAMPLES, SkinParameters, Structure, spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.radial import RadialProfile
+from dermis.reading import read_toml
 
 SPECTRAL = "spectral"
 _STRUCTURE: Structure = "dj2006"

@@ -22,6 +22,7 @@ from dermis.mesh.maps import Maps, load_maps
 from dermis.mesh.obj_maps import obj_maps
 from dermis.mesh.samples import SAMPLES, Sample, fetch
 from dermis.mesh.subdivide import subdivide_head
+from dermis.reading import is_file
 from dermis.scene.head_checks import check_given, check_relief, named
 from dermis.scene.head_table import AUTO, Eyes, NormalY, Up, VOrigin
 
@@ -97,7 +98,7 @@ def load_head(
         told["unit_mm"] = sample.unit_mm if unit_mm is None else unit_mm
         told["v_origin"] = sample.v_origin or v_origin if v_origin == "auto" else v_origin
         height_mm = sample.height_mm if height_mm is None else height_mm
-    elif not path.is_file():
+    elif not is_file(path):
         _refuse_name(name)
     elif is_gltf(path):
         files = embedded_maps(path)

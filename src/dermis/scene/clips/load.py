@@ -9,6 +9,7 @@ from pathlib import Path
 from dermis.errors import refuse
 from dermis.mesh.formats import is_gltf
 from dermis.mesh.head import Head
+from dermis.reading import is_file
 from dermis.scene.clips.clip import Clip
 from dermis.scene.clips.gltf_clip import load_gltf_clip
 from dermis.scene.clips.live_link import load_live_link
@@ -51,7 +52,7 @@ def load_motion(
         refuse(source, "a clip's name with a glTF file alone", f"{inside!r} came", "Leave it out")
     if is_sequence(source):
         return load_sequence(source, head, fps, unit_mm, up)
-    if not source.is_file():
+    if not is_file(source):
         refuse(source, _KINDS, "there is no such file", "Check the name")
     if source.suffix.lower() not in (".csv", *_LINES):
         refuse(source, _KINDS, f"the suffix is {source.suffix!r}", "Convert it to one of these")
@@ -62,6 +63,6 @@ def load_motion(
 def _parted(path: Path, clip: str | None) -> tuple[Path, str | None]:
     """A file, and the name of a clip that was written after it."""
     file, sign, name = str(path).rpartition("#")
-    if sign and not path.exists() and is_gltf(file):
+    if sign and not is_file(path) and is_gltf(file):
         return Path(file), clip or name
     return path, clip

@@ -1,0 +1,84 @@
+"""Numbers that callers and files give: finite, within what can be, and Python's own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.errors import refuse, shown_value
+
+
+def number(culprit: object, value: object, low: float, high: float, why: str = "") -> float:
+    """The value as a float, from `low` to `high`.
+
+    culprit : named in messages
+    why : the reason of the bounds
+
+    DermisError : it is text, a truth value, an array, not finite, or out of the range
+    """
+    found = _plain(value)
+    if isinstance(found, int | float) and not isinstance(found, bool) and low <= found <= high:
+        return float(found)
+    _refuse_number(culprit, "a number", value, low, high, why)
+
+
+def whole_number(culprit: object, value: object, low: int, high: int, why: str = "") -> int:
+    """As `number`, for counts and seeds; 4.0 is 4."""
+    found = _plain(value)
+    if isinstance(found, int | float) and not isinstance(found, bool) and low <= found <= high:
+        if found == int(found):
+            return int(found)
+    _refuse_number(culprit, "a whole number", value, low, high, why)
+
+
+def numbers(
+    culprit: object, values: object, shape: tuple[int, ...], limit: float, why: str = ""
+) -> NDArray[np.float64]:
+    """The values as an array of a shape, each from -`limit` to `limit`.
+
+    DermisError : they have another shape, or one is no such number
+    """
+    try:
+        if _has_text(values):
+            raise TypeError
+        found = np.asarray(values, np.float64)
+        fits = found.shape == shape and bool((np.abs(found) <= limit).all())
+    except (TypeError, ValueError, OverflowError):
+        fits = False
+    if not fits:
+        form = " x ".join(map(str, shape))
+        expected = f"{form} numbers from {-limit:.10g} to {limit:.10g}{f' ({why})' if why else ''}"
+        refuse(culprit, expected, f"{shown_value(values)} came", "Correct it")
+    return found
+
+
+def check_numbers(owner: object, ranges: Mapping[str, tuple[float, float]], prefix: str = "") -> None:
+    """Refuse fields of an object that are not within their ranges; those with whole bounds are whole.
+
+    DermisError : as `number`
+    """
+    for name, (low, high) in ranges.items():
+        check = whole_number if isinstance(low, int) and isinstance(high, int) else number
+        check(f"{prefix}{name}", getattr(owner, name), low, high)
+
+
+def _plain(value: object) -> Any:
+    return value.item() if isinstance(value, np.generic | np.ndarray) and value.ndim == 0 else value
+
+
+def _has_text(values: Any) -> bool:
+    """Whether texts or truth values are among the values, which NumPy would read as numbers."""
+    if isinstance(values, list | tuple):
+        return any(_has_text(one) for one in values)
+    return isinstance(values, str | bytes | bool | np.bool_) or (
+        isinstance(values, np.ndarray) and values.dtype.kind not in "iuf"
+    )
+
+
+def _refuse_number(culprit: object, kind: str, value: object, low: float, high: float, why: str) -> NoReturn:
+    reason = f" ({why})" if why else ""
+    expected = f"{kind} from {low:.10g} to {high:.10g}{reason}"
+    refuse(culprit, expected, f"{shown_value(value)} came", "Choose within")
