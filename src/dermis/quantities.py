@@ -35,9 +35,11 @@ def whole_number(culprit: object, value: object, low: int, high: int, why: str =
 
 
 def numbers(
-    culprit: object, values: object, shape: tuple[int, ...], limit: float, why: str = ""
+    culprit: object, values: object, shape: tuple[int, ...], low: float, high: float, why: str = ""
 ) -> NDArray[np.float64]:
-    """The values as an array of a shape, each from -`limit` to `limit`.
+    """The values as an array of a shape, each from `low` to `high`.
+
+    shape : with 0 for a side of any length
 
     DermisError : they have another shape, or one is no such number
     """
@@ -45,12 +47,13 @@ def numbers(
         if _has_text(values):
             raise TypeError
         found = np.asarray(values, np.float64)
-        fits = found.shape == shape and bool((np.abs(found) <= limit).all())
+        fits = found.ndim == len(shape) and bool(((low <= found) & (found <= high)).all())
+        fits = fits and all(side in (0, own) for side, own in zip(shape, found.shape, strict=True))
     except (TypeError, ValueError, OverflowError):
         fits = False
     if not fits:
-        form = " x ".join(map(str, shape))
-        expected = f"{form} numbers from {-limit:.10g} to {limit:.10g}{f' ({why})' if why else ''}"
+        form = " x ".join(str(side or "n") for side in shape)
+        expected = f"{form} numbers from {low:.10g} to {high:.10g}{f' ({why})' if why else ''}"
         refuse(culprit, expected, f"{shown_value(values)} came", "Correct it")
     return found
 

@@ -243,12 +243,12 @@ def test_lines_are_for_people(run: Run) -> None:
         (["gpu-gems-3", "--check", "--plot", "own.png"], "--check"),
         (["dj3", "-o", "own.toml", "--plot", "own.png", "--check", "--photons", "0"], "photons"),
         (["own.csv"], "no such file"),
-        (["endless.csv"], "more than 1,000,000 letters"),
+        (["endless.csv"], "at most 1.0 MB"),
         (["a" * 5000], "no such file"),
     ],
 )
 def test_refusals(run: Run, folder: Path, words: list[str], complaint: str) -> None:
-    (folder / "endless.csv").write_bytes(b"0" * 1_000_001)
+    (folder / "endless.csv").write_bytes(b"0" * ((1 << 20) + 1))
     before = sorted(folder.iterdir())
     ended = run("profile", *words)
     assert (ended.code, ended.stdout) == (2, ""), ended.stdout

@@ -13,10 +13,11 @@ import numpy as np
 
 from dermis.errors import refuse
 from dermis.optics.fits.gaussian import fit_gaussians
-from dermis.optics.gaussians import GaussianSum
+from dermis.optics.gaussians import MOST_WEIGHT, WIDEST_MM2, GaussianSum
 from dermis.optics.media import Floats
 from dermis.optics.tissue import Tissue, load_tissue, names
 from dermis.outputs import replacing
+from dermis.quantities import numbers
 from dermis.reading import read_text, read_toml
 
 PUBLISHED = "gpu-gems-3"
@@ -140,12 +141,9 @@ def _published() -> GaussianSum:
 
 
 def _from_toml(path: Path, document: Mapping[str, Any]) -> GaussianSum:
-    try:
-        variances = np.array(document["variances_mm2"], dtype=np.float64)
-        weights = np.array(document["weights"], dtype=np.float64)
-    except (KeyError, ValueError, TypeError):
-        expected = "lists of numbers variances_mm2 and weights"
-        refuse(f"profile {path}", expected, "something else came", _MEND)
+    name = f"profile {path}"
+    variances = numbers(f"{name}: variances_mm2", document["variances_mm2"], (0,), 0.0, WIDEST_MM2)
+    weights = numbers(f"{name}: weights", document.get("weights"), (0, 3), 0.0, MOST_WEIGHT)
     return _three(path, variances, weights)
 
 

@@ -10,7 +10,7 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.errors import refuse
+from dermis.errors import DermisError, refuse, shown_value
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.models import Model, diffusion_profile, through_slab
 from dermis.optics.diffusion.multipole import Clamp
@@ -138,9 +138,11 @@ def _from_skin_table(
     if unknown:
         known = ", ".join(sorted({"structure", *fields}))
         refuse(path, f"in [skin]: {known}", f"{', '.join(unknown)} came", "Correct the names")
-    wrong = [key for key, value in own.items() if type(value) not in (int, float)]
-    if wrong or structure not in get_args(Structure):
-        what = f"{wrong[0]} = {own[wrong[0]]!r}" if wrong else f"structure = {structure!r}"
-        expected = f"numbers, and a structure of {', '.join(get_args(Structure))}"
-        refuse(path, expected, f"{what} came", "Correct it")
-    return _spectral(str(document.get("name", path.stem)), wanted or structure, SkinParameters(**own), given)
+    if structure not in get_args(Structure):
+        expected = f"a structure of {', '.join(get_args(Structure))}"
+        refuse(path, expected, f"{shown_value(structure)} came", "Correct it")
+    try:
+        parameters = SkinParameters(**own)
+    except DermisError as fault:
+        raise DermisError(f"{path}: {fault}") from None
+    return _spectral(str(document.get("name", path.stem)), wanted or structure, parameters, given)

@@ -120,7 +120,7 @@ def _finding(one: ErrorDetails, model: type[BaseModel]) -> str:
     expected = re.sub("^(Input should be|Tuple should have|Value error,) |, unable to .*", "", one["msg"])
     expected = expected.replace("a valid tuple", f"a list{_length(one, model)}")
     if one["type"] in _BOUNDS | _NUMBERS:
-        expected = _number(one["loc"], model) or expected
+        expected = _number(one["loc"], model) or re.sub("^(greater|less)", r"a number \1", expected)
     if len(one["loc"]) == 1 and (words := words_of(model, str(one["loc"][0]))):
         expected = f"{', '.join(words)} or {expected}"
     came = shown_value(one["input"])

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import math
 import os
 from pathlib import Path
 
-from dermis.errors import refuse
+from dermis.errors import refuse, shown_value
 from dermis.mesh.formats import is_gltf
 from dermis.mesh.head import Head
 from dermis.reading import is_file
-from dermis.scene.clips.clip import Clip
+from dermis.scene.clips.clip import Clip, check_rate
 from dermis.scene.clips.gltf_clip import load_gltf_clip
 from dermis.scene.clips.live_link import load_live_link
 from dermis.scene.clips.mediapipe import load_mediapipe
 from dermis.scene.clips.sequence import is_sequence, load_sequence
+from dermis.scene.head_checks import check_options
 from dermis.scene.head_table import Up
 
 _LINES = (".jsonl", ".ndjson", ".json")
@@ -43,8 +43,10 @@ def load_motion(
     Raises DermisError for files that cannot be read, which it names with their lines, and for motion of
     which the head has no name; what it has only in part, `Clip.note` tells.
     """
-    if fps is not None and not (math.isfinite(fps) and fps > 0):
-        refuse("fps", "a number of frames a second above 0", f"{fps} came", "Correct it")
+    if not isinstance(path, str | os.PathLike):
+        refuse("load_motion", f"the name of {_KINDS}", f"{shown_value(path)} came", "Write its name")
+    check_options(unit_mm=unit_mm, up=up)
+    fps = None if fps is None else check_rate("fps", fps)
     source, inside = _parted(Path(path), clip)
     if is_gltf(source):
         return load_gltf_clip(source, head, inside)
