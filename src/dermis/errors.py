@@ -7,6 +7,7 @@ from typing import NoReturn
 
 _LONGEST_NAME, _LONGEST_TEXT = 300, 400  # letters of a message
 
+
 class DermisError(Exception):
     """The caller can mend this: the message says what was expected, what came and what to do.
 
@@ -29,7 +30,7 @@ def refuse(culprit: object, expected: str, came: str, remedy: str) -> NoReturn:
     culprit : the file, option or object at fault, named first
     expected, came, remedy : sentences without a full stop
     """
-    named, what = _short(str(culprit), _LONGEST_NAME), _short(came, _LONGEST_TEXT)
+    named, what = shortened(str(culprit), _LONGEST_NAME), shortened(came, _LONGEST_TEXT)
     raise DermisError(f"{named}: expected {expected}, but {what}. {remedy}.")
 
 
@@ -47,7 +48,7 @@ def shown_value(value: object, most: int = 60) -> str:
     return text if len(text) <= most else f"{text[:most]} ..."
 
 
-def _short(text: str, most: int) -> str:
+def shortened(text: str, most: int) -> str:
     """A text without its middle where it is too long for a message."""
     half = (most - 5) // 2
     return text if len(text) <= most else f"{text[:half]} ... {text[-half:]}"

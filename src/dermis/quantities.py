@@ -19,19 +19,18 @@ def number(culprit: object, value: object, low: float, high: float, why: str = "
 
     DermisError : it is text, a truth value, an array, not finite, or out of the range
     """
-    found = _plain(value)
-    if isinstance(found, int | float) and not isinstance(found, bool) and low <= found <= high:
-        return float(found)
-    _refuse_number(culprit, "a number", value, low, high, why)
+    found = _within(value, low, high)
+    if found is None:
+        _refuse_number(culprit, "a number", value, low, high, why)
+    return float(found)
 
 
-def whole_number(culprit: object, value: object, low: int, high: int, why: str = "") -> int:
+def whole_number(culprit: object, value: object, low: float, high: float, why: str = "") -> int:
     """As `number`, for counts and seeds; 4.0 is 4."""
-    found = _plain(value)
-    if isinstance(found, int | float) and not isinstance(found, bool) and low <= found <= high:
-        if found == int(found):
-            return int(found)
-    _refuse_number(culprit, "a whole number", value, low, high, why)
+    found = _within(value, low, high)
+    if found is None or found != int(found):
+        _refuse_number(culprit, "a whole number", value, low, high, why)
+    return int(found)
 
 
 def numbers(
@@ -68,8 +67,11 @@ def check_numbers(owner: object, ranges: Mapping[str, tuple[float, float]], pref
         check(f"{prefix}{name}", getattr(owner, name), low, high)
 
 
-def _plain(value: object) -> Any:
-    return value.item() if isinstance(value, np.generic | np.ndarray) and value.ndim == 0 else value
+def _within(value: object, low: float, high: float) -> int | float | None:
+    """The value as Python's number; None for what is none, or not in the range."""
+    found: Any = value.item() if isinstance(value, np.generic | np.ndarray) and value.ndim == 0 else value
+    is_number = isinstance(found, int | float) and not isinstance(found, bool)
+    return found if is_number and low <= found <= high else None
 
 
 def _has_text(values: Any) -> bool:

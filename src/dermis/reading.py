@@ -24,7 +24,8 @@ _PAGE = 1 << 16
 _MOST_BITS = 64  # of a whole number, as in TOML; any of them is a float as well
 _DEEPEST = 32  # parts of a key with dots: the parser's time grows with their square
 _DEEP = re.compile(
-    r"""(?<![\w\\-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){%d}""" % _DEEPEST
+    r"""(?<![\w\\-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
+    f"{{{_DEEPEST}}}"
 )
 _NONBLOCKING = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
 
@@ -87,7 +88,7 @@ def parse_json(text: str | bytes, culprit: object, expected: str) -> Any:
 
 
 def is_file(path: str | Path) -> bool:
-    """Whether a regular file has this name; False for names that no file can have or that are out of reach."""
+    """Whether a regular file has this name; False for names that none can have or out of reach."""
     try:
         return Path(path).is_file()
     except (OSError, ValueError):

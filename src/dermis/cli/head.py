@@ -167,8 +167,8 @@ def _look(usual: L, words: list[str] | None, option: str) -> L:
         if name not in known:
             refuse(option, f"names of {', '.join(known)}", f"{name!r} came", "Correct it")
     numbers: dict[str, Any] = dict(chosen)
-    if "seed" in numbers and numbers["seed"] == int(numbers["seed"]):
-        numbers["seed"] = int(numbers["seed"])
+    if (seed := chosen.get("seed")) is not None and seed.is_integer():
+        numbers["seed"] = int(seed)
     return replace(usual, **numbers)
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict, get_args
 from cyclopts import Parameter, Token
 
 from dermis.errors import DermisError, refuse
+from dermis.quantities import number
 
 if TYPE_CHECKING:
     from dermis.scene.plain import Plain
@@ -33,6 +34,7 @@ Json = Annotated[
 ]
 Adapter = Annotated[str, Parameter(help="auto (the best), cpu (software), or a part of an adapter's name.")]
 Output = Annotated[Path | None, Parameter(name=("--output", "-o"))]
+_LENGTHS_MM = 1e-6, 1e4
 NOTHING: dict[str, Any] = {}
 """Options of a model when none is given."""
 # cyclopts itself would round 64.5.
@@ -169,6 +171,4 @@ def parse_lengths(option: str, text: str) -> tuple[float, ...]:
         lengths = tuple(float(part) for part in text.split(","))
     except ValueError:
         refuse(option, "lengths in mm, such as 0.5,1,2", f"{text!r} came", "Write numbers with commas")
-    if not all(0.0 < length < 1e6 for length in lengths):
-        refuse(option, "lengths above 0 mm", f"{text!r} came", "Correct them")
-    return lengths
+    return tuple(number(option, length, *_LENGTHS_MM, "mm") for length in lengths)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis import outputs
-from dermis.errors import refuse
+from dermis.errors import refuse, shown_value
 from dermis.extras import needed
 
 SUFFIX = ".mp4"
@@ -26,6 +27,7 @@ _BT709, _LIMITED = 1, 1  # H.264's numbers for primaries, transfer and matrix; f
 _WAITING = 8
 _NTSC = tuple(Fraction(1000 * whole, 1001) for whole in (24, 30, 48, 60, 120))
 _NEAR_NTSC = Fraction(5, 1000)
+_RATE = re.compile(r"\d{1,9}(\.\d{1,20})?(/\d{1,9}|e[-+]?\d{1,2})?")  # of a few digits: exponents are powers
 _FASTEST, _FINEST = 1000, 1001
 
 
@@ -36,13 +38,14 @@ def exact_rate(given: str | float | Fraction, culprit: object = "rate") -> Fract
 
     Raises DermisError for what is no rate up to 1000.
     """
+    text = str(given).strip()
     try:
-        rate = Fraction(str(given).strip())
+        rate = Fraction(text if _RATE.fullmatch(text) else 0)
     except (ValueError, ZeroDivisionError):
         rate = Fraction(0)
     if not 0 < rate <= _FASTEST:
         expected = f"frames a second up to {_FASTEST}, such as 30, 23.976 or 24000/1001"
-        refuse(culprit, expected, f"{str(given)!r} came", "Correct it")
+        refuse(culprit, expected, f"{shown_value(text)} came", "Correct it")
     near = min(_NTSC, key=lambda ntsc: abs(ntsc - rate))
     rate = near if abs(near - rate) < _NEAR_NTSC else rate.limit_denominator(_FINEST)
     return max(rate, Fraction(1, _FINEST))

@@ -129,13 +129,15 @@ def _check(place: str, layer: Layer, last: bool) -> None:
     if a.ndim != 1 or a.shape != s.shape or len(a) == 0:
         came = f"shapes {a.shape} and {s.shape} came"
         refuse(place, "as many absorption as scattering coefficients", came, "Correct the lists")
-    if not ((0 <= a) & (a <= _DENSEST) & (_CLEAREST <= s) & (s <= _DENSEST)).all():
+    if not ((a >= 0) & (a <= _DENSEST) & (s >= _CLEAREST) & (s <= _DENSEST)).all():
         came = f"absorption {a.tolist()} and scattering {s.tolist()} came"
         expected = f"absorption from 0 and scattering from {_CLEAREST:g} to {_DENSEST:g} /mm"
         refuse(place, expected, came, "Correct them")
     endless = np.isinf(layer.thickness_mm) and layer.thickness_mm > 0 and last
     if not endless and not _THINNEST_MM <= layer.thickness_mm <= _THICKEST_MM:
-        expected = f"a thickness from {_THINNEST_MM:g} to {_THICKEST_MM:g} mm, infinite in the last layer only"
+        expected = (
+            f"a thickness from {_THINNEST_MM:g} to {_THICKEST_MM:g} mm, infinite in the last layer only"
+        )
         refuse(place, expected, f"{layer.thickness_mm} mm came", "Correct it")
 
 
@@ -183,7 +185,6 @@ def _layer(place: str, table: Mapping[str, Any]) -> Layer:
 
 def _three(place: str, table: Mapping[str, Any], key: str) -> Floats:
     return numbers(f"{place}: {key}", table.get(key), (3,), 0.0, _DENSEST, "1/mm in red, green and blue")
-
 
 
 def _read(table: str) -> dict[str, list[Layer]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from typing import Any
 
 from dermis.errors import refuse, shown_value
 from dermis.scene.findings import ImpossibleError
@@ -34,7 +35,7 @@ def check_given(files: Mapping[str, object], **lengths: object) -> None:
             refuse(role, "the name of a picture file", f"a {type(file).__name__} came", remedy)
 
 
-def check_options(**options: object) -> None:
+def check_options(**options: Any) -> None:
     """Refuse values that no [head] can have; words where several may stand come as tuples."""
     regions = options.get("regions", AUTO)
     if regions not in (AUTO, NO_REGIONS):

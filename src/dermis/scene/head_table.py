@@ -30,7 +30,9 @@ class EyeTable(Plain):
 
     eumelanin: Annotated[float | None, Field(ge=0, le=1)] = None
     """Of the iris, from none, which leaves it blue, to the darkest brown."""
-    pupil_mm: Annotated[float | None, Field(ge=1, le=4), Because("mm: pupils in glare and in the dark")] = None
+    pupil_mm: Annotated[float | None, Field(ge=1, le=4), Because("mm: pupils in glare and in the dark")] = (
+        None
+    )
     """Radius of the pupil [mm]."""
     redness: Annotated[float | None, Field(ge=0, le=1)] = None
     """Of the white of the eye."""

@@ -118,9 +118,9 @@ class SphereLight(PointLight):
     """An evenly bright sphere, as a lamp with a globe."""
 
     kind: Literal["sphere"] = "sphere"  # type: ignore[assignment]
-    radius_mm: Annotated[
-        float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 500, log=True)), _LAMPS
-    ] = 100.0
+    radius_mm: Annotated[float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 500, log=True)), _LAMPS] = (
+        100.0
+    )
     """Radius of the sphere [mm]."""
 
     @property

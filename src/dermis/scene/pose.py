@@ -48,7 +48,9 @@ class Pose:
         if given is None or isinstance(given, Pose):
             return given
         if not isinstance(given, Mapping):
-            refuse("pose", "a Pose or a mapping of weights by name", f"{shown_value(given)} came", "Correct it")
+            refuse(
+                "pose", "a Pose or a mapping of weights by name", f"{shown_value(given)} came", "Correct it"
+            )
         return cls(weights=given)
 
     def motion(self, rig: Rig, culprit: object = "pose") -> Motion:

@@ -149,7 +149,7 @@ def test_shares_beyond_one_are_refused_by_their_option(name: str, value: float) 
 
 @pytest.mark.parametrize("value", [0.0, -0.1, 2.1, np.nan, np.inf])
 def test_impossible_epidermis_is_refused(value: float) -> None:
-    with pytest.raises(DermisError, match="--epidermis-mm: expected a number from 0.001 to 2"):
+    with pytest.raises(DermisError, match=r"--epidermis-mm: expected a number from 0\.001 to 2"):
         replace(SKIN, epidermis_mm=value)
 
 

@@ -240,5 +240,5 @@ def test_a_time_that_is_none(tmp_path: Path) -> None:
     for seconds in (float("nan"), float("inf")):
         with pytest.raises(DermisError, match="a: time: expected a number"):
             clip.pose_at(seconds)
-    with pytest.raises(DermisError, match="rate: expected a number from 0.001"):
+    with pytest.raises(DermisError, match=r"rate: expected a number from 0\.001"):
         clip.frame_count(0)

@@ -58,7 +58,9 @@ def _table(entries: dict[str, Any], path: Path) -> RegionTable:
 
 def _row(path: Path, region: str, entry: Any) -> list[float]:
     if not isinstance(entry, dict) or entry.keys() != LIMITS.keys():
-        refuse(f"{path}: {region}", "m and rho_s", f"{shown_value(entry)} came", "Give both, and nothing else")
+        refuse(
+            f"{path}: {region}", "m and rho_s", f"{shown_value(entry)} came", "Give both, and nothing else"
+        )
     where = f"{path}: {region}"
     return [number(f"{where}: {name}", entry[name], *limits) for name, limits in LIMITS.items()]
 

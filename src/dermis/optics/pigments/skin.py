@@ -105,7 +105,9 @@ def spectral_medium(
     Source: [DonnerJensen2006], [Donner2008], [KrishnaswamyBaranoski2004].
     """
     if structure not in _STRUCTURES:
-        refuse("structure", ", ".join(get_args(Structure)), f"{shown_value(structure)} came", "Take one of them")
+        refuse(
+            "structure", ", ".join(get_args(Structure)), f"{shown_value(structure)} came", "Take one of them"
+        )
     wavelengths = visible(wavelength_nm)
     layers, note, sources = _STRUCTURES[structure]
     stack = layers(parameters, wavelengths, scattering(wavelengths))

@@ -54,7 +54,9 @@ class Clip:
         return math.floor(self.duration_s * check_rate(f"{self.name}: rate", rate) + _EARLY) + 1
 
     def __post_init__(self) -> None:
-        number(f"{self.name}: duration", self.duration_s, 0.0, LONGEST_S, "s: no motion lasts longer than a day")
+        number(
+            f"{self.name}: duration", self.duration_s, 0.0, LONGEST_S, "s: no motion lasts longer than a day"
+        )
 
     @property
     def note(self) -> str:

@@ -145,7 +145,12 @@ def _times(path: Path, lines: Sequence[int], codes: Sequence[_Timecode], fps: fl
     if len(back):
         row = int(back[0]) + 1
         came = f"this line is {times[row - 1] - times[row]:.3f} s before the last"
-        refuse(f"{path}, line {lines[row]}", "a Timecode that goes on", came, "Sort the lines, or remove this one")
+        refuse(
+            f"{path}, line {lines[row]}",
+            "a Timecode that goes on",
+            came,
+            "Sort the lines, or remove this one",
+        )
     return times
 
 
