@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
-from dermis.errors import DermisError, refuse
+from dermis.errors import DermisError, refuse, shown_value
 
 MOST_TEXT = 1 << 20  # bytes of settings: scenes, lights, tables
 _PAGE = 1 << 16
@@ -44,7 +44,7 @@ def read_file(path: str | Path, expected: str, most: int, name: object = None) -
             told = os.fstat(file.fileno()).st_size
             most_now = min(most, max(told, _PAGE))  # a file of the system tells no size
             data = file.read(most_now + 1) if told <= most else b""
-    except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
+    except (OSError, ValueError, TypeError) as fault:  # a NUL in the name; what is no name
         reason = getattr(fault, "strerror", None) or str(fault)
         refuse(culprit, expected, f"it cannot be read ({reason})", "Check its name")
     if max(told, len(data)) > most:
@@ -85,6 +85,16 @@ def parse_json(text: str | bytes, culprit: object, expected: str) -> Any:
     """
     with understood(culprit, expected):
         return json.loads(text, parse_constant=_no_number, parse_float=_finite, parse_int=_whole)
+
+
+def named_path(name: object, expected: str) -> Path:
+    """The path of a name.
+
+    DermisError : it is neither a text nor a path
+    """
+    if not isinstance(name, str | os.PathLike):
+        refuse("file", f"the name of {expected}", f"{shown_value(name)} came", "Write its name")
+    return Path(name)
 
 
 def is_file(path: str | Path) -> bool:

@@ -23,12 +23,14 @@ from dermis.gpu import Frame, Graph, open_device
 from dermis.gpu.device import gpu_failures
 from dermis.gpu.frame import Timed
 from dermis.mesh.head import Head
+from dermis.quantities import whole_number
 from dermis.scene.given import given_plain
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES
 
 T = TypeVar("T")
+_DEEPEST = 1000
 _WARMING_FRAMES = 100
 _IN_FLIGHT = 3  # frames submitted and not done: Python and the device overlap, with little latency
 
@@ -42,6 +44,9 @@ class Renderer:
 
     def __init__(self, adapter: str = "auto", depth: int = 1) -> None:
         started = time.perf_counter()
+        if not isinstance(adapter, str):
+            refuse("adapter", "its name", f"{shown_value(adapter)} came", "Write auto, cpu or a part of it")
+        depth = whole_number("depth", depth, 1, _DEEPEST)
         self.device = open_device(adapter)
         with gpu_failures(self.device):
             warm_up(self.device)

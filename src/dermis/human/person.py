@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,6 +79,8 @@ class Human:
             expected, came = "weights of targets by name", f"{shown_value(self.targets)} came"
             refuse("targets", expected, came, 'Write targets={"nose/nose-hump-incr": 0.5}')
         for name, weight in self.targets.items():
+            if not isinstance(name, str):
+                refuse("targets", "names", f"{shown_value(name)} came", "See human_targets()")
             number(f"target {name!r}", weight, -_MOST_WEIGHT, _MOST_WEIGHT, "what lies beyond is no face")
         for name, kind in (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook)):
             if not isinstance(look := getattr(self, name), kind | None):
@@ -102,6 +105,9 @@ class Human:
 
         Raises DermisError for targets that nobody knows.
         """
+        if layout not in get_args(Layout):
+            came = f"{shown_value(layout)} came"
+            refuse("layout", f"one of {', '.join(get_args(Layout))}", came, "Choose one")
         painted = maps or PaintedMaps(look=self.look)
         plain = human_head(self.weights(), painted, layout, self.iris)
         head = subdivide_head(plain, subdivide)
@@ -162,6 +168,8 @@ class Human:
         """Weights of published targets by name, those of 0 left out."""
         found = {**self._ancestry(), **self._build()}
         for name, weight in self.targets.items():
+            if not isinstance(name, str):
+                refuse("targets", "names", f"{shown_value(name)} came", "See human_targets()")
             found[name] = found.get(name, 0.0) + weight
         return {name: weight for name, weight in found.items() if weight}
 

@@ -18,7 +18,7 @@ from dermis.optics.media import Floats
 from dermis.optics.tissue import Tissue, load_tissue, names
 from dermis.outputs import replacing
 from dermis.quantities import numbers
-from dermis.reading import read_text, read_toml
+from dermis.reading import named_path, read_text, read_toml
 
 PUBLISHED = "gpu-gems-3"
 TERMS = 6
@@ -45,6 +45,7 @@ def load_profile(
 
     Raises DermisError when there is no such preset or file, or when its numbers cannot be a profile.
     """
+    named_path(name, "a profile")
     if pigments:
         return fit_profile(load_tissue(name, pigments=pigments), name, near)
     table = find_table(name)

@@ -18,7 +18,7 @@ from dermis.optics.media import Floats, Layer, Medium, media, medium_from_toml
 from dermis.optics.pigments.skin import EXAMPLES, SkinParameters, Structure, spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.radial import RadialProfile
-from dermis.reading import read_toml
+from dermis.reading import named_path, read_toml
 
 SPECTRAL = "spectral"
 _STRUCTURE: Structure = "dj2006"
@@ -101,7 +101,8 @@ def load_tissue(
 
     Raises DermisError for any other name, and when pigments are given to a medium that has none.
     """
-    given = dict(pigments or {})
+    named_path(name, "a tissue")
+    given = _known(pigments or {})
     if str(name) == SPECTRAL or str(name) in EXAMPLES:
         example = EXAMPLES.get(str(name), SkinParameters())
         return _spectral(str(name), structure or _STRUCTURE, example, given)
@@ -117,6 +118,14 @@ def load_tissue(
         refuse(option, f"a skin made of pigments ({skins})", f"{name} came", "Leave it out, or take a skin")
     medium = media()[str(name)] if str(name) in media() else medium_from_toml(Path(name), document)
     return Tissue(medium)
+
+
+def _known(pigments: Mapping[str, Any]) -> dict[str, Any]:
+    """Pigments by names that a skin has."""
+    names = SkinParameters.__dataclass_fields__
+    if not isinstance(pigments, Mapping) or not pigments.keys() <= names.keys():
+        refuse("pigments", f"some of {', '.join(names)}", f"{shown_value(pigments)} came", "Correct them")
+    return dict(pigments)
 
 
 def _spectral(name: str, structure: Structure, example: SkinParameters, given: dict[str, Any]) -> Tissue:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,7 +10,7 @@ from dermis.errors import refuse
 from dermis.human.regions.apply import with_regions
 from dermis.human.regions.table import load_table
 from dermis.mesh.head import Head
-from dermis.reading import is_file, read_toml
+from dermis.reading import is_file, named_path, read_toml
 from dermis.scene.camera import PRESETS, Camera, preset
 from dermis.scene.environment import Environment
 from dermis.scene.findings import ImpossibleError
@@ -57,7 +56,7 @@ def load_scene(path: str | Path, known: Head | None = None) -> tuple[Scene, Sett
 
     known : the head of the file's [head], when the caller has it already
     """
-    path = _path(path, "a scene in TOML")
+    path = named_path(path, "a scene in TOML")
     table = _read(path, "a scene in TOML")
     for part in table.keys() - _PARTS:
         refuse(path, f"only the parts {', '.join(sorted(_PARTS))}", f"{part!r} came", "Correct its name")
@@ -176,11 +175,5 @@ def _made(kind: type[P], culprit: object, part: str, table: Any) -> P:
         raise ImpossibleError(f"{culprit}: {part}", error.findings) from None
 
 
-def _path(name: object, expected: str) -> Path:
-    if not isinstance(name, str | os.PathLike):
-        refuse("file", f"the name of {expected}", f"a {type(name).__name__} came", "Write its name")
-    return Path(name)
-
-
 def _read(name: str | Path, expected: str) -> dict[str, Any]:
-    return read_toml(_path(name, expected), expected)
+    return read_toml(named_path(name, expected), expected)

@@ -42,6 +42,11 @@ class Pose:
     bones: Mapping[str, ArrayLike] = field(default_factory=dict)
     positions_mm: NDArray[np.float32] | None = None
 
+    def __post_init__(self) -> None:
+        for part in ("weights", "bones"):
+            if not isinstance(given := getattr(self, part), Mapping):
+                refuse(f"pose: {part}", "a mapping by name", f"{shown_value(given)} came", "Correct it")
+
     @classmethod
     def of(cls, given: Any) -> Pose | None:
         """A pose, the pose of a plain mapping of weights, or None."""

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from dermis.errors import refuse
+from dermis.errors import refuse, shown_value
 from dermis.scene.findings import Because
 from dermis.scene.plain import Plain, slider
 from dermis.specular.models import EnergyName, FresnelName, SpecularName
@@ -117,8 +117,8 @@ class Skin(Plain):
 
         Raises DermisError for any other name.
         """
-        if name not in PRESETS:
-            refuse("skin", f"one of {', '.join(PRESETS)}", f"{name!r} came", "Choose one of them")
+        if not isinstance(name, str) or name not in PRESETS:
+            refuse("skin", f"one of {', '.join(PRESETS)}", f"{shown_value(name)} came", "Choose one of them")
         return cls(**PRESETS[name])
 
     @property

@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from dermis.errors import refuse, shown_value
+from dermis.errors import refuse
 from dermis.mesh.formats import is_gltf
 from dermis.mesh.head import Head
-from dermis.reading import is_file
+from dermis.reading import is_file, named_path
 from dermis.scene.clips.clip import Clip, check_rate
 from dermis.scene.clips.gltf_clip import load_gltf_clip
 from dermis.scene.clips.live_link import load_live_link
@@ -43,11 +43,10 @@ def load_motion(
     Raises DermisError for files that cannot be read, which it names with their lines, and for motion of
     which the head has no name; what it has only in part, `Clip.note` tells.
     """
-    if not isinstance(path, str | os.PathLike):
-        refuse("load_motion", f"the name of {_KINDS}", f"{shown_value(path)} came", "Write its name")
+    named = named_path(path, _KINDS)
     check_options(unit_mm=unit_mm, up=up)
     fps = None if fps is None else check_rate("fps", fps)
-    source, inside = _parted(Path(path), clip)
+    source, inside = _parted(named, clip)
     if is_gltf(source):
         return load_gltf_clip(source, head, inside)
     if inside is not None:
