@@ -136,6 +136,7 @@ def head(
     check_output(output, (".glb", ".json"), "Choose .glb for a head, .json for the numbers of a person")
     numbers = given(african=african, asian=asian, caucasian=caucasian, sex=sex, age=age)
     numbers |= given(weight=weight, muscle=muscle)
+    resting = parse_weights(expression or [], EXPRESSION)
     person = _person(seed, numbers, parse_weights(target or [], TARGET))
     own = _look(person.look, skin, "--skin"), _look(person.iris, eye, "--eye")
     person = replace(person, skin=own[0], eyes=own[1], hair=_hair(person.hairdo, hair))
@@ -146,7 +147,7 @@ def head(
         made = person.head(layout=layout, **given(subdivide=subdivide))
         made = _with_maps(made, given(colour=colour, normal=normal, roughness=roughness))
         made = with_painted_maps(open_device(adapter), made, size)
-        length = _write(output, person, made, parse_weights(expression or [], EXPRESSION))
+        length = _write(output, person, made, resting)
     _report(output, person, made, as_json, bytes=length, seconds=round(time.perf_counter() - started, 3))
     return 0
 

@@ -112,7 +112,8 @@ class Pose:
         if self.positions_mm is None:
             return rig.positions_mm
         try:
-            places = np.ascontiguousarray(self.positions_mm, np.float32)
+            with np.errstate(over="ignore"):  # what is too large becomes infinite, and is refused below
+                places = np.ascontiguousarray(self.positions_mm, np.float32)
         except (TypeError, ValueError, OverflowError):
             places = np.zeros(0, np.float32)
         expected = (rig.of_file, 3)

@@ -26,6 +26,7 @@ from dermis.human.regions.table import RegionTable
 from dermis.human.regions.zones import REGIONS, Doubles
 from dermis.mesh.head import Head
 from dermis.mesh.maps import load_labels
+from dermis.quantities import numbers
 from dermis.reading import read_text, understood
 from dermis.tables import parse_rows
 
@@ -35,6 +36,7 @@ Places = Mapping[str, Place]
 _FEWEST = 10
 _FLATTEST_MM = 2.0  # root mean square distance from a plane: the warp needs three dimensions
 _FARTHEST_MM = 15.0  # centres of eyes lie this deep; what is farther belongs to another head
+_FARTHEST_AWAY_MM = 1e6
 _SLACK = 1.0  # for places picked by eye; 0 would carry each landmark exactly onto its twin
 
 
@@ -79,10 +81,14 @@ def to_average(head: Head, places: Places, points: Doubles) -> Doubles:
 
 
 def _read(text: str, name: str) -> Places:
-    with understood(name, "rows of landmark,x,y,z", KeyError, TypeError, csv.Error):
-        return {
-            row["landmark"]: (float(row["x"]), float(row["y"]), float(row["z"])) for row in parse_rows(text)
-        }
+    expected = "rows of landmark,x,y,z"
+    with understood(name, expected, KeyError, TypeError, csv.Error):
+        found = {row["landmark"]: tuple(float(row[axis]) for axis in "xyz") for row in parse_rows(text)}
+    if not found:
+        refuse(name, expected, "there are none", "Add them")
+    for landmark, place in found.items():
+        numbers(f"{name}: {landmark}", place, (3,), -_FARTHEST_AWAY_MM, _FARTHEST_AWAY_MM, "mm")
+    return {landmark: (x, y, z) for landmark, (x, y, z) in found.items()}
 
 
 def _check(head: Head, places: Places, average: Places) -> None:
