@@ -45,7 +45,10 @@ def shown_value(value: object, most: int = 60) -> str:
         text = f"{value!r}"
     except Exception:  # a whole number of thousands of digits, say
         return f"something too long to print ({type(value).__name__})"
-    return text if len(text) <= most else f"{text[:most]} ..."
+    if len(text) <= most:
+        return text
+    is_plain = isinstance(value, str | bytes | int | list | tuple | dict)
+    return f"{text[:most]} ..." if is_plain else f"a {type(value).__name__}"
 
 
 def shortened(text: str, most: int) -> str:

@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
-from dermis.errors import DermisError, refuse, shown_value
+from dermis.errors import DermisError, refuse
 
 MOST_TEXT = 1 << 20  # bytes of settings: scenes, lights, tables
 _PAGE = 1 << 16
@@ -93,7 +93,7 @@ def named_path(name: object, expected: str) -> Path:
     DermisError : it is neither a text nor a path
     """
     if not isinstance(name, str | os.PathLike):
-        refuse("file", f"the name of {expected}", f"{shown_value(name)} came", "Write its name")
+        refuse("file", f"the name of {expected}", f"a {type(name).__name__} came", "Write its name")
     return Path(name)
 
 

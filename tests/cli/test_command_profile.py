@@ -234,7 +234,7 @@ def test_lines_are_for_people(run: Run) -> None:
         (["skin1", "--model", "montecarlo", "--photons", "0"], "photons"),
         (["skin1", "--model", "montecarlo", "--photons", "1000", "--seed", "-1"], "seed"),
         (["skin1", "--model", "montecarlo", "--photons", "1000", "--anisotropy", "1"], "cosine"),
-        (["dj3", "--through", "0"], "above 0"),
+        (["dj3", "--through", "0"], "from 1e-06 to 10000"),
         (["dj3", "--through", "thick"], "0.5,1,2"),
         (["dj3", "-o", "own.csv"], ".toml"),
         (["dj3", "--plot", "own.bmp"], ".svg"),

@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from dermis.disk import Arrays, cached_arrays
+from dermis.errors import refuse, shown_value
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.quads import halves, polygons
 from dermis.mesh.rig import Stencils
 from dermis.mesh.subdivision_rules import Cage, catmull_clark_limit, refine_catmull_clark, refine_loop
-from dermis.quantities import whole_number
 
 MAX_LEVELS = 3
 _FORM = "subdivision 1"  # raise when weights or corners change for the same mesh
@@ -52,7 +52,9 @@ def subdivide(mesh: Mesh, levels: int) -> Subdivided:
 
     levels : 0 to 3, each takes four times the triangles
     """
-    whole_number("subdivide", levels, 0, MAX_LEVELS, "each level takes 4x the memory")
+    if not isinstance(levels, int | np.integer) or levels not in range(MAX_LEVELS + 1):
+        came = f"{shown_value(levels)} came"
+        refuse("subdivide", f"0 to {MAX_LEVELS} levels", came, "Each level takes 4x the memory")
     if levels == 0:
         return Subdivided(mesh, None)
     from scipy.sparse import csr_array
