@@ -12,6 +12,7 @@ import pytest
 
 import dermis
 from dermis import Human
+from dermis.human.hair.look import HairLook
 from dermis.human.skin.look import SkinLook
 from dermis.images.codecs import encode_png
 from dermis.mesh.eyes import EyeLook
