@@ -118,7 +118,7 @@ class Pose:
             places = np.zeros(0, np.float32)
         expected = (rig.of_file, 3)
         if places.shape != expected:
-            came = f"{np.shape(self.positions_mm)} came"
+            came = f"{places.shape if places.size else shown_value(self.positions_mm)} came"
             remedy = "Give as many points as Head.positions_mm lists, in its order"
             refuse(f"{culprit}: positions_mm", f"an array of {expected}", came, remedy)
         with np.errstate(invalid="ignore"):

@@ -16,7 +16,7 @@ from dermis.scene.pose import MOST_WEIGHT, Pose
 
 Doubles = NDArray[np.float64]
 
-MOST_CLIP = 64 << 20
+MOST_CLIP = 48 << 20
 """Bytes of a capture's file."""
 MOST_FRAMES, MOST_NAMES = 200_000, 500
 """Rows of a capture, almost an hour at 60 a second, and columns of it."""
