@@ -9,7 +9,8 @@ import pytest
 
 from dermis.errors import DermisError
 from dermis.registry import Named, Registry
-from dermis.scene.plain import ImpossibleError, Plain, choices_of, help_of
+from dermis.scene.findings import ImpossibleError
+from dermis.scene.plain import Plain, choices_of, help_of
 from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES
 

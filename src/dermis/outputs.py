@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NoReturn
 
-from dermis.errors import DermisError, refuse
+from dermis.errors import DermisError, refuse, shown_value
 
 
 def check_output(path: str | Path, suffixes: Sequence[str], advice: str = "Choose one of them") -> Path:
@@ -19,18 +19,20 @@ def check_output(path: str | Path, suffixes: Sequence[str], advice: str = "Choos
 
     Raises DermisError when the name ends otherwise, or when the folder is missing or not writable.
     """
+    if not isinstance(path, str | os.PathLike):
+        refuse("output", "the name of a file", f"{shown_value(path)} came", "Write its name")
     target = Path(path)
     if target.suffix.lower() not in suffixes:
         came = f"its suffix is {target.suffix!r}" if target.suffix else "it has no suffix"
         refuse(path, f"a name that ends in {' or '.join(suffixes)}", came, advice)
-    if not target.parent.is_dir():
-        refuse(path, "a folder that exists", f"there is no folder {target.parent}", "Make it first")
-    if target.exists() and not target.is_file():
-        refuse(path, "a file or a free name", "something else has this name", "Choose another name")
     trial = _temporary_name(target)
     try:
+        if not target.parent.is_dir():
+            refuse(path, "a folder that exists", f"there is no folder {target.parent}", "Make it first")
+        if target.exists() and not target.is_file():
+            refuse(path, "a file or a free name", "something else has this name", "Choose another name")
         trial.touch()
-    except OSError as fault:
+    except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
         refuse_output(path, fault)
     finally:  # also when interrupted in between
         with suppress(OSError):
@@ -41,7 +43,10 @@ def check_output(path: str | Path, suffixes: Sequence[str], advice: str = "Choos
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
     """A name in the same folder, moved to `path` when all went well and removed when not."""
-    target = Path(os.path.realpath(path))
+    try:
+        target = Path(os.path.realpath(path))
+    except ValueError as fault:  # a NUL in the name
+        refuse_output(path, fault)
     temporary = _temporary_name(target)
     try:
         yield temporary

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import stat
 import struct
 import tomllib
@@ -21,8 +22,14 @@ from dermis.errors import DermisError, refuse
 
 BROKEN = (LookupError, TypeError, AttributeError, ArithmeticError, struct.error)
 """What code raises that trusts the form of what it is given, see `understood`."""
-MOST_TEXT = 4 << 20  # bytes of settings: scenes, lights, tables
+MOST_TEXT = 1 << 20  # bytes of settings: scenes, lights, tables
 _PAGE = 1 << 16
+_MOST_BITS = 64  # of a whole number, as in TOML; any of them is a float as well
+_DEEPEST = 32  # parts of a key with dots: the parser's time grows with their square
+_DEEP = re.compile(
+    r"""(?<![\w\\-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
+    f"{{{_DEEPEST}}}"
+)
 _NONBLOCKING = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
 
 
@@ -40,7 +47,7 @@ def read_file(path: str | Path, expected: str, most: int, name: object = None) -
             told = os.fstat(file.fileno()).st_size
             most_now = min(most, max(told, _PAGE))  # a file of the system tells no size
             data = file.read(most_now + 1) if told <= most else b""
-    except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
+    except (OSError, ValueError, TypeError) as fault:  # a NUL in the name; what is no name
         reason = getattr(fault, "strerror", None) or str(fault)
         refuse(culprit, expected, f"it cannot be read ({reason})", "Check its name")
     if max(told, len(data)) > most:
@@ -75,7 +82,11 @@ def read_toml(path: str | Path, expected: str = "a TOML file") -> dict[str, Any]
     """
     text = read_text(path, expected)
     with understood(path, expected):
-        return tomllib.loads(text)
+        if _DEEP.search(text):
+            raise ValueError(f"a key has more than {_DEEPEST} parts with dots between them")
+        tables = tomllib.loads(text)
+        _check_whole_numbers(tables)
+    return tables
 
 
 def parse_json(text: str | bytes, culprit: object, expected: str) -> Any:
@@ -84,7 +95,17 @@ def parse_json(text: str | bytes, culprit: object, expected: str) -> Any:
     DermisError : it is not JSON, nested too deeply, or holds a number beyond floats
     """
     with understood(culprit, expected):
-        return json.loads(text, parse_constant=_no_number, parse_float=_finite)
+        return json.loads(text, parse_constant=_no_number, parse_float=_finite, parse_int=_whole)
+
+
+def named_path(name: object, expected: str) -> Path:
+    """The path of a name.
+
+    DermisError : it is neither a text nor a path
+    """
+    if not isinstance(name, str | os.PathLike):
+        refuse("file", f"the name of {expected}", f"a {type(name).__name__} came", "Write its name")
+    return Path(name)
 
 
 @contextmanager
@@ -121,6 +142,25 @@ def _finite(text: str) -> float:
     if not math.isfinite(number):
         raise ValueError(f"{text[:20]} is beyond what a number may be")
     return number
+
+
+def _whole(text: str) -> int:
+    number = int(text)
+    if number.bit_length() > _MOST_BITS:
+        raise ValueError(f"{text[:20]}... is beyond what a whole number may be")
+    return number
+
+
+def _check_whole_numbers(tables: dict[str, Any]) -> None:
+    waiting: list[Any] = [tables]
+    while waiting:
+        value = waiting.pop()
+        if isinstance(value, dict):
+            waiting.extend(value.values())
+        elif isinstance(value, list):
+            waiting.extend(value)
+        elif isinstance(value, int) and value.bit_length() > _MOST_BITS:
+            raise ValueError(f"a whole number has {value.bit_length()} bits, more than {_MOST_BITS}")
 
 
 def _no_number(text: str) -> NoReturn:

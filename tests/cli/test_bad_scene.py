@@ -13,7 +13,7 @@ SCENE = '[head]\nname = "head.obj"\n'
 SCENES = {
     "no scene": (None, "scene.toml", "No such file"),
     "not TOML": ("head == 5", "scene.toml", "line 1"),
-    "not text": ("\udcff", "scene.toml", "not TOML"),
+    "not text": ("\udcff", "scene.toml", "cannot be understood"),
     "no head": ("[skin]\n", "scene.toml: head", "there is none"),
     "head without name": ("[head]\n", "scene.toml: head", "there is none"),
     "head's name a number": ("[head]\nname = 5", "scene.toml: head", "5 came"),

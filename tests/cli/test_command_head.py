@@ -12,6 +12,7 @@ import pytest
 
 import dermis
 from dermis import Human
+from dermis.human.hair.look import HairLook
 from dermis.human.skin.look import SkinLook
 from dermis.images.codecs import encode_png
 from dermis.mesh.eyes import EyeLook
@@ -37,7 +38,8 @@ def test_writes_a_person_that_renders(run: Run, render: Run, folder: Path) -> No
     assert report["person"]["age"] == 70 and report["person"]["sex"] == drawn.sex
     assert report["person"]["targets"] == {**drawn.targets, "nose/nose-hump-incr": 0.5}
     told = report["person"]
-    person = Human(**told | {"skin": SkinLook(**told["skin"]), "eyes": EyeLook(**told["eyes"])})
+    looks = {"skin": SkinLook(**told["skin"]), "eyes": EyeLook(**told["eyes"])}
+    person = Human(**told | looks | {"hair": HairLook(**told["hair"])})
     assert person.look == drawn.look
     assert same_shape(load_head(folder / "own.glb", eyes="plain"), person) and not same_shape(
         load_head(folder / "own.glb", eyes="plain"), drawn

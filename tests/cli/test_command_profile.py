@@ -234,7 +234,7 @@ def test_lines_are_for_people(run: Run) -> None:
         (["skin1", "--model", "montecarlo", "--photons", "0"], "photons"),
         (["skin1", "--model", "montecarlo", "--photons", "1000", "--seed", "-1"], "seed"),
         (["skin1", "--model", "montecarlo", "--photons", "1000", "--anisotropy", "1"], "cosine"),
-        (["dj3", "--through", "0"], "above 0"),
+        (["dj3", "--through", "0"], "from 1e-06 to 10000"),
         (["dj3", "--through", "thick"], "0.5,1,2"),
         (["dj3", "-o", "own.csv"], ".toml"),
         (["dj3", "--plot", "own.bmp"], ".svg"),
@@ -243,12 +243,12 @@ def test_lines_are_for_people(run: Run) -> None:
         (["gpu-gems-3", "--check", "--plot", "own.png"], "--check"),
         (["dj3", "-o", "own.toml", "--plot", "own.png", "--check", "--photons", "0"], "photons"),
         (["own.csv"], "no such file"),
-        (["endless.csv"], "more than 1,000,000 letters"),
+        (["endless.csv"], "at most 1.0 MB"),
         (["a" * 5000], "no such file"),
     ],
 )
 def test_refusals(run: Run, folder: Path, words: list[str], complaint: str) -> None:
-    (folder / "endless.csv").write_bytes(b"0" * 1_000_001)
+    (folder / "endless.csv").write_bytes(b"0" * ((1 << 20) + 1))
     before = sorted(folder.iterdir())
     ended = run("profile", *words)
     assert (ended.code, ended.stdout) == (2, ""), ended.stdout

@@ -68,10 +68,10 @@ def test_options_are_laid_over_a_scenes_pose(face: str) -> None:
         ("--pose jawOpen", "--pose: expected NAME=WEIGHT"),
         ("--pose jawOpen=wide", "'jawOpen=wide' came"),
         ("--pose =1", "'=1' came"),
-        ("--pose jawOpen=nan", "nan came"),
+        ("--pose jawOpen=nan", "jawOpen=nan' came"),
         ("--pose jawOpen=1e9", "from -100 to 100"),
         ("--bone head=1,2", "--bone: expected NAME=X,Y,Z"),
-        ("--bone head=1,2,inf", "all of them finite"),
+        ("--bone head=1,2,inf", "three angles in degrees"),
     ],
 )
 def test_what_is_no_pose(render: Run, face: str, words: str, says: str) -> None:

@@ -160,7 +160,7 @@ def test_it_is_loaded_by_name(head: Head) -> None:
         ({"age": 20}, "age: expected a number from 25 to 90, but 20 came"),
         ({"sex": float("nan")}, "sex: expected a number"),
         ({"african": 0, "asian": 0, "caucasian": 0}, "ancestry: expected a share"),
-        ({"targets": {"nose/nose-hump-incr": 9.0}}, "expected a weight from -2 to 2"),
+        ({"targets": {"nose/nose-hump-incr": 9.0}}, "expected a number from -2 to 2"),
     ],
 )
 def test_what_cannot_be_is_refused(fields: dict[str, object], message: str) -> None:

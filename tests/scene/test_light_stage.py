@@ -35,5 +35,5 @@ def test_weights_are_the_light_from_the_turned_surroundings(tmp_path: Path) -> N
 
 
 def test_less_than_one_light_is_refused() -> None:
-    with pytest.raises(DermisError, match="light stage: expected at least one light, but 0 came"):
+    with pytest.raises(DermisError, match="light stage: expected a whole number from 1"):
         light_stage(0)

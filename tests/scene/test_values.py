@@ -9,7 +9,7 @@ import pytest
 
 from dermis.errors import DermisError
 from dermis.scene import Camera, DirectionalLight, Environment, PointLight, Settings, Skin, SpotLight
-from dermis.scene.plain import ImpossibleError
+from dermis.scene.findings import ImpossibleError
 
 FORM = re.compile(r"\w+: (\S+: )?expected .+, but .+\. Correct it\.")
 BAD = [
@@ -19,7 +19,7 @@ BAD = [
     (Skin, {"rho_s": -0.1}, "-0.1 came"),
     (Skin, {"albedo": "both"}, "'map' or 'profile'"),
     (Skin, {"colour": 1}, "one of profile, albedo, mix"),
-    (Settings, {"size": (0, 64)}, "size.0: expected a number greater than or equal to 1"),
+    (Settings, {"size": (0, 64)}, "size.0: expected a whole number from 1 to 16384 (pixels"),
     (Settings, {"size": (64,)}, "size.1"),
     (Settings, {"size": (64, 64, 64)}, "2 items"),
     (Settings, {"size": (16384, 16384), "samples": 2}, "134 million"),
@@ -28,7 +28,11 @@ BAD = [
     (Settings, {"samples": 65}, "65 came"),
     (Settings, {"exposure": 0}, "0 came"),
     (Settings, {"exposure": float("inf")}, "inf came"),
-    (Settings, {"exposure": "bright"}, "expected auto or a valid number, but 'bright' came"),
+    (
+        Settings,
+        {"exposure": "bright"},
+        "auto or a number from 1e-06 to 1000000 (20 stops either way), but 'bright'",
+    ),
     (Settings, {"background": (0, 0, -1)}, "background.2"),
     (Settings, {"background": "#12345"}, "none, gradient, environment or a colour: three linear numbers"),
     (Settings, {"background_blur": 2}, "2 came"),

@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 
 def print_json(value: Any) -> None:
-    """One JSON value and nothing else on stdout."""
-    print_lines(json.dumps(value, indent=2))
+    """One JSON value and nothing else on stdout; numbers that JSON cannot have, such as NaN, are null."""
+    print_lines(json.dumps(_finite(value), indent=2, allow_nan=False))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _finite(one) for name, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def print_lines(*lines: str) -> None:

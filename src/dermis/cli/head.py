@@ -136,6 +136,7 @@ def head(
     check_output(output, (".glb", ".json"), "Choose .glb for a head, .json for the numbers of a person")
     numbers = given(african=african, asian=asian, caucasian=caucasian, sex=sex, age=age)
     numbers |= given(weight=weight, muscle=muscle)
+    resting = parse_weights(expression or [], EXPRESSION)
     person = _person(seed, numbers, parse_weights(target or [], TARGET))
     own = _look(person.look, skin, "--skin"), _look(person.iris, eye, "--eye")
     person = replace(person, skin=own[0], eyes=own[1], hair=_hair(person.hairdo, hair))
@@ -146,7 +147,7 @@ def head(
         made = person.head(layout=layout, **given(subdivide=subdivide))
         made = _with_maps(made, given(colour=colour, normal=normal, roughness=roughness))
         made = on_device(adapter, lambda device: with_painted_maps(device, made, size))
-        length = _write(output, person, made, parse_weights(expression or [], EXPRESSION))
+        length = _write(output, person, made, resting)
     _report(output, person, made, as_json, bytes=length, seconds=round(time.perf_counter() - started, 3))
     return 0
 
@@ -167,8 +168,8 @@ def _look(usual: L, words: list[str] | None, option: str) -> L:
         if name not in known:
             refuse(option, f"names of {', '.join(known)}", f"{name!r} came", "Correct it")
     numbers: dict[str, Any] = dict(chosen)
-    if "seed" in numbers and numbers["seed"] == int(numbers["seed"]):
-        numbers["seed"] = int(numbers["seed"])
+    if (seed := chosen.get("seed")) is not None and seed.is_integer():
+        numbers["seed"] = int(seed)
     return replace(usual, **numbers)
 
 

@@ -15,13 +15,16 @@ from cyclopts.exceptions import (
     UnusedCliTokensError,
 )
 
+from dermis.errors import shortened, shown_value
+
+_LONGEST = 400  # letters
 _TYPES = {float: "a number", int: "a whole number", NoneType: ""}
 
 
 def explain(error: CycloptsError) -> str:
     """What was expected on the command line, what came, and where to read on."""
     command = " ".join(("dermis", *(error.command_chain or ())))
-    culprit, expected, came = _finding(error, command)
+    culprit, expected, came = (shortened(part, _LONGEST) for part in _finding(error, command))
     error.verbose = False
     hint = str(error).partition("Did you mean ")[2]
     did_you_mean = f"Did you mean {hint} " if hint else ""
@@ -36,7 +39,7 @@ def _finding(error: CycloptsError, command: str) -> tuple[str, str, str]:
             return error.token.keyword or error.token.value, f"an option of {command}", "it has none so named"
         case CoercionError():
             value = error.token.value if error.token else "something else"
-            return _name(error), _wanted(error.target_type), f"{value!r} came"
+            return _name(error), _wanted(error.target_type), f"{shown_value(value)} came"
         case MissingArgumentError():
             return error.keyword or _name(error), "a value", "there is none"
         case RepeatArgumentError():

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dermis.errors import refuse
+from dermis.quantities import number
 
 if TYPE_CHECKING:
     from dermis.mesh.head import Head
@@ -54,14 +55,15 @@ class Span:
 def parse_span(begin: float | None, end: float | None, fps: str | None, own_rate: float | None) -> Span:
     """The span that was typed."""
     from dermis.images.movie import exact_rate
+    from dermis.scene.clips.clip import LONGEST_S, check_rate
 
     for option, seconds in (("--from", begin), ("--to", end)):
-        if seconds is not None and not 0 <= seconds < math.inf:
-            refuse(option, "seconds from 0 on", f"{seconds} came", "Correct it")
+        if seconds is not None:
+            number(option, seconds, 0.0, LONGEST_S, "s")
     if end is not None and end <= (begin or 0):
         refuse("--to", f"a time after --from ({begin or 0:g} s)", f"{end:g} s came", "Correct one of them")
-    if own_rate is not None and not 0 < own_rate < math.inf:
-        refuse("--motion-fps", "a number of frames a second above 0", f"{own_rate} came", "Correct it")
+    if own_rate is not None:
+        check_rate("--motion-fps", own_rate)
     # as written: the float nearest to 0.1 lies after frame 3 of 30
     exact = [None if seconds is None else Fraction(str(seconds)) for seconds in (begin, end)]
     return Span(exact[0], exact[1], None if fps is None else exact_rate(fps, "--fps"), own_rate)

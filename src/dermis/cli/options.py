@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict, get_args
 from cyclopts import Parameter, Token
 
 from dermis.errors import DermisError, refuse
+from dermis.quantities import number
 
 if TYPE_CHECKING:
     from dermis.scene.plain import Plain
@@ -33,6 +34,7 @@ Json = Annotated[
 ]
 Adapter = Annotated[str, Parameter(help="auto (the best), cpu (software), or a part of an adapter's name.")]
 Output = Annotated[Path | None, Parameter(name=("--output", "-o"))]
+_LENGTHS_MM = 1e-6, 1e4
 NOTHING: dict[str, Any] = {}
 """Options of a model when none is given."""
 # cyclopts itself would round 64.5.
@@ -83,7 +85,8 @@ def is_option(model: type[Plain], field: str) -> bool:
 
 def _kind(model: type[Plain], field: str) -> tuple[Any, dict[str, Any]]:
     """What cyclopts takes a field's words for, and how it makes the value of them; None for no option."""
-    from dermis.scene.plain import choices_of, words_of
+    from dermis.scene.findings import words_of
+    from dermis.scene.plain import choices_of
 
     if choices := choices_of(model, field):
         return Literal[choices], {}
@@ -111,7 +114,8 @@ def _kind(model: type[Plain], field: str) -> tuple[Any, dict[str, Any]]:
 
 def _help(model: type[Plain], field: str, defaults: Mapping[str, Any]) -> str:
     """A field's help with its bounds, where they say something, and its default."""
-    from dermis.scene.plain import choices_of, help_of, shown, values_of, words_of
+    from dermis.scene.findings import words_of
+    from dermis.scene.plain import choices_of, help_of, shown, values_of
 
     text = help_of(model, field)
     worded = choices_of(model, field) or words_of(model, field)  # which cyclopts adds itself
@@ -127,7 +131,7 @@ def check(model: type[Plain], values: Mapping[str, Any], names: Mapping[str, str
     values : by field
     names : options by field, where they are not called like it
     """
-    from dermis.scene.plain import ImpossibleError
+    from dermis.scene.findings import ImpossibleError
 
     try:
         model(**values)
@@ -167,6 +171,4 @@ def parse_lengths(option: str, text: str) -> tuple[float, ...]:
         lengths = tuple(float(part) for part in text.split(","))
     except ValueError:
         refuse(option, "lengths in mm, such as 0.5,1,2", f"{text!r} came", "Write numbers with commas")
-    if not all(0.0 < length < 1e6 for length in lengths):
-        refuse(option, "lengths above 0 mm", f"{text!r} came", "Correct them")
-    return lengths
+    return tuple(number(option, length, *_LENGTHS_MM, "mm") for length in lengths)

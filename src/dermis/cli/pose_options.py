@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from dermis.scene.model import Scene
     from dermis.scene.pose import Pose
 
+_FARTHEST = 1e10
 POSE, BONE, LOOK_AT = "--pose", "--bone", "--look-at"
 Weights = Annotated[
     list[str] | None,
@@ -114,7 +115,9 @@ def gaze_given(words: str, scene: Scene) -> Pose:
 
 
 def _numbers(text: str) -> list[float] | None:
+    """The numbers between commas; None where one is none, or beyond all of them."""
     try:
-        return [float(part) for part in text.split(",")]
+        found = [float(part) for part in text.split(",")]
     except ValueError:
         return None
+    return found if all(abs(one) <= _FARTHEST for one in found) else None

@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from dermis.cli.console import note, print_json, print_lines, progress
 from dermis.cli.options import NOTHING, Json, Output, Whole, option_name, options_of, parse_lengths
 from dermis.errors import refuse
+from dermis.quantities import number, whole_number
 from dermis.scene.skin import Pigments
 
 _NAMES = {"structure": "skin"}
@@ -26,7 +27,7 @@ else:
 Model = Literal["dipole", "better-dipole", "multipole", "layered", "layered-point", "montecarlo"]
 Flag = Annotated[bool, Parameter(negative="")]
 
-_TERMS, _PHOTONS = 6, 1_000_000
+_TERMS, _PHOTONS, _MOST_PHOTONS = 6, 1_000_000, 10**10
 
 
 def profile(
@@ -155,7 +156,11 @@ def _light(photons: int | None, seed: int | None, anisotropy: float, traced: boo
     """What to trace, with a note when nothing is going to be traced."""
     if not traced and (photons, seed, anisotropy) != (None, None, 0.0):
         note("note: no photons are traced without --model montecarlo or --check")
-    return {"photons": _PHOTONS if photons is None else photons, "seed": seed or 0, "g": anisotropy}
+    return {
+        "photons": whole_number("--photons", _PHOTONS if photons is None else photons, 1, _MOST_PHOTONS),
+        "seed": whole_number("--seed", seed or 0, 0, 2**63 - 1),
+        "g": number("--anisotropy", anisotropy, -1.0, 1.0, "a mean cosine"),
+    }
 
 
 def _refuse_tissue_options(name: str, given: dict[str, Any]) -> None:

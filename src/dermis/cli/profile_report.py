@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from dermis.cli.profile_values import finite, plain, row
+from dermis.cli.profile_values import plain, row
 from dermis.optics.diffusion.models import through_gaussians
 from dermis.optics.fits.gaussian import GaussianFit, fit_gaussians
 
@@ -193,7 +193,7 @@ class Report:
         found: dict[str, Any] = {
             "eta": medium.eta,
             "layers": [layer.name for layer in medium.layers],
-            "thickness_mm": [finite(layer.thickness_mm) for layer in medium.layers],
+            "thickness_mm": [layer.thickness_mm for layer in medium.layers],
             "mean_free_path_mm": [layer.mean_free_path_mm for layer in medium.layers],
             "absorption_per_mm": [layer.sigma_a for layer in medium.layers],
             "scattering_per_mm": [layer.sigma_s_prime for layer in medium.layers],

@@ -15,11 +15,6 @@ def row(values: Floats) -> str:
     return " ".join(f"{value:7.4f}" for value in values)
 
 
-def finite(value: float) -> float | None:
-    """A number, None where it is none."""
-    return value if np.isfinite(value) else None
-
-
 def plain(value: Any) -> Any:
     """Arrays as lists, without what is None."""
     if isinstance(value, np.ndarray):

@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.errors import refuse, shown_value
 from dermis.frame.frame import draw_frame
 from dermis.frame.inputs import Inputs
 from dermis.frame.passes import pack, warm_up
@@ -23,12 +23,14 @@ from dermis.gpu import Device, Frame, Graph, open_device
 from dermis.gpu.failures import KeptOpen
 from dermis.gpu.frame import Timed
 from dermis.mesh.head import Head
-from dermis.scene.given import given_plain, shown_value
+from dermis.quantities import whole_number
+from dermis.scene.given import given_plain
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES
 
 T = TypeVar("T")
+_DEEPEST = 1000
 _WARMING_FRAMES = 100
 _IN_FLIGHT = 3  # frames submitted and not done: Python and the device overlap, with little latency
 
@@ -47,7 +49,10 @@ class Renderer:
     graph: Graph
 
     def __init__(self, adapter: str = "auto", depth: int = 1, *, reopens: bool = True) -> None:
-        self._adapter, self._depth, self._opening_ms = adapter, depth, 0.0
+        if not isinstance(adapter, str):
+            refuse("adapter", "its name", f"{shown_value(adapter)} came", "Write auto, cpu or a part of it")
+        self._depth = whole_number("depth", depth, 1, _DEEPEST)
+        self._adapter, self._opening_ms = adapter, 0.0
         self._last: Shown | None = None
         self._in_flight: deque[int] = deque()
         self.kept_open = KeptOpen(self._open, self._adopt, reopens=reopens)

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from numbers import Integral
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.usual import drawn_hair, shaved_shows, usual_hair, usual_recession
 from dermis.human.published import OLD, YOUNG, human_targets
 from dermis.human.skin.look import SkinLook
 from dermis.human.skin.usual import Origin, drawn_eyes, drawn_look
+from dermis.quantities import whole_number
 
 _MOST_SEED = 2**32 - 1
 _BEARDED = 0.6  # shadow of shaved hair below a beard
@@ -44,9 +43,7 @@ _MOST_SHAPE = 0.3
 
 def drawn(seed: int) -> dict[str, Any]:
     """The fields of `Human`, see `Human.drawn`."""
-    if not isinstance(seed, Integral) or not 0 <= seed <= _MOST_SEED:
-        refuse("seed", f"a whole number from 0 to {_MOST_SEED}", f"{seed!r} came", "Choose within")
-    rng = np.random.default_rng(int(seed))
+    rng = np.random.default_rng(whole_number("seed", seed, 0, _MOST_SEED))
     african, asian, caucasian = rng.dirichlet((_ALIKE,) * 3)
     sex = min(abs(rng.normal(0.0, _BETWEEN)), 0.3)
     sex = 1.0 - sex if rng.random() < 0.5 else sex

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.errors import refuse, shown_value
 from dermis.human.drawing import drawn
 from dermis.human.hair.groom import groomed
 from dermis.human.hair.look import HairLook
@@ -24,6 +24,7 @@ from dermis.mesh.eyes import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.subdivide import subdivide_head
+from dermis.quantities import check_numbers, number
 
 _RANGES = {
     "african": (0.0, 1.0),
@@ -36,7 +37,7 @@ _RANGES = {
     "hair_eumelanin": (0.0, 10.0),
     "hair_pheomelanin": (0.0, 10.0),
 }
-_MOST_WEIGHT = 2.0  # of a published target: what lies beyond is no face
+_MOST_WEIGHT = 2.0  # of a published target
 _NONE: Mapping[str, float] = MappingProxyType({})
 
 
@@ -71,21 +72,19 @@ class Human:
     hair: HairLook | None = None
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            if one.name in _RANGES:
-                low, high = _RANGES[one.name]
-                value = getattr(self, one.name)
-                if not isinstance(value, int | float | np.number) or not low <= value <= high:
-                    refuse(one.name, f"a number from {low:g} to {high:g}", f"{value!r} came", "Choose within")
+        check_numbers(self, _RANGES)
         if not self.african + self.asian + self.caucasian > 0:
             refuse("ancestry", "a share of african, asian or caucasian", "all are 0", "Raise one")
         if not isinstance(self.targets, Mapping):
-            expected, came = "weights of targets by name", f"{self.targets!r:.60} came"
+            expected, came = "weights of targets by name", f"{shown_value(self.targets)} came"
             refuse("targets", expected, came, 'Write targets={"nose/nose-hump-incr": 0.5}')
         for name, weight in self.targets.items():
-            if not (math.isfinite(weight) and abs(weight) <= _MOST_WEIGHT):
-                expected = f"a weight from {-_MOST_WEIGHT:g} to {_MOST_WEIGHT:g}"
-                refuse(f"target {name!r}", expected, f"{weight!r} came", "Choose within")
+            if not isinstance(name, str):
+                refuse("targets", "names", f"{shown_value(name)} came", "See human_targets()")
+            number(f"target {name!r}", weight, -_MOST_WEIGHT, _MOST_WEIGHT, "what lies beyond is no face")
+        for name, kind in (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook)):
+            if not isinstance(look := getattr(self, name), kind | None):
+                refuse(name, f"a {kind.__name__}", f"{shown_value(look)} came", "Make one, or leave it out")
 
     @classmethod
     def drawn(cls, seed: int) -> Human:
@@ -106,6 +105,9 @@ class Human:
 
         Raises DermisError for targets that nobody knows.
         """
+        if layout not in get_args(Layout):
+            came = f"{shown_value(layout)} came"
+            refuse("layout", f"one of {', '.join(get_args(Layout))}", came, "Choose one")
         painted = maps or PaintedMaps(look=self.look)
         plain = human_head(self.weights(), painted, layout, self.iris)
         head = subdivide_head(plain, subdivide)
@@ -166,6 +168,8 @@ class Human:
         """Weights of published targets by name, those of 0 left out."""
         found = {**self._ancestry(), **self._build()}
         for name, weight in self.targets.items():
+            if not isinstance(name, str):
+                refuse("targets", "names", f"{shown_value(name)} came", "See human_targets()")
             found[name] = found.get(name, 0.0) + weight
         return {name: weight for name, weight in found.items() if weight}
 

@@ -8,14 +8,14 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dermis.errors import refuse
+from dermis.errors import DermisError, refuse, shown_value
 from dermis.human.hair.look import HairLook
 from dermis.human.person import Human
 from dermis.human.skin.look import SkinLook
 from dermis.mesh.eyes import EyeLook
 from dermis.outputs import replacing
+from dermis.reading import parse_json, read_text
 
-_LARGEST = 1 << 20  # bytes
 T = TypeVar("T", Human, SkinLook, EyeLook, HairLook)
 
 
@@ -40,14 +40,7 @@ def read_person(path: Path) -> Human:
     Raises DermisError for files that are none, and for numbers that cannot be.
     """
     expected = 'JSON with the numbers of a person under "person"'
-    try:
-        if path.stat().st_size > _LARGEST:
-            refuse(
-                path, expected, "it is larger than a megabyte", "Write one with dermis head -o person.json"
-            )
-        told = json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError, RecursionError) as fault:
-        refuse(path, expected, f"it cannot be read ({str(fault)[:80]})", "Write one with dermis head")
+    told = parse_json(read_text(path, expected), path, expected)
     person = told.get("person") if isinstance(told, dict) else None
     if not isinstance(person, dict):
         refuse(path, expected, "there is none", "Write one with dermis head -o person.json")
@@ -60,11 +53,12 @@ def _made(path: Path, kind: type[T], numbers: Any) -> T:
     """A dataclass of plain numbers."""
     known = [one.name for one in fields(kind)]
     if not isinstance(numbers, Mapping):
-        refuse(path, f"numbers of {', '.join(known)}", f"{numbers!r:.40} came", "Correct it there")
+        came = f"{shown_value(numbers)} came"
+        refuse(path, f"numbers of {', '.join(known)}", came, "Correct it there")
     for name in numbers:
         if name not in known:
-            refuse(path, f"names of {', '.join(known)}", f"{name!r:.40} came", "Correct it there")
+            refuse(path, f"names of {', '.join(known)}", f"{shown_value(name)} came", "Correct it there")
     try:
         return kind(**numbers)
-    except (TypeError, ValueError, AttributeError, OverflowError) as fault:
-        refuse(path, "plain numbers", f"one is none ({str(fault)[:80]})", "Correct it there")
+    except DermisError as fault:
+        raise DermisError(f"{path}: {fault}") from None

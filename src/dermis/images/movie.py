@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -15,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis import outputs
-from dermis.errors import refuse
+from dermis.errors import refuse, shown_value
 from dermis.extras import needed
+from dermis.quantities import numbers, whole_number
 
 SUFFIX = ".mp4"
 DEFAULT_CRF = 18
@@ -24,8 +26,10 @@ DEFAULT_CRF = 18
 _WORST_CRF, _ENCODER, _EFFORT = 51, "libx264", "medium"
 _BT709, _LIMITED = 1, 1  # H.264's numbers for primaries, transfer and matrix; for levels from 16 to 235
 _WAITING = 8
+_MOST_PIXELS = 1 << 14  # along a side, as of H.264
 _NTSC = tuple(Fraction(1000 * whole, 1001) for whole in (24, 30, 48, 60, 120))
 _NEAR_NTSC = Fraction(5, 1000)
+_RATE = re.compile(r"\d{1,9}(\.\d{1,20})?(/\d{1,9}|e[-+]?\d{1,2})?")  # of a few digits: exponents are powers
 _FASTEST, _FINEST = 1000, 1001
 
 
@@ -36,13 +40,14 @@ def exact_rate(given: str | float | Fraction, culprit: object = "rate") -> Fract
 
     Raises DermisError for what is no rate up to 1000.
     """
+    text = str(given).strip() if isinstance(given, str | float | Fraction) else shown_value(given)
     try:
-        rate = Fraction(str(given).strip())
+        rate = Fraction(text if _RATE.fullmatch(text) else 0)
     except (ValueError, ZeroDivisionError):
         rate = Fraction(0)
     if not 0 < rate <= _FASTEST:
         expected = f"frames a second up to {_FASTEST}, such as 30, 23.976 or 24000/1001"
-        refuse(culprit, expected, f"{str(given)!r} came", "Correct it")
+        refuse(culprit, expected, f"{shown_value(text)} came", "Correct it")
     near = min(_NTSC, key=lambda ntsc: abs(ntsc - rate))
     rate = near if abs(near - rate) < _NEAR_NTSC else rate.limit_denominator(_FINEST)
     return max(rate, Fraction(1, _FINEST))
@@ -54,12 +59,12 @@ def check_movie(path: str | Path, size: tuple[int, int], crf: int = DEFAULT_CRF)
     DermisError : the path cannot be written to, a side is odd, the factor is none, or there is no encoder
     """
     target = outputs.check_output(path, (SUFFIX,), f"Give it the suffix {SUFFIX}")
+    numbers("--size", size, (2,), 1, _MOST_PIXELS, "pixels")
     if size[0] % 2 or size[1] % 2:
         even = f"{size[0] + size[0] % 2}x{size[1] + size[1] % 2}"
         came = f"{size[0]}x{size[1]} came"
         refuse("--size", f"even sides, which {SUFFIX} needs", came, f"Take {even}, or write frames/%05d.png")
-    if not 0 <= crf <= _WORST_CRF:
-        refuse("--crf", f"0 (without loss) to {_WORST_CRF}", f"{crf} came", f"Take {DEFAULT_CRF}")
+    whole_number("--crf", crf, 0, _WORST_CRF, f"0 without loss, {DEFAULT_CRF} as usual")
     _check_encoder(path)
     return target
 

@@ -7,13 +7,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
 from dermis.mesh.eyeball import SCLERA_MM, apex_mm
 from dermis.mesh.rig import Motion, Rig
+from dermis.quantities import check_numbers
 
 Doubles = NDArray[np.float64]
 
 PUPIL_MM = 1.0, 4.0
+_RANGES = {
+    "eumelanin": (0.0, 1.0),
+    "pupil_mm": PUPIL_MM,
+    "redness": (0.0, 1.0),
+    "seed": (0, 2**32 - 1),
+}
 
 
 @dataclass(frozen=True)
@@ -32,18 +38,7 @@ class EyeLook:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        limits = {
-            "eumelanin": (0.0, 1.0),
-            "pupil_mm": PUPIL_MM,
-            "redness": (0.0, 1.0),
-            "seed": (0, 2**32 - 1),
-        }
-        for name, (low, high) in limits.items():
-            value = getattr(self, name)
-            if not low <= value <= high or (name == "seed" and value != int(value)):
-                refuse(
-                    f"eyes: {name}", f"a number from {low:g} to {high:g}", f"{value!r} came", "Choose within"
-                )
+        check_numbers(self, _RANGES, "eyes: ")
 
 
 @dataclass(frozen=True)

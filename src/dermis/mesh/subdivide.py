@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dermis.disk import Arrays, cached_arrays
-from dermis.errors import refuse
+from dermis.errors import refuse, shown_value
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
@@ -53,7 +53,8 @@ def subdivide(mesh: Mesh, levels: int) -> Subdivided:
     levels : 0 to 3, each takes four times the triangles
     """
     if not isinstance(levels, int | np.integer) or levels not in range(MAX_LEVELS + 1):
-        refuse("subdivide", f"0 to {MAX_LEVELS} levels", f"{levels} came", "Each level takes 4x the memory")
+        came = f"{shown_value(levels)} came"
+        refuse("subdivide", f"0 to {MAX_LEVELS} levels", came, "Each level takes 4x the memory")
     if levels == 0:
         return Subdivided(mesh, None)
     from scipy.sparse import csr_array

@@ -14,6 +14,9 @@ MOST_GAUSSIANS = 24
 """As many as a frame sums: eight for each of three channels."""
 
 WIDEST_MM2 = 1e4
+MOST_WEIGHT = 100.0
+_NARROWEST_MM2 = 1e-12  # a nanometre, far below light's wavelengths
+_DARKEST = 1e-12  # of a channel's light: single precision divides by it
 _MEND = "Correct the profile's table"
 
 
@@ -43,10 +46,14 @@ class GaussianSum:
         if len(variance) > MOST_GAUSSIANS or variance.max() > WIDEST_MM2:
             limit = f"at most {MOST_GAUSSIANS} Gaussians of up to {WIDEST_MM2:g} mm2"
             refuse(self.name, limit, f"{len(variance)} up to {variance.max():g} came", _MEND)
-        if (variance <= 0).any() or (np.diff(variance) <= 0).any():
-            refuse(self.name, "variances above 0 that increase", f"they are {variance.tolist()}", _MEND)
-        if (weight < 0).any() or (weight.sum(axis=0) <= 0).any():
+        if (variance < _NARROWEST_MM2).any() or (np.diff(variance) <= 0).any():
+            expected = f"variances from {_NARROWEST_MM2:g} mm2 that increase"
+            refuse(self.name, expected, f"they are {variance.tolist()}", _MEND)
+        if (weight < 0).any() or (weight.sum(axis=0) < _DARKEST).any():
             refuse(self.name, "weights of 0 or more, some above 0 in each channel", "they are not", _MEND)
+        if weight.max() > MOST_WEIGHT:
+            came = f"{weight.max():g} came"
+            refuse(self.name, f"weights up to {MOST_WEIGHT:g}, for they are shares of light", came, _MEND)
 
     @property
     def albedo(self) -> Floats:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
+from dermis.quantities import number, numbers
 from dermis.tables import read_rows
 
 Floats = NDArray[np.float64]
@@ -25,7 +25,9 @@ _DJ3_NOTE = (
     "travel 0.02083 mm between events in the epidermis and nearly all of it would leave within 0.1 mm. The "
     "published sum of six Gaussians follows from neither reading: it is the preset gpu-gems-3"
 )
-_MOST_LETTERS = 1_000_000
+_ETA = 1.0, 2.5  # indices of refraction, from a matched surface to more than diamond
+_CLEAREST, _DENSEST = 1e-6, 1e6  # from clear water to ten times a metal's absorption [1/mm]
+_THINNEST_MM, _THICKEST_MM = 1e-9, 1e4  # from less than an atom to more than a body
 _KEYS = ("absorption_per_mm", "scattering_per_mm")
 
 
@@ -92,10 +94,9 @@ class Medium:
     def __post_init__(self) -> None:
         if not self.layers:
             refuse(self.name, "at least one layer", "none came", "Add one")
-        if not (np.isfinite(self.eta) and 1.0 <= self.eta <= 2.5):
-            refuse(self.name, "an index of refraction from 1 to 2.5", f"{self.eta:g} came", "Correct it")
-        for number, layer in enumerate(self.layers, 1):
-            _check(f"{self.name}, layer {number} ({layer.name})", layer, number == len(self.layers))
+        number(f"{self.name}: index of refraction", self.eta, *_ETA)
+        for count, layer in enumerate(self.layers, 1):
+            _check(f"{self.name}, layer {count} ({layer.name})", layer, count == len(self.layers))
         if len({len(layer.sigma_a) for layer in self.layers}) > 1:
             refuse(self.name, "as many channels in each layer", "they differ", "Correct the lists")
 
@@ -128,11 +129,15 @@ def _check(place: str, layer: Layer, last: bool) -> None:
     if a.ndim != 1 or a.shape != s.shape or len(a) == 0:
         came = f"shapes {a.shape} and {s.shape} came"
         refuse(place, "as many absorption as scattering coefficients", came, "Correct the lists")
-    if not (np.isfinite(a).all() and np.isfinite(s).all() and (a >= 0).all() and (s > 0).all()):
+    if not ((a >= 0) & (a <= _DENSEST) & (s >= _CLEAREST) & (s <= _DENSEST)).all():
         came = f"absorption {a.tolist()} and scattering {s.tolist()} came"
-        refuse(place, "absorption of 0 or more and scattering above 0 [1/mm]", came, "Correct them")
-    if not layer.thickness_mm > 0 or (np.isinf(layer.thickness_mm) and not last):
-        expected = "a thickness above 0 mm, infinite in the last layer only"
+        expected = f"absorption from 0 and scattering from {_CLEAREST:g} to {_DENSEST:g} /mm"
+        refuse(place, expected, came, "Correct them")
+    endless = np.isinf(layer.thickness_mm) and layer.thickness_mm > 0 and last
+    if not endless and not _THINNEST_MM <= layer.thickness_mm <= _THICKEST_MM:
+        expected = (
+            f"a thickness from {_THINNEST_MM:g} to {_THICKEST_MM:g} mm, infinite in the last layer only"
+        )
         refuse(place, expected, f"{layer.thickness_mm} mm came", "Correct it")
 
 
@@ -158,33 +163,12 @@ def medium_from_toml(path: Path, document: Mapping[str, Any]) -> Medium:
     tables = document.get("layers")
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
         refuse(path, "[[layers]] with absorption_per_mm and scattering_per_mm", "it has none", "Add them")
-    layers = tuple(_layer(f"{path}, layer {number}", table) for number, table in enumerate(tables, 1))
+    layers = tuple(_layer(f"{path}, layer {count}", table) for count, table in enumerate(tables, 1))
     unknown = sorted(set(document) - {"name", "eta", "layers"})
     if unknown:
         refuse(path, "name, eta and [[layers]]", f"{', '.join(unknown)} came", "Take them out")
-    return Medium(str(document.get("name", path.stem)), layers, _number(path, document, "eta", SKIN_ETA))
-
-
-def read_toml(path: Path) -> dict[str, Any]:
-    """A TOML file's contents; DermisError when it cannot be read."""
-    text = read_text(path, "a TOML file")
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        refuse(path, "a TOML file", f"it cannot be read: {error}", "Check its contents")
-
-
-def read_text(path: Path, form: str) -> str:
-    """The text of a small file; DermisError, which names the form expected, when it cannot be read."""
-    try:
-        with path.open(encoding="utf-8") as file:
-            text = file.read(_MOST_LETTERS + 1)  # some devices never end
-    except (OSError, UnicodeDecodeError) as error:
-        came = getattr(error, "strerror", None) or "it is not text"
-        refuse(path, form, f"it cannot be read: {came}", "Check its name and its contents")
-    if len(text) > _MOST_LETTERS:
-        refuse(path, form, f"it has more than {_MOST_LETTERS:,} letters", "Check its name")
-    return text
+    eta = number(f"{path}: eta", document.get("eta", SKIN_ETA), *_ETA)
+    return Medium(str(document.get("name", path.stem)), layers, eta)
 
 
 def _layer(place: str, table: Mapping[str, Any]) -> Layer:
@@ -193,23 +177,14 @@ def _layer(place: str, table: Mapping[str, Any]) -> Layer:
         known = ", ".join(("name", "thickness_mm", *_KEYS))
         refuse(place, known, f"{', '.join(unknown)} came", "Take it out or correct its name")
     absorption, scattering = (_three(place, table, key) for key in _KEYS)
-    thickness = _number(place, table, "thickness_mm", float("inf"))
+    thickness = table.get("thickness_mm", np.inf)
+    if thickness != np.inf:
+        thickness = number(f"{place}: thickness_mm", thickness, _THINNEST_MM, _THICKEST_MM)
     return Layer(absorption, scattering, thickness, str(table.get("name", "layer")))
 
 
 def _three(place: str, table: Mapping[str, Any], key: str) -> Floats:
-    value = table.get(key)
-    numbers = isinstance(value, list) and all(isinstance(one, int | float) for one in value)
-    if not isinstance(value, list) or not numbers or len(value) != 3:
-        refuse(place, f"{key} = [red, green, blue]", f"{value!r} came", "Write three numbers")
-    return np.array(value, dtype=np.float64)
-
-
-def _number(place: object, table: Mapping[str, Any], key: str, default: float) -> float:
-    value = table.get(key, default)
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        refuse(place, f"{key} as a number", f"{value!r} came", "Correct it")
-    return float(value)
+    return numbers(f"{place}: {key}", table.get(key), (3,), 0.0, _DENSEST, "1/mm in red, green and blue")
 
 
 def _read(table: str) -> dict[str, list[Layer]]:

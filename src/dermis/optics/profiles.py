@@ -13,10 +13,12 @@ import numpy as np
 
 from dermis.errors import refuse
 from dermis.optics.fits.gaussian import fit_gaussians
-from dermis.optics.gaussians import GaussianSum
-from dermis.optics.media import Floats, read_text, read_toml
+from dermis.optics.gaussians import MOST_WEIGHT, WIDEST_MM2, GaussianSum
+from dermis.optics.media import Floats
 from dermis.optics.tissue import Tissue, load_tissue, names
 from dermis.outputs import replacing
+from dermis.quantities import numbers
+from dermis.reading import named_path, read_text, read_toml
 
 PUBLISHED = "gpu-gems-3"
 TERMS = 6
@@ -43,6 +45,7 @@ def load_profile(
 
     Raises DermisError when there is no such preset or file, or when its numbers cannot be a profile.
     """
+    named_path(name, "a profile")
     if pigments:
         return fit_profile(load_tissue(name, pigments=pigments), name, near)
     table = find_table(name)
@@ -84,7 +87,7 @@ def _written(path: Path) -> tuple[int, ...]:
     """Time of writing, size and inode of a file; empty when there is none."""
     try:
         found = path.stat()
-    except OSError:  # no such file, a name too long, or a folder without access
+    except (OSError, ValueError):  # no such file, a name that none can have, or a folder without access
         return ()
     return found.st_mtime_ns, found.st_size, found.st_ino
 
@@ -139,12 +142,9 @@ def _published() -> GaussianSum:
 
 
 def _from_toml(path: Path, document: Mapping[str, Any]) -> GaussianSum:
-    try:
-        variances = np.array(document["variances_mm2"], dtype=np.float64)
-        weights = np.array(document["weights"], dtype=np.float64)
-    except (KeyError, ValueError, TypeError):
-        expected = "lists of numbers variances_mm2 and weights"
-        refuse(f"profile {path}", expected, "something else came", _MEND)
+    name = f"profile {path}"
+    variances = numbers(f"{name}: variances_mm2", document["variances_mm2"], (0,), 0.0, WIDEST_MM2)
+    weights = numbers(f"{name}: weights", document.get("weights"), (0, 3), 0.0, MOST_WEIGHT)
     return _three(path, variances, weights)
 
 

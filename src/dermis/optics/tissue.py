@@ -10,14 +10,15 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.errors import refuse
+from dermis.errors import DermisError, refuse, shown_value
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.models import Model, diffusion_profile, through_slab
 from dermis.optics.diffusion.multipole import Clamp
-from dermis.optics.media import Floats, Layer, Medium, media, medium_from_toml, read_toml
+from dermis.optics.media import Floats, Layer, Medium, media, medium_from_toml
 from dermis.optics.pigments.skin import EXAMPLES, SkinParameters, Structure, spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.radial import RadialProfile
+from dermis.reading import named_path, read_toml
 
 SPECTRAL = "spectral"
 _STRUCTURE: Structure = "dj2006"
@@ -100,7 +101,8 @@ def load_tissue(
 
     Raises DermisError for any other name, and when pigments are given to a medium that has none.
     """
-    given = dict(pigments or {})
+    named_path(name, "a tissue")
+    given = _known(pigments or {})
     if str(name) == SPECTRAL or str(name) in EXAMPLES:
         example = EXAMPLES.get(str(name), SkinParameters())
         return _spectral(str(name), structure or _STRUCTURE, example, given)
@@ -116,6 +118,14 @@ def load_tissue(
         refuse(option, f"a skin made of pigments ({skins})", f"{name} came", "Leave it out, or take a skin")
     medium = media()[str(name)] if str(name) in media() else medium_from_toml(Path(name), document)
     return Tissue(medium)
+
+
+def _known(pigments: Mapping[str, Any]) -> dict[str, Any]:
+    """Pigments by names that a skin has."""
+    names = SkinParameters.__dataclass_fields__
+    if not isinstance(pigments, Mapping) or not pigments.keys() <= names.keys():
+        refuse("pigments", f"some of {', '.join(names)}", f"{shown_value(pigments)} came", "Correct them")
+    return dict(pigments)
 
 
 def _spectral(name: str, structure: Structure, example: SkinParameters, given: dict[str, Any]) -> Tissue:
@@ -137,9 +147,11 @@ def _from_skin_table(
     if unknown:
         known = ", ".join(sorted({"structure", *fields}))
         refuse(path, f"in [skin]: {known}", f"{', '.join(unknown)} came", "Correct the names")
-    wrong = [key for key, value in own.items() if type(value) not in (int, float)]
-    if wrong or structure not in get_args(Structure):
-        what = f"{wrong[0]} = {own[wrong[0]]!r}" if wrong else f"structure = {structure!r}"
-        expected = f"numbers, and a structure of {', '.join(get_args(Structure))}"
-        refuse(path, expected, f"{what} came", "Correct it")
-    return _spectral(str(document.get("name", path.stem)), wanted or structure, SkinParameters(**own), given)
+    if structure not in get_args(Structure):
+        expected = f"a structure of {', '.join(get_args(Structure))}"
+        refuse(path, expected, f"{shown_value(structure)} came", "Correct it")
+    try:
+        parameters = SkinParameters(**own)
+    except DermisError as fault:
+        raise DermisError(f"{path}: {fault}") from None
+    return _spectral(str(document.get("name", path.stem)), wanted or structure, parameters, given)

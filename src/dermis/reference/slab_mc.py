@@ -14,6 +14,7 @@ from dermis.errors import refuse
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.media import Floats, Layer, Medium
 from dermis.optics.radial import RadialProfile, light_beyond, ring_edges
+from dermis.quantities import whole_number
 from dermis.reference.slab import ScatteringLayer, SlabResult, check_mean_cosine
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ BATCHES = 64
 
 MAX_PHOTONS = 10**10
 
+_MOST_SEED = 2**63 - 1
 _AT_ONCE = 20_000  # photons between two checks for Ctrl-C
 _NOTABLE_LOSS = 1e-3
 
@@ -144,10 +146,8 @@ def _check(layers: Sequence[ScatteringLayer], photons: int, seed: int) -> None:
         refuse("slab", "at least one layer", "none came", "Add one")
     if np.isinf([layer.thickness_mm for layer in layers[:-1]]).any():
         refuse("slab", "an infinite thickness in the last layer only", "another has it", "Correct it")
-    if not (isinstance(photons, int | np.integer) and 1 <= photons <= MAX_PHOTONS):
-        refuse("photons", f"a whole number from 1 to {MAX_PHOTONS:.0e}", f"{photons} came", "Correct it")
-    if not (isinstance(seed, int | np.integer) and seed >= 0):
-        refuse("seed", "a whole number of 0 or more", f"{seed} came", "Correct it")
+    whole_number("photons", photons, 1, int(MAX_PHOTONS))
+    whole_number("seed", seed, 0, _MOST_SEED)
 
 
 def _checked_edges(edges_mm: ArrayLike) -> Floats:

@@ -12,13 +12,14 @@ from pydantic import Field, model_validator
 
 from dermis.errors import refuse
 from dermis.mesh.head import Head
+from dermis.scene.findings import Because
 from dermis.scene.opencv import OpenCvCamera, extrinsics, from_opencv, intrinsics
 from dermis.scene.plain import Direction, Plain, Vector
 
 _DISTANCE_MM = 1100.0  # a portrait lens' distance: closer makes noses large
 
 
-_Fraction = Annotated[float, Field(ge=-10, le=10)]
+_Fraction = Annotated[float, Field(ge=-10, le=10), Because("lenses do not shift farther")]
 
 
 class Window(NamedTuple):
@@ -48,11 +49,11 @@ class Camera(Plain):
     """The point on the optical axis that is looked at: as a rule the middle of the picture [mm]."""
     up: Direction = (0.0, 1.0, 0.0)
     """The direction that is upwards in the picture."""
-    frame_mm: Annotated[float, Field(ge=0.01, le=1e5)] = 340.0
+    frame_mm: Annotated[float, Field(ge=0.01, le=1e5), Because("mm: from a pore's wall to a crowd")] = 340.0
     """Height of what the picture shows at the target's distance [mm]."""
     principal_point: tuple[_Fraction, _Fraction] = (0.5, 0.5)
     """Where the optical axis meets the picture, from its upper left corner, in widths and heights of it."""
-    pixel_aspect: Annotated[float, Field(ge=0.1, le=10)] = 1.0
+    pixel_aspect: Annotated[float, Field(ge=0.1, le=10), Because("sensors' pixels are nearly square")] = 1.0
     """Width of a pixel over its height."""
 
     @model_validator(mode="after")

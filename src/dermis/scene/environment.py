@@ -6,6 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from dermis.scene.findings import Because
 from dermis.scene.plain import Plain, slider
 
 
@@ -15,7 +16,15 @@ class Environment(Plain):
     name: str
     """Light from all around: a sample (royal_esplanade, lebombo), a latitude-longitude picture (.hdr, .exr),
     or "uniform" for radiance 1 from everywhere."""
-    rotation_degrees: Annotated[float, Field(ge=-3600, le=3600, json_schema_extra=slider(-180, 180))] = 0.0
+    rotation_degrees: Annotated[
+        float,
+        Field(ge=-3600, le=3600, json_schema_extra=slider(-180, 180)),
+        Because("degrees: ten turns either way"),
+    ] = 0.0
     """Turn of the environment about the upward axis, counter-clockwise as seen from above [degrees]."""
-    exposure: Annotated[float, Field(ge=0, le=1e6, json_schema_extra=slider(0.02, 10, log=True))] = 1.0
+    exposure: Annotated[
+        float,
+        Field(ge=0, le=1e6, json_schema_extra=slider(0.02, 10, log=True)),
+        Because("20 stops more; light is not negative"),
+    ] = 1.0
     """Factor of the environment's radiance."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -12,13 +10,15 @@ from dermis.errors import refuse
 from dermis.human.regions.apply import with_regions
 from dermis.human.regions.table import load_table
 from dermis.mesh.head import Head
+from dermis.reading import is_file, named_path, read_toml
 from dermis.scene.camera import PRESETS, Camera, preset
 from dermis.scene.environment import Environment
+from dermis.scene.findings import ImpossibleError
 from dermis.scene.head_table import NO_REGIONS, HeadTable, names_regions
 from dermis.scene.heads import load_head
 from dermis.scene.lights import LIGHTS, NO_LIGHTS, Light, light_presets, preset_lights
 from dermis.scene.model import Scene
-from dermis.scene.plain import ImpossibleError, Plain
+from dermis.scene.plain import Plain
 from dermis.scene.pose import Pose
 from dermis.scene.pose_table import PoseTable
 from dermis.scene.settings import Settings
@@ -56,7 +56,7 @@ def load_scene(path: str | Path, known: Head | None = None) -> tuple[Scene, Sett
 
     known : the head of the file's [head], when the caller has it already
     """
-    path = _path(path, "a scene in TOML")
+    path = named_path(path, "a scene in TOML")
     table = _read(path, "a scene in TOML")
     for part in table.keys() - _PARTS:
         refuse(path, f"only the parts {', '.join(sorted(_PARTS))}", f"{part!r} came", "Correct its name")
@@ -92,7 +92,7 @@ def head_table(path: Path) -> dict[str, Any]:
 def with_whole_names(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """A [head] whose files, in a folder, have names that hold from any other."""
     named = {role: folder / table[role] for role in ("name", "regions", *_MAPS) if role in table}
-    return {**table} | {role: str(file.resolve()) for role, file in named.items() if file.is_file()}
+    return {**table} | {role: str(file.resolve()) for role, file in named.items() if is_file(file)}
 
 
 def head_and_skin(table: HeadTable, skin: Skin, folder: Path) -> tuple[Head, Skin]:
@@ -147,7 +147,7 @@ def _environment(path: Path, table: Any) -> Environment:
 def _beside(folder: Path, name: str) -> str:
     """The file of that name in a scene's folder if there is one, else the name, of a preset mostly."""
     file = folder / name
-    return str(file) if file.is_file() else name
+    return str(file) if is_file(file) else name
 
 
 def _lights(culprit: object, tables: Any) -> tuple[Light, ...]:
@@ -175,17 +175,5 @@ def _made(kind: type[P], culprit: object, part: str, table: Any) -> P:
         raise ImpossibleError(f"{culprit}: {part}", error.findings) from None
 
 
-def _path(name: object, expected: str) -> Path:
-    if not isinstance(name, str | os.PathLike):
-        refuse("file", f"the name of {expected}", f"a {type(name).__name__} came", "Write its name")
-    return Path(name)
-
-
 def _read(name: str | Path, expected: str) -> dict[str, Any]:
-    path = _path(name, expected)
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        refuse(path, expected, f"it cannot be read ({error.strerror})", "Check the name")
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        refuse(path, expected, f"its text is not TOML ({error})", "Correct it there")
+    return read_toml(named_path(name, expected), expected)

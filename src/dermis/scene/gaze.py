@@ -14,8 +14,9 @@ from dermis.human.movement import gaze
 from dermis.mesh.head import Head
 from dermis.mesh.rig import Rig, Turn
 from dermis.mesh.turns import angles_matrix
+from dermis.quantities import numbers
 from dermis.scene.clips.names import matched
-from dermis.scene.pose import Pose
+from dermis.scene.pose import FARTHEST_MM, Pose
 
 Doubles = NDArray[np.float64]
 
@@ -39,11 +40,7 @@ def looking_at(head: Head, place_mm: ArrayLike, pose: Pose | Mapping[str, float]
     if eyes is None or rig.skeleton is None:
         remedy = f"{head.note}. {_NAME_THEM}" if head.note else _NAME_THEM
         refuse(head.name, "a head with eyes that turn", "it has none", remedy)
-    place = np.asarray(place_mm, np.float64)
-    if place.shape != (3,) or not np.isfinite(place).all():
-        refuse(
-            "look at", "three numbers, in mm from the head's centre", f"{place_mm!r:.60} came", "Correct it"
-        )
+    place = numbers("look at", place_mm, (3,), -FARTHEST_MM, FARTHEST_MM, "mm from the head's centre")
     own = [rig.skeleton.names[bone] for bone in rig.skeleton.bone[eyes.apex, 0]]
     weights = {name: value for name, value in base.weights.items() if name not in _names(rig.turns, own)}
     bones = {name: value for name, value in base.bones.items() if name not in own}

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from dermis.errors import notify, refuse
+from dermis.errors import notify, refuse, shown_value
 from dermis.mesh.head import Head
 from dermis.scene.camera import Camera, preset
 from dermis.scene.environment import Environment
@@ -115,11 +115,3 @@ def _check_place(what: str, position: Vector) -> None:
             f"{what}: expected a place around the head in mm, but this one is {away:g} mm from its middle. "
             "Write 1100 for 1.1 m."
         )
-
-
-def shown_value(value: object) -> str:
-    """What came, short: a class by its name, other things as they print or by their kind."""
-    if isinstance(value, type):
-        return f"the class {value.__name__}"
-    text = repr(value)
-    return text if len(text) <= 60 else f"a {type(value).__name__}"

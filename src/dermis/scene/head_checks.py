@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from typing import Any
 
-from dermis.errors import refuse
+from dermis.errors import refuse, shown_value
+from dermis.scene.findings import ImpossibleError
+from dermis.scene.head_table import AUTO, NO_REGIONS, HeadTable
 
 _UNITS_MM = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "inch": 25.4, "in": 25.4, "ft": 304.8}
 
@@ -30,6 +33,18 @@ def check_given(files: Mapping[str, object], **lengths: object) -> None:
         if file is not None and not isinstance(file, str | os.PathLike):
             remedy = f"Write dataclasses.replace(head, maps=replace(head.maps, {role}=...)) for one in memory"
             refuse(role, "the name of a picture file", f"a {type(file).__name__} came", remedy)
+
+
+def check_options(**options: Any) -> None:
+    """Refuse values that no [head] can have; words where several may stand come as tuples."""
+    regions = options.get("regions", AUTO)
+    if regions not in (AUTO, NO_REGIONS):
+        remedy = "Use with_regions for a table"
+        refuse("regions", f"{AUTO} or {NO_REGIONS}", f"{shown_value(regions)} came", remedy)
+    try:
+        HeadTable(name="", **options)
+    except ImpossibleError as error:
+        raise ImpossibleError("load_head", error.findings) from None
 
 
 def check_relief(height_mm: float | None, height: object) -> None:

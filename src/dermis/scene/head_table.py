@@ -7,9 +7,17 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from dermis.scene.findings import Because
 from dermis.scene.plain import Plain
 
-_Length = Annotated[float | None, Field(gt=0, allow_inf_nan=False)]
+_Relief = Annotated[
+    float | None,
+    Field(ge=1e-6, le=1),
+    Because("mm: 255 levels from a quarter of a micrometre to a nose and more"),
+]
+_Unit = Annotated[
+    float | None, Field(ge=1e-3, le=1e6), Because("mm: files count in micrometres to kilometres")
+]
 VOrigin = Literal["auto", "top", "bottom"]
 Up = Literal["y", "z"]
 NormalY = Literal["up", "down"]
@@ -22,11 +30,13 @@ class EyeTable(Plain):
 
     eumelanin: Annotated[float | None, Field(ge=0, le=1)] = None
     """Of the iris, from none, which leaves it blue, to the darkest brown."""
-    pupil_mm: Annotated[float | None, Field(ge=1, le=4)] = None
+    pupil_mm: Annotated[float | None, Field(ge=1, le=4), Because("mm: pupils in glare and in the dark")] = (
+        None
+    )
     """Radius of the pupil [mm]."""
     redness: Annotated[float | None, Field(ge=0, le=1)] = None
     """Of the white of the eye."""
-    seed: Annotated[int | None, Field(ge=0, le=2**32 - 1)] = None
+    seed: Annotated[int | None, Field(ge=0, le=2**32 - 1), Because("32 bits")] = None
     """Which fibres and vessels."""
 
 
@@ -41,13 +51,13 @@ class HeadTable(Plain):
     """Tangent-space normal map."""
     height: str | None = None
     """Height map; it needs height_mm."""
-    height_mm: _Length = None
+    height_mm: _Relief = None
     """Relief of one grey level of an 8-bit height map [mm]."""
     specular: str | None = None
     """Map of the surface reflection's strength, scaled to a mean of rho_s."""
     roughness: str | None = None
     """Map of the roughness m, 0 to 1."""
-    unit_mm: _Length = None
+    unit_mm: _Unit = None
     """Length of the file's unit [mm]; 1000 for glTF and 1 for others when left out."""
     v_origin: VOrigin = "auto"
     """Which row of the maps v = 0 is; "auto" keeps to the format's rule."""
@@ -63,7 +73,7 @@ class HeadTable(Plain):
     """Groups of the file that hold eyeballs, whatever they are called, be it with all of the head."""
     eye: EyeTable | None = None
     """What the eyes look like, where it is not as usual."""
-    subdivide: Annotated[int, Field(ge=0, le=3)] = 0
+    subdivide: Annotated[int, Field(ge=0, le=3), Because("each has four times the triangles")] = 0
     """Levels of subdivision: Catmull-Clark for a file of quads (.obj, .ply), else Loop."""
     regions: str = AUTO
     """Roughness and strength by region of the face: "auto" has the package's values where it knows the head

@@ -9,7 +9,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
-from dermis.errors import notify, refuse
+from dermis.errors import notify, refuse, shown_value
 from dermis.human.regions.usual import with_usual_regions
 from dermis.mesh.check import check_head_height
 from dermis.mesh.eyes import EyeLook
@@ -22,7 +22,8 @@ from dermis.mesh.maps import Maps, load_maps
 from dermis.mesh.obj_maps import obj_maps
 from dermis.mesh.samples import SAMPLES, Sample, fetch
 from dermis.mesh.subdivide import subdivide_head
-from dermis.scene.head_checks import check_given, check_relief, named
+from dermis.reading import is_file
+from dermis.scene.head_checks import check_given, check_options, check_relief, named
 from dermis.scene.head_table import AUTO, Eyes, NormalY, Up, VOrigin
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
 MapFile = str | os.PathLike[str] | None
 HUMAN = "human"
+_LONGEST_SEED = 20  # digits
 REPLACED = ("bust", "bust_many_charts")
 """Heads that the package had before `HUMAN`."""
 
@@ -85,8 +87,11 @@ def load_head(
     own = {"colour": colour, "normal": normal, "height": height}
     own |= {"specular": specular, "roughness": roughness}
     check_given(own, unit_mm=unit_mm, height_mm=height_mm)
-    told: dict[str, Any] = {"unit_mm": unit_mm, "v_origin": v_origin, "up": up, "opaque": tuple(opaque)}
-    told["eye_groups"] = tuple(eye_groups)
+    told: dict[str, Any] = {"unit_mm": unit_mm, "v_origin": v_origin, "up": up, "opaque": opaque}
+    told["eye_groups"] = eye_groups
+    others = {"height_mm": height_mm, "normal_y": normal_y, "eyes": eyes, "eye": eye}
+    check_options(**told, **others, subdivide=subdivide, regions=regions)
+    told |= {"opaque": tuple(opaque), "eye_groups": tuple(eye_groups)}
     if name == HUMAN or name.startswith(f"{HUMAN}:") or path.suffix.lower() == ".json":
         return _with_look(_human(name, own, height_mm, normal_y, told | {"eyes": eyes}, subdivide), eye)
     sample, files = SAMPLES.get(name), dict[str, Any]()
@@ -97,7 +102,7 @@ def load_head(
         told["unit_mm"] = sample.unit_mm if unit_mm is None else unit_mm
         told["v_origin"] = sample.v_origin or v_origin if v_origin == "auto" else v_origin
         height_mm = sample.height_mm if height_mm is None else height_mm
-    elif not path.is_file():
+    elif not is_file(path):
         _refuse_name(name)
     elif is_gltf(path):
         files = embedded_maps(path)
@@ -208,8 +213,9 @@ def _person(name: str) -> Human:
     if Path(name).suffix.lower() == ".json":
         return read_person(Path(name))
     words = name.partition(":")[2]
-    if not words.isdecimal():
-        refuse(name, f"{HUMAN}, or {HUMAN}:SEED with a whole number", f"{words!r} came", f"Try {HUMAN}:7")
+    if not words.isdecimal() or len(words) > _LONGEST_SEED:
+        came = f"{shown_value(words)} came"
+        refuse(name, f"{HUMAN}, or {HUMAN}:SEED with a whole number", came, f"Try {HUMAN}:7")
     return Human.drawn(int(words))
 
 

@@ -7,18 +7,19 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.quantities import whole_number
 from dermis.scene.environment import Environment
 from dermis.scene.lights import DirectionalLight
+
+_MOST_LIGHTS = 10_000
 
 
 def light_stage(count: int) -> list[DirectionalLight]:
     """Lights of irradiance 1, evenly around the head, on a spiral from above to below.
 
-    Raises DermisError for less than one. Source: [Debevec2000].
+    Raises DermisError for less than one and for more than ten thousand. Source: [Debevec2000].
     """
-    if count < 1:
-        refuse("light stage", "at least one light", f"{count} came", "Ask for more")
+    count = whole_number("light stage", count, 1, _MOST_LIGHTS, "lights")
     y = 1.0 - 2.0 * (np.arange(count) + 0.5) / count
     turn, radius = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count), np.sqrt(1.0 - y**2)
     places = np.stack([radius * np.sin(turn), y, radius * np.cos(turn)], axis=-1)

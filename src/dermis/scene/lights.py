@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from dermis.registry import Registry
+from dermis.scene.findings import Because
 from dermis.scene.plain import Colour, Direction, Plain, Vector, slider
 
 __all__ = [
@@ -28,9 +29,13 @@ __all__ = [
     "studio",
 ]
 
-_Degrees = Annotated[float, Field(gt=0, lt=89, json_schema_extra=slider(0.5, 88, log=True))]
-_Length = Annotated[float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 3000, log=True))]
-
+_Degrees = Annotated[
+    float,
+    Field(ge=0.01, le=89, json_schema_extra=slider(0.5, 88, log=True)),
+    Because("degrees of half a cone before the lamp"),
+]
+_LAMPS = Because("mm: lamps are neither thinner than paper nor larger than a square")
+_Length = Annotated[float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 3000, log=True)), _LAMPS]
 
 _BRIGHTNESS = ("brightness", "color", "colour", "energy", "intensity", "power", "strength")
 
@@ -49,7 +54,11 @@ class _Source(Plain):
     """Irradiance of a surface at the target that faces the light, linear Rec. 709; pi makes white skin 1."""
     shadows: bool = True
     """Whether it casts shadows."""
-    softness_mm: Annotated[float, Field(gt=0, le=1000, json_schema_extra=slider(0.1, 100, log=True))] = 1.5
+    softness_mm: Annotated[
+        float,
+        Field(ge=1e-3, le=1000, json_schema_extra=slider(0.1, 100, log=True)),
+        Because("mm: finer than light's own waves no edge is"),
+    ] = 1.5
     """Width over which a shadow's edge fades, at most 12 texels of the shadow map; for lights of some size it
     is the least width [mm]."""
 
@@ -109,7 +118,9 @@ class SphereLight(PointLight):
     """An evenly bright sphere, as a lamp with a globe."""
 
     kind: Literal["sphere"] = "sphere"  # type: ignore[assignment]
-    radius_mm: Annotated[float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 500, log=True))] = 100.0
+    radius_mm: Annotated[float, Field(ge=0.1, le=1e5, json_schema_extra=slider(1, 500, log=True)), _LAMPS] = (
+        100.0
+    )
     """Radius of the sphere [mm]."""
 
     @property
@@ -129,7 +140,7 @@ class DirectionalLight(_Source):
     kind: Literal["directional"] = "directional"
     direction: Direction
     """The way in which the light travels."""
-    angle_degrees: Annotated[float, Field(ge=0, le=20)] = 0.0
+    angle_degrees: Annotated[float, Field(ge=0, le=20), Because("degrees; wider light is no beam")] = 0.0
     """Angle that its source spans, 0.53 for the sun: shadows harden towards what casts them."""
 
     @property

@@ -7,12 +7,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.errors import refuse
+from dermis.errors import refuse, shown_value
+from dermis.quantities import numbers
 
 Doubles = NDArray[np.float64]
 _CORNER = 0.5  # from the middle of the first pixel, which is OpenCV's origin, to the picture's corner [pixel]
 _ROUNDING = 1e-4  # of rotations and skews as they are written in files
 _LEAST_MM = 1.0
+_LARGEST = 1e9
+_MOST_PIXELS = 1e6  # along a side
 
 
 class OpenCvCamera(NamedTuple):
@@ -37,7 +40,7 @@ def from_opencv(K: ArrayLike, R: ArrayLike, t: ArrayLike, size: tuple[int, int])
     if np.abs(rotation @ rotation.T - np.eye(3)).max() > _ROUNDING or np.linalg.det(rotation) < 0:
         came = f"R R^T is not 1, or its determinant is {np.linalg.det(rotation):.3g}"
         refuse("R", "a rotation matrix", came, "Make one of a vector with cv2.Rodrigues")
-    width, height = size
+    width, height = _sides(size)
     fx, fy, cx, cy = k[0, 0], k[1, 1], k[0, 2], k[1, 2]
     position = -rotation.T @ moved
     before = moved[2] if moved[2] > _LEAST_MM else max(float(np.linalg.norm(moved)), _LEAST_MM)
@@ -58,6 +61,7 @@ def intrinsics(seen: tuple[float, tuple[float, float], float], size: tuple[int, 
         heights, width of a pixel over its height
     """
     half_tangent, principal_point, pixel_aspect = seen
+    size = _sides(size)
     fy = 0.5 * size[1] / half_tangent
     cx, cy = np.multiply(principal_point, size) - _CORNER
     return np.array([[fy / pixel_aspect, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
@@ -84,13 +88,19 @@ def _check_intrinsics(k: Doubles) -> None:
 def _array(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Doubles:
     try:
         found = np.asarray(values, np.float64)
-    except (TypeError, ValueError):
-        refuse(name, f"numbers of shape {shape}", f"{values!r:.40} came", "Correct it")
+    except (TypeError, ValueError, OverflowError):
+        refuse(name, f"numbers of shape {shape}", f"{shown_value(values, 40)} came", "Correct it")
     if shape == (3,) and found.shape in ((3, 1), (1, 3)):  # as OpenCV returns them
         found = found.reshape(3)
-    if found.shape != shape or not np.isfinite(found).all():
-        refuse(name, f"finite numbers of shape {shape}", f"shape {found.shape} came", "Correct it")
+    if found.shape != shape or not (np.abs(found) <= _LARGEST).all():
+        came = f"shape {found.shape} came" if found.shape != shape else "others came"
+        refuse(name, f"numbers of shape {shape} up to {_LARGEST:g}", came, "Correct it")
     return found
+
+
+def _sides(size: tuple[int, int]) -> tuple[int, int]:
+    width, height = numbers("size", size, (2,), 1, _MOST_PIXELS, "pixels").tolist()
+    return int(width), int(height)
 
 
 def _unit(vector: NDArray[Any]) -> Doubles:

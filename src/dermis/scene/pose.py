@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NoReturn
@@ -11,14 +10,17 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.errors import refuse
+from dermis.errors import DermisError, refuse, shown_value
 from dermis.mesh.rig import Motion, Rig
 from dermis.mesh.skeleton import Skeleton
+from dermis.quantities import number, numbers
 
 MOST_WEIGHT = 100.0
+MOST_DEGREES = 1e5
 FARTHEST_MM = 1e6
 _FORMS = "three angles [degrees] or a (4, 4) matrix"
 _NEAR = 3  # names that are proposed
+_LONGEST_NAME = 80  # letters that are compared
 _FLAT = 1e-9  # determinant over size cubed
 
 Doubles = NDArray[np.float64]
@@ -40,13 +42,20 @@ class Pose:
     bones: Mapping[str, ArrayLike] = field(default_factory=dict)
     positions_mm: NDArray[np.float32] | None = None
 
+    def __post_init__(self) -> None:
+        for part in ("weights", "bones"):
+            if not isinstance(given := getattr(self, part), Mapping):
+                refuse(f"pose: {part}", "a mapping by name", f"{shown_value(given)} came", "Correct it")
+
     @classmethod
     def of(cls, given: Any) -> Pose | None:
         """A pose, the pose of a plain mapping of weights, or None."""
         if given is None or isinstance(given, Pose):
             return given
         if not isinstance(given, Mapping):
-            refuse("pose", "a Pose or a mapping of weights by name", f"{given!r:.80} came", "Correct it")
+            refuse(
+                "pose", "a Pose or a mapping of weights by name", f"{shown_value(given)} came", "Correct it"
+            )
         return cls(weights=given)
 
     def motion(self, rig: Rig, culprit: object = "pose") -> Motion:
@@ -67,11 +76,8 @@ class Pose:
         try:
             index = rig.target_index
             places = [index[name] for name in self.weights]
-            given = np.array(list(self.weights.values()), np.float64)
-            sound = given.ndim == 1 and bool((np.abs(given) <= MOST_WEIGHT).all())
-        except (KeyError, TypeError, ValueError):
-            sound = False
-        if not sound:
+            given = numbers(culprit, list(self.weights.values()), (0,), -MOST_WEIGHT, MOST_WEIGHT)
+        except (KeyError, TypeError, DermisError):
             _refuse_weights(self.weights, rig.targets.names, culprit)
         weights[places] = given if rig.targets.rest is None else given - rig.targets.rest[places]
         return weights
@@ -106,12 +112,13 @@ class Pose:
         if self.positions_mm is None:
             return rig.positions_mm
         try:
-            places = np.ascontiguousarray(self.positions_mm, np.float32)
-        except (TypeError, ValueError):
+            with np.errstate(over="ignore"):  # what is too large becomes infinite, and is refused below
+                places = np.ascontiguousarray(self.positions_mm, np.float32)
+        except (TypeError, ValueError, OverflowError):
             places = np.zeros(0, np.float32)
         expected = (rig.of_file, 3)
         if places.shape != expected:
-            came = f"{np.shape(self.positions_mm)} came"
+            came = f"{places.shape if places.size else shown_value(self.positions_mm)} came"
             remedy = "Give as many points as Head.positions_mm lists, in its order"
             refuse(f"{culprit}: positions_mm", f"an array of {expected}", came, remedy)
         with np.errstate(invalid="ignore"):
@@ -134,30 +141,24 @@ def _changes(
     for place, (bone, name) in enumerate(ordered):
         try:
             if len(given[name]) == 3:
-                rows.append(skeleton.turned(bone, _finite(given[name])))
+                angles = numbers(culprit, given[name], (3,), -MOST_DEGREES, MOST_DEGREES)
+                rows.append(skeleton.turned(bone, angles.tolist()))
                 turned.append(place)
             else:
-                changes[place] = given[name]
+                changes[place] = numbers(culprit, given[name], (4, 4), -FARTHEST_MM, FARTHEST_MM)
                 own.append(place)
-        except (TypeError, ValueError):
+        except (TypeError, DermisError):
             _refuse_form(f"{culprit}: bones.{name}", given[name])
     if turned:
         changes[turned] = np.array(rows).reshape(-1, 4, 4)
     if own:
-        _check_matrices(changes[own], [ordered[place][1] for place in own], given, culprit)
+        _check_matrices(changes[own], [ordered[place][1] for place in own], culprit)
         changes[own] = skeleton.changes([ordered[place][0] for place in own], changes[own])
     return changes
 
 
-def _check_matrices(matrices: Doubles, names: list[str], given: Mapping[str, Any], culprit: object) -> None:
-    """Refuse matrices that were broadcast, are not finite or flatten what they move."""
-    for name in names:
-        if np.shape(given[name]) != (4, 4):
-            _refuse_form(f"{culprit}: bones.{name}", given[name])
-    lost = ~np.isfinite(matrices).all(axis=(1, 2))
-    if lost.any():
-        name = names[int(lost.argmax())]
-        _refuse_form(f"{culprit}: bones.{name}", given[name])
+def _check_matrices(matrices: Doubles, names: list[str], culprit: object) -> None:
+    """Refuse matrices that flatten what they move."""
     linear = matrices[:, :3, :3]
     size = np.sqrt(np.einsum("nij,nij->n", linear, linear))
     flat = np.abs(np.linalg.det(linear)) <= _FLAT * size**3
@@ -167,14 +168,8 @@ def _check_matrices(matrices: Doubles, names: list[str], given: Mapping[str, Any
 
 
 def _refuse_form(culprit: str, given: Any) -> NoReturn:
-    refuse(culprit, f"{_FORMS}, all of them finite", f"{given!r:.80} came", "Correct it")
-
-
-def _finite(degrees: Any) -> Any:
-    """The angles; raises ValueError or TypeError for what are none."""
-    if not math.isfinite(sum(degrees)):
-        raise ValueError(degrees)
-    return degrees
+    expected = f"{_FORMS}, no angle beyond {MOST_DEGREES:g}, nothing beyond {FARTHEST_MM:g}"
+    refuse(culprit, expected, f"{shown_value(given, 80)} came", "Correct it")
 
 
 def _refuse_weights(weights: Mapping[Any, Any], names: tuple[str, ...], culprit: object) -> NoReturn:
@@ -182,10 +177,7 @@ def _refuse_weights(weights: Mapping[Any, Any], names: tuple[str, ...], culprit:
     for name, weight in weights.items():
         if name not in names:
             _refuse_name(f"{culprit}: weights", name, names, "morph target")
-        number = isinstance(weight, int | float | np.number)
-        if not number or not abs(float(weight)) <= MOST_WEIGHT:
-            expected = f"a number from -{MOST_WEIGHT:g} to {MOST_WEIGHT:g}"
-            refuse(f"{culprit}: weights.{name}", expected, f"{weight!r:.80} came", "Correct it")
+        number(f"{culprit}: weights.{name}", weight, -MOST_WEIGHT, MOST_WEIGHT)
     refuse(f"{culprit}: weights", "a number for each target", "something else came", "Correct it")
 
 
@@ -193,12 +185,12 @@ def _refuse_name(culprit: str, name: Any, known: Iterable[str], kind: str) -> No
     """Raise the error of a name that the head lacks, with those that are nearest to it."""
     names = list(known)
     if not names:
-        came = f"{name!r} came and it has none"
+        came = f"{shown_value(name)} came and it has none"
         refuse(culprit, f"a {kind} of the head", came, f"Load a glTF file with {kind}s, or leave it out")
     plain = {one.casefold(): one for one in names}
-    near = difflib.get_close_matches(str(name).casefold(), plain, _NEAR, 0.5)
+    near = difflib.get_close_matches(str(name)[:_LONGEST_NAME].casefold(), plain, _NEAR, 0.5)
     meant = f"Nearest: {', '.join(plain[one] for one in near)}" if near else f"It has {_some(names)}"
-    refuse(culprit, f"a {kind} of the head", f"there is no {name!r}", meant)
+    refuse(culprit, f"a {kind} of the head", f"there is no {shown_value(name)}", meant)
 
 
 def _some(names: list[str]) -> str:

@@ -6,10 +6,11 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from dermis.scene.findings import Because
 from dermis.scene.plain import Plain
 from dermis.scene.pose import MOST_WEIGHT
 
-_Weight = Annotated[float, Field(ge=-MOST_WEIGHT, le=MOST_WEIGHT)]
+_Weight = Annotated[float, Field(ge=-MOST_WEIGHT, le=MOST_WEIGHT), Because("faces come apart long before")]
 
 
 class PoseTable(Plain):

@@ -12,6 +12,7 @@ import numpy as np
 
 from dermis.errors import refuse
 from dermis.outputs import replacing
+from dermis.reading import is_file
 from dermis.scene.head_table import names_regions
 from dermis.scene.model import Scene
 from dermis.scene.plain import Plain
@@ -75,7 +76,7 @@ def _key(name: str) -> str:
 def _plain(title: str, values: Plain, left_out: set[str] | None = None) -> str:
     table = values.model_dump(exclude=left_out, exclude_none=True)
     for key in _FILES & table.keys():
-        if Path(table[key]).is_file():
+        if is_file(table[key]):
             table[key] = str(Path(table[key]).resolve())
     return _table(title, table)
 

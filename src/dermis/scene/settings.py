@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from dermis.registry import Named
-from dermis.scene.plain import Colour, Plain, Words, slider
+from dermis.scene.findings import Because, Words
+from dermis.scene.plain import Colour, Plain, slider
 from dermis.scene.techniques import TECHNIQUES
 
-_Side = Annotated[int, Field(ge=1, le=16384)]
+_Side = Annotated[int, Field(ge=1, le=16384), Because("pixels: what the largest GPUs hold")]
 _MOST_SAMPLES = 64
 MOST_WORK = 2**27
 _HEX = re.compile(r"#[0-9a-fA-F]{6}")
@@ -42,7 +43,10 @@ if TYPE_CHECKING:
     Background = Colour | Literal["none", "gradient", "environment"]
 else:
     Exposure = Annotated[
-        float, Field(ge=1e-6, le=1e6, json_schema_extra=slider(0.05, 20, log=True)), Words("auto")
+        float,
+        Field(ge=1e-6, le=1e6, json_schema_extra=slider(0.05, 20, log=True)),
+        Because("20 stops either way"),
+        Words("auto"),
     ]
     Background = Annotated[Colour, BeforeValidator(_decoded), Words("none", "gradient", "environment")]
 
@@ -59,9 +63,9 @@ class Settings(Plain):
 
     size: Annotated[tuple[_Side, _Side], BeforeValidator(_square)] = (1024, 1024)
     """Width and height of the picture [pixel]."""
-    atlas: Annotated[int, Field(ge=64)] = 2048
+    atlas: Annotated[int, Field(ge=64, le=16384), Because("texels: what the largest GPUs hold")] = 2048
     """Side of the atlas, the map in which light scatters [texel]."""
-    samples: Annotated[int, Field(ge=1, le=_MOST_SAMPLES)] = 4
+    samples: Annotated[int, Field(ge=1, le=_MOST_SAMPLES), Because("more show no difference")] = 4
     """Samples of each pixel, for smooth edges."""
     technique: Annotated[str, Named(TECHNIQUES)] = "texture-space"
     """How light scatters below the surface."""
@@ -75,7 +79,7 @@ class Settings(Plain):
     """Light between the charts for "clear-colour" seams, as irradiance over pi."""
     transmission: Literal["thin", "none"] = "thin"
     """Light through the head: "thin" for thin parts such as ears and nostrils, "none" for no part."""
-    shadow_size: Annotated[int, Field(ge=64, le=8192)] = 2048
+    shadow_size: Annotated[int, Field(ge=64, le=8192), Because("texels: finer than skin's pores")] = 2048
     """Side of each shadow map [texel]."""
     occlusion: Literal["baked", "rest", "none"] = "baked"
     """Ambient occlusion, which dims the environment's light where the head is in its way: "baked" follows a

@@ -6,7 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from dermis.errors import refuse
+from dermis.errors import refuse, shown_value
+from dermis.scene.findings import Because
 from dermis.scene.plain import Plain, slider
 from dermis.specular.models import EnergyName, FresnelName, SpecularName
 
@@ -19,8 +20,9 @@ PRESETS: dict[str, dict[str, Any]] = {"default": {}, "deck-2007": {"specular": "
 
 
 _Share = Annotated[float | None, Field(ge=0, le=1)]
-_Absorption = Annotated[float, Field(ge=0, le=1e4)]
-_Scattering = Annotated[float, Field(gt=0, le=1e4)]
+_DENSE = Because("1/mm: white paint has some hundreds")
+_Absorption = Annotated[float, Field(ge=0, le=1e4), _DENSE]
+_Scattering = Annotated[float, Field(ge=1e-6, le=1e4), _DENSE]
 _COEFFICIENT = Field(json_schema_extra=slider(1e-4, 50, log=True))
 
 
@@ -37,7 +39,11 @@ class Pigments(Plain):
     """Share of the dermis' volume that is blood."""
     oxygen: _Share = None
     """Share of the haemoglobin that carries oxygen."""
-    epidermis_mm: Annotated[float | None, Field(gt=0, le=2, json_schema_extra=slider(0.02, 0.5))] = None
+    epidermis_mm: Annotated[
+        float | None,
+        Field(ge=1e-3, le=2, json_schema_extra=slider(0.02, 0.5)),
+        Because("mm: from less than a cell to a callous heel"),
+    ] = None
     """Thickness of the epidermis [mm]."""
     epidermal_blood: Annotated[_Share, Field(json_schema_extra=slider(0, 0.1))] = None
     """Share of the epidermis' volume that is blood, for "donner2008" only."""
@@ -53,7 +59,9 @@ class TissueLayer(Plain):
     name: str = "layer"
     """What the layer is called."""
     thickness_mm: Annotated[
-        float | None, Field(gt=0, le=1000, json_schema_extra=slider(0.01, 5, log=True))
+        float | None,
+        Field(ge=1e-4, le=1000, json_schema_extra=slider(0.01, 5, log=True)),
+        Because("mm: from less than a cell's wall to more than a body"),
     ] = None
     """Thickness; none for the last layer, if it has no end [mm]."""
     absorption_per_mm: Annotated[tuple[_Absorption, _Absorption, _Absorption], _COEFFICIENT]
@@ -76,7 +84,9 @@ class Skin(Plain):
     profile's own colour and uses no map."""
     mix: Annotated[float, Field(ge=0, le=1)] = 0.5
     """Share of the colour map applied before scattering, the rest after it."""
-    roughness: Annotated[float, Field(ge=0.05, le=1)] = USUAL_ROUGHNESS
+    roughness: Annotated[
+        float, Field(ge=0.05, le=1), Because("smoother skin would mirror, facets lean no farther")
+    ] = USUAL_ROUGHNESS
     """Beckmann roughness m of the surface; where a head has a map of it, 0.3 leaves that as it is, and 0.6
     makes it twice as rough."""
     rho_s: Annotated[float, Field(ge=0, le=1)] = USUAL_RHO_S
@@ -107,8 +117,8 @@ class Skin(Plain):
 
         Raises DermisError for any other name.
         """
-        if name not in PRESETS:
-            refuse("skin", f"one of {', '.join(PRESETS)}", f"{name!r} came", "Choose one of them")
+        if not isinstance(name, str) or name not in PRESETS:
+            refuse("skin", f"one of {', '.join(PRESETS)}", f"{shown_value(name)} came", "Choose one of them")
         return cls(**PRESETS[name])
 
     @property

@@ -143,13 +143,13 @@ def test_examples_are_the_published_rows() -> None:
 @pytest.mark.parametrize("name", ["melanin", "eumelanin", "blood", "oxygen", "epidermal_blood", "oiliness"])
 @pytest.mark.parametrize("value", [-0.01, 1.01, np.nan])
 def test_shares_beyond_one_are_refused_by_their_option(name: str, value: float) -> None:
-    with pytest.raises(DermisError, match=f"--{name.replace('_', '-')}: expected a share from 0 to 1"):
+    with pytest.raises(DermisError, match=f"--{name.replace('_', '-')}: expected a number from 0 to 1"):
         replace(SKIN, **{name: value})
 
 
 @pytest.mark.parametrize("value", [0.0, -0.1, 2.1, np.nan, np.inf])
 def test_impossible_epidermis_is_refused(value: float) -> None:
-    with pytest.raises(DermisError, match="--epidermis-mm: expected more than 0"):
+    with pytest.raises(DermisError, match=r"--epidermis-mm: expected a number from 0\.001 to 2"):
         replace(SKIN, epidermis_mm=value)
 
 

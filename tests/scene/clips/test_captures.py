@@ -210,22 +210,22 @@ GOOD = {"time": 0.0, "blendshapes": {"jawOpen": 0.1}}
 @pytest.mark.parametrize(
     ("row", "words"),
     [
-        ('{"time": 0.1, "blend', r"a\.jsonl, line 2: expected an object in JSON, but .* at letter"),
+        ('{"time": 0.1, "blend', r"a\.jsonl, line 2: expected an object in JSON, but .*Unterminated string"),
         ("[1, 2]", r"line 2: expected an object in JSON, but \[1, 2\] came"),
         ({"time": 0.1}, r"line 2: expected blendshapes, but it has time"),
-        ({"time": "soon", "blendshapes": {}}, r"line 2: expected time as a number, but 'soon' came"),
+        ({"time": "soon", "blendshapes": {}}, r"line 2: time: expected a number .*'soon' came"),
         ({"time": 0.1, "blendshapes": 7}, r"line 2: expected blendshapes by name"),
         (
             {"time": 0.1, "blendshapes": {"jawOpen": "x"}},
             r"line 2: expected scores as numbers, but jawOpen is 'x'",
         ),
-        ('{"time": 0.1, "blendshapes": {"jawOpen": NaN}}', r"line 2: .*jawOpen is nan"),
+        ('{"time": 0.1, "blendshapes": {"jawOpen": NaN}}', r"line 2: .*NaN is not a number"),
         ({"time": 0.1, "blendshapes": [{"score": 1}]}, r"line 2: expected a categoryName"),
         (
             {"time": -0.1, "blendshapes": {"jawOpen": 0}},
             r"line 2: expected times that go on, but -0\.1 s comes",
         ),
-        (GOOD | {"matrix": [1, 2]}, r"line 2: expected a matrix of 4 x 4"),
+        (GOOD | {"matrix": [1, 2]}, r"line 2: matrix: expected 16 numbers"),
         (GOOD | {"matrix": np.zeros((4, 4)).tolist()}, r"line 2: expected a matrix that turns"),
     ],
 )
@@ -238,7 +238,7 @@ def test_a_time_that_is_none(tmp_path: Path) -> None:
     clip = dermis.load_motion(_lines(tmp_path / "a.jsonl", GOOD), HEAD)
     assert clip.duration_s == 0.0 and clip.rate is None and clip.frame_count(30) == 1
     for seconds in (float("nan"), float("inf")):
-        with pytest.raises(DermisError, match="a finite time"):
+        with pytest.raises(DermisError, match="a: time: expected a number"):
             clip.pose_at(seconds)
-    with pytest.raises(DermisError, match="a rate above 0"):
+    with pytest.raises(DermisError, match=r"rate: expected a number from 0\.001"):
         clip.frame_count(0)

@@ -78,11 +78,9 @@ fn shaded(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Shaded {
     let a = corner_at(t.x);
     let b = corner_at(t.y);
     let c = corner_at(t.z);
-    let weights = ray_to_weights(a.position - shade.eye, b.position - shade.eye, c.position - shade.eye);
+    let weights = ray_to_weights(shade.eye, a.position, b.position, c.position);
     let w = meet(weights, ray_through(place, size));
-    // A sample on an edge may lie a little outside: stay on the triangle.
-    let clamped = max(w, vec3f(0.0));
-    let inside = clamped / (clamped.x + clamped.y + clamped.z);
+    let inside = within(w); // a sample on an edge may lie a little outside
     var point = interpolate(a, b, c, inside, t.w);
     point.place = place_of_point(triangle, inside);
     point.curvature = curvature_at(t, inside);

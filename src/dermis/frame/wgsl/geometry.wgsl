@@ -105,12 +105,27 @@ fn interpolate(a: Corner, b: Corner, c: Corner, w: vec3f, flags: u32) -> Point {
     return point;
 }
 
-// Barycentric weights of where a ray from the origin meets a triangle's plane are linear in the ray, up to scale.
-fn ray_to_weights(a: vec3f, b: vec3f, c: vec3f) -> mat3x3f {
-    return transpose(mat3x3f(cross(b, c), cross(c, a), cross(a, b)));
+// Barycentric weights of where a ray from the eye meets a triangle's plane are linear in the ray, up to scale. They are
+// made of the triangle's sides: products of its corners, seen from far away, would cancel each other to noise.
+fn ray_to_weights(eye: vec3f, a: vec3f, b: vec3f, c: vec3f) -> mat3x3f {
+    let away = a - eye;
+    let to_b = cross(c - a, away);
+    let to_c = cross(away, b - a);
+    return transpose(mat3x3f(cross(b - a, c - a) - to_b - to_c, to_b, to_c));
 }
+
+const FARTHEST_WEIGHT: f32 = 1e4; // where a ray runs along the plane
 
 fn meet(weights: mat3x3f, ray: vec3f) -> vec3f {
     let w = weights * ray;
-    return w / (w.x + w.y + w.z);
+    let sum = w.x + w.y + w.z;
+    let scaled = w / select(sum, 1e-20, abs(sum) < 1e-20);
+    return clamp(scaled, vec3f(-FARTHEST_WEIGHT), vec3f(FARTHEST_WEIGHT));
+}
+
+// The nearest to weights that lies within the triangle.
+fn within(w: vec3f) -> vec3f {
+    let clamped = max(w, vec3f(0.0));
+    let sum = clamped.x + clamped.y + clamped.z;
+    return select(vec3f(1.0 / 3.0), clamped / max(sum, 1e-20), sum > 0.0);
 }

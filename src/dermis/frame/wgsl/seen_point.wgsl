@@ -17,9 +17,7 @@ fn ray_to(rays: Rays, place: vec2f, size: vec2f) -> vec3f {
 
 // Barycentric weights within a triangle of corners `t`.
 fn weights_under(t: vec4u, ray: vec3f, eye: vec3f) -> vec3f {
-    let w = ray_to_weights(position_of(t.x) - eye, position_of(t.y) - eye, position_of(t.z) - eye) * ray;
-    let inside = max(w * sign(w.x + w.y + w.z), vec3f(0.0));
-    return inside / max(inside.x + inside.y + inside.z, 1e-20);
+    return within(meet(ray_to_weights(eye, position_of(t.x), position_of(t.y), position_of(t.z)), ray));
 }
 
 fn point_under(index: u32, weights: vec3f) -> Point {

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
-from dermis.errors import refuse
+from dermis.errors import refuse, shown_value
+from dermis.quantities import check_numbers
 
 Style = Literal["none", "cropped", "short"]
 STYLES: tuple[Style, ...] = get_args(Style)
@@ -50,10 +51,5 @@ class HairLook:
 
     def __post_init__(self) -> None:
         if self.style not in STYLES:
-            refuse("style", f"one of {', '.join(STYLES)}", f"{self.style!r} came", "Choose one")
-        for field in fields(self)[1:]:
-            value = getattr(self, field.name)
-            low, high = RANGES.get(field.name, (0, 1))
-            if not low <= value <= high or (field.name == "seed" and value != int(value)):
-                expected = f"a number from {low:g} to {high:g}"
-                refuse(field.name, expected, f"{value!r} came", "Choose within")
+            refuse("style", f"one of {', '.join(STYLES)}", f"{shown_value(self.style)} came", "Choose one")
+        check_numbers(self, {field.name: RANGES.get(field.name, (0.0, 1.0)) for field in fields(self)[1:]})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping
 from functools import cache
 from importlib import resources
@@ -25,6 +26,8 @@ from dermis.human.regions.table import RegionTable
 from dermis.human.regions.zones import REGIONS, Doubles
 from dermis.mesh.head import Head
 from dermis.mesh.maps import load_labels
+from dermis.quantities import numbers
+from dermis.reading import read_text, understood
 from dermis.tables import parse_rows
 
 Place = tuple[float, float, float]
@@ -33,15 +36,13 @@ Places = Mapping[str, Place]
 _FEWEST = 10
 _FLATTEST_MM = 2.0  # root mean square distance from a plane: the warp needs three dimensions
 _FARTHEST_MM = 15.0  # centres of eyes lie this deep; what is farther belongs to another head
+_FARTHEST_AWAY_MM = 1e6
 _SLACK = 1.0  # for places picked by eye; 0 would carry each landmark exactly onto its twin
 
 
 def load_landmarks(path: Path) -> Places:
     """Places [mm from the head's centre] by name, from a CSV with landmark,x,y,z and comments after #."""
-    try:
-        return _read(path.read_text(encoding="utf-8"), str(path))
-    except (OSError, UnicodeDecodeError) as error:
-        refuse(path, "landmarks in CSV", f"it cannot be read ({error})", "Check the name")
+    return _read(read_text(path, "landmarks in CSV"), str(path))
 
 
 def known_landmarks(head: Head) -> Places | None:
@@ -80,12 +81,14 @@ def to_average(head: Head, places: Places, points: Doubles) -> Doubles:
 
 
 def _read(text: str, name: str) -> Places:
-    try:
-        return {
-            row["landmark"]: (float(row["x"]), float(row["y"]), float(row["z"])) for row in parse_rows(text)
-        }
-    except (KeyError, TypeError, ValueError) as error:
-        refuse(name, "rows of landmark,x,y,z", f"one cannot be read ({error})", "Correct it there")
+    expected = "rows of landmark,x,y,z"
+    with understood(name, expected, KeyError, TypeError, csv.Error):
+        found = {row["landmark"]: tuple(float(row[axis]) for axis in "xyz") for row in parse_rows(text)}
+    if not found:
+        refuse(name, expected, "there are none", "Add them")
+    for landmark, place in found.items():
+        numbers(f"{name}: {landmark}", place, (3,), -_FARTHEST_AWAY_MM, _FARTHEST_AWAY_MM, "mm")
+    return {landmark: (x, y, z) for landmark, (x, y, z) in found.items()}
 
 
 def _check(head: Head, places: Places, average: Places) -> None:

@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.errors import refuse, shown_value
 from dermis.human.regions.zones import REGIONS
+from dermis.quantities import number
+from dermis.reading import read_toml
 
 DEFAULT = "default"
 """Name of the package's own table, of artist's values."""
@@ -42,13 +44,7 @@ def load_table(name: str | Path) -> RegionTable:
     if str(name) == DEFAULT:
         own = resources.files(__package__).joinpath("default.toml").read_text("utf-8")
         return _table(tomllib.loads(own), Path(DEFAULT))
-    path = Path(name)
-    try:
-        return _table(tomllib.loads(path.read_text(encoding="utf-8")), path)
-    except OSError as error:
-        refuse(name, "default, or regions in TOML", f"it cannot be read ({error.strerror})", "Check the name")
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        refuse(name, "regions in TOML", f"its text is not TOML ({error})", "Correct it there")
+    return _table(read_toml(name, "default, or regions in TOML"), Path(name))
 
 
 def _table(entries: dict[str, Any], path: Path) -> RegionTable:
@@ -62,16 +58,14 @@ def _table(entries: dict[str, Any], path: Path) -> RegionTable:
 
 def _row(path: Path, region: str, entry: Any) -> list[float]:
     if not isinstance(entry, dict) or entry.keys() != LIMITS.keys():
-        refuse(f"{path}: {region}", "m and rho_s", f"{entry!r} came", "Give both, and nothing else")
-    for quantity, (low, high) in LIMITS.items():
-        value = entry[quantity]
-        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-            expected = f"a number from {low:g} to {high:g}"
-            refuse(f"{path}: {region}: {quantity}", expected, f"{value!r} came", "Choose within")
-    return [float(entry[quantity]) for quantity in LIMITS]
+        refuse(
+            f"{path}: {region}", "m and rho_s", f"{shown_value(entry)} came", "Give both, and nothing else"
+        )
+    where = f"{path}: {region}"
+    return [number(f"{where}: {name}", entry[name], *limits) for name, limits in LIMITS.items()]
 
 
 def _file(path: Path, key: str, name: Any) -> Path:
     if not isinstance(name, str):
-        refuse(f"{path}: {key}", "the name of a file", f"{name!r} came", "Write it in quotes")
+        refuse(f"{path}: {key}", "the name of a file", f"{shown_value(name)} came", "Write it in quotes")
     return path.parent / name

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-from dermis.errors import refuse
+from dermis.quantities import check_numbers
 
 RANGES = {"seed": (0, 2**32 - 1)}
 """Least and greatest values of fields that do not go from 0 to 1."""
@@ -52,9 +52,4 @@ class SkinLook:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            low, high = RANGES.get(field.name, (0, 1))
-            if not low <= value <= high or (field.name == "seed" and value != int(value)):
-                expected = f"a number from {low} to {high}"
-                refuse(field.name, expected, f"{value!r} came", "Choose within")
+        check_numbers(self, {field.name: RANGES.get(field.name, (0.0, 1.0)) for field in fields(self)})

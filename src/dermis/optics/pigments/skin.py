@@ -9,7 +9,7 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from dermis.errors import refuse
+from dermis.errors import refuse, shown_value
 from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium
 from dermis.optics.pigments.chromophores import (
     DERMIS_SHARE,
@@ -20,6 +20,7 @@ from dermis.optics.pigments.chromophores import (
     melanosome,
 )
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, visible
+from dermis.quantities import number
 
 Structure = Literal["dj2006", "donner2008", "biospec"]
 
@@ -29,9 +30,14 @@ LEAKED_MELANIN: Final = 0.175
 _SHEET_MM = 0.001
 _CORNEUM_MM, _PAPILLARY_MM = 0.01, 0.2
 _RETICULAR_BLOOD = 0.0091 / 0.012
-_THICKEST_EPIDERMIS_MM = 2.0
+EPIDERMIS_MM = 1e-3, 2.0
+"""From less than a cell to a callous heel."""
 _ONE_INDEX = f"all layers have the index {SKIN_ETA:g}: light meets no surface between them"
 _THIN = "the multipole misjudges so thin a layer: take layered diffusion"
+
+
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
 
 
 @dataclass(frozen=True)
@@ -59,12 +65,8 @@ class SkinParameters:
 
     def __post_init__(self) -> None:
         for name in ("melanin", "eumelanin", "blood", "oxygen", "epidermal_blood", "oiliness"):
-            value = getattr(self, name)
-            if not 0.0 <= value <= 1.0:
-                refuse(_option(name), "a share from 0 to 1", f"{value:g} came", "Correct it")
-        if not 0.0 < self.epidermis_mm <= _THICKEST_EPIDERMIS_MM:
-            expected = f"more than 0 and up to {_THICKEST_EPIDERMIS_MM:g} mm"
-            refuse(_option("epidermis_mm"), expected, f"{self.epidermis_mm:g} mm came", "Correct it")
+            number(_option(name), getattr(self, name), 0.0, 1.0, "a share")
+        number(_option("epidermis_mm"), self.epidermis_mm, *EPIDERMIS_MM, "mm")
         if self.melanin + self.epidermal_blood > 1.0:
             both = f"{_option('melanin')} and {_option('epidermal_blood')}"
             came = f"{self.melanin:g} and {self.epidermal_blood:g} came"
@@ -103,7 +105,9 @@ def spectral_medium(
     Source: [DonnerJensen2006], [Donner2008], [KrishnaswamyBaranoski2004].
     """
     if structure not in _STRUCTURES:
-        refuse("structure", ", ".join(get_args(Structure)), f"{structure!r} came", "Take one of them")
+        refuse(
+            "structure", ", ".join(get_args(Structure)), f"{shown_value(structure)} came", "Take one of them"
+        )
     wavelengths = visible(wavelength_nm)
     layers, note, sources = _STRUCTURES[structure]
     stack = layers(parameters, wavelengths, scattering(wavelengths))
@@ -171,10 +175,6 @@ def mixed_layers(parameters: SkinParameters, shares: Floats) -> tuple[Layer, Lay
     red = _dermal_absorption(parameters, column, WAVELENGTHS_NM)
     epidermis, dermis = (np.broadcast_to(k * scattered, brown.shape) for k in (1.0, DERMIS_SHARE))
     return Layer(brown, epidermis, parameters.epidermis_mm, "epidermis"), Layer(red, dermis, name="dermis")
-
-
-def _option(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
 
 
 _Build = Callable[[SkinParameters, Floats, Floats], tuple[Layer, ...]]

@@ -6,11 +6,19 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from dermis.errors import refuse
+from dermis.quantities import number
 from dermis.scene.pose import Pose
 
 _SHOWN = 8  # names in a note
+LONGEST_S = 86_400.0
+_LATEST_S = 1e9
+_SLOWEST, _FASTEST = 0.001, 1000.0
 _EARLY = 1e-6  # of a frame: how far a frame that rounding lost may lie before the end
+
+
+def check_rate(culprit: object, rate: object) -> float:
+    """Frames a second; raises DermisError for what are none."""
+    return number(culprit, rate, _SLOWEST, _FASTEST, "frames a second")
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,15 +46,17 @@ class Clip:
 
         Raises DermisError for a time that is none, and for a frame that cannot be read.
         """
-        if not math.isfinite(seconds):
-            refuse(self.name, "a finite time", f"{seconds} came", "Correct it")
-        return self.sample(min(max(float(seconds), 0.0), self.duration_s))
+        time_s = number(f"{self.name}: time", seconds, -_LATEST_S, _LATEST_S, "s")
+        return self.sample(min(max(time_s, 0.0), self.duration_s))
 
     def frame_count(self, rate: float) -> int:
         """How many frames it has at a rate [1/s]: frame k is at k / rate, the last not after its end."""
-        if not (math.isfinite(rate) and rate > 0):
-            refuse(self.name, "a rate above 0", f"{rate} came", "Give the frames a second")
-        return math.floor(self.duration_s * rate + _EARLY) + 1
+        return math.floor(self.duration_s * check_rate(f"{self.name}: rate", rate) + _EARLY) + 1
+
+    def __post_init__(self) -> None:
+        number(
+            f"{self.name}: duration", self.duration_s, 0.0, LONGEST_S, "s: no motion lasts longer than a day"
+        )
 
     @property
     def note(self) -> str:

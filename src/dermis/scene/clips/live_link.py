@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import csv
+import io
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
@@ -15,8 +16,9 @@ from numpy.typing import NDArray
 from dermis.errors import refuse
 from dermis.mesh.head import Head
 from dermis.mesh.turns import angles_matrix, matrix_quaternion
+from dermis.reading import read_text, understood
 from dermis.scene.clips.clip import Clip
-from dermis.scene.clips.sampled import Samples, check_weight, sampled_clip
+from dermis.scene.clips.sampled import MOST_CLIP, Samples, check_size, check_weights, sampled_clip
 from dermis.scene.clips.turning import TurningBones, head_turns, steady, turning_bones
 
 Doubles = NDArray[np.float64]
@@ -24,7 +26,7 @@ Doubles = NDArray[np.float64]
 _TIME, _COUNT = "timecode", "blendshapecount"
 _PARTS = ("head", "lefteye", "righteye")
 _ANGLES = {f"{part}{angle}" for part in _PARTS for angle in ("pitch", "yaw", "roll")}
-_TIMECODE = re.compile(r"(\d+):(\d+):(\d+)[:;](\d+(?:\.\d+)?)")
+_TIMECODE = re.compile(r"(\d{1,3}):(\d{1,2}):(\d{1,2})[:;](\d{1,4}(?:\.\d{1,12})?)")
 _RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0, 240.0)
 _APPS = 60.0
 _DAY_S, _MIDNIGHT_S = 86400.0, 82800.0
@@ -66,31 +68,42 @@ def load_live_link(path: Path, head: Head, fps: float | None = None) -> Clip:
 
 
 def _read(path: Path, fps: float | None) -> _Table:
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as fault:
-        refuse(path, "a CSV of Live Link Face", f"it cannot be read ({fault})", "Check the file")
-    reader = csv.reader(text.splitlines())
-    lines = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    if len(lines) < 2:
-        came = "it is empty" if not lines else "it has only its header"
-        refuse(path, "a CSV of Live Link Face with a header and rows", came, "Export it again")
-    header = [cell.strip() for cell in lines[0][1]]
-    _check_header(f"{path}, line {lines[0][0]}", header)
-    folded = [name.casefold() for name in header]
-    at, kept = folded.index(_TIME), [k for k, name in enumerate(folded) if name not in (_TIME, _COUNT, "")]
-    codes, values = [], np.empty((len(lines) - 1, len(kept)))
-    for index, (number, row) in enumerate(lines[1:]):
-        culprit = f"{path}, line {number}"
-        if len(row) < len(header) or any(cell.strip() for cell in row[len(header) :]):
-            refuse(culprit, f"{len(header)} cells", f"{len(row)} came", "Correct or remove the line")
-        codes.append(_timecode(culprit, row[at]))
-        values[index] = list(_numbers(culprit, header, row, kept))
-    times = _times([f"{path}, line {number}" for number, _ in lines[1:]], codes, fps)
-    return _Table([header[k] for k in kept], times, values)
+    expected = "a CSV of Live Link Face"
+    reader = csv.reader(io.StringIO(read_text(path, expected, MOST_CLIP), newline=""))
+    with understood(path, expected, csv.Error):
+        header = [cell.strip() for cell in next(filter(_has_text, reader), [])]
+        if not header:
+            refuse(path, f"{expected} with a header and rows", "it is empty", "Export it again")
+        _check_header(f"{path}, line {reader.line_num}", header)
+        folded = [name.casefold() for name in header]
+        kept = [k for k, name in enumerate(folded) if name not in (_TIME, _COUNT, "")]
+        lines: list[int] = []
+        codes: list[_Timecode] = []
+        rows: list[Doubles] = []
+        for row in filter(_has_text, reader):
+            culprit = f"{path}, line {reader.line_num}"
+            _check_row(culprit, header, row)
+            lines.append(reader.line_num)
+            codes.append(_timecode(culprit, row[folded.index(_TIME)]))
+            rows.append(_numbers(culprit, header, row, kept))
+            check_size(path, len(rows), len(kept))
+    if not rows:
+        refuse(path, f"{expected} with a header and rows", "it has only its header", "Export it again")
+    times = _times(path, lines, codes, fps)
+    return _Table([header[k] for k in kept], times, np.array(rows))
+
+
+def _has_text(row: Sequence[str]) -> bool:
+    return any(map(str.strip, row))
+
+
+def _check_row(culprit: str, header: Sequence[str], row: Sequence[str]) -> None:
+    if len(row) < len(header) or any(cell.strip() for cell in row[len(header) :]):
+        refuse(culprit, f"{len(header)} cells", f"{len(row)} came", "Correct or remove the line")
 
 
 def _check_header(culprit: str, header: Sequence[str]) -> None:
+    check_size(culprit, 0, len(header))
     folded = [name.casefold() for name in header if name]
     if _TIME not in folded:
         came = f"the columns are {', '.join(header[:5])}{' ...' if len(header) > 5 else ''}"
@@ -102,14 +115,16 @@ def _check_header(culprit: str, header: Sequence[str]) -> None:
         refuse(culprit, "columns of blend shapes", "there are none", "Export it from Live Link Face as it is")
 
 
-def _numbers(culprit: str, header: Sequence[str], row: Sequence[str], kept: Sequence[int]) -> Iterator[float]:
-    for column in kept:
+def _numbers(culprit: str, header: Sequence[str], row: Sequence[str], kept: Sequence[int]) -> Doubles:
+    values = np.zeros(len(kept))
+    for place, column in enumerate(kept):
         try:
-            value = float(row[column])
+            values[place] = float(row[column])
         except ValueError:
             came = f"{header[column]} is {row[column]!r}"
             refuse(culprit, "numbers", came, "Correct or remove the line")
-        yield check_weight(culprit, header[column], value)
+    check_weights(culprit, [header[column] for column in kept], values)
+    return values
 
 
 def _timecode(culprit: str, cell: str) -> _Timecode:
@@ -120,7 +135,7 @@ def _timecode(culprit: str, cell: str) -> _Timecode:
     return _Timecode(3600 * hours + 60 * minutes + seconds, float(match[4]))
 
 
-def _times(culprits: Sequence[str], codes: Sequence[_Timecode], fps: float | None) -> Doubles:
+def _times(path: Path, lines: Sequence[int], codes: Sequence[_Timecode], fps: float | None) -> Doubles:
     """Seconds of each row; a timecode that goes from 23 to 0 hours goes on."""
     rate = fps or _rate(codes)
     times = np.array([one.seconds + one.frames / rate for one in codes])
@@ -130,7 +145,12 @@ def _times(culprits: Sequence[str], codes: Sequence[_Timecode], fps: float | Non
     if len(back):
         row = int(back[0]) + 1
         came = f"this line is {times[row - 1] - times[row]:.3f} s before the last"
-        refuse(culprits[row], "a Timecode that goes on", came, "Sort the lines, or remove this one")
+        refuse(
+            f"{path}, line {lines[row]}",
+            "a Timecode that goes on",
+            came,
+            "Sort the lines, or remove this one",
+        )
     return times
 
 

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import math
 import os
 from pathlib import Path
 
 from dermis.errors import refuse
 from dermis.mesh.formats import is_gltf
 from dermis.mesh.head import Head
-from dermis.scene.clips.clip import Clip
+from dermis.reading import is_file, named_path
+from dermis.scene.clips.clip import Clip, check_rate
 from dermis.scene.clips.gltf_clip import load_gltf_clip
 from dermis.scene.clips.live_link import load_live_link
 from dermis.scene.clips.mediapipe import load_mediapipe
 from dermis.scene.clips.sequence import is_sequence, load_sequence
+from dermis.scene.head_checks import check_options
 from dermis.scene.head_table import Up
 
 _LINES = (".jsonl", ".ndjson", ".json")
@@ -42,16 +43,17 @@ def load_motion(
     Raises DermisError for files that cannot be read, which it names with their lines, and for motion of
     which the head has no name; what it has only in part, `Clip.note` tells.
     """
-    if fps is not None and not (math.isfinite(fps) and fps > 0):
-        refuse("fps", "a number of frames a second above 0", f"{fps} came", "Correct it")
-    source, inside = _parted(Path(path), clip)
+    named = named_path(path, _KINDS)
+    check_options(unit_mm=unit_mm, up=up)
+    fps = None if fps is None else check_rate("fps", fps)
+    source, inside = _parted(named, clip)
     if is_gltf(source):
         return load_gltf_clip(source, head, inside)
     if inside is not None:
         refuse(source, "a clip's name with a glTF file alone", f"{inside!r} came", "Leave it out")
     if is_sequence(source):
         return load_sequence(source, head, fps, unit_mm, up)
-    if not source.is_file():
+    if not is_file(source):
         refuse(source, _KINDS, "there is no such file", "Check the name")
     if source.suffix.lower() not in (".csv", *_LINES):
         refuse(source, _KINDS, f"the suffix is {source.suffix!r}", "Convert it to one of these")
@@ -62,6 +64,6 @@ def load_motion(
 def _parted(path: Path, clip: str | None) -> tuple[Path, str | None]:
     """A file, and the name of a clip that was written after it."""
     file, sign, name = str(path).rpartition("#")
-    if sign and not path.exists() and is_gltf(file):
+    if sign and not is_file(path) and is_gltf(file):
         return Path(file), clip or name
     return path, clip

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import math
+import io
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
@@ -12,10 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis import quantities
+from dermis.errors import refuse, shown_value
 from dermis.mesh.head import Head
+from dermis.reading import parse_json, read_text
 from dermis.scene.clips.clip import Clip
-from dermis.scene.clips.sampled import Samples, check_weight, sampled_clip
+from dermis.scene.clips.sampled import MOST_CLIP, Samples, check_size, check_weights, sampled_clip
 from dermis.scene.clips.turning import head_turns, matrix_turns, turning_bones
 
 Doubles = NDArray[np.float64]
@@ -24,13 +25,18 @@ _SECONDS = {"time": 1.0, "time_s": 1.0, "timestamp_ms": 1e-3}
 _SHAPES = ("blendshapes", "face_blendshapes", "faceBlendshapes")
 _MATRIX = ("matrix", "facial_transformation_matrix", "facialTransformationMatrix")
 _NEUTRAL = "_neutral"  # what is left when nothing else is there: not a shape
+_LATEST = 1e15  # milliseconds of a clock; frames count from the first
+_FARTHEST = 1e6
 _MEND = "Correct or remove the line"
 
 
 class _Row(NamedTuple):
+    """A frame: weights (k,) of some columns (k,)."""
+
     line: int
     seconds: float
-    weights: dict[str, float]
+    columns: NDArray[np.intp]
+    weights: Doubles
     matrix: Doubles | None
 
 
@@ -46,12 +52,14 @@ def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
 
     Raises DermisError for a file without frames and for broken lines, which it names.
     """
-    rows = [row for row in _rows(path, fps) if row.weights]
+    columns: dict[str, int] = {}
+    rows = list(_rows(path, fps, columns))
     if not rows:
         refuse(path, "lines of JSON with blend shapes", "there are none", "Record it again")
     _check_order(path, rows)
-    names = tuple(dict.fromkeys(name for row in rows for name in row.weights))
-    weights = np.array([[row.weights.get(name, 0.0) for name in names] for row in rows])
+    names, weights = tuple(columns), np.zeros((len(rows), len(columns)))
+    for place, row in enumerate(rows):
+        weights[place, row.columns] = row.weights
     matrices = [row.matrix for row in rows if row.matrix is not None]
     bones = turning_bones(head.control.skeleton)
     angles: dict[str, Doubles] = {}
@@ -64,21 +72,23 @@ def load_mediapipe(path: Path, head: Head, fps: float | None = None) -> Clip:
     return sampled_clip(path, path.stem, samples, head)
 
 
-def _rows(path: Path, fps: float | None) -> Iterator[_Row]:
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as fault:
-        refuse(path, "lines of JSON", f"it cannot be read ({fault})", "Check the file")
-    for number, line in enumerate(lines, start=1):
+def _rows(path: Path, fps: float | None, columns: dict[str, int]) -> Iterator[_Row]:
+    """Frames that have blend shapes.
+
+    columns : by name of a blend shape; new names are added
+    """
+    count = 0
+    for number, line in enumerate(io.StringIO(read_text(path, "lines of JSON", MOST_CLIP)), start=1):
         if line.strip():
-            yield _row(f"{path}, line {number}", number, line, fps)
+            row = _row(f"{path}, line {number}", number, line, fps, columns)
+            count += len(row.columns) > 0
+            check_size(path, count, len(columns))
+            if len(row.columns):
+                yield row
 
 
-def _row(culprit: str, number: int, line: str, fps: float | None) -> _Row:
-    try:
-        told = json.loads(line)
-    except json.JSONDecodeError as fault:
-        refuse(culprit, "an object in JSON", f"{fault.msg} at letter {fault.pos + 1}", _MEND)
+def _row(culprit: str, number: int, line: str, fps: float | None, columns: dict[str, int]) -> _Row:
+    told = parse_json(line, culprit, "an object in JSON")
     if not isinstance(told, dict):
         refuse(culprit, "an object in JSON", f"{line.strip():.40} came", _MEND)
     shapes = next((told[key] for key in _SHAPES if key in told), None)
@@ -87,23 +97,23 @@ def _row(culprit: str, number: int, line: str, fps: float | None) -> _Row:
         refuse(culprit, "blendshapes", came, _MEND)
     matrix = next((told[key] for key in _MATRIX if told.get(key) is not None), None)
     seconds = _seconds(culprit, number, told, fps)
-    return _Row(
-        number, seconds, _weights(culprit, shapes), None if matrix is None else _matrix(culprit, matrix)
-    )
+    scores = _scores(culprit, shapes)
+    places = np.array([columns.setdefault(name, len(columns)) for name in scores], np.intp)
+    weights = np.fromiter(scores.values(), np.float64, len(scores))
+    check_weights(culprit, list(scores), weights)
+    return _Row(number, seconds, places, weights, None if matrix is None else _matrix(culprit, matrix))
 
 
 def _seconds(culprit: str, number: int, told: Mapping[str, Any], fps: float | None) -> float:
     for key, scale in _SECONDS.items():
         if key in told:
-            if not isinstance(told[key], int | float) or not math.isfinite(told[key]):
-                refuse(culprit, f"{key} as a number", f"{told[key]!r} came", _MEND)
-            return float(told[key]) * scale
+            return scale * quantities.number(f"{culprit}: {key}", told[key], -_LATEST, _LATEST)
     if fps is None:
         refuse(culprit, f"a time ({', '.join(_SECONDS)})", "it has none", "Give the frames a second (fps)")
     return (number - 1) / fps
 
 
-def _weights(culprit: str, shapes: Any) -> dict[str, float]:
+def _scores(culprit: str, shapes: Any) -> dict[str, float]:
     """Scores by name, from either form."""
     if isinstance(shapes, list):
         categories = [one if isinstance(one, dict) else {} for one in shapes]
@@ -112,21 +122,20 @@ def _weights(culprit: str, shapes: Any) -> dict[str, float]:
             refuse(culprit, "a categoryName and a score for each blend shape", "one has none", _MEND)
         shapes = {str(name): one["score"] for name, one in zip(names, categories, strict=True)}
     if not isinstance(shapes, dict):
-        refuse(culprit, "blendshapes by name or as a list", f"{shapes!r:.40} came", _MEND)
+        refuse(culprit, "blendshapes by name or as a list", f"{shown_value(shapes)} came", _MEND)
     for name, score in shapes.items():
-        if not isinstance(score, int | float):
-            refuse(culprit, "scores as numbers", f"{name} is {score!r}", _MEND)
-    return {name: check_weight(culprit, name, float(s)) for name, s in shapes.items() if name != _NEUTRAL}
+        if type(score) not in (int, float):
+            refuse(culprit, "scores as numbers", f"{name} is {shown_value(score)}", _MEND)
+    return {name: score for name, score in shapes.items() if name != _NEUTRAL}
 
 
 def _matrix(culprit: str, given: Any) -> Doubles:
     """(4, 4) with the translation in its last column, from rows or columns."""
-    try:
-        matrix = np.array(given, np.float64).reshape(4, 4)
-    except (TypeError, ValueError):
-        refuse(culprit, "a matrix of 4 x 4 numbers", f"{given!r:.40} came", _MEND)
-    if not np.isfinite(matrix).all() or not abs(np.linalg.det(matrix[:3, :3])) > 1e-12:
-        refuse(culprit, "a matrix that turns", "this one is flat or not finite", _MEND)
+    flat = isinstance(given, list) and not any(isinstance(one, list) for one in given)
+    shape = (16,) if flat else (4, 4)
+    matrix = quantities.numbers(f"{culprit}: matrix", given, shape, -_FARTHEST, _FARTHEST).reshape(4, 4)
+    if not abs(np.linalg.det(matrix[:3, :3])) > 1e-12:
+        refuse(culprit, "a matrix that turns", "this one is flat", _MEND)
     return matrix.T if matrix[3, :3].any() and not matrix[:3, 3].any() else matrix
 
 

@@ -16,6 +16,10 @@ from dermis.scene.pose import MOST_WEIGHT, Pose
 
 Doubles = NDArray[np.float64]
 
+MOST_CLIP = 48 << 20
+"""Bytes of a capture's file."""
+MOST_FRAMES, MOST_NAMES = 200_000, 500
+"""Rows of a capture, almost an hour at 60 a second, and columns of it."""
 _USUAL_RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0)
 _NEARLY = 0.02
 
@@ -85,12 +89,21 @@ def rate_of(times: Doubles) -> float | None:
     return near if abs(near / rate - 1) < _NEARLY else rate
 
 
-def check_weight(culprit: str, name: str, value: float) -> float:
-    """The weight; raises DermisError unless it is a finite number of a sensible size."""
-    if not abs(value) <= MOST_WEIGHT:
+def check_weights(culprit: object, names: Sequence[str], values: Doubles) -> None:
+    """Refuse weights (n,) of which one is no number of a sensible size."""
+    lost = ~(np.abs(values) <= MOST_WEIGHT)
+    if lost.any():
         expected = f"numbers from -{MOST_WEIGHT:g} to {MOST_WEIGHT:g}"
-        refuse(culprit, expected, f"{name} is {value}", "Correct or remove the line")
-    return value
+        first = int(lost.argmax())
+        refuse(culprit, expected, f"{names[first]} is {values[first]:g}", "Correct or remove the line")
+
+
+def check_size(culprit: object, frames: int, names: int) -> None:
+    """Refuse captures that are none by their number of rows or columns."""
+    if frames > MOST_FRAMES or names > MOST_NAMES:
+        expected = f"at most {MOST_FRAMES:,} frames of {MOST_NAMES} numbers"
+        came = f"it has more ({frames:,} of {names:,} so far)"
+        refuse(culprit, expected, came, "Cut it, or leave out columns that no head has")
 
 
 def _some(names: Sequence[str]) -> str:

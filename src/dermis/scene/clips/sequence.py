@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -31,7 +32,7 @@ _NUMBER = re.compile(r"%0?\d*d")
 def is_sequence(path: Path) -> bool:
     """Whether a name is a folder, a pattern, or a mesh that could be one frame."""
     return (
-        path.is_dir()
+        _is_folder(path)
         or bool(_NUMBER.search(path.name))
         or "*" in path.name
         or path.suffix.lower() in SUFFIXES
@@ -43,14 +44,15 @@ def frame_files(path: Path) -> list[Path]:
 
     Raises DermisError when there are none, or of several kinds.
     """
-    if path.is_dir():
+    if _is_folder(path):
         found = [one for one in path.iterdir() if one.suffix.lower() in SUFFIXES]
     elif _NUMBER.search(path.name):
         before, after = _NUMBER.split(path.name, maxsplit=1)
         shape = re.compile(rf"{re.escape(before)}\d+{re.escape(after)}")
         found = [one for one in _listed(path.parent) if shape.fullmatch(one.name)]
     elif "*" in path.name:
-        found = list(path.parent.glob(path.name))
+        shape = re.compile(fnmatch.translate(path.name))
+        found = [one for one in _listed(path.parent) if shape.fullmatch(one.name)]
     else:
         found = [path]
     kinds = sorted({one.suffix.lower() for one in found})
@@ -142,7 +144,14 @@ class _Frames:
 
 
 def _listed(folder: Path) -> list[Path]:
-    return list(folder.iterdir()) if folder.is_dir() else []
+    return list(folder.iterdir()) if _is_folder(folder) else []
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):  # names that none can have, or that are out of reach
+        return False
 
 
 def _by_number(file: Path) -> tuple[int, str]:

@@ -10,7 +10,8 @@ from typing import Any
 from imgui_bundle import imgui
 
 from dermis.errors import DermisError
-from dermis.scene.plain import Colour, Plain, Range, choices_of, help_of, range_of, words_of
+from dermis.scene.findings import words_of
+from dermis.scene.plain import Colour, Plain, Range, choices_of, help_of, range_of
 from dermis.viewer.session import Session
 from dermis.viewer.state import ViewerState
 

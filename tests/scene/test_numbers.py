@@ -1,0 +1,122 @@
+"""Every number of a model, a person or a skin is finite, in single precision too, and in a stated range."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import fields
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+from pydantic.fields import FieldInfo
+
+import dermis
+from dermis.errors import DermisError
+from dermis.human.hair.look import HairLook
+from dermis.human.person import Human
+from dermis.human.skin.look import SkinLook
+from dermis.mesh.eyes import EyeLook
+from dermis.optics.pigments.skin import SkinParameters
+from dermis.scene import Environment, Skin
+from dermis.scene.camera import Camera
+from dermis.scene.findings import Because, ImpossibleError, bounds_of, number_fields
+from dermis.scene.head_table import EyeTable, HeadTable
+from dermis.scene.lights import LIGHTS
+from dermis.scene.plain import Plain
+from dermis.scene.pose_table import PoseTable
+from dermis.scene.settings import Settings
+from dermis.scene.skin import Pigments, TissueLayer
+
+PLACE = {"position": (0, 0, 900)}
+THIRD = (0.1, 0.1, 0.1)
+NEEDED: dict[type[Plain], dict[str, Any]] = {
+    **{LIGHTS[kind]: PLACE for kind in LIGHTS},
+    **{LIGHTS[kind]: {"direction": (0, 0, -1)} for kind in ("directional", "stripe")},
+    Camera: PLACE,
+    Environment: {"name": "uniform"},
+    HeadTable: {"name": "human"},
+    TissueLayer: {"absorption_per_mm": THIRD, "scattering_per_mm": THIRD},
+    **{model: {} for model in (EyeTable, Pigments, Skin, Settings, PoseTable)},
+}
+"""The package's models, each with what it cannot be without."""
+PEOPLE = (Human, SkinLook, HairLook, EyeLook, SkinParameters)
+HUGE = 10**400
+NONE = [np.nan, np.inf, -np.inf, 1e308, -1e308, HUGE, 10**5000, True, "1", 1j, [1.0], np.ones((2, 2))]
+"""What no number is, in or out of any range."""
+LEAST = 5e-324  # which is 0 in single precision
+
+
+def _models(kind: type[Plain] = Plain) -> Iterator[type[Plain]]:
+    for one in kind.__subclasses__():
+        if one.__module__.startswith("dermis.") and not one.__name__.startswith("_"):
+            yield one
+        yield from _models(one)
+
+
+def test_no_model_is_left_out() -> None:
+    assert set(_models()) == set(NEEDED)
+
+
+def _made(model: type[Plain], field: str, value: Any) -> Any:
+    """A model with the value as its field's number, in each place of a list or under a name."""
+    kind = model.model_fields[field].annotation
+    count = len(get_args(kind)) if getattr(kind, "__origin__", None) is tuple else 0
+    if getattr(kind, "__origin__", None) is dict:
+        value = {"name": value}
+    return model(**{**NEEDED[model], field: (value,) * count if count else value})
+
+
+NUMBERS = [(model, field) for model in NEEDED for field in number_fields(model)]
+IDS = [f"{model.__name__}.{field}" for model, field in NUMBERS]
+
+
+@pytest.mark.parametrize(("model", "field"), NUMBERS, ids=IDS)
+def test_what_is_no_number_of_a_model_is_refused(model: type[Plain], field: str) -> None:
+    for value in NONE:
+        if isinstance(value, str) and number_fields(model)[field]:  # a word may stand for it
+            continue
+        with pytest.raises(ImpossibleError, match=rf"^{model.__name__}: {field}"):
+            _made(model, field, value)
+
+
+@pytest.mark.parametrize(("model", "field"), NUMBERS, ids=IDS)
+def test_a_number_of_a_model_has_a_range_with_a_reason(model: type[Plain], field: str) -> None:
+    info = model.model_fields[field]
+    kind = get_args(info.annotation)
+    if bounds_of(info) == (None, None):
+        info = FieldInfo.from_annotation(kind[-1])
+    low, high = bounds_of(info)
+    assert low is not None and high is not None and np.isfinite(np.float32([low, high])).all()
+    assert (low, high) == (0, 1) or any(isinstance(one, Because) for one in info.metadata)
+    assert low <= 0 or np.float32(low) > 0
+    if low > 0:
+        with pytest.raises(ImpossibleError):
+            _made(model, field, LEAST)
+
+
+@pytest.mark.parametrize("kind", PEOPLE)
+def test_what_is_no_number_of_a_person_is_refused(kind: Callable[..., object]) -> None:
+    names = [one.name for one in fields(kind) if one.type in ("float", "int")]  # type: ignore[arg-type]
+    assert len(names) > 3
+    for name in names:
+        for value in [*NONE, None]:
+            with pytest.raises(DermisError, match=r"expected a (whole )?number from"):
+                kind(**{name: value})
+
+
+POSES: Mapping[str, Callable[[Any], dermis.Pose]] = {
+    "weight": lambda value: dermis.Pose({"jawOpen": value}),
+    "angle": lambda value: dermis.Pose(bones={"head": [0, value, 0]}),
+    "matrix": lambda value: dermis.Pose(
+        bones={"head": [[1, 0, 0, value], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}
+    ),
+    "place": lambda value: dermis.Pose(positions_mm=[[value, 0, 0]]),  # type: ignore[arg-type]
+}
+
+
+@pytest.mark.parametrize("part", POSES)
+def test_what_is_no_number_of_a_pose_is_refused(part: str) -> None:
+    head = Human().head()
+    for value in NONE:
+        with pytest.raises(DermisError, match=r"^pose: "):
+            dermis.Scene(head, pose=POSES[part](value))
