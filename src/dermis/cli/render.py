@@ -111,6 +111,8 @@ def _draw_and_report(
         "adapter": renderer.device.adapter.name,
         "size": list(settings.size),
         "atlas": settings.atlas,
+        "subdivide": scene.head.levels,
+        "triangles": len(scene.head.mesh.triangles),
         "exposure": rendered.exposure,
         "gaussians": rendered.gaussians,
         "gpu_ms": rendered.gpu_ms,

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from dermis.cli.console import note
 from dermis.cli.eye_options import EYE, EyeLooks, note_eyes
 from dermis.cli.options import check, option_name, options_of, refuse_options
 from dermis.cli.pose_options import (
@@ -22,11 +25,12 @@ from dermis.cli.pose_options import (
 )
 from dermis.errors import refuse
 from dermis.scene.environment import Environment
-from dermis.scene.head_table import NO_REGIONS, EyeTable, HeadTable, names_regions
+from dermis.scene.head_table import AUTO, NO_REGIONS, EyeTable, HeadTable, names_regions
 from dermis.scene.settings import PHOTOGRAPHED, Settings
 from dermis.scene.skin import PRESETS, Skin
 
 if TYPE_CHECKING:
+    from dermis.mesh.head import Head
     from dermis.scene import Light, Scene
 
     HeadOptions = dict[str, Any]
@@ -96,6 +100,7 @@ def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     _check(name, given)
     scene, settings = _begin(name, given)
     note_eyes(scene.head, given.head.get("eyes"))
+    _note_levels(scene.head, _head_of(name, given).get("subdivide", AUTO))
     if weights or turns:
         scene = replace(scene, pose=laid_over(pose_given(weights, turns, scene.head, name), scene.pose))
     environment = _environment(scene.environment, given.around)
@@ -131,19 +136,42 @@ def _check(name: str, given: SceneOptions) -> None:
 
 def _begin(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     """The file's scene, or a head's with defaults."""
-    from dermis.scene import Scene, load_scene
+    from dermis.scene import Scene, load_camera, load_scene
     from dermis.scene.files import head_and_skin
+    from dermis.scene.smoothness import SmoothIn
 
     if Path(name).suffix.lower() == ".toml":
         refuse_options(given.head, HEAD, "with a scene file", "Write it into the file's [head]")
-        return load_scene(Path(name))
+        return load_scene(Path(name), camera=given.camera, size=given.settings.get("size"))
     alike = {"regions": NO_REGIONS} if given.surface == "deck-2007" else {}
     table = HeadTable(**{"name": name, **alike, **given.head})
     if names_regions(vars(table)) and "rho_s" in given.skin:
         came = "it came with --regions, which says it for each region"
         refuse(option_name("rho_s"), "one or the other", came, "Leave one out, or use --oiliness")
-    head, skin = head_and_skin(table, Skin(), Path())
+    size = Settings(**PHOTOGRAPHED, **given.settings).size
+    picture = SmoothIn(partial(load_camera, given.camera or "portrait"), size)
+    head, skin = head_and_skin(table, Skin(), Path(), picture)
     return Scene(head, skin=skin), Settings()
+
+
+def _head_of(name: str, given: SceneOptions) -> Mapping[str, Any]:
+    """What was typed about the head, or stands in the scene's file."""
+    from dermis.scene.files import head_table
+
+    return head_table(Path(name)) if Path(name).suffix.lower() == ".toml" else given.head
+
+
+def _note_levels(head: Head, wanted: object) -> None:
+    """A line on stderr about levels of subdivision that were found for the picture.
+
+    wanted : what was typed for --subdivide, or stands in the scene's file
+    """
+    from dermis.scene.heads import LEAST_OF_PEOPLE, is_person
+
+    least = LEAST_OF_PEOPLE if is_person(head.name) else 0
+    if wanted == AUTO and head.levels > least:
+        count = f"{len(head.mesh.triangles):,} triangles"
+        note(f"note: --subdivide {head.levels}: {count}, for a smooth outline in this picture")
 
 
 def _environment(before: Environment | None, around: dict[str, Any]) -> Environment | None:

@@ -27,6 +27,7 @@ class Head:
     strands : its brows and lashes, None for none
     hair : of head and beard, in no order: from afar the first few, wider, stand for all; None for none
     note : what could not be made of its file, and why; empty for nothing
+    levels : of subdivision that its mesh has come through
     """
 
     name: str
@@ -38,6 +39,7 @@ class Head:
     strands: Strands | None = None
     hair: Strands | None = None
     note: str = ""
+    levels: int = 0
 
     @cached_property
     def control(self) -> Rig:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -29,17 +30,19 @@ class Subdivided(NamedTuple):
     stencils: Stencils | None
 
 
-def subdivide_head(head: Head, levels: int) -> Head:
+def subdivide_head(head: Head, levels: int | Callable[[Head], int]) -> Head:
     """The head on a finer mesh; what moved its points now moves the control points of that mesh.
 
     head : not subdivided yet
-    levels : 0 to 3
+    levels : 0 to 3, or what finds them for the head
     """
+    levels = levels(head) if callable(levels) else levels
     mesh, stencils = subdivide(head.mesh, levels)
     if stencils is None:
         return head
     strands, hair = (part and part.refined(head.mesh, mesh, levels) for part in (head.strands, head.hair))
-    return replace(head, mesh=mesh, rig=replace(head.control, stencils=stencils), strands=strands, hair=hair)
+    rig = replace(head.control, stencils=stencils)
+    return replace(head, mesh=mesh, rig=rig, strands=strands, hair=hair, levels=int(levels))
 
 
 def subdivide(mesh: Mesh, levels: int) -> Subdivided:

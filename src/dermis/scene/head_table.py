@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
-from dermis.scene.plain import Plain
+from dermis.scene.plain import Plain, Words
 
 _Length = Annotated[float | None, Field(gt=0, allow_inf_nan=False)]
 VOrigin = Literal["auto", "top", "bottom"]
@@ -15,6 +15,10 @@ Up = Literal["y", "z"]
 NormalY = Literal["up", "down"]
 AUTO, NO_REGIONS = "auto", "none"
 Eyes = Literal["fitted", "plain"]
+if TYPE_CHECKING:
+    _Levels = int | Literal["auto"]
+else:
+    _Levels = Annotated[int, Field(ge=0, le=3), Words(AUTO)]
 
 
 class EyeTable(Plain):
@@ -63,8 +67,9 @@ class HeadTable(Plain):
     """Groups of the file that hold eyeballs, whatever they are called, be it with all of the head."""
     eye: EyeTable | None = None
     """What the eyes look like, where it is not as usual."""
-    subdivide: Annotated[int, Field(ge=0, le=3)] = 0
-    """Levels of subdivision: Catmull-Clark for a file of quads (.obj, .ply), else Loop."""
+    subdivide: _Levels = AUTO
+    """Levels of subdivision: Catmull-Clark for a file of quads (.obj, .ply), else Loop; "auto" for as many as
+    the outline needs to look smooth in a picture of this size from this camera."""
     regions: str = AUTO
     """Roughness and strength by region of the face: "auto" has the package's values where it knows the head
     and no map says the roughness, "none" has one value for all; "default" names the package's table (an
