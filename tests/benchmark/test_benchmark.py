@@ -41,7 +41,8 @@ def renderer(device: Device) -> Renderer:
 
 @pytest.fixture(scope="module")
 def row(renderer: Renderer, head_file: str, tmp_path_factory: pytest.TempPathFactory) -> Row:
-    return measure(renderer, TINY, load_head(head_file, subdivide=0), tmp_path_factory.mktemp("profile"), 1e9, BRIEF)
+    head, folder = load_head(head_file, subdivide=0), tmp_path_factory.mktemp("profile")
+    return measure(renderer, TINY, head, folder, 1e9, BRIEF)
 
 
 @pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)

@@ -183,9 +183,9 @@ def _made_of(take: _Take, given: SceneOptions, *files: str) -> str:
     scene = take.scene
     named = [*files, scene.head.name, *map(str, given.head.values()), take.clip.name]
     metered_at = take.first if take.settings.exposure == "auto" else None
-    seen = scene.head.levels, scene.lights, scene.camera, scene.skin, scene.environment, take.settings, take.rate, metered_at
+    seen = scene.lights, scene.camera, scene.skin, scene.environment, take.settings, take.rate, metered_at
     typed = given.head, given.eye, given.pose, given.bone, given.look_at
-    parts = [*map(_as_it_is, named), *map(repr, typed), repr(seen)]
+    parts = [*map(_as_it_is, named), *map(repr, typed), repr(seen), str(scene.head.levels)]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 

@@ -15,12 +15,13 @@ from dermis.frame.passes.post import Picture
 from dermis.gpu import Device, download
 from dermis.gpu.device import gpu_failures
 from dermis.scene.settings import Settings
+from dermis.summary import Summarised
 
 _MOST = 255
 
 
-@dataclass(frozen=True)
-class Rendered:
+@dataclass(frozen=True, repr=False)
+class Rendered(Summarised):
     """An image on the device, valid until its renderer draws the next one.
 
     gpu_ms : device time of each stage that was timed, and "total" [ms]; None without timestamps

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
+from dermis.mesh.eye_limits import LIMITS
 from dermis.mesh.eyeball import SCLERA_MM, apex_mm
 from dermis.mesh.rig import Motion, Rig
+from dermis.summary import Summarised
 
 Doubles = NDArray[np.float64]
-
-PUPIL_MM = 1.0, 4.0
 
 
 @dataclass(frozen=True)
@@ -32,13 +32,7 @@ class EyeLook:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        limits = {
-            "eumelanin": (0.0, 1.0),
-            "pupil_mm": PUPIL_MM,
-            "redness": (0.0, 1.0),
-            "seed": (0, 2**32 - 1),
-        }
-        for name, (low, high) in limits.items():
+        for name, (low, high) in LIMITS.items():
             value = getattr(self, name)
             if not low <= value <= high or (name == "seed" and value != int(value)):
                 refuse(
@@ -46,8 +40,8 @@ class EyeLook:
                 )
 
 
-@dataclass(frozen=True)
-class Eyes:
+@dataclass(frozen=True, repr=False)
+class Eyes(Summarised):
     """The eyeballs of a head, in their true shape: a ball with a cornea, see mesh/eyeball.py.
 
     apex, back, side : (k,) control points of each: the cornea's apex, the one opposite, one of the equator to

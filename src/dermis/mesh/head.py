@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +16,7 @@ from dermis.mesh.strands import Strands
 _CROWN_TO_CENTRE_MM = 120.0  # half the height of an adult head
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Head:
     """A mesh in mm with its maps.
 
@@ -40,6 +40,16 @@ class Head:
     hair: Strands | None = None
     note: str = ""
     levels: int = 0
+
+    def __repr__(self) -> str:
+        """Name, size, maps and what moves it, on two lines."""
+        maps = [one.name for one in fields(Maps) if getattr(self.maps, one.name) is not None]
+        told = [f"maps: {', '.join([*maps, *(['painted'] if self.maps.painted else [])]) or 'none'}"]
+        counts = {"targets": len(self.targets), "bones": len(self.bones)}
+        told += [f"{count} {name}" for name, count in counts.items() if count]
+        told += [name for name in ("eyes", "strands", "hair") if getattr(self, name) is not None]
+        size = f"{len(self.mesh.triangles):,} triangles at level {self.levels} of subdivision"
+        return f"<Head {self.name!r}: {size}\n {'; '.join(told)}>"
 
     @cached_property
     def control(self) -> Rig:

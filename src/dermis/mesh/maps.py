@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from dermis.errors import refuse
 from dermis.images.colour import decode_srgb_levels
 from dermis.images.filters import without_steps
 from dermis.images.io import Picture, read_bytes, read_image
+from dermis.summary import Summarised
 
 Floats = NDArray[np.float32]
 PathLike = str | Path | Picture
@@ -29,8 +30,8 @@ _MEAN_TEXELS, _MOST_APART = 64, 16  # for means: fewest samples a side, largest 
 _FORM = 1  # increment when the same files give other maps
 
 
-@dataclass(frozen=True)
-class Maps:
+@dataclass(frozen=True, repr=False)
+class Maps(Summarised):
     """Maps of the skin, None where there is none. Row 0 is the top; sizes may differ from map to map.
 
     colour : (H, W, 3) linear Rec. 709 [-]
@@ -47,6 +48,8 @@ class Maps:
     specular: Floats | None = None
     roughness: Floats | None = None
     region: NDArray[np.uint8] | None = None
+    painted: ClassVar[bool] = False
+    """Whether the device paints those that are None."""
 
     @property
     def rough(self) -> bool:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import Field
 
+from dermis.mesh.eye_limits import LIMITS
 from dermis.scene.plain import Plain, Words
 
 _Length = Annotated[float | None, Field(gt=0, allow_inf_nan=False)]
 VOrigin = Literal["auto", "top", "bottom"]
 Up = Literal["y", "z"]
 NormalY = Literal["up", "down"]
-AUTO, NO_REGIONS = "auto", "none"
+AUTO: Final = "auto"
+NO_REGIONS = "none"
 Eyes = Literal["fitted", "plain"]
 if TYPE_CHECKING:
     _Levels = int | Literal["auto"]
@@ -21,16 +23,21 @@ else:
     _Levels = Annotated[int, Field(ge=0, le=3), Words(AUTO)]
 
 
+def _within(name: str) -> Any:
+    low, high = LIMITS[name]
+    return Field(ge=low, le=high)
+
+
 class EyeTable(Plain):
     """What replaces the look of a head's eyes; None leaves their own."""
 
-    eumelanin: Annotated[float | None, Field(ge=0, le=1)] = None
+    eumelanin: Annotated[float | None, _within("eumelanin")] = None
     """Of the iris, from none, which leaves it blue, to the darkest brown."""
-    pupil_mm: Annotated[float | None, Field(ge=1, le=4)] = None
+    pupil_mm: Annotated[float | None, _within("pupil_mm")] = None
     """Radius of the pupil [mm]."""
-    redness: Annotated[float | None, Field(ge=0, le=1)] = None
+    redness: Annotated[float | None, _within("redness")] = None
     """Of the white of the eye."""
-    seed: Annotated[int | None, Field(ge=0, le=2**32 - 1)] = None
+    seed: Annotated[int | None, _within("seed")] = None
     """Which fibres and vessels."""
 
 

@@ -18,7 +18,7 @@ from dermis.scene.head_table import AUTO
 
 @dataclass(frozen=True)
 class SmoothIn:
-    """As many levels of subdivision as a head's outline needs to look smooth in a picture; none for most scans.
+    """As many levels of subdivision as a head's outline needs to look smooth in a picture.
 
     camera : from where the head, as it comes, is seen
     size : of the picture [pixel]
@@ -41,7 +41,7 @@ class SmoothIn:
 
 Levels = int | Callable[[Head], int]
 Subdivide = Levels | Literal["auto"]
-"""Levels of subdivision, "auto" for what a portrait of 1024x1024 needs, or a function of the head as it comes."""
+"""Levels of subdivision, "auto" for a portrait of 1024x1024, or a function of the head as it comes."""
 
 
 def chosen_levels(subdivide: Subdivide) -> Levels:

@@ -56,7 +56,7 @@ class ViewerState:
 
     @property
     def table(self) -> Mapping[str, Any]:
-        """The [head] table, with the levels of subdivision that the head has got; empty for one made in memory."""
+        """The [head] table with the levels of subdivision that were found; empty for one made in memory."""
         return self.head and {"subdivide": self.scene.head.levels, **self.head}
 
     def with_skin(self, **fields: Any) -> ViewerState:

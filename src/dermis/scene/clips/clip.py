@@ -8,13 +8,14 @@ from dataclasses import dataclass
 
 from dermis.errors import refuse
 from dermis.scene.pose import Pose
+from dermis.summary import Summarised
 
 _SHOWN = 8  # names in a note
 _EARLY = 1e-6  # of a frame: how far a frame that rounding lost may lie before the end
 
 
-@dataclass(frozen=True, eq=False)
-class Clip:
+@dataclass(frozen=True, eq=False, repr=False)
+class Clip(Summarised):
     """A motion that a file holds, for one head: `pose_at` gives its pose at any time.
 
     name : of the clip, else of its file
