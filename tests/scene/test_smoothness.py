@@ -100,7 +100,7 @@ def test_options_and_files_say_what_picture_it_is_for(
     scene.write_text('camera = "portrait"\n[head]\nname = "head.obj"\n[render]\nsize = [64, 64]\n')
 
     def levels(name: Path, side: int | None = None, **head: object) -> int:
-        sized = {"size": (side, side)} if side else {}
+        sized = {"background": (0, 0, 0)} | ({"size": (side, side)} if side else {})
         return assemble(str(name), SceneOptions(settings=sized, head=head))[0].head.levels
 
     assert levels(scene) == levels(path, 64) == 0

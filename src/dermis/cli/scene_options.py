@@ -12,6 +12,7 @@ from cyclopts import Parameter
 
 from dermis.cli.console import note
 from dermis.cli.eye_options import EYE, EyeLooks, note_eyes
+from dermis.cli.head_options import HEAD, HeadOptions, check_head
 from dermis.cli.options import check, option_name, options_of, refuse_options
 from dermis.cli.pose_options import (
     LookAt,
@@ -33,19 +34,16 @@ if TYPE_CHECKING:
     from dermis.mesh.head import Head
     from dermis.scene import Light, Scene
 
-    HeadOptions = dict[str, Any]
     SkinOptions = dict[str, Any]
     SettingsOptions = dict[str, Any]
     EnvironmentOptions = dict[str, Any]
     SkinPreset = str | None
 
-HEAD = {"specular": "specular_map", "roughness": "roughness_map"}
 AROUND = {field: f"env_{field}" for field in Environment.model_fields}
 AROUND |= {"name": "env", "rotation_degrees": "env_rotation"}
 
 if not TYPE_CHECKING:
     SkinPreset = Literal[tuple(PRESETS)] | None
-    HeadOptions = options_of(HeadTable, without=("name",), names=HEAD)
     SkinOptions, SettingsOptions = options_of(Skin), options_of(Settings, defaults=PHOTOGRAPHED)
     EnvironmentOptions = options_of(Environment, names=AROUND)
 
@@ -124,7 +122,7 @@ def _check(name: str, given: SceneOptions) -> None:
 
     looks = given.head.get("eye", {})
     check(EyeTable, looks, {field_: f"eye {field_}" for field_ in looks})
-    check(HeadTable, {"name": name} | given.head, HEAD)
+    check_head(name, given.head)
     check(Skin, given.skin)
     check(Settings, given.settings)
     check(Environment, {"name": "uniform"} | given.around, AROUND)
@@ -148,8 +146,8 @@ def _begin(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     if names_regions(vars(table)) and "rho_s" in given.skin:
         came = "it came with --regions, which says it for each region"
         refuse(option_name("rho_s"), "one or the other", came, "Leave one out, or use --oiliness")
-    size = Settings(**PHOTOGRAPHED, **given.settings).size
-    picture = SmoothIn(partial(load_camera, given.camera or "portrait"), size)
+    seen = partial(load_camera, given.camera or "portrait")
+    picture = SmoothIn(seen, Settings(**given.settings).size)
     head, skin = head_and_skin(table, Skin(), Path(), picture)
     return Scene(head, skin=skin), Settings()
 
