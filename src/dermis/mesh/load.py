@@ -22,6 +22,7 @@ from dermis.mesh.gltf.geometry import read_gltf
 from dermis.mesh.joined import joined, taken
 from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.rigging import build_rig, part_points
+from dermis.preparing import preparing
 
 Origin = Literal["auto", "top", "bottom"]
 Up = Literal["y", "z"]
@@ -49,6 +50,7 @@ def load_mesh(
     ).mesh
 
 
+@preparing("reading the mesh")
 def load_rigged(
     path: str | Path,
     *,

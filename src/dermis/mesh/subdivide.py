@@ -16,6 +16,7 @@ from dermis.mesh.mesh import Mesh
 from dermis.mesh.quads import halves, polygons
 from dermis.mesh.rig import Stencils
 from dermis.mesh.subdivision_rules import Cage, catmull_clark_limit, refine_catmull_clark, refine_loop
+from dermis.preparing import preparing
 
 MAX_LEVELS = 3
 _FORM = "subdivision 1"  # raise when weights or corners change for the same mesh
@@ -83,6 +84,7 @@ def _kept(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
     return cached_arrays(sources, f"{_FORM} {levels}", names, lambda: _refined(mesh, levels, by_quads))
 
 
+@preparing("subdividing the mesh")
 def _refined(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
     """Corners of the finer faces, and weights of control points, row after row as `Stencils` have them."""
     alone = mesh.triangles.astype(np.int64).ravel(), np.full(len(mesh.triangles), 3), mesh.material

@@ -22,6 +22,7 @@ from dermis.mesh.maps import Maps, load_maps
 from dermis.mesh.obj_maps import obj_maps
 from dermis.mesh.samples import SAMPLES, Sample, fetch
 from dermis.mesh.subdivide import subdivide_head
+from dermis.preparing import preparing
 from dermis.scene.head_checks import check_given, check_relief, named
 from dermis.scene.head_table import AUTO, Eyes, NormalY, Up, VOrigin
 from dermis.scene.smoothness import Levels, Subdivide, chosen_levels
@@ -183,6 +184,7 @@ def _check_kind(sample: Sample) -> None:
         refuse(sample.name, "a head", f"this sample is an {sample.kind}", hint)
 
 
+@preparing("making the person")
 def _human(
     name: str,
     maps: dict[str, MapFile],

@@ -12,11 +12,13 @@ from dermis.human.regions.apply import SIZE, with_regions
 from dermis.human.regions.labels import known_landmarks
 from dermis.human.regions.table import DEFAULT, load_table
 from dermis.mesh.head import Head
+from dermis.preparing import preparing
 
 _FORM = 1  # increment when `with_regions` gives other maps for the same head
 _NAMES = ["roughness", "specular"]
 
 
+@preparing("finding the regions of the face")
 def with_usual_regions(head: Head) -> Head:
     """The head with the package's table by region, where it knows the regions and no map says the roughness.
 
