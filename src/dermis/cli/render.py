@@ -39,7 +39,7 @@ def render(
 
         dermis render lee_perry_smith --camera cheek --technique none -o dry.exr
 
-        dermis render head.obj --unit-mm 100 --colour skin.png --subdivide 1
+        dermis render head.obj --unit-mm 100 --colour skin.png --opaque teeth
 
         dermis render --pose mouthSmileLeft=1,mouthSmileRight=1 --bone head=0,20,0 -o smile.png
 

@@ -70,7 +70,8 @@ def load_head(
     v_origin : which row of the maps v = 0 is; the format's rule when "auto"
     up : the file's upward axis
     normal_y : way in which green points in the normal map: "up" (OpenGL) or "down" (DirectX)
-    opaque : groups of the file that are not skin, whatever they are called
+    opaque : groups of the file that light does not enter, beside those that are not called skin where one is;
+        two balls that are called eyes get the package's eyes without it
     eyes : "fitted" puts the package's own eyes where a file has two balls called so, see `with_fitted_eyes`;
         "plain" keeps the file's
     eye_groups : groups of the file that hold eyeballs, whatever they are called, be it with all of the head
