@@ -67,9 +67,9 @@ class HeadTable(Plain):
     normal_y: NormalY = "up"
     """Way in which green points in the normal map: "up" (OpenGL) or "down" (DirectX)."""
     opaque: tuple[str, ...] = ()
-    """Groups of the file to draw as plain surfaces, which light does not enter: clothes, teeth, horns. Needed
-    where no group has skin in its name, as all are skin then; where one has, all others are opaque already. Two
-    balls whose groups are called eyes become the package's eyes without it."""
+    """Groups of the file to draw as plain surfaces, which light does not enter, such as teeth or clothes.
+    Needed where no group has skin in its name, as all are skin then; where one has, all others are opaque
+    already. Two balls whose groups are called eyes become the package's eyes without it."""
     eyes: Eyes = "fitted"
     """Eyeballs of a file (groups called eyes, Eye_L, cornea ...): replaced by the package's, or plain."""
     eye_groups: tuple[str, ...] = ()
