@@ -9,7 +9,7 @@ import pytest
 from small_head import write_head
 
 import dermis
-from dermis.cli.scene_options import SceneOptions, assemble
+from dermis.cli.scene_options import SceneOptions, assemble, note_levels
 from dermis.errors import DermisError
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
@@ -101,7 +101,10 @@ def test_options_and_files_say_what_picture_it_is_for(
 
     def levels(name: Path, side: int | None = None, **head: object) -> int:
         sized = {"background": (0, 0, 0)} | ({"size": (side, side)} if side else {})
-        return assemble(str(name), SceneOptions(settings=sized, head=head))[0].head.levels
+        given = SceneOptions(settings=sized, head=head)
+        made = assemble(str(name), given)[0].head
+        note_levels(str(name), given, made)
+        return made.levels
 
     assert levels(scene) == levels(path, 64) == 0
     assert not capsys.readouterr().err

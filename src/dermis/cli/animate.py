@@ -17,7 +17,7 @@ from dermis.cli.motion import clip_of, motion_file, names_of, parse_span
 from dermis.cli.moving_output import MovingOutput
 from dermis.cli.options import Adapter, Json, Whole
 from dermis.cli.pose_options import laid_over
-from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble
+from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble, note_levels
 
 if TYPE_CHECKING:
     from dermis.frame.renderer import Renderer
@@ -125,6 +125,7 @@ def animate(
         numbers, rate = span.frames(moved)
     if moved.note:
         note(f"note: {moved.note}")
+    note_levels(head, scene, described.head)
     take = _Take(described, settings, moved, rate, numbers[0])
     missing = target.missing(numbers, settings.size, _made_of(take, scene, head, moving))
     began = time.perf_counter()

@@ -14,7 +14,7 @@ from cyclopts import Parameter
 
 from dermis.cli.console import note, print_json, print_lines, working_on
 from dermis.cli.options import Adapter, Json
-from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble
+from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble, note_levels
 from dermis.scene.techniques import TECHNIQUES
 
 _MOST_UNSCATTERED = 0.05  # closed eyes and other collapsed charts of real scans stay under it
@@ -68,6 +68,7 @@ def render(
         opening = beside.submit(Renderer, adapter)  # its driver starts and compiles while the head loads
         with working_on("loading"):
             described, settings = assemble(head, scene)
+        note_levels(head, scene, described.head)
         return _draw_and_report(described, settings, output, opening, as_json, started)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -98,7 +97,6 @@ def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     _check(name, given)
     scene, settings = _begin(name, given)
     note_eyes(scene.head, given.head.get("eyes"))
-    _note_levels(scene.head, _head_of(name, given).get("subdivide", AUTO))
     if weights or turns:
         scene = replace(scene, pose=laid_over(pose_given(weights, turns, scene.head, name), scene.pose))
     environment = _environment(scene.environment, given.around)
@@ -113,6 +111,21 @@ def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     if given.look_at is not None:
         made = replace(made, pose=gaze_given(given.look_at, made))
     return made, Settings(**{**PHOTOGRAPHED, **settings.model_dump(exclude_unset=True), **given.settings})
+
+
+def note_levels(name: str, given: SceneOptions, head: Head) -> None:
+    """A line on stderr about levels of subdivision that were found for the picture.
+
+    name : of the head or of the scene's file, whose head this is
+    """
+    from dermis.scene.files import head_table
+    from dermis.scene.heads import LEAST_OF_PEOPLE, is_person
+
+    told = head_table(Path(name)) if Path(name).suffix.lower() == ".toml" else given.head
+    least = LEAST_OF_PEOPLE if is_person(head.name) else 0
+    if told.get("subdivide", AUTO) == AUTO and head.levels > least:
+        count = f"{len(head.mesh.triangles):,} triangles"
+        note(f"note: --subdivide {head.levels}: {count}, for a smooth outline in this picture")
 
 
 def _check(name: str, given: SceneOptions) -> None:
@@ -150,26 +163,6 @@ def _begin(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     picture = SmoothIn(seen, Settings(**given.settings).size)
     head, skin = head_and_skin(table, Skin(), Path(), picture)
     return Scene(head, skin=skin), Settings()
-
-
-def _head_of(name: str, given: SceneOptions) -> Mapping[str, Any]:
-    """What was typed about the head, or stands in the scene's file."""
-    from dermis.scene.files import head_table
-
-    return head_table(Path(name)) if Path(name).suffix.lower() == ".toml" else given.head
-
-
-def _note_levels(head: Head, wanted: object) -> None:
-    """A line on stderr about levels of subdivision that were found for the picture.
-
-    wanted : what was typed for --subdivide, or stands in the scene's file
-    """
-    from dermis.scene.heads import LEAST_OF_PEOPLE, is_person
-
-    least = LEAST_OF_PEOPLE if is_person(head.name) else 0
-    if wanted == AUTO and head.levels > least:
-        count = f"{len(head.mesh.triangles):,} triangles"
-        note(f"note: --subdivide {head.levels}: {count}, for a smooth outline in this picture")
 
 
 def _environment(before: Environment | None, around: dict[str, Any]) -> Environment | None:

@@ -136,7 +136,7 @@ def same(a: ViewerState, b: ViewerState) -> bool:
     def rest(state: ViewerState) -> tuple[Any, ...]:
         scene = state.scene
         seen = tuple(scene.lights), scene.camera, scene.skin, scene.environment
-        return (*seen, state.settings, state.head, state.view, state.rig, state.chart, state.seconds)
+        return (*seen, state.settings, state.table, state.view, state.rig, state.chart, state.seconds)
 
     one, other = a.scene, b.scene
     return one.head is other.head and same_pose(one.pose, other.pose) and rest(a) == rest(b)
