@@ -1,13 +1,15 @@
 # Two commands are enough: `make demo` shows the package, `make test` checks it.
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-dev demo lint test wheel docs lock clean
+.PHONY: help setup setup-dev demo lint test adversity wheel docs lock clean
 
 PY := .venv/bin/python
 ARGS ?=
+MINUTES ?= 60
+SEED ?= 1
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | while IFS="$$(printf '\t')" read -r name what; do \
-		printf '  make %-6s %s\n' "$$name" "$$what"; done
+		printf '  make %-9s %s\n' "$$name" "$$what"; done
 
 setup: ## what a picture needs: an environment in .venv from requirements.lock, and a Vulkan driver
 	@sh tools/setup.sh
@@ -27,6 +29,9 @@ lint: setup-dev ## style, types and floors
 
 test: lint ## lint and every test (ARGS="-k blur" chooses some)
 	$(PY) -m pytest -n 2 --dist loadfile --durations=10 $(ARGS)
+
+adversity: setup-dev ## damaged inputs of every kind for MINUTES=60; SEED=2 for others
+	$(PY) -m tests.adversity --minutes $(MINUTES) --seed $(SEED) $(ARGS)
 
 wheel: setup ## the package as a wheel in dist
 	$(PY) -m pip wheel --quiet --no-deps --no-build-isolation --disable-pip-version-check -w dist . && ls dist

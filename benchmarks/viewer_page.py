@@ -54,7 +54,8 @@ class Page:
         self.size, self.clock = size, clock
         self._last: Picture | None = None
         self.send("resize", width=size[0], height=size[1], pwidth=size[0], pheight=size[1], ratio=1.0)
-        self.send("key_down", key="Tab", modifiers=[])  # hides the panel
+        self.next_picture(self.patience_s)  # there is no panel before
+        self.send("key_down", key="Tab", modifiers=[])  # hides it
 
     def send(self, kind: str, **fields: Any) -> None:
         """An event."""
@@ -74,6 +75,8 @@ class Page:
             except TimeoutError:
                 return None
             told = json.loads(message)
+            if told["type"] == "failure":
+                raise RuntimeError(told["text"])
             if told["type"] == "framebufferdata":
                 data = self._socket.recv(timeout=_PATIENCE_S)
                 assert isinstance(data, bytes)
@@ -108,12 +111,12 @@ class Page:
 
 
 def _connected(url: str, clock: Clock) -> Any:
-    """A socket; the server tells its address a moment before it listens."""
+    """A socket, which the caller closes."""
     from websockets.sync.client import connect
 
     while True:
         try:
-            return connect(url, max_size=None, open_timeout=min(_PATIENCE_S, clock.left_s))
+            return connect(url, max_size=None, open_timeout=min(_PATIENCE_S, clock.left_s)).__enter__()
         except ConnectionRefusedError:
             if clock.over:
                 raise

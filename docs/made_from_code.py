@@ -34,6 +34,14 @@ TABLES: dict[str, tuple[type[Plain], dict[str, str] | None]] = {
 }
 """The tables of a scene's file: their models, and options by field where these are called otherwise."""
 _FIELD = re.compile(r"^(?P<names>\w+(?:, \w+)*) : (?P<meaning>.*)$")
+_PARTS = re.compile(
+    r"_(?P<index>[A-Za-z]{2,})|\^(?:\((?P<power>[^()]*)\)|(?P<name>[A-Za-z]{2,}))"
+    r"|(?P<word>[A-Za-z]{3,}(?:[ -][A-Za-z]+)*)"
+)
+"""What is more than a letter in the equation of a script."""
+_SIGNS = {"Σ": "sum", "ρ": "rho", "σ": "sigma", "π": "pi", "∂": "partial", "·": "cdot", "≈": "approx"}
+_TEX = {sign: rf"\{name} " for sign, name in _SIGNS.items()}
+_TEX |= {"∗": "*", "−": "-", "′": "'", "₀": "_0", "²": "^2", "⁵": "^5"}
 _KEY = re.compile(r"\[([A-Za-z]{2,}\d{4}[a-z]?)\]")
 
 
@@ -62,10 +70,24 @@ def gallery() -> str:
 
 def _picture(script: Script) -> str:
     lines = [f"## {script.title}", "", script.caption, ""]
-    lines += [f"*{script.equation}*", ""] if script.equation else []
+    lines += [f"$${_drawn(script.equation)}$$", ""] if script.equation else []
     lines += [f"![{script.title}](../images/{script.name}.webp)", ""]
     told = [f"`dermis gallery --only {script.name}`", *(f"[{key}](#{key.lower()})" for key in script.sources)]
     return "\n".join([*lines, " · ".join(told), ""])
+
+
+def _drawn(equation: str) -> str:
+    """A script's equation in TeX: words upright, indices and powers in their places."""
+
+    def part(found: re.Match[str]) -> str:
+        index, power, name, word = found["index"], found["power"], found["name"], found["word"]
+        if index or name:
+            return rf"{'_' if index else '^'}{{\text{{{index or name}}}}}"
+        if power:
+            return f"^{{{_PARTS.sub(part, power)}}}"
+        return rf"\{word} " if word in ("exp", "max") else rf"\,\text{{{word}}}"
+
+    return _PARTS.sub(part, equation).translate(str.maketrans(_TEX))
 
 
 def settings() -> str:

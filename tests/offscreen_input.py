@@ -13,6 +13,7 @@ from dermis.scene.settings import Settings
 
 ADAPTER = os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
 _EDGE, _MOST_TURNS = 10.0, 20  # logical pixels; of the wheel
+_LONGEST_S = 60.0
 SETTINGS = Settings(atlas=128, samples=2, shadow_size=256)
 
 
@@ -23,12 +24,18 @@ class InputDriver:
     viewer: Any
     canvas: Any
     now: float = 0.0
+    patient: bool = True  # whether frames wait for a head that is prepared
 
     def frame(self, seconds: float = 0.05) -> NDArray[np.uint8]:
         """The next frame's (h, w, 3) pixels, some time later [s]."""
         self.now += seconds
         self.canvas._process_events()
-        return np.array(self.canvas.draw())[..., :3]
+        drawn = np.array(self.canvas.draw())[..., :3]
+        coming = self.viewer._preparation._coming
+        if coming is None or not self.patient:
+            return drawn
+        coming.exception(_LONGEST_S)
+        return self.frame(0.0)
 
     def settled(self) -> NDArray[np.uint8]:
         """The picture when nothing moves any more."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
@@ -91,16 +93,33 @@ BROKEN: dict[str, Callable[[bytes], bytes]] = {
     "the hash": lambda whole: b"0" * 64 + whole[64:],
     "objects": lambda whole: forged(whole, lambda told: told["arrays"][0].__setitem__(1, "|O")),
     "other arrays": lambda whole: forged(whole, lambda told: told["arrays"].pop()),
+    "deep": lambda whole: headed(b'{"key": ' + b"[" * 500_000),
+    "no table": lambda whole: headed(b"[1, 2]"),
+    "more than it holds": lambda whole: forged(
+        whole, lambda told: told["arrays"][0].__setitem__(2, [1 << 50])
+    ),
+    "less than nothing": lambda whole: forged(
+        whole, lambda told: told["arrays"][0].__setitem__(2, [-1, -4096])
+    ),
+    "longer": lambda whole: whole + b"more",
     "another key": lambda whole: forged(whole, lambda told: told.update(key="atlas/0")),
 }
+
+
+def shaped(told: dict[str, Any], *shape: int) -> None:
+    told["arrays"][0][2] = shape
 
 
 def forged(whole: bytes, change: Callable[[dict[str, Any]], object]) -> bytes:
     """A file whose head is another, with the hash that fits."""
     _, head, data = whole.split(b"\n", 2)
     change(told := json.loads(head))
-    head = json.dumps(told).encode() + b"\n"
-    return hashlib.sha256(head).hexdigest().encode() + b"\n" + head + data
+    return headed(json.dumps(told).encode()) + data
+
+
+def headed(head: bytes) -> bytes:
+    """A file's head after its hash."""
+    return hashlib.sha256(head + b"\n").hexdigest().encode() + b"\n" + head + b"\n"
 
 
 @pytest.mark.parametrize("broken", BROKEN)
@@ -147,25 +166,6 @@ def test_a_large_file_is_checked_block_by_block(tmp_path: Path, monkeypatch: pyt
     assert disk.find("large", "one", ["a", "b"]) is not None
 
 
-def test_a_kept_file_that_changed_is_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
-    made: list[int] = []
-
-    def make() -> bytes:
-        made.append(1)
-        return b"glTF and more"
-
-    path = disk.stored_file("heads", "one.glb", make)
-    assert disk.stored_file("heads", "one.glb", make) == path and len(made) == 1
-    for spoilt in (path, path.with_name("one.glb.sha256")):
-        for content in (b"glTF and mora", b""):
-            spoilt.write_bytes(content)
-            assert disk.stored_file("heads", "one.glb", make).read_bytes() == b"glTF and more"
-    path.unlink()
-    assert disk.stored_file("heads", "one.glb", make).read_bytes() == b"glTF and more"
-    assert len(made) == 6
-
-
 @pytest.mark.parametrize("blocked", ["a file", "a folder in the file's place", "nothing may be written"])
 def test_a_folder_that_cannot_be_used_does_no_harm(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, blocked: str
@@ -185,7 +185,7 @@ def test_a_folder_that_may_only_be_read_is_read(
     folder: Path, built: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first = cached_atlas(plane(10.0), 64)
-    monkeypatch.setattr(Path, "touch", _refuse)
+    monkeypatch.setattr(os, "utime", _refuse)
     assert same(cached_atlas(plane(10.0), 64), first)
     assert built == [64]
 
@@ -327,3 +327,58 @@ def test_a_mesh_comes_back_from_disk(tmp_path: Path, monkeypatch: pytest.MonkeyP
     cached_rigged(b"file", "up z", load)
     cached_rigged(b"another", "up y", load)
     assert len(made) == 3
+
+
+def test_a_flipped_bit_anywhere_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And the file goes, so that the next start need not read it."""
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    disk.store("few", "one", {"a": np.arange(3, dtype=np.uint8)})
+    path = only(tmp_path / "few")
+    whole = path.read_bytes()
+    for place in range(len(whole)):
+        spoilt = bytearray(whole)
+        spoilt[place] ^= 1 << 5 * place % 8
+        path.write_bytes(spoilt)
+        assert disk.find("few", "one", ["a"]) is None and not path.exists()
+        path.touch(0o600)
+
+
+def test_a_head_takes_no_memory_before_its_file_is_long_enough(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DERMIS_CACHE", str(tmp_path))
+    disk.store("few", "one", {"a": np.arange(3, dtype=np.uint8)})
+    path = only(tmp_path / "few")
+    whole = path.read_bytes()
+    monkeypatch.setattr(np, "empty", lambda *_: pytest.fail("made room"))
+    for kind, shape in (
+        ("|u1", [1 << 40]),
+        ("|u1", [-3, -1]),
+        ("|O", [3]),
+        ("<f4,<f4", [3]),
+        ("|S0", [1 << 62]),
+    ):
+        wrong = ["a", kind, shape, "C"]
+        path.write_bytes(forged(whole, lambda told, wrong=wrong: told["arrays"].__setitem__(0, wrong)))
+        assert disk.find("few", "one", ["a"]) is None
+
+
+def test_two_processes_at_once_leave_whole_files(tmp_path: Path) -> None:
+    code = """
+import sys
+import numpy as np
+from dermis import disk
+from dermis.private import cache_folder
+for k in range(60):
+    for name in "ab":
+        expected = np.full(3000, ord(name) + k % 3)
+        found = disk.stored("both", name + str(k % 3), ["array"], lambda: {"array": expected})
+        assert np.array_equal(found["array"], expected)
+        if k % 5 == 0:
+            (cache_folder() / "both" / f"{name}{k % 3}.arrays").unlink(missing_ok=True)
+"""
+    environment = os.environ | {"DERMIS_CACHE": str(tmp_path)}
+    command = [sys.executable, "-c", code]
+    both = [subprocess.Popen(command, env=environment, stderr=subprocess.PIPE) for _ in range(2)]
+    assert [(one.communicate()[1], one.returncode) for one in both] == [(b"", 0)] * 2
+    assert not list(tmp_path.rglob("*.part"))

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 DOCS = Path(__file__).parent.parent / "docs"
 
 
@@ -26,3 +28,14 @@ def test_pages_build(tmp_path: Path) -> None:
     assert "The whole technique in studio light" in (tmp_path / "generated" / "gallery.html").read_text(
         "utf-8"
     )
+
+
+def test_equations_of_the_gallery_are_ones_that_tex_can_draw(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(DOCS)
+    from made_from_code import gallery
+    from matplotlib.mathtext import MathTextParser
+
+    drawn = re.findall(r"^\$\$(.*)\$\$$", gallery(), re.MULTILINE)
+    assert len(drawn) > 10
+    for equation in drawn:
+        assert equation.isascii() and MathTextParser("path").parse(f"${equation}$").width > 0

@@ -30,9 +30,11 @@ def check_output(path: str | Path, suffixes: Sequence[str], advice: str = "Choos
     trial = _temporary_name(target)
     try:
         trial.touch()
-        trial.unlink()
     except OSError as fault:
         refuse_output(path, fault)
+    finally:  # also when interrupted in between
+        with suppress(OSError):
+            trial.unlink()
     return target
 
 

@@ -26,7 +26,7 @@ MESHES = {
     "a folder": Bad("inputs", "inputs", "neither"),
     "not a mesh": Bad("text.obj", "text.obj", "none"),
     "another format": Bad("head.fbx", "head.fbx", "'.fbx'"),
-    "cut short": Bad("short.obj", "short.obj", "cannot be read"),
+    "cut short": Bad("short.obj", "short.obj", "cannot be understood"),
     "no uv": Bad("no_uv.obj", "no_uv.obj", "'skin' has none"),
     "uv outside": Bad("far_uv.obj", "far_uv.obj", "to 1.5"),
     "zero area": Bad("flat.obj", "flat.obj", "zero area"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
@@ -16,7 +15,6 @@ from moving_head import CAPTURE, write_moving_head
 
 import dermis
 from dermis.cli import pose_options
-from dermis.cli.console import interruptible
 from dermis.images.io import read_image
 
 Run = Callable[..., Any]
@@ -112,17 +110,6 @@ def test_an_interruption_leaves_whole_frames_and_no_movie(
     for path in Path("f").glob("*.png"):
         assert read_image(path).shape == (32, 32, 3)
     assert not list(Path("f").glob(".dermis*"))
-
-
-def test_ctrl_c_waits_for_the_end_of_a_frame() -> None:
-    usual = signal.getsignal(signal.SIGINT)
-    with pytest.raises(KeyboardInterrupt), interruptible() as check:
-        check()
-        signal.raise_signal(signal.SIGINT)  # in a callback of the driver it would be lost
-        with pytest.raises(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGINT)
-        check()
-    assert signal.getsignal(signal.SIGINT) is usual
 
 
 def test_a_capture_moves_the_head_and_says_what_it_lacks(animate: Run) -> None:

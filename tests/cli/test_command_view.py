@@ -84,7 +84,8 @@ def test_without_a_display_it_names_the_way_out(folder: Path) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Ctrl+C is sent as a signal")
-def test_one_ctrl_c_ends_the_page(folder: Path) -> None:
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
+def test_one_signal_ends_the_page(folder: Path, number: int, code: int) -> None:
     pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
     command = [
         sys.executable,
@@ -101,15 +102,21 @@ def test_one_ctrl_c_ends_the_page(folder: Path) -> None:
     # A shell's background job ignores Ctrl+C, and so would what it starts.
     default = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        served = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        (folder / "temporary").mkdir()
+        environment = os.environ | {"TMPDIR": str(folder / "temporary")}
+        served = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+        )
     finally:
         signal.signal(signal.SIGINT, default)
     with served:
         try:
             assert served.stdout is not None
             urllib.request.urlopen(served.stdout.readline().split()[0], timeout=60).close()
-            served.send_signal(signal.SIGINT)
-            assert served.wait(timeout=60) == 0
+            assert list((folder / "temporary").iterdir())
+            served.send_signal(number)
+            assert served.wait(timeout=60) == code
+            assert not list((folder / "temporary").iterdir())
         finally:
             served.kill()
 

@@ -70,6 +70,30 @@ def test_frames_of_something_else_are_drawn_again(tmp_path: Path) -> None:
     assert files.missing(range(2), SIZE) == [0, 1]
 
 
+@pytest.mark.parametrize("damage", ["no text", "empty", "large", "a pipe"])
+def test_a_damaged_record_says_nothing(tmp_path: Path, damage: str) -> None:
+    files = _files(tmp_path)
+    files.claim("a smile")
+    write_png(files.path(0), PICTURE)
+    record = files.pattern.with_name(".%03d.png.made-of")
+    if damage == "a pipe":
+        record.unlink()
+        os.mkfifo(record)
+    else:
+        record.write_bytes({"no text": b"\xff\xfe", "empty": b"", "large": b"a smile" * 99}[damage])
+    files.claim("a smile")
+    assert record.read_bytes() == b"a smile"
+    os.utime(files.path(0), (1e9, 1e9))
+    assert files.missing([0], SIZE) == [0]
+
+
+def test_a_pipe_is_no_frame(tmp_path: Path) -> None:
+    files = _files(tmp_path)
+    files.claim("a smile")
+    os.mkfifo(files.path(0))
+    assert files.missing([0], SIZE) == [0]
+
+
 def test_png_is_checked_without_decoding() -> None:
     data = encode_png(PICTURE)
     assert png_size(data) == SIZE

@@ -306,7 +306,7 @@ def test_a_still_file_has_no_rig(tmp_path: Path) -> None:
 def test_damaged_targets_are_refused_by_name(tmp_path: Path, damage: str, words: str) -> None:
     file = GltfFile()
     rows = UP[:3] if damage == "count" else np.where(damage == "nan", np.nan, UP)
-    more = {"weights": [float("nan")]} if damage == "rest" else {}
+    more = {"weights": ["nan"]} if damage == "rest" else {}
     mesh = add_mesh(file, targets={"up": file.numbers(rows)}, name="face", **more)
     path = file.write(tmp_path / "a.gltf", file.add("nodes", mesh=mesh))
     with pytest.raises(DermisError, match=words) as caught:

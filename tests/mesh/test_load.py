@@ -167,13 +167,13 @@ def test_uv_missing_by_rounding_only_is_put_back(obj: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
-        ("a.obj", b"", "none|cannot be read"),
+        ("a.obj", b"", "none|cannot be understood"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "uv"),
         ("a.obj", b"v 0 0 0\nv nan 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n", "NaN"),
-        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 9/1\n", "cannot be read|indices"),
-        ("a.glb", b"glTF\x02\x00\x00\x00", "cannot be read"),
-        ("a.glb", b"\x89PNG\r\n\x1a\n" + bytes(64), "cannot be read"),
-        ("a.gltf", b"[]", "cannot be read"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 9/1\n", "cannot be understood|indices"),
+        ("a.glb", b"glTF\x02\x00\x00\x00", "cannot be understood|a glTF file"),
+        ("a.glb", b"\x89PNG\r\n\x1a\n" + bytes(64), "cannot be understood|a glTF file"),
+        ("a.gltf", b"[]", "cannot be understood|a glTF file"),
         ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n", "cannot be read"),
         ("a.fbx", b"Kaydara", r"\.fbx.*|suffix"),
     ],

@@ -12,7 +12,7 @@ import pytest
 from dermis.errors import DermisError
 from dermis.images.filters import mip_chain, without_steps
 from dermis.images.io import read_image, write_exr, write_png
-from dermis.mesh import maps
+from dermis.mesh import map_pixels
 from dermis.mesh.maps import Maps, load_maps
 
 SHAPE = (24, 32)
@@ -67,7 +67,7 @@ def test_a_large_file_is_decoded_once(tmp_path: Path, monkeypatch: pytest.Monkey
         decoded.append(path.name)
         return read_image(path)
 
-    monkeypatch.setattr(maps, "read_image", counted)
+    monkeypatch.setattr(map_pixels, "read_image", counted)
     rng = np.random.default_rng(5)
     noise = rng.integers(0, 256, (256, 256, 3)).astype(np.uint8)
     up = _png(tmp_path / "n.png", _encoded(np.dstack([0.1 * rng.random((256, 256, 2)), np.ones((256, 256))])))

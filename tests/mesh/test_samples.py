@@ -147,12 +147,19 @@ def test_download_is_kept(
     assert fetch("tiny") == paths
 
 
+@pytest.mark.parametrize("damage", ["cut", "a link to nowhere", "a pipe"])
 def test_damaged_file_in_the_cache_is_fetched_again(
-    cache: Path, home: str, monkeypatch: pytest.MonkeyPatch
+    cache: Path, home: str, damage: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _register(monkeypatch, _sample(f"{home}/tiny.hdr"))
-    (cache / "env").mkdir(parents=True)
-    (cache / "env" / "tiny.hdr").write_bytes(CONTENT[:5])
+    file = cache / "env" / "tiny.hdr"
+    file.parent.mkdir(parents=True)
+    if damage == "cut":
+        file.write_bytes(CONTENT[:5])
+    elif damage == "a pipe" and hasattr(os, "mkfifo"):
+        os.mkfifo(file)
+    else:
+        file.symlink_to("nowhere")
     assert not cached("tiny")
     assert fetch("tiny")["environment"].read_bytes() == CONTENT
 

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
-import numba
 import numpy as np
 import pytest
 
@@ -67,20 +63,3 @@ def test_deflections_have_the_moments_of_henyey_and_greenstein(
         assert abs(moment.mean() - expected) < 4.0 * moment.std() / np.sqrt(DEFLECTIONS)
     across = after - np.outer(cosine, direction)
     assert (np.abs(across.mean(axis=0)) < 4.0 / np.sqrt(2.0 * DEFLECTIONS)).all()
-
-
-def test_machine_without_a_folder_for_compiled_code_compiles_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    """numba says so with a RuntimeError as soon as it is asked to keep a function."""
-    compiles = numba.njit
-
-    def no_folder(*, cache: bool = False, **options: Any) -> Callable[..., Any]:
-        if cache:
-            raise RuntimeError("cannot cache function: no locator available")
-        return compiles(**options)
-
-    monkeypatch.setattr(numba, "njit", no_folder)
-    assert photon.compiled(_double)(2) == 4
-
-
-def _double(number: int) -> int:
-    return 2 * number

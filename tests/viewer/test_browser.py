@@ -34,9 +34,20 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium h
 
 @pytest.fixture(scope="module")
 def url(head_file: Path) -> Iterator[str]:
-    """Of a page that `dermis view --browser` serves."""
+    """Of a page that `dermis view --browser --token` serves."""
     pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
-    words = ["view", str(head_file), "--browser", "--port", "0", "--size", "400x480", "--adapter", ADAPTER]
+    words = [
+        "view",
+        str(head_file),
+        "--browser",
+        "--token",
+        "--port",
+        "0",
+        "--size",
+        "400x480",
+        "--adapter",
+        ADAPTER,
+    ]
     command = [
         sys.executable,
         "-m",
@@ -99,6 +110,8 @@ def test_a_lost_connection_comes_back_by_itself(page: Any) -> None:
 
 def test_a_reloaded_page_shows_the_head_again(page: Any) -> None:
     still(page, shows_head)
+    assert "token" not in page.url  # a cookie has it, which scripts cannot read
+    assert page.evaluate("document.cookie") == "" and page.context.cookies()[0]["sameSite"] == "Strict"
     page.reload()
     wait_for_picture(page)
     still(page, shows_head)
@@ -196,14 +209,15 @@ def test_a_page_that_came_encrypted_opens_an_encrypted_socket(
     page_at: str, socket_at: str, browser: Any, url: str
 ) -> None:
     """As behind a proxy, which here driver the server's own files on."""
-    page = browser.new_page()
+    page, base = browser.new_page(), url.partition("?")[0]
     page.add_init_script(_RECORD_SOCKETS)
-    elsewhere = f"{page_at}//skin.example/some/token/"
+    elsewhere = f"{page_at}//skin.example/some/folder/"
+    page.request.get(url)  # which gives the cookie
     page.route(
         elsewhere + "**",
-        lambda route: route.fulfill(response=page.request.get(url + route.request.url[len(elsewhere) :])),
+        lambda route: route.fulfill(response=page.request.get(base + route.request.url[len(elsewhere) :])),
     )
     page.goto(elsewhere)
     page.wait_for_function("() => window.opened.length > 0")
-    assert page.evaluate("window.opened") == [f"{socket_at}//skin.example/some/token/"]
+    assert page.evaluate("window.opened") == [f"{socket_at}//skin.example/some/folder/"]
     page.close()

@@ -64,11 +64,15 @@ def test_a_chosen_file_is_sent_and_shown_and_others_are_refused(
         choose(good)
         assert wait(page, lambda: session.state.scene.head is not first.scene.head)
         (opened,) = session.heads.recent
-        assert opened.endswith("/mine.obj") and opened.startswith(shown.folder)
+        assert opened.startswith(shown.folder) and session.heads.called(opened) == "mine.obj"
         page.wait_for_function("() => document.querySelector('#files').innerText === ''")
+        with page.expect_download() as coming:
+            page.keyboard.press("Control+s")
+        saved = Path(coming.value.path()).read_text()
+        assert 'name = "mine.obj"' in saved and shown.folder not in saved
         state = session.state
         choose(bad)
-        assert wait(page, lambda: "broken.obj" in session.message) and session.state is state
+        assert wait(page, lambda: "broken.obj: " in session.message) and session.state is state
         choose(other)
         page.wait_for_function("() => document.querySelector('#files').innerText.includes('.glb, .obj')")
         assert session.heads.recent == [opened] and len(list(Path(shown.folder).rglob("*.*"))) == 2

@@ -1,9 +1,8 @@
-"""Who gets through to the canvas, and what a page may send; slow pages drop frames."""
+"""Who gets through to the canvas, and where it is served."""
 
 from __future__ import annotations
 
 import asyncio
-import json
 import socket
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 import pytest
 
 from dermis.errors import DermisError
-from dermis.viewer.browser.guard import Guard, acceptable, is_local
+from dermis.viewer.browser.guard import MOST_PAGES, Guard, is_local
 from dermis.viewer.browser.server import Address, bind
 
 HOST = "127.0.0.1:8765"
@@ -29,10 +28,11 @@ async def _app(scope: Any, receive: Any, send: Any) -> None:
 
 def ask(
     guard: Guard,
-    path: str = "/",
+    query: str = "",
     kind: str = "http",
     host: str = HOST,
     texts: tuple[str, ...] = (),
+    scheme: str = "",
     **headers: str,
 ) -> list[Any]:
     """What the guard answers to a request."""
@@ -47,12 +47,18 @@ def ask(
         answers.append(message)
 
     all_headers = [(name.encode(), value.encode()) for name, value in {"host": host, **headers}.items()]
-    asyncio.run(guard({"type": kind, "path": path, "headers": all_headers}, receive, send))
+    scope = {"type": kind, "path": "/", "query_string": query.encode(), "headers": all_headers}
+    usual = {"http": "http", "websocket": "ws"}[kind]
+    asyncio.run(guard(scope | {"scheme": scheme or usual}, receive, send))
     return answers
 
 
 def status(answers: list[Any]) -> Any:
     return answers[0].get("status", answers[0].get("code", answers[0]["type"]))
+
+
+PASSED, REFUSED = (200, "websocket.accept"), (403, 1008)
+KINDS = pytest.mark.parametrize("kind", ["http", "websocket"])
 
 
 def test_this_machine_needs_no_token() -> None:
@@ -63,62 +69,71 @@ def test_this_machine_needs_no_token() -> None:
     assert status(ask(guard, kind="websocket")) == "websocket.accept"
 
 
-@pytest.mark.parametrize("kind", ["http", "websocket"])
-@pytest.mark.parametrize("path", ["/", "/wrong/", "/index.html", "/secre", "/secrets/", "//secret/"])
-def test_without_the_token_nothing_is_there(kind: str, path: str) -> None:
-    refused = status(ask(Guard(_app, "secret"), path, kind))
-    assert refused == (404 if kind == "http" else 1008)
+@KINDS
+@pytest.mark.parametrize(
+    "query", ["", "token=", "token=wrong", "token=secre", "token=secrets", "tokens=secret"]
+)
+@pytest.mark.parametrize("cookie", ["", "dermis=", "dermis=secrets", "other=secret; a", "dermis", "=secret"])
+def test_without_the_token_nothing_is_answered(kind: str, query: str, cookie: str) -> None:
+    answers = ask(Guard(_app, "secret"), query, kind, cookie=cookie)
+    assert status(answers) in REFUSED
+    if kind == "http":
+        assert b"dermis view has printed" in answers[1]["body"] and b"secret" not in answers[1]["body"]
 
 
-@pytest.mark.parametrize("path", ["/secret/", "/secret/renderview.js"])
-def test_the_token_opens_page_and_socket(path: str) -> None:
-    guard = Guard(_app, "secret")
-    assert status(ask(guard, path, host="gpu.example:8765")) == 200
-    assert status(ask(guard, path, "websocket", host="gpu.example:8765")) == "websocket.accept"
+def test_the_token_of_the_address_becomes_a_cookie_that_opens_all_else() -> None:
+    guard = Guard(_app, "secret", "dermis-80")
+    headers = ask(guard, "token=secret", host="gpu.example:8765")[0]["headers"]
+    assert headers == [(b"set-cookie", b"dermis-80=secret; Path=/; HttpOnly; SameSite=Strict")]
+    for kind in ("http", "websocket"):
+        answers = ask(guard, kind=kind, host="gpu.example:8765", cookie="a=b; dermis-80=secret")
+        assert status(answers) in PASSED and not answers[0].get("headers")
+        assert status(ask(guard, kind=kind, cookie="dermis-81=secret")) in REFUSED
+    assert status(ask(guard, "token=secret", "websocket")) == "websocket.accept"
 
 
-@pytest.mark.parametrize("kind", ["http", "websocket"])
+@KINDS
 def test_pages_of_other_sites_are_refused(kind: str) -> None:
     guard = Guard(_app, "")
-    assert status(ask(guard, kind=kind, origin="http://evil.example")) in (404, 1008)
-    assert status(ask(guard, kind=kind, host="evil.example:8765")) in (404, 1008)
-    assert status(ask(guard, kind=kind, origin=f"http://{HOST}")) in (200, "websocket.accept")
+    for origin in (
+        "http://evil.example",
+        f"https://{HOST}",
+        f"http://{HOST}1",
+        "http://127.0.0.1",
+        "null",
+        "",
+    ):
+        assert status(ask(guard, kind=kind, origin=origin)) in REFUSED
+    assert status(ask(guard, kind=kind, host="evil.example:8765")) in REFUSED
+    assert status(ask(guard, kind=kind, origin=f"http://{HOST}")) in PASSED
 
 
-def test_with_the_token_a_proxy_may_call_the_host_otherwise() -> None:
-    answers = ask(Guard(_app, "secret"), "/secret/", "websocket", HOST, origin="https://skin.example")
-    assert status(answers) == "websocket.accept"
+@KINDS
+def test_with_the_token_too(kind: str) -> None:
+    guard, cookie = Guard(_app, "secret"), "dermis=secret"
+    assert status(ask(guard, kind=kind, cookie=cookie, origin="http://127.0.0.1:9000")) in REFUSED
+    assert status(ask(guard, "token=secret", kind=kind, origin="http://evil.example")) in REFUSED
 
 
-@pytest.mark.parametrize(
-    ("event", "passes"),
-    [
-        ({"type": "pointer_down", "x": 1, "y": 2}, True),
-        ({"type": "_framefeedback", "index": 3}, True),
-        ({"type": "_framefeedback", "index": "3"}, False),
-        ({"type": "_framefeedback"}, False),
-        ({"type": "resize", "pwidth": 1920, "pheight": 1080, "ratio": 1}, True),
-        ({"type": "resize", "pwidth": 100000, "pheight": 100000, "ratio": 1}, False),
-        ({"type": "resize", "pwidth": "many", "pheight": 1, "ratio": 1}, False),
-        ({"type": "close"}, False),
-        ({"type": "_clients_change", "ids": [7]}, False),
-        ({"type": 3}, False),
-        ({"x": 1}, False),
-        ([1, 2], False),
-        ({"type": "char", "data": "x" * 5000}, False),
-    ],
-)
-def test_a_page_may_send_events_only(event: Any, passes: bool) -> None:
-    assert acceptable(json.dumps(event)) is passes
+@pytest.mark.parametrize(("kind", "scheme"), [("http", "https"), ("websocket", "wss")])
+def test_behind_a_proxy_the_origin_is_the_one_that_it_tells(kind: str, scheme: str) -> None:
+    guard = Guard(_app, "secret")
+    given = {"host": "skin.example", "origin": "https://skin.example", "cookie": "dermis=secret"}
+    assert status(ask(guard, kind=kind, scheme=scheme, **given)) in PASSED
+    assert status(ask(guard, kind=kind, **given)) in REFUSED
 
 
-@pytest.mark.parametrize("text", ["", "{", "hello", None, b"{}"])
-def test_what_is_no_event_is_dropped(text: Any) -> None:
-    assert not acceptable(text)
+def test_only_so_many_pages_are_open() -> None:
+    guard = Guard(_app, "")
+    guard._pages = MOST_PAGES
+    assert status(ask(guard, kind="websocket")) == 1008 and status(ask(guard)) == 200
+    guard._pages -= 1
+    for _ in range(2):  # it counts those that leave
+        assert status(ask(guard, kind="websocket")) == "websocket.accept"
 
 
 def test_bad_messages_do_not_reach_the_canvas() -> None:
-    good = '{"type": "show"}'
+    good = '{"timestamp":1.0,"type":"show"}'
     answers = ask(Guard(_app, ""), kind="websocket", texts=('{"type": "close"}', "{", good))
     assert answers[1]["text"] == good
 
@@ -145,7 +160,7 @@ def test_other_hosts_get_a_token_that_is_new_each_time() -> None:
     for _ in range(2):
         listener, address = bind("0.0.0.0", 0)
         with listener:
-            assert len(address.token) >= 20 and address.url.endswith(f"/{address.token}/")
+            assert len(address.token) >= 20 and address.url.endswith(f"/?token={address.token}")
             tokens.add(address.token)
     assert len(tokens) == 2
     listener, address = bind("127.0.0.1", 0)
@@ -156,12 +171,12 @@ def test_other_hosts_get_a_token_that_is_new_each_time() -> None:
 def test_this_machine_gets_a_token_when_asked() -> None:
     listener, address = bind("127.0.0.1", 0, secret=True)
     with listener:
-        assert len(address.token) >= 20 and address.url.endswith(f"/{address.token}/")
+        assert len(address.token) >= 20 and address.url.endswith(f"/?token={address.token}")
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::"])
 def test_a_server_that_listens_everywhere_goes_by_the_machine_s_name(host: str) -> None:
-    assert Address(host, 80, "secret").url == f"http://{socket.gethostname()}:80/secret/"
+    assert Address(host, 80, "secret").url == f"http://{socket.gethostname()}:80/?token=secret"
 
 
 def test_addresses_of_version_six_are_bracketed() -> None:

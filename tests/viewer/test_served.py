@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import io
-import json
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from offscreen_input import SETTINGS
+from page_client import PATIENCE_S, SIZE, Page, difference, visit
 from served_viewer import served
 
 from dermis.mesh.head import Head
@@ -22,91 +20,15 @@ from dermis.viewer.player import MotionFile
 from dermis.viewer.state import ViewerState
 
 pytest.importorskip("imgui_bundle", reason="the extra `viewer` is not installed")
-client = pytest.importorskip("websockets.sync.client", reason="the extra `viewer` is not installed")
+pytest.importorskip("websockets", reason="the extra `viewer` is not installed")
 
-SIZE = 400, 300
-_PATIENCE_S, _QUIET_S = 25.0, 0.7
 _AT_ONCE = 2  # frames on the way to a page
-
-
-class Page:
-    """What a page does, without a browser; it confirms only the frames that the test wants."""
-
-    def __init__(self, socket: Any) -> None:
-        self._socket = socket
-        self.active: bool | None = None
-        self.frames: list[tuple[int, str, bytes]] = []
-
-    def tell(self, kind: str, **fields: Any) -> None:
-        self._socket.send(json.dumps({"type": kind, "timestamp": 0.0, **fields}))
-
-    def show(self, size: tuple[int, int] = SIZE) -> None:
-        width, height = size
-        self.frames.clear()
-        self.tell("resize", width=width, height=height, pwidth=width, pheight=height, ratio=1.0)
-
-    def confirm(self, index: int) -> None:
-        self.tell("_framefeedback", index=index, localtime=0.0)
-
-    def drag(self, start: int, end: int) -> None:
-        button = {"button": 1, "buttons": [1], "modifiers": [], "y": 150}
-        self.frames.clear()
-        self.tell("pointer_down", x=start, **button)
-        for x in np.linspace(start, end, 30):
-            self.tell("pointer_move", x=float(x), **button)
-            time.sleep(0.01)
-        self.tell("pointer_up", x=end, **button)
-
-    def hear(self, quiet_s: float = _QUIET_S, *, confirming: bool = False) -> None:
-        """Take what comes until nothing comes any more."""
-        while True:
-            try:
-                message = self._socket.recv(timeout=quiet_s)
-            except TimeoutError:
-                return
-            told = json.loads(message)
-            if told["type"] == "active":
-                self.active = told["value"]
-            elif told["type"] == "framebufferdata":
-                self.frames.append((told["index"], told["mimetype"], self._socket.recv()))
-                if confirming:
-                    self.confirm(told["index"])
-
-    def wait(
-        self, reached: Callable[[], Any], quiet_s: float = _QUIET_S, *, confirming: bool = False
-    ) -> None:
-        """Take what comes until something has happened."""
-        end = time.monotonic() + _PATIENCE_S
-        while not reached():
-            assert time.monotonic() < end, "what the page waits for never comes"
-            self.hear(quiet_s, confirming=confirming)
-
-    def still(self) -> NDArray[np.int64]:
-        """The picture when it is sent without loss and nothing follows."""
-        from PIL import Image
-
-        end = time.monotonic() + _PATIENCE_S
-        while time.monotonic() < end:
-            self.hear(confirming=True)
-            if self.frames and self.frames[-1][1] == "image/png":
-                image = Image.open(io.BytesIO(self.frames[-1][2])).convert("RGB")
-                return np.array(image).astype(np.int64)
-        raise AssertionError("the page never comes to rest")
 
 
 @pytest.fixture(scope="module")
 def viewer(head: Head) -> Iterator[Any]:
     with served(ViewerState(Scene(head), SETTINGS), SIZE) as one:
         yield one
-
-
-def visit(viewer: Any) -> Any:
-    return client.connect(viewer.url.replace("http", "ws", 1), max_size=None)
-
-
-def difference(a: NDArray[np.int64], b: NDArray[np.int64]) -> float:
-    """Mean over the part that neither the panel nor text covers."""
-    return float(np.abs(a[:200, 205:] - b[:200, 205:]).mean())
 
 
 def test_a_page_that_shows_nothing_gets_two_frames_and_then_the_newest(viewer: Any) -> None:
@@ -148,7 +70,7 @@ def test_a_lossless_frame_keeps_nothing_waiting_and_is_not_sent_late(
     def slowly(array: NDArray[np.uint8], *, lossless: bool) -> bytes:
         if lossless:
             begun.set()
-            gate.wait(_PATIENCE_S)
+            gate.wait(PATIENCE_S)
         return encoded(array, lossless=lossless)
 
     with visit(viewer) as socket:

@@ -24,11 +24,22 @@ async def _app(scope: Any, receive: Any, send: Any) -> None:
 class Server:
     def __init__(self, folder: Path) -> None:
         self.got: list[Path] = []
-        canvas = SimpleNamespace(ticket="secret", on_file=self.got.append)
+        self.names: list[str] = []
+        self.canvas = canvas = SimpleNamespace(ticket="secret", on_file=self._take)
         self.app = Guard(Uploads(_app, canvas, folder), "")
 
+    def _take(self, path: Path, name: str) -> None:
+        self.got.append(path)
+        self.names.append(name)
+
     def send(
-        self, name: str, *pieces: bytes, ticket: str = "secret", whole: bool = True, **headers: str
+        self,
+        name: str,
+        *pieces: bytes,
+        ticket: str = "secret",
+        whole: bool = True,
+        then: Any = None,
+        **headers: str,
     ) -> tuple[int, str]:
         """Status and text of the answer."""
         count = len(pieces)
@@ -40,7 +51,7 @@ class Server:
         answers: list[Any] = []
 
         async def receive() -> Any:
-            return coming.pop(0)
+            return coming.pop(0) if then is None or len(coming) > 1 else await then()
 
         async def send(message: Any) -> None:
             answers.append(message)
@@ -48,6 +59,7 @@ class Server:
         told = {"host": "127.0.0.1:8765", "x-dermis-ticket": ticket} | headers
         listed = [(key.replace("_", "-").encode(), value.encode()) for key, value in told.items()]
         scope = {"type": "http", "method": "POST", "path": f"/upload/{name}", "headers": listed}
+        scope |= {"scheme": "http", "query_string": b""}
         asyncio.run(self.app(scope, receive, send))
         return answers[0]["status"], answers[1]["body"].decode()
 
@@ -57,12 +69,25 @@ def server(tmp_path: Path) -> Server:
     return Server(tmp_path)
 
 
-def test_a_file_comes_whole_under_a_name_without_a_path(server: Server, tmp_path: Path) -> None:
+def test_a_file_comes_whole_and_its_name_is_no_path(server: Server, tmp_path: Path) -> None:
     assert server.send("a head.obj", b"v 0 0", b" 0\n") == (200, "")
-    (path,) = server.got
-    assert path.read_bytes() == b"v 0 0 0\n" and path.name == "a_head.obj" and tmp_path in path.parents
-    assert server.send("..%2f.obj", b"x")[0] == 200
-    assert all(one.resolve().is_relative_to(tmp_path) for one in server.got)
+    assert server.got == [tmp_path / "1" / "upload.obj"] and server.names == ["a head.obj"]
+    assert server.got[0].read_bytes() == b"v 0 0 0\n"
+    assert server.got[0].parent.stat().st_mode & 0o777 == 0o700
+    for name in (
+        "..%2f.obj",
+        "..\\..\\b.OBJ",
+        "nul\0.obj",
+        "\n" + "x" * 5000 + ".glb",
+        "~root.toml",
+        "con.ply",
+    ):
+        assert server.send(name, b"x")[0] == 200
+    assert [path.relative_to(tmp_path).parts for path in server.got[1:]] == [
+        (str(number), f"upload{kind}")
+        for number, kind in enumerate((".obj",) * 3 + (".glb", ".toml", ".ply"), 2)
+    ]
+    assert all(name.isprintable() and len(name) <= 80 for name in server.names)
 
 
 @pytest.mark.parametrize("name", ["a.exe", "a.zip", "a", "a.obj.py", ".obj/../b.html"])
@@ -80,8 +105,8 @@ def test_only_the_page_that_has_control_may_send(ticket: str, server: Server, tm
 
 
 def test_another_site_may_not(server: Server) -> None:
-    assert server.send("a.obj", b"x", origin="http://evil.example")[0] == 404
-    assert server.send("a.obj", b"x", origin="null")[0] == 404
+    assert server.send("a.obj", b"x", origin="http://evil.example")[0] == 403
+    assert server.send("a.obj", b"x", origin="null")[0] == 403
     assert server.got == []
 
 
@@ -104,3 +129,38 @@ def test_nothing_is_left_of_a_file_that_ends_early(server: Server, tmp_path: Pat
     status, said = server.send("a.obj", b"v 0", whole=False)
     assert status == 400 and "whole" in said and server.got == [] and not list(tmp_path.rglob("*.obj"))
     assert server.send("a.obj", b"v")[0] == 200
+
+
+def test_a_file_that_does_not_go_on_is_given_up(
+    server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(uploads, "IDLE_S", 0.05)
+
+    async def never() -> Any:
+        await asyncio.sleep(60.0)
+
+    status, said = server.send("a.obj", b"v 0", whole=False, then=never)
+    assert status == 400 and "nothing came" in said and not list(tmp_path.rglob("*.obj"))
+    assert server.send("a.obj", b"v")[0] == 200
+
+
+def test_only_so_many_files_are_taken(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(uploads, "MOST_FILES", 2)
+    assert [server.send("a.obj", b"v")[0] for _ in range(3)] == [200, 200, 400]
+
+
+def test_a_full_disk_is_told(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: Any, **__: Any) -> Any:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "open", full)
+    status, said = server.send("a.obj", b"v")
+    assert status == 400 and "No space left" in said
+    monkeypatch.undo()
+    assert server.send("a.obj", b"v")[0] == 200
+
+
+def test_nothing_is_taken_before_there_is_a_viewer(server: Server, tmp_path: Path) -> None:
+    server.canvas.on_file = None
+    status, said = server.send("a.obj", b"v")
+    assert status == 400 and "being prepared" in said and not any(tmp_path.iterdir())

@@ -21,9 +21,35 @@ COMMANDS = {
     "cite": "Print BibTeX entries of the works behind a picture.",
 }
 
+_INTERRUPTED = 130
+
 
 def main() -> None:
-    """Run the command line; exit with 2 when the caller can mend what went wrong."""
+    """Run the command line; exit with 2 when the caller can mend what went wrong.
+
+    130 after Ctrl-C, 143 after SIGTERM, 129 after SIGHUP; 2 also when stdout could not be written to, but
+    not when its reader left.
+    """
+    from dermis.cli.interruption import Interruption
+    from dermis.cli.streams import Streams
+
+    with Streams() as streams, Interruption() as interruption:
+        try:
+            code = _run()
+            if (fault := streams.fault()) and not code:
+                came = f"it fails ({fault.strerror})"
+                code = _fail(f"stdout: expected a place to write to, but {came}. Write it elsewhere.")
+        except KeyboardInterrupt:
+            code = _INTERRUPTED
+            streams.drop()
+        except Exception:  # some libraries make one of their own of it
+            if not (code := interruption.code):
+                raise
+    sys.exit(interruption.code or code)
+
+
+def _run() -> int:
+    """The exit status of the command that was typed."""
     from cyclopts import App, CycloptsError
 
     from dermis.cli.help_text import reflowed
@@ -35,6 +61,7 @@ def main() -> None:
         help="Human skin: physically based, in real time, checked against the truth.",
         help_format="plaintext",
         result_action="return_value",
+        suppress_keyboard_interrupt=False,
     )
     if (chosen := next(iter(sys.argv[1:]), "")) in COMMANDS:
         command = getattr(import_module(f"dermis.cli.{chosen}"), chosen)
@@ -46,13 +73,11 @@ def main() -> None:
     try:
         with warnings.catch_warnings():
             _show_notes()
-            sys.exit(app(sys.argv[1:], exit_on_error=False, print_error=False) or 0)
+            return int(app(sys.argv[1:], exit_on_error=False, print_error=False) or 0)
     except DermisError as error:
-        _fail(str(error))
+        return _fail(str(error))
     except CycloptsError as error:
-        _fail(explain(error))
-    except KeyboardInterrupt:
-        sys.exit(130)
+        return _fail(explain(error))
 
 
 def _show_notes() -> None:
@@ -71,6 +96,6 @@ def _show_notes() -> None:
     warnings.showwarning = show
 
 
-def _fail(message: str) -> None:
+def _fail(message: str) -> int:
     sys.stderr.write(f"dermis: {message}\n")
-    sys.exit(2)
+    return 2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from dermis.cli.console import interruptible, note, print_json, print_lines, progress, working_on
+from dermis.cli.console import note, print_json, print_lines, progress, working_on
 from dermis.cli.motion import clip_of, motion_file, names_of, parse_span
 from dermis.cli.moving_output import MovingOutput
 from dermis.cli.options import Adapter, Json, Whole
@@ -39,13 +39,9 @@ class _Take:
     rate: Fraction
     first: int
 
-    def scenes(self, numbers: Iterable[int], check: Callable[[], None]) -> Iterator[Scene]:
-        """The scene of each frame; what the clip does not move keeps the scene's own pose.
-
-        check : called before each
-        """
+    def scenes(self, numbers: Iterable[int]) -> Iterator[Scene]:
+        """The scene of each frame; what the clip does not move keeps the scene's own pose."""
         for number in numbers:
-            check()
             pose = self.clip.pose_at(float(number / self.rate))
             yield replace(self.scene, pose=laid_over(pose, self.scene.pose))
 
@@ -158,8 +154,8 @@ def _draw(take: _Take, numbers: Sequence[int], target: MovingOutput, adapter: st
     options["exposure"] = _exposure(take, renderer)
     options["alpha"] = target.numbered and take.settings.background == "none"
     writing, bar = target.writing(size, take.rate), progress("drawing frames")
-    with interruptible() as check, writing as write, bar as report:
-        pictures = renderer.render_many(take.scenes(numbers, check), **options)
+    with writing as write, bar as report:
+        pictures = renderer.render_many(take.scenes(numbers), **options)
         for done, (number, picture) in enumerate(zip(numbers, pictures, strict=True), 1):
             write(number, picture)
             report(done, len(numbers))
@@ -170,7 +166,7 @@ def _exposure(take: _Take, renderer: Renderer) -> float:
     """One for all frames: that given, or metered at the first, whichever of them are still to be drawn."""
     if take.settings.exposure != "auto":
         return take.settings.exposure
-    (scene,) = take.scenes([take.first], lambda: None)
+    (scene,) = take.scenes([take.first])
     found = renderer.draw(scene, take.settings, timed=False).exposure
     note(f"note: --exposure {found:.3g}, metered at the first frame")
     return found

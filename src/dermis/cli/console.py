@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import json
 import logging
-import os
-import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from dermis.errors import refuse
 from dermis.preparing import LOGGER
 
 TOLD_AFTER_S = 2.0
@@ -25,15 +21,9 @@ def print_json(value: Any) -> None:
 
 
 def print_lines(*lines: str) -> None:
-    """Lines of a result on stdout; a reader that leaves early, as `head` does, is no fault."""
-    try:
-        sys.stdout.write("\n".join(lines) + "\n")
-        sys.stdout.flush()
-    except OSError as fault:
-        # What is left over goes nowhere, or Python would try again as it ends.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        if not isinstance(fault, BrokenPipeError):
-            refuse("stdout", "a place to write to", f"it fails ({fault.strerror})", "Write it elsewhere")
+    """Lines of a result on stdout, at once."""
+    sys.stdout.write("\n".join(lines) + "\n")
+    sys.stdout.flush()
 
 
 def note(text: str) -> None:
@@ -53,34 +43,6 @@ def progress(what: str) -> Iterator[Callable[[int, int], None]]:
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(what)
         yield lambda done, of: bar.update(task, completed=done, total=of)
-
-
-@contextmanager
-def interruptible() -> Iterator[Callable[[], None]]:
-    """A check to be called between two frames, which raises KeyboardInterrupt once Ctrl-C was pressed.
-
-    Raised right away it could land in a callback of the driver and be lost; pressed again, it is.
-    """
-    pressed = threading.Event()
-
-    def remember(*_: object) -> None:
-        if pressed.is_set():
-            raise KeyboardInterrupt
-        pressed.set()
-
-    def check() -> None:
-        if pressed.is_set():
-            raise KeyboardInterrupt
-
-    usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    if not usual or threading.current_thread() is not threading.main_thread():
-        yield check
-        return
-    signal.signal(signal.SIGINT, remember)
-    try:
-        yield check
-    finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @contextmanager

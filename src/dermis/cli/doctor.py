@@ -34,9 +34,9 @@ def doctor(*, adapter: Adapter = "auto", as_json: Json = False) -> int:
 
 def examine(wanted: str) -> dict[str, Any]:
     """All findings as one JSON-ready object."""
-    from dermis.disk import cache_folder
     from dermis.gpu.adapters import WANTED_FEATURES, list_adapters
     from dermis.mesh.samples import SAMPLES, cached
+    from dermis.private import cache_folder
 
     found = [
         {"name": a.name, "driver": a.driver, "kind": a.kind, "backend": a.backend}

@@ -54,13 +54,14 @@ def view(
     head:
         human, the head of the package, a sample, a mesh file, or a scene in TOML.
     browser:
-        Serve a web page instead of opening a window, for machines without a screen.
+        Serve a web page instead of opening a window, for machines without a screen. It is there at once, and
+        tells what is being prepared.
     port:
         Where the page is served; 0 for any that is free [8765].
     host:
-        Address to listen at; others than this machine's own need the token in the printed URL [127.0.0.1].
+        Address to listen at; others than this machine's own need the token of the printed URL [127.0.0.1].
     token:
-        Ask for a token in the URL on this machine too: for one with other users, and behind a proxy.
+        Ask for a token on this machine too: for one with other users, and behind a proxy.
     motion:
         Play a motion: a glTF file's clip (file.glb, or file.glb#clip), a CSV of Live Link Face, lines of JSON
         of MediaPipe, or meshes of one topology (a folder, face_%05d.obj).
@@ -77,14 +78,16 @@ def view(
         refuse("--motion-fps", "a motion with it", "there is none", "Add --motion")
     from dermis.viewer.windows import serve, show_window
 
-    window = scene.settings.get("size", _WINDOW)
-    with working_on("loading"):
+    def load() -> tuple[ViewerState, MotionFile | None]:
         state = _state(head, scene, adapter)
-        played = _motion(motion, motion_fps, state)
+        return state, _motion(motion, motion_fps, state)
+
+    window = scene.settings.get("size", _WINDOW)
     if browser:
-        where = host or _HOST, _PORT if port is None else port
-        serve(state, adapter, window, *where, _announce, secret=token, motion=played)
+        serve(load, adapter, window, host or _HOST, _PORT if port is None else port, _announce, secret=token)
     else:
+        with working_on("loading"):
+            state, played = load()
         show_window(state, adapter, window, motion=played)
     return 0
 

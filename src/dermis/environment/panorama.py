@@ -12,6 +12,7 @@ from dermis.errors import refuse
 from dermis.images.colour import luminance
 from dermis.images.io import read_image
 from dermis.mesh.samples import SAMPLES, fetch
+from dermis.reading import is_file
 
 Floats = NDArray[np.float64]
 UNIFORM = "uniform"
@@ -102,7 +103,7 @@ def panorama_file(name: str) -> Path | None:
         return None
     sample = SAMPLES.get(name)
     if sample is None:
-        if not Path(name).is_file():
+        if not is_file(name):
             known = ", ".join([*_sample_names(), UNIFORM])
             expected, came = f"an .hdr or .exr file or one of {known}", "it is neither"
             refuse(f"environment {name!r}", expected, came, "Check the name")

@@ -9,8 +9,10 @@ from pathlib import Path
 
 from dermis import outputs
 from dermis.errors import DermisError, refuse
-from dermis.images.codecs import decode_exr, png_size
-from dermis.images.io import OUTPUT_SUFFIXES, check_output
+from dermis.images.codecs import png_size
+from dermis.images.exr import decode_exr
+from dermis.images.io import OUTPUT_SUFFIXES, check_output, read_bytes
+from dermis.reading import read_file
 
 _NUMBER = re.compile(r"%(?:0(\d+))?d")
 
@@ -51,7 +53,7 @@ class FrameFiles:
 
         made_of : a text that two frames of one number share if they look the same
         """
-        if anew or not self._record.is_file() or self._record.read_text(encoding="utf-8") != made_of:
+        if anew or not self._says(made_of):
             with outputs.replacing(self._record) as trial:
                 trial.write_text(made_of, encoding="utf-8")
 
@@ -59,6 +61,14 @@ class FrameFiles:
         """Those of the frames that are to be drawn: all but files that count, are whole and of this size."""
         begun_ns = self._record.stat().st_mtime_ns
         return [number for number in numbers if not _stands(self.path(number), size, begun_ns)]
+
+    def _says(self, made_of: str) -> bool:
+        """Whether frames are there of which the record says this; a damaged one says nothing."""
+        text = made_of.encode()
+        try:
+            return read_file(self._record, "a record of frames", len(text)) == text
+        except DermisError:
+            return False
 
     @property
     def _record(self) -> Path:
@@ -68,11 +78,11 @@ class FrameFiles:
 def _stands(path: Path, size: tuple[int, int], begun_ns: int) -> bool:
     """Whether a picture of this size lies there whole, written since a time."""
     try:
-        if path.stat().st_mtime_ns < begun_ns:
+        if not path.is_file() or path.stat().st_mtime_ns < begun_ns:
             return False
         if path.suffix.lower() == ".png":
-            return png_size(path.read_bytes()) == size
-        height, width = decode_exr(path).shape[:2]
+            return png_size(read_bytes(path)) == size
+        height, width = decode_exr(read_bytes(path)).shape[:2]
     except (OSError, ValueError, RuntimeError, DermisError):
         return False
     return (width, height) == size

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,19 +13,15 @@ from numpy.typing import NDArray
 
 from dermis import outputs
 from dermis.errors import DermisError, refuse
-from dermis.images.codecs import (
-    EXR_START,
-    PILLOW_STARTS,
-    RADIANCE_START,
-    Pixels,
-    decode_exr,
-    decode_radiance,
-    decode_with_pillow,
-    encode_png,
-)
+from dermis.images.codecs import PILLOW_STARTS, Pixels, decode_with_pillow, encode_png, pillow_size
 from dermis.images.colour import encode_srgb8
+from dermis.images.exr import EXR_START, decode_exr, exr_size
+from dermis.images.radiance import RADIANCE_START, decode_radiance, radiance_size
+from dermis.images.sizes import MOST_BYTES, TooLargeError
+from dermis.reading import read_file
 
 OUTPUT_SUFFIXES = (".png", ".exr")
+_Codec = Callable[[bytes], Any]
 _READABLE = "a picture (PNG, JPEG, TIFF, EXR or HDR)"
 
 
@@ -53,16 +49,29 @@ def read_image(path: str | Path | Picture) -> Pixels:
 
     Grey with alpha becomes RGBA. Colour profiles and camera orientation are ignored, as for any texture.
     """
-    data = read_bytes(path)
+    image: Pixels = _by_kind(path, read_bytes(path), decode_exr, decode_radiance, decode_with_pillow)
+    return image[..., None] if image.ndim == 2 else image
+
+
+def read_size(path: str | Path | Picture) -> tuple[int, int]:
+    """Width and height of a picture by its header; its pixels may be damaged all the same.
+
+    DermisError : the file is missing, is no picture, or is larger than one may be
+    """
+    size: tuple[int, int] = _by_kind(path, read_bytes(path), exr_size, radiance_size, pillow_size)
+    return size
+
+
+def _by_kind(path: str | Path | Picture, data: bytes, exr: _Codec, radiance: _Codec, pillow: _Codec) -> Any:
+    """What the codec of the kind that the bytes begin as says of them."""
+    kinds = {EXR_START: exr, RADIANCE_START: radiance} | dict.fromkeys(PILLOW_STARTS, pillow)
+    codec = next((codec for start, codec in kinds.items() if data.startswith(start)), None)
+    if codec is None or (codec is exr and isinstance(path, Picture)):
+        refuse(path, _READABLE, "its first bytes match none of these", "Convert it to PNG")
     try:
-        if data.startswith(EXR_START) and not isinstance(path, Picture):
-            image: Pixels = decode_exr(Path(path))
-        elif data.startswith(RADIANCE_START):
-            image = decode_radiance(data)
-        elif data.startswith(PILLOW_STARTS):
-            image = decode_with_pillow(data)
-        else:
-            refuse(path, _READABLE, "its first bytes match none of these", "Convert it to PNG")
+        return codec(data)
+    except TooLargeError as fault:
+        refuse(path, "a picture of as many pixels as 8192 x 8192 at most", str(fault), "Resize it")
     except DermisError:
         raise
     except Exception as fault:  # decoders raise anything for damaged data
@@ -70,7 +79,6 @@ def read_image(path: str | Path | Picture) -> Pixels:
             f"{path}: expected {_READABLE}, but it cannot be decoded ({outputs.reason(fault)}). "
             "It is cut off, damaged or of an unusual kind: fetch or export it again."
         ) from fault
-    return image[..., None] if image.ndim == 2 else image
 
 
 def check_output(path: str | Path) -> Path:
@@ -160,9 +168,4 @@ def read_bytes(path: str | Path | Picture) -> bytes:
     """
     if isinstance(path, Picture):
         return path.data
-    try:
-        return Path(path).read_bytes()
-    except OSError as fault:
-        raise DermisError(
-            f"{path}: expected {_READABLE}, but it cannot be read ({outputs.reason(fault)}). Check the path."
-        ) from fault
+    return read_file(path, _READABLE, MOST_BYTES)

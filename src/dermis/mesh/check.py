@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
-from dermis.mesh.formats import default_unit_mm
+from dermis.mesh.formats import Part, default_unit_mm
 from dermis.mesh.geometry import edges, triangle_areas
+from dermis.mesh.limits import MOST_TRIANGLES, MOST_VERTICES
 from dermis.mesh.mesh import Mesh
+from dermis.mesh.rig import Rig
 
 UV_TOLERANCE = 1e-4
 FARTHEST_MM = 1e6
@@ -31,6 +35,8 @@ def check_mesh(mesh: Mesh, culprit: object) -> None:
     triangles without area, edges of more than two triangles, and a mesh without skin.
     """
     check_arrays(mesh.positions, mesh.uv, mesh.triangles, culprit)
+    for name in ("normals", "dpdu", "dpdv"):
+        _check_finite(name, getattr(mesh, name), culprit)
     _check_uv_range(mesh, culprit)
     _check_areas(mesh, culprit)
     _check_manifold(mesh, culprit)
@@ -52,10 +58,7 @@ def check_arrays(
         came = f"they run from {triangles.min()} to {triangles.max()}"
         refuse(culprit, f"triangle indices from 0 to {len(positions) - 1}", came, _DAMAGED)
     for name, values in (("positions", positions), ("uv", uv)):
-        lost = np.flatnonzero(~np.isfinite(values).all(axis=1))
-        if len(lost):
-            came = f"{len(lost)} vertices are NaN or infinite, first {lost[0]}"
-            refuse(culprit, f"finite {name}", came, _DAMAGED)
+        _check_finite(name, values, culprit)
     farthest = float(np.abs(positions).max())
     if farthest > FARTHEST_MM:
         expected, came = (
@@ -63,6 +66,37 @@ def check_arrays(
             f"one is {farthest:.3g} mm away",
         )
         refuse(culprit, expected, came, f"{_UNIT}, or move the head to the origin")
+
+
+def _check_finite(name: str, values: NDArray[np.floating], culprit: object, of: str = "vertices") -> None:
+    lost = np.flatnonzero(~np.isfinite(values).all(axis=tuple(range(1, values.ndim))))
+    if len(lost):
+        came = f"{len(lost)} {of} are NaN or infinite, first {lost[0]}"
+        refuse(culprit, f"finite {name}", came, _DAMAGED)
+
+
+def check_rig(rig: Rig, culprit: object) -> None:
+    """Refuse what moves a mesh where its numbers are not finite, or places that nobody's head is as large as.
+
+    Raises `DermisError` then.
+    """
+    _check_finite("displacements of targets", rig.targets.delta_mm, culprit, "of them")
+    if rig.targets.rest is not None:
+        _check_finite("weights of targets", rig.targets.rest, culprit, "of them")
+    if rig.skeleton is not None:
+        for name in ("local", "inverse_bind", "resting", "weight"):
+            _check_finite(f"bones ({name})", getattr(rig.skeleton, name), culprit, "of them")
+
+
+def check_amount(parts: Sequence[Part], culprit: object) -> None:
+    """Refuse parts that have more triangles or vertices than a head's, before they are put together."""
+    for name, most, count in (
+        ("triangles", MOST_TRIANGLES, sum(len(part.triangles) for part in parts)),
+        ("vertices", MOST_VERTICES, sum(len(part.positions) for part in parts)),
+    ):
+        if count > most:
+            remedy = "Decimate it (in Blender: Modifiers > Decimate)"
+            refuse(culprit, f"a mesh of at most {most:,} {name}", f"it has {count:,}", remedy)
 
 
 def _check_uv_range(mesh: Mesh, culprit: object) -> None:
@@ -99,6 +133,10 @@ def _check_skin(mesh: Mesh, culprit: object) -> None:
     if mesh.material.min() < 0 or mesh.material.max() >= len(mesh.materials):
         came = f"they run from {mesh.material.min()} to {mesh.material.max()}"
         refuse(culprit, f"material indices below {len(mesh.materials)}", came, "Build the mesh again")
+    for one in mesh.materials:
+        if not all(0 <= value <= 1 for value in one.colour):  # NaN is not either
+            came = f"that of {one.name!r} is {', '.join(f'{value:g}' for value in one.colour)}"
+            refuse(culprit, "colours of materials from 0 to 1", came, "Correct it there")
     used = np.bincount(mesh.material, minlength=len(mesh.materials))
     skins = [(one.name, n) for one, n in zip(mesh.materials, used, strict=True) if one.kind == "skin"]
     empty = [name for name, count in skins if count == 0]

@@ -5,7 +5,6 @@ trimesh parses OBJ and PLY; the groups, which it would rename, are numbered in t
 
 from __future__ import annotations
 
-import re
 import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -15,9 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.mesh.limits import MOST_BYTES
 from dermis.mesh.mtl import read_materials
-from dermis.mesh.quads import find_pairs, obj_sides, ply_sides
+from dermis.mesh.obj_text import face_sides, joined_lines, numbered, read_obj_text
+from dermis.mesh.ply_header import check_ply
+from dermis.mesh.quads import find_pairs, ply_sides
+from dermis.reading import read_file
 
 Colour = tuple[float, float, float]
 Array = NDArray[np.float64]
@@ -99,49 +101,32 @@ class Model:
 
 def read_obj(path: Path) -> Model:
     """Parts of a .obj file by `usemtl` and `g`; colours are Kd of its .mtl, taken as linear."""
-    return obj_model(path, path.read_bytes().decode("utf-8", errors="replace"))
+    return obj_model(path, read_obj_text(path))
 
 
 def obj_model(path: Path, text: str) -> Model:
     """The same of a file's text."""
-    text = text.replace("\r\n", "\n").replace("\\\n", " ")
-    text = re.sub(r"^((?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", r"\1", text, flags=re.MULTILINE)
-    if re.search(r"^f[^\n]*[ /]-\d", text, re.MULTILINE):
-        came = "it has relative (negative) ones"
-        refuse(path, "faces by absolute index", came, "Export it again, in Blender")
+    text = joined_lines(path, text)
     materials = read_materials(path, text).materials
     colours = {name: colour_of(one.kd) for name, one in materials.items() if len(one.kd) >= 3}
-    text, groups = _mark_obj(text, colours)
+    text, pairs = numbered(path, text)
+    sides = face_sides(path, text, len(pairs))
+    names = [tuple(dict.fromkeys(name for name in pair if name)) for pair in pairs]
+    groups = [Group(name, colours.get(pair[0], GREY)) for name, pair in zip(names, pairs, strict=True)]
     numbers = "\n".join(f"newmtl {k}" for k in range(len(groups)))
     # trimesh pops groups from the end: file order again
     parts = list(_parts(text.encode(), "obj", groups, resolver={"marked.mtl": numbers.encode()}))[::-1]
-    faces = {id(group): sides for group, sides in zip(groups, obj_sides(text, len(groups)), strict=True)}
+    faces = {id(group): each for group, each in zip(groups, sides, strict=True)}
     parts = [replace(part, quads=find_pairs(faces[id(part.group)], part.triangles)) for part in parts]
     full, none = [part.group for part in parts], np.empty((0, 3))
     empty = [Part(g, none, None, None, none.astype(int)) for g in groups if g.names and g not in full]
     return Model(parts + empty)
 
 
-def _mark_obj(text: str, colours: dict[str, Colour]) -> tuple[str, list[Group]]:
-    """Replace each `usemtl` and `g` by `usemtl` of a number, one for each pair of names."""
-    current = {"usemtl": "", "g": ""}
-    numbers: dict[tuple[str, str], int] = {("", ""): 0}
-
-    def number(match: re.Match[str]) -> str:
-        current[match[1]] = match[2] or ""
-        key = (current["usemtl"], current["g"])
-        return f"usemtl {numbers.setdefault(key, len(numbers))}"
-
-    marked = re.sub(r"^[ \t]*(usemtl|g)(?:[ \t]+([^\n]*?))?[ \t]*$", number, text, flags=re.MULTILINE)
-    names = [tuple(dict.fromkeys(name for name in key if name)) for key in numbers]
-    groups = [Group(name, colours.get(key[0], GREY)) for name, key in zip(names, numbers, strict=True)]
-    return f"mtllib marked.mtl\nusemtl 0\n{marked}", groups
-
-
 def read_ply(path: Path) -> Model:
     """The one part of a .ply file; uv from the vertex properties s, t or u, v or texture_u, texture_v."""
-    data = path.read_bytes()
-    header = data[: data.find(b"end_header")]
+    data = read_file(path, "a PLY file", MOST_BYTES)
+    header = check_ply(path, data)
     # uv by face corner need vertices split, after which normals need not fit them any more; uv by vertex
     # do not, and splitting would drop the normals as soon as one vertex is unused
     by_corner = b"texcoord" in header

@@ -13,8 +13,11 @@ from numpy.typing import NDArray
 
 from dermis.mesh.check import check_arrays
 from dermis.mesh.formats import Index, default_unit_mm, obj_model
+from dermis.mesh.geometry import compacted
 from dermis.mesh.joined import joined
+from dermis.mesh.limits import MOST_BYTES
 from dermis.mesh.load import Up, check_options, read_model, upright
+from dermis.reading import BROKEN, is_file, read_file, understood
 
 Floats = NDArray[np.float32]
 
@@ -66,10 +69,12 @@ class FrameReader:
         """
         unit = default_unit_mm(path) if self.unit_mm is None else float(self.unit_mm)
         check_options(path, unit, "auto", self.up)
-        if self._pattern is not None and self._first is not None and path.is_file():
-            places = _places(path.read_bytes(), self._pattern)
+        if self._pattern is not None and self._first is not None and is_file(path):
+            places = _places(read_file(path, "an OBJ file", MOST_BYTES), self._pattern)
             if places is not None:
-                return self._first._replace(positions_mm=self._in_head(unit * places))
+                moved = self._in_head(unit * places)
+                check_arrays(moved, self._first.uv, self._first.triangles, path)
+                return self._first._replace(positions_mm=moved)
         vertices = self._parsed(path, unit)
         if self._first is None:
             self._first = vertices
@@ -77,17 +82,17 @@ class FrameReader:
         return vertices
 
     def _parsed(self, path: Path, unit: float) -> Vertices:
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), understood(path, "a mesh", *BROKEN):
             part = joined(read_model(path).parts, path)
             place = self._in_head(unit * part.positions)
             assert part.uv is not None
             check_arrays(place, part.uv, part.triangles, path)
-        used, compact = np.unique(part.triangles, return_inverse=True)
-        corners = compact.reshape(-1, 3).astype(np.int32)
-        return Vertices(place[used], corners, part.uv[used].astype(np.float32))
+        used, corners = compacted(part.triangles)
+        return Vertices(place[used], corners.astype(np.int32), part.uv[used].astype(np.float32))
 
     def _in_head(self, places: NDArray[np.float64]) -> Floats:
-        return upright(places, self.up).astype(np.float32)
+        with np.errstate(over="ignore"):  # what is infinite then is refused
+            return upright(places, self.up).astype(np.float32)
 
 
 def _split(data: bytes) -> tuple[list[tuple[bytes, bytes, bytes]], bytes]:
@@ -98,7 +103,7 @@ def _split(data: bytes) -> tuple[list[tuple[bytes, bytes, bytes]], bytes]:
 
 def _pattern(path: Path) -> _Pattern:
     """What an OBJ file has besides its places: it is parsed with the numbers of its lines as places."""
-    data = path.read_bytes()
+    data = read_file(path, "an OBJ file", MOST_BYTES)
     places, digest = _split(data)
     count = iter(range(len(places)))
     numbered = _PLACE.sub(lambda match: b"v %d 0 0\n" % next(count), data)

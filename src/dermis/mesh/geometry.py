@@ -28,6 +28,13 @@ def weld(rows: ArrayLike) -> Ints:
     return index
 
 
+def compacted(triangles: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Vertices that triangles (f, 3) use (n,), in order, and the triangles by numbers of these."""
+    seen = np.zeros(int(triangles.max()) + 1, bool)
+    seen[triangles] = True
+    return np.flatnonzero(seen).astype(np.int64), (np.cumsum(seen) - 1)[triangles]
+
+
 def edges(triangles: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Unique edges (e, 2), the edge of each side (3f,) and the number of sides on each edge (e,).
 

@@ -12,17 +12,19 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import DermisError, refuse
+from dermis.errors import refuse
 from dermis.mesh.cached import Rigged, cached_rigged
-from dermis.mesh.check import UV_TOLERANCE, check_arrays, check_mesh
+from dermis.mesh.check import UV_TOLERANCE, check_amount, check_arrays, check_mesh, check_rig
 from dermis.mesh.eye_names import names_eye
 from dermis.mesh.formats import Array, Group, Model, Part, default_unit_mm, is_gltf, read_obj, read_ply
-from dermis.mesh.geometry import build_mesh, weld
+from dermis.mesh.geometry import build_mesh, compacted, weld
 from dermis.mesh.gltf.geometry import read_gltf
 from dermis.mesh.joined import joined, taken
+from dermis.mesh.limits import MOST_BYTES
 from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.rigging import build_rig, part_points
 from dermis.preparing import preparing
+from dermis.reading import BROKEN, is_file, read_file, understood
 
 Origin = Literal["auto", "top", "bottom"]
 Up = Literal["y", "z"]
@@ -80,7 +82,8 @@ def load_rigged(
     check_options(source, unit, v_origin, up)
 
     load = partial(_loaded, source, unit, v_origin, up, opaque, eye_groups)
-    data = source.read_bytes() if source.suffix.lower() == ".glb" and source.is_file() else b""
+    glb = source.suffix.lower() == ".glb" and is_file(source)
+    data = read_file(source, "a mesh file", MOST_BYTES) if glb else b""
     if not data or b'"uri"' in data:  # parts of it lie in other files
         return load()
     named = source.stem  # as a group without a name is
@@ -96,7 +99,7 @@ def _loaded(
     eye_groups: tuple[str, ...],
 ) -> Rigged:
     """The mesh and the rig as they are in the file."""
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"), understood(source, "a mesh", *BROKEN):
         model = read_model(source)
         part, to_head = joined(model.parts, source), np.eye(4)
         assert part.uv is not None and part.normals is not None
@@ -105,14 +108,18 @@ def _loaded(
         flat = _v_down(part.uv, source, v_origin).astype(np.float32)
         check_arrays(place, flat, part.triangles, source)
         material, materials = _materials(model.parts, opaque, eye_groups, source)
-        used, compact = np.unique(part.triangles, return_inverse=True)
+        used, corners = compacted(part.triangles)
         kept, point = taken(part, used), weld(np.column_stack((place, _company(model.parts)))[used])
         if model.moves:
-            point = part_points(point, kept, to_head[:3, :3])
-    corners = compact.reshape(-1, 3)
-    mesh = build_mesh(place[used], flat[used], corners, material, materials, normals[used], point, part.quads)
-    check_mesh(mesh, source)
-    return Rigged(mesh, build_rig(mesh.positions, point, kept, model.bones, model.weights, to_head, source))
+            point = part_points(point, kept, to_head[:3, :3], source)
+        mesh = build_mesh(
+            place[used], flat[used], corners, material, materials, normals[used], point, part.quads
+        )
+        check_mesh(mesh, source)
+        rig = build_rig(mesh.positions, point, kept, model.bones, model.weights, to_head, source)
+        if rig is not None:
+            check_rig(rig, source)
+    return Rigged(mesh, rig)
 
 
 def _company(parts: list[Part]) -> NDArray[np.float32]:
@@ -137,17 +144,11 @@ def read_model(source: Path) -> Model:
     if reader is None:
         came = f"the suffix is {source.suffix!r}"
         refuse(source, f"a mesh file ({', '.join(READERS)})", came, "Export it as one of these")
-    if not source.is_file():
+    if not is_file(source):
         refuse(source, "a mesh file", "there is no such file", "Check the path")
-    try:
+    # a damaged file makes trimesh fail anywhere, with any exception
+    with understood(source, f"a sound {source.suffix} mesh", Exception):
         model = reader(source)
-    except DermisError:
-        raise
-    # a damaged file makes the reader fail anywhere, with any exception
-    except Exception as error:
-        came = f"it cannot be read ({f'{type(error).__name__}: {error}'.splitlines()[0][:200]})"
-        remedy = "The file is damaged or cut short: export it again"
-        refuse(source, f"a sound {source.suffix} mesh", came, remedy)
     full = [part for part in model.parts if len(part.triangles)]
     if not full:
         refuse(source, "a mesh of triangles", "it has none", "Export the head as a polygon mesh")
@@ -155,6 +156,7 @@ def read_model(source: Path) -> Model:
     if skins and not any(len(part.triangles) for part in skins):
         came = f"skin group {skins[0].group.names[0]!r} has no triangles"
         refuse(source, "a group of triangles that is skin", came, "Assign its faces to it, or rename it")
+    check_amount(full, source)
     return replace(model, parts=full)
 
 

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
+
+from dermis.mesh.beside import beside
+from dermis.mesh.limits import MOST_LIBRARIES, MOST_MTL_BYTES
+from dermis.mesh.obj_text import libraries
+from dermis.reading import read_file
 
 _ROLES = {"map_kd": "colour", "map_ks": "specular", "map_pr": "roughness", "norm": "normal"}
 _ROLES |= {"map_bump": "bump", "bump": "bump"}
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 _OPTION = re.compile(
     rf"-(?:bm\s+(?P<factor>{_NUMBER})"
     rf"|(?P<place>[ost])(?P<numbers>(?:\s+{_NUMBER}(?=\s)){{1,3}})"
@@ -16,7 +21,8 @@ _OPTION = re.compile(
     r"|(?:blendu|blendv|boost|cc|clamp|imfchan|texres|type)\s+\S+)\s+",
     re.IGNORECASE,
 )
-_LAST = re.compile(rf"\s+-bm\s+(?P<factor>{_NUMBER})$", re.IGNORECASE)
+_WHOLE_NUMBER = re.compile(_NUMBER)
+_LONGEST = 4096  # characters of a line
 
 
 @dataclass(frozen=True)
@@ -55,38 +61,25 @@ def read_materials(path: Path, text: str) -> Library:
 
     text : of the OBJ file
     """
-    found = Library()
-    for told in re.findall(r"^[ \t]*mtllib[ \t]+(.*?)[ \t]*$", text, re.MULTILINE):
-        for name in [told] if beside(path, told) else told.split(".mtl "):
+    found, left = Library(), MOST_MTL_BYTES
+    for told in libraries(text)[:MOST_LIBRARIES]:
+        for name in [told] if beside(path, told) else told.split(".mtl ")[:MOST_LIBRARIES]:
             file = beside(path, name) or beside(path, f"{name}.mtl")
             if file is None:
                 found.missing.append(name)
             else:
-                found.materials |= _materials(file.read_bytes().decode("utf-8", errors="replace"))
+                data = read_file(file, "material libraries", left)
+                left -= len(data)
+                found.materials |= _materials(data.decode("utf-8", errors="replace"))
     return found
-
-
-def beside(path: Path, name: str) -> Path | None:
-    """The file of that name in the folder of `path` or below it; None for one that is elsewhere or nowhere.
-
-    Names with the separators of Windows will do. Of a name that leads elsewhere the last part is looked for.
-    """
-    told = PureWindowsPath(name.strip().strip('"'))
-    try:
-        folder = path.parent.resolve()
-        for part in (told, PureWindowsPath(told.name)):
-            file = folder.joinpath(*part.parts).resolve()
-            if not part.anchor and file.is_relative_to(folder) and file.is_file():
-                return file
-    except (OSError, ValueError):  # no file can have such a name
-        return None
-    return None
 
 
 def _materials(text: str) -> dict[str, MtlMaterial]:
     found: dict[str, MtlMaterial] = {}
     current = MtlMaterial()
     for line in text.splitlines():
+        if len(line) > _LONGEST:
+            continue
         key, _, value = line.strip().replace("\t", " ").partition(" ")
         if key.lower() == "newmtl":
             current = found.setdefault(value.strip(), MtlMaterial())
@@ -99,13 +92,15 @@ def _materials(text: str) -> dict[str, MtlMaterial]:
 
 def _texture(key: str, rest: str) -> Texture:
     """What a statement says; its name goes to the end of the line, with its spaces."""
-    factor, moved = 1.0, False
-    while option := _OPTION.match(rest):
+    factor, moved, place = 1.0, False, 0
+    while option := _OPTION.match(rest, place):
         factor = float(option["factor"] or factor)
         if option["place"]:
             usual = 1.0 if option["place"] in "sS" else 0.0
             moved |= any(float(number) != usual for number in option["numbers"].split())
-        rest = rest[option.end() :]
-    if last := _LAST.search(rest):  # as some programs write it
-        factor, rest = float(last["factor"]), rest[: last.start()]
+        place = option.end()
+    rest = rest[place:]
+    match rest.rsplit(maxsplit=2):
+        case [name, last, number] if last.lower() == "-bm" and _WHOLE_NUMBER.fullmatch(number):
+            factor, rest = float(number), name  # as some programs write it
     return Texture(key, rest, factor, moved)

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
-from dermis.errors import DermisError
-from dermis.images.io import read_image
+import numpy as np
+
+from dermis.errors import DermisError, refuse
+from dermis.images.io import read_image, read_size
+from dermis.images.sizes import MOST_TOGETHER
+from dermis.mesh.beside import beside
+from dermis.mesh.map_pixels import Floats, finite
 from dermis.mesh.maps import Maps, load_maps
-from dermis.mesh.mtl import MtlMaterial, Texture, beside, read_materials
+from dermis.mesh.mtl import MtlMaterial, Texture, read_materials
+from dermis.mesh.obj_text import groups_of_faces, read_obj_text
 
 _RELIEF = ("normal", "height")
 _ENOUGH = 256  # texels a side
@@ -36,13 +41,14 @@ def obj_maps(
     given : roles of maps that are not wanted
     height_mm, normal_y : see `load_maps`
     """
-    text = path.read_bytes().decode("utf-8", errors="replace").replace("\r\n", "\n")
+    text = read_obj_text(path)
     library, faults = read_materials(path, text), list[str]()
     faults += [f"mtllib: {name} is not in its folder" for name in library.missing]
     wanted = _skin(text, library.materials, opaque).textures
     maps, roles = Maps(), [role for role in ("colour", "specular", "roughness") if role not in given]
     if not set(_RELIEF) & set(given):
         roles.append("normal" if "normal" in wanted else "bump")
+    left = MOST_TOGETHER
     for role in (one for one in roles if one in wanted):
         texture = wanted[role]
         file = beside(path, texture.name)
@@ -50,12 +56,22 @@ def obj_maps(
             faults.append(f"{texture.key}: {texture.name} is not in its folder")
             continue
         try:
+            left -= _texels(file, left)
             maps = replace(maps, **_loaded(role, file, texture, height_mm, normal_y))
         except DermisError as fault:
             faults.append(f"{texture.key}: {fault}")
         if texture.moved:
             faults.append(f"{texture.key}: {texture.name} is taken without its -s, -o or -t")
     return maps, _notice(path, faults)
+
+
+def _texels(file: Path, left: int) -> int:
+    """How many texels a picture has, of those that are left to a mesh file."""
+    width, height = read_size(file)
+    if width * height > left:
+        expected = f"pictures of at most {MOST_TOGETHER / 1e6:.0f} million texels together"
+        refuse(file, expected, "with this one there are more", "Resize them")
+    return width * height
 
 
 def _notice(path: Path, faults: list[str]) -> str:
@@ -74,11 +90,17 @@ def _loaded(
         return {} if made is None else {role: made * made}
     if role == "bump" and _is_grey(file):
         made = load_maps(height=file, height_mm=height_mm).height
-        return {} if made is None else {"height": made * texture.factor}
+        return {} if made is None else {"height": _times(made, texture, file)}
     if role in ("bump", "normal"):
         made = load_maps(normal=file, normal_y=normal_y).normal
-        return {} if made is None else {"normal": made * texture.factor}
+        return {} if made is None else {"normal": _times(made, texture, file)}
     return {role: getattr(load_maps(**{role: file}), role)}  # type: ignore[arg-type]
+
+
+def _times(made: Floats, texture: Texture, file: Path) -> Floats:
+    """A relief multiplied as its material says."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return finite(file, made * np.float32(texture.factor))
 
 
 def _is_grey(file: Path) -> bool:
@@ -92,12 +114,7 @@ def _is_grey(file: Path) -> bool:
 
 def _skin(text: str, materials: dict[str, MtlMaterial], opaque: Collection[str]) -> MtlMaterial:
     """The material of the skin: of groups called so, else of all, the one with the most faces."""
-    current, faces = {"usemtl": "", "g": ""}, Counter[tuple[str, str]]()
-    for key, value in re.findall(r"^[ \t]*(usemtl|g|f)\b[ \t]*([^\n]*?)[ \t]*$", text, re.MULTILINE):
-        if key == "f":
-            faces[current["usemtl"], current["g"]] += 1
-        else:
-            current[key] = value
+    faces = Counter(groups_of_faces(text))
     unwanted = {name.casefold() for name in opaque}
     left = {names: count for names, count in faces.items() if not unwanted & set(map(str.casefold, names))}
     named = {names: count for names, count in left.items() if "skin" in " ".join(names).casefold()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -17,18 +16,6 @@ Index = NDArray[np.int64]
 def halves(quads: NDArray[np.integer]) -> Index:
     """(2q, 3) triangles (a, b, c) and (c, d, a) of each quad, side by side; quads : (q, 4)."""
     return np.ascontiguousarray(quads[:, [0, 1, 2, 2, 3, 0]], np.int64).reshape(-1, 3)
-
-
-def obj_sides(text: str, groups: int) -> list[Index]:
-    """How many corners each face of each group has; the text names groups by number, `usemtl 0` first."""
-    sides: list[list[int]] = [[] for _ in range(groups)]
-    current = sides[0]
-    for line in re.finditer(r"^(?:usemtl (\d+)|f([ \t].*))$", text, re.MULTILINE):
-        if line[1]:
-            current = sides[int(line[1])]
-        else:
-            current.append(len(line[2].split()))
-    return [np.array(one, dtype=np.int64) for one in sides]
 
 
 def ply_sides(metadata: Mapping[str, Any]) -> Index:

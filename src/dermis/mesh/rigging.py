@@ -16,19 +16,25 @@ Mask = NDArray[np.bool_]
 
 PARTED_MM = 0.01
 """Vertices at one place that a target moves this far apart are two points, as of lips that touch."""
+_MOST_AT_ONE_PLACE = 64
 _SAME_SHARE = 0.004  # a step of weights in 8 bits
 _LEAST_MM = 1e-4  # what rounding leaves of vertices that do not move
 
 
-def part_points(point: Ints, part: Part, linear: Array) -> Ints:
+def part_points(point: Ints, part: Part, linear: Array, culprit: object) -> Ints:
     """(v,) points of which vertices that move differently are no longer one; in the order they were in.
 
     point : (v,) welded by their places
     linear : (3, 3) from the file's space to mm
+
+    Raises DermisError for more such vertices at one place than any mesh has.
     """
     left = np.flatnonzero(np.bincount(point)[point] > 1)
     copy, number = np.zeros(len(point), np.int64), 0
     while len(left):
+        if number > _MOST_AT_ONE_PLACE:
+            came = f"{number} of them move apart"
+            refuse(culprit, "a few vertices at one place", came, "The file is damaged: export it again")
         groups, first = np.unique(point[left], return_index=True)
         other = left[first[np.searchsorted(groups, point[left])]]
         apart = _targets_part(part, left, other, linear) | _bones_part(part, left, other)

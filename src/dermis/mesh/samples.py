@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import stat
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,8 +14,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, NoReturn
 
-from dermis.disk import cache_folder
 from dermis.errors import DermisError, refuse
+from dermis.private import cache_folder, make_private
 
 DATA_VARIABLE = "DERMIS_DATA"
 
@@ -111,6 +112,8 @@ def _is_right(path: Path, file: SampleFile) -> bool:
     """Whether the file is there with the known hash."""
     try:
         status = path.stat()
+        if not stat.S_ISREG(status.st_mode):  # a pipe would hold the reader up
+            return False
         return _sha256(path, status.st_size, status.st_mtime_ns) == file.sha256
     except OSError:
         return False
@@ -130,6 +133,9 @@ def _download(sample: Sample, roles: list[str]) -> None:
         file, progress = sample.files[role], _Progress(sample.files[role].name)
         downloader = pooch.HTTPDownloader(progressbar=progress, timeout=30)
         try:
+            make_private(_folder(sample))
+            if not (place := _folder(sample) / file.name).is_file():
+                place.unlink(missing_ok=True)  # pooch would read from a pipe
             pooch.retrieve(
                 file.url, f"sha256:{file.sha256}", file.name, _folder(sample), downloader=downloader
             )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 from dataclasses import dataclass
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.disk import find, store
+from dermis.disk import find, keep
 from dermis.environment.panorama import load_panorama
 from dermis.optics.media import Medium
 from dermis.reference.mitsuba_scene import Lambertian
@@ -98,5 +97,4 @@ def kept_passes(key: str, size: tuple[int, int]) -> Passes | None:
 
 def store_passes(key: str, passes: Passes) -> None:
     """Keep passes under a name; the disk may fail without harm, and a file is whole or not there."""
-    with contextlib.suppress(OSError):
-        store(_FOLDER, key, {name: np.asarray(value) for name, value in vars(passes).items()})
+    keep(_FOLDER, key, {name: np.asarray(value) for name, value in vars(passes).items()})

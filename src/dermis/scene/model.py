@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 from dermis.mesh.head import Head
 from dermis.mesh.rig import Motion
@@ -28,7 +29,7 @@ class Scene:
     environment : or its name
     pose : how the head is moved, or weights of its morph targets by name; at rest when left out
 
-    A scene does not change; `dataclasses.replace(scene, skin=...)` is another one.
+    A scene does not change; `scene.replace(skin=...)` is another one.
 
     Raises DermisError for a pose that the head cannot take, and for parts of another kind.
     """
@@ -61,6 +62,10 @@ class Scene:
         Raises DermisError for anything else.
         """
         return given if isinstance(given, Scene) else cls(given)  # type: ignore[arg-type]
+
+    def replace(self, **parts: Any) -> Scene:
+        """The same with other parts, checked."""
+        return replace(self, **parts)
 
     def _set(self, part: str, value: object) -> None:
         object.__setattr__(self, part, value)

@@ -18,6 +18,7 @@ CAMERAS = ("portrait", "three-quarter", "profile", "ear", "cheek")
 """Camera presets of the keys 1 to 5."""
 LIGHT_KEY = "Shift"
 _WHEEL = 1e-3  # change of the logarithm of the distance per unit of the wheel
+_MOST_WHEEL = 10.0  # of that logarithm in one frame, for which all turns are summed
 _LEFT = 1
 _GRAB = 8.0  # logical pixels to either side of the divider within which a pointer grabs it
 
@@ -49,7 +50,8 @@ class Controls:
         elif kind == "pointer_up":
             self._end(event, size)
         elif kind == "wheel":
-            self._zoom(math.exp(_WHEEL * event["dy"]), (event["x"], event["y"]), size, "wheel")
+            turned = max(-_MOST_WHEEL, min(_MOST_WHEEL, _WHEEL * event["dy"]))
+            self._zoom(math.exp(turned), (event["x"], event["y"]), size, "wheel")
         elif kind == "double_click":
             self._focus(event, size)
         elif kind == "key_down":

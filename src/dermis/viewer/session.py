@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -17,6 +19,9 @@ from dermis.viewer.history import History
 from dermis.viewer.player import MotionFile, Player
 from dermis.viewer.state import PARTS, PICTURE, ViewerState, load_state, save_state
 from dermis.viewer.studio import Studio
+
+_LONGEST_REASON = 160
+_log = logging.getLogger(__name__)
 
 
 class Session:
@@ -56,6 +61,7 @@ class Session:
         self.offer: Callable[[str, bytes], None] | None = None
         self.motion_file, self.search = motion.path if motion else "", ""
         self.positions: dict[str, tuple[float, float]] = {}
+        self._faults: set[str] = set()
 
     @property
     def state(self) -> ViewerState:
@@ -72,12 +78,23 @@ class Session:
         self.history.change(state, gesture)
         self.message = ""
 
+    def tell_fault(self, what: str, error: Exception) -> None:
+        """Tell of an error that nobody foresaw, once: over the picture, and with its traceback in the log."""
+        said = f"{what} ({type(error).__name__}: {_shortened(str(error))})"
+        if said not in self._faults:
+            self._faults.add(said)
+            self.message = said
+            _log.error(said, exc_info=error)
+
     def save(self, path: Path) -> None:
         """Write the scene file, or offer it as a download.
 
         Raises DermisError when that is not possible.
         """
-        self._write(path, lambda target: save_state(target, self.shown))
+        shown = self.shown
+        if "name" in shown.head:  # a file that a page has sent is to lie beside the scene
+            shown = replace(shown, head={**shown.head, "name": self.heads.sent_as(str(shown.head["name"]))})
+        self._write(path, lambda target: save_state(target, shown))
         self.message = f"saved {path}"
 
     def load(self, path: Path) -> None:
@@ -96,6 +113,9 @@ class Session:
             state = self.heads.take(self.state)
         except DermisError as error:
             self.message = str(error)
+            return
+        except Exception as error:
+            self.tell_fault("That cannot be opened", error)
             return
         if state is not None:
             self.player.stop()
@@ -130,6 +150,11 @@ class Session:
             target = Path(folder) / path.name
             write(target)
             self.offer(path.name, target.read_bytes())
+
+
+def _shortened(text: str) -> str:
+    line = " ".join(text.split())
+    return line if len(line) <= _LONGEST_REASON else f"{line[:_LONGEST_REASON]} ..."
 
 
 def apply_regions(state: ViewerState, name: str, known: Iterable[ViewerState] = ()) -> ViewerState:

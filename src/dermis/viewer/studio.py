@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.errors import refuse
 from dermis.frame.rendered import Rendered
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device, download, make_texture
@@ -22,6 +24,7 @@ from dermis.viewer.state import PARTS, PICTURE, ViewerState, changed, same
 from dermis.viewer.views import Views
 
 _SIZES = 2  # of everything: for frames in motion and for still ones
+_SMALL = (96, 64)  # a picture that needs all shaders and little time
 _TIMED_FRAMES = 120
 _BEFORE = "before"  # the frozen state's own light, so that a camera that moves lights neither again
 
@@ -40,9 +43,12 @@ class Studio:
     """A renderer that computes only what has changed, and the last image it made.
 
     adapter : "auto", "cpu" or part of an adapter's name
+
+    is_preparing : whether `prepare` runs, perhaps in another thread, when nothing else may be drawn
     """
 
     def __init__(self, adapter: str = "auto") -> None:
+        self.is_preparing = False
         self.renderer = Renderer(adapter, depth=_SIZES)
         self.pace = Pace(software=self.renderer.device.adapter.kind == "CPU")
         self.rendered: Rendered | None = None
@@ -54,6 +60,23 @@ class Studio:
         self.times: deque[dict[str, float]] = deque(maxlen=_TIMED_FRAMES)
         self._frozen: Frozen | None = None
         self._lit: tuple[ViewerState, str] | None = None
+
+    def prepare(self, state: ViewerState, go_on: Callable[[], None] = lambda: None) -> None:
+        """Make what the first pictures of a state take long for, in motion and still.
+
+        go_on : called when the head's resources are there
+
+        Raises DermisError for states that cannot be rendered and when the device fails.
+        """
+        self.is_preparing = True
+        try:
+            for moving in (True, False):
+                self.renderer.prepare(state.scene, self._settings(state, _SMALL, moving))
+            go_on()
+            for moving in (True, False):
+                self.image(state, state.scene.camera, _SMALL, moving)
+        finally:
+            self.is_preparing = False
 
     def pictures(
         self,
@@ -124,6 +147,8 @@ class Studio:
 
         Raises DermisError when that is not possible.
         """
+        if self.is_preparing:
+            refuse("picture", "a head that can be drawn", "it is being prepared", "Try it again in a moment")
         image = self._draw(state.with_settings(size=size))
         self._shown = None
         linear, made = path.suffix.lower() == ".exr", self.rendered

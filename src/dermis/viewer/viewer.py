@@ -13,6 +13,7 @@ from dermis.viewer.blit import Blit, Patch
 from dermis.viewer.controls import shifted
 from dermis.viewer.navigation import Easing
 from dermis.viewer.player import MotionFile
+from dermis.viewer.preparing import Preparation
 from dermis.viewer.session import Session
 from dermis.viewer.state import ViewerState
 from dermis.viewer.studio import Studio
@@ -33,6 +34,7 @@ class Viewer:
     adapter : "auto", "cpu" or part of an adapter's name
     clock : time [s]
     motion : played from the beginning
+    studio : one on the adapter that has prepared the state already
 
     `failure` is the error that closed the canvas when the device could not be opened again.
 
@@ -46,14 +48,15 @@ class Viewer:
         adapter: str = "auto",
         clock: Callable[[], float] = time.perf_counter,
         motion: MotionFile | None = None,
+        studio: Studio | None = None,
     ) -> None:
         from dermis.viewer.panel.panel import Panel  # whose packages are in the extra `viewer`
 
         self.canvas = canvas
         self._adapter, self._clock = adapter, clock
         self._context = canvas.get_wgpu_context()
-        self.session = Session(state, Studio(adapter), motion, clock)
-        self._connect()
+        self.session = Session(state, studio or Studio(adapter), motion, clock)
+        self._preparation = Preparation(self._connect())
         self.session.player.play()
         self.panel = Panel(self.session)
         self._easing = Easing(state.scene.camera)
@@ -77,7 +80,11 @@ class Viewer:
             self._failures = 0
         except (wgpu.GPUError, DermisError) as error:
             self._recover(error)
-        if not self.is_still or self._panel_frames:
+        except Exception as error:
+            self.session.tell_fault("This frame cannot be drawn", error)
+            return  # the next event draws another one
+        going_on = not self.is_still and not self._preparation.is_running  # whose end wakes it
+        if going_on or self._panel_frames:
             self._panel_frames = max(0, self._panel_frames - 1)
             self.canvas.request_draw()
 
@@ -87,7 +94,8 @@ class Viewer:
         state, studio = self.session.shown, self.session.studio
         arrived = self._last_state is state and self._easing.camera == state.scene.camera
         final = studio.is_current or self._refused is state
-        return arrived and final and not self._is_moving(self._clock())
+        there = not self._preparation.is_running
+        return there and arrived and final and not self._is_moving(self._clock())
 
     def _draw(self, now: float) -> None:
         session, size = self.session, self._picture_size()
@@ -134,6 +142,8 @@ class Viewer:
         session = self.session
         if state is not self._refused:
             try:
+                if kept := self._preparation.picture(session.studio, state):
+                    return kept, None
                 images = session.studio.pictures(state, session.split.before, camera, size, moving)
                 if self._refused:
                     self._refused, session.message = None, ""
@@ -141,9 +151,19 @@ class Viewer:
             except DermisError as error:
                 if session.studio.last_image is None or isinstance(error.__cause__, wgpu.GPUError):
                     raise
-                self._refused = state
-                session.message = str(error)
+                self._refuse(state, str(error))
+            except wgpu.GPUError:
+                raise
+            except Exception as error:
+                if session.studio.last_image is None:
+                    raise
+                self._refuse(state)
+                session.tell_fault("This cannot be drawn", error)
         return session.studio.last_image, None
+
+    def _refuse(self, state: ViewerState, message: str = "") -> None:
+        self._refused = state
+        self.session.message = message
 
     def _is_moving(self, now: float) -> bool:
         return self.session.player.is_playing or now - self._last_change < _QUIET_S
@@ -151,6 +171,8 @@ class Viewer:
     def _status(self, size: tuple[int, int]) -> str:
         studio = self.session.studio
         settings = studio.settings
+        if self._preparation.is_running:
+            return "preparing the head ..."
         if settings is None or studio.rendered is None or not studio.pace.software:
             return ""
         width, height = settings.size
@@ -190,15 +212,16 @@ class Viewer:
         self._blit = Blit(device, format_)
         self.panel.open(device, format_)
 
-    def _connect(self) -> None:
-        """Let files come from and go to a page, which may be on another machine."""
+    def _connect(self) -> Callable[[], None]:
+        """Let files come from and go to a page, which may be on another machine; returns what wakes it."""
         canvas, session = self.canvas, self.session
         session.offer = getattr(canvas, "offer", None)
         session.ask_for_file = getattr(canvas, "ask_for_file", None)
         if session.ask_for_file:
-            canvas.on_file = lambda path: session.heads.open(str(path))
+            canvas.on_file = lambda path, name: session.heads.open(str(path), name)
         loop = canvas._rc_canvas_group.get_loop()
         session.heads.wake = lambda: loop and loop.call_soon_threadsafe(canvas.request_draw)
+        return session.heads.wake
 
     def _recover(self, error: Exception) -> None:
         """Open the device again after it was lost or ran out of memory."""
@@ -212,6 +235,7 @@ class Viewer:
         with contextlib.suppress(wgpu.GPUError):  # releases the texture of the old device
             self._context.unconfigure()
         self.session.studio = Studio(self._adapter)
+        self._preparation.forget()
         self._open()
         self.session.message = "the graphics device was lost and opened again"
         self.canvas.request_draw()

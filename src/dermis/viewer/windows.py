@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import importlib
 import os
+import signal
+import sys
+import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NoReturn
@@ -21,6 +25,7 @@ from dermis.viewer.viewer import Viewer
 Size = tuple[int, int]
 _TITLE = "dermis"
 _MOST_FPS = 60
+_SIGNALLED = 128  # plus the signal's number, as shells tell it
 
 
 def show_window(state: ViewerState, adapter: str, size: Size, *, motion: MotionFile | None = None) -> None:
@@ -40,12 +45,24 @@ def show_window(state: ViewerState, adapter: str, size: Size, *, motion: MotionF
     except Exception as error:  # glfw has no class of its own for a missing display
         _refuse_display(error)
     viewer = Viewer(state, canvas, adapter, motion=motion)
-    backend.loop.run()
+    with _untouched_signals():
+        backend.loop.run()
     _raise_failure(viewer)
 
 
+@contextmanager
+def _untouched_signals() -> Iterator[None]:
+    """rendercanvas would close the window at a signal, in the middle of a frame that then fails."""
+    loops: Any = importlib.import_module("rendercanvas.core.loop")
+    usual, loops.HANDLED_SIGNALS = loops.HANDLED_SIGNALS, ()
+    try:
+        yield
+    finally:
+        loops.HANDLED_SIGNALS = usual
+
+
 def serve(
-    state: ViewerState,
+    load: Callable[[], tuple[ViewerState, MotionFile | None]],
     adapter: str,
     size: Size,
     host: str,
@@ -53,34 +70,35 @@ def serve(
     announce: Callable[[str, bool], None],
     *,
     secret: bool = False,
-    motion: MotionFile | None = None,
 ) -> None:
-    """Serve web pages until interrupted.
+    """Serve web pages until interrupted; they tell what is prepared until there is a picture.
 
+    load : reads what is shown first and the motion that is played, in a thread
     size : of the canvas until a page reports its own
     port : 0 for any free one
-    announce : called with the page's URL and whether other machines can reach it
+    announce : called with the page's URL and whether other machines can reach it, before anything is read
     secret : whether the URL has a token even when only this machine can reach it
-    motion : played in the pages
 
-    Raises DermisError when the address cannot be used, without a device or the extra `viewer`.
+    Raises what `load` does, and DermisError when the address cannot be used, without a device or the extra
+    `viewer`.
     """
     _backend("http", ("uvicorn", "websockets"), "viewer")
     from dermis.viewer.browser.canvas import PageCanvas
     from dermis.viewer.browser.guard import is_local
-    from dermis.viewer.browser.server import bind, server
+    from dermis.viewer.browser.opening import shown
+    from dermis.viewer.browser.server import bind, run_until, server
 
     listener, address = bind(host, port, secret=secret)
-    with listener, TemporaryDirectory(prefix="dermis-") as folder:
+    with _tidy_end(), listener, TemporaryDirectory(prefix="dermis-") as folder:
         canvas = PageCanvas(size=size, title=_TITLE, max_fps=_MOST_FPS)
-        viewer = Viewer(state, canvas, adapter, motion=motion)
-        viewer.canvas._size_info.set_physical_size(*size, 1.0)
-        announce(address.url, not is_local(host))
+        canvas._size_info.set_physical_size(*size, 1.0)
         pages = server(address, canvas, Path(folder))
         # rendercanvas handles Ctrl+C by closing the canvas; without this the server would keep running.
-        viewer.canvas.add_event_handler(lambda event: setattr(pages, "should_exit", True), "close")
-        pages.run(sockets=[listener])
-    _raise_failure(viewer)
+        canvas.add_event_handler(lambda event: setattr(pages, "should_exit", True), "close")
+        announce(address.url, not is_local(host))
+        viewer = run_until(pages, listener, lambda: shown(pages, canvas, load, adapter))
+    if viewer:
+        _raise_failure(viewer)
 
 
 def view(
@@ -136,6 +154,26 @@ def _backend(name: str, needed: tuple[str, ...], extra: str) -> Any:
             remedy = f'Install it: pip install "dermis[{extra}]"'
             refuse("viewer", f"the package {package.replace('_', '-')}", "it is not installed", remedy)
     return importlib.import_module(f"rendercanvas.{name}")
+
+
+@contextmanager
+def _tidy_end() -> Iterator[None]:
+    """Let signals that end the process leave nothing behind, as Ctrl+C does."""
+    replaced = {}
+    is_main = threading.current_thread() is threading.main_thread()  # which alone may handle them
+    for name in ("SIGTERM", "SIGHUP") if is_main else ():
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is signal.SIG_DFL:
+            replaced[number] = signal.signal(number, _exit)
+    try:
+        yield
+    finally:
+        for number, usual in replaced.items():
+            signal.signal(number, usual)
+
+
+def _exit(number: int, _: object) -> None:
+    sys.exit(_SIGNALLED + number)
 
 
 def _refuse_display(reason: object) -> NoReturn:

@@ -152,7 +152,7 @@ DAMAGES = {
     "kind": (lambda a: a["samplers"][1].update(interpolation="WILD"), r"channel 1: .*'WILD' came"),
     "zero": (lambda a: a["samplers"][0].update(output="zero"), r"channel 0: .*unit quaternions"),
     "no targets": (lambda a: a["channels"][2]["target"].update(node=0), r"node 0 has no morph targets"),
-    "no sampler": (lambda a: a["channels"][1].update(sampler=9), r"sound animation clips, but 'nod'"),
+    "no sampler": (lambda a: a["channels"][1].update(sampler=9), r"clip 'nod': expected a sound animation"),
 }
 
 

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from dermis.errors import DermisError, refuse
+from dermis.errors import refuse
 from dermis.mesh.curves import Curve
 from dermis.mesh.formats import Array
-from dermis.mesh.gltf.document import Document, Tree, read_document
+from dermis.mesh.gltf.document import Document, Tree, numbered, read_document
 from dermis.mesh.gltf.nodes import Nodes, read_nodes
 from dermis.mesh.gltf.targets import target_names
+from dermis.mesh.limits import MOST_CHANNELS
+from dermis.reading import BROKEN, understood
 
 _WIDTH = {"translation": 3, "rotation": 4, "scale": 3}
 _KINDS = ("STEP", "LINEAR", "CUBICSPLINE")
@@ -50,7 +51,7 @@ class _Keys(NamedTuple):
 
 def clip_names(path: Path) -> tuple[str, ...]:
     """Names of the file's clips; those without are numbered."""
-    return _names(_opened(path))
+    return _names(read_document(path))
 
 
 def read_clip(path: Path, name: str | None) -> Animation:
@@ -58,7 +59,7 @@ def read_clip(path: Path, name: str | None) -> Animation:
 
     Raises DermisError for a clip that is not there, and for one that is damaged.
     """
-    document = _opened(path)
+    document = read_document(path)
     names = _names(document)
     if not names:
         refuse(path, "a file with animation clips", "it has none", "Export it with its animation")
@@ -68,21 +69,8 @@ def read_clip(path: Path, name: str | None) -> Animation:
     if name is not None and name not in names:
         refuse(path, f"one of its clips ({', '.join(names)})", f"{name!r} came", "Correct the name")
     index = 0 if name is None else names.index(name)
-    try:
+    with understood(f"{path}: clip {names[index][:80]!r}", "a sound animation", *BROKEN):
         return Animation(names[index], tuple(_tracks(document, index, names[index])))
-    except DermisError:
-        raise
-    except (KeyError, IndexError, ValueError, TypeError, AttributeError, OSError) as fault:
-        came = f"{names[index]!r} cannot be read ({type(fault).__name__}: {fault})"
-        refuse(path, "sound animation clips", came[:250], _DAMAGED)
-
-
-def _opened(path: Path) -> Document:
-    try:
-        return read_document(path)
-    except (KeyError, ValueError, TypeError, struct.error, OSError) as fault:
-        came = f"it cannot be read ({f'{type(fault).__name__}: {fault}'.splitlines()[0][:200]})"
-        refuse(path, "a glTF file", came, "Check its name, or export it again")
 
 
 def _names(document: Document) -> tuple[str, ...]:
@@ -92,17 +80,20 @@ def _names(document: Document) -> tuple[str, ...]:
 
 def _tracks(document: Document, index: int, name: str) -> list[Track]:
     """The clip's curves, those of the same kind and keys side by side in one."""
-    clip, nodes = document.tree["animations"][index], read_nodes(document)
+    clip, nodes = document.one("animations", index), read_nodes(document)
+    if len(clip["channels"]) > MOST_CHANNELS:
+        came = f"{name!r} has {len(clip['channels']):,}"
+        refuse(document.path, f"clips of at most {MOST_CHANNELS:,} channels", came, "Export it again")
     groups: dict[tuple[object, ...], list[tuple[str, _Keys]]] = {}
-    found = []
+    found, names = [], dict[int, tuple[str, ...]]()
     for number, channel in enumerate(clip["channels"]):
         target, culprit = channel["target"], f"{document.path}: clip {name!r}, channel {number}"
         if "node" not in target or target["path"] not in (*_WIDTH, "weights"):
             continue  # of an extension
         _check_node(nodes, target["node"], culprit)
-        sampler = clip["samplers"][channel["sampler"]]
+        sampler = clip["samplers"][numbered(channel["sampler"], len(clip["samplers"]), "samplers")]
         if target["path"] == "weights":
-            found.append(_weights(document, target["node"], sampler, culprit))
+            found.append(_weights(document, target["node"], sampler, culprit, names))
             continue
         keys = _keys(document, sampler, _WIDTH[target["path"]], culprit)
         if target["path"] == "rotation" and not keys.plain.any(axis=-1).all():
@@ -117,9 +108,14 @@ def _check_node(nodes: Nodes, node: int, culprit: str) -> None:
         refuse(culprit, f"nodes from 0 to {len(nodes.names) - 1}", f"it moves node {node}", _DAMAGED)
 
 
-def _weights(document: Document, node: int, sampler: Tree, culprit: str) -> Track:
-    mesh = document.tree["nodes"][node].get("mesh")
-    names = () if mesh is None else target_names(document.tree["meshes"][mesh])
+def _weights(
+    document: Document, node: int, sampler: Tree, culprit: str, known: dict[int, tuple[str, ...]]
+) -> Track:
+    """Weights of a node's targets; known : names by mesh, of those that were met."""
+    mesh = document.all("nodes")[node].get("mesh")
+    if mesh is not None and mesh not in known:
+        known[mesh] = target_names(document.one("meshes", mesh))
+    names = () if mesh is None else known[mesh]
     if not names:
         came = f"node {node} has no morph targets"
         refuse(culprit, "weights of a mesh with morph targets", came, _DAMAGED)

@@ -14,10 +14,17 @@ from dermis.mesh.formats import GREY, Array, Group, Index, Model, Part, colour_o
 from dermis.mesh.gltf.document import Document, Tree, read_document
 from dermis.mesh.gltf.nodes import Nodes, read_nodes
 from dermis.mesh.gltf.skins import Armature, Followed, read_armature, read_followed
-from dermis.mesh.gltf.targets import Displaced, displaced, read_targets, resting_weights
+from dermis.mesh.gltf.targets import Displaced, displaced, read_targets, resting_weights, target_names
+from dermis.mesh.limits import MOST_DISPLACEMENTS, MOST_GROUPS, MOST_TRIANGLES, MOST_VERTICES
 from dermis.mesh.quads import find_pairs
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_MOST = {
+    "primitives": MOST_GROUPS,
+    "triangles": MOST_TRIANGLES,
+    "vertices": MOST_VERTICES,
+    "displacements by targets": MOST_DISPLACEMENTS,
+}
 _HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_mesh_quantization")
 
 
@@ -52,23 +59,38 @@ class _Reader:
     weights: dict[str, float]
 
     def parts(self) -> Iterator[Part]:
-        shown = [k for k in self.nodes.shown or () if "mesh" in self.document.tree["nodes"][k]]
-        for node in shown:
-            yield from self._mesh(
-                self.document.tree["meshes"][self.document.tree["nodes"][node]["mesh"]], node
-            )
-        if not shown:  # a file of meshes alone
+        counts = {"primitives": 0, "triangles": 0, "vertices": 0, "displacements by targets": 0}
+        for part in self._all():
+            moved = sum(len(vertex) for vertex, _ in part.targets.values())
+            for name, count in zip(counts, (1, len(part.triangles), len(part.positions), moved), strict=True):
+                counts[name] += count
+                self._check_most(name, counts[name])
+            yield part
+
+    def _check_most(self, name: str, count: int) -> None:
+        """Refuse a scene before all of it is built; instances count as often as they are shown."""
+        if count > _MOST[name]:
+            came, remedy = "it has more", "Export the head alone, or decimated"
+            refuse(self.document.path, f"a scene of at most {_MOST[name]:,} {name}", came, remedy)
+
+    def _all(self) -> Iterator[Part]:
+        nodes, shown = self.document.all("nodes"), self.nodes.shown or ()
+        meshes = [k for k in shown if "mesh" in nodes[k]]
+        for node in meshes:
+            yield from self._mesh(self.document.one("meshes", nodes[node]["mesh"]), node)
+        if not meshes:  # a file of meshes alone
             for mesh in self.document.all("meshes"):
                 yield from self._mesh(mesh, None)
 
     def _mesh(self, mesh: Tree, node: int | None) -> Iterator[Part]:
+        names = target_names(mesh)
         for primitive in mesh["primitives"]:
             if primitive.get("mode", _TRIANGLES) in (_TRIANGLES, _STRIP, _FAN):
-                yield self._part(mesh, primitive, node)
+                yield self._part(mesh, names, primitive, node)
 
-    def _part(self, mesh: Tree, primitive: Tree, node: int | None) -> Part:
+    def _part(self, mesh: Tree, names: tuple[str, ...], primitive: Tree, node: int | None) -> Part:
         """A primitive where its node, or the joints of its skin, take it."""
-        part, targets = self._unplaced(mesh, primitive)
+        part, targets = self._unplaced(mesh, names, primitive)
         if node is None:
             return _placed(part, targets, np.eye(4))
         if "skin" in self.document.tree["nodes"][node] and self.armature:
@@ -81,15 +103,18 @@ class _Reader:
         count = len(part.positions)
         return replace(placed, bone=np.full((count, 1), bone), weight=np.ones((count, 1)))
 
-    def _unplaced(self, mesh: Tree, primitive: Tree) -> tuple[Part, dict[str, Displaced]]:
+    def _unplaced(
+        self, mesh: Tree, names: tuple[str, ...], primitive: Tree
+    ) -> tuple[Part, dict[str, Displaced]]:
         """A primitive in its mesh's space, with targets at their default weights, and all its targets."""
         given = primitive["attributes"]
+        self._check_most("vertices", self.document.one("accessors", given["POSITION"])["count"])
         positions = self.document.real(given["POSITION"]).reshape(-1, 3)
         uv, normals = (
             fractions(self.document.numbers(given[name])) if name in given else None
             for name in ("TEXCOORD_0", "NORMAL")
         )
-        targets = read_targets(self.document, mesh, primitive, len(positions))
+        targets = read_targets(self.document, mesh, names, primitive, len(positions))
         moved = displaced(positions, targets, self.weights)
         if moved is not positions:
             normals = None  # they belong to another shape
@@ -112,6 +137,8 @@ class _Reader:
         """(f, 3) the corners of a primitive's triangles."""
         index = np.arange(count)
         if "indices" in primitive:
+            corners = self.document.one("accessors", primitive["indices"])["count"]
+            self._check_most("triangles", corners // 3)
             index = self.document.numbers(primitive["indices"]).ravel().astype(np.int64)
         mode = primitive.get("mode", _TRIANGLES)
         if mode == _TRIANGLES:
@@ -123,8 +150,8 @@ class _Reader:
         return strip
 
     def _group(self, mesh: Tree, primitive: Tree) -> Group:
-        materials = self.document.all("materials")
-        material: dict[str, Any] = materials[primitive["material"]] if "material" in primitive else {}
+        one = self.document.one
+        material: dict[str, Any] = one("materials", primitive["material"]) if "material" in primitive else {}
         names = tuple(str(thing["name"]) for thing in (material, mesh) if thing.get("name"))
         factor = material.get("pbrMetallicRoughness", {}).get("baseColorFactor")
         return Group(names, colour_of(factor) if factor else GREY)

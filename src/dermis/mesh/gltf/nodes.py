@@ -9,7 +9,8 @@ import numpy as np
 
 from dermis.errors import refuse
 from dermis.mesh.formats import Array
-from dermis.mesh.gltf.document import Document, Tree
+from dermis.mesh.gltf.document import Document, Tree, numbered
+from dermis.mesh.limits import DEEPEST_NODE, MOST_NODES
 from dermis.mesh.turns import quaternion_matrix
 
 
@@ -42,28 +43,36 @@ class Nodes:
 def read_nodes(document: Document) -> Nodes:
     """The file's nodes.
 
-    Raises DermisError when they go round in a circle.
+    Raises DermisError when they go round in a circle, or are too many or too deep.
     """
     nodes = document.all("nodes")
+    if len(nodes) > MOST_NODES:
+        came = f"it has {len(nodes):,}"
+        refuse(document.path, f"a scene of at most {MOST_NODES:,} nodes", came, "Export the head alone")
     names, parent = node_names(nodes), _parents(nodes)
     order = _order(document, names, parent)
     local = np.array([_local(node) for node in nodes]).reshape(-1, 4, 4)
-    world = local.copy()
+    world, depth = local.copy(), [0] * len(nodes)
     for index in order:
         if parent[index] >= 0:
             world[index] = world[parent[index]] @ local[index]
+            depth[index] = depth[parent[index]] + 1
+    if max(depth, default=0) > DEEPEST_NODE:
+        came = f"it has {max(depth):,}"
+        refuse(document.path, f"at most {DEEPEST_NODE:,} nodes below each other", came, "Export it again")
     return Nodes(names, parent, order, local, world, _shown(document, nodes))
 
 
 def node_names(nodes: list[Tree]) -> tuple[str, ...]:
     """A name for each node: its own, with a number after it where another one has it already."""
     found: dict[str, None] = {}
+    counts: dict[str, int] = {}
     for index, node in enumerate(nodes):
         name = own = str(node.get("name") or f"node {index}")
-        count = 2
+        count = counts.get(own, 2)
         while name in found:
             name, count = f"{own} {count}", count + 1
-        found[name] = None
+        found[name], counts[own] = None, count
     return tuple(found)
 
 
@@ -71,8 +80,7 @@ def _parents(nodes: list[Tree]) -> tuple[int, ...]:
     parent = [-1] * len(nodes)
     for index, node in enumerate(nodes):
         for child in node.get("children", []):
-            if not 0 <= child < len(nodes):
-                raise IndexError(f"node {index} has a child {child}, which there is not")
+            numbered(child, len(nodes), "nodes")
             if parent[child] < 0:
                 parent[child] = index
     return tuple(parent)
@@ -96,10 +104,10 @@ def _shown(document: Document, nodes: list[Tree]) -> tuple[int, ...] | None:
     """Nodes of the scene, the last child of each first."""
     if "scenes" not in document.tree:
         return None
-    waiting = list(document.tree["scenes"][document.tree.get("scene", 0)].get("nodes", []))
+    waiting = list(document.one("scenes", document.tree.get("scene", 0)).get("nodes", []))
     found: dict[int, None] = {}
     while waiting:
-        index = waiting.pop()
+        index = numbered(waiting.pop(), len(nodes), "nodes")
         if index not in found:
             found[index] = None
             waiting.extend(nodes[index].get("children", []))

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import base64
-import struct
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
+
+import numpy as np
 
 from dermis.errors import refuse
-from dermis.images.io import Picture
+from dermis.images.io import Picture, read_size
+from dermis.images.sizes import MOST_TOGETHER
+from dermis.mesh.beside import named_by_uri
 from dermis.mesh.gltf.document import Document, read_document
+from dermis.reading import BROKEN, is_file, understood
 
 _READABLE = {"image/png", "image/jpeg"}
 ROLES = ("normal", "height", "specular", "roughness", "region")
@@ -24,11 +27,20 @@ def embedded_maps(path: Path) -> dict[str, Any]:
 
     Raises DermisError when the file is damaged.
     """
-    try:
-        return _maps(read_document(path))
-    except (KeyError, IndexError, ValueError, TypeError, AttributeError, struct.error, OSError) as fault:
-        detail = f"{type(fault).__name__}: {fault}".splitlines()[0][:200]
-        refuse(path, "sound textures", f"they cannot be read ({detail})", "Export the file again")
+    document = read_document(path)
+    with understood(path, "sound textures", *BROKEN):
+        found = _maps(document)
+    texels = 0
+    for picture in (one for one in found.values() if isinstance(one, Picture) or is_file(str(one))):
+        width, height = read_size(picture)
+        texels += width * height
+    if texels > MOST_TOGETHER:
+        came, remedy = (
+            f"they have {texels / 1e6:.0f} million",
+            "Resize them, or name them yourself (--colour, ...)",
+        )
+        refuse(path, f"textures of at most {MOST_TOGETHER / 1e6:.0f} million texels together", came, remedy)
+    return found
 
 
 def _maps(document: Document) -> dict[str, Any]:
@@ -38,7 +50,7 @@ def _maps(document: Document) -> dict[str, Any]:
     def picture(reference: dict[str, Any] | None) -> Picture | Path | None:
         if reference is None or reference.get("texCoord", 0) != 0:
             return None
-        source = document.tree["textures"][reference["index"]].get("source")
+        source = document.one("textures", reference["index"]).get("source")
         return None if source is None else _picture(document, source)
 
     found: dict[str, Any] = {"colour": picture(skin.get("pbrMetallicRoughness", {}).get("baseColorTexture"))}
@@ -47,12 +59,21 @@ def _maps(document: Document) -> dict[str, Any]:
         found["normal"] = picture(skin.get("normalTexture"))
     else:
         found |= {role: picture(own.get(role)) for role in ROLES}
-        found["height_mm"] = own.get("height_mm")
+        found["height_mm"] = _relief(own.get("height_mm"))
     return {role: value for role, value in found.items() if value is not None}
 
 
+def _relief(height_mm: Any) -> float | None:
+    """The relief of a grey level [mm] that a file tells."""
+    if height_mm is None:
+        return None
+    if isinstance(height_mm, bool) or not isinstance(height_mm, int | float) or not 0 < height_mm < np.inf:
+        raise ValueError(f"height_mm is {str(height_mm)[:40]!r}, not a number above 0")
+    return float(height_mm)
+
+
 def _picture(document: Document, source: int) -> Picture | Path | None:
-    image = document.tree["images"][source]
+    image = document.one("images", source)
     name = f"{document.path}, image {image.get('name', source)}"
     if "bufferView" in image:
         if image.get("mimeType") not in _READABLE:
@@ -62,5 +83,5 @@ def _picture(document: Document, source: int) -> Picture | Path | None:
     if uri.startswith("data:"):
         kind, _, text = uri[5:].partition(";base64,")
         return Picture(name, base64.b64decode(text)) if kind in _READABLE else None
-    file = document.path.parent / unquote(uri)
+    file = named_by_uri(document.path, uri)
     return file if file.suffix.lower() in (".png", ".jpg", ".jpeg") else None

@@ -9,12 +9,14 @@ import numpy as np
 
 from dermis.errors import refuse
 from dermis.mesh.formats import Array, Bones, Index, fractions
-from dermis.mesh.gltf.document import Document, Tree
+from dermis.mesh.gltf.document import Document, Tree, numbered
 from dermis.mesh.gltf.nodes import Nodes, node_names
+from dermis.mesh.limits import MOST_BONES, MOST_INFLUENCES
 from dermis.mesh.rig import INFLUENCES
 
 _MOVES = {"translation", "rotation", "scale"}
 _STILL = "scene"
+_AT_ONCE = 1 << 16  # vertices
 _DAMAGED = "The file is damaged: export it again"
 
 
@@ -47,8 +49,8 @@ class Armature:
 
 def read_armature(document: Document, nodes: Nodes) -> Armature | None:
     """Joints, and nodes that an animation moves with meshes below them, with all above; None for none."""
-    meshes = [k for k in nodes.shown or () if "mesh" in document.tree["nodes"][k]]
-    skinned = [k for k in meshes if "skin" in document.tree["nodes"][k]]
+    meshes = [k for k in nodes.shown or () if "mesh" in document.all("nodes")[k]]
+    skinned = [k for k in meshes if "skin" in document.all("nodes")[k]]
     rigid = [k for k in meshes if k not in set(skinned)]
     joints = {joint for k in skinned for joint in _skin(document, k)["joints"]}
     below = {one for k in rigid for one in nodes.above(k)}
@@ -56,6 +58,9 @@ def read_armature(document: Document, nodes: Nodes) -> Armature | None:
     chosen = {one for k in moving for one in nodes.above(k)}
     if not chosen:
         return None
+    if len(chosen) > MOST_BONES:
+        came = f"it has {len(chosen):,}"
+        refuse(document.path, f"at most {MOST_BONES:,} bones", came, "Export it with fewer")
     still = any(chosen.isdisjoint(nodes.above(k)) for k in rigid)
     kept = [k for k in nodes.order if k in chosen]
     of_node = {node: number + still for number, node in enumerate(kept)}
@@ -80,7 +85,13 @@ def _animated(document: Document) -> set[int]:
 
 
 def _skin(document: Document, node: int) -> Tree:
-    skin: Tree = document.tree["skins"][document.tree["nodes"][node]["skin"]]
+    skin = document.one("skins", document.all("nodes")[node]["skin"])
+    joints = skin["joints"]
+    if len(joints) > MOST_BONES:
+        came = f"it has {len(joints):,}"
+        refuse(document.path, f"a skin of at most {MOST_BONES:,} joints", came, "Export it with fewer")
+    for joint in joints:
+        numbered(joint, len(document.all("nodes")), "nodes")
     return skin
 
 
@@ -93,6 +104,9 @@ def read_followed(
     """
     skin, given = _skin(document, node), primitive["attributes"]
     count = max(1, sum(name.startswith("WEIGHTS_") for name in given))
+    if 4 * count > MOST_INFLUENCES:
+        came, remedy = f"{nodes.names[node]!r} has {count} sets of four", "Export it with fewer"
+        refuse(document.path, f"at most {MOST_INFLUENCES} joints of a vertex", came, remedy)
     names = [k for k in range(count) if f"JOINTS_{k}" in given and f"WEIGHTS_{k}" in given]
     if not names:
         came = f"the mesh of {nodes.names[node]!r} has none"
@@ -105,7 +119,10 @@ def read_followed(
     if "inverseBindMatrices" in skin:
         bound = document.real(skin["inverseBindMatrices"]).reshape(-1, 4, 4).transpose(0, 2, 1)
     resting = nodes.world[skin["joints"]] @ bound[: len(skin["joints"])]
-    placed = np.einsum("vk,vkij->vij", weight, resting[joint])
+    placed = np.empty((len(joint), 4, 4))
+    for start in range(0, len(joint), _AT_ONCE):
+        some = slice(start, start + _AT_ONCE)
+        placed[some] = np.einsum("vk,vkij->vij", weight[some], resting[joint[some]])
     bone = np.array([armature.of_node[k] for k in skin["joints"]])
     return Followed(bone[joint], weight), np.asarray(placed)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from dermis.errors import refuse
 from dermis.mesh.formats import Array, Index
 from dermis.mesh.gltf.document import Document, Tree
 from dermis.mesh.gltf.nodes import Nodes
+from dermis.mesh.limits import MOST_TARGETS
 
 
 class Displaced(NamedTuple):
@@ -29,19 +30,25 @@ def target_names(mesh: Tree) -> tuple[str, ...]:
     counts = [len(primitive.get("targets", [])) for primitive in mesh["primitives"]]
     extras = mesh.get("extras")
     told = extras.get("targetNames") if isinstance(extras, dict) else None
-    given = [str(name) for name in told] if isinstance(told, list) else []
-    return tuple(given[k] if k < len(given) else f"target {k}" for k in range(max(counts, default=0)))
+    most = max(counts, default=0)
+    if most > MOST_TARGETS:
+        raise ValueError(f"a mesh has {most:,} morph targets, more than {MOST_TARGETS:,}")
+    given = [str(name) for name in told[:most]] if isinstance(told, list) else []
+    return tuple(given[k] if k < len(given) else f"target {k}" for k in range(most))
 
 
-def read_targets(document: Document, mesh: Tree, primitive: Tree, count: int) -> dict[str, Displaced]:
+def read_targets(
+    document: Document, mesh: Tree, names: tuple[str, ...], primitive: Tree, count: int
+) -> dict[str, Displaced]:
     """Displacements of a primitive's vertices by name, in the mesh's space.
 
-    count : of its vertices
+    names : of the mesh's targets
+    count : of the primitive's vertices
 
     Raises DermisError for a target of another count, or with numbers that are none.
     """
     found: dict[str, Displaced] = {}
-    for name, target in zip(target_names(mesh), primitive.get("targets", []), strict=False):
+    for name, target in zip(names, primitive.get("targets", []), strict=False):
         if "POSITION" not in target:
             continue
         delta = document.real(target["POSITION"])
@@ -62,11 +69,14 @@ def resting_weights(document: Document, nodes: Nodes) -> dict[str, float]:
     A node's weights go before its mesh's. Of a name in several meshes the first counts: it is one target.
     """
     found: dict[str, float] = {}
+    names: dict[int, tuple[str, ...]] = {}
     for index in nodes.shown or ():
-        node = document.tree["nodes"][index]
-        mesh = document.tree["meshes"][node["mesh"]] if "mesh" in node else {"primitives": []}
-        weights = node.get("weights", mesh.get("weights", []))
-        for name, weight in zip(target_names(mesh), weights, strict=False):
+        node = document.all("nodes")[index]
+        mesh: Tree = document.one("meshes", node["mesh"]) if "mesh" in node else {"primitives": []}
+        weights: Any = node.get("weights", mesh.get("weights", []))
+        if weights and id(mesh) not in names:
+            names[id(mesh)] = target_names(mesh)
+        for name, weight in zip(names[id(mesh)] if weights else (), weights, strict=False):
             found.setdefault(name, float(weight))
     if not np.isfinite(list(found.values())).all():
         refuse(document.path, "finite weights of targets", "some are not", "Export the file again")

@@ -34,8 +34,21 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         self._lossless = 0  # number of the current lossless frame, 0 when a newer frame has replaced it
         self._ticket_holder = 0
         self.ticket = ""  # of the page that has control, for files that it sends
-        self.on_file: Callable[[Path], None] = lambda path: None
+        self.on_file: Callable[[Path, str], None] | None = None  # takes them when there is a viewer
+        self._said: dict[str, Any] | None = None  # to pages that have nothing to show yet
         super().__init__(**given)
+
+    def tell_stage(self, text: str, number: int, of: int) -> None:
+        """Tell the pages what is prepared, and the stage's number, before there is a picture."""
+        self._say({"type": "stage", "text": text, "number": number, "of": of})
+
+    def tell_failure(self, text: str) -> None:
+        """Tell the pages why there will be no picture."""
+        self._say({"type": "failure", "text": text})
+
+    def _say(self, message: dict[str, Any]) -> None:
+        self._said = message
+        asgi.send_all(message)
 
     def ask_for_file(self) -> None:
         """Let the page that has control choose a file to send."""
@@ -50,6 +63,8 @@ class PageCanvas(HttpRenderCanvas):  # type: ignore[misc]
         if self._active_client != self._ticket_holder:
             self.ticket, self._ticket_holder = secrets.token_urlsafe(_TICKET_BYTES), self._active_client
             asgi.send_to({"type": "ticket", "value": self.ticket}, [], self._active_client)
+        if self._said and not self._sent:
+            asgi.send_all(self._said)
 
     def offer(self, name: str, data: bytes) -> None:
         """Send a file to the page that has control, which offers it as a download."""

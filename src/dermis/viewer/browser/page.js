@@ -2,6 +2,7 @@
 // it becomes active.
 
 import { take } from './files.js'
+import { follow } from './stage.js'
 
 const RETRY_MS = 1000
 const TAPS_MS = 350
@@ -17,7 +18,13 @@ window.BaseRenderView.prototype.setThrottle = function (throttle) {
   this._wheelThrottle = throttle
 }
 
+// A cookie has the token from here on; in the address it would be kept in the history and seen on screenshots.
+if (window.location.search) { window.history.replaceState(null, '', window.location.pathname) }
+
 const notice = document.getElementById('notice')
+
+// As a style of its own, without which rendercanvas would choose a size; pages may not write styles into elements.
+Object.assign(document.getElementById('canvas').style, { width: '100%', height: '100%' })
 
 // The socket opened last, perhaps still connecting: with two of them this page would be watching itself.
 let latest = null
@@ -42,6 +49,7 @@ setInterval(() => {
 function hear (event) {
   const message = typeof event.data === 'string' ? JSON.parse(event.data) : { bytes: event.data }
   take(message)
+  follow(message)
   if (message.type !== 'active') { return }
   notice.textContent = message.value ? '' : WATCHING
   if (message.value) {
@@ -88,7 +96,7 @@ let pinching = false
 let began = null // where the last finger touched
 let tapped = null // where and when the last tap ended
 
-function follow (event) {
+function count (event) {
   if (event.pointerType !== 'touch') { return }
   if (event.type === 'pointerdown') { began = { x: event.clientX, y: event.clientY } }
   if (event.type === 'pointerdown' || fingers.has(event.pointerId)) {
@@ -126,5 +134,5 @@ function leave (event) {
   if (fingers.size === 0) { pinching = false }
 }
 
-for (const type of ['pointerdown', 'pointermove']) { window.addEventListener(type, follow, { capture: true }) }
+for (const type of ['pointerdown', 'pointermove']) { window.addEventListener(type, count, { capture: true }) }
 for (const type of ['pointerup', 'pointercancel']) { window.addEventListener(type, leave, { capture: true }) }

@@ -2,26 +2,40 @@
 
 from __future__ import annotations
 
+import asyncio
 import secrets
 import socket
+from collections.abc import Callable, Coroutine
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from dermis.errors import refuse
 from dermis.viewer.browser.canvas import PageCanvas
 from dermis.viewer.browser.guard import Guard, is_local
 from dermis.viewer.browser.uploads import Uploads
 
+T = TypeVar("T")
 _TOKEN_BYTES = 18
 _MOST_MESSAGE_BYTES = 1 << 16
 _SHUTDOWN_S = 1
+_OWN = {"page.css": "css", "page.js": "javascript", "files.js": "javascript", "stage.js": "javascript"}
+HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
+    "img-src blob: data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-store",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+"""Of every response: the page runs its own files alone, in no frame, and nothing of it is kept."""
+
 _EVERYWHERE = "0.0.0.0", "::"
 
 
 class Address(NamedTuple):
     """Where the page is served.
 
-    token : secret part of the URL, empty when only this machine can connect
+    token : secret part of the URL, empty for none
     """
 
     host: str
@@ -33,7 +47,7 @@ class Address(NamedTuple):
         """The page's URL; a server that listens on all interfaces uses the machine's name."""
         name = socket.gethostname() if self.host in _EVERYWHERE else self.host
         host = f"[{name}]" if ":" in name else name
-        return f"http://{host}:{self.port}/" + (f"{self.token}/" if self.token else "")
+        return f"http://{host}:{self.port}/" + (f"?token={self.token}" if self.token else "")
 
 
 def bind(host: str, port: int, *, secret: bool = False) -> tuple[socket.socket, Address]:
@@ -65,12 +79,16 @@ def server(address: Address, canvas: PageCanvas, folder: Path) -> Any:
     import uvicorn
     from rendercanvas.http import asgi, resources
 
+    from dermis.viewer.browser.connections import LimitedConnection
+
     own = Path(__file__).parent
-    resources["index.html"] = "text/html", (own / "page.html").read_text(encoding="utf-8")
-    for script in ("page.js", "files.js"):
-        resources[script] = "text/javascript", (own / script).read_text(encoding="utf-8")
+    resources["index.html"] = "text/html; charset=utf-8", (own / "page.html").read_text(encoding="utf-8")
+    for name, kind in _OWN.items():
+        resources[name] = f"text/{kind}; charset=utf-8", (own / name).read_text(encoding="utf-8")
     config = uvicorn.Config(
-        Guard(Uploads(asgi, canvas, folder), address.token),
+        Guard(Uploads(asgi, canvas, folder), address.token, f"dermis-{address.port}"),
+        http=LimitedConnection,
+        headers=list(HEADERS.items()),
         log_level="warning",
         ws_max_size=_MOST_MESSAGE_BYTES,
         ws_per_message_deflate=False,  # images are already compressed
@@ -78,3 +96,20 @@ def server(address: Address, canvas: PageCanvas, folder: Path) -> Any:
         server_header=False,
     )
     return uvicorn.Server(config)
+
+
+def run_until(pages: Any, listener: socket.socket, begin: Callable[[], Coroutine[Any, Any, T]]) -> T | None:
+    """Run a server until it is told to exit, and something beside it: what that returned, if it has ended.
+
+    Raises what it raises.
+    """
+
+    async def run() -> T | None:
+        beside = asyncio.create_task(begin())
+        await pages.serve(sockets=[listener])
+        if beside.done():  # not awaited: after Ctrl+C that would be an interrupt again
+            return beside.result()
+        beside.cancel()
+        return None
+
+    return asyncio.run(run())

@@ -1,9 +1,11 @@
-"""Files that a page sends: one at a time, of bounded size, into a folder that the server removes."""
+"""Files that a page sends: one at a time, of bounded size and number, into a folder that goes at the end."""
 
 from __future__ import annotations
 
+import asyncio
 import hmac
-import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -17,6 +19,12 @@ MOST_BYTES = 1 << 28
 MOST_BYTES_IN_ALL = 1 << 30
 """Of all files of a server."""
 
+MOST_FILES = 200
+"""Of a server."""
+
+IDLE_S = 20.0
+"""Within which the next piece of a file comes [s]."""
+
 TICKET_HEADER = b"x-dermis-ticket"
 _FOLDER = "upload"
 _MOST_LETTERS = 80
@@ -26,8 +34,8 @@ class Uploads:
     """ASGI middleware that takes files at upload/NAME from the page that has control.
 
     app : answers everything else
-    canvas : a `PageCanvas`, whose ticket the page must send, and which gets the paths
-    folder : where files go
+    canvas : a `PageCanvas`, whose ticket the page must send, and which gets each file's path and name
+    folder : where files go, by numbers: what a page calls them is shown and no more
     """
 
     def __init__(self, app: App, canvas: Any, folder: Path) -> None:
@@ -41,28 +49,36 @@ class Uploads:
         if scope["type"] != "http" or scope["method"] != "POST" or _FOLDER not in parts[-2:-1]:
             await self._app(scope, receive, send)
             return
-        headers = dict(scope["headers"])
+        headers, name = dict(scope["headers"]), _shown(parts[-1])
         status, answer = 200, ""
+        content = [(b"content-type", b"text/plain; charset=utf-8")]
         try:
-            self._check(parts[-1], headers)
-            self._canvas.on_file(await self._store(parts[-1], receive))
+            kind = self._kind(name, headers)
+            self._canvas.on_file(await self._store(name, kind, receive), name)
         except DermisError as error:
             status, answer = 400, str(error)
-        content = [(b"content-type", b"text/plain; charset=utf-8")]
+            content.append((b"connection", b"close"))  # whatever of the file is still to come
         await send({"type": "http.response.start", "status": status, "headers": content})
         await send({"type": "http.response.body", "body": answer.encode()})
 
-    def _check(self, name: str, headers: dict[bytes, bytes]) -> None:
+    def _kind(self, name: str, headers: dict[bytes, bytes]) -> str:
+        """What the file is, as one of `HEAD_FILES`, when it may come."""
         ticket = headers.get(TICKET_HEADER, b"")
         if not self._canvas.ticket or not hmac.compare_digest(ticket, self._canvas.ticket.encode()):
             refuse("upload", "the page that has control", "another one sent this", "Close the other page")
-        if Path(name).suffix.lower() not in HEAD_FILES:
+        kind = next((one for one in HEAD_FILES if name.lower().endswith(one)), None)
+        if kind is None:
             kinds = ", ".join(HEAD_FILES)
             refuse(name, f"a mesh, a person or a scene ({kinds})", "it ends otherwise", "Convert it")
+        if self._canvas.on_file is None:
+            refuse(name, "a page that shows a head", "the first one is being prepared", "Send it again soon")
         if self._is_busy:
             refuse(name, "one file at a time", "another one is on its way", "Wait for it")
+        if self._count >= MOST_FILES:
+            refuse(name, f"at most {MOST_FILES} files", "this is one more", "Start the viewer again")
         length = headers.get(b"content-length", b"0")
-        self._check_size(name, int(length) if length.isdigit() else 0)
+        self._check_size(name, int(length) if length.isdigit() and len(length) < 16 else 0)
+        return kind
 
     def _check_size(self, name: str, size: int) -> None:
         if size > MOST_BYTES:
@@ -71,27 +87,40 @@ class Uploads:
             most = f"at most {MOST_BYTES_IN_ALL >> 20} MB of files in all"
             refuse(name, most, "this one would be too much", "Start the viewer again")
 
-    async def _store(self, name: str, receive: Receive) -> Path:
+    async def _store(self, name: str, kind: str, receive: Receive) -> Path:
         """The path of what comes, whole; nothing is left of one that is refused."""
         self._count += 1
-        path = self._folder / str(self._count) / _plain(name)
-        path.parent.mkdir()
+        folder = self._folder / str(self._count)  # of its own, as a scene may name files beside it
+        path = folder / f"upload{kind}"
+        with self._busy(name):
+            folder.mkdir(mode=0o700)
+            try:
+                with path.open("xb") as file:
+                    await self._copy(name, receive, file)
+            except BaseException:
+                path.unlink(missing_ok=True)
+                folder.rmdir()
+                raise
+            self._bytes += path.stat().st_size
+        return path
+
+    @contextmanager
+    def _busy(self, name: str) -> Iterator[None]:
         self._is_busy = True
         try:
-            with path.open("wb") as file:
-                await self._copy(name, receive, file)
-        except BaseException:
-            path.unlink()
-            raise
+            yield
+        except OSError as fault:
+            refuse(name, "room for it on the server", f"it cannot be kept ({fault.strerror})", "Free some")
         finally:
             self._is_busy = False
-        self._bytes += path.stat().st_size
-        return path
 
     async def _copy(self, name: str, receive: Receive, file: BinaryIO) -> None:
         more, size = True, 0
         while more:
-            message = await receive()
+            try:
+                message = await asyncio.wait_for(receive(), IDLE_S)
+            except TimeoutError:
+                refuse(name, "a whole file", f"nothing came for {IDLE_S:g} s", "Send it again")
             if message["type"] != "http.request":
                 refuse(name, "a whole file", "the connection ended before", "Send it again")
             size += len(message.get("body", b""))
@@ -100,6 +129,6 @@ class Uploads:
             more = message.get("more_body", False)
 
 
-def _plain(name: str) -> str:
-    """A file's name without letters that a path could mean something by."""
-    return re.sub(r"[^\w.-]|^\.+", "_", name)[-_MOST_LETTERS:]
+def _shown(name: str) -> str:
+    """What people see of a file's name."""
+    return "".join(letter if letter.isprintable() else "_" for letter in name)[-_MOST_LETTERS:]

@@ -17,15 +17,15 @@ def feed_pointer(event: Mapping[str, Any], frame: Callable[[], None]) -> None:
 
     frame : lays out the panel with the events so far
     """
-    io, kind = imgui.get_io(), event["event_type"]
-    io.add_mouse_pos_event(event["x"], event["y"])
+    kind = event["event_type"]
+    imgui.get_io().add_mouse_pos_event(event["x"], event["y"])
     if kind in ("pointer_down", "pointer_up"):
         # A slider ignores a move in the frame of its release, and a press is where that frame's last move is.
-        frame()
-        io.add_mouse_button_event(max(0, event["button"] - 1), kind == "pointer_down")
+        frame()  # which may take another context, with other inputs
+        imgui.get_io().add_mouse_button_event(max(0, event["button"] - 1), kind == "pointer_down")
         frame()
     elif kind == "wheel":
-        io.add_mouse_wheel_event(-_WHEEL * event["dx"], -_WHEEL * event["dy"])
+        imgui.get_io().add_mouse_wheel_event(-_WHEEL * event["dx"], -_WHEEL * event["dy"])
 
 
 def feed_key(event: Mapping[str, Any], frame: Callable[[], None]) -> None:

@@ -226,3 +226,5 @@ def attempt(session: Session, act: Callable[[], None]) -> None:
         act()
     except DermisError as error:
         session.message = str(error)
+    except Exception as error:
+        session.tell_fault("This cannot be done", error)

@@ -7,7 +7,7 @@ import random
 from imgui_bundle import imgui
 
 from dermis.scene.heads import HUMAN
-from dermis.viewer.heads import built_in, called
+from dermis.viewer.heads import built_in
 from dermis.viewer.panel.fields import button, explain, record_position
 from dermis.viewer.session import Session
 
@@ -45,12 +45,12 @@ def _choice(session: Session) -> None:
     """The heads of the package and recent files."""
     now = str(session.state.head.get("name", session.state.scene.head.name))
     names = dict.fromkeys((*built_in(), *session.heads.recent, now))
-    is_open = imgui.begin_combo("head", called(now))
+    is_open = imgui.begin_combo("head", session.heads.called(now))
     if not is_open:
         record_position(session, "head")
         return
     for name in names:
-        clicked, _ = imgui.selectable(f"{called(name)}###{name}", name == now)
+        clicked, _ = imgui.selectable(f"{session.heads.called(name)}###{name}", name == now)
         record_position(session, f"head/{name}")
         if clicked and name != now:
             session.heads.open(name)

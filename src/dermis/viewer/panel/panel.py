@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from imgui_bundle import imgui, implot
-from wgpu.utils.imgui import ImguiWgpuBackend
+from imgui_bundle import imgui
 
 from dermis.gpu import Device
 from dermis.viewer.panel.feeding import POINTER, feed_key, feed_pointer
 from dermis.viewer.panel.fields import attempt, button, record_position
+from dermis.viewer.panel.imgui_frames import ImguiFrames, closed_again
 from dermis.viewer.panel.overlay import HELP_KEYS, PLAY_KEY, draw_divider, draw_help, draw_messages
 from dermis.viewer.panel.sections import SECTIONS
-from dermis.viewer.panel.style import set_style
 from dermis.viewer.session import Session
 
 _WIDTH, _CONTROLS = 330.0, 0.5  # of the panel, and their share of it
@@ -37,21 +37,14 @@ class Panel:
         self._session = session
         self.visible, self.opened, self.shows_help = True, False, False
         self._size = (0.0, 0.0)
-        self._is_new = self._has_popup = self._scrolls = False
+        self._has_popup = self._scrolls = False
         self._button_end = (0.0, 0.0)
-        self._context: Any = None
+        self._frames = ImguiFrames(partial(session.tell_fault, "The panel cannot be drawn"))
         self.label_width = 0.0  # right of the controls, logical
 
     def open(self, device: Device, target: str) -> None:
         """Create the resources for drawing into textures of a format."""
-        # A context holds its font's texture, which belongs to one device.
-        self._context = imgui.create_context()
-        self._plots = implot.create_context()
-        self._enter()
-        set_style()
-        self._is_new = True
-        self._device = device
-        self._backend = ImguiWgpuBackend(device.handle, target)
+        self._frames.open(device, target)
 
     def width(self, size: tuple[float, float]) -> float:
         """Of what the panel takes from the picture in a window of that size, logical."""
@@ -71,7 +64,7 @@ class Panel:
 
     def feed(self, event: Mapping[str, Any], size: tuple[float, float]) -> bool:
         """Process an event; returns whether it was for the panel, not for the picture."""
-        self._enter()
+        self._frames.enter()
         self._size = size
         io, kind = imgui.get_io(), event["event_type"]
         if kind == "key_down" and not io.want_text_input and self._shortcut(event):
@@ -86,34 +79,21 @@ class Panel:
             io.add_mouse_pos_event(-1e6, -1e6)
             return False
         feed_key(event, lambda: self._frame(size))
-        return bool(io.want_text_input)
+        return bool(imgui.get_io().want_text_input)  # of a context that the frame may have made
 
     def draw(self, target: Any, size: tuple[float, float], pixel_ratio: float) -> None:
         """Draw over what the target shows.
 
         size : of the window, logical
         """
-        self._enter()
+        self._frames.enter()
         imgui.get_io().display_framebuffer_scale = imgui.ImVec2(pixel_ratio, pixel_ratio)
         self._frame(size)
-        encoder = self._device.handle.create_command_encoder()
-        attachment = {"view": target, "load_op": "load", "store_op": "store"}
-        render_pass = encoder.begin_render_pass(label="panel", color_attachments=[attachment])
-        self._backend.render(imgui.get_draw_data(), render_pass)
-        render_pass.end()
-        self._device.handle.queue.submit([encoder.finish()])
+        self._frames.render(target)
 
     def _frame(self, size: tuple[float, float]) -> None:
-        """Let Dear ImGui see the events so far, and lay out what `draw` draws."""
         self._size = size
-        imgui.get_io().display_size = imgui.ImVec2(*size)
-        for _ in range(2 if self._is_new else 1):  # the first frame of a window only measures it
-            self._is_new = False
-            imgui.new_frame()
-            try:
-                self._draw_windows(size)
-            finally:
-                imgui.render()
+        self._frames.lay_out(size, lambda: self._draw_windows(size))
 
     def _shortcut(self, event: Mapping[str, Any]) -> bool:
         """Whether a key was a shortcut of the panel."""
@@ -146,10 +126,6 @@ class Panel:
         else:
             return False
         return True
-
-    def _enter(self) -> None:
-        imgui.set_current_context(self._context)
-        implot.set_current_context(self._plots)
 
     def _covers(self, x: float, y: float, size: tuple[float, float]) -> bool:
         """Whether a pointer there is over the panel; Dear ImGui would know it only a frame later."""
@@ -205,7 +181,8 @@ class Panel:
             record_position(session, section.title)
             if is_open:
                 imgui.push_id(section.title)  # sections may share labels
-                section.draw(session)
+                with closed_again(partial(session.tell_fault, f"{section.title} cannot be drawn")):
+                    section.draw(session)
                 imgui.pop_id()
         imgui.pop_item_width()
         self._scroll_by_touch()

@@ -1,0 +1,143 @@
+"""Ctrl-C, and the signals that ask a process to end: the work is left as by an exception, files are whole."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import socket
+import sys
+import threading
+import time
+from types import FrameType, TracebackType
+from typing import Any, Self
+
+_SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+_AGAIN_S = 0.5  # a second one so late is another; programs in between send the same one twice
+_RETRY_S = 0.02
+_TO_BE_LEFT = {"importlib", "pydantic"}  # modules half imported, and what calls back from Rust
+_DRIVERS = {"wgpu", "glfw"}
+_RETRY, _END = b"\0", b"\xff"  # no signals
+_SHELLS = 128  # a shell's status of what a signal ended, less the signal's number
+
+
+class Interruption:
+    """Raises KeyboardInterrupt once for Ctrl-C, SIGTERM or SIGHUP inside a `with` block.
+
+    Asked again, the process ends at once, also while the main thread is in a driver or another library.
+    Signals that the caller ignores or handles stay his.
+
+    code : the exit status that follows; 0 as long as nobody has asked
+    """
+
+    def __init__(self) -> None:
+        self.code = 0
+        self._is_raised = self._is_late = False
+        self._usual: dict[int, Any] = {}
+        self._sent = 0  # by ourselves
+
+    def __enter__(self) -> Self:
+        if threading.current_thread() is not threading.main_thread():
+            return self
+        for number in _SIGNALS:
+            usual = signal.getsignal(number)
+            if usual in (signal.SIG_DFL, signal.default_int_handler):
+                self._usual[number] = usual
+                signal.signal(number, self._handle)
+        self._usual_hook, sys.unraisablehook = sys.unraisablehook, self._lost
+        self._reading, self._writing = socket.socketpair()
+        self._writing.setblocking(False)
+        self._before = signal.set_wakeup_fd(self._writing.fileno(), warn_on_full_buffer=False)
+        self._watching = threading.Thread(target=self._watch, daemon=True, name="dermis-signals")
+        self._watching.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if threading.current_thread() is not threading.main_thread():
+            return
+        for number, usual in self._usual.items():
+            signal.signal(number, signal.SIG_DFL if self.code else usual)
+        signal.set_wakeup_fd(self._before)
+        sys.unraisablehook = self._usual_hook
+        self._writing.send(_END)
+        self._watching.join()
+        self._writing.close()
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        self.code = self.code or _SHELLS + number
+        if self._is_raised:
+            return
+        if (loop := _running_loop()) is not None:  # from one of its tasks asyncio would print it
+            self._is_raised = True
+            loop.call_soon_threadsafe(_interrupt)
+        elif _would_be_lost(frame):
+            self._raise_later()
+        else:
+            self._is_raised = True
+            _interrupt()
+
+    def _raise_later(self) -> None:
+        self._is_raised, self._is_late = False, True
+        self._writing.send(_RETRY)
+
+    def _lost(self, lost: Any) -> None:
+        """What Python calls with an exception that nobody gets, as in a destructor."""
+        if self.code and issubclass(lost.exc_type, KeyboardInterrupt):
+            self._raise_later()
+        else:
+            self._usual_hook(lost)
+
+    def _watch(self) -> None:
+        """See signals arrive, which the main thread does only between two steps of Python."""
+        asked_s = 0.0
+        with self._reading:
+            while True:
+                if not select.select([self._reading], [], [], _RETRY_S if self._is_late else None)[0]:
+                    self._is_late = False
+                    self._send_again()
+                    continue
+                arrived = self._reading.recv(1)
+                if arrived == _END:
+                    return
+                if arrived[0] not in self._usual or signal.getsignal(arrived[0]) != self._handle:
+                    continue  # a server shuts down by its own rules
+                if self._sent:
+                    self._sent -= 1
+                elif not asked_s:
+                    asked_s = time.monotonic()
+                elif time.monotonic() - asked_s > _AGAIN_S:
+                    os._exit(_SHELLS + arrived[0])
+
+    def _send_again(self) -> None:
+        self._sent += 1
+        number = self.code - _SHELLS
+        if hasattr(signal, "pthread_kill"):
+            signal.pthread_kill(threading.main_thread().ident or 0, number)
+        else:
+            signal.raise_signal(number)
+
+
+def _interrupt() -> None:
+    raise KeyboardInterrupt
+
+
+def _running_loop() -> Any:
+    """asyncio's, if the main thread is in one."""
+    if (asyncio := sys.modules.get("asyncio")) is None:
+        return None
+    try:
+        return asyncio.get_running_loop()
+    except RuntimeError:
+        return None
+
+
+def _would_be_lost(frame: FrameType | None) -> bool:
+    """Whether an exception would not come out of there as it is."""
+    while frame is not None:
+        package, name = str(frame.f_globals.get("__name__")).partition(".")[0], frame.f_code.co_name
+        if package in _TO_BE_LEFT or (package in _DRIVERS and "callback" in name):
+            return True
+        frame = frame.f_back
+    return False

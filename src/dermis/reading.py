@@ -1,0 +1,138 @@
+"""The one door for bytes that others wrote: files that a user names, and files that those name in turn.
+
+Only regular files are opened, no more is read than the kind may have, and what a parser says of text that it
+cannot take becomes a sentence that names the file.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import stat
+import struct
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NoReturn
+
+from dermis.errors import DermisError, refuse
+
+BROKEN = (LookupError, TypeError, AttributeError, ArithmeticError, struct.error)
+"""What code raises that trusts the form of what it is given, see `understood`."""
+MOST_TEXT = 4 << 20  # bytes of settings: scenes, lights, tables
+_PAGE = 1 << 16
+_NONBLOCKING = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
+
+
+def read_file(path: str | Path, expected: str, most: int, name: object = None) -> bytes:
+    """All bytes of a regular file.
+
+    expected : what it should be, for messages
+    most : bytes that such a file may have
+    name : what messages call it, the path where None
+    DermisError : it is missing, no regular file, larger, or cannot be read
+    """
+    culprit = path if name is None else name
+    try:
+        with os.fdopen(_open_regular(path, culprit, expected), "rb") as file:
+            told = os.fstat(file.fileno()).st_size
+            most_now = min(most, max(told, _PAGE))  # a file of the system tells no size
+            data = file.read(most_now + 1) if told <= most else b""
+    except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
+        reason = getattr(fault, "strerror", None) or str(fault)
+        refuse(culprit, expected, f"it cannot be read ({reason})", "Check its name")
+    if max(told, len(data)) > most:
+        came = f"it has {_megabytes(max(told, len(data)))}"
+        refuse(
+            culprit, f"{expected} of at most {_megabytes(most)}", came, "Check its name, or make it smaller"
+        )
+    return data
+
+
+def is_file(path: str | Path) -> bool:
+    """Whether a regular file of this name is there; none is of a name that no file can have."""
+    try:
+        return Path(path).is_file()
+    except (OSError, ValueError):  # too long, or with a NUL
+        return False
+
+
+def read_text(path: str | Path, expected: str, most: int = MOST_TEXT) -> str:
+    """A file's text, UTF-8 with or without a mark of its order.
+
+    DermisError : as for `read_file`, or it is not text
+    """
+    with understood(path, expected):
+        return read_file(path, expected, most).decode("utf-8-sig")
+
+
+def read_toml(path: str | Path, expected: str = "a TOML file") -> dict[str, Any]:
+    """A TOML file's tables.
+
+    DermisError : as for `read_text`, or it is not TOML
+    """
+    text = read_text(path, expected)
+    with understood(path, expected):
+        return tomllib.loads(text)
+
+
+def parse_json(text: str | bytes, culprit: object, expected: str) -> Any:
+    """What a JSON text says; all its numbers are finite.
+
+    DermisError : it is not JSON, nested too deeply, or holds a number beyond floats
+    """
+    with understood(culprit, expected):
+        return json.loads(text, parse_constant=_no_number, parse_float=_finite)
+
+
+@contextmanager
+def understood(culprit: object, expected: str, *more: type[Exception]) -> Iterator[None]:
+    """Refuse the file where a parser inside gives up.
+
+    more : errors that it raises besides the usual ones
+    """
+    try:
+        yield
+    except DermisError:
+        raise
+    except RecursionError:
+        refuse(culprit, expected, "it is nested too deeply", "Export it again, or correct it")
+    except MemoryError:
+        refuse(culprit, expected, "it asks for more memory than there is", "Make it smaller")
+    except Exception as fault:
+        if not isinstance(fault, (ValueError, OverflowError, *more)):
+            raise
+        refuse(culprit, expected, f"it cannot be understood ({_reason(fault)})", "Check its contents")
+
+
+def _open_regular(path: str | Path, culprit: object, expected: str) -> int:
+    """A descriptor of the file; a pipe or a device is never waited for."""
+    descriptor = os.open(path, os.O_RDONLY | _NONBLOCKING)
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        refuse(culprit, expected, "it is no regular file", "Copy its contents to a file first")
+    return descriptor
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text[:20]} is beyond what a number may be")
+    return number
+
+
+def _no_number(text: str) -> NoReturn:
+    raise ValueError(f"{text} is not a number")
+
+
+def _megabytes(size: int) -> str:
+    return f"{size / 1e6:,.1f} MB" if size >= 1e5 else f"{size:,} bytes"
+
+
+def _reason(fault: BaseException) -> str:
+    """What a fault says, short enough for one line."""
+    text = " ".join(str(fault)[:1000].split())
+    text = text if text and isinstance(fault, ValueError) else f"{type(fault).__name__}: {text}"
+    return text if len(text) <= 200 else f"{text[:197]}..."

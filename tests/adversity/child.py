@@ -1,0 +1,192 @@
+"""An input in a process of its own, under limits of time and memory, and what came of it."""
+
+from __future__ import annotations
+
+import contextlib
+import faulthandler
+import json
+import os
+import re
+import select
+import signal
+import sys
+import time
+import traceback
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from adversity import case
+from adversity.case import FoundError, Plan
+from adversity.hostile import NAMES, NUMBERS, PIPE
+from adversity.kind import Kind
+
+from dermis.errors import DermisError
+
+FORM = re.compile(r".+?: expected .+, but .+\. \S.+[.?]", re.DOTALL)
+_CACHE = "cache"
+_TOLD, _PRINTED = ".told.json", ".printed"
+_UNFINISHED = re.compile(r"\.dermis-|\.part$")
+_HELD = tuple(one for one in (*NAMES, *NUMBERS) if one.strip())
+_LOOK_S = 0.02
+_OWN = str(Path(__file__).parent)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What an input may take.
+
+    cpu_s : time on processors [s]
+    stalled_s : time in which it does nothing at all [s]
+    bytes : memory above that of the process before it
+    """
+
+    cpu_s: float = 10.0
+    stalled_s: float = 10.0
+    bytes: int = 2 << 30
+
+
+def outcome_of(kind: Kind, plan: Plan, folder: Path, limits: Limits) -> tuple[str, str, str]:
+    """Outcome, place and last lines of an input whose files lie in a folder."""
+    os.mkfifo(folder / PIPE)
+    before = _listed(folder)
+    idle, held_open = os.pipe()  # standard input that never ends
+    process = os.fork()
+    if process == 0:
+        _take(kind, plan, folder, idle)
+    os.close(idle)
+    try:
+        died = _watch(process, limits)
+    finally:
+        os.close(held_open)
+    told = folder / _TOLD
+    printed = (folder / _PRINTED).read_text("utf-8", "replace") if (folder / _PRINTED).exists() else ""
+    last = "\n".join(printed[-4000:].splitlines()[-12:])
+    if died or not told.exists():
+        return died or case.SIGNAL, _place_of_dump(printed), last
+    outcome, place, what = json.loads(told.read_text())
+    left = _left_behind(outcome, plan, before, _listed(folder))
+    if left:
+        return case.HALF_WRITTEN, "left behind", f"{left} lie there after: {outcome}\n{what}"
+    return outcome, place, "\n".join(filter(None, (what, last)))
+
+
+def _take(kind: Kind, plan: Plan, folder: Path, idle: int) -> None:
+    """In the child: take the input in, tell what came of it, and end."""
+    try:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        printed = os.open(folder / _PRINTED, os.O_WRONLY | os.O_CREAT)
+        for target, source in enumerate((idle, printed, printed)):
+            os.dup2(source, target)
+        sys.stdin, sys.stdout, sys.stderr = open(0), open(1, "w", 1), open(2, "w", 1)  # noqa: SIM115
+        os.chdir(folder)
+        faulthandler.enable(all_threads=False)
+        np.seterr(all="warn", under="ignore")  # as users have it, and not tests
+        warnings.simplefilter("default")
+        told = _told(kind, plan)
+        Path(_TOLD).write_text(json.dumps(told))
+    finally:
+        os._exit(0)
+
+
+def _told(kind: Kind, plan: Plan) -> tuple[str, str, str]:
+    """Outcome, place, and what it says."""
+    try:
+        kind.take(plan)
+    except DermisError as refusal:
+        return _of_refusal(refusal, plan)
+    except FoundError as found:
+        return found.outcome, re.split(r"[. ]", str(found))[0], str(found)
+    except BaseException as fault:
+        text = "".join(traceback.format_exception(fault, limit=-40))
+        return case.TRACEBACK, _place(fault), text[-3000:]
+    return case.ACCEPTED, "", ""
+
+
+def _of_refusal(refusal: DermisError, plan: Plan) -> tuple[str, str, str]:
+    """A refusal has the package's form, and begins with a file of the input or a name that one holds."""
+    message = str(refusal)
+    culprit = message.partition(": expected ")[0]
+    names = any(one in culprit for one in plan["culprits"]) or _is_held(culprit.strip("'\""))
+    if FORM.fullmatch(message) and (names or not plan["culprits"]):
+        return case.REFUSED, "", message[:300]
+    what = "names no file" if FORM.fullmatch(message) else "has another form"
+    return case.UNCLEAR, f"{what}: {_place(refusal)}", message[:3000]
+
+
+def _is_held(culprit: str) -> bool:
+    """Whether it is a name that a damaged file may hold, as it is or shortened."""
+    begin, shortened, _ = culprit.partition(" ... ")
+    if shortened:
+        return any(begin in one for one in _HELD)
+    return not culprit.strip() or culprit.endswith(_HELD)
+
+
+def _place(fault: BaseException) -> str:
+    """The last line of the package that a fault went through, and its kind."""
+    frames = [one for one in traceback.extract_tb(fault.__traceback__) if not one.filename.startswith(_OWN)]
+    ours = [one for one in frames if "/dermis/" in one.filename and one.name != "refuse"]
+    last = next(reversed(ours or frames), None)
+    where = f"{last.filename.rpartition('/dermis/')[2]}:{last.lineno} {last.name}" if last else "?"
+    return f"{type(fault).__name__} at {where}"
+
+
+def _place_of_dump(printed: str) -> str:
+    """The package's innermost line of what `faulthandler` wrote."""
+    found = re.search(r'File ".*?/dermis/([^"]+)", line (\d+) in (\w+)', printed)
+    return f"{found[1]}:{found[2]} {found[3]}" if found else ""
+
+
+def _watch(process: int, limits: Limits) -> str:
+    """Wait for a child; the limit that it broke, empty for none."""
+    watched, used, moved = os.pidfd_open(process), 0.0, time.monotonic()
+    with contextlib.closing(os.fdopen(watched)):
+        base = _state(process)[1]
+        while not select.select([watched], [], [], _LOOK_S)[0]:
+            now, (cpu_s, held, runs) = time.monotonic(), _state(process)
+            if cpu_s > used or runs:
+                used, moved = cpu_s, now
+            broken = case.MEMORY if held - base > limits.bytes else ""
+            if cpu_s > limits.cpu_s or now - moved > limits.stalled_s:
+                broken = case.HANG
+            if broken:
+                return _end(process, broken)
+    _, ended, used_in_all = os.wait4(process, 0)
+    if used_in_all.ru_maxrss * 1024 - base > limits.bytes:
+        return case.MEMORY
+    return "" if ended == 0 else case.SIGNAL
+
+
+def _end(process: int, broken: str) -> str:
+    """Have a child write where it is, and kill it."""
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(process, signal.SIGABRT)
+        time.sleep(0.1)
+        os.kill(process, signal.SIGKILL)
+    os.waitpid(process, 0)
+    return broken
+
+
+def _state(process: int) -> tuple[float, int, bool]:
+    """Time on processors [s], resident bytes, and whether it runs just now."""
+    try:
+        stat = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    except (OSError, ProcessLookupError):
+        return 0.0, 0, True
+    cpu_s = (int(stat[11]) + int(stat[12])) / os.sysconf("SC_CLK_TCK")
+    return cpu_s, int(stat[21]) * os.sysconf("SC_PAGE_SIZE"), stat[0] in "RD"
+
+
+def _listed(folder: Path) -> set[str]:
+    """Names of all files in a folder, but for those of the campaign."""
+    found = (str(one.relative_to(folder)) for one in folder.rglob("*") if not one.is_dir())
+    return {one for one in found if one not in (_TOLD, _PRINTED)}
+
+
+def _left_behind(outcome: str, plan: Plan, before: set[str], after: set[str]) -> list[str]:
+    """Files that should not be there: unfinished ones, and any beside a refusal."""
+    new = {one for one in after - before if not one.startswith(_CACHE)}
+    allowed = tuple(plan.get("outputs" if outcome == case.ACCEPTED else "kept", ()))
+    left = {one for one in new if _UNFINISHED.search(Path(one).name) or not one.startswith(allowed)}
+    return sorted(left) if outcome in (case.ACCEPTED, case.REFUSED) else []

@@ -1,0 +1,38 @@
+"""All kinds of input."""
+
+from __future__ import annotations
+
+import warnings
+from contextlib import chdir
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from adversity.kind import Kind
+from adversity.kinds import (
+    caches,
+    clips,
+    commands,
+    frames,
+    large,
+    machine_code,
+    meshes,
+    pages,
+    pictures,
+    scenes,
+)
+
+_PARTS = meshes, pictures, scenes, clips, caches, machine_code, frames, pages, large, commands
+KINDS: dict[str, Kind] = {kind.name: kind for part in _PARTS for kind in part.KINDS}
+_WARMED = 24  # sound inputs of each kind: all that it can begin with
+
+
+def prepare(kinds: dict[str, Kind] = KINDS) -> None:
+    """Take sound inputs here: what they import and build once is there for the processes that follow."""
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for kind in (one for one in kinds.values() if not one.opens_device):
+            for number in range(_WARMED):
+                with TemporaryDirectory() as folder, chdir(folder):
+                    kind.take(kind.sound(Random(number)).write(Path(folder)))

@@ -1,0 +1,51 @@
+"""Numbered pictures that an interrupted command left, and the record of what they are made of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from random import Random
+
+import numpy as np
+from adversity.case import WRONG, FoundError, Input, Plan
+from adversity.damage import scarred
+from adversity.kind import Kind
+from adversity.kinds.pictures import exr_bytes
+
+from dermis.images.codecs import encode_png
+
+_MADE_OF = "1f" * 32
+_SIZE = (12, 8)
+_COUNT = 3
+
+
+def _sound(rng: Random) -> Input:
+    suffix = rng.choice((".png", ".exr"))
+    width, height = _SIZE
+    png = encode_png(np.full((height, width, 3), 90, np.uint8))
+    data = png if suffix == ".png" else exr_bytes(3, height, width)
+    pictures = {f"frames/{k:03}{suffix}": data for k in range(_COUNT)}
+    pattern = f"frames/%03d{suffix}"
+    record = {f"frames/.%03d{suffix}.made-of": _MADE_OF.encode()}
+    return Input({**record, **pictures}, {"file": pattern, "culprits": []})
+
+
+def _take(plan: Plan) -> None:
+    """Go on where it was: what is kept is whole, and the record is as it must be."""
+    from dermis.errors import DermisError
+    from dermis.images.frame_files import FrameFiles
+    from dermis.images.io import read_image
+
+    files = FrameFiles(Path(plan["file"]))
+    files.prepare()
+    files.claim(_MADE_OF)
+    missing = files.missing(range(_COUNT), _SIZE)
+    for number in set(range(_COUNT)) - set(missing):
+        try:
+            shape = read_image(files.path(number)).shape
+        except DermisError as refusal:
+            raise FoundError(WRONG, f"a frame is kept that cannot be read: {refusal}") from None
+        if shape[1::-1] != _SIZE:
+            raise FoundError(WRONG, f"a frame of {shape} is kept")
+
+
+KINDS = (Kind("frames", _sound, _take, scarred, share=5),)

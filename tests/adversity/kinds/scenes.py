@@ -1,0 +1,224 @@
+"""Files of settings: scenes, lights, cameras, people, regions, media and profiles."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from random import Random
+from typing import Any
+
+from adversity.case import Input, Plan
+from adversity.checks import check_finite
+from adversity.kind import Kind
+from adversity.kinds.meshes import head_files, moving_files
+from adversity.kinds.pictures import picture_bytes
+from adversity.trees import toml_text
+
+_PROFILE = "variance_mm2,red,green,blue\n0.01,0.3,0.5,0.6\n0.2,0.3,0.3,0.3\n2.0,0.4,0.2,0.1\n"
+_MEDIUM: Mapping[str, Any] = {
+    "name": "tissue",
+    "eta": 1.4,
+    "layers": [
+        {"absorption_per_mm": [2.1, 2.1, 5.0], "scattering_per_mm": [48.0, 60.0, 65.0], "thickness_mm": 0.25},
+        {"absorption_per_mm": [0.16, 0.19, 0.3], "scattering_per_mm": [32.0, 40.0, 46.0]},
+    ],
+}
+_PIGMENTS: Mapping[str, Any] = {
+    "skin": {"structure": "dj2006", "melanin": 0.05, "blood": 0.02, "oxygen": 0.7}
+}
+_GAUSSIANS: Mapping[str, Any] = {"variances_mm2": [0.01, 0.5], "weights": [[0.4, 0.5, 0.6], [0.6, 0.5, 0.4]]}
+
+
+def _toml(tree: Mapping[str, Any]) -> bytes:
+    return toml_text(_plain(dict(tree))).encode()
+
+
+def _plain(value: Any) -> Any:
+    """The tree without what TOML does not have."""
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items() if one is not None}
+    return [_plain(one) for one in value] if isinstance(value, list | tuple) else value
+
+
+@cache
+def _lights_tree() -> list[dict[str, Any]]:
+    from dermis.scene.lights import LIGHTS
+
+    return [{"kind": kind, **_dump(light)} for kind, light in LIGHTS.items()]
+
+
+def _dump(model: Any) -> dict[str, Any]:
+    """A model's defaults, and numbers where it has none."""
+    needed = {
+        "irradiance": (1.0, 1.0, 1.0),
+        "position": (100.0, 200.0, 900.0),
+        "direction": (0.0, -1.0, -1.0),
+    }
+    given = {key: value for key, value in needed.items() if key in model.model_fields}
+    return {key: one for key, one in model(**given).model_dump().items() if key != "kind"}
+
+
+@cache
+def _scene_trees() -> tuple[dict[str, Any], ...]:
+    """One with all parts and files, one with what moves, one with the package's own human."""
+    from dermis.scene.camera import Camera
+    from dermis.scene.settings import Settings
+    from dermis.scene.skin import Skin
+
+    camera = Camera(position=(0.0, 0.0, 900.0), target=(0.0, 0.0, 0.0)).model_dump()
+    files = {
+        "name": "head.obj",
+        "colour": "skin.png",
+        "height": "height.png",
+        "height_mm": 0.02,
+        "unit_mm": 1.0,
+    }
+    parts = {
+        "head": {
+            **files,
+            "normal": "normal.png",
+            "specular": "grey.png",
+            "roughness": "grey.png",
+            "opaque": ["eye_L"],
+        },
+        "skin": {**Skin().model_dump(), "profile": "profile.csv"},
+        "environment": {"name": "sky.hdr", "exposure": 1.0, "rotation_degrees": 10.0},
+        "camera": camera,
+        "render": Settings().model_dump(),
+        "lights": _lights_tree(),
+    }
+    moving = {
+        "head": {"name": "head.glb"},
+        "pose": {"weights": {"jawOpen": 0.5}, "bones": {"head": [0.0, 20.0, 0.0]}},
+        "lights": "lights.toml",
+        "camera": "camera.toml",
+    }
+    return parts, moving
+
+
+@cache
+def files_of_scenes() -> Mapping[str, bytes]:
+    """Files that the scenes name."""
+    own = {
+        "sky.hdr": picture_bytes("sky.hdr"),
+        "profile.csv": _PROFILE.encode(),
+        "head.glb": moving_files()[0],
+    }
+    lights, camera = {"lights": _lights_tree()}, {"camera": _scene_trees()[0]["camera"]}
+    return {**head_files(), **own, "lights.toml": _toml(lights), "camera.toml": _toml(camera)}
+
+
+@cache
+def scene_files() -> tuple[bytes, ...]:
+    """Scenes that name them."""
+    return tuple(map(_toml, _scene_trees()))
+
+
+def _scene(rng: Random) -> Input:
+    files = {**files_of_scenes(), "scene.toml": rng.choice(scene_files())}
+    return Input(files, {"file": "scene.toml", "words": ["scene.toml"]}, ("scene.toml",))
+
+
+def _take_scene(plan: Plan) -> None:
+    from dermis.optics.profiles import load_profile
+    from dermis.scene.files import load_scene
+
+    scene, settings = load_scene(plan["file"])
+    parts = scene.skin, scene.lights, scene.camera, scene.environment, scene.pose, settings
+    check_finite(parts, "scene")
+    check_finite(load_profile(scene.skin.profile), "profile")
+
+
+def _lights(rng: Random) -> Input:
+    words = ["head.obj", "--lights", "lights.toml"]
+    return Input({"lights.toml": files_of_scenes()["lights.toml"]}, {"file": "lights.toml", "words": words})
+
+
+def _take_lights(plan: Plan) -> None:
+    from dermis.scene.files import load_lights
+
+    check_finite(load_lights(plan["file"]), "lights")
+
+
+def _camera(rng: Random) -> Input:
+    words = ["head.obj", "--camera", "camera.toml"]
+    return Input({"camera.toml": files_of_scenes()["camera.toml"]}, {"file": "camera.toml", "words": words})
+
+
+def _take_camera(plan: Plan) -> None:
+    from dermis.human.regions.average import average_head
+    from dermis.scene.files import load_camera
+
+    check_finite(load_camera(plan["file"], average_head()), "camera")
+
+
+def _person(rng: Random) -> Input:
+    from dermis.human.person import Human
+    from dermis.human.person_file import numbers_of
+
+    numbers = json.dumps({"person": numbers_of(Human.drawn(rng.randrange(100)))}, default=float)
+    return Input({"person.json": numbers.encode()}, {"file": "person.json", "words": ["person.json"]})
+
+
+def _take_person(plan: Plan) -> None:
+    from dermis.human.person_file import read_person
+
+    person = read_person(Path(plan["file"]))
+    check_finite((person.positions_mm, person.look, person.iris, person.hairdo), "person")
+
+
+def _regions(rng: Random) -> Input:
+    from importlib import resources
+
+    from dermis.human.regions.labels import average_landmarks
+
+    text = resources.files("dermis.human.regions").joinpath("default.toml").read_text("utf-8")
+    named = rng.choice(("landmarks", "labels"))
+    file = {"landmarks": "places.csv", "labels": "labels.png"}[named]
+    rows = [f"{name},{x:.6g},{y:.6g},{z:.6g}" for name, (x, y, z) in average_landmarks().items()]
+    labels = picture_bytes("labels.png")
+    files = {"places.csv": "\n".join(["landmark,x,y,z", *rows, ""]).encode(), "labels.png": labels}
+    table = f'{named} = "{file}"\n{text}'.encode()
+    return Input({"regions.toml": table, file: files[file]}, {"file": "regions.toml"})
+
+
+def _take_regions(plan: Plan) -> None:
+    """The table and the files that it names; painting a head by them takes seconds."""
+    from dermis.human.regions.labels import load_landmarks
+    from dermis.human.regions.table import load_table
+    from dermis.mesh.maps import load_labels
+
+    table = load_table(plan["file"])
+    check_finite(table.values, "regions")
+    if table.labels is not None:
+        load_labels(table.labels)
+    if table.landmarks is not None:
+        check_finite(load_landmarks(table.landmarks), "landmarks")
+
+
+def _profile(rng: Random) -> Input:
+    trees = {"medium.toml": _MEDIUM, "pigments.toml": _PIGMENTS, "gaussians.toml": _GAUSSIANS}
+    files = {name: _toml(tree) for name, tree in trees.items()} | {"profile.csv": _PROFILE.encode()}
+    name = rng.choice(tuple(files))
+    culprits = [name, str(_MEDIUM["name"])]  # a medium may be called as its file calls it
+    plan = {"file": name, "culprits": culprits, "words": ["head.obj", "--profile", name]}
+    return Input({name: files[name]}, plan)
+
+
+def _take_profile(plan: Plan) -> None:
+    from dermis.optics.profiles import load_profile
+
+    profile = load_profile(plan["file"])
+    check_finite((profile.variance_mm2, profile.weight), "profile")
+
+
+KINDS = (
+    Kind("scene", _scene, _take_scene, share=20),
+    Kind("lights", _lights, _take_lights, share=8),
+    Kind("camera", _camera, _take_camera, share=5),
+    Kind("person", _person, _take_person, share=8),
+    Kind("regions", _regions, _take_regions, share=6),
+    Kind("profile", _profile, _take_profile, share=8),
+)

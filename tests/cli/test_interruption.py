@@ -1,0 +1,214 @@
+"""Ctrl-C, SIGTERM and SIGHUP at the worst moment: nothing half-written stays, and the exit status tells."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from rigged_head import write_rigged_head, write_take
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX's")
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+START = """
+import os, signal, sys, time
+from pathlib import Path
+
+def asked(number):
+    os.kill(os.getpid(), number)
+    time.sleep(60)  # what follows is raised in here
+
+{}
+from dermis.cli import main
+sys.argv[0] = "dermis"
+main()
+"""
+AT_THE_END = """
+usual = Path.replace
+def replace(path, target):  # a file that is whole takes its name
+    if not path.suffix == ".part":
+        asked(signal.{0})
+    return usual(path, target)
+Path.replace = replace
+"""
+IN_THE_CACHE = AT_THE_END.replace("if not path", "if path")
+AT_A_FRAME = """
+import dermis.cli.animate as command
+usual, drawn = command.laid_over, []
+def laid_over(*given):
+    drawn.append(1)
+    if len(drawn) == 3:
+        asked(signal.{0})
+    return usual(*given)
+command.laid_over = laid_over
+"""
+SMALL = "--size 32x32 --atlas 64 --adapter cpu"
+
+
+def _interrupted(folder: Path, moment: str, number: signal.Signals, words: str) -> tuple[int, str]:
+    """Exit status and stderr of a command that is asked to end at a moment; Ctrl-C is not ignored."""
+    code = START.format(moment.format(number.name))
+    environment = os.environ | {"DERMIS_CACHE": str(folder / "cache")}
+    usual = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        ran = subprocess.run(
+            [sys.executable, "-c", code, *words.split()], capture_output=True, cwd=folder, env=environment
+        )
+    finally:
+        signal.signal(signal.SIGINT, usual)
+    assert ran.stdout == b""
+    return ran.returncode, ran.stderr.decode()
+
+
+def _left(folder: Path) -> set[str]:
+    return {path.name for path in folder.rglob("*") if path.is_file() and path.suffix != ".arrays"}
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_the_exit_status_tells_the_signal(tmp_path: Path, number: signal.Signals) -> None:
+    assert _interrupted(tmp_path, AT_THE_END, number, "head -o person.json") == (128 + number, "")
+    assert not _left(tmp_path)
+
+
+def test_a_picture_is_whole_or_as_it_was(folder: Path) -> None:
+    (folder / "a.png").write_bytes(b"of yesterday")
+    words = f"render head.obj -o a.png {SMALL}"
+    assert _interrupted(folder, AT_THE_END, signal.SIGTERM, words) == (143, "")
+    assert _left(folder) == {"a.png", "head.obj"} and (folder / "a.png").read_bytes() == b"of yesterday"
+
+
+def test_a_cache_file_is_whole_or_not_there(folder: Path) -> None:
+    words = f"render head.obj -o a.png {SMALL}"
+    assert _interrupted(folder, IN_THE_CACHE, signal.SIGTERM, words) == (143, "")
+    assert _left(folder) == {"head.obj"} and not list((folder / "cache").rglob("*.arrays"))
+
+
+@pytest.mark.parametrize("output", ["a.mp4", "frames/%d.png"])
+def test_a_movie_is_whole_or_not_there(folder: Path, output: str) -> None:
+    write_rigged_head(folder / "face.glb")
+    write_take(folder / "take.csv", 0.0, 0.5, 1.0, 0.5, 0.0)
+    words = f"animate face.glb --motion take.csv -o {output} {SMALL}"
+    code, said = _interrupted(folder, AT_A_FRAME, signal.SIGTERM, words)
+    assert code == 143 and "Traceback" not in said
+    left = _left(folder) - {"face.glb", "take.csv", "head.obj"}
+    assert not [name for name in left if name.startswith(".dermis") or name.endswith(".mp4")]
+
+
+def test_a_person_is_whole_or_not_there(tmp_path: Path) -> None:
+    words = "head --size 256 --subdivide 0 --adapter cpu -o a.glb"
+    assert _interrupted(tmp_path, AT_THE_END, signal.SIGTERM, words) == (143, "")
+    assert not _left(tmp_path)
+
+
+def test_a_gallery_holds_whole_pictures(folder: Path) -> None:
+    words = "gallery --only gaussians --head head.obj --size 32 --adapter cpu -o out"
+    assert _interrupted(folder, AT_THE_END, signal.SIGTERM, words) == (143, "")
+    assert _left(folder) == {"head.obj"}
+
+
+BODY = """
+import os, signal, sys, time
+from dermis.cli.interruption import Interruption
+
+with Interruption() as interruption:
+    try:
+        {}
+    except KeyboardInterrupt:
+        sys.stdout.write("raised\\n")
+        sys.stdout.flush()
+    {}
+sys.exit(interruption.code)
+"""
+
+
+def _start(body: str, after: str = "pass") -> subprocess.Popen[str]:
+    code = BODY.format(body.replace("\n", "\n        "), after)
+    pipe = subprocess.PIPE
+    return subprocess.Popen([sys.executable, "-c", code], stdout=pipe, stderr=pipe, text=True)
+
+
+def test_asked_again_it_ends_at_once() -> None:
+    """Also while it cleans up, and in a library that holds the main thread."""
+    slow = "import hashlib; hashlib.pbkdf2_hmac('sha256', b'', b'', 10**9)"  # minutes
+    with _start("sys.stdout.write('ready\\n'); sys.stdout.flush(); time.sleep(60)", slow) as ran:
+        assert ran.stdout is not None
+        assert ran.stdout.readline() == "ready\n"
+        ran.send_signal(signal.SIGTERM)
+        assert ran.stdout.readline() == "raised\n"
+        time.sleep(0.7)
+        ran.send_signal(signal.SIGTERM)
+        assert ran.wait(timeout=20) == 143
+        assert ran.communicate()[1] == ""
+
+
+def test_the_same_signal_from_a_program_in_between_is_one() -> None:
+    with _start("sys.stdout.write('ready\\n'); sys.stdout.flush(); time.sleep(60)", "time.sleep(0.3)") as ran:
+        assert ran.stdout is not None
+        assert ran.stdout.readline() == "ready\n"
+        ran.send_signal(signal.SIGTERM)
+        assert ran.stdout.readline() == "raised\n"
+        ran.send_signal(signal.SIGTERM)
+        assert (ran.wait(timeout=20), *ran.communicate()) == (143, "", "")
+
+
+LOST = {
+    "a destructor": """
+class Lost:
+    def __del__(self): os.kill(os.getpid(), signal.SIGTERM); time.sleep(0.1)
+Lost()
+time.sleep(60)""",
+    "a task of a loop": """
+import asyncio
+async def drawn():
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(0.1)
+async def shown():
+    task = asyncio.create_task(drawn())
+    await asyncio.sleep(60)
+asyncio.run(shown())""",
+    "a module half imported": """
+import importlib.abc, importlib.util
+class Swallows(importlib.abc.Loader):
+    def exec_module(self, module):
+        try: os.kill(os.getpid(), signal.SIGTERM); time.sleep(0.1)
+        except BaseException: pass
+importlib._bootstrap._load(importlib.util.spec_from_loader("swallows", Swallows()))
+time.sleep(60)""",
+    "a driver's callback": """
+space = {"__name__": "wgpu.native", "os": os, "signal": signal, "time": time}
+exec("def callback():\\n try: os.kill(os.getpid(), signal.SIGTERM); time.sleep(0.1)\\n"
+     " except BaseException: pass", space)
+space["callback"]()
+time.sleep(60)""",
+}
+
+
+@pytest.mark.parametrize("place", LOST)
+def test_where_an_exception_would_be_lost_it_comes_later(place: str) -> None:
+    with _start(LOST[place]) as ran:
+        assert (*ran.communicate(timeout=30), ran.returncode) == ("raised\n", "", 143)
+
+
+def test_what_the_caller_ignores_stays_ignored() -> None:
+    """As nohup does with SIGHUP."""
+    usual = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        ran = _start("os.kill(os.getpid(), signal.SIGHUP); time.sleep(0.1)")
+    finally:
+        signal.signal(signal.SIGHUP, usual)
+    with ran:
+        assert (*ran.communicate(timeout=30), ran.returncode) == ("", "", 0)
+
+
+def test_afterwards_signals_are_as_before() -> None:
+    from dermis.cli.interruption import Interruption
+
+    before = [signal.getsignal(number) for number in SIGNALS], sys.unraisablehook
+    with Interruption():
+        assert signal.getsignal(signal.SIGTERM) != before[0][1]
+    assert ([signal.getsignal(number) for number in SIGNALS], sys.unraisablehook) == before

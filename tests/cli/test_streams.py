@@ -1,0 +1,134 @@
+"""Standard streams that are full, closed, left by their reader, or of few letters: told in a line at most."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+pytestmark = pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a shell and a full device")
+
+HELP, CITE = "render --help", "cite"
+FAILS = "dermis: stdout: expected a place to write to, but it fails ({}). Write it elsewhere.\n"
+SINKS = {
+    "full": (">/dev/full", 2, FAILS.format("No space left on device")),
+    "closed": (">&-", 2, FAILS.format("Bad file descriptor")),
+    "nothing is open": (">&- 2>&- <&-", 2, ""),
+    "stderr is closed": ("2>&- >/dev/null", 0, ""),
+    "stderr is full": ("2>/dev/full >/dev/full", 2, ""),
+    "stdin is closed": ("<&- >/dev/null", 0, ""),
+}
+
+
+class Ended(NamedTuple):
+    """How a shell's command ended."""
+
+    code: int
+    stdout: str
+    stderr: str
+
+
+def _shell(line: str, folder: Path, **more: str) -> Ended:
+    """Run a line; `dermis` in it is the command."""
+    line = line.replace("dermis ", f"'{sys.executable}' -m dermis ")
+    ran = subprocess.run(["/bin/sh", "-c", line], capture_output=True, env=os.environ | more, cwd=folder)
+    return Ended(ran.returncode, ran.stdout.decode("latin-1"), ran.stderr.decode("latin-1"))
+
+
+@pytest.mark.parametrize("words", [HELP, CITE])
+@pytest.mark.parametrize("sink", SINKS)
+def test_what_cannot_be_written_is_told_once(words: str, sink: str, tmp_path: Path) -> None:
+    where, code, said = SINKS[sink]
+    assert _shell(f"dermis {words} {where}", tmp_path) == (code, "", said)
+
+
+@pytest.mark.parametrize("words", ["--help", HELP, CITE, "cite nobody"])
+def test_a_reader_that_leaves_early_is_no_fault(words: str, tmp_path: Path) -> None:
+    wrong = 2 * (words == "cite nobody")
+    ended = _shell(f"{{ dermis {words}; echo $? >code; }} | true", tmp_path)
+    assert (ended.code, ended.stdout) == (0, "") and (tmp_path / "code").read_text() == f"{wrong}\n"
+    assert ended.stderr.count("\n") == bool(wrong)
+
+
+def test_letters_that_the_stream_lacks_are_written_as_numbers(tmp_path: Path) -> None:
+    lines = _shell("dermis cite Kienle1998", tmp_path, PYTHONIOENCODING="utf-8").stdout
+    plain = _shell("dermis cite Kienle1998", tmp_path, PYTHONIOENCODING="ascii", LANG="C")
+    assert (plain.code, plain.stderr) == (0, "") and plain.stdout.isascii()
+    assert plain.stdout.count("\n") == lines.count("\n")
+    assert _shell("dermis --help", tmp_path, PYTHONIOENCODING="latin-1").code == 0
+
+
+SMALL = "head.obj --size 32x32 --atlas 64 --adapter cpu"
+
+
+def test_no_file_gets_the_number_of_a_closed_stream(folder: Path) -> None:
+    """What libraries print would land in it."""
+    assert _shell(f"dermis render {SMALL} -o a.png >&- 2>&- <&-", folder).code == 2
+    data = (folder / "a.png").read_bytes()
+    assert data.startswith(b"\x89PNG") and data.endswith(b"IEND\xaeB`\x82")
+
+
+def test_a_name_that_is_no_text_is_told(tmp_path: Path) -> None:
+    ended = _shell("dermis head -o $(printf 'a\\377.json')", tmp_path)
+    assert ended.code == 0 and ended.stdout.startswith("a\\udcff.json  ") and ended.stderr == ""
+    assert (tmp_path / os.fsdecode(b"a\xff.json")).exists()
+
+
+def test_a_bar_outlives_its_terminal() -> None:
+    master, slave = os.openpty()
+    code = """
+import sys
+from dermis.cli.console import progress, working_on
+from dermis.cli.streams import Streams
+with Streams():
+    with working_on("loading"), progress("drawing") as report:
+        sys.stdin.readline()
+        report(1, 2)
+sys.stdout.write("done")
+"""
+    command = [sys.executable, "-c", code]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=slave, text=True) as ran:
+        os.close(slave)
+        os.read(master, 1)  # the bar is there
+        os.close(master)
+        assert ran.communicate("gone\n", timeout=60) == ("done", None)
+    assert ran.returncode == 0
+
+
+def test_a_stream_that_is_full_for_a_while_gets_all() -> None:
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    code = """
+import sys
+from dermis.cli.streams import Streams
+with Streams() as streams:
+    sys.stdout.write("x" * 300_000)
+    assert streams.fault() is None
+"""
+    with subprocess.Popen([sys.executable, "-c", code], stdout=writing) as ran:
+        os.close(writing)
+        with os.fdopen(reading, "rb") as file:
+            assert len(file.read()) == 300_000
+    assert ran.returncode == 0
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are POSIX's")
+def test_a_reader_that_does_not_read_holds_up_no_end() -> None:
+    code = """
+import dermis.cli, sys
+from dermis.cli.console import print_lines
+dermis.cli._run = lambda: print_lines("x" * 300_000)
+dermis.cli.main()
+"""
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as ran:
+        assert ran.stdout is not None and ran.stderr is not None
+        assert ran.stdout.read(1) == b"x"
+        ran.terminate()
+        assert ran.wait(timeout=30) == 143 and ran.stderr.read() == b""

@@ -1,0 +1,148 @@
+"""Pictures that ask for more than they hold: refused by their headers, or decoded in little memory."""
+
+from __future__ import annotations
+
+import io
+import struct
+import subprocess
+import sys
+import time
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dermis.errors import DermisError
+from dermis.images.io import read_image, write_exr
+from dermis.mesh.maps import load_maps
+
+MAP_SIDE = 4096
+MOST_MEMORY = 3.0  # times the pixels that are kept
+
+
+def png(width: int, height: int, bits: int, kind: int, rows: bytes) -> bytes:
+    def part(name: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+
+    header = struct.pack(">IIBBBBB", width, height, bits, kind, 0, 0, 0)
+    palette = part(b"PLTE", bytes(range(256)) * 3) if kind == 3 else b""
+    pixels = part(b"IDAT", zlib.compress(rows, 1))
+    return b"\x89PNG\r\n\x1a\n" + part(b"IHDR", header) + palette + pixels + part(b"IEND", b"")
+
+
+def radiance(width: int, height: int, rows: bytes) -> bytes:
+    return f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n".encode() + rows
+
+
+def jpeg(scans: int) -> bytes:
+    """Twice as high as wide, with as many scans, all but the first ones empty."""
+    import PIL.Image
+
+    stream = io.BytesIO()
+    PIL.Image.new("RGB", (4096, 8192)).save(stream, "JPEG", progressive=True)
+    return stream.getvalue().replace(b"\xff\xd9", b"\xff\xda" * scans + b"\xff\xd9")
+
+
+def exr(folder: Path, width: int, height: int, layers: int = 0) -> bytes:
+    """A small file whose header tells another size."""
+    more = {f"layer {k}": np.ones((4, 4), np.float32) for k in range(layers)}
+    write_exr(folder / "small.exr", np.ones((4, 4, 3), np.float32), more)
+    data = (folder / "small.exr").read_bytes()
+    at = data.index(b"dataWindow\0box2i\0") + len(b"dataWindow\0box2i\0") + 4
+    return data[:at] + struct.pack("<4i", 0, 0, width - 1, height - 1) + data[at + 16 :]
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.hdr", "a.exr", "wide.exr"])
+def test_more_pixels_than_any_picture_has_are_refused_by_the_header(tmp_path: Path, name: str) -> None:
+    files = {
+        "a.png": png(16384, 16384, 8, 2, b""),
+        "a.hdr": radiance(16384, 8192, b"\2\2\x40\0"),
+        "a.exr": exr(tmp_path, 16384, 8192),
+        "wide.exr": exr(tmp_path, 1 << 28, 1),
+    }
+    (tmp_path / name).write_bytes(files[name])
+    with pytest.raises(DermisError, match=rf"{name}: expected a picture of as many pixels as 8192 x 8192"):
+        read_image(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "words"),
+    [
+        ("none.hdr", radiance(0, 0, b""), "0 x 0"),
+        ("lit.hdr", b"#?RADIANCE\nEXPOSURE=0" + radiance(8, 1, bytes(32))[10:], "EXPOSURE"),
+        ("dark.hdr", b"#?RADIANCE\nEXPOSURE=nan" + radiance(8, 1, bytes(32))[10:], "EXPOSURE"),
+        ("empty.hdr", radiance(8, 1, b"\2\2\0\10" + b"\0" * 64), "run is empty|ends in the middle"),
+        ("scans.jpg", jpeg(100), "scans"),
+    ],
+)
+def test_headers_that_mean_nothing_are_refused(tmp_path: Path, name: str, data: bytes, words: str) -> None:
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(DermisError, match=rf"{name}: .*({words})"):
+        read_image(tmp_path / name)
+
+
+def test_layers_of_an_exr_file_count(tmp_path: Path) -> None:
+    """The library decodes all of them, whichever are wanted."""
+    (tmp_path / "a.exr").write_bytes(exr(tmp_path, 2048, 1024, layers=94))
+    with pytest.raises(DermisError, match=r"a\.exr: .*all its channels have 203 million numbers"):
+        read_image(tmp_path / "a.exr")
+
+
+def peak_of(path: Path, call: str) -> float:
+    """By how many times the result's bytes the memory grew at its highest while a child made it."""
+    code = f"""
+import resource, sys
+from dermis.images import codecs, colour, exr, radiance
+from dermis.images.io import read_image
+from dermis.mesh.maps import load_maps
+import OpenEXR, PIL.Image, PIL.PngImagePlugin
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+kept = {call}
+print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 / kept.nbytes)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=path)
+    return float(done.stdout)
+
+
+@pytest.mark.parametrize(
+    ("kind", "row", "call"),
+    [
+        (3, b"\5", "read_image('a.png')"),
+        (2, b"\x80\x80\xff", "load_maps(normal='a.png').normal"),
+        (0, b"\5", "load_maps(height='a.png', height_mm=0.02).height"),
+    ],
+    ids=["palette", "normals", "heights"],
+)
+def test_little_more_than_what_is_kept_is_in_memory(tmp_path: Path, kind: int, row: bytes, call: str) -> None:
+    rows = (b"\0" + row * MAP_SIDE) * MAP_SIDE
+    (tmp_path / "a.png").write_bytes(png(MAP_SIDE, MAP_SIDE, 8, kind, rows))
+    assert peak_of(tmp_path, call) < MOST_MEMORY
+
+
+def test_coded_radiance_is_decoded_fast(tmp_path: Path) -> None:
+    """Runs of two and two that are none: 4096 x 2048 of them in less than 5 seconds."""
+    width, height = 4096, 512
+    row = b"\2\2" + struct.pack(">H", width) + b"\x82\x82\2\1\3" * width
+    (tmp_path / "a.hdr").write_bytes(radiance(width, height, row * height))
+    began = time.process_time()
+    image = read_image(tmp_path / "a.hdr")
+    took = time.process_time() - began
+    assert took < 5 * width * height / (4096 * 2048)
+    level = np.array([130, 130, 1, 3])
+    expected = (level * 2.0 ** (level - 136)).astype(np.float32)
+    np.testing.assert_array_equal(image[-1, 4:8], np.repeat(expected[:, None], 3, axis=1))
+
+
+def test_infinite_heights_are_refused_after_they_are_scaled(tmp_path: Path) -> None:
+    import PIL.Image
+
+    PIL.Image.fromarray(np.full((16, 16), 3e38, np.float32)).save(tmp_path / "a.tif")
+    with pytest.raises(DermisError, match=r"a\.tif: expected a map of finite numbers"):
+        load_maps(height=tmp_path / "a.tif", height_mm=0.02)
+
+
+def test_a_map_is_as_large_as_any_device_takes(tmp_path: Path) -> None:
+    (tmp_path / "a.png").write_bytes(png(8193, 16, 8, 2, b""))
+    with pytest.raises(DermisError, match=r"a\.png: expected a colour map of at most 8192 texels a side"):
+        load_maps(colour=tmp_path / "a.png")

@@ -1,0 +1,128 @@
+"""Errors that nobody foresaw end one frame, are told once, and leave the next one whole."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from offscreen_input import InputDriver
+
+from dermis.viewer.session import Session
+
+SIZE = 400, 480
+PANEL, PICTURE = np.s_[:470, :195], np.s_[:380, 205:]  # without the messages at the lower edge
+
+
+@pytest.fixture
+def calm(shared_driver: InputDriver, caplog: pytest.LogCaptureFixture) -> Iterator[InputDriver]:
+    """The module's viewer, with an empty list of what it has told, as it was before when the test ends."""
+    session = shared_driver.viewer.session
+    session._faults.clear()
+    session.message = ""
+    shared_driver.event("pointer_move", x=300.0, y=240.0, button=0, buttons=())
+    yield shared_driver
+    shared_driver.canvas._size_info.set_physical_size(*SIZE, 1.0)
+    while session.history.can_undo:
+        session.history.undo()
+    shared_driver.settled()
+
+
+def unlike(a: NDArray[np.uint8], b: NDArray[np.uint8], part: Any) -> float:
+    return float((a[part] != b[part]).mean())
+
+
+@pytest.mark.parametrize("ratio", [1e-300, -1.0, float("nan"), float("inf"), 1e300])
+def test_an_impossible_pixel_ratio_ends_only_its_frames(
+    calm: InputDriver, ratio: float, caplog: pytest.LogCaptureFixture
+) -> None:
+    before = calm.settled()
+    calm.canvas._size_info.set_physical_size(*SIZE, ratio)
+    for kind in ("pointer_move", "pointer_down", "pointer_up"):
+        calm.event(kind, x=300.0, y=240.0, button=1, buttons=(1,))
+        calm.frame()
+    calm.canvas._size_info.set_physical_size(*SIZE, 1.0)
+    calm.event("pointer_leave")
+    after = calm.settled()
+    assert unlike(after, before, PANEL) < 0.002 and unlike(after, before, PICTURE) == 0.0
+    told = [record.message for record in caplog.records]
+    assert len(told) == len(set(told)) <= 2
+
+
+def test_a_section_that_fails_spares_the_others(
+    calm: InputDriver, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    from imgui_bundle import imgui
+
+    from dermis.viewer.panel.sections import SECTIONS
+
+    def fail(session: Session) -> None:
+        imgui.push_style_var(int(imgui.StyleVar_.alpha), 0.2)
+        imgui.push_id("half")
+        imgui.begin_child("open")
+        imgui.begin_disabled(True)
+        raise ZeroDivisionError("no\nnumber")
+
+    before, session = calm.settled(), calm.viewer.session
+    first, *others = SECTIONS
+    monkeypatch.setattr("dermis.viewer.panel.panel.SECTIONS", (first._replace(draw=fail), *others))
+    session.positions.clear()
+    for _ in range(3):
+        calm.frame()
+    assert "show" in session.positions and "upload a file" not in session.positions
+    said = "Head cannot be drawn (ZeroDivisionError: no number)"
+    assert session.message == said and [record.message for record in caplog.records] == [said]
+    monkeypatch.undo()
+    session.message = ""
+    calm.event("pointer_leave")
+    assert unlike(calm.settled(), before, PANEL) < 0.002
+
+
+def test_a_state_that_cannot_be_drawn_leaves_the_last_picture(
+    calm: InputDriver, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    before, session = calm.settled(), calm.viewer.session
+    good, image = session.state, session.studio.image
+
+    def fail_for_others(state: Any, *given: Any) -> Any:
+        return image(state, *given) if state is good else np.zeros(2).reshape(3)
+
+    monkeypatch.setattr(session.studio, "image", fail_for_others)
+    session.change(session.state.with_skin(mix=0.1))
+    assert unlike(calm.settled(), before, PICTURE) == 0.0
+    assert "cannot reshape" in session.message and len(caplog.records) == 1
+    session.history.undo()
+    assert np.array_equal(calm.settled()[PICTURE], before[PICTURE])
+
+
+def test_a_frame_that_fails_elsewhere_is_told_and_the_next_one_drawn(
+    calm: InputDriver, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = calm.settled()
+
+    def fail(*_: Any) -> None:
+        raise IndexError("patch")
+
+    monkeypatch.setattr(calm.viewer._blit, "draw", fail)
+    calm.frame()
+    assert calm.viewer.session.message == "This frame cannot be drawn (IndexError: patch)"
+    monkeypatch.undo()
+    assert unlike(calm.settled(), before, PICTURE) == 0.0 and calm.viewer.failure is None
+
+
+def test_a_head_or_a_button_that_fails_is_told(calm: InputDriver, monkeypatch: pytest.MonkeyPatch) -> None:
+    session = calm.viewer.session
+
+    def fail(*_: Any) -> None:
+        raise MemoryError("too large")
+
+    monkeypatch.setattr(session.heads, "take", fail)
+    calm.frame()
+    assert session.message == "That cannot be opened (MemoryError: too large)"
+    monkeypatch.undo()
+    monkeypatch.setattr(session, "save", fail)
+    calm.event("key_down", key="s", modifiers=("Control",))
+    calm.frame()
+    assert session.message == "This cannot be done (MemoryError: too large)"

@@ -1,0 +1,182 @@
+"""Clients that send what no page does, say nothing, or come in crowds; what responses tell browsers."""
+
+from __future__ import annotations
+
+import contextlib
+import http.client
+import json
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from page_client import PATIENCE_S, Page, difference, visit
+
+pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
+
+from dermis.viewer.browser import connections
+from dermis.viewer.browser.server import HEADERS
+
+RESIZE = '{"type": "resize", "timestamp": 1, "width": 1, "height": 1, "pwidth": 400, "pheight": 300, '
+BAD = [
+    RESIZE + '"ratio": 1e-300}',
+    RESIZE + '"ratio": NaN}',
+    '{"type": "pointer_down", "timestamp": 1, "x": NaN, "y": 1e400, "button": 1, "buttons": [1]}',
+    '{"type": "wheel", "timestamp": 1, "x": 1, "y": 1, "dx": 1e308, "dy": 1e308, "modifiers": []}',
+    '{"type": "key_down", "timestamp": 1, "key": ["a"]}',
+    '{"a":' * 800,
+    "[" * 4096,
+    "[" * 60000,
+]
+
+
+def test_no_message_breaks_the_page(shown: Any) -> None:
+    with visit(shown) as socket:
+        page = Page(socket)
+        page.show()
+        before = page.still()
+        for text in BAD:
+            socket.send(text)
+        socket.send(b"\0" * 1000)
+        page.drag(300, 240)
+        assert difference(before, page.still()) > 0.5  # it was heard, and drawn
+        assert shown.canvas.get_pixel_ratio() == 1.0 and not shown.session.message
+
+
+def test_a_message_that_is_far_too_long_ends_its_own_socket(shown: Any) -> None:
+    from websockets.exceptions import ConnectionClosed
+
+    with visit(shown) as one, visit(shown) as other:
+        one.send("x" * (1 << 17))
+        with pytest.raises(ConnectionClosed):
+            Page(one).hear()
+        page = Page(other)
+        page.show()
+        page.still()
+
+
+def address(shown: Any) -> tuple[str, int]:
+    parts = urlsplit(shown.url)
+    return str(parts.hostname), int(parts.port or 0)
+
+
+@contextlib.contextmanager
+def answered(shown: Any, method: str, path: str, **headers: str) -> Iterator[http.client.HTTPResponse]:
+    connection = http.client.HTTPConnection(*address(shown), timeout=PATIENCE_S)
+    connection.request(method, path, headers=headers)
+    yield connection.getresponse()
+    connection.close()
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "status"),
+    [
+        ("GET", "/", 200),
+        ("GET", "/page.js", 200),
+        ("GET", "/page.css", 200),
+        ("GET", "/renderview.js", 200),
+        ("GET", "/nowhere", 404),
+        ("POST", "/upload/a.obj", 400),
+    ],
+)
+def test_every_response_tells_browsers_what_the_page_may(
+    shown: Any, method: str, path: str, status: int
+) -> None:
+    with answered(shown, method, path) as response:
+        assert response.status == status
+        assert {name: response.headers.get_all(name) for name in HEADERS} == {
+            name: [value] for name, value in HEADERS.items()
+        }
+    policy = HEADERS["Content-Security-Policy"]
+    assert "frame-ancestors 'none'" in policy and "unsafe" not in policy
+    assert HEADERS["Cache-Control"] == "no-store" and HEADERS["X-Content-Type-Options"] == "nosniff"
+
+
+def test_who_is_refused_is_told_the_same_and_hung_up_on(shown: Any) -> None:
+    with answered(shown, "GET", "/", Host="evil.example") as response:
+        assert response.status == 403 and response.headers["Connection"] == "close"
+        assert response.headers["Content-Security-Policy"] and b"token" not in response.read()
+
+
+def closes_within(one: socket.socket, seconds: float) -> bool:
+    one.settimeout(seconds)
+    try:
+        while one.recv(4096):
+            pass
+    except TimeoutError:
+        return False
+    except ConnectionResetError:
+        pass
+    return True
+
+
+ASKED = b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"
+
+
+@pytest.mark.parametrize(
+    "said",
+    [b"", b"GET / HTTP/1.1\r\nHost:", ASKED + b"GET /page.js HT", b"\x16\x03\x01"],
+    ids=["nothing", "half", "one and a half", "another protocol"],
+)
+def test_headers_that_do_not_come_are_not_waited_for(
+    shown: Any, said: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(connections, "HEADERS_S", 0.3)
+    with socket.create_connection(address(shown)) as one:
+        one.sendall(said)
+        stop = threading.Event()
+
+        def dribble() -> None:
+            with contextlib.suppress(OSError):
+                while said and not stop.wait(0.1):
+                    one.sendall(b"a")
+
+        slow = threading.Thread(target=dribble)
+        slow.start()
+        try:
+            assert closes_within(one, 3.0)
+        finally:
+            stop.set()
+            slow.join()
+
+
+def test_a_page_may_be_silent(shown: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connections, "HEADERS_S", 0.2)
+    with visit(shown) as one:
+        time.sleep(0.8)
+        page = Page(one)
+        page.show()
+        page.still()
+
+
+def test_only_so_many_connections_are_open(shown: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connections, "MOST_CONNECTIONS", 3)
+    with contextlib.ExitStack() as crowd:
+        for _ in range(3):
+            crowd.enter_context(socket.create_connection(address(shown)))
+        time.sleep(0.2)
+        late = crowd.enter_context(socket.create_connection(address(shown)))
+        assert closes_within(late, 3.0)
+    time.sleep(0.2)
+    with answered(shown, "GET", "/") as response:
+        assert response.status == 200
+
+
+def test_only_so_many_pages_are_shown(shown: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    from websockets.exceptions import InvalidStatus
+
+    monkeypatch.setattr("dermis.viewer.browser.guard.MOST_PAGES", 2)
+    with contextlib.ExitStack() as crowd:
+        for _ in range(2):
+            crowd.enter_context(visit(shown))
+        with pytest.raises(InvalidStatus):
+            crowd.enter_context(visit(shown))
+    deadline = time.monotonic() + PATIENCE_S
+    while time.monotonic() < deadline:
+        with contextlib.suppress(InvalidStatus), visit(shown) as one:
+            assert json.loads(one.recv(timeout=PATIENCE_S))["type"] in ("active", "ticket")
+            return
+    raise AssertionError("pages that leave are not forgotten")
