@@ -74,7 +74,7 @@ def measure(
 ) -> dict[str, Any]:
     """All figures; `keep` gets those known so far after each part."""
     began = time.perf_counter()
-    head, renderer = dermis.load_head(plan.head), dermis.Renderer(plan.adapter)
+    head, renderer = dermis.load_head(plan.head, subdivide=0), dermis.Renderer(plan.adapter)
     told = _about(plan, renderer)
     for part in parts:
         note(part)

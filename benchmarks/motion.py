@@ -58,7 +58,7 @@ def main(
     """
     if output is not None:
         check_output(output, (".json",))
-    renderer, loaded = Renderer(adapter), load_head(head)
+    renderer, loaded = Renderer(adapter), load_head(head, subdivide=0)
     software = renderer.device.adapter.kind == "CPU"
     case, effort = (_ON_CPU, ON_CPU) if software else (_ON_GPU, Effort())
     with tempfile.TemporaryDirectory() as folder:

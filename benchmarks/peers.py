@@ -99,7 +99,7 @@ def compare_peers(head: str, lights: list[str], plan: Plan, adapter: str) -> dic
         blender_python()
     except DermisError as fault:
         note(f"Cycles is left out. {fault}")
-    loaded, renderer = dermis.load_head(head), dermis.Renderer(adapter)
+    loaded, renderer = dermis.load_head(head, subdivide=0), dermis.Renderer(adapter)
     scenes: list[Measured] = []
     with progress("measuring") as bar:
         done = 0

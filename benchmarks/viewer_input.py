@@ -118,7 +118,7 @@ def offscreen(plan: Plan) -> InputDriver:
 
     settings = Settings(atlas=plan.atlas, samples=plan.samples, shadow_size=plan.atlas)
     canvas = OffscreenRenderCanvas(size=plan.size)
-    state = ViewerState(Scene(load_head(plan.head)), settings, {"name": plan.head})
+    state = ViewerState(Scene(load_head(plan.head, subdivide=0)), settings, {"name": plan.head})
     viewer = Viewer(state, canvas, plan.adapter)
     viewer.panel.visible = False
     viewer.session.studio.pace = Steady(viewer.session.studio.pace.software)

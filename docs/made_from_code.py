@@ -8,8 +8,9 @@ from typing import Any
 
 import dermis
 from dermis import cite
+from dermis.cli.head_options import HEAD
 from dermis.cli.options import is_option, option_name
-from dermis.cli.scene_options import AROUND, HEAD
+from dermis.cli.scene_options import AROUND
 from dermis.gallery.script import Script, find_scripts
 from dermis.scene import Camera, Environment, Settings, Skin
 from dermis.scene.head_table import EyeTable, HeadTable

@@ -37,6 +37,12 @@ def test_no_more_is_read_than_the_kind_may_have(tmp_path: Path) -> None:
         read_file(path, "a table", _MOST)
 
 
+@pytest.mark.skipif(not Path("/proc/kallsyms").exists(), reason="no such file of the system")
+def test_a_file_that_tells_no_size_is_not_cut() -> None:
+    with pytest.raises(DermisError, match="grows while it is read"):
+        read_file("/proc/kallsyms", "a table", 1 << 30)
+
+
 @pytest.mark.parametrize(
     "text", ["a = " + "[" * 5000, "a = " + "1" * 5000, "a =", "\xff", "a = 1\na = 2"], ids=range(5)
 )

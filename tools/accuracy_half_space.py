@@ -152,4 +152,4 @@ def _nodes(low: float, high: float) -> tuple[Floats, Floats]:
 
 
 if __name__ == "__main__":
-    sys.stdout.write(table(load_head("lee_perry_smith"), "auto") + "\n")
+    sys.stdout.write(table(load_head("lee_perry_smith", subdivide=0), "auto") + "\n")

@@ -117,9 +117,9 @@ def furnace(renderer: dermis.Renderer, head: Head, energy: str, **chosen: str) -
 
 def furnaces(renderer: dermis.Renderer) -> str:
     """Rows of the furnace table."""
-    ball = dermis.Head("ball", uv_sphere(115.0), dermis.load_head("lee_perry_smith").maps)
+    ball = dermis.Head("ball", uv_sphere(115.0), dermis.load_head("lee_perry_smith", subdivide=0).maps)
     ball = replace(ball, maps=replace(ball.maps, normal=None, height=None, specular=None, roughness=None))
-    heads = {"sphere": ball, "scan": dermis.load_head("lee_perry_smith", regions="none")}
+    heads = {"sphere": ball, "scan": dermis.load_head("lee_perry_smith", regions="none", subdivide=0)}
     rows = []
     for name, head in heads.items():
         for energy, occlusion, transmission in (
@@ -159,7 +159,7 @@ def soft_shadow_error(renderer: dermis.Renderer, rig: str) -> tuple[float, float
     """Bias and root mean square difference from 64 point lights, over the mean radiance."""
     light = load_lights(rig)[0]
     assert isinstance(light, RectangleLight)
-    head = dermis.load_head("lee_perry_smith")
+    head = dermis.load_head("lee_perry_smith", subdivide=0)
     settings = Settings(size=(384, 384), atlas=256, samples=1, technique="none", shadow_size=1024)
     made, exact = (
         renderer.draw(Scene(head, lights=lights), settings).linear() for lights in ([light], as_points(light))
@@ -171,7 +171,7 @@ def soft_shadow_error(renderer: dermis.Renderer, rig: str) -> tuple[float, float
 
 def occlusion_error(renderer: dermis.Renderer) -> float:
     """Root mean square difference of the open share of the sky from 1024 directions, on the scan."""
-    head = dermis.load_head("lee_perry_smith")
+    head = dermis.load_head("lee_perry_smith", subdivide=0)
     inputs = renderer.prepare(Scene(head), Settings(size=(64, 64), atlas=512, samples=1))
     texels, atlas = inputs.layouts[0].atlas.resources["atlas"], cached_atlas(head.mesh, 512, "stitched")
     few, many = (

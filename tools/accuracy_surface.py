@@ -108,7 +108,7 @@ def seams(renderer: Renderer) -> list[str]:
     own = dermis.load_head("human")
     rows += row(renderer, "human, neck and back of the head", own, HEAD_SIDE, seen)
     rows += row(renderer, "human, eye sockets and inside of the mouth", own, HEAD_SIDE, hidden)
-    human = dermis.load_head(Path(os.environ["DERMIS_DATA"]) / HUMAN, unit_mm=100)
+    human = dermis.load_head(Path(os.environ["DERMIS_DATA"]) / HUMAN, unit_mm=100, subdivide=0)
     human = replace(human, maps=Maps())
     rows += row(renderer, "MakeHuman, neck", human, HEAD_SIDE, at_neck)
     return rows + row(renderer, "MakeHuman, back of the head", human, HEAD_SIDE, behind)

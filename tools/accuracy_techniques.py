@@ -92,7 +92,7 @@ def floor(head: Head, medium: str, traced: Comparison, adapter: str) -> str:
 
 def main() -> None:
     adapter = sys.argv[1] if len(sys.argv) > 1 else "auto"
-    head = dermis.load_head("lee_perry_smith")
+    head = dermis.load_head("lee_perry_smith", subdivide=0)
     found: dict[str, str] = {}
     for medium in ("skin1", "skin2"):
         found[f"traced_{medium}"], made = table(head, "path-traced", medium, adapter)

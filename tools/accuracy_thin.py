@@ -149,7 +149,7 @@ def ears(renderer: dermis.Renderer) -> str:
     """Red light on the dark side of heads' ears, lit from behind and from the front."""
     rows = []
     for name in ("lee_perry_smith", "human"):
-        head = dermis.load_head(name)
+        head = dermis.load_head(name, subdivide=0)
         mesh, centre = head.mesh, np.array(head.centre_mm)
         for side, z in (("behind", 1.0), ("the front", -1.0)):
             way = np.array([0.0, 0.0, z])

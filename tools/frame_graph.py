@@ -61,7 +61,7 @@ def main() -> None:
     adapter, page = (*sys.argv[1:], *("auto", str(PAGE))[len(sys.argv) - 1 :])[:2]
     renderer = dermis.Renderer(adapter)
     name = "lee_perry_smith" if cached("lee_perry_smith") else "human"
-    scene = dermis.Scene(rigged(dermis.load_head(name), TARGETS))
+    scene = dermis.Scene(rigged(dermis.load_head(name, subdivide=0), TARGETS))
     renderer.draw(scene, SETTINGS)
     ms = renderer.draw_warm(scene, SETTINGS).gpu_ms or {}
     listing, marks = listed(renderer, scene), dict[str, set[str]]()

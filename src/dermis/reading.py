@@ -50,11 +50,9 @@ def read_file(path: str | Path, expected: str, most: int, name: object = None) -
     except (OSError, ValueError, TypeError) as fault:  # a NUL in the name; what is no name
         reason = getattr(fault, "strerror", None) or str(fault)
         refuse(culprit, expected, f"it cannot be read ({reason})", "Check its name")
-    if max(told, len(data)) > most:
-        came = f"it has {_megabytes(max(told, len(data)))}"
-        refuse(
-            culprit, f"{expected} of at most {_megabytes(most)}", came, "Check its name, or make it smaller"
-        )
+    if told > most or len(data) > most_now:
+        came = f"it has {_megabytes(told)}" if told > most else "it grows while it is read"
+        refuse(culprit, f"{expected} of at most {_megabytes(most)}", came, "Check its name or its size")
     return data
 
 

@@ -41,7 +41,8 @@ def renderer(device: Device) -> Renderer:
 
 @pytest.fixture(scope="module")
 def row(renderer: Renderer, head_file: str, tmp_path_factory: pytest.TempPathFactory) -> Row:
-    return measure(renderer, TINY, load_head(head_file), tmp_path_factory.mktemp("profile"), 1e9, BRIEF)
+    head, folder = load_head(head_file, subdivide=0), tmp_path_factory.mktemp("profile")
+    return measure(renderer, TINY, head, folder, 1e9, BRIEF)
 
 
 @pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
@@ -65,14 +66,14 @@ def test_profiles_of_any_length_keep_the_albedo(count: int) -> None:
 
 def test_cameras_and_lights_move(head_file: str, tmp_path: Path) -> None:
     case = replace(TINY, lights=5)
-    scenes = scenes_of(case, load_head(head_file), tmp_path, 3)
+    scenes = scenes_of(case, load_head(head_file, subdivide=0), tmp_path, 3)
     assert len({scene.camera for scene in scenes}) == 3
     assert all(len({light.position for light in scene.lights}) == 5 for scene in scenes)  # type: ignore[union-attr]
     assert len({scene.lights[4] for scene in scenes}) == 3
 
 
 def test_the_floor_by_hand(renderer: Renderer, head_file: str, tmp_path: Path) -> None:
-    head = load_head(head_file)
+    head = load_head(head_file, subdivide=0)
     (scene,), settings = scenes_of(TINY, head, tmp_path, 1), settings_of(TINY)
     image = renderer.draw(scene, settings).srgb8()
     moved = moved_by(renderer.device, renderer.prepare(scene, settings), len(head.mesh.positions))
@@ -102,7 +103,7 @@ def test_the_floor_of_thin_parts_is_their_buffers(renderer: Renderer, tmp_path: 
     vertices = [line.split() for line in obj_text().splitlines()]
     flat = [[*w[:3], str(0.03 * float(w[3]))] if w[:1] == ["v"] else w for w in vertices]
     (tmp_path / "leaf.obj").write_text("\n".join(map(" ".join, flat)))
-    head, case = load_head(tmp_path / "leaf.obj"), replace(TINY, gaussians=4)
+    head, case = load_head(tmp_path / "leaf.obj", subdivide=0), replace(TINY, gaussians=4)
     (scene,), settings = scenes_of(case, head, tmp_path, 1), settings_of(case)
     renderer.draw(scene, settings)
     moved = moved_by(renderer.device, renderer.prepare(scene, settings), len(head.mesh.positions))
@@ -130,7 +131,7 @@ def test_a_row_is_complete(row: Row) -> None:
 
 def test_more_work_moves_more_bytes(renderer: Renderer, row: Row, head_file: str, tmp_path: Path) -> None:
     larger = replace(TINY, image=(96, 64), atlas=128, lights=2, gaussians=4)
-    more = measure(renderer, larger, load_head(head_file), tmp_path, 1e9, BRIEF)
+    more = measure(renderer, larger, load_head(head_file, subdivide=0), tmp_path, 1e9, BRIEF)
     for stage in ("shadows", "irradiance", "diffuse", "combine", "visibility", "shade", "post"):
         assert more.floor_ms[stage] > 1.25 * row.floor_ms[stage], stage
 

@@ -19,7 +19,7 @@ from dermis.images.io import read_image
 
 Run = Callable[..., Any]
 SMALL = ("--size", "32x32", "--atlas", "64", "--samples", "1", "--shadow-size", "64")
-KEYS = ["file", "adapter", "size", "fps", "frames", "drawn", "seconds", "frames_per_s"]
+KEYS = ["file", "adapter", "size", "subdivide", "fps", "frames", "drawn", "seconds", "frames_per_s"]
 
 
 @pytest.fixture

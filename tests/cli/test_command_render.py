@@ -30,7 +30,19 @@ STAGES = {
     "post",
     "total",
 }
-KEYS = ["image", "adapter", "size", "atlas", "exposure", "gaussians", "gpu_ms", "frame_ms", "setup_ms"]
+KEYS = [
+    "image",
+    "adapter",
+    "size",
+    "atlas",
+    "subdivide",
+    "triangles",
+    "exposure",
+    "gaussians",
+    "gpu_ms",
+    "frame_ms",
+    "setup_ms",
+]
 SCENE = """
 lights = "studio"
 camera = "profile"

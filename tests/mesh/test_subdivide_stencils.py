@@ -85,7 +85,7 @@ def test_a_loaded_head_has_its_stencils(tmp_path: Path) -> None:
     lines += [" ".join(["f", *(f"{k + 1}/{k + 1}" for k in row)]) for row in mesh.triangles]
     path = tmp_path / "ball.obj"
     path.write_text("\n".join(lines))
-    plain, head = load_head(path), load_head(path, subdivide=1)
+    plain, head = (load_head(path, subdivide=levels) for levels in (0, 1))
     assert plain.rig is None
     assert head.rig is not None and head.rig.stencils is not None
     np.testing.assert_array_equal(head.positions_mm, plain.positions_mm)

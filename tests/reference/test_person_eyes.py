@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 from painted_ball import ball, paint
 
+from dermis.mesh.eye_limits import LIMITS
 from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_mm
-from dermis.mesh.eyes import PUPIL_MM
 from dermis.reference.mitsuba_scene import load_mitsuba, mesh_shape, sensor_of, variant_of
 from dermis.reference.person import eyes
 from dermis.reference.person.subject import Person
@@ -109,7 +109,7 @@ def test_the_white_turns_clear_at_the_limbus() -> None:
 def test_the_iris_reaches_the_ball_and_is_wider_than_a_pupil() -> None:
     flat, _, radius = eyes.disc()
     assert np.linalg.norm(flat, axis=1).max() < SCLERA_MM
-    assert radius > LIMBUS_MM - 0.2 > PUPIL_MM[1]
+    assert radius > LIMBUS_MM - 0.2 > LIMITS["pupil_mm"][1]
 
 
 def test_eyes_stand_where_their_frames_say() -> None:

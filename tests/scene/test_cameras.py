@@ -15,7 +15,7 @@ from dermis.scene.heads import load_head
 
 @pytest.fixture(scope="module")
 def head(tmp_path_factory: pytest.TempPathFactory) -> Head:
-    return load_head(write_head(tmp_path_factory.mktemp("head") / "head.obj"))
+    return load_head(write_head(tmp_path_factory.mktemp("head") / "head.obj"), subdivide=0)
 
 
 def _seen(camera: Camera, head: Head, points: np.ndarray) -> np.ndarray:

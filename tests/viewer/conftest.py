@@ -27,7 +27,7 @@ def head_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def head(head_file: Path) -> Head:
-    return load_head(head_file)
+    return load_head(head_file, subdivide=0)
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def rigged_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def rigged_head(rigged_file: Path) -> Head:
-    return load_head(rigged_file)
+    return load_head(rigged_file, subdivide=0)
 
 
 @pytest.fixture

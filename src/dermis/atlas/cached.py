@@ -12,6 +12,7 @@ from dermis.atlas.atlas import GUTTER, REACH_MM, Atlas
 from dermis.atlas.build import build_atlas
 from dermis.disk import Array, Arrays, stored
 from dermis.mesh.mesh import Mesh
+from dermis.preparing import preparing
 
 _FORM = 6  # increment when `build_atlas` gives other results for the same mesh
 
@@ -20,6 +21,7 @@ def cached_atlas(mesh: Mesh, size: int, layout: str = "mesh", reach_mm: float = 
     """`build_atlas`, read back from disk when it was made before; the disk may fail without harm."""
     names = [field.name for field in fields(Atlas)]
 
+    @preparing("laying the skin out on the atlas")
     def make() -> Arrays:
         atlas = build_atlas(mesh, size, layout, reach_mm)
         return {name: getattr(atlas, name) for name in names}

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import platform
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.metadata import version
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 from dermis.benchmark.cases import Case
 from dermis.benchmark.floor import copy_rate
 from dermis.benchmark.measure import ON_CPU, Effort, Row, measure
 from dermis.errors import DermisError
 from dermis.frame.renderer import Renderer
+from dermis.mesh.head import Head
 from dermis.scene.heads import load_head
 
 _LIBRARIES = ("dermis", "wgpu", "numpy")
@@ -66,10 +69,15 @@ class Benchmark:
 
 
 def run(
-    cases: list[Case], head: str = "human", adapter: str = "auto", progress: Progress | None = None
+    cases: list[Case],
+    head: str = "human",
+    adapter: str = "auto",
+    progress: Progress | None = None,
+    options: Mapping[str, Any] = MappingProxyType({}),
 ) -> Benchmark:
     """Measure the cases one after another.
 
+    options : of `load_head`, but for the levels of subdivision
     progress : called with the number of cases done, and of all
 
     Raises DermisError when none of them could be measured.
@@ -78,7 +86,9 @@ def run(
     renderer = Renderer(adapter)
     device = renderer.device
     rate = copy_rate(device)
-    rows, left_out = _all_of(cases, head, renderer, rate, progress or (lambda done, of: None))
+    rows, left_out = _all_of(
+        cases, partial(load_head, head, **options), renderer, rate, progress or (lambda done, of: None)
+    )
     if not rows:
         raise DermisError(left_out[0].reason)
     return Benchmark(
@@ -95,11 +105,11 @@ def run(
 
 
 def _all_of(
-    cases: list[Case], head: str, renderer: Renderer, rate: float, progress: Progress
+    cases: list[Case], load: Callable[..., Head], renderer: Renderer, rate: float, progress: Progress
 ) -> tuple[list[Row], list[LeftOut]]:
     """The cases that could be measured, and the others."""
     effort = ON_CPU if renderer.device.adapter.kind == "CPU" else Effort()
-    subdivided = lru_cache(1)(lambda levels: load_head(head, subdivide=levels))
+    subdivided = lru_cache(1)(lambda levels: load(subdivide=levels))
     rows: list[Row] = []
     left_out: list[LeftOut] = []
     subdivided(cases[0].subdivide)  # a missing head is an error of all cases

@@ -17,7 +17,7 @@ from dermis.cli.motion import clip_of, motion_file, names_of, parse_span
 from dermis.cli.moving_output import MovingOutput
 from dermis.cli.options import Adapter, Json, Whole
 from dermis.cli.pose_options import laid_over
-from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble
+from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble, note_levels
 
 if TYPE_CHECKING:
     from dermis.frame.renderer import Renderer
@@ -121,6 +121,7 @@ def animate(
         numbers, rate = span.frames(moved)
     if moved.note:
         note(f"note: {moved.note}")
+    note_levels(head, scene, described.head)
     take = _Take(described, settings, moved, rate, numbers[0])
     missing = target.missing(numbers, settings.size, _made_of(take, scene, head, moving))
     began = time.perf_counter()
@@ -130,6 +131,7 @@ def animate(
         "file": str(output),
         "adapter": used,
         "size": list(settings.size),
+        "subdivide": described.head.levels,
         "fps": float(rate),
         "frames": len(numbers),
         "drawn": len(missing),
@@ -180,7 +182,7 @@ def _made_of(take: _Take, given: SceneOptions, *files: str) -> str:
     metered_at = take.first if take.settings.exposure == "auto" else None
     seen = scene.lights, scene.camera, scene.skin, scene.environment, take.settings, take.rate, metered_at
     typed = given.head, given.eye, given.pose, given.bone, given.look_at
-    parts = [*map(_as_it_is, named), *map(repr, typed), repr(seen)]
+    parts = [*map(_as_it_is, named), *map(repr, typed), repr(seen), str(scene.head.levels)]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
 from dermis.cli.console import print_json, print_lines, progress
-from dermis.cli.options import Adapter, Json, Output
+from dermis.cli.head_options import HEAD, FileOptions, check_head
+from dermis.cli.options import NOTHING, Adapter, Json, Output, refuse_options
 
 if TYPE_CHECKING:
     from dermis.benchmark.run import Benchmark
@@ -16,6 +17,7 @@ def bench(
     *,
     preset: Literal["film", "interactive", "cpu"] | None = None,
     head: str = "auto",
+    file: FileOptions = NOTHING,
     output: Output = None,
     adapter: Adapter = "auto",
     as_json: Json = False,
@@ -33,6 +35,8 @@ def bench(
         dermis bench
 
         dermis bench --preset film --head lee_perry_smith -o report.html
+
+        dermis bench --head head.obj --unit-mm 100 --colour skin.png
 
         dermis bench --preset cpu --adapter cpu --json
 
@@ -57,10 +61,13 @@ def bench(
     if output is not None:
         check_output(output, (".html",), "Choose such a name")
         needed("matplotlib", "the report's plots")
+    if head == "auto":
+        refuse_options(file, HEAD, "without a file", "Add --head")
+    check_head(head, file)
     software = fitting_adapters(adapter)[0][0].kind == "CPU"
     cases = PRESETS[preset or ("cpu" if software else "interactive")].cases()
     with progress("measuring") as tell:
-        made = run(cases, _head(head), adapter, tell)
+        made = run(cases, _head(head), adapter, tell, file)
     if as_json:
         print_json(to_json(made))
     else:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from dermis.cli.console import print_json, print_lines, working_on
 from dermis.cli.eye_options import note_eyes
+from dermis.cli.head_options import ShapeOptions, check_head
 from dermis.cli.options import NOTHING, Adapter, Json, Output, Whole, check, given, option_name, options_of
 from dermis.errors import refuse
-from dermis.scene.head_table import HeadTable
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.techniques import TECHNIQUES
@@ -24,11 +24,9 @@ if TYPE_CHECKING:
 
     SizeOptions = dict[str, Any]
     SkinOptions = dict[str, Any]
-    EyesOptions = dict[str, Any]
 else:
     SizeOptions = options_of(Settings, only=_SIZES, defaults=_SIZES)
     SkinOptions = options_of(Skin, only=("direction", "roughness"))
-    EyesOptions = options_of(HeadTable, only=("eyes", "eye_groups"))
 
 
 def compare(
@@ -42,7 +40,7 @@ def compare(
     medium: str | None = None,
     sizes: SizeOptions = NOTHING,
     skin: SkinOptions = NOTHING,
-    eyes: EyesOptions = NOTHING,
+    shape: ShapeOptions = NOTHING,
     samples: Whole = None,
     output: Output = None,
     adapter: Adapter = "auto",
@@ -50,11 +48,13 @@ def compare(
 ) -> int:
     """Compare techniques of scattering with the truth on a head, or the models of the surface.
 
-    Techniques are judged with the profile's own colour, without surface reflection and energy term.
+    Techniques are judged with the profile's own colour, without maps, surface reflection and energy term.
 
     Examples:
 
         dermis compare lee_perry_smith -o report.html
+
+        dermis compare head.obj --unit-mm 100 --against heat
 
         dermis compare human --against path-traced --light back --samples 256 --json
 
@@ -84,7 +84,7 @@ def compare(
         HTML report; for specular a folder of plots.
     """
     words = given(against=against, techniques=techniques, light=light, region=region)
-    chosen = words | given(medium=medium, samples=samples) | sizes | skin | eyes
+    chosen = words | given(medium=medium, samples=samples) | sizes | skin | shape
     _check_used(what, chosen)
     if what == "specular":
         from dermis.cli.compare_specular import compare_specular
@@ -92,7 +92,7 @@ def compare(
         check(Skin, skin)
         compare_specular(output, Skin(**skin).roughness, adapter, as_json)
     else:
-        _compare_techniques(what, eyes, _choose(chosen, sizes) | {"adapter": adapter}, output, as_json)
+        _compare_techniques(what, shape, _choose(chosen, sizes) | {"adapter": adapter}, output, as_json)
     return 0
 
 
@@ -131,7 +131,7 @@ def _choose(chosen: Mapping[str, Any], sizes: Mapping[str, Any]) -> dict[str, An
 
 
 def _compare_techniques(
-    head: str, eyes: Mapping[str, Any], chosen: dict[str, Any], output: Path | None, as_json: bool
+    head: str, shape: Mapping[str, Any], chosen: dict[str, Any], output: Path | None, as_json: bool
 ) -> None:
     """Render a head with each technique, judge it by a truth, print and write what came of it."""
     from dermis.comparison import compare as comparison
@@ -139,12 +139,13 @@ def _compare_techniques(
     from dermis.outputs import check_output
     from dermis.scene.heads import load_head
 
+    check_head(head, shape)
     comparison.check_choices(*(chosen[option] for option in ("against", "light", "region", "medium")))
     if output is not None:
         check_output(output, (".html",), "Choose such a name")
     with working_on("comparing"):
-        loaded = load_head(head, **eyes)
-        note_eyes(loaded, eyes.get("eyes"))
+        loaded = load_head(head, subdivide=0, **shape)
+        note_eyes(loaded, shape.get("eyes"))
         made = comparison.compare(loaded, **chosen)
     if output is not None:
         write_report(output, made)

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
+
+from dermis.preparing import LOGGER
+
+TOLD_AFTER_S = 2.0
 
 
 def print_json(value: Any) -> None:
@@ -50,11 +56,36 @@ def progress(what: str) -> Iterator[Callable[[int, int], None]]:
 
 @contextmanager
 def working_on(what: str) -> Iterator[None]:
-    """A spinner on stderr while something takes its time; silent when stderr is not a terminal."""
+    """A spinner on stderr, with what is being prepared; silent when stderr is not a terminal."""
     if not sys.stderr.isatty():
         yield
         return
     from rich.console import Console
 
-    with Console(stderr=True).status(what):
-        yield
+    told, before = _Told(what), LOGGER.level
+    LOGGER.addHandler(told)
+    LOGGER.setLevel(logging.DEBUG)
+    try:
+        with Console(stderr=True).status(told):
+            yield
+    finally:
+        LOGGER.setLevel(before)
+        LOGGER.removeHandler(told)
+
+
+class _Told(logging.Handler):
+    """A spinner's text: what is done, and what of it has been prepared for two seconds or more."""
+
+    def __init__(self, what: str) -> None:
+        super().__init__()
+        self._what, self._step, self._began = what, "", 0.0
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Note that a step begins, or that it has ended."""
+        begins = record.levelno >= logging.INFO
+        self._step, self._began = record.getMessage() if begins else "", time.monotonic()
+
+    def __rich__(self) -> str:
+        seconds = time.monotonic() - self._began
+        long = self._step and seconds >= TOLD_AFTER_S
+        return f"{self._what}: {self._step} ({seconds:.0f} s)" if long else self._what

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from dermis.cli.console import note
+from dermis.mesh.eye_limits import LIMITS
 
 if TYPE_CHECKING:
     from dermis.mesh.head import Head
 
 EYE = "--eye"
+_LEAST, _MOST = LIMITS["pupil_mm"]
 EyeLooks = Annotated[
     list[str] | None,
     Parameter(
@@ -19,7 +21,7 @@ EyeLooks = Annotated[
         negative="",
         metavar="NAME=NUMBER,...",
         help="What the eyes look like, as eumelanin=0.1,pupil_mm=2.5: eumelanin of the iris, 0 (blue) to 1; "
-        "pupil_mm, its radius, 1 to 4; redness of the white, 0 to 1; seed.",
+        f"pupil_mm, its radius, {_LEAST:g} to {_MOST:g}; redness of the white, 0 to 1; seed.",
     ),
 ]
 

@@ -59,5 +59,6 @@ def _name(error: Any) -> str:
 
 def _wanted(kind: Any) -> str:
     """A type in words; the choices of a literal."""
-    choices = [_TYPES.get(choice, str(choice)) for choice in get_args(kind) or (kind,)]
-    return " or ".join(filter(None, choices))
+    if get_args(kind):
+        return " or ".join(filter(None, map(_wanted, get_args(kind))))
+    return _TYPES.get(kind, str(kind))

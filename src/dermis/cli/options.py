@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict, get_args
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
 
 def _whole(_: type, tokens: Sequence[Token]) -> int:
     return int(tokens[0].value)
+
+
+def _whole_or_word(words: Collection[str], _: type, tokens: Sequence[Token]) -> int | str:
+    return tokens[0].value if tokens[0].value in words else int(tokens[0].value)
 
 
 def _size(_: type, tokens: Sequence[Token]) -> tuple[int, int]:
@@ -91,8 +96,10 @@ def _kind(model: type[Plain], field: str) -> tuple[Any, dict[str, Any]]:
     if choices := choices_of(model, field):
         return Literal[choices], {}
     if words := words_of(model, field):
-        number = model.model_fields[field].annotation is float
+        number = model.model_fields[field].annotation in (float, int)
         shown = {"metavar": "|".join((*words, "NUMBER" if number else "COLOUR")), "show_choices": False}
+        if model.model_fields[field].annotation is int:
+            return int | Literal[words], shown | {"converter": partial(_whole_or_word, words)}
         return (float | Literal[words] if number else str), shown
     kind = model.model_fields[field].annotation
     kind = next((one for one in get_args(kind) if get_args(kind)[-1] is NoneType), kind)

@@ -14,7 +14,7 @@ from cyclopts import Parameter
 
 from dermis.cli.console import note, print_json, print_lines, working_on
 from dermis.cli.options import Adapter, Json
-from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble
+from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble, note_levels
 from dermis.scene.techniques import TECHNIQUES
 
 _MOST_UNSCATTERED = 0.05  # closed eyes and other collapsed charts of real scans stay under it
@@ -39,7 +39,7 @@ def render(
 
         dermis render lee_perry_smith --camera cheek --technique none -o dry.exr
 
-        dermis render head.obj --unit-mm 100 --colour skin.png --subdivide 1
+        dermis render head.obj --unit-mm 100 --colour skin.png --opaque teeth
 
         dermis render --pose mouthSmileLeft=1,mouthSmileRight=1 --bone head=0,20,0 -o smile.png
 
@@ -70,6 +70,7 @@ def render(
         opening = beside.submit(Renderer, adapter)  # its driver starts and compiles while the head loads
         with working_on("loading"):
             described, settings = assemble(head, scene)
+        note_levels(head, scene, described.head)
         return _draw_and_report(described, settings, output, opening, as_json, started)
 
 
@@ -113,6 +114,8 @@ def _draw_and_report(
         "adapter": renderer.device.adapter.name,
         "size": list(settings.size),
         "atlas": settings.atlas,
+        "subdivide": scene.head.levels,
+        "triangles": len(scene.head.mesh.triangles),
         "exposure": rendered.exposure,
         "gaussians": rendered.gaussians,
         "gpu_ms": rendered.gpu_ms,

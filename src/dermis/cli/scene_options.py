@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from dermis.cli.console import note
 from dermis.cli.eye_options import EYE, EyeLooks, note_eyes
+from dermis.cli.head_options import HEAD, HeadOptions, check_head
 from dermis.cli.options import check, option_name, options_of, refuse_options
 from dermis.cli.pose_options import (
     LookAt,
@@ -22,26 +25,24 @@ from dermis.cli.pose_options import (
 )
 from dermis.errors import refuse
 from dermis.scene.environment import Environment
-from dermis.scene.head_table import NO_REGIONS, EyeTable, HeadTable, names_regions
+from dermis.scene.head_table import AUTO, NO_REGIONS, EyeTable, HeadTable, names_regions
 from dermis.scene.settings import PHOTOGRAPHED, Settings
 from dermis.scene.skin import PRESETS, Skin
 
 if TYPE_CHECKING:
+    from dermis.mesh.head import Head
     from dermis.scene import Light, Scene
 
-    HeadOptions = dict[str, Any]
     SkinOptions = dict[str, Any]
     SettingsOptions = dict[str, Any]
     EnvironmentOptions = dict[str, Any]
     SkinPreset = str | None
 
-HEAD = {"specular": "specular_map", "roughness": "roughness_map"}
 AROUND = {field: f"env_{field}" for field in Environment.model_fields}
 AROUND |= {"name": "env", "rotation_degrees": "env_rotation"}
 
 if not TYPE_CHECKING:
     SkinPreset = Literal[tuple(PRESETS)] | None
-    HeadOptions = options_of(HeadTable, without=("name",), names=HEAD)
     SkinOptions, SettingsOptions = options_of(Skin), options_of(Settings, defaults=PHOTOGRAPHED)
     EnvironmentOptions = options_of(Environment, names=AROUND)
 
@@ -112,6 +113,21 @@ def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     return made, Settings(**{**PHOTOGRAPHED, **settings.model_dump(exclude_unset=True), **given.settings})
 
 
+def note_levels(name: str, given: SceneOptions, head: Head) -> None:
+    """A line on stderr about levels of subdivision that were found for the picture.
+
+    name : of the head or of the scene's file, whose head this is
+    """
+    from dermis.scene.files import head_table
+    from dermis.scene.heads import LEAST_OF_PEOPLE, is_person
+
+    told = head_table(Path(name)) if Path(name).suffix.lower() == ".toml" else given.head
+    least = LEAST_OF_PEOPLE if is_person(head.name) else 0
+    if told.get("subdivide", AUTO) == AUTO and head.levels > least:
+        count = f"{len(head.mesh.triangles):,} triangles"
+        note(f"note: --subdivide {head.levels}: {count}, for a smooth outline in this picture")
+
+
 def _check(name: str, given: SceneOptions) -> None:
     """Refuse what cannot be before the head is loaded, which takes longer."""
     from dermis.environment.panorama import panorama_file
@@ -119,7 +135,7 @@ def _check(name: str, given: SceneOptions) -> None:
 
     looks = given.head.get("eye", {})
     check(EyeTable, looks, {field_: f"eye {field_}" for field_ in looks})
-    check(HeadTable, {"name": name} | given.head, HEAD)
+    check_head(name, given.head)
     check(Skin, given.skin)
     check(Settings, given.settings)
     check(Environment, {"name": "uniform"} | given.around, AROUND)
@@ -131,18 +147,21 @@ def _check(name: str, given: SceneOptions) -> None:
 
 def _begin(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     """The file's scene, or a head's with defaults."""
-    from dermis.scene import Scene, load_scene
+    from dermis.scene import Scene, load_camera, load_scene
     from dermis.scene.files import head_and_skin
+    from dermis.scene.smoothness import SmoothIn
 
     if Path(name).suffix.lower() == ".toml":
         refuse_options(given.head, HEAD, "with a scene file", "Write it into the file's [head]")
-        return load_scene(Path(name))
+        return load_scene(Path(name), camera=given.camera, size=given.settings.get("size"))
     alike = {"regions": NO_REGIONS} if given.surface == "deck-2007" else {}
     table = HeadTable(**{"name": name, **alike, **given.head})
     if names_regions(vars(table)) and "rho_s" in given.skin:
         came = "it came with --regions, which says it for each region"
         refuse(option_name("rho_s"), "one or the other", came, "Leave one out, or use --oiliness")
-    head, skin = head_and_skin(table, Skin(), Path())
+    seen = partial(load_camera, given.camera or "portrait")
+    picture = SmoothIn(seen, Settings(**given.settings).size)
+    head, skin = head_and_skin(table, Skin(), Path(), picture)
     return Scene(head, skin=skin), Settings()
 
 

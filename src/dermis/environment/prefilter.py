@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.environment.harmonics import analyse, synthesise, zonal
 from dermis.environment.panorama import Sun, load_panorama, split_suns
+from dermis.preparing import preparing
 from dermis.specular.beckmann import beckmann
 from dermis.specular.cosines import cosines
 from dermis.specular.models import MODELS, Lobe
@@ -93,6 +94,7 @@ class Prefiltered:
     suns: tuple[Sun, ...]
 
 
+@preparing("filtering the environment")
 def prefilter(name: str) -> Prefiltered:
     """A panorama's layers and suns. It takes a quarter of a second, so nothing is kept on disk.
 

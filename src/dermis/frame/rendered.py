@@ -14,6 +14,7 @@ from dermis.frame.passes.pack import Leaving
 from dermis.frame.passes.post import Picture
 from dermis.gpu import Device, download
 from dermis.scene.settings import Settings
+from dermis.summary import Summarised
 
 T = TypeVar("T")
 _MOST = 255
@@ -31,8 +32,8 @@ class Shown:
     meter: Meter | None
 
 
-@dataclass(frozen=True)
-class Rendered:
+@dataclass(frozen=True, repr=False)
+class Rendered(Summarised):
     """An image on the device, valid until its renderer draws the next one.
 
     gpu_ms : device time of each stage that was timed, and "total" [ms]; None without timestamps

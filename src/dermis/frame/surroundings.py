@@ -20,6 +20,7 @@ from dermis.gpu import ComputeProgram, Device, Memo, make_texture, upload
 from dermis.gpu.program import Resources
 from dermis.gpu.textures import texture_from
 from dermis.mesh.head import Head
+from dermis.preparing import preparing
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
@@ -124,6 +125,7 @@ def occlusion_map(device: Device, head: Head, atlas: Atlas, lit: Resources, texe
     """
     side = min(atlas.size, _FINEST_OCCLUSION)
 
+    @preparing("finding how much of the sky each place sees")
     def bake() -> NDArray[np.uint16]:
         baked = bake_occlusion(device, head, atlas, lit, texels, side)
         levels: NDArray[np.uint16] = np.rint(65535.0 * whole_map(baked, side)).astype(np.uint16)

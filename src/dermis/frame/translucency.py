@@ -18,6 +18,7 @@ from dermis.frame.passes.translucency_points import RECEIVER_BYTES, SOURCE_BYTES
 from dermis.frame.passes.translucency_weights import source_level, weighing
 from dermis.gpu import Device, Memo, make_texture, scratch, upload
 from dermis.gpu.program import Resources
+from dermis.preparing import preparing
 
 Floats = NDArray[np.float64]
 _WIDTHS_TO_DOUBLE, _LEAST_SHARED_MM = 2, 0.5
@@ -56,6 +57,7 @@ def shared_width(widest_mm: float) -> float:
     return float(2.0 ** (step / _WIDTHS_TO_DOUBLE))
 
 
+@preparing("finding the thin parts")
 def find_pairs(
     device: Device, surface: Resources, atlas: Atlas, cells: Cells, tables: CellTables
 ) -> PairBuffers:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import get_args
@@ -39,6 +39,7 @@ _RANGES = {
 }
 _MOST_WEIGHT = 2.0  # of a published target
 _NONE: Mapping[str, float] = MappingProxyType({})
+Levels = int | Callable[[Head], int]
 
 
 @dataclass(frozen=True)
@@ -96,12 +97,12 @@ class Human:
         """
         return cls(**drawn(seed))
 
-    def head(self, maps: Maps | None = None, layout: Layout = "own", subdivide: int = 1) -> Head:
+    def head(self, maps: Maps | None = None, layout: Layout = "own", subdivide: Levels = 1) -> Head:
         """The person at rest, with expressions and bones to move by.
 
         maps : those of the skin; painted as `look` says when left out
         layout : "own" has most room for the face; "hm08" is the published one, which MakeHuman's skins fit
-        subdivide : levels of Catmull and Clark's subdivision, 0 to 3
+        subdivide : levels of Catmull and Clark's subdivision, 0 to 3, or what finds them for the head
 
         Raises DermisError for targets that nobody knows.
         """
@@ -112,7 +113,7 @@ class Human:
         plain = human_head(self.weights(), painted, layout, self.iris)
         head = subdivide_head(plain, subdivide)
         mean_mm = control_mm(_MEAN.weights()).astype(np.float64)
-        return groomed(head, plain, mean_mm, subdivide, self.hairdo, self.look.recession)
+        return groomed(head, plain, mean_mm, head.levels, self.hairdo, self.look.recession)
 
     def on(self, head: Head) -> Head:
         """The head of another person with this one's skin and eyes.

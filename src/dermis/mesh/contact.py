@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.mesh.eyeball import SCLERA_MM, apex_mm, clearance_mm
+from dermis.summary import Summarised
 
 Doubles = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 
-@dataclass(frozen=True, eq=False)
-class Contact:
+@dataclass(frozen=True, eq=False, repr=False)
+class Contact(Summarised):
     """Control points that stay off the eyeballs of a head, cornea included, wherever these look.
 
     point : (n,) control points of lids

@@ -7,19 +7,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.mesh.eye_limits import LIMITS
 from dermis.mesh.eyeball import SCLERA_MM, apex_mm
 from dermis.mesh.rig import Motion, Rig
 from dermis.quantities import check_numbers
+from dermis.summary import Summarised
 
 Doubles = NDArray[np.float64]
-
-PUPIL_MM = 1.0, 4.0
-_RANGES = {
-    "eumelanin": (0.0, 1.0),
-    "pupil_mm": PUPIL_MM,
-    "redness": (0.0, 1.0),
-    "seed": (0, 2**32 - 1),
-}
 
 
 @dataclass(frozen=True)
@@ -38,11 +32,11 @@ class EyeLook:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        check_numbers(self, _RANGES, "eyes: ")
+        check_numbers(self, LIMITS, "eyes: ")
 
 
-@dataclass(frozen=True)
-class Eyes:
+@dataclass(frozen=True, repr=False)
+class Eyes(Summarised):
     """The eyeballs of a head, in their true shape: a ball with a cornea, see mesh/eyeball.py.
 
     apex, back, side : (k,) control points of each: the cornea's apex, the one opposite, one of the equator to

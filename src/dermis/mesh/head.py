@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +16,7 @@ from dermis.mesh.strands import Strands
 _CROWN_TO_CENTRE_MM = 120.0  # half the height of an adult head
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Head:
     """A mesh in mm with its maps.
 
@@ -27,6 +27,7 @@ class Head:
     strands : its brows and lashes, None for none
     hair : of head and beard, in no order: from afar the first few, wider, stand for all; None for none
     note : what could not be made of its file, and why; empty for nothing
+    levels : of subdivision that its mesh has come through
     """
 
     name: str
@@ -38,6 +39,17 @@ class Head:
     strands: Strands | None = None
     hair: Strands | None = None
     note: str = ""
+    levels: int = 0
+
+    def __repr__(self) -> str:
+        """Name, size, maps and what moves it, on two lines."""
+        maps = [one.name for one in fields(Maps) if getattr(self.maps, one.name) is not None]
+        told = [f"maps: {', '.join([*maps, *(['painted'] if self.maps.painted else [])]) or 'none'}"]
+        counts = {"targets": len(self.targets), "bones": len(self.bones)}
+        told += [f"{count} {name}" for name, count in counts.items() if count]
+        told += [name for name in ("eyes", "strands", "hair") if getattr(self, name) is not None]
+        size = f"{len(self.mesh.triangles):,} triangles at level {self.levels} of subdivision"
+        return f"<Head {self.name!r}: {size}\n {'; '.join(told)}>"
 
     @cached_property
     def control(self) -> Rig:

@@ -23,6 +23,7 @@ from dermis.mesh.joined import joined, taken
 from dermis.mesh.limits import MOST_BYTES
 from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.rigging import build_rig, part_points
+from dermis.preparing import preparing
 from dermis.reading import BROKEN, is_file, read_file, understood
 
 Origin = Literal["auto", "top", "bottom"]
@@ -51,6 +52,7 @@ def load_mesh(
     ).mesh
 
 
+@preparing("reading the mesh")
 def load_rigged(
     path: str | Path,
     *,

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from dermis.mesh.map_pixels import (
     plain_map,
     slope_map,
 )
+from dermis.summary import Summarised
 
 Load = Callable[[PathLike], NDArray[Any]]
 
@@ -34,8 +35,8 @@ _MEAN_TEXELS, _MOST_APART = 64, 16  # for means: fewest samples a side, largest 
 _FORM = 1  # increment when the same files give other maps
 
 
-@dataclass(frozen=True)
-class Maps:
+@dataclass(frozen=True, repr=False)
+class Maps(Summarised):
     """Maps of the skin, None where there is none. Row 0 is the top; sizes may differ from map to map.
 
     colour : (H, W, 3) linear Rec. 709 [-]
@@ -52,6 +53,8 @@ class Maps:
     specular: Floats | None = None
     roughness: Floats | None = None
     region: NDArray[np.uint8] | None = None
+    painted: ClassVar[bool] = False
+    """Whether the device paints those that are None."""
 
     @property
     def rough(self) -> bool:

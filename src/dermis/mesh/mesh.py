@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.mesh.outline import Outline, hull
+from dermis.summary import Summarised
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]
@@ -37,8 +38,8 @@ class Material:
     eye: bool = False
 
 
-@dataclass(frozen=True)
-class Mesh:
+@dataclass(frozen=True, repr=False)
+class Mesh(Summarised):
     """Triangles with attributes at corner vertices; Y up, face towards +Z, counter-clockwise is outside.
 
     A point on a uv seam has one corner vertex for each of its uvs; `point` is the same for all of them.

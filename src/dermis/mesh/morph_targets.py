@@ -8,12 +8,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.summary import Summarised
+
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]
 
 
-@dataclass(frozen=True, eq=False)
-class MorphTargets:
+@dataclass(frozen=True, eq=False, repr=False)
+class MorphTargets(Summarised):
     """Displacements of some of the points by name, target after target.
 
     names : (t,)

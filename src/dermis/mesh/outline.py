@@ -8,9 +8,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.summary import Summarised
 
-@dataclass(frozen=True, eq=False)
-class Outline:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Outline(Summarised):
     """Places of a shape beyond which, seen from wherever, none of it lies.
 
     places_mm : (n, 3)

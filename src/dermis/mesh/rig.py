@@ -15,6 +15,7 @@ from dermis.mesh.morph_targets import MorphTargets, no_targets
 from dermis.mesh.rig_outline import RigOutline, corners_of, outline_of, outline_points
 from dermis.mesh.skeleton import INFLUENCES, Skeleton
 from dermis.mesh.turns import rigid_motion
+from dermis.summary import Summarised
 
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
@@ -48,8 +49,8 @@ class Motion(NamedTuple):
     positions_mm: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class Stencils:
+@dataclass(frozen=True, eq=False, repr=False)
+class Stencils(Summarised):
     """Points of a subdivided mesh, each as a mean of some control points.
 
     first : (q + 1,) where the control points of each begin
@@ -89,8 +90,8 @@ class Carried(NamedTuple):
     points: Ints
 
 
-@dataclass(frozen=True, eq=False)
-class Rig:
+@dataclass(frozen=True, eq=False, repr=False)
+class Rig(Summarised):
     """The control points of a head and what moves them: morph targets first, then bones.
 
     positions_mm : (p, 3) the points at rest, before any subdivision, in the head's space

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from dermis.mesh.morph_targets import MorphTargets
 from dermis.mesh.outline import hull_points
 from dermis.mesh.skeleton import Floats, Skeleton
+from dermis.summary import Summarised
 
 Index = NDArray[np.intp]
 
@@ -33,8 +34,8 @@ _ACTIVE = 0.3  # share of the targets
 _FOLLOWS = 0.02  # least weight
 
 
-@dataclass(frozen=True, eq=False)
-class RigOutline:
+@dataclass(frozen=True, eq=False, repr=False)
+class RigOutline(Summarised):
     """Some of a rig's points, with all that moves them, dense; points are columns.
 
     rest_mm : (4, s) with a 1 below each

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.mesh.turns import angles_matrix
+from dermis.summary import Summarised
 
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
@@ -21,8 +22,8 @@ _STILL = np.eye(4)
 _FEW = 12
 
 
-@dataclass(frozen=True, eq=False)
-class Skeleton:
+@dataclass(frozen=True, eq=False, repr=False)
+class Skeleton(Summarised):
     """Bones, parents before children, and the points that follow them.
 
     names : (b,)

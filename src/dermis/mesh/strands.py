@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.mesh.mesh import Floats, Ints, Mesh
+from dermis.summary import Summarised
 
 Doubles = NDArray[np.float64]
 _LEAST = 1e-9
@@ -25,8 +26,8 @@ class Roots(NamedTuple):
     place: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class Strands:
+@dataclass(frozen=True, eq=False, repr=False)
+class Strands(Summarised):
     """Hairs, thin round fibres through knots.
 
     roots : where each begins

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ from dermis.mesh.mesh import Mesh
 from dermis.mesh.quads import halves, polygons
 from dermis.mesh.rig import Stencils
 from dermis.mesh.subdivision_rules import Cage, catmull_clark_limit, refine_catmull_clark, refine_loop
+from dermis.preparing import preparing
 
 MAX_LEVELS = 3
 _FORM = "subdivision 1"  # raise when weights or corners change for the same mesh
@@ -29,17 +31,19 @@ class Subdivided(NamedTuple):
     stencils: Stencils | None
 
 
-def subdivide_head(head: Head, levels: int) -> Head:
+def subdivide_head(head: Head, levels: int | Callable[[Head], int]) -> Head:
     """The head on a finer mesh; what moved its points now moves the control points of that mesh.
 
     head : not subdivided yet
-    levels : 0 to 3
+    levels : 0 to 3, or what finds them for the head
     """
+    levels = levels(head) if callable(levels) else levels
     mesh, stencils = subdivide(head.mesh, levels)
     if stencils is None:
         return head
     strands, hair = (part and part.refined(head.mesh, mesh, levels) for part in (head.strands, head.hair))
-    return replace(head, mesh=mesh, rig=replace(head.control, stencils=stencils), strands=strands, hair=hair)
+    rig = replace(head.control, stencils=stencils)
+    return replace(head, mesh=mesh, rig=rig, strands=strands, hair=hair, levels=int(levels))
 
 
 def subdivide(mesh: Mesh, levels: int) -> Subdivided:
@@ -81,6 +85,7 @@ def _kept(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
     return cached_arrays(sources, f"{_FORM} {levels}", names, lambda: _refined(mesh, levels, by_quads))
 
 
+@preparing("subdividing the mesh")
 def _refined(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:
     """Corners of the finer faces, and weights of control points, row after row as `Stencils` have them."""
     alone = mesh.triangles.astype(np.int64).ravel(), np.full(len(mesh.triangles), 3), mesh.material

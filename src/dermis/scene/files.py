@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,7 +15,7 @@ from dermis.reading import is_file, named_path, read_toml
 from dermis.scene.camera import PRESETS, Camera, preset
 from dermis.scene.environment import Environment
 from dermis.scene.findings import ImpossibleError
-from dermis.scene.head_table import NO_REGIONS, HeadTable, names_regions
+from dermis.scene.head_table import AUTO, NO_REGIONS, HeadTable, names_regions
 from dermis.scene.heads import load_head
 from dermis.scene.lights import LIGHTS, NO_LIGHTS, Light, light_presets, preset_lights
 from dermis.scene.model import Scene
@@ -24,6 +25,7 @@ from dermis.scene.pose_table import PoseTable
 from dermis.scene.settings import Settings
 from dermis.scene.skin import PRESETS as SKINS
 from dermis.scene.skin import Skin
+from dermis.scene.smoothness import SmoothIn
 
 P = TypeVar("P", bound=Plain)
 _PARTS = {"head", "pose", "skin", "lights", "environment", "camera", "render"}
@@ -46,7 +48,13 @@ def load_camera(name: str | Path, head: Head) -> Camera:
     return _made(Camera, name, "camera", table)
 
 
-def load_scene(path: str | Path, known: Head | None = None) -> tuple[Scene, Settings]:
+def load_scene(
+    path: str | Path,
+    known: Head | None = None,
+    *,
+    camera: str | None = None,
+    size: tuple[int, int] | None = None,
+) -> tuple[Scene, Settings]:
     """Scene and settings of a TOML file; what it leaves out keeps its default.
 
     Tables: [head] (file or sample under `name`, the options of `load_head`, and `regions`, a table as for
@@ -55,6 +63,7 @@ def load_scene(path: str | Path, known: Head | None = None) -> tuple[Scene, Sett
     scene's folder. With an environment there are no other lights unless the file names some.
 
     known : the head of the file's [head], when the caller has it already
+    camera, size : of the picture that the head is subdivided for, in place of the file's own
     """
     path = named_path(path, "a scene in TOML")
     table = _read(path, "a scene in TOML")
@@ -64,10 +73,13 @@ def load_scene(path: str | Path, known: Head | None = None) -> tuple[Scene, Sett
     settings = _made(Settings, path, "render", table.get("render", {}))
     described = _made(HeadTable, path, "head", table.get("head"))
     _check_said_once(path, described, skin)
-    head, skin = (known, skin) if known else head_and_skin(described, skin, path.parent)
+    told = table.get("camera", "portrait")
+    seen = partial(_camera, path, told) if camera is None else partial(load_camera, camera)
+    picture = SmoothIn(seen, size or settings.size)
+    head, skin = (known, skin) if known else head_and_skin(described, skin, path.parent, picture)
     environment = _environment(path, table["environment"]) if "environment" in table else None
     pose = _pose(path, table["pose"], head) if "pose" in table else None
-    lights, camera = table.get("lights"), table.get("camera", "portrait")
+    lights = table.get("lights")
     if lights is None:
         lights = "studio" if environment is None else NO_LIGHTS
     return Scene(
@@ -76,9 +88,7 @@ def load_scene(path: str | Path, known: Head | None = None) -> tuple[Scene, Sett
         if isinstance(lights, str)
         else _lights(path, lights),
         environment=environment,
-        camera=load_camera(_beside(path.parent, camera), head)
-        if isinstance(camera, str)
-        else _made(Camera, path, "camera", camera),
+        camera=_camera(path, told, head),
         skin=skin.model_copy(update={"profile": _beside(path.parent, skin.profile)}),
         pose=pose,
     ), settings
@@ -95,10 +105,13 @@ def with_whole_names(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     return {**table} | {role: str(file.resolve()) for role, file in named.items() if is_file(file)}
 
 
-def head_and_skin(table: HeadTable, skin: Skin, folder: Path) -> tuple[Head, Skin]:
+def head_and_skin(
+    table: HeadTable, skin: Skin, folder: Path, picture: SmoothIn | None = None
+) -> tuple[Head, Skin]:
     """The head of a [head] table, and the skin with the mean strength that a table of regions gives it.
 
     folder : where the files lie that the table names
+    picture : that the head is subdivided for, where the table does not say how often
 
     Raises DermisError for files that cannot be used.
     """
@@ -107,6 +120,8 @@ def head_and_skin(table: HeadTable, skin: Skin, folder: Path) -> tuple[Head, Ski
     if regions is not None:
         options["regions"] = NO_REGIONS
     options |= {role: folder / options[role] for role in _MAPS if role in options}
+    if picture is not None and table.subdivide == AUTO:
+        options["subdivide"] = picture
     head = load_head(_beside(folder, table.name), **options)
     if regions is None:
         return head, skin
@@ -127,6 +142,12 @@ def _check_said_once(path: Path, table: HeadTable, skin: Skin) -> None:
     if names_regions(vars(table)) and "rho_s" in skin.model_fields_set:
         came = "it came beside the head's regions, which say it for each region"
         refuse(f"{path}: skin: rho_s", "one or the other", came, "Leave one out, or use oiliness")
+
+
+def _camera(path: Path, told: Any, head: Head) -> Camera:
+    if isinstance(told, str):
+        return load_camera(_beside(path.parent, told), head)
+    return _made(Camera, path, "camera", told)
 
 
 def _pose(path: Path, table: Any, head: Head) -> Pose:

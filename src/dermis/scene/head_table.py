@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import Field
 
-from dermis.scene.findings import Because
+from dermis.mesh.eye_limits import LIMITS
+from dermis.scene.findings import Because, Words
 from dermis.scene.plain import Plain
 
 _Relief = Annotated[
@@ -21,22 +22,32 @@ _Unit = Annotated[
 VOrigin = Literal["auto", "top", "bottom"]
 Up = Literal["y", "z"]
 NormalY = Literal["up", "down"]
-AUTO, NO_REGIONS = "auto", "none"
+AUTO: Final = "auto"
+NO_REGIONS = "none"
 Eyes = Literal["fitted", "plain"]
+if TYPE_CHECKING:
+    _Levels = int | Literal["auto"]
+else:
+    _Levels = Annotated[int, Field(ge=0, le=3), Because("each has four times the triangles"), Words(AUTO)]
+
+
+def _within(name: str) -> Any:
+    low, high = LIMITS[name]
+    return Field(ge=low, le=high)
 
 
 class EyeTable(Plain):
     """What replaces the look of a head's eyes; None leaves their own."""
 
-    eumelanin: Annotated[float | None, Field(ge=0, le=1)] = None
+    eumelanin: Annotated[float | None, _within("eumelanin")] = None
     """Of the iris, from none, which leaves it blue, to the darkest brown."""
-    pupil_mm: Annotated[float | None, Field(ge=1, le=4), Because("mm: pupils in glare and in the dark")] = (
+    pupil_mm: Annotated[float | None, _within("pupil_mm"), Because("mm: pupils in glare and in the dark")] = (
         None
     )
     """Radius of the pupil [mm]."""
-    redness: Annotated[float | None, Field(ge=0, le=1)] = None
+    redness: Annotated[float | None, _within("redness")] = None
     """Of the white of the eye."""
-    seed: Annotated[int | None, Field(ge=0, le=2**32 - 1), Because("32 bits")] = None
+    seed: Annotated[int | None, _within("seed"), Because("32 bits")] = None
     """Which fibres and vessels."""
 
 
@@ -66,15 +77,18 @@ class HeadTable(Plain):
     normal_y: NormalY = "up"
     """Way in which green points in the normal map: "up" (OpenGL) or "down" (DirectX)."""
     opaque: tuple[str, ...] = ()
-    """Groups of the file that are not skin, whatever they are called."""
+    """Groups of the file to draw as plain surfaces, which light does not enter, such as teeth or clothes.
+    Needed where no group has skin in its name, as all are skin then; where one has, all others are opaque
+    already. Two balls whose groups are called eyes become the package's eyes without it."""
     eyes: Eyes = "fitted"
     """Eyeballs of a file (groups called eyes, Eye_L, cornea ...): replaced by the package's, or plain."""
     eye_groups: tuple[str, ...] = ()
     """Groups of the file that hold eyeballs, whatever they are called, be it with all of the head."""
     eye: EyeTable | None = None
     """What the eyes look like, where it is not as usual."""
-    subdivide: Annotated[int, Field(ge=0, le=3), Because("each has four times the triangles")] = 0
-    """Levels of subdivision: Catmull-Clark for a file of quads (.obj, .ply), else Loop."""
+    subdivide: _Levels = AUTO
+    """Levels of subdivision: Catmull-Clark for a file of quads (.obj, .ply), else Loop; "auto" for as many as
+    the outline needs to look smooth in a picture of this size from this camera."""
     regions: str = AUTO
     """Roughness and strength by region of the face: "auto" has the package's values where it knows the head
     and no map says the roughness, "none" has one value for all; "default" names the package's table (an

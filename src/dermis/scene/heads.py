@@ -22,9 +22,11 @@ from dermis.mesh.maps import Maps, load_maps
 from dermis.mesh.obj_maps import obj_maps
 from dermis.mesh.samples import SAMPLES, Sample, fetch
 from dermis.mesh.subdivide import subdivide_head
+from dermis.preparing import preparing
 from dermis.reading import is_file
 from dermis.scene.head_checks import check_given, check_options, check_relief, named
 from dermis.scene.head_table import AUTO, Eyes, NormalY, Up, VOrigin
+from dermis.scene.smoothness import Levels, Subdivide, chosen_levels
 
 if TYPE_CHECKING:
     from dermis.human.person import Human
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
 MapFile = str | os.PathLike[str] | None
 HUMAN = "human"
 _LONGEST_SEED = 20  # digits
+LEAST_OF_PEOPLE = 1  # levels of subdivision
 REPLACED = ("bust", "bust_many_charts")
 """Heads that the package had before `HUMAN`."""
 
@@ -53,7 +56,7 @@ def load_head(
     eyes: Eyes = "fitted",
     eye_groups: Sequence[str] | str = (),
     eye: Mapping[str, float] | None = None,
-    subdivide: int = 0,
+    subdivide: Subdivide = AUTO,
     regions: Literal["auto", "none"] = "auto",
 ) -> Head:
     """The parametric human ("human"), a sample ("lee_perry_smith") or a file (.glb, .gltf, .obj, .ply).
@@ -69,13 +72,15 @@ def load_head(
     v_origin : which row of the maps v = 0 is; the format's rule when "auto"
     up : the file's upward axis
     normal_y : way in which green points in the normal map: "up" (OpenGL) or "down" (DirectX)
-    opaque : groups of the file that are not skin, whatever they are called
+    opaque : groups of the file that light does not enter, beside those that are not called skin where one is;
+        two balls that are called eyes get the package's eyes without it
     eyes : "fitted" puts the package's own eyes where a file has two balls called so, see `with_fitted_eyes`;
         "plain" keeps the file's
     eye_groups : groups of the file that hold eyeballs, whatever they are called, be it with all of the head
     eye : what the eyes look like where it is not as usual: fields of `EyeLook`
     subdivide : levels of subdivision, 0 to 3: Catmull-Clark for a file of quads, else Loop; the human has one
-        at least
+        at least. "auto" for as many as its outline needs to look smooth in a portrait of 1024x1024,
+        `SmoothIn(camera, size)` for another picture
     regions : "auto" for gloss by region of the face where the package knows the head and no map says the
         roughness; "none" for one roughness all over
 
@@ -88,12 +93,12 @@ def load_head(
     own |= {"specular": specular, "roughness": roughness}
     check_given(own, unit_mm=unit_mm, height_mm=height_mm)
     told: dict[str, Any] = {"unit_mm": unit_mm, "v_origin": v_origin, "up": up, "opaque": opaque}
-    told["eye_groups"] = eye_groups
+    told["eye_groups"], levels = eye_groups, chosen_levels(subdivide)
     others = {"height_mm": height_mm, "normal_y": normal_y, "eyes": eyes, "eye": eye}
-    check_options(**told, **others, subdivide=subdivide, regions=regions)
+    check_options(**told, **others, subdivide=AUTO if callable(subdivide) else subdivide, regions=regions)
     told |= {"opaque": tuple(opaque), "eye_groups": tuple(eye_groups)}
-    if name == HUMAN or name.startswith(f"{HUMAN}:") or path.suffix.lower() == ".json":
-        return _with_look(_human(name, own, height_mm, normal_y, told | {"eyes": eyes}, subdivide), eye)
+    if is_person(name):
+        return _with_look(_human(name, own, height_mm, normal_y, told | {"eyes": eyes}, levels), eye)
     sample, files = SAMPLES.get(name), dict[str, Any]()
     if sample is not None:
         _check_kind(sample)
@@ -119,15 +124,20 @@ def load_head(
     if notice:
         notify(notice)
     thanks = f"{sample.attribution}, {sample.licence}" if sample else ""
-    made = _subdivided(Head(name, rigged.mesh, maps, thanks, rigged.rig), subdivide)
+    made = _subdivided(Head(name, rigged.mesh, maps, thanks, rigged.rig), levels)
     made = with_usual_regions(made) if regions == AUTO else made
     return _with_look(with_fitted_eyes(made, rigged.mesh) if eyes == "fitted" else made, eye)
 
 
-def _subdivided(head: Head, levels: int) -> Head:
+def is_person(name: str) -> bool:
+    """Whether a head's name is that of the parametric human, or of a file of its numbers."""
+    return name == HUMAN or name.startswith(f"{HUMAN}:") or Path(name).suffix.lower() == ".json"
+
+
+def _subdivided(head: Head, levels: Levels) -> Head:
     """The head on a finer mesh; sequences of files have places for the file's own vertices."""
     made = subdivide_head(head, levels)
-    if levels and made.rig is not None:
+    if made.levels and made.rig is not None:
         return replace(made, rig=replace(made.rig, corner=head.mesh.point))
     return made
 
@@ -179,13 +189,14 @@ def _check_kind(sample: Sample) -> None:
         refuse(sample.name, "a head", f"this sample is an {sample.kind}", hint)
 
 
+@preparing("making the person")
 def _human(
     name: str,
     maps: dict[str, MapFile],
     height_mm: float | None,
     normal_y: NormalY,
     told: dict[str, Any],
-    subdivide: int,
+    levels: Levels,
 ) -> Head:
     """The parametric human, in its own layout.
 
@@ -199,7 +210,11 @@ def _human(
     check_relief(height_mm, maps["height"])
     given: dict[str, Any] = {role: file for role, file in maps.items() if file is not None}
     loaded = load_maps(**given, height_mm=height_mm, normal_y=normal_y) if given else None
-    made = _person(name).head(subdivide=subdivide or 1)
+    made = _person(name).head(
+        subdivide=(lambda plain: max(LEAST_OF_PEOPLE, levels(plain)))
+        if callable(levels)
+        else levels or LEAST_OF_PEOPLE
+    )
     own = {role: getattr(loaded, role) for role in given}  # all others are painted
     return replace(made, name=name, maps=replace(made.maps, **own))
 

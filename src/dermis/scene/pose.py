@@ -14,6 +14,7 @@ from dermis.errors import DermisError, refuse, shown_value
 from dermis.mesh.rig import Motion, Rig
 from dermis.mesh.skeleton import Skeleton
 from dermis.quantities import number, numbers
+from dermis.summary import Summarised
 
 MOST_WEIGHT = 100.0
 MOST_DEGREES = 1e5
@@ -26,8 +27,8 @@ _FLAT = 1e-9  # determinant over size cubed
 Doubles = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Pose:
+@dataclass(frozen=True, eq=False, repr=False)
+class Pose(Summarised):
     """Weights of morph targets, turns of bones, or places of all points.
 
     weights : of targets by name, mostly 0 to 1; those that are left out keep the weight that they rest with

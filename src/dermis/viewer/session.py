@@ -169,11 +169,11 @@ def apply_regions(state: ViewerState, name: str, known: Iterable[ViewerState] = 
         refuse(
             "regions", "a head from a file or a sample", "it was made in memory", "Write it to a file first"
         )
-    wanted = {key: value for key, value in state.head.items() if key != "regions"}
+    wanted = {key: value for key, value in state.table.items() if key != "regions"}
     if name != AUTO:
         wanted["regions"] = name
     for other in known:
-        if dict(other.head) == wanted:
+        if dict(other.table) == wanted:
             return state.with_head(other.scene.head, wanted, other.scene.skin.rho_s)
     head, skin = head_and_skin(HeadTable(**wanted), Skin(), Path())
     return state.with_head(head, wanted, skin.rho_s)

@@ -54,6 +54,11 @@ class ViewerState:
     chart: Chart = field(default_factory=Chart)
     seconds: float = 0.0
 
+    @property
+    def table(self) -> Mapping[str, Any]:
+        """The [head] table with the levels of subdivision that were found; empty for one made in memory."""
+        return self.head and {"subdivide": self.scene.head.levels, **self.head}
+
     def with_skin(self, **fields: Any) -> ViewerState:
         """Change fields of the skin.
 
@@ -131,7 +136,7 @@ def same(a: ViewerState, b: ViewerState) -> bool:
     def rest(state: ViewerState) -> tuple[Any, ...]:
         scene = state.scene
         seen = tuple(scene.lights), scene.camera, scene.skin, scene.environment
-        return (*seen, state.settings, state.head, state.view, state.rig, state.chart, state.seconds)
+        return (*seen, state.settings, state.table, state.view, state.rig, state.chart, state.seconds)
 
     one, other = a.scene, b.scene
     return one.head is other.head and same_pose(one.pose, other.pose) and rest(a) == rest(b)
@@ -150,7 +155,7 @@ def save_state(path: Path, state: ViewerState) -> None:
     if not state.head:
         refuse(path, "a head from a file or a sample", "it was made in memory", "Write it to a file first")
     parts = state.view if state.view in PARTS else state.settings.parts
-    save_scene(path, state.scene, changed(state.settings, parts=parts), state.head)
+    save_scene(path, state.scene, changed(state.settings, parts=parts), state.table)
 
 
 def named_state(name: str) -> ViewerState:
@@ -189,7 +194,8 @@ def load_state(path: Path, before: ViewerState | None = None) -> ViewerState:
     Raises DermisError for a file that is not a scene.
     """
     table = head_table(path)
-    known = before.scene.head if before and before.head == table and not names_regions(table) else None
+    alike = before is not None and table in (before.head, before.table)
+    known = before.scene.head if before and alike and not names_regions(table) else None
     scene, described = load_scene(path, known)
     settings = Settings(**{**PHOTOGRAPHED, **described.model_dump(exclude_unset=True)})
     return opened(scene, settings, table, rig="" if scene.lights else NO_LIGHTS)

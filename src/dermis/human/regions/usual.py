@@ -13,10 +13,12 @@ from dermis.human.regions.labels import known_landmarks
 from dermis.human.regions.table import DEFAULT, load_table
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
+from dermis.preparing import preparing
 
 _FORM = 2  # increment when `with_regions` gives other maps for the same head
 
 
+@preparing("finding the regions of the face")
 def with_usual_regions(head: Head) -> Head:
     """The head with the package's table by region, where it knows the regions and no map says the roughness.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from dermis.human.skin.look import SkinLook
 from dermis.mesh.maps import Maps
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PaintedMaps(Maps):
     """Maps that the device paints by a look; those that are given replace what it paints.
 
@@ -21,6 +22,7 @@ class PaintedMaps(Maps):
     """
 
     look: SkinLook = field(default_factory=SkinLook)
+    painted: ClassVar[bool] = True
 
     @property
     def rough(self) -> bool:

@@ -20,6 +20,7 @@ from dermis.mesh.head import Head
 from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.quads import halves
 from dermis.mesh.rig import Stencils
+from dermis.preparing import preparing
 
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -46,6 +47,7 @@ class _Shape(NamedTuple):
     scale: float
 
 
+@preparing("fitting the eyes")
 def with_fitted_eyes(head: Head, coarse: Mesh | None = None) -> Head:
     """The head with the package's eyes where its file calls something eyes that is two balls.
 

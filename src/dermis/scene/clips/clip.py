@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from dermis.quantities import number
 from dermis.scene.pose import Pose
+from dermis.summary import Summarised
 
 _SHOWN = 8  # names in a note
 LONGEST_S = 86_400.0
@@ -21,8 +22,8 @@ def check_rate(culprit: object, rate: object) -> float:
     return number(culprit, rate, _SLOWEST, _FASTEST, "frames a second")
 
 
-@dataclass(frozen=True, eq=False)
-class Clip:
+@dataclass(frozen=True, eq=False, repr=False)
+class Clip(Summarised):
     """A motion that a file holds, for one head: `pose_at` gives its pose at any time.
 
     name : of the clip, else of its file

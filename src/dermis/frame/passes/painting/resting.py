@@ -12,6 +12,7 @@ from dermis.frame.passes import each, map_mips, program
 from dermis.frame.passes.painting.given import OWNER, SKIN, Given, key_of
 from dermis.gpu import Device, Frame, make_texture, upload
 from dermis.gpu.textures import download
+from dermis.preparing import preparing
 
 _FOLDER = "painted"
 _WORD = 4  # bytes
@@ -51,6 +52,7 @@ def resting(device: Device, given: Given, side: int, moving: bool = False) -> Re
     return made
 
 
+@preparing("painting the skin")
 def painted(device: Device, given: Given, side: int) -> Resting:
     """The maps, painted."""
     surface = given.surface

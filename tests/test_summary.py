@@ -1,0 +1,46 @@
+"""What heads and other data of many numbers print as."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+import dermis
+from dermis.human.person import Human
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.primitives import uv_sphere
+from dermis.summary import summary
+
+
+@pytest.fixture(scope="module")
+def person() -> Head:
+    return Human().head(subdivide=0)
+
+
+def test_a_head_tells_its_name_size_maps_and_what_moves_it(person: Head) -> None:
+    first, second = repr(person).splitlines()
+    assert first == f"<Head 'human': {len(person.mesh.triangles):,} triangles at level 0 of subdivision"
+    assert second.split("; ")[:3] == [" maps: painted", "52 targets", "10 bones"]
+    ball = Head("ball", uv_sphere(120.0), Maps(colour=np.zeros((512, 512, 3), np.float32)))
+    assert repr(ball).splitlines()[1] == " maps: colour>"
+
+
+def test_nothing_that_a_head_holds_prints_its_numbers(person: Head) -> None:
+    pose = dermis.Pose({f"target {k}": 1.0 for k in range(99)}, positions_mm=person.positions_mm)
+    rig = person.control
+    parts = [getattr(person, one.name) for one in fields(person)]
+    for thing in (person, pose, rig, rig.targets, rig.skeleton, rig.contact, rig.outline, *parts):
+        assert len(repr(thing)) < 500
+    assert "int32" in repr(person.mesh)
+    assert "float32[" in repr(pose)
+
+
+def test_short_values_print_as_they_are() -> None:
+    assert summary((1, 2)) == "(1, 2)"
+    assert summary("a name") == "'a name'"
+    assert summary(list(range(1000))) == "<1,000 in a list>"
+    assert summary(np.zeros((3, 2))) == "float64[3, 2]"
+    assert summary((np.zeros(9),)) == "<1 in a tuple>"
