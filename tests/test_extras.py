@@ -15,6 +15,7 @@ from small_head import write_head
 from dermis.errors import DermisError
 from dermis.extras import EXTRAS, needed
 from dermis.images.codecs import decode_with_pillow, encode_png
+from dermis.images.io import read_image
 
 SOURCE = Path(__file__).resolve().parents[1] / "src"
 ADAPTER = os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
@@ -52,6 +53,13 @@ def test_what_needs_an_extra_says_which(options: tuple[str, ...], extra: str, tm
     made = run(*options, folder=tmp_path)
     assert made.returncode == 2, made.stdout + made.stderr
     assert f"dermis[{extra}]" in " ".join(made.stderr.split()) and "Traceback" not in made.stderr
+
+
+def test_a_picture_that_needs_one_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "deep.png").write_bytes(encode_png(np.zeros((4, 4, 3), np.uint16)))
+    monkeypatch.setitem(sys.modules, "av", None)
+    with pytest.raises(DermisError, match=r"deep\.png: a picture with 16 bits of colour: expected .* av,"):
+        read_image(tmp_path / "deep.png")
 
 
 def test_each_extra_is_one_of_the_packages() -> None:

@@ -43,7 +43,7 @@ def numbers(
     DermisError : they have another shape, or one is no such number
     """
     try:
-        if _has_text(values):
+        if _has_text(values, len(shape)):
             raise TypeError
         found = np.asarray(values, np.float64)
         fits = found.ndim == len(shape) and bool(((low <= found) & (found <= high)).all())
@@ -74,11 +74,14 @@ def _within(value: object, low: float, high: float) -> int | float | None:
     return found if is_number and low <= found <= high else None
 
 
-def _has_text(values: Any) -> bool:
-    """Whether texts or truth values are among the values, which NumPy would read as numbers."""
-    if isinstance(values, list | tuple):
-        return any(_has_text(one) for one in values)
-    return isinstance(values, str | bytes | bool | np.bool_) or (
+def _has_text(values: Any, sides: int) -> bool:
+    """Whether texts or truth values are among the values, which NumPy would read as numbers.
+
+    sides : of the array that they should be; deeper lists count as text
+    """
+    if sides and isinstance(values, list | tuple):
+        return any(_has_text(one, sides - 1) for one in values)
+    return isinstance(values, list | tuple | str | bytes | bool | np.bool_) or (
         isinstance(values, np.ndarray) and values.dtype.kind not in "iuf"
     )
 

@@ -79,7 +79,8 @@ def _take(kind: Kind, plan: Plan, folder: Path, idle: int) -> None:
         printed = os.open(folder / _PRINTED, os.O_WRONLY | os.O_CREAT)
         for target, source in enumerate((idle, printed, printed)):
             os.dup2(source, target)
-        sys.stdin, sys.stdout, sys.stderr = open(0), open(1, "w", 1), open(2, "w", 1)  # noqa: SIM115
+        sys.stdin, sys.stdout = open(0), open(1, "w", 1)  # noqa: SIM115
+        sys.stderr = open(2, "w", 1, errors="backslashreplace")  # noqa: SIM115
         os.chdir(folder)
         faulthandler.enable(all_threads=False)
         np.seterr(all="warn", under="ignore")  # as users have it, and not tests

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError
 from typing import Any
 
 import pytest
@@ -48,6 +49,16 @@ def test_healthy_machine_as_json(run: Run, opened: None, device: Any) -> None:
     assert all(set(adapter["features"]) == set(WANTED_FEATURES) for adapter in report["adapters"])
     assert {"dermis", "wgpu", "numpy"} <= set(report["libraries"])
     assert "lee_perry_smith" in report["samples"]
+
+
+def test_sources_that_were_never_installed_have_no_version(
+    run: Run, opened: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unknown(name: str) -> str:
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr("dermis.cli.doctor.version", unknown)
+    assert set(json.loads(run("doctor", "--json").stdout)["libraries"].values()) == {"not installed"}
 
 
 def test_healthy_machine_in_words(run: Run, opened: None, device: Any) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from dermis.cli.console import print_json, print_lines
@@ -48,10 +48,18 @@ def examine(wanted: str) -> dict[str, Any]:
         "adapters": found,
         "python": platform.python_version(),
         "platform": platform.platform(),
-        "libraries": {name: version(name) for name in _LIBRARIES},
+        "libraries": {name: _version(name) for name in _LIBRARIES},
         "cache": str(cache_folder()),
         "samples": {name: cached(name) for name in SAMPLES},
     }
+
+
+def _version(name: str) -> str:
+    """Of a package; sources that were never installed have none."""
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "not installed"
 
 
 def _try_out(wanted: str) -> dict[str, Any]:

@@ -72,8 +72,8 @@ def _by_kind(path: str | Path | Picture, data: bytes, exr: _Codec, radiance: _Co
         return codec(data)
     except TooLargeError as fault:
         refuse(path, "a picture of as many pixels as 8192 x 8192 at most", str(fault), "Resize it")
-    except DermisError:
-        raise
+    except DermisError as fault:  # a package is missing
+        raise DermisError(f"{path}: {fault}") from fault
     except Exception as fault:  # decoders raise anything for damaged data
         raise DermisError(
             f"{path}: expected {_READABLE}, but it cannot be decoded ({outputs.reason(fault)}). "

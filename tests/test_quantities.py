@@ -1,0 +1,30 @@
+"""Numbers that callers and files give."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dermis.errors import DermisError
+from dermis.quantities import numbers
+
+
+def test_an_array_of_the_shape_is_taken() -> None:
+    assert np.array_equal(numbers("place", [[1, 2, 3]], (0, 3), -5, 5), [[1, 2, 3]])
+
+
+@pytest.mark.parametrize("values", [[["1"]], [[True]], [1, [2, 3]], "123", [[6.0]], [[float("nan")]]])
+def test_what_is_no_array_of_numbers_is_refused(values: object) -> None:
+    with pytest.raises(DermisError, match=r"place: expected n x 1 numbers from -5 to 5, but"):
+        numbers("place", values, (0, 1), -5, 5)
+
+
+def test_lists_without_end_are_refused() -> None:
+    nested: list[Any] = []
+    for _ in range(5000):
+        nested = [nested]
+    nested.append(nested)
+    with pytest.raises(DermisError, match="3 numbers"):
+        numbers("place", nested, (3,), -5, 5)
