@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import NoReturn
 
 _LONGEST_NAME, _LONGEST_TEXT = 300, 400  # letters of a message
@@ -13,6 +15,17 @@ class DermisError(Exception):
 
     The command line prints it without a traceback and exits with 2.
     """
+
+
+@contextmanager
+def about(culprit: object) -> Iterator[None]:
+    """Say of what is refused inside what it is about, unless that is said already."""
+    try:
+        yield
+    except DermisError as error:
+        if str(culprit) in str(error):
+            raise
+        raise DermisError(f"{culprit}: {error}") from error
 
 
 class DermisWarning(UserWarning):
@@ -31,7 +44,8 @@ def refuse(culprit: object, expected: str, came: str, remedy: str) -> NoReturn:
     expected, came, remedy : sentences without a full stop
     """
     named, what = shortened(str(culprit), _LONGEST_NAME), shortened(came, _LONGEST_TEXT)
-    raise DermisError(f"{named}: expected {expected}, but {what}. {remedy}.")
+    end = "" if remedy.endswith("?") else "."
+    raise DermisError(f"{named}: expected {expected}, but {what}. {remedy}{end}")
 
 
 def shown_value(value: object, most: int = 60) -> str:

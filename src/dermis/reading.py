@@ -50,6 +50,8 @@ def read_file(path: str | Path, expected: str, most: int, name: object = None) -
     except (OSError, ValueError, TypeError) as fault:  # a NUL in the name; what is no name
         reason = getattr(fault, "strerror", None) or str(fault)
         refuse(culprit, expected, f"it cannot be read ({reason})", "Check its name")
+    if data is None:
+        refuse(culprit, expected, "nothing can be read from it", "Copy its contents to a file first")
     if told > most or len(data) > most_now:
         came = f"it has {_megabytes(told)}" if told > most else "it grows while it is read"
         refuse(culprit, f"{expected} of at most {_megabytes(most)}", came, "Check its name or its size")

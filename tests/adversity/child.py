@@ -28,6 +28,7 @@ FORM = re.compile(r".+?: expected .+, but .+\. \S.+[.?]", re.DOTALL)
 _CACHE = "cache"
 _TOLD, _PRINTED = ".told.json", ".printed"
 _UNFINISHED = re.compile(r"\.dermis-|\.part$")
+_LIGHT = re.compile(r"light \d+$")  # of a preset, within a head that a file made too large
 _HELD = tuple(one for one in (*NAMES, *NUMBERS) if one.strip())
 _LOOK_S = 0.02
 _OWN = str(Path(__file__).parent)
@@ -110,6 +111,7 @@ def _of_refusal(refusal: DermisError, plan: Plan) -> tuple[str, str, str]:
     message = str(refusal)
     culprit = message.partition(": expected ")[0]
     names = any(one in culprit for one in plan["culprits"]) or _is_held(culprit.strip("'\""))
+    names |= bool(_LIGHT.match(culprit))
     if FORM.fullmatch(message) and (names or not plan["culprits"]):
         return case.REFUSED, "", message[:300]
     what = "names no file" if FORM.fullmatch(message) else "has another form"
@@ -121,7 +123,7 @@ def _is_held(culprit: str) -> bool:
     begin, shortened, _ = culprit.partition(" ... ")
     if shortened:
         return any(begin in one for one in _HELD)
-    return not culprit.strip() or culprit.endswith(_HELD)
+    return not culprit.strip() or culprit.endswith((*_HELD, *(one.replace("//", "/") for one in _HELD)))
 
 
 def _place(fault: BaseException) -> str:

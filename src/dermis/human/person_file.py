@@ -8,9 +8,10 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dermis.errors import DermisError, refuse, shown_value
+from dermis.errors import DermisError, about, refuse, shown_value
 from dermis.human.hair.look import HairLook
 from dermis.human.person import Human
+from dermis.human.published import check_targets
 from dermis.human.skin.look import SkinLook
 from dermis.mesh.eyes import EyeLook
 from dermis.outputs import replacing
@@ -46,7 +47,10 @@ def read_person(path: Path) -> Human:
         refuse(path, expected, "there is none", "Write one with dermis head -o person.json")
     parts: tuple[tuple[str, Any], ...] = (("skin", SkinLook), ("eyes", EyeLook), ("hair", HairLook))
     made = {name: _made(path, kind, person[name]) for name, kind in parts if person.get(name) is not None}
-    return _made(path, Human, person | made)
+    human = _made(path, Human, person | made)
+    with about(path):
+        check_targets(human.targets)
+    return human
 
 
 def _made(path: Path, kind: type[T], numbers: Any) -> T:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib import resources
 from typing import Any, NamedTuple
@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
+from dermis.errors import refuse, shown_value
 
 Points = NDArray[np.float64]
 
@@ -43,12 +43,9 @@ def places_mm(weights: Mapping[str, float]) -> Points:
     found, moved = data(), moves()
     points = [np.arange(len(found["positions_mm"]))]
     deltas: list[NDArray[np.floating]] = [found["positions_mm"].astype(np.float64)]
+    check_targets(weights)
     known = {name: index for index, name in enumerate(moved.names)}
     for name, weight in weights.items():
-        if name not in known:
-            close = [one for one in known if name.split("/")[-1] in one][:3]
-            hint = f"Did you mean {' or '.join(close)}?" if close else "List: dermis head --list-targets"
-            refuse(f"target {name!r}", "a published target", "there is none of this name", hint)
         part = slice(*moved.first[known[name] : known[name] + 2])
         points.append(moved.point[part])
         deltas.append(weight * moved.delta_mm[part])
@@ -56,6 +53,17 @@ def places_mm(weights: Mapping[str, float]) -> Points:
     places = np.stack([np.bincount(point, column) for column in delta.T], axis=1)
     eyes = [list(map(str, found["joint_names"])).index(name) for name in ("l-eye", "r-eye")]
     return np.asarray(places - places[count() :][eyes].mean(axis=0))
+
+
+def check_targets(names: Iterable[str]) -> None:
+    """Raises DermisError for a target that is not published."""
+    known = moves().names
+    for name in names:
+        if name not in known:
+            close = [one for one in known if name.split("/")[-1] in one][:3]
+            hint = f"Did you mean {' or '.join(close)}?" if close else "List: dermis head --list-targets"
+            came = "there is none of this name"
+            refuse(f"target {shown_value(name)}", "a published target", came, hint)
 
 
 def human_targets() -> tuple[str, ...]:

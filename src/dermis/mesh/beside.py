@@ -8,6 +8,8 @@ from urllib.parse import unquote
 from dermis.errors import refuse
 from dermis.reading import is_file
 
+_LONGEST = 4096  # characters of a path; some systems take their time to say so
+
 
 def beside(path: Path, name: str) -> Path | None:
     """The file of that name in the folder of `path` or below it; None for one that is elsewhere or nowhere.
@@ -37,6 +39,8 @@ def named_by_uri(path: Path, uri: str) -> Path:
 
 def _within(folder: Path, name: PureWindowsPath) -> Path | None:
     """The file's real place; None for what no file is called, and for what is not below the folder."""
+    if len(str(name)) > _LONGEST:
+        return None
     try:
         home = folder.resolve()
         file = home.joinpath(*name.parts).resolve()

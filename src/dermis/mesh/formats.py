@@ -157,9 +157,12 @@ def _part(mesh: Any, group: Group) -> Part:
     uv = getattr(mesh.visual, "uv", None)
     normals = mesh.vertex_normals if "vertex_normals" in mesh._cache else None
     triangles = np.array(mesh.faces, dtype=np.int64).reshape(-1, 3)
+    places = np.asarray(mesh.vertices, dtype=np.float64) + 0.0  # without -0
+    if places.ndim != 2 or places.shape[1] != 3:
+        raise ValueError(f"its vertices have {places.shape[-1]} coordinates, not 3")
     return Part(
         group,
-        np.asarray(mesh.vertices, dtype=np.float64) + 0.0,  # without -0
+        places,
         None if uv is None else fractions(np.asarray(uv)),
         None if normals is None else fractions(np.asarray(normals)) + 0.0,
         triangles,

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dermis.errors import refuse
+from dermis.errors import about, refuse
 from dermis.human.regions.apply import with_regions
 from dermis.human.regions.table import load_table
 from dermis.mesh.head import Head
@@ -76,7 +76,8 @@ def load_scene(
     told = table.get("camera", "portrait")
     seen = partial(_camera, path, told) if camera is None else partial(load_camera, camera)
     picture = SmoothIn(seen, size or settings.size)
-    head, skin = (known, skin) if known else head_and_skin(described, skin, path.parent, picture)
+    with about(path):
+        head, skin = (known, skin) if known else head_and_skin(described, skin, path.parent, picture)
     environment = _environment(path, table["environment"]) if "environment" in table else None
     pose = _pose(path, table["pose"], head) if "pose" in table else None
     lights = table.get("lights")

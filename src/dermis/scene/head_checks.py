@@ -47,8 +47,8 @@ def check_options(**options: Any) -> None:
         raise ImpossibleError("load_head", error.findings) from None
 
 
-def check_relief(height_mm: float | None, height: object) -> None:
+def check_relief(height_mm: float | None, height: object, culprit: str = "height_mm") -> None:
     """Refuse a length without the heights that it is for."""
     if height_mm is not None and height is None:
         came = f"{height_mm} came without a height map"
-        refuse("height_mm", "a height map with it", came, "Give the map too, or leave height_mm out")
+        refuse(culprit, "a height map with it", came, "Give the map too, or leave height_mm out")

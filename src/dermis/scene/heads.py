@@ -120,7 +120,7 @@ def load_head(
         rigged = load_rigged(path, **told)
         check_head_height(rigged.mesh, name, told["unit_mm"])
         maps, notice = reading.result()
-    check_relief(height_mm, maps.height)
+    check_relief(height_mm, maps.height, f"{name}: height_mm")
     if notice:
         notify(notice)
     thanks = f"{sample.attribution}, {sample.licence}" if sample else ""
@@ -210,11 +210,8 @@ def _human(
     check_relief(height_mm, maps["height"])
     given: dict[str, Any] = {role: file for role, file in maps.items() if file is not None}
     loaded = load_maps(**given, height_mm=height_mm, normal_y=normal_y) if given else None
-    made = _person(name).head(
-        subdivide=(lambda plain: max(LEAST_OF_PEOPLE, levels(plain)))
-        if callable(levels)
-        else levels or LEAST_OF_PEOPLE
-    )
+    found = levels if callable(levels) else lambda plain: levels
+    made = _person(name).head(subdivide=lambda plain: max(LEAST_OF_PEOPLE, found(plain)))
     own = {role: getattr(loaded, role) for role in given}  # all others are painted
     return replace(made, name=name, maps=replace(made.maps, **own))
 

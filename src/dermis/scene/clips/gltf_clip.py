@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.errors import about
 from dermis.mesh.curves import Curve
 from dermis.mesh.gltf.clips import Track, read_clip
 from dermis.mesh.head import Head
@@ -58,15 +59,16 @@ def load_gltf_clip(path: Path, head: Head, name: str | None) -> Clip:
     def sample(seconds: float) -> Pose:
         weights = np.zeros(len(targets))
         moved = None if rests is None else _Rests(*(one.copy() for one in rests))
-        for path, curve, columns, places in parts:
+        for moves, curve, columns, places in parts:
             values = curve.at(seconds)
-            if path == "weights":
+            if moves == "weights":
                 weights[places] = values[0, columns]
             elif moved is not None and places:
-                getattr(moved, path)[places] = values[columns]
+                getattr(moved, moves)[places] = values[columns]
         matrices = [] if moved is None else list(_matrices(moved))
         shares = dict(zip(targets, weights.tolist(), strict=True))
-        return Pose(shares, dict(zip(bones, matrices, strict=True)))
+        with about(path):
+            return Pose(shares, dict(zip(bones, matrices, strict=True)))
 
     times = [track.curve.times_s for track in clip.tracks]
     end, rate = max(float(one[-1]) for one in times), rate_of(max(times, key=len))
