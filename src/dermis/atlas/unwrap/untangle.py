@@ -48,7 +48,7 @@ def _even(places: Doubles, ends: Index, free: NDArray[np.bool_]) -> Doubles:
     n = len(places)
     both = np.vstack((ends, ends[:, ::-1]))
     links = csr_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(n, n))
-    matrix: Any = laplacian(links)
+    matrix: Any = laplacian(links).tocsr()  # which comes in another form, slow to index
     pull = matrix[free]
     moved = places.copy()
     moved[free] = spsolve(pull[:, free].tocsc(), -(pull[:, ~free] @ places[~free])).reshape(-1, 2)
