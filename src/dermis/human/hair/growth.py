@@ -66,7 +66,7 @@ def grown(
     """
     n, t = len(root_mm), np.linspace(0.0, 1.0, ways.shape[1])
     found = _astray(_between(root_mm, guide_mm, ways), normal, rough, rng)
-    found *= np.clip(1.0 + rough.uneven * rng.normal(size=n), 0.35, 1.4)[:, None, None]
+    found *= np.clip(1.0 + rough.uneven * rng.normal(size=n), 0.35, 1.2)[:, None, None]
     found = _tufted(root_mm, found, t, rough.tufts, rng)
     size = rough.frizz * np.linalg.norm(found[:, -1], axis=1)
     found = found + size[:, None, None] * _waves(n, t, rng)
@@ -99,14 +99,17 @@ def _astray(ways: Doubles, normal: Doubles, rough: Roughness, rng: np.random.Gen
 
 
 def _tufted(root_mm: Doubles, ways: Doubles, t: Doubles, much: float, rng: np.random.Generator) -> Doubles:
-    """Tips drawn to those of a few."""
+    """Hairs drawn together with those beside them, to their mean, so that none leads others astray."""
     from scipy.spatial import cKDTree
 
     _, first = np.unique(np.floor(root_mm / _TUFT_MM).astype(np.int64), axis=0, return_index=True)
     _, near = cKDTree(root_mm[first]).query(root_mm)
     apart = (root_mm + ways.transpose(1, 0, 2)).transpose(1, 0, 2)
     drawn = much * rng.uniform(0.3, 1.0, len(root_mm))[:, None, None] * (t**1.3)[None, :, None]
-    return np.asarray(ways + drawn * (apart[first[near]] - apart))
+    total = np.zeros((len(first), *ways.shape[1:]))
+    np.add.at(total, near, apart)
+    mean = total[near] / np.bincount(near, minlength=len(first))[near, None, None]
+    return np.asarray(ways + drawn * (mean - apart))
 
 
 def _waves(n: int, t: Doubles, rng: np.random.Generator) -> Doubles:
