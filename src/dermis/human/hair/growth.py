@@ -99,17 +99,14 @@ def _astray(ways: Doubles, normal: Doubles, rough: Roughness, rng: np.random.Gen
 
 
 def _tufted(root_mm: Doubles, ways: Doubles, t: Doubles, much: float, rng: np.random.Generator) -> Doubles:
-    """Hairs drawn together with those beside them, to their mean, so that none leads others astray."""
+    """Tips drawn to those of a few."""
     from scipy.spatial import cKDTree
 
     _, first = np.unique(np.floor(root_mm / _TUFT_MM).astype(np.int64), axis=0, return_index=True)
     _, near = cKDTree(root_mm[first]).query(root_mm)
     apart = (root_mm + ways.transpose(1, 0, 2)).transpose(1, 0, 2)
     drawn = much * rng.uniform(0.3, 1.0, len(root_mm))[:, None, None] * (t**1.3)[None, :, None]
-    total = np.zeros((len(first), *ways.shape[1:]))
-    np.add.at(total, near, apart)
-    mean = total[near] / np.bincount(near, minlength=len(first))[near, None, None]
-    return np.asarray(ways + drawn * (mean - apart))
+    return np.asarray(ways + drawn * (apart[first[near]] - apart))
 
 
 def _waves(n: int, t: Doubles, rng: np.random.Generator) -> Doubles:
