@@ -91,8 +91,8 @@ def test_rigs_are_those_asked_for() -> None:
     assert sorted(np.sign(light.target[0]) for light in ears) == [-1, 1]
     for light in ears:  # hair over the ears is left dark, or it would clip
         assert isinstance(light, SpotLight)
-        above, ear = np.array(light.target) + [0, 50, 0], np.array(light.target)
-        ways = above - light.position, ear - light.position
+        ear, up = np.array(light.target), np.array([0.0, 50.0, 0.0])
+        ways = ear + up - light.position, ear - light.position
         cosine = ways[0] @ ways[1] / np.prod([np.linalg.norm(way) for way in ways])
         assert np.degrees(np.arccos(cosine)) > light.outer_degrees
 
