@@ -168,6 +168,20 @@ def test_hairs_shade_the_skin_softly(renderer: Renderer) -> None:
     assert share[32:] == pytest.approx(1.0, abs=TWIN) and share[:17] == pytest.approx(1.0, abs=TWIN)
 
 
+@pytest.mark.parametrize("behind_mm", [20.0, 60.0])
+def test_hairs_behind_the_head_do_not_shade_its_front(renderer: Renderer, behind_mm: float) -> None:
+    """However far before the skin the hair lies that casts a shadow there."""
+    y = np.arange(-1.95, 2.0, 0.1)
+    ends = np.column_stack([np.full(40, -30.0), y, np.full(40, 25.0)])
+    far = ends - np.array([0.0, 0.2, 1.0]) * (25.0 + behind_mm)  # along the light
+    slanted = frontal(shadows=True).model_copy(update={"direction": (0.0, -0.2, -1.0)})
+    begins = ends[::4], np.concatenate([ends[::4], *9 * [far]])
+    heads = [hairy(each, each * [-1, 1, 1], 0.025, BLACK) for each in begins]
+    scenes = [replace(lit(head), lights=(slanted,)) for head in heads]
+    alone, both = (picture(renderer, scene, shadow_size=512)[..., 0] for scene in scenes)
+    assert both[:, 20] == pytest.approx(alone[:, 20], rel=0.05) and alone[:, 20].min() < 0.9 * alone.max()
+
+
 def test_hairs_follow_the_skin(renderer: Renderer) -> None:
     """A sheet that is moved and turned takes its hairs with it."""
     head = one(0.4)

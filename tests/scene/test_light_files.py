@@ -14,6 +14,7 @@ from dermis.scene import (
     RectangleLight,
     Scene,
     SphereLight,
+    SpotLight,
     StripeLight,
     load_lights,
     load_scene,
@@ -88,6 +89,12 @@ def test_rigs_are_those_asked_for() -> None:
     assert max(max(light.irradiance) for light in load_lights("rim")) < np.pi  # white skin is not clipped
     ears = [light for light in load_lights("backlit") if light.position[2] < 0]
     assert sorted(np.sign(light.target[0]) for light in ears) == [-1, 1]
+    for light in ears:  # hair over the ears is left dark, or it would clip
+        assert isinstance(light, SpotLight)
+        ear, up = np.array(light.target), np.array([0.0, 50.0, 0.0])
+        ways = ear + up - light.position, ear - light.position
+        cosine = ways[0] @ ways[1] / np.prod([np.linalg.norm(way) for way in ways])
+        assert np.degrees(np.arccos(cosine)) > light.outer_degrees
 
 
 def test_an_environment_replaces_the_lights_that_are_not_named(folder: Path) -> None:

@@ -20,7 +20,7 @@ TILE = 8
 """Pixels along a side of the tiles that hairs are listed in."""
 _WAYS = 64  # chains of a tile on GPUs: one for each pixel's invocation to follow
 _FINE_WINDOW, _WINDOW = 256, 288  # texels across what hairs hold back of a light, half as many down
-_LAYERS = 5  # of depth there
+_LAYERS = 6  # of depth there
 _HEAD_WORDS = 8  # before them
 _LINKS_OF_PIECE = 4  # for hairs in no more than a few tiles
 _MOST_LINKS = 1 << 22

@@ -30,8 +30,10 @@ fn add(layer: i32, texel: vec2i, cover: f32, depth: f32) {
         return;
     }
     let behind = depth - f32(atomicLoad(&splatted[word])) / DEEP;
-    let which = min(u32(layers_before(behind)), HAIR_LAYERS - 1u);
-    atomicAdd(&splatted[word + 1u + which], u32(cover * DENSE + 0.5));
+    let which = u32(layers_before(behind));
+    if (which < HAIR_LAYERS) { // what lies behind them all is on the head's other side, and would darken this one
+        atomicAdd(&splatted[word + 1u + which], u32(cover * DENSE + 0.5));
+    }
 }
 
 fn splat(light: Light, a: vec4f, b: vec4f, wider: f32) {

@@ -66,7 +66,7 @@ def grown(
     """
     n, t = len(root_mm), np.linspace(0.0, 1.0, ways.shape[1])
     found = _astray(_between(root_mm, guide_mm, ways), normal, rough, rng)
-    found *= np.clip(1.0 + rough.uneven * rng.normal(size=n), 0.35, 1.4)[:, None, None]
+    found *= np.clip(1.0 + rough.uneven * rng.normal(size=n), 0.35, 1.2)[:, None, None]
     found = _tufted(root_mm, found, t, rough.tufts, rng)
     size = rough.frizz * np.linalg.norm(found[:, -1], axis=1)
     found = found + size[:, None, None] * _waves(n, t, rng)
