@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NoReturn
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from dermis.errors import refuse, shown_value
+
+if TYPE_CHECKING:  # loading it takes longer than all of --help
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 def number(culprit: object, value: object, low: float, high: float, why: str = "") -> float:
@@ -42,6 +43,8 @@ def numbers(
 
     DermisError : they have another shape, or one is no such number
     """
+    import numpy as np
+
     try:
         if _has_text(values, len(shape)):
             raise TypeError
@@ -69,6 +72,8 @@ def check_numbers(owner: object, ranges: Mapping[str, tuple[float, float]], pref
 
 def _within(value: object, low: float, high: float) -> int | float | None:
     """The value as Python's number; None for what is none, or not in the range."""
+    import numpy as np
+
     found: Any = value.item() if isinstance(value, np.generic | np.ndarray) and value.ndim == 0 else value
     is_number = isinstance(found, int | float) and not isinstance(found, bool)
     return found if is_number and low <= found <= high else None
@@ -79,6 +84,8 @@ def _has_text(values: Any, sides: int) -> bool:
 
     sides : of the array that they should be; deeper lists count as text
     """
+    import numpy as np
+
     if sides and isinstance(values, list | tuple):
         return any(_has_text(one, sides - 1) for one in values)
     return isinstance(values, list | tuple | str | bytes | bool | np.bool_) or (

@@ -79,7 +79,7 @@ def peers(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(peers, "blender_python", lambda: Path("python"))
     monkeypatch.setattr(peers, "version", lambda name: "1.0")
     monkeypatch.setattr(peers, "QUICK", peers_measured.Plan(SIDE, (4, 64), 16, 3))
-    monkeypatch.setattr(dermis, "load_head", lambda name: BALL)
+    monkeypatch.setattr(dermis, "load_head", lambda name, subdivide: BALL)
     monkeypatch.setattr(dermis, "Renderer", FakeRenderer)
     return peers
 

@@ -84,7 +84,7 @@ def test_no_curve_leaves_its_panel(m: float) -> None:
         (("head.obj", "--size", "wide"), "--size: expected WIDTHxHEIGHT"),
         (("head.obj", "-o", "report.pdf"), "expected a name that ends in .html"),
         ((), "expected a value"),
-        (("specular", "--roughness", "2"), "--roughness: expected a number less than or equal to 1"),
+        (("specular", "--roughness", "2"), "--roughness: expected a number from 0.05 to 1 "),
         (("specular", "-o", "taken/plots"), "expected a place to write"),
         (("head.obj", "--roughness", "0.4"), "--roughness: expected no such option here"),
         (("head.obj", "--samples", "8"), "--samples: expected no such option here"),

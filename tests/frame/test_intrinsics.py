@@ -130,13 +130,13 @@ def test_hairs_are_cropped_too(renderer: Renderer) -> None:
             "K: expected pixels with right .* skew is 9",
         ),
         ({"K": np.diag([1.0, -1.0, 1.0])}, "K: expected fx, fy above 0"),
-        ({"K": np.eye(4)}, r"K: expected finite numbers of shape \(3, 3\), but shape \(4, 4\) came"),
+        ({"K": np.eye(4)}, r"K: expected numbers of shape \(3, 3\) .*, but shape \(4, 4\) came"),
         ({"K": "camera.yml"}, "K: expected numbers"),
         ({"R": 2 * R}, "R: expected a rotation matrix"),
         ({"R": np.diag([1.0, 1.0, -1.0])}, "R: .*its determinant is -1"),
-        ({"R": (0.1, 0.2, 0.3)}, r"R: expected finite numbers of shape \(3, 3\)"),
-        ({"t": (0, 0)}, "t: expected finite numbers"),
-        ({"t": (0, 0, np.nan)}, "t: expected finite numbers"),
+        ({"R": (0.1, 0.2, 0.3)}, r"R: expected numbers of shape \(3, 3\)"),
+        ({"t": (0, 0)}, "t: expected numbers"),
+        ({"t": (0, 0, np.nan)}, "t: expected numbers"),
     ],
 )
 def test_what_is_no_camera_is_refused(given: dict, said: str) -> None:

@@ -107,7 +107,7 @@ def test_what_cannot_be_a_movie_is_told_at_once(tmp_path: Path, monkeypatch: pyt
     path = tmp_path / "a.mp4"
     with pytest.raises(DermisError, match=r"--size: expected even sides.*63x48 came\. Take 64x48"):
         check_movie(path, (63, 48))
-    with pytest.raises(DermisError, match=r"--crf: expected 0 .* to 51, but 52 came"):
+    with pytest.raises(DermisError, match=r"--crf: expected a whole number from 0 to 51 .*, but 52 came"):
         check_movie(path, SIZE, 52)
     with pytest.raises(DermisError, match=r"ends in \.mp4"):
         check_movie(tmp_path / "a.avi", SIZE)

@@ -230,5 +230,5 @@ def test_looks_can_be_told(tmp_path: Path) -> None:
     made, plain = head(path, eye={"eumelanin": 0.1, "seed": 3}), head(path)
     assert made.eyes is not None and plain.eyes is not None
     assert made.eyes.look == replace(plain.eyes.look, eumelanin=0.1, seed=3)
-    with pytest.raises(DermisError, match="'colour' came"):
+    with pytest.raises(DermisError, match="colour: expected one of eumelanin"):
         head(path, eye={"colour": 1.0})

@@ -217,14 +217,14 @@ def test_nodes_of_one_name_take_no_time(tmp_path: Path) -> None:
     assert time.process_time() - began < SOON_S
 
 
-@pytest.mark.parametrize("index", [-1, 1.0, "0", True, 10**30, None])
+@pytest.mark.parametrize("index", [-1, 1.0, "0", True, 2**60, None])
 def test_numbers_of_things_that_there_are_not(tmp_path: Path, index: object) -> None:
     file, node = square()
     file.tree["nodes"][node]["mesh"] = index
     assert "there are 1 meshes" in refused(load_mesh, file.write(tmp_path / "a.glb", node))
 
 
-@pytest.mark.parametrize("relief", ["1", [1], {"mm": 1}, -1, 0, True, 10**400])
+@pytest.mark.parametrize("relief", ["1", [1], {"mm": 1}, -1, 0, True, 2**60])
 def test_a_relief_that_is_no_length_is_refused(tmp_path: Path, relief: object) -> None:
     file, node = square()
     file.tree["materials"] = [{"extras": {"dermis": {"height_mm": relief}}}]

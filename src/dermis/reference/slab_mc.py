@@ -56,7 +56,7 @@ def trace_slab(
 
     Source: [Wang1995].
     """
-    _check(layers, photons, seed)
+    photons = _check(layers, photons, seed)
     edges = default_edges() if edges_mm is None else _checked_edges(edges_mm)
     tally = _trace(_stack(layers), photons, seed, edges, report)
     return _shares(tally, photons, edges, layers[0].eta)
@@ -141,13 +141,13 @@ def _layer(layer: Layer, channel: int, g: float, eta: float) -> ScatteringLayer:
     return ScatteringLayer(float(layer.sigma_a[channel]), sigma_s, layer.thickness_mm, g, eta)
 
 
-def _check(layers: Sequence[ScatteringLayer], photons: int, seed: int) -> None:
+def _check(layers: Sequence[ScatteringLayer], photons: int, seed: int) -> int:
     if not layers:
         refuse("slab", "at least one layer", "none came", "Add one")
     if np.isinf([layer.thickness_mm for layer in layers[:-1]]).any():
         refuse("slab", "an infinite thickness in the last layer only", "another has it", "Correct it")
-    whole_number("photons", photons, 1, int(MAX_PHOTONS))
     whole_number("seed", seed, 0, _MOST_SEED)
+    return whole_number("photons", photons, 1, int(MAX_PHOTONS))
 
 
 def _checked_edges(edges_mm: ArrayLike) -> Floats:

@@ -9,17 +9,17 @@ from functools import cache
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin
 
-import numpy as np
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from dermis.errors import DermisError, shown_value
+from dermis.errors import DermisError, shortened, shown_value
 
 _BOUNDS = {"greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number"}
 _NUMBERS = {"float_type", "float_parsing", "int_type", "int_parsing", "int_from_float", "int_parsing_size"}
 _TEXTS = (str, bytes, bytearray)
 _LONGEST_NAME = 80
+_LONGEST_TABLE = 160
 
 
 class Words:
@@ -82,6 +82,8 @@ def plain_numbers(value: Any, text: bool = False) -> Any:
 
     text : whether a text can stand for the value
     """
+    import numpy as np  # loading it takes longer than all of --help
+
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     if isinstance(value, list | tuple):
@@ -125,7 +127,8 @@ def _finding(one: ErrorDetails, model: type[BaseModel]) -> str:
         expected = f"{', '.join(words)} or {expected}"
     came = shown_value(one["input"])
     if not one["loc"] and isinstance(one["input"], dict):  # values that do not go together
-        came = ", ".join(f"{name} {shown_value(value)}" for name, value in one["input"].items())
+        values = ", ".join(f"{name} {shown_value(value)}" for name, value in one["input"].items())
+        came = shortened(values, _LONGEST_TABLE)
     return f"expected {expected}, but {came} came"
 
 

@@ -48,8 +48,8 @@ def _even(places: Doubles, ends: Index, free: NDArray[np.bool_]) -> Doubles:
     n = len(places)
     both = np.vstack((ends, ends[:, ::-1]))
     links = csr_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(n, n))
-    matrix: Any = laplacian(links).tocsr()  # which comes in another form, slow to index
-    pull = matrix[free]
+    matrix: Any = laplacian(links)
+    pull: Any = csr_array(matrix)[free]  # it comes in a form that is slow to index
     moved = places.copy()
     moved[free] = spsolve(pull[:, free].tocsc(), -(pull[:, ~free] @ places[~free])).reshape(-1, 2)
     return moved

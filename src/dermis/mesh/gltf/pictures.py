@@ -6,8 +6,6 @@ import base64
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from dermis.errors import refuse
 from dermis.images.io import Picture, read_size
 from dermis.images.sizes import MOST_TOGETHER
@@ -16,6 +14,7 @@ from dermis.mesh.gltf.document import Document, read_document
 from dermis.reading import BROKEN, is_file, understood
 
 _READABLE = {"image/png", "image/jpeg"}
+_MOST_MM = 1.0  # of a grey level, as anywhere
 ROLES = ("normal", "height", "specular", "roughness", "region")
 
 
@@ -67,8 +66,8 @@ def _relief(height_mm: Any) -> float | None:
     """The relief of a grey level [mm] that a file tells."""
     if height_mm is None:
         return None
-    if isinstance(height_mm, bool) or not isinstance(height_mm, int | float) or not 0 < height_mm < np.inf:
-        raise ValueError(f"height_mm is {str(height_mm)[:40]!r}, not a number above 0")
+    if isinstance(height_mm, bool) or not isinstance(height_mm, int | float) or not 0 < height_mm <= _MOST_MM:
+        raise ValueError(f"height_mm is {str(height_mm)[:40]!r}, not a number above 0 and up to {_MOST_MM:g}")
     return float(height_mm)
 
 
