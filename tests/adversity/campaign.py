@@ -100,6 +100,7 @@ def run(
         kept = _keep(keep, outcome, kinds[outcome.kind]) if outcome.failed and tally.wants(outcome) else ""
         tally.add(outcome, kept)
         told(tally)
+    gc.unfreeze()
     for _, process in ways:
         process.join()
         if process.exitcode:

@@ -145,7 +145,7 @@ def _watch(process: int, limits: Limits) -> str:
     """Wait for a child; the limit that it broke, empty for none."""
     watched, used, moved = os.pidfd_open(process), 0.0, time.monotonic()
     with contextlib.closing(os.fdopen(watched)):
-        base = _state(process)[1]
+        base = max(_state(process)[1], _state(os.getpid())[1])  # a child loads what its parent had as well
         while not select.select([watched], [], [], _LOOK_S)[0]:
             now, (cpu_s, held, runs) = time.monotonic(), _state(process)
             if cpu_s > used or runs:

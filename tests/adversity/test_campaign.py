@@ -46,7 +46,7 @@ from dermis.errors import DermisError, refuse
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are watched through /proc")
 
 ROOT = Path(__file__).resolve().parents[2]
-_TIGHT = Limits(cpu_s=0.5, stalled_s=0.5, bytes=400 << 20)  # libraries that tests have loaded count
+_TIGHT = Limits(cpu_s=1.0, stalled_s=0.5, bytes=400 << 20)  # libraries that tests have loaded count
 _SEED = 20
 
 
@@ -74,7 +74,7 @@ def _reads_a_pipe(plan: Plan) -> None:
 def _eats(plan: Plan) -> None:
     held = []
     while True:
-        held.append(np.ones(1 << 20))
+        held.append(np.ones(1 << 23))
 
 
 def _dies(plan: Plan) -> None:

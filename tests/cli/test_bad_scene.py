@@ -17,7 +17,7 @@ SCENES = {
     "no head": ("[skin]\n", "scene.toml: head", "there is none"),
     "head without name": ("[head]\n", "scene.toml: head", "there is none"),
     "head's name a number": ("[head]\nname = 5", "scene.toml: head", "5 came"),
-    "head that is not there": ('[head]\nname = "x.obj"', "x.obj", "neither"),
+    "head that is not there": ('[head]\nname = "x.obj"', "scene.toml: x.obj", "neither"),
     "unknown part": (SCENE + "[lamp]\n", "scene.toml", "'lamp' came"),
     "unknown key of head": (SCENE + "units = 1", "scene.toml: head", "unknown"),
     "unknown key of skin": (SCENE + "[skin]\nrough = 1", "scene.toml: skin", "unknown"),

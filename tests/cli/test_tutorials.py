@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import Run
 
+Run = Callable[..., Any]
 DOCS = Path(__file__).parents[2] / "docs"
 TUTORIALS = sorted((DOCS / "tutorials").glob("*.md"))
 _BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -42,7 +43,8 @@ def _check(run: Run, line: str) -> None:
     name, *words = shlex.split(command)
     assert name == "dermis"
     done = run(*words)
-    remarks = [line for line in done.stderr.splitlines() if not line.startswith("note: --subdivide")]
+    notes = [line for line in done.stderr.splitlines() if line.startswith("note:")]
+    remarks = [note for note in notes if not note.startswith("note: --subdivide")]
     assert (done.code, remarks) == (0, []), done.stderr
     if target:
         Path(target).write_text(done.stdout, "utf-8")
