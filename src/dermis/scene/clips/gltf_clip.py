@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import about
+from dermis.errors import refuse
 from dermis.mesh.curves import Curve
 from dermis.mesh.gltf.clips import Track, read_clip
 from dermis.mesh.head import Head
@@ -16,7 +16,7 @@ from dermis.mesh.skeleton import Skeleton
 from dermis.mesh.turns import matrix_quaternion, quaternion_matrix
 from dermis.scene.clips.clip import Clip
 from dermis.scene.clips.sampled import rate_of, refuse_names
-from dermis.scene.pose import Pose
+from dermis.scene.pose import MOST_WEIGHT, Pose
 
 Doubles = NDArray[np.float64]
 
@@ -67,8 +67,10 @@ def load_gltf_clip(path: Path, head: Head, name: str | None) -> Clip:
                 getattr(moved, moves)[places] = values[columns]
         matrices = [] if moved is None else list(_matrices(moved))
         shares = dict(zip(targets, weights.tolist(), strict=True))
-        with about(path):
-            return Pose(shares, dict(zip(bones, matrices, strict=True)))
+        if len(weights) and not np.abs(weights).max() <= MOST_WEIGHT:
+            came = f"{weights[np.argmax(np.abs(weights))]:g} came at {seconds:g} s"
+            refuse(path, f"weights from -{MOST_WEIGHT:g} to {MOST_WEIGHT:g}", came, "Export it again")
+        return Pose(shares, dict(zip(bones, matrices, strict=True)))
 
     times = [track.curve.times_s for track in clip.tracks]
     end, rate = max(float(one[-1]) for one in times), rate_of(max(times, key=len))
