@@ -57,9 +57,8 @@ def chosen(text: str, settings: Settings) -> Settings:
     [
         ({"atlas": 512}, "blurred light of 512x512x6 ", "--atlas"),
         ({"size": (1024, 512), "samples": 16}, "picture of 1024x512x1 rgba32float", "--size"),
-        ({"shadow_size": 4096}, "shadow maps of 4096x4096x2 ", "--shadow-size 2048"),
     ],
-    ids=["atlas", "size", "shadows"],
+    ids=["atlas", "size"],
 )
 def test_what_is_told_to_fit_does(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, asked: dict[str, Any], what: str, option: str

@@ -177,6 +177,15 @@ def test_damaged_clips_are_refused_by_name(tmp_path: Path, damage: str) -> None:
     assert str(caught.value).startswith(str(path))
 
 
+def test_weights_that_no_pose_takes_name_the_file(tmp_path: Path) -> None:
+    file = _file(clip=False)
+    _add_clip(file, "far", weights={"node": 2, "output": file.numbers(1e20 * WEIGHTS.reshape(-1, 1))})
+    path = file.write(tmp_path / "a.glb", 0)
+    clip = dermis.load_motion(path, _head(path))
+    with pytest.raises(DermisError, match=r"a\.glb: expected weights from -100 to 100, but 1e\+20 came"):
+        clip.pose_at(float(np.ravel(TIMES)[1]))
+
+
 def test_what_fits_nothing_is_refused(tmp_path: Path) -> None:
     head = _head(_file(clip=False).write(tmp_path / "head.glb", 0))
     other = GltfFile()
