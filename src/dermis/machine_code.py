@@ -7,6 +7,7 @@ import pickle
 import sys
 from collections.abc import Callable
 from functools import cache
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -32,6 +33,9 @@ def compiled(function: Function) -> Function:
     return cast(Function, made)
 
 
+_HOLDS_ADDRESSES = attrgetter("library.has_dynamic_globals")  # of this process
+
+
 class _KeptCode(caching.NullCache):  # type: ignore[misc, name-defined]
     """In place of numba's own cache, which unpickles, and so runs, whatever lies in its files.
 
@@ -53,8 +57,8 @@ class _KeptCode(caching.NullCache):  # type: ignore[misc, name-defined]
         return compiler.CompileResult._rebuild(target_context, *pickle.loads(found[_NAME].tobytes()))
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep what was compiled, where it holds no addresses of this process."""
-        if data.lifted or data.library.has_dynamic_globals:
+        """Keep what was compiled, where another process can use it."""
+        if data.lifted or _HOLDS_ADDRESSES(data):
             return
         code = np.frombuffer(serialize.dumps(data._reduce()), np.uint8)
         keep(_FOLDER, self._key(sig, data.codegen), {_NAME: code})
