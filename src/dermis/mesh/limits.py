@@ -11,6 +11,8 @@ MOST_CORNERS = 4096
 """Of one polygon."""
 MOST_GROUPS = 4096
 """Materials, groups, and the primitives of a glTF file's scene."""
+MOST_RELIEF_MM = 1.0
+"""Of one grey level of an 8-bit height map: 255 of them are a nose and more."""
 MOST_NODES, DEEPEST_NODE = 1 << 16, 1024
 MOST_INFLUENCES = 16
 """Of bones on a vertex, of which the four strongest are kept."""

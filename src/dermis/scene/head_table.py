@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 from pydantic import Field
 
 from dermis.mesh.eye_limits import LIMITS
+from dermis.mesh.limits import MOST_RELIEF_MM
 from dermis.scene.findings import Because, Words
 from dermis.scene.plain import Plain
 
 _Relief = Annotated[
     float | None,
-    Field(ge=1e-6, le=1),
+    Field(ge=1e-6, le=MOST_RELIEF_MM),
     Because("mm: 255 levels from a quarter of a micrometre to a nose and more"),
 ]
 _Unit = Annotated[

@@ -11,10 +11,10 @@ from dermis.images.io import Picture, read_size
 from dermis.images.sizes import MOST_TOGETHER
 from dermis.mesh.beside import named_by_uri
 from dermis.mesh.gltf.document import Document, read_document
+from dermis.mesh.limits import MOST_RELIEF_MM
 from dermis.reading import BROKEN, is_file, understood
 
 _READABLE = {"image/png", "image/jpeg"}
-_MOST_MM = 1.0  # of a grey level, as anywhere
 ROLES = ("normal", "height", "specular", "roughness", "region")
 
 
@@ -66,8 +66,14 @@ def _relief(height_mm: Any) -> float | None:
     """The relief of a grey level [mm] that a file tells."""
     if height_mm is None:
         return None
-    if isinstance(height_mm, bool) or not isinstance(height_mm, int | float) or not 0 < height_mm <= _MOST_MM:
-        raise ValueError(f"height_mm is {str(height_mm)[:40]!r}, not a number above 0 and up to {_MOST_MM:g}")
+    if (
+        isinstance(height_mm, bool)
+        or not isinstance(height_mm, int | float)
+        or not 0 < height_mm <= MOST_RELIEF_MM
+    ):
+        raise ValueError(
+            f"height_mm is {str(height_mm)[:40]!r}, not a number above 0 and up to {MOST_RELIEF_MM:g}"
+        )
     return float(height_mm)
 
 
