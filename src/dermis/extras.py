@@ -13,6 +13,9 @@ EXTRAS = {
     "numba": "truth",
     "mitsuba": "truth",
     "flip_evaluator": "truth",
+    "pyarrow": "batch",
+    "webdataset": "batch",
+    "distributed": "cluster",
 }
 """Extra by module, for those that `needed` is asked for."""
 
