@@ -92,7 +92,8 @@ def table(report: dict[str, Any]) -> str:
 
 def _line(row: dict[str, Any]) -> str:
     noise = f"{row['noise']:.1%}" if row["noise"] else "none"
-    return f"| {row['renderer']} | {row['setting']} | {row['seconds']:.3g} | {row['core_seconds']:.3g} | {noise} |"
+    times = f"{row['seconds']:.3g} | {row['core_seconds']:.3g}"
+    return f"| {row['renderer']} | {row['setting']} | {times} | {noise} |"
 
 
 def _cycles(
