@@ -224,8 +224,6 @@ def test_heads_that_follow_another_begin_anew(renderer: Renderer) -> None:
     cut = scene_of(other, frontal(), camera=front_camera(other))
     clip, settings = [turned(5.0), cut, turned(9.0)], settings_of()
     found = renderer.observe(clip, settings, outputs=["motion"], previous=SCENE)
-        [turned(5.0), cut, turned(9.0)], settings_of(), outputs=["motion"], previous=SCENE
-    )
     assert [bool(one.outputs["motion"].any()) for one in found] == [True, False, False]
     given = renderer.observe([SCENE, SCENE], settings_of(), outputs=["motion"], previous=[None, turned(5.0)])
     assert [bool(one.outputs["motion"].any()) for one in given] == [False, True]
