@@ -28,7 +28,7 @@ _NEAR_MM = 1.2  # of a place in the front plane
 # the ear at the height of the eyes, over the angle of the jaw, to the chin [mm].
 _JAW_MM = np.array([[69.5, 0, -57], [68.6, -15, -56], [67, -30, -53], [65.2, -42, -50], [61.6, -52, -45],
                     [58.4, -62, -40], [54.8, -72, -35], [50.4, -81, -31], [45, -88.5, -26], [38, -95, -20],
-                    [30, -100.4, -10], [20, -104.6, 0], [10, -105.6, 9], [0, -105.6, 15.3]])  # fmt: skip
+                    [30, -100.4, -10], [20, -104.6, 0], [10, -106.3, 7], [0, -106.8, 12.5]])  # fmt: skip
 
 
 class Surface:
@@ -109,13 +109,12 @@ class Surface:
         """(n, 3) the outer border of a lip, from its corner to the middle [mm]."""
         seam = np.interp(np.abs(self.at_mm[:, 0]), *_SEAM_MM.T)
         side = (self.at_mm[:, 1] > seam + 0.4) if upper else (self.at_mm[:, 1] < seam - 0.4)
-        those = self.face & side & (np.abs(self.lips) < 0.15) & (np.abs(self.at_mm[:, 0] - 10.5) < 10.6)
+        those = self.face & side & (np.abs(self.lips) < 0.3) & (np.abs(self.at_mm[:, 0] - 10.5) < 11.0)
         those &= self.at_mm[:, 2] > 15
         found = self.at_mm[those]
-        x = np.linspace(20.5, 0.0, 24)
-        rows = [found[np.abs(found[:, 0] - each) < 0.6].mean(axis=0) for each in x]
-        path = np.stack(rows)
-        path[:, 0] = x
+        x = np.linspace(20.0, 0.0, 24)
+        near = [found[np.abs(found[:, 0] - each) < 0.8].mean(axis=0) for each in x]
+        path = np.column_stack([x, np.stack(near)[:, 1:]])
         return np.concatenate([self.at_mm[[self.mouth_corner()]], path])
 
     def mouth_corner(self) -> int:
