@@ -133,7 +133,7 @@ def _shared(
     skin, program = asked.skin, shade.shade_program(device)
     around, total = asked.environment, asked.split.total
     return {
-        "skin": surface.skin_record(program, skin, asked.head.maps, asked.profile, asked.lights),
+        "skin": surface.skin_record(program, skin, asked.head.maps, asked.profile, sum(asked.parts)),
         "environment": surroundings.environment_record(program, around, skin, total, asked.occluded),
         "shadow_maps": shadow_maps.texture,
         "shadow_bounds": shadow_maps.bounds,

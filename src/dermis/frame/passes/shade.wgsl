@@ -3,7 +3,6 @@
 //#include "sample_bits.wgsl"
 //#include "pixel_skin.wgsl"
 
-override SPLIT: bool = false; // whether light below the skin is kept apart, to spread over the picture
 // Pixels of an invocation, one below the other. Software adapters run a branch for all lanes of a vector as long as one of
 // them needs it: with a strip, each lane goes on to its next pixel that sees the head when it is done with one.
 override STRIP: u32 = 1u;

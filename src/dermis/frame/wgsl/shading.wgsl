@@ -6,6 +6,7 @@
 //#include "lids.wgsl"
 //#include "pre_integrated.wgsl"
 
+override SPLIT: bool = false; // whether light below the skin is kept apart, to spread over the picture
 override EYES: bool = false; // whether there are eyes of true shape, and teeth
 
 const WET_ROUGHNESS: f32 = 0.1; // of plain materials: teeth, tongues, eyeballs of files
