@@ -9,45 +9,45 @@ from dermis.frame.inputs import Inputs
 from dermis.frame.passes import blend
 from dermis.frame.passes.outputs import light, pigments, thickness
 from dermis.frame.passes.outputs.light import Shading
-from dermis.frame.passes.outputs.planes import Planes
+from dermis.frame.passes.outputs.planes import Drawn, Planes
 from dermis.gpu import Graph
 from dermis.scene.techniques import TECHNIQUES
 
 
-def draw_light(graph: Graph, planes: Planes, inputs: Inputs, centres: Any, below: Any) -> None:
+def draw_light(graph: Graph, planes: Planes, inputs: Inputs, drawn: Drawn) -> None:
     """Shade the pixels' centres, and let what spreads over the picture spread."""
-    made, shading = inputs.resources.outputs, _shading(inputs, below)
+    made, shading = inputs.resources.outputs, _shading(inputs, drawn.below)
     assert made is not None
     technique, apart = TECHNIQUES[inputs.settings.technique], made.light.apart
-    light.draw(graph, planes, shading, centres, apart and apart.layers)
+    light.draw(graph, planes, shading, drawn.centres, apart and apart.layers)
     if apart is not None and "diffuse" in planes.channels:
         light.add_spread(graph, planes, *technique.spread(graph, inputs, apart))
     if "translucent" in planes.channels:
         through = _draw_through(graph, inputs, made.light.through)
-        light.take_through(graph, planes, shading, centres, through)
+        light.take_through(graph, planes, shading, drawn.centres, through)
 
 
-def draw_visibility(graph: Graph, planes: Planes, inputs: Inputs, centres: Any, below: Any) -> None:
+def draw_visibility(graph: Graph, planes: Planes, inputs: Inputs, drawn: Drawn) -> None:
     """Find which share of each light arrives."""
     made = inputs.resources.outputs
     assert made is not None
-    light.draw_visibility(graph, planes, _shading(inputs, below), centres, made.light.parts)
+    light.draw_visibility(graph, planes, _shading(inputs, drawn.below), drawn.centres, made.light.parts)
 
 
-def draw_pigments(graph: Graph, planes: Planes, inputs: Inputs, centres: Any, below: Any) -> None:
+def draw_pigments(graph: Graph, planes: Planes, inputs: Inputs, drawn: Drawn) -> None:
     """Read the skin's pigments."""
     made = inputs.resources.outputs
     assert made is not None and made.light.pigmented is not None
-    pigments.draw(graph, planes, inputs.lit, (inputs.view, inputs.centre_mm), centres, made.light.pigmented)
+    pigments.draw(graph, planes, inputs.lit, (inputs.view, inputs.centre_mm), drawn.centres, made.light.pigmented)
 
 
-def draw_thickness(graph: Graph, planes: Planes, inputs: Inputs, centres: Any, below: Any) -> None:
+def draw_thickness(graph: Graph, planes: Planes, inputs: Inputs, drawn: Drawn) -> None:
     """Measure the flesh below the skin."""
     made, thin = inputs.resources.outputs, inputs.layouts[0].translucency
     assert made is not None and thin is not None
     thickness.measure(graph, thin, made.light.thickness)
     look = inputs.view, inputs.centre_mm
-    thickness.draw(graph, planes, inputs.lit, look, centres, made.light.thickness)
+    thickness.draw(graph, planes, inputs.lit, look, drawn.centres, made.light.thickness)
 
 
 def _shading(inputs: Inputs, below: Any) -> Shading:

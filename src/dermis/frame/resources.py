@@ -87,7 +87,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         gaussians=len(asked.profile.variance_mm2),
         strands=strands,
         unscattered=keep(atlases[0][0].unscattered, asked.head.mesh),
-        **picture_resources(memo, device, asked),
+        **picture_resources(memo, device, asked, tuple(layouts)),
     )
 
 
