@@ -24,16 +24,19 @@ struct Reach {
 // Squares of how far places beside the inward normal count: of a part of their depth, and of a part of the spacing.
 const CONE: f32 = 0.05;
 const GRAIN: f32 = 0.4;
-const BEYOND: f32 = 0.25; // of the radius' square: what lies deeper than pairs reach counts like a cell so far aside
+const BEYOND: f32 = 0.11; // of the radius' square: what lies deeper than pairs reach counts like a cell so far aside
+const FADES: f32 = 0.7; // of the radius, from which places count less and less
 
 // Depth along the inward normal of the far side, and how much it counts: cells right below count most.
 fn far_side(receiver: Receiver, source: Source) -> vec2f {
     let lie = lie_of(receiver.position, receiver.normal, source);
     let depth = dot(receiver.position - source.centre, receiver.normal);
     let aside2 = max(lie.square - depth * depth, 0.0);
-    let near = exp(-aside2 / (CONE * depth * depth + GRAIN * reach.spacing2_mm2));
-    let even = aside2 + reach.spacing2_mm2;
-    let share = select(0.0, share_of(lie.cosine, lie.inward), depth > 0.0 && lie.square < reach.radius_mm * reach.radius_mm);
+    let grain = max(reach.spacing2_mm2, source.area); // sparse cells are blurred more, which hides their pattern
+    let near = exp(-aside2 / (CONE * depth * depth + GRAIN * grain));
+    let even = aside2 + grain;
+    let within = 1.0 - rise(FADES, 1.0, sqrt(lie.square) / reach.radius_mm);
+    let share = select(0.0, within * share_of(lie.cosine, lie.inward), depth > 0.0);
     return vec2f(depth, share * source.area * near / (even * even * even));
 }
 
