@@ -25,7 +25,7 @@ def output_resources(
         return None
     settings, keep = asked.settings, memo.keep
     stages: dict[str, list[tuple[str, int]]] = {}
-    for name, channels in output_channels(asked).items():
+    for name, channels in asked.output_channels.items():
         stages.setdefault(OUTPUTS[name].stage, []).append((name, channels))
     planes = [
         keep(make_planes, device, stage, tuple(of), settings.size, of=stage) for stage, of in stages.items()
@@ -39,11 +39,6 @@ def output_resources(
         before=keep(make_shape, device, tables, of="before") if moves else None,
         light=light_space(memo, device, asked, layouts),
     )
-
-
-def output_channels(asked: Asked) -> dict[str, int]:
-    """How many numbers each output has in a pixel."""
-    return {name: OUTPUTS[name].channels or len(asked.parts) for name in asked.outputs}
 
 
 def _centres(device: Device, size: tuple[int, int]) -> Any:

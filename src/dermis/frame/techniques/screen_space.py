@@ -57,6 +57,7 @@ class ScreenSpace(Technique):
     sources = ("Jimenez2015",)
     shade_constants = (("SPLIT", 1),)
     pixel_bytes = 64
+    apart_bytes = 48
 
     def make(
         self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum

@@ -51,6 +51,7 @@ class Technique:
     curved : whether the shading reads the surface's curvature
     shade_constants : pipeline constants of the shading pass
     pixel_bytes : of memory for each pixel, besides the picture
+    apart_bytes : of memory for each pixel for `make_apart`
     """
 
     sources: ClassVar[tuple[str, ...]] = ()
@@ -60,6 +61,7 @@ class Technique:
     curved: ClassVar[bool] = False
     shade_constants: ClassVar[Constants] = ()
     pixel_bytes: ClassVar[int] = 0
+    apart_bytes: ClassVar[int] = 0
 
     def split(self, profile: GaussianSum, white: bool) -> Split:
         """The profile as the technique uses it.
