@@ -80,9 +80,7 @@ _GEOMETRY = (
 
 _RADIANCE, _MICROMETRES = Levels(1 / 4096), Levels(0.001)
 _LIGHT = (
-    Output(
-        "albedo", "light", "RGB", _FLOAT, "", "share of the light below the skin that leaves", 0.0, _SHARE
-    ),
+    Output("albedo", "light", "RGB", _FLOAT, "", "share of the light that comes back", 0.0, _SHARE),
     Output("irradiance", "light", "RGB", _FLOAT, "", "light that enters, not yet spread", 0.0, _RADIANCE),
     Output("diffuse", "light", "RGB", _FLOAT, "", "radiance that leaves below the skin", 0.0, _RADIANCE),
     Output("specular", "light", "RGB", _FLOAT, "", "radiance off the surface", 0.0, _RADIANCE),
