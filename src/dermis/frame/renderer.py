@@ -198,8 +198,8 @@ class Renderer(Submitter):
         Raises DermisError as `draw` does.
         """
         chosen = given_plain(Settings, settings or {}, "settings", "size=(512, 512)")
-        given = {"outputs": asked_outputs(outputs), "landmarks": asked_landmarks(landmarks)}
-        send = partial(self._send, settings=chosen, linear=linear, alpha=alpha, **given)
+        asked = partial(self._send, outputs=asked_outputs(outputs), landmarks=asked_landmarks(landmarks))
+        send = partial(asked, settings=chosen, linear=linear, alpha=alpha)
         frames = observed_frames(send, scenes, previous, chosen)
         return arriving(self.kept_open, lambda: self.device, frames)
 
