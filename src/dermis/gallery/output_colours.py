@@ -16,7 +16,7 @@ _RANGE = 0.02, 0.98  # quantiles of what is seen that are black and white
 
 
 def coloured(name: str, values: NDArray[Any]) -> NDArray[np.uint8]:
-    """(h, w, 3) bytes: light as it looks, a colour for each whole number, else dark to bright over what is seen.
+    """(h, w, 3) bytes: light as it looks, a colour for each whole number, else dark to bright.
 
     values : (h, w) or (h, w, c) of the output
     """
@@ -24,8 +24,8 @@ def coloured(name: str, values: NDArray[Any]) -> NDArray[np.uint8]:
         return encode_srgb8(_LIGHT[name] * values)
     if OUTPUTS[name].kind != "float32":
         colours = np.random.default_rng(8).integers(40, 255, (_COLOURS, 3), np.uint8)
-        there = np.uint8(values != OUTPUTS[name].background)
-        return np.asarray(colours[values.astype(int) % _COLOURS] * there[..., None], np.uint8)
+        colours = colours[values.astype(int) % _COLOURS]
+        return np.where((values != OUTPUTS[name].background)[..., None], colours, np.uint8(0))
     each = values.reshape(*values.shape[:2], -1)[..., :3]
     seen = (each != 0).any(axis=-1)
     low, high = np.quantile(each[seen], _RANGE, axis=0)
@@ -33,4 +33,4 @@ def coloured(name: str, values: NDArray[Any]) -> NDArray[np.uint8]:
     if levels.shape[2] == 1:
         levels = levels.repeat(3, axis=2)
     wide = np.pad(levels, ((0, 0), (0, 0), (0, 3 - levels.shape[2])))
-    return np.rint(255 * wide).astype(np.uint8)
+    return np.asarray(np.rint(255 * wide), np.uint8)
