@@ -193,7 +193,7 @@ class Renderer(Submitter):
         alpha, linear : as of `render_many`
         previous : the scene before the first, as motion is counted from one to the next of the same head; or
             those before each
-        landmarks : names of sets (`dermis.human.landmarks.points.SETS`), or files of rows name,vertex
+        landmarks : names of sets (`dermis.human.landmarks.sets.SETS`), or files of rows name,vertex
 
         Raises DermisError as `draw` does.
         """
