@@ -105,19 +105,20 @@ class Preparation:
 
     def _around(self, head: Head, motion: Motion | None, outline: Outline) -> tuple[Look, Any]:
         """How the sky sees the head as it is posed, and the shader's record of it."""
-        anchors = self.memo.keep(anchors_of, head)
+        anchors, motion = self.memo.keep(anchors_of, head.topology), motion or head.control.rest
         return self.memo.keep(_looked, outline, using=(motion, self.device, head, anchors))
 
     def _moved(self, head: Head, motion: Motion | None) -> Moved:
         """The head as it is posed, or at rest where no motion came."""
-        resting = self.memo.keep(_resting, head)
-        return self.memo.keep(_posed, head, motion, resting.motion) if motion else resting
+        at_rest = self.memo.keep(_resting, head)
+        return self.memo.keep(_posed, head, motion or head.control.rest, at_rest)
 
 
 def _person(scene: Scene) -> Any:
-    """Where the control points rest, if not where the head's own do."""
-    motion, own = scene.motion, scene.head.control.positions_mm
-    return None if motion is None or motion.positions_mm is own else motion.positions_mm
+    """Where the control points rest, if not where those of the head's topology do."""
+    motion = scene.motion or scene.head.control.rest
+    places = motion.positions_mm
+    return None if places is scene.head.topology.control.positions_mm else places
 
 
 def _movements(head: Head, motion: Motion | None) -> NDArray[np.float32]:
@@ -125,8 +126,8 @@ def _movements(head: Head, motion: Motion | None) -> NDArray[np.float32]:
     return movements(head.targets, motion.weights)
 
 
-def _resting(head: Head) -> Moved:
-    return Moved(resting(head.control), head.mesh.outline, _eyes(head, head.control.rest))
+def _resting(head: Head) -> MotionBytes:
+    return resting(head.control)
 
 
 def _eyes(head: Head, motion: Motion) -> EyesSeen | None:
@@ -141,7 +142,7 @@ def _posed(head: Head, motion: Motion, at_rest: MotionBytes) -> Moved:
     rig, weights, matrices = head.control, motion.weights.tobytes(), motion.matrices.tobytes()
     same = motion.positions_mm is rig.positions_mm
     positions = at_rest.positions if same else motion.positions_mm.tobytes()
-    moved = MotionBytes(positions, weights, matrices)
+    moved = at_rest._replace(positions=positions, weights=weights, matrices=matrices)
     if moved == at_rest:  # where the mesh's own outline is exact
         return Moved(moved, head.mesh.outline, _eyes(head, motion))
     return Moved(moved, Outline(rig.outline_mm(motion), _SLACK_MM), _eyes(head, motion))
