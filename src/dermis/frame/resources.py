@@ -26,15 +26,14 @@ from dermis.frame.passes.shape import still_shape
 from dermis.frame.picture_resources import picture_resources
 from dermis.frame.resting import resting
 from dermis.frame.shape import Shape, ShapeTables, make_shape, shape_tables
-from dermis.frame.strands import (
-    StrandResources,
-    has_strands,
+from dermis.frame.strand_space import (
+    make_space,
     make_strand_picture,
     make_strand_shadows,
-    make_tables,
     no_strand_shadows,
-    skin_under,
+    room_of,
 )
+from dermis.frame.strands import StrandResources, has_strands, make_tables, skin_under
 from dermis.frame.techniques.technique import AtlasTechnique, Technique
 from dermis.frame.translucency import translucency_of
 from dermis.gpu import Constants, Device, Memo
@@ -109,9 +108,10 @@ def _shading(memo: Memo, device: Device, asked: Asked) -> tuple[Any, Any]:
 def _strands(memo: Memo, device: Device, asked: Asked) -> StrandResources | None:
     if not has_strands(asked.head, asked.settings):
         return None
-    tables = memo.keep(make_tables, device, asked.head.bare)
-    picture = memo.keep(make_strand_picture, device, tables, asked.settings.size)
-    shadows = memo.keep(make_strand_shadows, device, asked.shadow_layers, tables, of=asked.view)
+    room = room_of(asked.head)
+    tables = memo.keep(make_tables, device, asked.head.bare, memo.keep(make_space, device, room))
+    picture = memo.keep(make_strand_picture, device, room, asked.settings.size)
+    shadows = memo.keep(make_strand_shadows, device, asked.shadow_layers, room, of=asked.view)
     return StrandResources(tables, picture, shadows, memo.keep(skin_under, asked.head))
 
 

@@ -118,8 +118,9 @@ def _laid(layout: Layout) -> _Laid:
 
 
 def _quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
-    """All quads, with eyeballs of true shape instead of the published ones: uv (u, 2), points of quads (q, 4),
-    their corners in uv (q, 4), and what they are made of (q,).
+    """All quads, with eyeballs of true shape instead of the published ones.
+
+    uv (u, 2), points of quads (q, 4), their corners in uv (q, 4), and what they are made of (q,).
     """
     found = data()
     if layout == "own":

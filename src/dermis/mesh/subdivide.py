@@ -73,9 +73,7 @@ def subdivide_head(head: Head, levels: int | Callable[[Head], int]) -> Head:
         return head
     strands, hair = (part and part.refined(head.mesh, mesh, levels) for part in (head.strands, head.hair))
     rig = replace(head.control, stencils=stencils)
-    return replace(
-        head, mesh=mesh, rig=rig, strands=strands, hair=hair, levels=int(levels), template=None
-    )
+    return replace(head, mesh=mesh, rig=rig, strands=strands, hair=hair, levels=int(levels), template=None)
 
 
 def levels_of(head: Head, levels: int | Callable[[Head], int]) -> int:

@@ -15,7 +15,7 @@ SPACES: tuple[Space, ...] = ("body", "lip", "level", "ring")
 bent along the lines of the forehead; and the distance from the eye with x and y."""
 Ground = Literal["all", "lips", "lines", "furrows", "folds", "veins", "hairline"]
 GROUNDS: tuple[Ground, ...] = ("all", "lips", "lines", "furrows", "folds", "veins", "hairline")
-"""Where noise shows: all over, or on lips, fine lines, folds, either of these, near veins and the hairline."""
+"""Where noise shows: all over, on lips, fine lines, these or folds, folds, veins, or at the hairline."""
 _TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 """From each size of a fractal to the next: their lattices never line up."""
 _SHRINK = 0.49
@@ -114,7 +114,8 @@ def noise_table() -> NDArray[np.float32]:
     """(n, 16) a row for each octave of each noise, as spot.wgsl reads it.
 
     Three rows of the matrix from its space to its lattice [1/mm], each with a number behind it: which size of
-    texel shows it [mm], 0 for any; its strength; its seed. Then which noise it belongs to, which space, and where it shows.
+    texel shows it [mm], 0 for any; its strength; its seed. Then which noise it belongs to, which space, and
+    where it shows.
     """
     rows = list(_rows())
     table = np.zeros((len(rows), 16), np.float32)
