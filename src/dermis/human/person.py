@@ -114,7 +114,7 @@ class Human:
         plain = human_head(self.weights(), painted, layout, self.iris)
         shared = template(layout, levels_of(plain, subdivide))
         head = shared.shaped(plain)
-        return groomed(head, plain, shared.mean_mm, head.levels, self.hairdo, self.look.recession)
+        return groomed(head, plain, shared.rooting, head.levels, self.hairdo, self.look.recession)
 
     def on(self, head: Head) -> Head:
         """The head of another person with this one's skin and eyes.

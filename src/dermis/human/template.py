@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dermis.human.hair.rooting import Rooting, eye_middles
 from dermis.human.model import Layout, human_head
 from dermis.mesh.eyes import EyeLook
 from dermis.mesh.head import Head
@@ -28,12 +28,12 @@ class Template:
     """What all people with a layout and a level have in common.
 
     head : the mean person, bare
-    mean_mm : (p, 3) its control points
+    rooting : where brows and lashes grow on it
     refinement : how meshes are refined; None at level 0
     """
 
     head: Head
-    mean_mm: NDArray[np.float64]
+    rooting: Rooting
     refinement: Refinement | None
 
     def shaped(self, plain: Head) -> Head:
@@ -54,9 +54,10 @@ def template(layout: Layout, levels: int) -> Template:
     """
     plain = human_head(MEAN, Maps(), layout, EyeLook())
     mean_mm = plain.control.positions_mm.astype(np.float64)
+    rooting = Rooting(plain.mesh, mean_mm, eye_middles(plain.mesh))
     if levels == 0:
-        return Template(plain, mean_mm, None)
+        return Template(plain, rooting, None)
     found = refinement(plain.mesh, levels)
     rig = replace(plain.control, stencils=found.stencils)
     head = replace(plain, mesh=found.mesh(plain.mesh), rig=rig, levels=levels)
-    return Template(head, mean_mm, found)
+    return Template(head, rooting, found)

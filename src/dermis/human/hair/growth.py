@@ -64,7 +64,7 @@ def grown(
     root_mm, normal : (n, 3) of the hairs
     guide_mm, ways : (g, 3) and (g, k, 3) of the guides
     """
-    n, t = len(root_mm), np.linspace(0.0, 1.0, ways.shape[1])
+    t = np.linspace(0.0, 1.0, ways.shape[1])
     found = _astray(_between(root_mm, guide_mm, ways), normal, rough, rng)
     found = _tufted(root_mm, found, t, rough.tufts, rng)
     size = rough.frizz * np.linalg.norm(found[:, -1], axis=1)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.human.hair.skin import Index
+from dermis.human.hair.rooting import Index
 from dermis.human.skin.face import AMOUNTS, DEGREES, hairline, zones
 from dermis.human.skin.surface import FIELDS, average
 from dermis.mesh.mesh import Floats, Mesh

@@ -76,7 +76,8 @@ def beard_hair(ground: Ground, look: HairLook) -> list[Grown]:
     if look.beard_mm == 0.0:
         return []
     rng, mesh = np.random.default_rng((look.seed, 4)), ground.plain.mesh
-    few, many = (hairy_skin.rooted(mesh, hairy_skin.beard(), n, rng) for n in (_GUIDES_PER_CM2, BEARD_PER_CM2))
+    both = _GUIDES_PER_CM2, BEARD_PER_CM2
+    few, many = (hairy_skin.rooted(mesh, hairy_skin.beard(), density, rng) for density in both)
     guide, hair = ground.rooted(few), ground.rooted(many)
     lie = combed_beard(few.places, guide.normals, look)
     ways = guides(ground.skin, guide.places, lie, knots_of(look))
