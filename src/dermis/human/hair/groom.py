@@ -13,7 +13,7 @@ from dermis.human.hair.look import HairLook
 from dermis.human.hair.rooting import Rooting, eye_middles
 from dermis.human.hair.skin import Skin
 from dermis.mesh.head import Head
-from dermis.mesh.strands import Doubles, Roots, Strands, finer_roots, frames, points_of, seen_from
+from dermis.mesh.strands import Doubles, Roots, Strands, finer_roots, frames, points_of, seen_in
 from dermis.specular.hair import absorption_per_mm
 
 _LASHES_DARKER = 1.6
@@ -93,8 +93,8 @@ def _joined(head: Head, parts: list[Grown], absorption: Doubles) -> Strands:
     roots = Roots(*(np.concatenate(each) for each in zip(*(part.roots for part in parts), strict=True)))
     knots, radius = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
     bundle, cover = (_each(parts, name) for name in ("bundle", "cover"))
-    root, _ = frames(head.mesh, roots, points_of(head.mesh))
-    ways = seen_from(head.mesh, roots, knots - root[:, None])
+    root, frame = frames(head.mesh, roots, points_of(head.mesh))
+    ways = seen_in(frame, knots - root[:, None])
     numbers = radius, absorption / bundle[:, None], cover
     return Strands(roots, ways, *(one.astype(np.float32) for one in numbers))
 
