@@ -116,18 +116,39 @@ fn in_space(spot: Spot, space: u32) -> vec3f {
     }
 }
 
-// Noise of all sizes, of rows from the first on.
+// How much of a row of noise shows at a texel.
 // grounds: bits of where the texel is; noise that shows elsewhere alone is left 0
+fn shown(row: u32, texel_mm: f32, grounds: u32) -> f32 {
+    let blob_mm = tables.noises[row].x.w;
+    let here = (grounds & (1u << bitcast<u32>(tables.noises[row].which.z))) != 0u;
+    return select(0.0, select(visible(blob_mm, texel_mm), 1.0, blob_mm == 0.0), here);
+}
+
+// Noise of all sizes, of rows from the first on. Software adapters run what is in a branch for nothing, but for no row
+// that is passed over here.
 fn make_noise(spot: Spot, first: u32, end: u32, grounds: u32) {
-    for (var k = first; k < end; k++) {
-        let one = tables.noises[k];
-        let shown = select(visible(one.x.w, spot.texel_mm), 1.0, one.x.w == 0.0);
-        if (shown > 0.0 && (grounds & (1u << bitcast<u32>(one.which.z))) != 0u) {
-            let p = in_space(spot, bitcast<u32>(one.which.y));
-            let lattice = vec3f(dot(one.x.xyz, p), dot(one.y.xyz, p), dot(one.z.xyz, p));
-            let seed = bitcast<u32>(one.z.w) + 64u * paint.seed;
-            noise[bitcast<u32>(one.which.x)] += one.y.w * shown * gradient_noise(lattice, seed);
+    var k = first;
+    loop {
+        var much = 0.0;
+        loop {
+            if (k >= end) {
+                break;
+            }
+            much = shown(k, spot.texel_mm, grounds);
+            if (much > 0.0) {
+                break;
+            }
+            k++;
         }
+        if (k >= end) {
+            break;
+        }
+        let one = tables.noises[k];
+        let p = in_space(spot, bitcast<u32>(one.which.y));
+        let lattice = vec3f(dot(one.x.xyz, p), dot(one.y.xyz, p), dot(one.z.xyz, p));
+        let seed = bitcast<u32>(one.z.w) + 64u * paint.seed;
+        noise[bitcast<u32>(one.which.x)] += one.y.w * much * gradient_noise(lattice, seed);
+        k++;
     }
 }
 
