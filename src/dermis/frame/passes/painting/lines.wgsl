@@ -44,23 +44,38 @@ fn folded(spot: Spot) -> f32 {
         0.0,
     );
     let p = spot.left + FOLD_WANDER_MM * bend;
-    for (var k = 0u; k < FOLDS; k++) {
-        let fold = tables.folds[k];
-        let own = fold.size.x;
-        let width = width_of(fold, spot.texel_mm);
-        if (distance(p, fold.ball.xyz) < fold.ball.w + FOLD_REACH * width) {
-            let near = nearest(p, fold.knots);
-            let square = near.x / (width * width);
-            let shape = (0.35 * exp(-square / 7.0) - exp(-square)) * (1.0 - smoothstep(0.6 * 36.0, 36.0, square));
-            let ends = 1.0 - pow(2.0 * near.y - 1.0, 4.0);
-            let part = ends * shape * own / width * max(0.8 + 0.6 * noise[NOISE_LINE_DEPTH], 0.0);
-            height += mix(fold.size.y, fold.size.z, paint.age) * part;
-            if (fold.size.w > 0.0) {
-                deepened[u32(fold.size.w) - 1u] += (MOVED + MOVED_OLD * paint.age) * fold.size.z * part;
+    var k = 0u;
+    loop { // over those that reach here, as in make_noise
+        loop {
+            if (k >= FOLDS) {
+                break;
             }
+            if (reaches(tables.folds[k], p, spot.texel_mm)) {
+                break;
+            }
+            k++;
         }
+        if (k >= FOLDS) {
+            break;
+        }
+        let fold = tables.folds[k];
+        let width = width_of(fold, spot.texel_mm);
+        let near = nearest(p, fold.knots);
+        let square = near.x / (width * width);
+        let shape = (0.35 * exp(-square / 7.0) - exp(-square)) * (1.0 - smoothstep(0.6 * 36.0, 36.0, square));
+        let ends = 1.0 - pow(2.0 * near.y - 1.0, 4.0);
+        let part = ends * shape * fold.size.x / width * max(0.8 + 0.6 * noise[NOISE_LINE_DEPTH], 0.0);
+        height += mix(fold.size.y, fold.size.z, paint.age) * part;
+        if (fold.size.w > 0.0) {
+            deepened[u32(fold.size.w) - 1u] += (MOVED + MOVED_OLD * paint.age) * fold.size.z * part;
+        }
+        k++;
     }
     return height;
+}
+
+fn reaches(fold: Fold, p: vec3f, texel_mm: f32) -> bool {
+    return distance(p, fold.ball.xyz) < fold.ball.w + FOLD_REACH * width_of(fold, texel_mm);
 }
 
 // Squared distance to a fold [mm2], and how far along it that is.

@@ -1,5 +1,6 @@
 // Colour, relief and gloss of the skin at each texel of its maps, from pigments, marks and lines of the face.
 //#include "spot.wgsl"
+//#include "marks.wgsl"
 //#include "lines.wgsl"
 
 @group(0) @binding(3) var<storage, read> owners: array<u32>;

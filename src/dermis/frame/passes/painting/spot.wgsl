@@ -200,34 +200,28 @@ fn sum_zones(spot: Spot) {
         zone[k] = vec4f(0.0);
     }
     let p = spot.left + WANDER_MM * vec3f(noise[NOISE_WANDER_X], noise[NOISE_WANDER_Y], 0.0);
-    for (var k = 0u; k < ZONES; k++) {
-        let off = (p - tables.zones[k].centre.xyz) * tables.zones[k].reach.xyz;
-        let away = dot(off, off);
-        if (away < 14.0) {
-            let weight = exp(-away);
-            for (var c = 0u; c < AMOUNT_ROWS; c++) {
-                zone[c] += weight * tables.zones[k].amounts[c];
+    var k = 0u;
+    loop { // over those that reach here, as in make_noise
+        var away = 0.0;
+        loop {
+            if (k >= ZONES) {
+                break;
             }
+            let off = (p - tables.zones[k].centre.xyz) * tables.zones[k].reach.xyz;
+            away = dot(off, off);
+            if (away < 14.0) {
+                break;
+            }
+            k++;
         }
-    }
-}
-
-fn scatter_dots(spot: Spot, scalp: f32, lip: f32) {
-    var kept: array<f32, DOTS>;
-    let sun = saturate(zone_of(ZONE_SUN));
-    let freckled = paint.freckles * (0.12 + 0.88 * sun) * (0.75 + 0.75 * noise[NOISE_SUN]) * (1.0 - lip);
-    kept[DOT_FRECKLES] = 0.7 * freckled;
-    kept[DOT_SMALL_FRECKLES] = freckled;
-    kept[DOT_MOLES] = 0.3 * paint.moles * (1.0 - lip);
-    kept[DOT_AGE_SPOTS] = 0.8 * paint.spots * (0.1 + 0.9 * sun) * (1.0 - lip);
-    kept[DOT_STUBBLE] = select(0.0, 1.0, max(scalp * paint.stubble, saturate(zone_of(ZONE_BEARD)) * paint.beard) > 0.0);
-    for (var k = 0u; k < DOTS; k++) {
-        dotted[k] = 0.0;
-        if (kept[k] > 0.0) {
-            let kind = tables.dot_kinds[k];
-            let bent = spot.body + kind.ragged_mm * vec3f(noise[NOISE_RAGGED_X], noise[NOISE_RAGGED_Y], 0.0);
-            dotted[k] = dots(bent, spot.normal, kind, kept[k], spot.texel_mm, 64u * paint.seed + 40u + 2u * k);
+        if (k >= ZONES) {
+            break;
         }
+        let weight = exp(-away);
+        for (var c = 0u; c < AMOUNT_ROWS; c++) {
+            zone[c] += weight * tables.zones[k].amounts[c];
+        }
+        k++;
     }
 }
 
