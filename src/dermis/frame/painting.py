@@ -11,7 +11,7 @@ from dermis.human.skin.face import AMOUNTS, DEGREES, sizes
 from dermis.human.skin.movements import FOLDING
 from dermis.human.skin.textures import DOTS, GROUNDS, NOISES, WANDERING, noise_table
 
-_NAMES = {
+_NAMES: dict[str, Sequence[str]] = {
     "noises": [noise.name for noise in NOISES],
     "dots": [dots.name for dots in DOTS],
     "amounts": list(AMOUNTS),

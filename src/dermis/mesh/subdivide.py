@@ -124,7 +124,7 @@ def refinement(mesh: Mesh, levels: int) -> Refinement:
         Stencils(first, column, weight.astype(np.float32)),
         finer["uv"],
         point,
-        triangles,
+        triangles.astype(np.int32),
         finer["material"],
         quads,
     )

@@ -85,7 +85,7 @@ def _between(root_mm: Doubles, guide_mm: Doubles, ways: Doubles) -> Doubles:
     share /= share.sum(axis=1, keepdims=True)
     first = np.arange(0, _BESIDE * n + 1, _BESIDE)
     shares = csr_array((share.ravel(), np.asarray(near).ravel(), first), shape=(n, g))
-    return np.asarray((shares @ ways.reshape(g, -1)).reshape(n, *ways.shape[1:]))
+    return np.asarray(shares @ ways.reshape(g, -1)).reshape(n, *ways.shape[1:])
 
 
 def _astray(ways: Doubles, normal: Doubles, rough: Roughness, rng: np.random.Generator) -> Doubles:

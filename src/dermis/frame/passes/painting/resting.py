@@ -73,7 +73,7 @@ def _owned(device: Device, given: Given, side: int) -> dict[str, Any]:
     """Buffers of the surface, and of whose each texel is; made once for all people with its layout."""
     surface = given.surface
     known = device.shared("painted surfaces", WeakKeyDictionary[Painting, dict[int, dict[str, Any]]])
-    sides = known.setdefault(surface, {})
+    sides: dict[int, dict[str, Any]] = known.setdefault(surface, {})
     if side not in sides:
         sides.clear()
         made = {
