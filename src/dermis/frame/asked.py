@@ -54,12 +54,17 @@ class Asked:
         return self.head.topology
 
     @property
+    def shares(self) -> bool:
+        """Whether these are made for other people too."""
+        return self.topology is not self.head.bare
+
+    @property
     def searched(self) -> Any:
         """Where control points rest as thin parts are looked for, None for those of the head's topology.
 
         All people of a template share its own: what passes through these is weighed for each.
         """
-        return None if self.head.template else self.person
+        return None if self.shares else self.person
 
     @property
     def white(self) -> bool:

@@ -54,7 +54,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     reading = device, asked.head, asked.white, settings.gamma == "right", asked.painted_side, asked.moving
     maps = memo.soon(device.executor, upload_maps, *reading)  # which take long to read
     shadow_maps = _shadows(memo, device, asked)
-    tables = keep(shape_tables, device, asked.topology, of="shared" if asked.head.template else "")
+    tables = keep(shape_tables, device, asked.topology, of="shared" if asked.shares else "")
     shape = keep(make_shape, device, tables)
     person = keep(still_shape, device, tables) if asked.person is not None else None
     curvature = keep(_curvature, device, asked.topology) if technique.curved else None

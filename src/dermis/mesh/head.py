@@ -73,8 +73,10 @@ class Head:
 
     @property
     def topology(self) -> Head:
-        """The bare head that its layout is made for: its template, or itself."""
-        return self.bare if self.template is None else self.template
+        """The bare head that atlas and tables are made for: its template, while its rig is of that, or itself."""
+        shared = self.template
+        own = shared is None or self.rig is None or self.rig.template is not shared.rig
+        return self.bare if shared is None or own else shared
 
     @property
     def positions_mm(self) -> Floats:
