@@ -1,4 +1,4 @@
-"""Files of settings: scenes, lights, cameras, people, regions, media and profiles."""
+"""Files of settings: scenes, lights, cameras, people, regions, landmarks, media and profiles."""
 
 from __future__ import annotations
 
@@ -214,11 +214,34 @@ def _take_profile(plan: Plan) -> None:
     check_finite((profile.variance_mm2, profile.weight), "profile")
 
 
+def _landmarks(rng: Random) -> Input:
+    rows = [f"point {k},{rng.randrange(200)}" for k in range(rng.randrange(1, 80))]
+    text = "\n".join(["# mine", "name,vertex", *rows, ""])
+    return Input({"points.csv": text.encode()}, {"file": "points.csv"})
+
+
+def _take_landmarks(plan: Plan) -> None:
+    from dermis.human.landmarks.points import landmark_points
+
+    found = landmark_points(_ball(), plan["file"])
+    check_finite((found.share, found.corner), "landmarks")
+
+
+@cache
+def _ball() -> Any:
+    from dermis.mesh.head import Head
+    from dermis.mesh.maps import Maps
+    from dermis.mesh.primitives import uv_sphere
+
+    return Head("ball", uv_sphere(60.0, 24, 12), Maps())
+
+
 KINDS = (
     Kind("scene", _scene, _take_scene, share=20),
     Kind("lights", _lights, _take_lights, share=8),
     Kind("camera", _camera, _take_camera, share=5),
     Kind("person", _person, _take_person, share=8),
     Kind("regions", _regions, _take_regions, share=6),
+    Kind("landmarks", _landmarks, _take_landmarks, share=3),
     Kind("profile", _profile, _take_profile, share=8),
 )

@@ -88,10 +88,9 @@ def _of_human(head: Head, rows: Rows) -> LandmarkPoints:
 
 
 def _of_table(head: Head, name: str) -> LandmarkPoints:
-    rows = parse_rows(read_text(check_landmarks(name), _EXPECTED))
-    count = len(head.positions_mm)
+    text, count = read_text(check_landmarks(name), _EXPECTED), len(head.positions_mm)
     with understood(name, _EXPECTED, KeyError, TypeError, csv.Error):
-        found = [(str(row["name"]), int(row["vertex"])) for row in rows]
+        found = [(str(row["name"]), int(row["vertex"])) for row in parse_rows(text)]
     if not 0 < len(found) <= _MOST:
         refuse(name, f"1 to {_MOST} landmarks", f"{len(found)} came", "Correct the table")
     for landmark, vertex in found:
