@@ -184,7 +184,9 @@ def spec_of(tables: Mapping[str, Any], folder: Path = Path()) -> Spec:
     """
     if "folder" in tables:
         refuse("folder", "no such key", "it came", "Files lie relative to the spec's own folder")
-    given = dict(matched(tables, folder))
+    given = {
+        name: table if name == "files" else matched(table, folder, name) for name, table in tables.items()
+    }
     given["render"] = _render(given.pop("size", (512, 512)), given.get("render", {}))
     if isinstance(groups := given.get("correlated", ()), list | tuple):
         given["correlated"] = tuple(_made(Correlated, "correlated", group) for group in groups)
