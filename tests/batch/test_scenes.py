@@ -161,9 +161,8 @@ def test_heads_are_taken_from_files_of_people_and_of_scenes(tmp_path: Path) -> N
 
 
 def test_pose_is_what_expression_and_weights_say() -> None:
-    drawn = spec(
-        "[expression]\nname = 'wink'\n[expressions.wink]\neyeBlinkLeft = 1\nmouthSmile = 0.5\n[pose]\njawOpen = 0.2"
-    )
+    own = "[expressions.wink]\neyeBlinkLeft = 1\nmouthSmile = 0.5\n[pose]\njawOpen = 0.2"
+    drawn = spec(f"[expression]\nname = 'wink'\n{own}")
     parameters = drawn.parameters(0)
     weights = {name[5:]: value for name, value in parameters.items() if name.startswith("pose.")}
     assert weights == {"eyeBlinkLeft": 1, "mouthSmileLeft": 0.5, "mouthSmileRight": 0.5, "jawOpen": 0.2}
@@ -194,17 +193,17 @@ def test_lights_are_of_the_rig_that_is_drawn() -> None:
 
 
 def test_background_and_environment_come_together() -> None:
-    told = "[environment]\nname = {choice = ['none', 'uniform']}\nstrength = 0.5\n[background]\nkind = 'environment'\nblur = 0.3"
-    drawn = spec(told)
+    around = "[environment]\nname = {choice = ['none', 'uniform']}\nstrength = 0.5\n"
+    drawn = spec(f"images_per_person = 9\n{around}[background]\nkind = 'environment'\nblur = 0.3")
+    maker = SceneMaker(drawn)
     for k in range(8):
         parameters = drawn.parameters(k)
-        scene, settings = SceneMaker(drawn).scene(parameters) if k < 2 else (None, None)
         assert (parameters["background.kind"] == "environment") == (
             parameters["environment.name"] == "uniform"
         )
-        if scene is not None and settings is not None:
-            assert (settings.background == "environment") == (scene.environment is not None)
-            assert settings.background_blur == (0.3 if scene.environment else 0.0)
+        scene, settings = maker.scene(parameters)
+        assert (settings.background == "environment") == (scene.environment is not None)
+        assert settings.background_blur == (0.3 if scene.environment else 0.0)
     plain = spec("[background]\nkind = 'colour'\nred = 0.1\ngreen = 0.2\nblue = 0.3")
     assert SceneMaker(plain).scene(plain.parameters(0))[1].background == (0.1, 0.2, 0.3)
 
