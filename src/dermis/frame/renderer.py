@@ -90,7 +90,7 @@ class Renderer(Submitter):
         Raises DermisError for sizes over the device's limits and when the device fails.
         """
         settings = given_plain(Settings, settings or {}, "settings", "size=(512, 512)")
-        what = Scene.of(scene), settings, view, asked_outputs(outputs), previous
+        what = Scene.of(scene), settings, view, asked_outputs(outputs), previous and Scene.of(previous)
         return self.kept_open.run(partial(self._draw, anew, timed, *what))
 
     def _draw(self, anew: bool, timed: Timed, *what: Any) -> Rendered:
@@ -198,8 +198,8 @@ class Renderer(Submitter):
         Raises DermisError as `draw` does.
         """
         chosen = given_plain(Settings, settings or {}, "settings", "size=(512, 512)")
-        given = {"outputs": asked_outputs(outputs), "landmarks": asked_landmarks(landmarks)}
-        send = partial(self._send, settings=chosen, linear=linear, alpha=alpha, **given)
+        asked = partial(self._send, outputs=asked_outputs(outputs), landmarks=asked_landmarks(landmarks))
+        send = partial(asked, settings=chosen, linear=linear, alpha=alpha)
         frames = observed_frames(send, scenes, previous, chosen)
         return arriving(self.kept_open, lambda: self.device, frames)
 
