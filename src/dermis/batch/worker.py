@@ -10,14 +10,18 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
+from dermis.batch.drawing import Parameters
 from dermis.batch.encoding import Encoded, Encoders
 from dermis.batch.entries import entries
 from dermis.batch.scenes import SceneMaker
 from dermis.batch.shards import Shard, ShardWriter, is_whole
 from dermis.batch.spec import Spec
 from dermis.errors import DermisError
+from dermis.frame.observation import Observation
 from dermis.frame.renderer import Renderer
 from dermis.gpu.failures import DeviceError
+from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
 
 
 class Failure(NamedTuple):
@@ -46,9 +50,10 @@ class _Plan(NamedTuple):
     """An image to be drawn."""
 
     number: int
-    parameters: dict[str, Any]
-    scene: Any
-    settings: Any
+    parameters: Parameters
+    scene: Scene
+    settings: Settings
+    before: Scene | None
 
 
 class Worker:
@@ -122,7 +127,7 @@ class Worker:
             number = numbers.popleft()
             parameters = self._work.spec.parameters(number)
             try:
-                plan = _Plan(number, parameters, *self._maker.scene(parameters))
+                plan = _Plan(number, parameters, *self._maker.scene(parameters), self._before(number))
             except DermisError as fault:
                 if not self._work.keep_going:
                     raise DermisError(f"image {number}: {fault}") from fault
@@ -134,12 +139,25 @@ class Worker:
     def _observed(self, plans: Iterable[_Plan]) -> Iterator[Any]:
         """Observations of scenes, frames in flight as long as the settings stay the same."""
         spec = self._work.spec
+        asked: dict[str, Any] = {"outputs": spec.outputs}
+        if spec.landmarks:
+            asked["landmarks"] = spec.landmarks
         for settings, alike in itertools.groupby(plans, lambda plan: plan.settings):
-            scenes = (plan.scene for plan in alike)
-            yield from self._renderer.observe(
-                scenes, settings, outputs=spec.outputs, landmarks=spec.landmarks
-            )
+            those, again = itertools.tee(alike)
+            before = (plan.before for plan in again)  # and never what happened to be drawn before
+            scenes = (plan.scene for plan in those)
+            yield from self._renderer.observe(scenes, settings, previous=before, **asked)
+
+    def _before(self, number: int) -> Any:
+        """The scene that an image's motion is counted from: the image before it, of the same person."""
+        spec = self._work.spec
+        if "motion" not in spec.outputs or number % spec.images_per_person == 0:
+            return None
+        try:
+            return self._maker.scene(spec.parameters(number - 1))[0]
+        except DermisError:  # it is left out of the data set
+            return None
 
 
-def _encode(spec: Spec, number: int, observation: Any, parameters: dict[str, Any]) -> Encoded:
+def _encode(spec: Spec, number: int, observation: Observation, parameters: Parameters) -> Encoded:
     return number, entries(number, observation, parameters, spec)
