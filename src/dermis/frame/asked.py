@@ -28,6 +28,7 @@ class Asked:
     lights, shadow_layers : how many parts of lights there are, and how many of them cast shadows
     posed : whether the scene has a pose
     view : name of a scene among several that are drawn in turn
+    outputs : names of what is asked of the frame besides its picture
     """
 
     head: Head
@@ -42,6 +43,7 @@ class Asked:
     shadow_layers: int
     posed: bool
     view: str
+    outputs: tuple[str, ...] = ()
 
     @property
     def white(self) -> bool:

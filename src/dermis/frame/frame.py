@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dermis.frame.inputs import Inputs
+from dermis.frame.output_stages import draw_outputs
 from dermis.frame.passes import (
     background,
     bloom,
@@ -51,3 +52,4 @@ def draw_frame(graph: Graph, inputs: Inputs, technique: Technique) -> None:
     if made.glow:
         radiance = bloom.draw(graph, made.glow, radiance, inputs.settings.bloom)
     post.draw(graph, radiance, made.picture, inputs.settings, made.meter)
+    draw_outputs(graph, inputs)

@@ -17,6 +17,8 @@ from dermis.frame.passes.background import Backdrop
 from dermis.frame.passes.bloom import Glow
 from dermis.frame.passes.meter import Meter
 from dermis.frame.passes.moving_occlusion import Sky
+from dermis.frame.passes.outputs.motion import Before
+from dermis.frame.passes.outputs.planes import OutputResources
 from dermis.frame.passes.painting.expression import Face
 from dermis.frame.passes.post import Picture
 from dermis.frame.passes.shadows import ShadowMaps
@@ -71,6 +73,7 @@ class Resources:
     meter : what meters the exposure, None where it is given
     backdrop : space for what is behind the head, None for nothing
     glow : space for the bloom, None without one
+    outputs : space for what is asked besides the picture, None for nothing
     unscattered : share of the skin's triangles that the atlas cannot hold
     """
 
@@ -97,6 +100,7 @@ class Resources:
     meter: Meter | None
     backdrop: Backdrop | None
     glow: Glow | None
+    outputs: OutputResources | None
     unscattered: float
 
 
@@ -113,6 +117,8 @@ class Inputs:
     seen : what the picture shows of a plane before the eye
     around : how the sky sees the head, and the shader's record of it; None where occlusion does not move
     view, constants : record of the shading pass, and its pipeline constants
+    centre_mm : the head's, from which places of the scene are counted
+    before : the scene before, None where nothing reads it
     """
 
     resources: Resources
@@ -128,6 +134,8 @@ class Inputs:
     around: tuple[Look, Any] | None
     view: Any
     constants: Constants
+    centre_mm: Triple
+    before: Before | None = None
 
     @property
     def lit(self) -> dict[str, Any]:

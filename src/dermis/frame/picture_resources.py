@@ -1,4 +1,4 @@
-"""Space for what makes a picture of radiance: meter, what is behind the head, bloom, and the picture."""
+"""Space for what makes a picture of radiance: meter, background, bloom, the picture; and outputs."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 from dermis.errors import refuse
 from dermis.frame import surroundings
 from dermis.frame.asked import Asked
+from dermis.frame.output_resources import output_resources
 from dermis.frame.passes.background import Backdrop
 from dermis.frame.passes.bloom import make_glow
 from dermis.frame.passes.meter import make_meter
@@ -25,6 +26,7 @@ def picture_resources(memo: Memo, device: Device, asked: Asked) -> dict[str, Any
         "meter": keep(make_meter, device) if settings.exposure == "auto" else None,
         "backdrop": _backdrop(memo, device, asked),
         "glow": keep(make_glow, device, settings.size) if settings.bloom else None,
+        "outputs": output_resources(memo, device, asked),
     }
 
 

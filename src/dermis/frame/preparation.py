@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.errors import refuse
 from dermis.frame.asked import Asked
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.inputs import EyesSeen, Inputs, camera_views, pinhole, seen_by
@@ -15,6 +16,7 @@ from dermis.frame.levels import Blur, scale_of
 from dermis.frame.lights import light_constants, light_records, light_views
 from dermis.frame.limits import no_room
 from dermis.frame.passes.moving_occlusion import sky_record
+from dermis.frame.passes.outputs.motion import Before
 from dermis.frame.passes.shade import shade_program
 from dermis.frame.passes.shape import MotionBytes, resting
 from dermis.frame.projection import Views, shadow_layers
@@ -25,6 +27,7 @@ from dermis.frame.strands import strand_constants
 from dermis.frame.surroundings import brightest, load_surroundings, with_suns
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Device, Memo
+from dermis.gpu.memo import same
 from dermis.gpu.no_room import NoRoomError
 from dermis.human.skin.movements import movements
 from dermis.mesh.head import Head
@@ -57,18 +60,31 @@ class Preparation:
         self.device, self.memo = device, Memo(depth)
         self.profile_of = SkinProfiles().of
 
-    def inputs(self, scene: Scene, settings: Settings, view: str = "") -> Inputs:
+    def inputs(
+        self,
+        scene: Scene,
+        settings: Settings,
+        view: str = "",
+        outputs: tuple[str, ...] = (),
+        previous: Scene | None = None,
+    ) -> Inputs:
         """Everything that a frame reads; what it does not is let go of.
 
         view : name of a scene among several that are drawn in turn: each has light and shadows of its own
+        outputs : names of what is asked besides the picture
+        previous : scene of the same head that motion is counted from, this one itself when left out
 
         Raises DermisError for sizes over the device's limits.
         """
-        inputs = self._inputs(scene, settings, TECHNIQUES[settings.technique], view)
+        inputs = self._inputs(scene, settings, TECHNIQUES[settings.technique], view, outputs)
+        if "motion" in outputs:
+            inputs = replace(inputs, before=self._before(scene, previous or scene, inputs))
         self.memo.end()
         return inputs
 
-    def _inputs(self, scene: Scene, settings: Settings, technique: Technique, view: str) -> Inputs:
+    def _inputs(
+        self, scene: Scene, settings: Settings, technique: Technique, view: str, outputs: tuple[str, ...]
+    ) -> Inputs:
         keep, device, head, around = self.memo.keep, self.device, scene.head.bare, scene.environment
         profile = self.profile_of(scene.skin)
         surroundings = keep(load_surroundings, device, around.name if around else None)
@@ -78,7 +94,7 @@ class Preparation:
         record, layers, parts = keep(_lights, *lit_by, using=(device, scene))
         who = scene.head, scene.skin, profile, _person(scene)
         counts = parts, len(layers.clips), scene.motion is not None
-        asked = Asked(*who, settings, around, surroundings, technique, *counts, view)
+        asked = Asked(*who, settings, around, surroundings, technique, *counts, view, outputs)
         try:
             resources = keep(make_resources, self.memo, device, asked)
         except NoRoomError as error:
@@ -101,6 +117,7 @@ class Preparation:
             around=self._around(head, scene.motion, moved.outline) if resources.sky else None,
             view=seen_by(resources.view, seen_from, moved.eyes),
             constants=resources.constants + shone_on,
+            centre_mm=head.centre_mm,
         )
 
     def _around(self, head: Head, motion: Motion | None, outline: Outline) -> tuple[Look, Any]:
@@ -108,10 +125,33 @@ class Preparation:
         anchors = self.memo.keep(anchors_of, head)
         return self.memo.keep(_looked, outline, using=(motion, self.device, head, anchors))
 
+    def _before(self, scene: Scene, previous: Scene, inputs: Inputs) -> Before:
+        """What motion is counted from.
+
+        Raises DermisError for a scene of another head.
+        """
+        head = scene.head.bare
+        if not same(previous.head.bare, head):
+            came, remedy = f"{previous.head.name!r} came", "Leave it out where a head follows another"
+            refuse("previous", "a scene of the same head", came, remedy)
+        moved = self.memo.keep(_resting, head).motion
+        if previous.motion is not None:
+            moved = self.memo.keep(_bytes_of, head, previous.motion, moved, of="before")
+        seen_from = pinhole(previous.camera, head, inputs.settings)
+        view = seen_by(inputs.resources.view, seen_from, None)
+        return Before(None if moved == inputs.motion else moved, view)
+
     def _moved(self, head: Head, motion: Motion | None) -> Moved:
         """The head as it is posed, or at rest where no motion came."""
         resting = self.memo.keep(_resting, head)
         return self.memo.keep(_posed, head, motion, resting.motion) if motion else resting
+
+
+def _bytes_of(head: Head, motion: Motion, at_rest: MotionBytes) -> MotionBytes:
+    """A motion as the shaders read it; the bytes of a head's own points are always the same object."""
+    weights, matrices = motion.weights.tobytes(), motion.matrices.tobytes()
+    same = motion.positions_mm is head.control.positions_mm
+    return MotionBytes(at_rest.positions if same else motion.positions_mm.tobytes(), weights, matrices)
 
 
 def _person(scene: Scene) -> Any:
@@ -138,10 +178,7 @@ def _eyes(head: Head, motion: Motion) -> EyesSeen | None:
 
 
 def _posed(head: Head, motion: Motion, at_rest: MotionBytes) -> Moved:
-    rig, weights, matrices = head.control, motion.weights.tobytes(), motion.matrices.tobytes()
-    same = motion.positions_mm is rig.positions_mm
-    positions = at_rest.positions if same else motion.positions_mm.tobytes()
-    moved = MotionBytes(positions, weights, matrices)
+    rig, moved = head.control, _bytes_of(head, motion, at_rest)
     if moved == at_rest:  # where the mesh's own outline is exact
         return Moved(moved, head.mesh.outline, _eyes(head, motion))
     return Moved(moved, Outline(rig.outline_mm(motion), _SLACK_MM), _eyes(head, motion))

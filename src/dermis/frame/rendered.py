@@ -9,7 +9,10 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.errors import refuse
+from dermis.frame.outputs import OUTPUTS
 from dermis.frame.passes.meter import Meter, read_meter
+from dermis.frame.passes.outputs.planes import OutputResources
 from dermis.frame.passes.pack import Leaving
 from dermis.frame.passes.post import Picture
 from dermis.gpu import Device, download
@@ -25,11 +28,13 @@ class Shown:
     """Where a frame is; it moves when its device is lost and the frame drawn again.
 
     meter : what metered the exposure, None where it was given
+    outputs : what was asked besides the picture, None for nothing
     """
 
     device: Device
     picture: Picture
     meter: Meter | None
+    outputs: OutputResources | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -90,6 +95,18 @@ class Rendered(Summarised):
         """(h, w, 4) float32 over the background "none", multiplied by alpha as OpenEXR has it."""
         return self._exposed()
 
+    def output(self, name: str) -> NDArray[Any]:
+        """(h, w) or (h, w, channels) of an output that was asked of the frame, row 0 at the top.
+
+        Raises DermisError for one that was not asked.
+        """
+        OUTPUTS[name]
+        asked = self.shown.outputs.names if self.shown.outputs else ()
+        if name not in asked:
+            came = f"the frame was drawn with {', '.join(asked) or 'none'}"
+            refuse(f"output {name}", "one that was asked", came, f'Pass outputs=("{name}",) to draw')
+        return self._read(lambda at: _read_output(at, name))
+
     def clipped(self) -> float:
         """Share of the head's pixels with a part that is brighter than the picture's bytes can show."""
         levels = self._read(lambda at: download(at.device, at.picture.bytes))
@@ -109,3 +126,12 @@ class Rendered(Summarised):
             )
         found: T = self.kept(lambda: read(self.shown))
         return found
+
+
+def _read_output(at: Shown, name: str) -> NDArray[Any]:
+    """One of the outputs of a frame; waits for it."""
+    assert at.outputs is not None
+    planes = at.outputs.planes_of(name)
+    start, size = planes.place(name)
+    raw = at.device.handle.queue.read_buffer(planes.buffer, start, size)
+    return planes.array(name, np.frombuffer(raw, np.uint8).copy())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any, Literal, TypeVar, overload
@@ -12,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse, shown_value
-from dermis.frame.frame import draw_frame
-from dermis.frame.inputs import Inputs
-from dermis.frame.passes import pack, warm_up
+from dermis.frame.in_flight import arriving
+from dermis.frame.observation import Observation, observed_frames
+from dermis.frame.outputs import asked_outputs
+from dermis.frame.passes import warm_up
 from dermis.frame.passes.pack import Leaving
-from dermis.frame.passes.post import Picture
-from dermis.frame.preparation import Preparation
 from dermis.frame.rendered import Rendered, Shown
-from dermis.gpu import Device, Frame, Graph, open_device
+from dermis.frame.submitter import Submitter
+from dermis.gpu import Device, open_device
 from dermis.gpu.failures import KeptOpen
 from dermis.gpu.frame import Timed
 from dermis.mesh.head import Head
@@ -27,15 +26,13 @@ from dermis.quantities import whole_number
 from dermis.scene.given import given_plain
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
-from dermis.scene.techniques import TECHNIQUES
 
 T = TypeVar("T")
 _DEEPEST = 1000
 _WARMING_FRAMES = 100
-_IN_FLIGHT = 3  # frames submitted and not done: Python and the device overlap, with little latency
 
 
-class Renderer:
+class Renderer(Submitter):
     """Renders scenes on one device; what does not change between two frames is not computed again.
 
     A device that its driver loses is opened again, and the frame drawn anew.
@@ -45,16 +42,12 @@ class Renderer:
     reopens : False raises DeviceLostError instead, for callers that keep resources of their own on the device
     """
 
-    device: Device
-    graph: Graph
-
     def __init__(self, adapter: str = "auto", depth: int = 1, *, reopens: bool = True) -> None:
         if not isinstance(adapter, str):
             refuse("adapter", "its name", f"{shown_value(adapter)} came", "Write auto, cpu or a part of it")
+        super().__init__()
         self._depth = whole_number("depth", depth, 1, _DEEPEST)
         self._adapter, self._opening_ms = adapter, 0.0
-        self._last: Shown | None = None
-        self._in_flight: deque[int] = deque()
         self.kept_open = KeptOpen(self._open, self._adopt, reopens=reopens)
 
     def _open(self) -> Device:
@@ -64,17 +57,8 @@ class Renderer:
     def _adopt(self, device: Device) -> None:
         """Make what is kept from frame to frame on a device that was just opened."""
         warm_up(device)
-        self.device, self.graph = device, Graph(device)
-        preparation = Preparation(device, self._depth)
-        self.memo, self.prepare = preparation.memo, preparation.inputs
-        self.profile_of = preparation.profile_of
-        self._in_flight.clear()
+        self.on(device, self._depth)
         self._opening_ms = 1e3 * (time.perf_counter() - self._opening_began)
-
-    def forget(self) -> None:
-        """Forget all that is kept; the next frame makes it again."""
-        self.memo.forget()
-        self.graph.forget()
 
     def draw(
         self,
@@ -84,6 +68,8 @@ class Renderer:
         anew: bool = False,
         timed: Timed = True,
         view: str = "",
+        outputs: Iterable[str] = (),
+        previous: Scene | None = None,
     ) -> Rendered:
         """Render one frame and leave the image on the device.
 
@@ -92,16 +78,19 @@ class Renderer:
             "whole" times only the frame, with its stages in one pass; False returns as soon as the frame is
             submitted, and waits only for a device that is three frames behind
         view : name of a scene among several drawn in turn: each keeps light and shadows of its own
+        outputs : names of what else is wanted of the frame, for `Rendered.output`
+        previous : scene of the same head that motion is counted from; without it there is none
 
         Raises DermisError for sizes over the device's limits and when the device fails.
         """
         settings = given_plain(Settings, settings or {}, "settings", "size=(512, 512)")
-        draw = partial(self._draw, Scene.of(scene), settings, anew, timed, view)
-        return self.kept_open.run(draw)
+        what = Scene.of(scene), settings, view, asked_outputs(outputs), previous
+        return self.kept_open.run(partial(self._draw, anew, timed, *what))
 
-    def _draw(self, scene: Scene, settings: Settings, anew: bool, timed: Timed, view: str) -> Rendered:
+    def _draw(self, anew: bool, timed: Timed, *what: Any) -> Rendered:
+        """what : that is prepared"""
         started = time.perf_counter()
-        inputs = self.prepare(scene, settings, view)
+        inputs = self.prepare(*what)
         ready = time.perf_counter()
         frame, _ = self._submit(inputs, timed, anew)
         if timed:
@@ -112,11 +101,10 @@ class Renderer:
         times = frame.stage_ms() if timed else None
         setup_ms, made = 1e3 * (ready - started) + self._opening_ms, inputs.resources
         self._opening_ms = 0.0
-        shown = self._last = Shown(self.device, made.picture, made.meter)
+        shown = self._last = Shown(self.device, made.picture, made.meter, made.outputs)
 
         def again() -> None:
-            now = self._draw(scene, settings, anew, timed, view).shown
-            shown.device, shown.picture, shown.meter = now.device, now.picture, now.meter
+            vars(shown).update(vars(self._draw(anew, timed, *what).shown))
             self._last = shown
 
         return Rendered(
@@ -153,33 +141,6 @@ class Renderer:
         self.device.wait()
         return self.draw(scene, settings, anew=True)
 
-    def _submit(
-        self, inputs: Inputs, timed: Timed, anew: bool, leave: Callable[[Graph, Picture], T] | None = None
-    ) -> tuple[Frame, T | None]:
-        """Declare a frame and run its stale passes.
-
-        leave : starts reading the picture back in the same submission
-        """
-        if anew:
-            self.graph.forget()
-        self.graph.begin()
-        draw_frame(self.graph, inputs, TECHNIQUES[inputs.settings.technique])
-        leaving = leave(self.graph, inputs.resources.picture) if leave else None
-        frame, self._last = self.graph.submit(timed), None
-        return frame, leaving
-
-    def _keep_pace(self, frame: Frame) -> None:
-        """Wait until no more frames than allowed are in flight."""
-        self._in_flight.append(frame.submitted)
-        while len(self._in_flight) > _IN_FLIGHT:
-            self.device.wait(self._in_flight.popleft())
-
-    def _leave(self, picture: Picture, **how: Any) -> Leaving:
-        self.graph.begin()
-        leaving = pack.draw(self.graph, picture, **how)
-        self.graph.submit()
-        return leaving
-
     def render(self, scene: Scene | Head, **settings: Any) -> NDArray[np.float32]:
         """(h, w, 3) float32 linear Rec. 709 image; `settings` are those of `Settings`."""
         return self.draw(Scene.of(scene), Settings(**settings)).linear()
@@ -205,30 +166,34 @@ class Renderer:
 
         Raises DermisError as `draw` does.
         """
-        chosen, sent = Settings(**settings), deque[tuple[Leaving, Callable[[], Leaving]]]()
-        for scene in scenes:
-            send = partial(self._send, scene, chosen, linear, alpha)
-            sent.append((self.kept_open.run(send), send))
-            if len(sent) >= _IN_FLIGHT:
-                yield self._arrived(*sent.popleft())
-        while sent:
-            yield self._arrived(*sent.popleft())
+        send = partial(self._send, settings=Settings(**settings), linear=linear, alpha=alpha)
+        frames = ((partial(send, Scene.of(scene)), Leaving.image) for scene in scenes)
+        yield from arriving(self.kept_open, lambda: self.device, frames)
 
-    def _arrived(self, sent: Leaving, send: Callable[[], Leaving]) -> NDArray[Any]:
-        """The picture of a frame that was sent; it is sent again where its device was lost meanwhile."""
+    def observe(
+        self,
+        scenes: Iterable[Scene],
+        settings: Settings | None = None,
+        *,
+        outputs: Iterable[str] = (),
+        alpha: bool = False,
+        linear: bool = False,
+        previous: Scene | Iterable[Scene | None] | None = None,
+    ) -> Iterator[Observation]:
+        """What is seen of each scene in turn, each yielded while the next ones are drawn.
 
-        def image() -> NDArray[Any]:
-            return (sent if sent.fetched.device is self.device else send()).image()
+        outputs : names of what is wanted besides the picture
+        alpha, linear : as of `render_many`
+        previous : the scene before the first, as motion is counted from one to the next of the same head; or
+            those before each
 
-        return self.kept_open.run(image)
-
-    def _send(self, scene: Scene, settings: Settings, linear: bool, alpha: bool) -> Leaving:
-        """Submit a frame and start reading its picture back."""
-        inputs = self.prepare(Scene.of(scene), settings)
-        leave = partial(pack.draw, linear=linear, alpha=settings if alpha else None)
-        _, leaving = self._submit(inputs, False, False, leave)
-        assert leaving is not None
-        return leaving
+        Raises DermisError as `draw` does.
+        """
+        chosen = given_plain(Settings, settings or {}, "settings", "size=(512, 512)")
+        asked = asked_outputs(outputs)
+        send = partial(self._send, settings=chosen, linear=linear, alpha=alpha, outputs=asked)
+        frames = observed_frames(send, scenes, previous, chosen)
+        return arriving(self.kept_open, lambda: self.device, frames)
 
 
 def render(scene: Scene | Head, adapter: str = "auto", **settings: Any) -> NDArray[np.float32]:

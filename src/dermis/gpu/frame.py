@@ -98,16 +98,14 @@ class Frame(Recorder):
             (width, height, layers),
         )
 
-    def fetch(self, buffer: Any, fetched: Fetched | None = None) -> Fetched:
-        """The bytes of a buffer as the passes so far leave them, on their way from the device.
-
-        fetched : where they go, if that is made already
-        """
+    def fetch(self, buffers: Sequence[Any], fetched: Fetched) -> None:
+        """Send the bytes of buffers on their way, one after the other, as the passes so far leave them."""
         self._end_pass()
-        fetched = fetched or Fetched(self.device, buffer.size)
-        self._encoder.copy_buffer_to_buffer(buffer, 0, fetched.buffer, 0, buffer.size)
+        start = 0
+        for buffer in buffers:
+            self._encoder.copy_buffer_to_buffer(buffer, 0, fetched.buffer, start, buffer.size)
+            start += buffer.size
         self._fetched.append(fetched)
-        return fetched
 
     def draw(
         self,

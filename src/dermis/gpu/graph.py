@@ -57,7 +57,7 @@ class Graph(Recorder):
         self._passes: list[Pass] = []
         self._uniforms = Uniforms(device)
         self._known: list[Dependencies] = []
-        self._fetches: list[tuple[Any, Fetched]] = []
+        self._fetches: list[tuple[tuple[Any, ...], Fetched]] = []
 
     def forget(self) -> None:
         """Take all content for unknown: the next frame runs every pass."""
@@ -143,10 +143,10 @@ class Graph(Recorder):
         self._passes.append(Pass(recording.stages, lambda frame: frame.run(steps), access.number, declared))
         return result
 
-    def fetch(self, buffer: Any) -> Fetched:
-        """The bytes of a buffer as all the frame's passes leave it, on their way from the device."""
-        fetched = Fetched(self.device, buffer.size)
-        self._fetches.append((buffer, fetched))
+    def fetch(self, *buffers: Any) -> Fetched:
+        """The bytes of buffers, one after the other, as all the frame's passes leave them."""
+        fetched = Fetched(self.device, sum(buffer.size for buffer in buffers))
+        self._fetches.append((buffers, fetched))
         return fetched
 
     def submit(self, timed: Timed = False) -> Frame:
@@ -162,8 +162,8 @@ class Graph(Recorder):
                 self.listing = None
             for one in due:
                 one.run(frame)
-            for buffer, fetched in self._fetches:
-                frame.fetch(buffer, fetched)
+            for buffers, fetched in self._fetches:
+                frame.fetch(buffers, fetched)
             frame.submit()
         except Exception:
             self.forget()

@@ -1,4 +1,4 @@
-"""Packs the finished picture for readback: three or four bytes or floats per pixel."""
+"""Packs the finished picture for readback, three or four bytes or floats per pixel, and outputs with it."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from dermis.errors import refuse
 from dermis.frame.passes import program
+from dermis.frame.passes.outputs.planes import OutputResources
 from dermis.frame.passes.post import Picture, encoding_of
 from dermis.gpu import Device, Graph
 from dermis.gpu.readback import Fetched
 from dermis.scene.settings import Settings
 
 _ROW = 1024  # as in the shaders
+_WORD = 4  # bytes
 _PIXELS, _WORDS = 4, 3  # read and written by one invocation that packs bytes
 
 
@@ -26,27 +28,51 @@ class Leaving:
     size : (width, height) [pixel]
     kind : dtype of its numbers
     channels : 3, or 4 with alpha
+    words : that the picture takes, before the outputs
+    outputs : that come with it, None for none
     """
 
     fetched: Fetched
     size: tuple[int, int]
     kind: type[np.uint8] | type[np.float32]
     channels: int
+    words: int
+    outputs: OutputResources | None = None
 
     def image(self) -> NDArray[Any]:
         """(h, w, 3 or 4) sRGB bytes or linear floats; waits for them. To be called once."""
+        return self._image(self.fetched.array())
+
+    def all(self) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:
+        """The same with the outputs by name; in its place, to be called once."""
+        raw, start, found = self.fetched.array(), _WORD * self.words, dict[str, NDArray[Any]]()
+        for planes in self.outputs.planes if self.outputs else ():
+            end = start + planes.buffer.size
+            found |= planes.arrays(raw[start:end])
+            start = end
+        return self._image(raw), {name: found[name] for name in self.outputs.names} if self.outputs else {}
+
+    def _image(self, raw: NDArray[np.uint8]) -> NDArray[Any]:
         width, height = self.size
         count = self.channels * width * height
-        numbers = self.fetched.array()[: count * np.dtype(self.kind).itemsize].view(self.kind)
+        numbers = raw[: count * np.dtype(self.kind).itemsize].view(self.kind)
         return numbers.reshape(height, width, self.channels)
 
 
-def draw(graph: Graph, picture: Picture, *, linear: bool = False, alpha: Settings | None = None) -> Leaving:
+def draw(
+    graph: Graph,
+    picture: Picture,
+    *,
+    linear: bool = False,
+    alpha: Settings | None = None,
+    outputs: OutputResources | None = None,
+) -> Leaving:
     """Pack the picture and start reading it back to NumPy.
 
     linear : floats rather than bytes
     alpha : settings of the picture where the head's coverage is wanted too: light times coverage as floats,
         colours that are to be multiplied by it as bytes
+    outputs : what comes with it
 
     Raises DermisError for more than the device has in one buffer.
     """
@@ -61,10 +87,13 @@ def draw(graph: Graph, picture: Picture, *, linear: bool = False, alpha: Setting
     else:
         count = -(-pixels // _PIXELS)
         shader, words, bound = program(device, "pack.wgsl"), _WORDS * count, {"bytes": picture.bytes}
-    _check(device, 4 * words, pixels)
+    _check(device, _WORD * words, pixels)
     packed = _packed(device, picture, words)
+    buffers = [packed, *(planes.buffer for planes in (outputs.planes if outputs else ()))]
+    _check_sum(device, buffers, pixels)
     graph.compute("pack", shader, bound | {"packed": packed}, (_ROW, -(-count // _ROW)))
-    return Leaving(graph.fetch(packed), picture.size, np.float32 if linear else np.uint8, channels)
+    kind = np.float32 if linear else np.uint8
+    return Leaving(graph.fetch(*buffers), picture.size, kind, channels, words, outputs)
 
 
 def _check(device: Device, size: int, pixels: int) -> None:
@@ -72,6 +101,13 @@ def _check(device: Device, size: int, pixels: int) -> None:
     if size > most:
         limit = f"at most {most * pixels // size} pixels at once from {device.adapter.name}"
         refuse("size", limit, f"there are {pixels}", "Choose a smaller one")
+
+
+def _check_sum(device: Device, buffers: list[Any], pixels: int) -> None:
+    size, most = sum(buffer.size for buffer in buffers), device.max_buffer_bytes
+    if size > most:
+        limit = f"outputs of at most {most * pixels // size} pixels at once from {device.adapter.name}"
+        refuse("size", limit, f"there are {pixels}", "Ask for fewer outputs, or a smaller size")
 
 
 def _packed(device: Device, picture: Picture, words: int) -> Any:

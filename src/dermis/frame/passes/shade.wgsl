@@ -3,6 +3,7 @@
 //#include "mouth.wgsl"
 //#include "open_sky.wgsl"
 //#include "lids.wgsl"
+//#include "footprint.wgsl"
 //#include "pre_integrated.wgsl"
 //#include "sample_bits.wgsl"
 //#include "shaded.wgsl"
@@ -15,7 +16,6 @@ override STRIP: u32 = 1u;
 override EYES: bool = false; // whether there are eyes of true shape, and teeth
 
 const WET_ROUGHNESS: f32 = 0.1; // of plain materials: teeth, tongues, eyeballs of files
-const FINEST_RATIO: f32 = 4.0; // longest over shortest side of a footprint that one map sample may cover
 
 struct Shade {
     eye: vec3f,
@@ -90,9 +90,7 @@ fn shaded(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Shaded {
     let spacing = sqrt(share);
     let wx = meet(weights, ray_through(place + vec2f(spacing, 0.0), size)) - w;
     let wy = meet(weights, ray_through(place + vec2f(0.0, spacing), size)) - w;
-    let x = length(wx.x * a.uv + wx.y * b.uv + wx.z * c.uv);
-    let y = length(wy.x * a.uv + wy.y * b.uv + wy.z * c.uv);
-    let footprint = max(min(x, y), max(x, y) / FINEST_RATIO);
+    let footprint = footprint_of(wx.x * a.uv + wx.y * b.uv + wx.z * c.uv, wy.x * a.uv + wy.y * b.uv + wy.z * c.uv);
     var surface: Surface;
     if (opaque) {
         surface = Surface(point.normal, shade.material_colour[point.flags >> 8u].rgb, WET_ROUGHNESS, 1.0);

@@ -1,0 +1,59 @@
+"""What of a spec does not go together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from dermis.batch.dials import check_looks, check_skin, check_weights
+from dermis.batch.distributions import Distribution
+from dermis.batch.tables import MIXTURE
+from dermis.errors import refuse
+
+_ANCESTRY = "person.african", "person.asian", "person.caucasian"
+_HEAD = "person.head"
+
+
+def check_spec(spec: Any, drawn: Mapping[str, Distribution], expressions: Mapping[str, Any]) -> None:
+    """Refuse a spec that cannot be drawn, by table and key."""
+    check_looks(spec.person)
+    check_skin(spec.skin)
+    check_weights(spec.pose)
+    _check_person(drawn)
+    _check_expression(spec.expression.name, expressions)
+    _check_correlated(spec.correlated, drawn)
+
+
+def _check_person(drawn: Mapping[str, Distribution]) -> None:
+    given = [name for name in drawn if name.startswith("person.") and name != _HEAD]
+    if _HEAD in drawn and given:
+        remedy = "Leave one out"
+        refuse(given[0], "people that are drawn", f"{_HEAD} names heads", remedy)
+    shares = [drawn[name] for name in _ANCESTRY if name in drawn]
+    if shares and not any(min(share.ends) > 0 for share in shares):  # type: ignore[type-var, operator]
+        came = "all of them can be 0 at once"
+        refuse("person", "a share of african, asian or caucasian above 0", came, "Raise the low end of one")
+
+
+def _check_expression(name: Distribution, expressions: Mapping[str, Any]) -> None:
+    known = [*expressions, MIXTURE]
+    for end in name.ends:
+        if end not in known:
+            remedy = f"Add [expressions.{end}], or correct it"
+            refuse("expression: name", f"one of {', '.join(known)}", f"{end!r} came", remedy)
+
+
+def _check_correlated(groups: Any, drawn: Mapping[str, Distribution]) -> None:
+    seen: set[str] = set()
+    for group in groups:
+        people = [name.startswith("person.") for name in group.of]
+        for name in group.of:
+            if name not in drawn:
+                expected = "names of parameters that the spec draws, such as camera.yaw_deg"
+                refuse("correlated: of", expected, f"{name!r} is none", "Correct it")
+            if name in seen:
+                refuse("correlated: of", "each name in one group", f"{name} is in two", "Make one of both")
+        if people != sorted(people, reverse=True):
+            came = f"{group.of[people.index(False)]} comes before one"
+            refuse("correlated: of", "parameters of the person first", came, "Change their order")
+        seen |= set(group.of)

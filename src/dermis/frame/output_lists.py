@@ -1,0 +1,29 @@
+"""The outputs as their stages' shaders list them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+
+from dermis.frame.outputs import OUTPUTS, Output
+from dermis.gpu.wgsl_source import Member
+
+STAGES = ("geometry", "surface", "motion", "alpha")
+"""Shaders that make outputs, passes/outputs/STAGE.wgsl."""
+
+
+def output_lists() -> Mapping[str, Callable[[], Sequence[Member]]]:
+    """A list for each stage: STAGE_outputs, the outputs that it can make."""
+    return {f"{stage}_outputs": partial(_made_by, stage) for stage in STAGES}
+
+
+def _made_by(stage: str) -> list[Member]:
+    return [Member(one.name, Path(), _words(one)) for one in OUTPUTS.values() if one.stage == stage]
+
+
+def _words(output: Output) -> tuple[tuple[str, str], ...]:
+    """Type of its values in the shader, and the one where nothing is seen."""
+    kind = output.word if output.channels == 1 else f"vec{output.channels}f"
+    nothing = output.background if kind == "f32" else int(output.background)
+    return ("type", kind), ("nothing", f"{kind}({nothing})")

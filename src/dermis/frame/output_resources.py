@@ -1,0 +1,45 @@
+"""Space for the outputs that are asked of a frame."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dermis.frame.asked import Asked
+from dermis.frame.outputs import OUTPUTS
+from dermis.frame.passes.outputs.planes import OutputResources, make_planes
+from dermis.frame.passes.visibility_buffer import make_layers
+from dermis.frame.shape import make_shape, shape_tables
+from dermis.gpu import Device, Memo
+
+
+def output_resources(memo: Memo, device: Device, asked: Asked) -> OutputResources | None:
+    """Space for the outputs that are asked, None for none.
+
+    Raises DermisError for more than the device has in one buffer.
+    """
+    if not asked.outputs:
+        return None
+    settings, keep = asked.settings, memo.keep
+    stages: dict[str, list[tuple[str, int]]] = {}
+    for name, channels in output_channels(asked).items():
+        stages.setdefault(OUTPUTS[name].stage, []).append((name, channels))
+    planes = [
+        keep(make_planes, device, stage, tuple(of), settings.size, of=stage) for stage, of in stages.items()
+    ]
+    moves = any(OUTPUTS[name].stage == "motion" for name in asked.outputs)
+    tables = keep(shape_tables, device, asked.head.bare)
+    return OutputResources(
+        names=asked.outputs,
+        planes=tuple(planes),
+        centres=None if settings.samples == 1 else keep(_centres, device, settings.size),
+        before=keep(make_shape, device, tables, of="before") if moves else None,
+    )
+
+
+def output_channels(asked: Asked) -> dict[str, int]:
+    """How many numbers each output has in a pixel."""
+    return {name: OUTPUTS[name].channels or asked.lights for name in asked.outputs}
+
+
+def _centres(device: Device, size: tuple[int, int]) -> Any:
+    return make_layers(device, size, 1, triangles=True)

@@ -1,0 +1,1 @@
+"""What a frame knows besides its colour: stages, each a shader for those of its outputs that are asked."""

@@ -1,0 +1,19 @@
+// What head and hair cover of each pixel, by all of its samples.
+//#include "planes.wgsl"
+
+//#each alpha_outputs: override {NAME}_FIRST: u32 = UNASKED;
+
+@group(0) @binding(50) var exposed: texture_2d<f32>;
+
+fn alpha_output(pixel: vec2u) -> f32 {
+    return textureLoad(exposed, pixel, 0).a;
+}
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    let size = textureDimensions(exposed);
+    if (any(id.xy >= size)) {
+        return;
+    }
+    //#each alpha_outputs: put_{type}({NAME}_FIRST, cell_of(id.xy, size), {name}_output(id.xy));
+}
