@@ -10,7 +10,7 @@ from typing import Protocol
 
 from dermis.batch.datasheet import write_datasheet
 from dermis.batch.index import write_index
-from dermis.batch.shards import Shard, is_whole, remove_leftovers, shards_of
+from dermis.batch.shards import Shard, is_there, remove_leftovers, shards_of
 from dermis.batch.spec import Spec
 from dermis.batch.told import Told
 from dermis.batch.worker import Failure, Work
@@ -79,13 +79,13 @@ def run(
     claim(work.out, work.spec)
     every = shards_of(work.spec)
     mine = every[part[0] :: part[1]]
-    missing = [shard for shard in mine if not is_whole(work.out, shard, work.spec)]
+    missing = [shard for shard in mine if not is_there(work.out, shard, work.spec)]
     remove_leftovers(work.out, mine)
     try:
         images, failed = _drawn(crew, work, missing, told)
     finally:
         remove_leftovers(work.out, mine)
-    whole = all(is_whole(work.out, shard, work.spec) for shard in every)
+    whole = all(is_there(work.out, shard, work.spec) for shard in every)
     if whole:  # whoever sees it writes the same bytes
         write_index(work.out, work.spec)
         write_datasheet(work.out, work.spec)

@@ -14,7 +14,7 @@ from dermis.batch.drawing import Parameters
 from dermis.batch.encoding import Encoded, Encoders
 from dermis.batch.entries import entries
 from dermis.batch.scenes import SceneMaker
-from dermis.batch.shards import Shard, ShardWriter, is_whole
+from dermis.batch.shards import Shard, ShardWriter, is_there
 from dermis.batch.spec import Spec
 from dermis.errors import DermisError
 from dermis.frame.observation import Observation
@@ -77,10 +77,11 @@ class Worker:
         lost twice, LostProcessError where a process that encodes ended.
         """
         work = self._work
-        if is_whole(work.out, shard, work.spec):
+        if is_there(work.out, shard, work.spec):
             return ()
         failed: list[Failure] = []
-        with ShardWriter(work.out, shard, work.spec) as writer:
+        adapter = self._renderer.device.adapter.name
+        with ShardWriter(work.out, shard, work.spec, adapter) as writer:
             for number, found in self._encoders.encoded(self._jobs(shard, failed)):
                 writer.add(number, found)
                 drawn()
@@ -136,17 +137,17 @@ class Worker:
             sent.append(plan)
             yield plan
 
-    def _observed(self, plans: Iterable[_Plan]) -> Iterator[Any]:
-        """Observations of scenes, frames in flight as long as the settings stay the same."""
+    def _observed(self, plans: Iterable[_Plan]) -> Iterator[Observation]:
+        """What is seen of each, frames in flight; those without a background have alpha."""
         spec = self._work.spec
         asked: dict[str, Any] = {"outputs": spec.outputs}
         if spec.landmarks:
             asked["landmarks"] = spec.landmarks
-        for settings, alike in itertools.groupby(plans, lambda plan: plan.settings):
-            those, again = itertools.tee(alike)
-            before = (plan.before for plan in again)  # and never what happened to be drawn before
-            scenes = (plan.scene for plan in those)
-            yield from self._renderer.observe(scenes, settings, previous=before, **asked)
+        for alpha, alike in itertools.groupby(plans, lambda plan: plan.settings.background == "none"):
+            each = itertools.tee(alike, 3)
+            scenes, settings = (plan.scene for plan in each[0]), (plan.settings for plan in each[1])
+            before = (plan.before for plan in each[2])  # and never what happened to be drawn before
+            yield from self._renderer.observe(scenes, settings, alpha=alpha, previous=before, **asked)
 
     def _before(self, number: int) -> Any:
         """The scene that an image's motion is counted from: the image before it, of the same person."""
