@@ -48,12 +48,14 @@ class Drawing(WorkerPlugin):  # type: ignore[misc]
 
     def setup(self, worker: Any) -> None:
         """Called by dask when the worker has the plugin."""
-        self._kept = {"lock": threading.Lock(), "ends": ExitStack()}
+        self._kept = {"lock": threading.Lock(), "ends": ExitStack(), "over": threading.Event()}
 
     def teardown(self, worker: Any) -> None:
-        """Called by dask when the run is over or the worker ends."""
-        with self._kept["lock"]:
+        """Called by dask when the run is over or the worker ends; whoever draws stops by itself."""
+        self._kept["over"].set()
+        if self._kept["lock"].acquire(blocking=False):
             self._close()
+            self._kept["lock"].release()
 
     def draw(self, shard: Shard) -> Told:
         """Draw a shard: what became of it.
@@ -62,13 +64,20 @@ class Drawing(WorkerPlugin):  # type: ignore[misc]
         """
         with self._kept["lock"]:
             try:
-                failed = self._worker().draw(shard)
+                failed = self._worker().draw(shard, self._go_on)
             except (DeviceError, LostProcessError):
                 self._close()
                 raise
             except DermisError as fault:
                 return Told(refusal=str(fault))
+            finally:
+                if self._kept["over"].is_set():
+                    self._close()
         return Told(shard.stop - shard.first, shard, failed)
+
+    def _go_on(self) -> None:
+        if self._kept["over"].is_set():
+            raise DermisError("the run: expected to go on, but it is over. Give the command again.")
 
     def _worker(self) -> Worker:
         """Ours, opened for the first shard."""

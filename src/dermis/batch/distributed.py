@@ -46,7 +46,7 @@ class Cluster:
             client.register_plugin(Drawing.of(work, self.adapter), name=name)
             try:
                 with _mark(work.out) as mark:
-                    _check_disks(client, name, mark)
+                    _check_disks(client, mark)
                 yield from _told(client, name, shards)
             finally:
                 with suppress(OSError, TimeoutError):  # the scheduler is gone
@@ -83,7 +83,7 @@ def _mark(out: Path) -> Iterator[Path]:
         place.unlink()
 
 
-def _check_disks(client: Any, name: str, mark: Path) -> None:
+def _check_disks(client: Any, mark: Path) -> None:
     """Refuse a folder that is not the same for all workers."""
     from dermis.batch.dask_worker import sees
 
@@ -104,7 +104,7 @@ def _told(client: Any, name: str, shards: Sequence[Shard]) -> Iterator[Told]:
         for shard in shards
     }
     try:
-        for done in as_completed(list(tasks)):
+        for done in as_completed(list(tasks), loop=client.loop):
             shard = tasks.pop(done)
             if done.status != "finished":
                 raise DermisError(
