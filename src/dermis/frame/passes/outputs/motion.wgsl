@@ -23,21 +23,13 @@ fn place_now(vertex: u32) -> vec3f {
     return position_of(vertex);
 }
 
-// Where a point is in the picture [pixel].
-fn projected(rays: Rays, p: vec3f, size: vec2f) -> vec2f {
-    let way = p - rays.eye;
-    let across = vec2f(dot(way, rays.right) / dot(rays.right, rays.right), dot(way, rays.up) / dot(rays.up, rays.up));
-    let ndc = across / dot(way, rays.forward) - rays.shift;
-    return (0.5 + vec2f(0.5, -0.5) * ndc) * size;
-}
-
 fn motion_output(seen: Seen) -> vec2f {
     let w = seen.weights;
     let t = seen.corners;
     let size = vec2f(textureDimensions(centres));
     let now = w.x * place_now(t.x) + w.y * place_now(t.y) + w.z * place_now(t.z);
     let then = w.x * place_before(t.x) + w.y * place_before(t.y) + w.z * place_before(t.z);
-    return projected(look.rays, now, size) - projected(before.rays, then, size);
+    return projected(look.rays, now, size).xy - projected(before.rays, then, size).xy;
 }
 
 @compute @workgroup_size(8, 8)
