@@ -91,11 +91,11 @@ def decode_output(name: str, kind: str, data: bytes) -> Array:
     if name in LEVELS and kind == "png":
         step, zero = LEVELS[name]
         picture = (picture.astype(np.float32) - np.float32(zero)) * np.float32(step)
-    output = OUTPUTS[name] if name in OUTPUTS else None
-    if output is not None and output.channels:
-        if picture.shape[2] < output.channels:
-            raise ValueError(f"it has {picture.shape[2]} channels, not {output.channels}")
-        picture = picture[..., : output.channels].astype(output.kind)
+    channels = OUTPUTS[name].channels if name in OUTPUTS else 0
+    if channels:
+        if picture.shape[2] < channels:
+            raise ValueError(f"it has {picture.shape[2]} channels, not {channels}")
+        picture = picture[..., :channels].astype(OUTPUTS[name].kind)
     return picture[..., 0] if picture.shape[2] == 1 else picture
 
 
