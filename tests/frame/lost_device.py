@@ -145,6 +145,24 @@ def beside_frames(renderer: Renderer) -> Any:
     return renderer.draw(scene(), DRAWN).linear()
 
 
+def observing(renderer: Renderer) -> Any:
+    """Outputs, read one by one and with pictures in flight."""
+    names, scenes = ("depth", "motion"), [scene(), scene(0.3), scene(0.6), scene(0.9)]
+    rendered = renderer.draw(scenes[0], DRAWN, outputs=names)
+    depth = rendered.output("depth")
+    opened[-1].handle.destroy()
+    assert depth.any() and np.array_equal(rendered.output("depth"), depth)
+    known = list(renderer.observe(scenes, DRAWN, outputs=names))
+    for target, name, calls in ((Frame, "submit", 3), (pack.Leaving, "all", 2)):
+        with losing(target, name, calls):
+            found = list(renderer.observe(scenes, DRAWN, outputs=names))
+        assert len(found) == len(scenes)
+        for one, same in zip(found, known, strict=True):
+            assert np.array_equal(one.picture, same.picture)
+            assert all(np.array_equal(one.outputs[name], same.outputs[name]) for name in names)
+    return renderer.draw(scene(), DRAWN).linear()
+
+
 STAGES: tuple[Stage, ...] = (
     loading,
     recording,
@@ -155,6 +173,7 @@ STAGES: tuple[Stage, ...] = (
     begun_to_read,
     painting,
     many,
+    observing,
     beside_frames,
 )
 

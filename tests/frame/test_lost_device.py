@@ -22,6 +22,7 @@ STAGES = (
     "begun_to_read",
     "painting",
     "many",
+    "observing",
     "beside_frames",
     "animate",
 )

@@ -16,7 +16,7 @@ from dermis.batch.distributions import Distribution
 from dermis.batch.drawing import Drawing, Parameters
 from dermis.batch.drawn import Anything
 from dermis.batch.encodings import Encoding
-from dermis.batch.expressions import package_expressions
+from dermis.batch.expressions import package_expressions, targets_of
 from dermis.batch.matching import check_hashes, hashes, matched
 from dermis.batch.spec_text import plain_values, tables_text
 from dermis.batch.tables import (
@@ -126,6 +126,11 @@ class Spec(Plain):
     def distributions(self) -> Mapping[str, Distribution]:
         """By name of the parameter that is drawn from each."""
         return self._drawing.drawn
+
+    @property
+    def own_targets(self) -> frozenset[str]:
+        """Morph targets that [pose] names, alone or as one of a pair."""
+        return frozenset(targets_of(self.pose))
 
     def parameters(self, k: int) -> Parameters:
         """All that is drawn for image k, by name: numbers of six digits, and texts.

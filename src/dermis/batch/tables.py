@@ -106,7 +106,7 @@ class CameraTable(Plain):
     """From where the face is seen. Whatever is drawn, the whole face is in the picture."""
 
     distance_mm: Annotated[Distribution, _AWAY] = Constant(1100.0)
-    """From the middle of the head [mm]."""
+    """From the middle of the face [mm]."""
     yaw_deg: Annotated[Distribution, _TURN] = Constant(0.0)
     """Around the head, to its left [degrees]."""
     pitch_deg: Annotated[Distribution, _LEAN] = Constant(0.0)
@@ -131,7 +131,7 @@ class LampTable(Plain):
     pitch_deg: Annotated[Distribution, _LEAN] = Constant(0.0)
     """Above it [degrees]."""
     distance_mm: Annotated[Distribution, Within(400, 20_000, "mm: not in the face")] = Constant(1300.0)
-    """From the middle of the head [mm]."""
+    """From the middle of the face [mm]."""
     size_mm: Annotated[Distribution, Within(10, 3000, "mm: from a flashlight to a wall")] = Constant(500.0)
     """Length of its sides [mm]."""
     strength: Annotated[Distribution, _STOPS] = Constant(1.0)

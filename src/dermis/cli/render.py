@@ -13,6 +13,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from dermis.cli.console import note, print_json, print_lines, working_on
+from dermis.cli.frame_outputs import Format, FrameOutputs, Outputs
 from dermis.cli.options import Adapter, Json
 from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble, note_levels
 from dermis.scene.techniques import TECHNIQUES
@@ -28,6 +29,8 @@ def render(
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("dermis.png"),
     scene: SceneOptions = DEFAULTS,
+    outputs: Outputs = None,
+    outputs_format: Format = None,
     adapter: Adapter = "auto",
     as_json: Json = False,
 ) -> int:
@@ -47,6 +50,8 @@ def render(
 
         dermis render scene.toml --size 1920x1080 --json
 
+        dermis render --outputs depth,normal,uv -o face.exr
+
     Parameters
     ----------
     head:
@@ -62,6 +67,7 @@ def render(
     from dermis.images.io import check_output
 
     check_output(output)
+    more = FrameOutputs(outputs, outputs_format, output)
     from dermis.frame.renderer import Renderer
     from dermis.gpu.address_space import check_listing
 
@@ -71,7 +77,7 @@ def render(
         with working_on("loading"):
             described, settings = assemble(head, scene)
         note_levels(head, scene, described.head)
-        return _draw_and_report(described, settings, output, opening, as_json, started)
+        return _draw_and_report(described, settings, output, more, opening, as_json, started)
 
 
 @contextlib.contextmanager
@@ -87,13 +93,18 @@ def _uncollected() -> Iterator[None]:
 
 
 def _draw_and_report(
-    scene: Any, settings: Any, output: Path, opening: Future[Any], as_json: bool, started: float
+    scene: Any,
+    settings: Any,
+    output: Path,
+    more: FrameOutputs,
+    opening: Future[Any],
+    as_json: bool,
+    started: float,
 ) -> int:
-    from dermis.images.io import write_image, write_png
-
     with working_on("rendering"):
         renderer = opening.result()
-        rendered = renderer.draw(scene, settings)
+        rendered = renderer.draw(scene, settings, outputs=more.names)
+        values = {name: rendered.output(name) for name in more.names}
         setup_ms = rendered.setup_ms
         if as_json:  # the first frame fills caches; a warm one is timed
             rendered = renderer.draw_warm(scene, settings)
@@ -103,14 +114,11 @@ def _draw_and_report(
         why = "their uv is collapsed, mirrored onto other skin, or thinner than a texel of the atlas"
         note(f"note: {share} are lit without scattering: {why}")
     _note_light(scene, settings, rendered.suns)
-    with_alpha = settings.background == "none"
-    if output.suffix.lower() == ".png":
-        write_png(output, rendered.rgba8() if with_alpha else rendered.srgb8())
-    else:
-        write_image(output, rendered.linear_rgba() if with_alpha else rendered.linear())
+    _write(rendered, settings, output, more, values)
     _note_clipped(rendered)
     report = {
         "image": str(output),
+        **({"outputs": more.report} if more.names else {}),
         "adapter": renderer.device.adapter.name,
         "size": list(settings.size),
         "atlas": settings.atlas,
@@ -128,6 +136,22 @@ def _draw_and_report(
         seconds = time.perf_counter() - started
         print_lines(f"{output}  {seconds:.1f} s on {report['adapter']}", *_thanks(scene.head.attribution))
     return 0
+
+
+def _write(rendered: Any, settings: Any, output: Path, more: FrameOutputs, values: Any) -> None:
+    """The image, and the outputs in it or beside it."""
+    from dermis.images.io import write_image, write_png
+
+    with_alpha = settings.background == "none"
+    if output.suffix.lower() == ".png":
+        write_png(output, rendered.rgba8() if with_alpha else rendered.srgb8())
+        linear = None
+    else:
+        linear = rendered.linear_rgba() if with_alpha else rendered.linear()
+        if not (more.names and more.together):
+            write_image(output, linear)
+    if more.names:
+        more.write(linear, values)
 
 
 def _note_light(scene: Any, settings: Any, suns: int) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 from dermis.frame import surroundings
 from dermis.frame.inputs import Split
+from dermis.frame.outputs import OUTPUTS
 from dermis.frame.passes.painting import paint
 from dermis.frame.seams import LaidOut, Remedy, laid_out, remedy_of
 from dermis.frame.surroundings import Surroundings
@@ -98,6 +99,11 @@ class Asked:
     def count(self) -> int:
         """Gaussians that light is blurred by over the atlas."""
         return len(self.split.blurred_mm2)
+
+    @property
+    def output_channels(self) -> dict[str, int]:
+        """How many numbers each output that is asked has in a pixel."""
+        return {name: OUTPUTS[name].channels or self.lights for name in self.outputs}
 
     @cached_property
     def atlases(self) -> LaidOut:

@@ -24,6 +24,7 @@ _FLOATS = 16  # bytes of a texel: four floats
 _GEOMETRY = 8 + 8 + 8  # bytes of an atlas texel: place on the mesh, stretch, reach
 _PICTURE = 36  # bytes of a pixel
 _SAMPLE = 8
+_NUMBER = 2 * 4  # bytes of a pixel for each number of an output, and those of its copy for reading
 _FEW_SAMPLES = 4  # of a pixel, below which edges are rough
 _SHARE = 0.75  # of the room that was found: the head, its maps and programs take some
 _LEAST = 64  # of a side, below which nothing is won
@@ -73,6 +74,7 @@ def frame_bytes(asked: Asked) -> dict[str, float]:
     technique, settings, atlases = asked.technique, asked.settings, asked.atlases
     width, height = settings.size
     pixel = _PICTURE + _SAMPLE * settings.samples + technique.pixel_bytes
+    pixel += _NUMBER * sum(asked.output_channels.values())
     texel = atlas_texel_bytes(technique, asked.count, len(atlases.layouts))
     return {
         "atlas": texel * atlases.side**2,

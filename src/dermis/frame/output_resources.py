@@ -21,7 +21,7 @@ def output_resources(memo: Memo, device: Device, asked: Asked) -> OutputResource
         return None
     settings, keep = asked.settings, memo.keep
     stages: dict[str, list[tuple[str, int]]] = {}
-    for name, channels in output_channels(asked).items():
+    for name, channels in asked.output_channels.items():
         stages.setdefault(OUTPUTS[name].stage, []).append((name, channels))
     planes = [
         keep(make_planes, device, stage, tuple(of), settings.size, of=stage) for stage, of in stages.items()
@@ -34,11 +34,6 @@ def output_resources(memo: Memo, device: Device, asked: Asked) -> OutputResource
         centres=None if settings.samples == 1 else keep(_centres, device, settings.size),
         before=keep(make_shape, device, tables, of="before") if moves else None,
     )
-
-
-def output_channels(asked: Asked) -> dict[str, int]:
-    """How many numbers each output has in a pixel."""
-    return {name: OUTPUTS[name].channels or asked.lights for name in asked.outputs}
 
 
 def _centres(device: Device, size: tuple[int, int]) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,17 @@ from dermis.errors import refuse, shown_value
 from dermis.registry import Registry
 
 _WORDS = {"f": "f32", "i": "i32", "u": "u32"}
+
+
+class Levels(NamedTuple):
+    """How a PNG of 16 bits holds an output: level = value / step + zero, rounded and kept within 0 to 65535.
+
+    step : of a level, in the output's unit
+    zero : level of the value 0
+    """
+
+    step: float
+    zero: int = 0
 
 
 @dataclass(frozen=True)
@@ -24,6 +36,7 @@ class Output:
     unit : of its numbers, empty for none
     description : of it, in a few words for the help texts
     background : its value where nothing is seen
+    levels : how a PNG holds it, None where none can; whole numbers of a byte are their own levels
     """
 
     name: str
@@ -33,6 +46,7 @@ class Output:
     unit: str
     description: str
     background: float = 0.0
+    levels: Levels | None = None
 
     @property
     def channels(self) -> int:
@@ -45,18 +59,22 @@ class Output:
         return _WORDS[np.dtype(self.kind).kind]
 
 
-_FLOAT = np.float32
+_FLOAT, _MIDDLE = np.float32, 1 << 15
+_TENTHS, _SHARE = Levels(0.1), Levels(1 / 65535)
+_AROUND_0, _UNIT, _MOVED = Levels(0.1, _MIDDLE), Levels(1 / 32767, _MIDDLE), Levels(1 / 64, _MIDDLE)
 _GEOMETRY = (
-    Output("depth", "geometry", "Z", _FLOAT, "mm", "distance along the optical axis"),
-    Output("position", "geometry", "XYZ", _FLOAT, "mm", "place in the world, from the head's centre"),
-    Output("normal", "surface", "XYZ", _FLOAT, "", "normal in the world, with the skin's relief"),
-    Output("normal_geometric", "geometry", "XYZ", _FLOAT, "", "normal of the flat triangle, in the world"),
-    Output("normal_camera", "surface", "XYZ", _FLOAT, "", "normal with relief: x right, y down, z forward"),
-    Output("uv", "geometry", "UV", _FLOAT, "", "place in the maps"),
+    Output("depth", "geometry", "Z", _FLOAT, "mm", "distance along the optical axis", 0.0, _TENTHS),
+    Output("position", "geometry", "XYZ", _FLOAT, "mm", "place in the world", 0.0, _AROUND_0),
+    Output("normal", "surface", "XYZ", _FLOAT, "", "normal with the skin's relief, in the world", 0.0, _UNIT),
+    Output("normal_geometric", "geometry", "XYZ", _FLOAT, "", "normal of the flat triangle", 0.0, _UNIT),
+    Output("normal_camera", "surface", "XYZ", _FLOAT, "", "normal with relief, to the camera", 0.0, _UNIT),
+    Output("uv", "geometry", "UV", _FLOAT, "", "place in the maps", 0.0, _SHARE),
     Output("triangle", "geometry", "I", np.int32, "", "number of the mesh's triangle", -1.0),
-    Output("barycentric", "geometry", "ABC", _FLOAT, "", "weights of the triangle's corners"),
-    Output("motion", "motion", "XY", _FLOAT, "pixel", "way since the scene before: x right, y down"),
-    Output("alpha", "alpha", "A", _FLOAT, "", "share of the pixel that head and hair cover, by all samples"),
+    Output("barycentric", "geometry", "ABC", _FLOAT, "", "weights of the triangle's corners", 0.0, _SHARE),
+    Output(
+        "motion", "motion", "XY", _FLOAT, "pixel", "way in the picture from the scene before", 0.0, _MOVED
+    ),
+    Output("alpha", "alpha", "A", _FLOAT, "", "share of the pixel that head and hair cover", 0.0, _SHARE),
 )
 
 OUTPUTS: Registry[Output] = Registry("output", {one.name: one for one in _GEOMETRY})

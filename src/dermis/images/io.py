@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -159,6 +160,27 @@ def write_exr(
     header = {"compression": compression, "type": OpenEXR.scanlineimage}
     with outputs.replacing(path) as temporary:
         OpenEXR.File(header, channels).write(str(temporary))
+
+
+def encode_exr_parts(parts: Mapping[str, Mapping[str, NDArray[Any]]], swift: bool = False) -> bytes:
+    """A float32 OpenEXR file of several pictures, compressed without loss; of one, a file of one part.
+
+    parts : channels (H, W) by name, of each part by its name; the first is what other programs show
+    swift : as of `write_exr`
+    """
+    import OpenEXR
+
+    compression = OpenEXR.RLE_COMPRESSION if swift else OpenEXR.ZIP_COMPRESSION
+    header = {"compression": compression, "type": OpenEXR.scanlineimage}
+    made = [
+        OpenEXR.Part(
+            dict(header), {key: np.ascontiguousarray(one, np.float32) for key, one in channels.items()}, name
+        )
+        for name, channels in parts.items()
+    ]
+    into = io.BytesIO()
+    OpenEXR.File(made).write(into)
+    return into.getvalue()
 
 
 def read_bytes(path: str | Path | Picture) -> bytes:
