@@ -15,7 +15,7 @@ from dermis.batch.spec import Spec
 from dermis.extras import needed
 
 INDEX = "index.parquet"
-_NUMBERS = {"camera.K": 9, "camera.R": 9, "camera.t": 3, "head_pose": 12, "gaze": 6}
+NUMBERS = {"camera.K": 9, "camera.R": 9, "camera.t": 3, "head_pose": 12, "gaze": 6}
 """Columns that are lists, row by row of their matrix, and how long."""
 _FIRST = "number", "key", "shard"
 
@@ -81,9 +81,9 @@ def _schema(out: Path, spec: Spec) -> Any:
             for name, value in row.items():
                 if value is not None:
                     kinds.setdefault(name, set()).add(type(value))
-    parameters = sorted(kinds.keys() - _NUMBERS.keys() - set(_FIRST))
+    parameters = sorted(kinds.keys() - NUMBERS.keys() - set(_FIRST))
     columns = [("number", arrow.int64()), ("key", arrow.string()), ("shard", arrow.string())]
-    columns += [(name, arrow.list_(arrow.float64(), size)) for name, size in _NUMBERS.items()]
+    columns += [(name, arrow.list_(arrow.float64(), size)) for name, size in NUMBERS.items()]
     columns += [(name, _column_kind(arrow, kinds[name])) for name in parameters]
     return arrow.schema(columns)
 
