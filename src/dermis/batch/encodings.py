@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import io
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.frame.outputs import OUTPUTS
+from dermis.frame.output_files import png_levels
+from dermis.frame.outputs import OUTPUTS, Output
 from dermis.images.codecs import decode_with_pillow, encode_png
 from dermis.images.exr import decode_exr, encode_exr
 from dermis.images.png_rows import decode_rows
@@ -20,26 +21,6 @@ EFFORT = 1
 """Of PNG's compression: 2 takes a tenth longer for 2 % fewer bytes."""
 
 
-class Levels(NamedTuple):
-    """Numbers as levels of a 16-bit PNG: value = (level - zero) * step, rounded and clipped."""
-
-    step: float
-    zero: int = 0
-
-
-_SIGNED, _SHARE = Levels(1 / 32767, 32767), Levels(1 / 65535)
-LEVELS = {
-    "depth": Levels(0.1),
-    "thickness": Levels(0.01),
-    **dict.fromkeys(("normal", "normal_geometric", "normal_camera"), _SIGNED),
-    **dict.fromkeys(("alpha", "barycentric", "albedo", "melanin", "blood"), _SHARE),
-}
-"""Outputs that fit into 16 bits: depth up to 6553.5 mm in steps of 0.1, directions to 0.002 degrees."""
-_HALVES = frozenset(("irradiance", "diffuse", "specular", "translucent", "visibility"))
-_MOST_LEVEL = 65535
-_NPY = b"\x93NUMPY\x01\x00"
-
-
 def file_kind(name: str, encoding: Encoding) -> str:
     """The kind of file that holds an output: png, exr or npy.
 
@@ -48,35 +29,36 @@ def file_kind(name: str, encoding: Encoding) -> str:
     output = OUTPUTS[name]
     if encoding == "npy" or not output.channels:
         return "npy"
-    fits = name in LEVELS or np.dtype(output.kind) == np.uint8
+    fits = output.levels is not None or output.kind is np.uint8
     return "png" if fits and encoding == "png" else "exr"
 
 
 def stored_as(name: str, encoding: Encoding) -> str:
     """How the numbers of an output are stored, in words."""
-    kind = file_kind(name, encoding)
-    if kind == "png" and name in LEVELS:
-        step, zero = LEVELS[name]
+    output, kind = OUTPUTS[name], file_kind(name, encoding)
+    if kind == "png" and output.levels is not None:
+        step, zero = output.levels
         size = f"{step:g}" if step >= 1e-3 else f"1/{1 / step:.0f}"
-        return f"16-bit PNG, value = {f'(level - {zero})' if zero else 'level'} x {size}"
+        return f"16-bit PNG, {f'(level - {zero})' if zero else 'level'} x {size}"
     if kind == "png":
         return "8-bit PNG"
-    bits = 16 if _is_half(name, encoding) else 32
-    return f"OpenEXR, {bits}-bit floats" if kind == "exr" else f"NumPy, {_stored_kind(name, encoding)}"
+    bits = 8 * _stored_kind(output, encoding).itemsize
+    return f"OpenEXR, {bits}-bit floats" if kind == "exr" else f"NumPy, {_stored_kind(output, encoding).name}"
 
 
 def encode_output(name: str, values: Array, encoding: Encoding) -> bytes:
     """The file of an output, (h, w) or (h, w, c), of the kind that `file_kind` says."""
-    picture = values[..., None] if values.ndim == 2 else values
-    kind = file_kind(name, encoding)
+    output, kind = OUTPUTS[name], file_kind(name, encoding)
     if kind == "npy":
         file = io.BytesIO()
-        np.save(file, np.ascontiguousarray(values, _stored_kind(name, encoding)), allow_pickle=False)
+        np.save(file, np.ascontiguousarray(values, _stored_kind(output, encoding)), allow_pickle=False)
         return file.getvalue()
-    if kind == "exr":
-        padded = np.pad(picture, ((0, 0), (0, 0), (0, 1))) if picture.shape[2] == 2 else picture
-        return encode_exr(padded.astype(_exr_kind(name, encoding)))
-    return encode_png(_levels(name, picture), EFFORT, runs=True)
+    if kind == "png":
+        return encode_png(np.atleast_3d(png_levels(name, values)), EFFORT, runs=True)
+    picture = np.atleast_3d(values)
+    padded = np.pad(picture, ((0, 0), (0, 0), (0, 1))) if picture.shape[2] == 2 else picture
+    stored = _stored_kind(output, encoding)
+    return encode_exr(padded.astype(stored if stored.kind == "f" else np.float32))
 
 
 def decode_output(name: str, kind: str, data: bytes) -> Array:
@@ -88,14 +70,15 @@ def decode_output(name: str, kind: str, data: bytes) -> Array:
     if kind == "npy":
         return _decode_npy(data)
     picture = decode_exr(data) if kind == "exr" else decode_png(data)
-    if name in LEVELS and kind == "png":
-        step, zero = LEVELS[name]
-        picture = (picture.astype(np.float32) - np.float32(zero)) * np.float32(step)
     output = OUTPUTS[name] if name in OUTPUTS else None
-    if output is not None and output.channels:
+    if output is not None:
         if picture.shape[2] < output.channels:
             raise ValueError(f"it has {picture.shape[2]} channels, not {output.channels}")
-        picture = picture[..., : output.channels].astype(output.kind)
+        picture = picture[..., : output.channels]
+        if kind == "png" and output.levels is not None:
+            step, zero = output.levels
+            picture = (picture.astype(np.float32) - np.float32(zero)) * np.float32(step)
+        picture = picture.astype(output.kind)
     return picture[..., 0] if picture.shape[2] == 1 else picture
 
 
@@ -105,26 +88,10 @@ def decode_png(data: bytes) -> Array:
     return decode_with_pillow(data) if picture is None else picture
 
 
-def _levels(name: str, picture: Array) -> Array:
-    if name not in LEVELS:
-        return picture
-    step, zero = LEVELS[name]
-    scaled = np.nan_to_num(picture, nan=0.0) * np.float32(1 / step) + np.float32(zero)
-    return np.rint(np.clip(scaled, 0, _MOST_LEVEL)).astype(np.uint16)
-
-
-def _is_half(name: str, encoding: Encoding) -> bool:
-    return encoding == "png" and name in _HALVES
-
-
-def _exr_kind(name: str, encoding: Encoding) -> type[np.floating[Any]]:
-    return np.float16 if _is_half(name, encoding) else np.float32
-
-
-def _stored_kind(name: str, encoding: Encoding) -> np.dtype[Any]:
-    """Of an array of NumPy's, little-endian on every machine."""
-    kind = np.float16 if _is_half(name, encoding) else OUTPUTS[name].kind
-    return np.dtype(kind).newbyteorder("<")
+def _stored_kind(output: Output, encoding: Encoding) -> np.dtype[Any]:
+    """Of its numbers in a file, little-endian on every machine."""
+    half = encoding == "png" and output.kind is np.float32 and output.levels is None
+    return np.dtype(np.float16 if half else output.kind).newbyteorder("<")
 
 
 def _decode_npy(data: bytes) -> Array:

@@ -26,7 +26,8 @@ class Asked:
     """What resources are made for.
 
     person : (p, 3) places of the head's control points where another person rests, None for the head's own
-    lights, shadow_layers : how many parts of lights there are, and how many of them cast shadows
+    parts : how many parts each light is shaded as, those of the environment last
+    shadow_layers : how many parts of lights cast shadows
     posed : whether the scene has a pose
     view : name of a scene among several that are drawn in turn
     outputs : names of what is asked of the frame besides its picture
@@ -40,7 +41,7 @@ class Asked:
     environment: Environment | None
     surroundings: Surroundings
     technique: Technique
-    lights: int
+    parts: tuple[int, ...]
     shadow_layers: int
     posed: bool
     view: str
@@ -103,7 +104,7 @@ class Asked:
     @property
     def output_channels(self) -> dict[str, int]:
         """How many numbers each output that is asked has in a pixel."""
-        return {name: OUTPUTS[name].channels or self.lights for name in self.outputs}
+        return {name: OUTPUTS[name].channels or len(self.parts) for name in self.outputs}
 
     @cached_property
     def atlases(self) -> LaidOut:

@@ -52,4 +52,4 @@ def draw_frame(graph: Graph, inputs: Inputs, technique: Technique) -> None:
     if made.glow:
         radiance = bloom.draw(graph, made.glow, radiance, inputs.settings.bloom)
     post.draw(graph, radiance, made.picture, inputs.settings, made.meter)
-    draw_outputs(graph, inputs)
+    draw_outputs(graph, inputs, below)

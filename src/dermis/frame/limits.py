@@ -75,7 +75,10 @@ def frame_bytes(asked: Asked) -> dict[str, float]:
     width, height = settings.size
     pixel = _PICTURE + _SAMPLE * settings.samples + technique.pixel_bytes
     pixel += _NUMBER * sum(asked.output_channels.values())
+    pixel += technique.apart_bytes * ("diffuse" in asked.outputs)
     texel = atlas_texel_bytes(technique, asked.count, len(atlases.layouts))
+    if "translucent" in asked.outputs:
+        texel += _FLOATS * (2 * len(atlases.layouts) - 1)
     return {
         "atlas": texel * atlases.side**2,
         "size": float(pixel * width * height),

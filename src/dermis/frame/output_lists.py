@@ -9,7 +9,7 @@ from pathlib import Path
 from dermis.frame.outputs import OUTPUTS, Output
 from dermis.gpu.wgsl_source import Member
 
-STAGES = ("geometry", "surface", "motion", "alpha")
+STAGES = ("geometry", "surface", "motion", "alpha", "light", "visibility", "pigments", "thickness")
 """Shaders that make outputs, passes/outputs/STAGE.wgsl."""
 
 

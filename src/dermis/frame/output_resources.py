@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from dermis.frame.asked import Asked
+from dermis.frame.atlas_layout import AtlasLayout
+from dermis.frame.light_space import light_space
 from dermis.frame.outputs import OUTPUTS
 from dermis.frame.passes.outputs.planes import OutputResources, make_planes
 from dermis.frame.passes.visibility_buffer import make_layers
@@ -12,10 +14,12 @@ from dermis.frame.shape import make_shape, shape_tables
 from dermis.gpu import Device, Memo
 
 
-def output_resources(memo: Memo, device: Device, asked: Asked) -> OutputResources | None:
+def output_resources(
+    memo: Memo, device: Device, asked: Asked, layouts: tuple[AtlasLayout, ...]
+) -> OutputResources | None:
     """Space for the outputs that are asked, None for none.
 
-    Raises DermisError for more than the device has in one buffer.
+    Raises DermisError for more than the device has in one buffer, and for outputs that the scene has not.
     """
     if not asked.outputs:
         return None
@@ -33,6 +37,7 @@ def output_resources(memo: Memo, device: Device, asked: Asked) -> OutputResource
         planes=tuple(planes),
         centres=None if settings.samples == 1 else keep(_centres, device, settings.size),
         before=keep(make_shape, device, tables, of="before") if moves else None,
+        light=light_space(memo, device, asked, layouts),
     )
 
 

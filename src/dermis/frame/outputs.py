@@ -77,7 +77,20 @@ _GEOMETRY = (
     Output("alpha", "alpha", "A", _FLOAT, "", "share of the pixel that head and hair cover", 0.0, _SHARE),
 )
 
-OUTPUTS: Registry[Output] = Registry("output", {one.name: one for one in _GEOMETRY})
+_RADIANCE, _MICROMETRES = Levels(1 / 4096), Levels(0.001)
+_LIGHT = (
+    Output("albedo", "light", "RGB", _FLOAT, "", "share of the light below the skin that leaves", 0.0, _SHARE),
+    Output("irradiance", "light", "RGB", _FLOAT, "", "light that enters, not yet spread", 0.0, _RADIANCE),
+    Output("diffuse", "light", "RGB", _FLOAT, "", "radiance that leaves below the skin", 0.0, _RADIANCE),
+    Output("specular", "light", "RGB", _FLOAT, "", "radiance off the surface", 0.0, _RADIANCE),
+    Output("translucent", "light", "RGB", _FLOAT, "", "of the diffuse, what crossed flesh", 0.0, _RADIANCE),
+    Output("visibility", "visibility", "", _FLOAT, "", "share of each light that arrives"),
+    Output("melanin", "pigments", "A", _FLOAT, "", "share of the epidermis' volume", 0.0, _SHARE),
+    Output("blood", "pigments", "A", _FLOAT, "", "share of the dermis' volume", 0.0, _SHARE),
+    Output("thickness", "thickness", "A", _FLOAT, "mm", "of the flesh below the skin", 0.0, _MICROMETRES),
+)
+
+OUTPUTS: Registry[Output] = Registry("output", {one.name: one for one in (*_GEOMETRY, *_LIGHT)})
 """By the names that `Renderer.draw` and `dermis render --outputs` take."""
 
 

@@ -7,6 +7,7 @@ from typing import Any
 from dermis.errors import refuse
 from dermis.frame import surroundings
 from dermis.frame.asked import Asked
+from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.output_resources import output_resources
 from dermis.frame.passes.background import Backdrop
 from dermis.frame.passes.bloom import make_glow
@@ -15,7 +16,9 @@ from dermis.frame.passes.post import make_picture
 from dermis.gpu import Device, Memo, make_texture
 
 
-def picture_resources(memo: Memo, device: Device, asked: Asked) -> dict[str, Any]:
+def picture_resources(
+    memo: Memo, device: Device, asked: Asked, layouts: tuple[AtlasLayout, ...]
+) -> dict[str, Any]:
     """By their names among the frame's resources.
 
     Raises DermisError for surroundings to be seen where there are none.
@@ -26,7 +29,7 @@ def picture_resources(memo: Memo, device: Device, asked: Asked) -> dict[str, Any
         "meter": keep(make_meter, device) if settings.exposure == "auto" else None,
         "backdrop": _backdrop(memo, device, asked),
         "glow": keep(make_glow, device, settings.size) if settings.bloom else None,
-        "outputs": output_resources(memo, device, asked),
+        "outputs": output_resources(memo, device, asked, layouts),
     }
 
 

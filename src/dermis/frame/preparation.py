@@ -13,7 +13,7 @@ from dermis.frame.asked import Asked
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.inputs import EyesSeen, Inputs, camera_views, pinhole, seen_by
 from dermis.frame.levels import Blur, scale_of
-from dermis.frame.lights import light_constants, light_records, light_views
+from dermis.frame.lights import light_constants, light_parts, light_records, light_views
 from dermis.frame.limits import no_room
 from dermis.frame.passes.moving_occlusion import sky_record
 from dermis.frame.passes.outputs.motion import Before
@@ -205,7 +205,7 @@ def _scaled(blurs: tuple[Blur, ...], scale: float) -> tuple[Blur, ...]:
 
 def _lights(
     _: Head, __: Lights, outline: Outline, size: int, device: Device, scene: Scene
-) -> tuple[Any, Views, int]:
-    """The shader's array of lights, how shadow maps see the head, and how many parts the lights have."""
-    views = light_views(scene, outline, size)
-    return light_records(shade_program(device), scene, views), shadow_layers(views), len(views)
+) -> tuple[Any, Views, tuple[int, ...]]:
+    """The shader's array of lights, how shadow maps see the head, and how many parts each light has."""
+    views, parts = light_views(scene, outline, size), light_parts(scene)
+    return light_records(shade_program(device), scene, views), shadow_layers(views), parts

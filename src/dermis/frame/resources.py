@@ -87,7 +87,7 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         gaussians=len(asked.profile.variance_mm2),
         strands=strands,
         unscattered=keep(atlases[0][0].unscattered, asked.head.mesh),
-        **picture_resources(memo, device, asked),
+        **picture_resources(memo, device, asked, tuple(layouts)),
     )
 
 
@@ -133,7 +133,7 @@ def _shared(
     skin, program = asked.skin, shade.shade_program(device)
     around, total = asked.environment, asked.split.total
     return {
-        "skin": surface.skin_record(program, skin, asked.head.maps, asked.profile, asked.lights),
+        "skin": surface.skin_record(program, skin, asked.head.maps, asked.profile, sum(asked.parts)),
         "environment": surroundings.environment_record(program, around, skin, total, asked.occluded),
         "shadow_maps": shadow_maps.texture,
         "shadow_bounds": shadow_maps.bounds,

@@ -3,9 +3,10 @@
 from dermis.frame.lights.records import (
     light_constants,
     light_numbers,
+    light_parts,
     light_records,
     light_views,
     sun_lights,
 )
 
-__all__ = ["light_constants", "light_numbers", "light_records", "light_views", "sun_lights"]
+__all__ = ["light_constants", "light_numbers", "light_parts", "light_records", "light_views", "sun_lights"]

@@ -72,6 +72,11 @@ def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
     return tuple((name, 1) for name, used in named.items() if used)
 
 
+def light_parts(scene: Scene) -> tuple[int, ...]:
+    """How many parts each light is shaded as."""
+    return tuple(len(KINDS[light.kind].parts(light)) for light in scene.lights)
+
+
 def light_views(scene: Scene, outline: Outline, size: int) -> list[ShadowView | None]:
     """The shadow view of each part of each light; None for those without shadows.
 

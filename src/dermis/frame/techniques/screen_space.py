@@ -30,7 +30,7 @@ class Apart:
     layers : light below the skin with its depth [mm]; the share of it that leaves towards the eye
     below, leaving : views of the two
     between : light spread along rows only
-    result : the whole picture
+    result : the whole picture, None where nobody asks for it
     """
 
     layers: Any
@@ -57,6 +57,7 @@ class ScreenSpace(Technique):
     sources = ("Jimenez2015",)
     shade_constants = (("SPLIT", 1),)
     pixel_bytes = 64
+    apart_bytes = 48
 
     def make(
         self, memo: Memo, device: Device, settings: Settings, profile: GaussianSum
@@ -74,17 +75,31 @@ class ScreenSpace(Technique):
         apart, kernel = inputs.resources.own
         return draw(graph, apart, kernel, inputs.seen, radiance)
 
+    def make_apart(self, memo: Memo, device: Device, settings: Settings) -> Apart:
+        """The same space again, without one for the whole picture."""
+        return memo.keep(make_apart, device, settings.size, False, of="outputs")
+
+    def spread(self, graph: Graph, inputs: Inputs, apart: Apart) -> tuple[Any, Any]:
+        """Spread what the shading kept apart along rows and columns."""
+        _, kernel = inputs.resources.own
+        spread(graph, apart, kernel, inputs.seen)
+        return apart.below, apart.leaving
+
 
 TECHNIQUE = ScreenSpace()
 
 
-def make_apart(device: Device, size: tuple[int, int]) -> Apart:
-    """Space for a picture of size (width, height)."""
+def make_apart(device: Device, size: tuple[int, int], whole: bool = True) -> Apart:
+    """Space for a picture of size (width, height).
+
+    whole : whether the whole picture is asked for
+    """
     layers = make_texture(device, size, "rgba32float", layers=2)
     below, leaving = (
         layers.create_view(dimension="2d", base_array_layer=k, array_layer_count=1) for k in range(2)
     )
-    between, result = (make_texture(device, size, "rgba32float") for _ in range(2))
+    between = make_texture(device, size, "rgba32float")
+    result = make_texture(device, size, "rgba32float") if whole else None
     return Apart(layers, below, leaving, between, result)
 
 
@@ -100,16 +115,25 @@ def draw(graph: Recorder, apart: Apart, kernel: Kernel, seen: Window, over: Any)
     seen : what the picture shows of a plane before the eye
     over : the shaded picture without the light below the skin
     """
-    device, size = graph.device, over.size[:2]
+    spread(graph, apart, kernel, seen)
+    bound = {"over": over, "below": apart.below, "leaving": apart.leaving, "image": apart.result}
+    shader = program(graph.device, TECHNIQUES / "resurface.wgsl")
+    graph.compute("screen space", shader, bound, over.size[:2])
+    return apart.result
+
+
+def spread(graph: Recorder, apart: Apart, kernel: Kernel, seen: Window) -> None:
+    """Spread the light of `apart` over the picture.
+
+    seen : what the picture shows of a plane before the eye
+    """
+    device, size = graph.device, apart.between.size[:2]
     along = [program(device, TECHNIQUES / "screen_space.wgsl", (("AXIS", axis),)) for axis in (0, 1)]
     record = along[0].record("Spread", half=seen.half, shift=seen.shift, reach=kernel.reach_mm)
     passes = ((apart.below, apart.between), (apart.between, apart.below))
     for shader, (source, blurred) in zip(along, passes, strict=True):
         bound = {"spread": record, "source": source, "kernel": kernel.texture, "blurred": blurred}
         graph.compute("screen space", shader, bound, size)
-    bound = {"over": over, "below": apart.below, "leaving": apart.leaving, "image": apart.result}
-    graph.compute("screen space", program(device, TECHNIQUES / "resurface.wgsl"), bound, size)
-    return apart.result
 
 
 def kernel_table(kernel: SeparableKernel) -> tuple[NDArray[np.float64], float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -50,6 +51,7 @@ class Technique:
     curved : whether the shading reads the surface's curvature
     shade_constants : pipeline constants of the shading pass
     pixel_bytes : of memory for each pixel, besides the picture
+    apart_bytes : of memory for each pixel for `make_apart`
     """
 
     sources: ClassVar[tuple[str, ...]] = ()
@@ -59,6 +61,7 @@ class Technique:
     curved: ClassVar[bool] = False
     shade_constants: ClassVar[Constants] = ()
     pixel_bytes: ClassVar[int] = 0
+    apart_bytes: ClassVar[int] = 0
 
     def split(self, profile: GaussianSum, white: bool) -> Split:
         """The profile as the technique uses it.
@@ -105,6 +108,14 @@ class Technique:
     def finish(self, graph: Graph, inputs: Inputs, radiance: Any) -> Any:
         """Declare the passes after the shading; returns the texture that holds the picture."""
         return radiance
+
+    def make_apart(self, memo: Memo, device: Device, settings: Settings) -> Any:
+        """Space for what the shading of outputs keeps apart, in its texture `layers`; None for nothing."""
+        return None
+
+    def spread(self, graph: Graph, inputs: Inputs, apart: Any) -> tuple[Any, Any]:
+        """Spread that over the picture; returns textures of the light and of the share of it that leaves."""
+        raise NotImplementedError
 
 
 class AtlasTechnique(Technique):
@@ -172,6 +183,11 @@ class AtlasTechnique(Technique):
         """Let the blurred light through thin parts, and add up what leaves."""
         through = translucency.draw(graph, levels, blur, thin) if thin else None
         combine.draw(graph, levels, blur, into, through)
+
+    def leave_through(self, graph: Any, levels: Levels, blur: Blur, thin: Any, into: Any) -> None:
+        """Add up only what `leave` let through thin parts, by the same steps."""
+        alone = replace(blur, weight=np.zeros_like(blur.weight))
+        combine.draw(graph, levels, alone, into, thin.light)
 
 
 def _weights(profile: GaussianSum, white: bool) -> NDArray[np.float64]:

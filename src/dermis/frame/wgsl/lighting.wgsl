@@ -52,6 +52,11 @@ fn next_that_may_shine(first: u32, p: vec3f, n: vec3f) -> u32 {
     return i;
 }
 
+// Share of a light from a direction that reaches a point, past the head and its hairs.
+fn reaching(light: Light, point: Point, l: vec3f) -> f32 {
+    return visibility(light, point, l) * past_strands(light, point.position);
+}
+
 // open: share of the sky that the point sees
 fn light_up(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
     return light_through(point, surface, Film(surface.normal, vec3f(0.0)), v, open);
@@ -79,7 +84,7 @@ fn light_through(point: Point, surface: Surface, film: Film, v: vec3f, open: f32
             let cosine = dot(surface.normal, arriving.direction);
             if (cosine > 0.0) {
                 if (seen < 0.0) {
-                    seen = visibility(light, point, arriving.direction) * past_strands(light, point.position);
+                    seen = reaching(light, point, arriving.direction);
                 }
                 let e = arriving.irradiance * seen;
                 let filled = arriving.irradiance * max(vec3f(seen), film.scattered);

@@ -35,6 +35,17 @@ def places(rng: np.random.Generator) -> tuple[Doubles, Doubles, Doubles, Doubles
     return u, v, x, y
 
 
+def strip(across: float) -> Doubles:
+    """(k, 2) x, y in the front plane along the left brow, from its inner end [mm].
+
+    across : from its lower edge, -1, over its middle to its upper one, 1
+    """
+    along = np.gradient(np.stack([_X, _Y], axis=-1), axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    x, y = _X - across * _HALF * along[:, 1], _Y + across * _HALF * along[:, 0]
+    return np.stack([x, y], axis=-1)
+
+
 def count(look: HairLook) -> int:
     """Hairs of one brow."""
     return int(_MOST * (0.55 + 0.45 * look.bushy))

@@ -34,13 +34,29 @@ _FOLD = np.array([[-68.0, 27.0], [-60, 24.5], [-50, 21.5], [-43, 20]])
 _CHIN = np.array([[-110.0, 26.0], [-68, 22.0]])
 
 
+_NOSE_AHEAD_MM, _JAW_Y = -20.0, -108.0
+
+
+def nose_mm(places: Doubles) -> Doubles:
+    """How far (n,) places (n, 3) on the average human are inside of the nose [mm]."""
+    x, y, z = np.abs(places[:, 0]), places[:, 1], places[:, 2]
+    top, half = _NOSE[-1]
+    beside = np.interp(y, *_NOSE.T) - np.maximum(y - top, 0.0) * half - x
+    return np.where(z > _NOSE_AHEAD_MM, np.minimum(beside, y - np.interp(x, *_NOSE_BASE.T)), -1.0)
+
+
+def neck_mm(places: Doubles) -> Doubles:
+    """How far (n,) places (n, 3) on the average human are below the jaw and the skull [mm]."""
+    return np.asarray(_JAW_Y + 0.42 * np.maximum(6 - places[:, 2], 0) - places[:, 1])
+
+
 def region_of(places: Doubles, lips: Mask, ears: Mask) -> NDArray[np.int64]:
     """Index into `REGIONS` (n,) of places (n, 3) on the average human [mm].
 
     lips, ears : (n,) what is these, the inside of the mouth with the lips
     """
     x, y, z = np.abs(places[:, 0]), places[:, 1], places[:, 2]
-    front, over_jaw = z > -20, y > -108 + 0.42 * np.maximum(6 - z, 0)
+    front, over_jaw = z > _NOSE_AHEAD_MM, neck_mm(places) < 0
     tests = {
         "ear": ears,
         "lips": lips,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +67,17 @@ class Planes:
         return firsts
 
 
+class Drawn(NamedTuple):
+    """What the frame's own passes leave for its outputs.
+
+    centres : texture of the triangles at the pixels' centres
+    below : what the shading read as `scattered`
+    """
+
+    centres: Any
+    below: Any
+
+
 @dataclass(frozen=True, eq=False)
 class OutputResources:
     """Space for a frame's outputs.
@@ -75,12 +86,14 @@ class OutputResources:
     planes : a buffer for each stage that makes some
     centres : triangles at the pixels' centres; None where the picture's only sample lies there
     before : the shape in the scene before, None where nothing reads it
+    light : what outputs of light take besides, a `LightSpace`
     """
 
     names: tuple[str, ...]
     planes: tuple[Planes, ...]
     centres: Layers | None
     before: Shape | None
+    light: Any
 
     def planes_of(self, name: str) -> Planes:
         """Those that hold an output."""

@@ -39,3 +39,8 @@ fn put_vec3f(first: u32, cell: Cell, value: vec3f) {
     planes[at + 1u] = bitcast<u32>(value.y);
     planes[at + 2u] = bitcast<u32>(value.z);
 }
+
+fn get_vec3f(first: u32, cell: Cell) -> vec3f {
+    let at = first * cell.pixels + 3u * cell.index;
+    return bitcast<vec3f>(vec3u(planes[at], planes[at + 1u], planes[at + 2u]));
+}

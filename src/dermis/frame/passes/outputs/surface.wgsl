@@ -1,7 +1,6 @@
 // Outputs of the surface with its relief, at the centre of each pixel.
-//#include "seen.wgsl"
+//#include "seen_footprint.wgsl"
 //#include "skin.wgsl"
-//#include "footprint.wgsl"
 //#include "planes.wgsl"
 
 //#each surface_outputs: override {NAME}_FIRST: u32 = UNASKED;
@@ -17,20 +16,6 @@ fn normal_output(seen: Seen) -> vec3f {
 fn normal_camera_output(seen: Seen) -> vec3f {
     let n = normal_output(seen);
     return vec3f(dot(n, normalize(look.rays.right)), -dot(n, normalize(look.rays.up)), dot(n, look.rays.forward));
-}
-
-// Of the whole pixel.
-fn footprint_at(seen: Seen) -> f32 {
-    let size = vec2f(textureDimensions(centres));
-    let a = corner_at(seen.corners.x);
-    let b = corner_at(seen.corners.y);
-    let c = corner_at(seen.corners.z);
-    let weights = ray_to_weights(look.rays.eye, a.position, b.position, c.position);
-    let place = vec2f(seen.pixel) + 0.5;
-    let w = meet(weights, ray_to(look.rays, place, size));
-    let wx = meet(weights, ray_to(look.rays, place + vec2f(1.0, 0.0), size)) - w;
-    let wy = meet(weights, ray_to(look.rays, place + vec2f(0.0, 1.0), size)) - w;
-    return footprint_of(wx.x * a.uv + wx.y * b.uv + wx.z * c.uv, wy.x * a.uv + wy.y * b.uv + wy.z * c.uv);
 }
 
 @compute @workgroup_size(8, 8)

@@ -99,10 +99,10 @@ fn keep_moved(at: vec2u, share: f32, flush: f32, pressed: f32) {
     textureStore(moved, at, 1, vec4f(share * vec3f(deepened[4], deepened[5], deepened[6]), flush - pressed));
 }
 
-fn keep(at: vec2u, rgb: vec3f, shine: vec2f, height: f32, amounts: vec3f) {
+fn keep(at: vec2u, rgb: vec3f, shine: vec2f, height: f32, amounts: vec3f, shares: vec2f) {
     textureStore(colour, at, vec4f(rgb, 1.0));
     textureStore(specular, at, vec4f(shine.x, amounts.x, amounts.z, 0.0));
-    textureStore(roughness, at, vec4f(shine.y, amounts.y, 0.0, 0.0));
+    textureStore(roughness, at, vec4f(shine.y, amounts.y, saturate(shares)));
     heights[(at.y + 1u) * (paint.side + 2u) + at.x + 1u] = height;
 }
 
@@ -115,7 +115,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if (owner == 0u) {
         let shine = vec2f(STRENGTH + OILY_STRENGTH * paint.oil, ROUGHNESS + OILY_ROUGHNESS * paint.oil);
         keep_moved(id.xy, 0.0, 0.0, 0.0);
-        keep(id.xy, colour_of(0u, paint.melanin, paint.blood), shine, 0.0, vec3f(0.0));
+        keep(id.xy, colour_of(0u, paint.melanin, paint.blood), shine, 0.0, vec3f(0.0), vec2f(paint.melanin, paint.blood));
         return;
     }
     let spot = spot_of(owner, id.xy);
@@ -142,5 +142,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let bare = (1.0 - lip) * (1.0 - mucosa) * (1.0 - inner);
     let pores = saturate(0.45 + zone[ZONE_PORES]) * bare;
     let furrows = max(1.0 + zone[ZONE_FURROWS], 0.2) * bare * (0.8 + 2.2 * paint.age * paint.age);
-    keep(id.xy, rgb, gloss(lip, wet, max(scalp * paint.stubble, beard), inner), height, vec3f(pores, furrows, spot.density));
+    keep(id.xy, rgb, gloss(lip, wet, max(scalp * paint.stubble, beard), inner), height, vec3f(pores, furrows, spot.density), p);
 }

@@ -1,14 +1,7 @@
-// The shading of a part of a pixel, and all the skin of a pixel together.
+// All the skin of a pixel together.
 
 const ONE_SURFACE: f32 = 4.0; // largest change of depth over width within one surface, in a pixel
 const CROSSED: f32 = 2.0; // step in depth that light below the skin crosses [mm]: still one surface
-
-struct Shaded {
-    below: vec3f, // light below the skin
-    leaving: vec3f, // share of it that leaves towards the eye
-    over: vec3f, // light that does not spread: off the surface, from plain materials, scattered only once
-    depth: f32, // of skin [mm], else 0
-}
 
 // The skin of one pixel, each member times the share of its samples.
 struct PixelSkin {

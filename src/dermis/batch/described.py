@@ -1,0 +1,31 @@
+"""What the files of a data set mean: outputs, classes of labels, landmarks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dermis.batch.encodings import file_kind, stored_as
+from dermis.batch.spec import Spec
+from dermis.frame.outputs import OUTPUTS
+
+
+def outputs_of(spec: Spec) -> dict[str, dict[str, Any]]:
+    """Of each output: kind of its files, how numbers are stored, unit, content, value of the background."""
+    return {
+        name: {
+            "file": file_kind(name, spec.encoding),
+            "stored": stored_as(name, spec.encoding),
+            "step": _levels(name, spec)[0],
+            "zero": _levels(name, spec)[1],
+            "unit": OUTPUTS[name].unit,
+            "description": OUTPUTS[name].description,
+            "background": OUTPUTS[name].background,
+        }
+        for name in spec.outputs
+    }
+
+
+def _levels(name: str, spec: Spec) -> tuple[float, int]:
+    """Step and zero of its levels: value = (level - zero) * step; (1, 0) for numbers as they are."""
+    levels = OUTPUTS[name].levels
+    return (1.0, 0) if levels is None or file_kind(name, spec.encoding) != "png" else levels

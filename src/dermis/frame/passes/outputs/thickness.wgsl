@@ -1,0 +1,25 @@
+// How thick the flesh is below what the centre of each pixel sees.
+//#include "bilinear.wgsl"
+//#include "seen.wgsl"
+//#include "planes.wgsl"
+
+//#each thickness_outputs: override {NAME}_FIRST: u32 = UNASKED;
+
+@group(0) @binding(53) var thickness_map: texture_2d<f32>; // of the coarse atlas [mm]; 1 where there is surface
+
+fn thickness_output(seen: Seen) -> f32 {
+    let found = load_bilinear(thickness_map, seen.point.place);
+    return select(0.0, found.x / max(found.a, 1e-6), (seen.point.flags & MAPPED) != 0u);
+}
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    let size = textureDimensions(centres);
+    if (any(id.xy >= size)) {
+        return;
+    }
+    let seen = seen_at(id.xy, size);
+    let there = sees_any(id.xy);
+    let cell = cell_of(id.xy, size);
+    //#each thickness_outputs: if ({NAME}_FIRST != UNASKED) {{ put_{type}({NAME}_FIRST, cell, select({nothing}, {name}_output(seen), there)); }}
+}

@@ -1,0 +1,37 @@
+"""The classes of the label outputs."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple
+
+from dermis.tables import read_rows
+
+
+class LabelClass(NamedTuple):
+    """What a pixel may show.
+
+    number : in the output `label`
+    face_synthetics : its number in the output `label_face_synthetics`
+    """
+
+    number: int
+    name: str
+    face_synthetics: int
+    description: str
+
+
+@cache
+def label_classes() -> tuple[LabelClass, ...]:
+    """All classes by their numbers, which have no gaps."""
+    rows = read_rows(__package__, "classes")
+    return tuple(
+        LabelClass(int(row["number"]), row["name"], int(row["face_synthetics"]), row["description"])
+        for row in rows
+    )
+
+
+@cache
+def class_number(name: str) -> int:
+    """Number of a class."""
+    return next(one.number for one in label_classes() if one.name == name)

@@ -1,0 +1,172 @@
+"""Places on the average human's surface, densely, and the curves along which landmarks lie; of the left side."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.human.hair import brows
+from dermis.human.model import MATERIALS
+from dermis.human.regions.average import AVERAGE, average_head, parts
+from dermis.human.skin.surface import FIELDS, average, lid_rings
+from dermis.mesh.strands import Roots, corners, finer_roots, points_of, weights
+
+Doubles = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+LEVELS = 3
+STEPS = 8  # places along a side of a quad
+AHEAD_MM = 900.0  # of the camera that sees the outline
+_UPPER, _LOWER = np.arange(13), np.r_[12:28, 0]  # rows of lid_rings.csv, from corner to corner
+_EDGE, _CREST = 1, 2  # columns of lid_rings.csv
+_SEAM_MM = np.array([[0.0, -67.3], [10, -66.7], [18, -67.2], [22.2, -67.9]])  # x, y where the lips meet
+_CORNER_MM = 22.2
+_NEAR_MM = 1.2  # of a place in the front plane
+# Artist's values on the average human, seen from the front and the side: the outline of the face from in front of
+# the ear at the height of the eyes, over the angle of the jaw, to the chin [mm].
+_JAW_MM = np.array([[69.5, 0, -57], [68.6, -15, -56], [67, -30, -53], [65.2, -42, -50], [61.6, -52, -45],
+                    [58.4, -62, -40], [54.8, -72, -35], [50.4, -81, -31], [45, -88.5, -26], [38, -95, -20],
+                    [30, -100.4, -10], [20, -104.6, 0], [10, -106.3, 7], [0, -106.8, 12.5]])  # fmt: skip
+
+
+class Surface:
+    """The dense surface.
+
+    quad, place : (n,) and (n, 2) of each candidate
+    at_mm : (n, 3) on the average human
+    """
+
+    def __init__(self) -> None:
+        self.head = AVERAGE.head(subdivide=LEVELS)
+        grid = np.arange(STEPS + 1) / STEPS
+        steps = np.stack(np.meshgrid(grid, grid, indexing="ij"), axis=-1).reshape(-1, 2)
+        quads = len(average_head().mesh.quads)
+        self.quad = np.repeat(np.arange(quads), len(steps))
+        self.place = np.tile(steps, (quads, 1)).astype(np.float32)
+        fine = finer_roots(average_head().mesh, Roots(self.quad.astype(np.int32), self.place), LEVELS)
+        self._corner, self._share = corners(self.head.mesh, fine.quad), weights(fine.place)
+        self.points_mm = points_of(self.head.mesh)
+        self.at_mm = self._of(self.points_mm)
+        self.lips, self.mouth, self.lids = self._of(self._fields()).T
+
+    def _of(self, values: Doubles) -> Doubles:
+        return np.asarray(np.einsum("nk,nkc->nc", self._share, values[self._corner]))
+
+    def _fields(self) -> Doubles:
+        """(p, 3) `FIELDS` at the points of the fine mesh."""
+        told = average()[1].astype(np.float64)
+        control = np.zeros((len(self.head.control.positions_mm), len(FIELDS)))
+        control[: len(told)] = told
+        assert self.head.control.stencils is not None
+        return self.head.control.stencils.points(control)
+
+    @cached_property
+    def skin(self) -> NDArray[np.bool_]:
+        """(n,) whether a candidate is of skin."""
+        mesh = average_head().mesh
+        return np.asarray(mesh.material[mesh.quads[self.quad, 0]] == 0)
+
+    @cached_property
+    def face(self) -> NDArray[np.bool_]:
+        """(n,) skin outside of mouth and ears."""
+        return self.skin & ~np.isin(self.quad, np.concatenate([parts()["mouth"], parts()["ears"]]))
+
+    def nearest(self, wanted: Doubles, among: NDArray[np.bool_] | None = None) -> int:
+        """Number of the candidate nearest to a place (3,) [mm]."""
+        those = np.flatnonzero(self.face if among is None else among)
+        return int(those[np.linalg.norm(self.at_mm[those] - wanted, axis=1).argmin()])
+
+    def frontmost(self, x: float, y: float) -> int:
+        """Number of the candidate that is seen at a place of the front plane [mm]."""
+        off = np.hypot(self.at_mm[:, 0] - x, self.at_mm[:, 1] - y)
+        near = np.flatnonzero(self.face & (off < _NEAR_MM))
+        first = near[self.at_mm[near, 2] > self.at_mm[near, 2].max() - _NEAR_MM]
+        return int(first[off[first].argmin()])
+
+    def opposite(self, candidate: int) -> int:
+        """Number of the candidate on the other side."""
+        mirrored = self.at_mm[candidate] * [-1, 1, 1]
+        alike = self.skin if self.skin[candidate] else ~self.skin
+        same = alike & (np.abs(self.mouth - self.mouth[candidate]) < 1.0)
+        return self.nearest(mirrored, same)
+
+    def lid(self, upper: bool) -> Doubles:
+        """(r, 3) the edge of the lid that borders on the eye, from the inner to the outer corner [mm]."""
+        rows = lid_rings()[0][_UPPER if upper else _LOWER[::-1]]
+        edge, crest = (self.points_mm[rows[:, column]] for column in (_EDGE, _CREST))
+        told = average()[1][:, FIELDS.index("lids")].astype(np.float64)
+        low, high = told[rows[:, _EDGE]], told[rows[:, _CREST]]
+        part = (-low / (high - low))[:, None]
+        return np.asarray((1 - part) * edge + part * crest)
+
+    def on_lid(self, place: Doubles) -> int:
+        """Number of the candidate where lids border on the eye, nearest to a place (3,) [mm]."""
+        return self.nearest(place, self.skin & (np.abs(self.lids) < 0.12) & (self.at_mm[:, 0] > 0))
+
+    def lip_border(self, upper: bool) -> Doubles:
+        """(n, 3) the outer border of a lip, from its corner to the middle [mm]."""
+        seam = np.interp(np.abs(self.at_mm[:, 0]), *_SEAM_MM.T)
+        side = (self.at_mm[:, 1] > seam + 0.4) if upper else (self.at_mm[:, 1] < seam - 0.4)
+        those = self.face & side & (np.abs(self.lips) < 0.3) & (np.abs(self.at_mm[:, 0] - 10.5) < 11.0)
+        those &= self.at_mm[:, 2] > 15
+        found = self.at_mm[those]
+        x = np.linspace(20.0, 0.0, 24)
+        near = [found[np.abs(found[:, 0] - each) < 0.8].mean(axis=0) for each in x]
+        path = np.column_stack([x, np.stack(near)[:, 1:]])
+        return np.concatenate([self.at_mm[[self.mouth_corner()]], path])
+
+    def mouth_corner(self) -> int:
+        """Where the lips meet at the left end."""
+        x, y = _CORNER_MM, float(_SEAM_MM[-1, 1])
+        return self.frontmost(x, y)
+
+    def inner_lip(self, upper: bool) -> Doubles:
+        """(n, 3) the lowest of the upper lip or the highest of the lower one, from the corner to the middle."""
+        seam = np.interp(np.abs(self.at_mm[:, 0]), *_SEAM_MM.T)
+        above = self.at_mm[:, 1] - seam
+        side = (above > 0) & (above < 3) if upper else (above < 0) & (above > -3)
+        those = np.flatnonzero(self.skin & side & (self.mouth > 15) & (self.at_mm[:, 2] > 14))
+        rows = []
+        for x in np.linspace(20.0, 0.0, 21):
+            near = those[np.abs(self.at_mm[those, 0] - x) < 0.5]
+            height = self.at_mm[near, 1] if upper else -self.at_mm[near, 1]
+            rows.append(self.at_mm[near[height.argmin()]] * [0, 1, 1] + [x, 0, 0])
+        return np.concatenate([self.at_mm[[self.mouth_corner()]], np.stack(rows)])
+
+    def on_inner_lip(self, place: Doubles, upper: bool) -> int:
+        """Number of the candidate on a lip nearest to a place of its inner edge."""
+        seam = np.interp(np.abs(self.at_mm[:, 0]), *_SEAM_MM.T)
+        side = (self.at_mm[:, 1] > seam) == upper
+        return self.nearest(place, self.skin & side & (self.mouth > 15))
+
+    def jaw(self) -> Doubles:
+        """(n, 3) the outline of the face, from the height of the eyes to the chin."""
+        return _JAW_MM
+
+    def midline(self, y: float) -> int:
+        """Number of the candidate in the middle at a height."""
+        middle = self.face & (np.abs(self.at_mm[:, 0]) < 0.05) & (self.at_mm[:, 2] > 0)
+        those = np.flatnonzero(middle)
+        return int(those[np.abs(self.at_mm[those, 1] - y).argmin()])
+
+    def brow(self, across: float) -> Doubles:
+        """(n, 3) along the brow from its inner end; across : from its lower edge, -1, to its upper one, 1."""
+        x, y = brows.strip(across).T
+        return self.at_mm[[self.frontmost(*each) for each in zip(x, y, strict=True)]]
+
+    def apex(self, name: str) -> int:
+        """Number of the candidate at the cornea's apex of an eye."""
+        mesh = average_head().mesh
+        material = mesh.material[mesh.quads[self.quad, 0]] == list(MATERIALS.values()).index(
+            next(one for one in MATERIALS.values() if one.name == name)
+        )
+        those = np.flatnonzero(material)
+        return int(those[self.at_mm[those, 2].argmax()])
+
+
+def arcs(path: Doubles, shares: Doubles) -> Doubles:
+    """(n, 3) places at shares (n,) of a path's length."""
+    run = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    return np.stack([np.interp(shares * run[-1], run, column) for column in path.T], axis=-1)

@@ -1,0 +1,52 @@
+"""Makes src/dermis/human/landmarks/*.csv: where landmarks lie on the quads of the parametric human.
+
+python tools/human_landmarks.py
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from human_landmark_places import Surface
+from human_landmark_sets import face_synthetics, ibug, mediapipe
+
+OUT = Path(__file__).parent.parent / "src" / "dermis" / "human" / "landmarks"
+SOURCE = "tools/human_landmarks.py, by geometry and by eye on the average human"
+HEADER = """\
+# quantity: {what}; left is the person's own
+# unit: number of the human's quad, how far along its first side and across it (0 to 1), how far from there on the
+#   way to the back of the eyeball (0 to 1)
+# source: {source}
+# licence: CC0
+landmark,quad,along,across,sunk
+"""
+SETS = {
+    "ibug-68": (ibug, "the 68 landmarks of iBUG's 300-W in their order, on the surface and at rest in it"),
+    "face-synthetics-70": (
+        face_synthetics,
+        "the 70 landmarks of FaceSynthetics in their order: those of iBUG, then the right and the left pupil",
+    ),
+    "mediapipe": (mediapipe, "points of MediaPipe's face mesh by their numbers there: outlines and the midline"),
+}
+
+
+def main() -> None:
+    """Make the tables."""
+    surface = Surface()
+    for name, (made, what) in SETS.items():
+        rows = [row(surface, landmark, place) for landmark, place in made(surface).items()]
+        path = OUT / f"{name}.csv"
+        path.write_text(HEADER.format(what=what, source=SOURCE) + "".join(rows), encoding="utf-8")
+        sys.stdout.write(f"{path}  {len(rows)} points\n")
+
+
+def row(surface: Surface, landmark: str, place: tuple[int, float]) -> str:
+    """A line of the table; place : number of a candidate, and how far it is sunk."""
+    candidate, sunk = place
+    along, across = surface.place[candidate]
+    return f"{landmark},{surface.quad[candidate]},{along:g},{across:g},{sunk:.3g}\n"
+
+
+if __name__ == "__main__":
+    main()
