@@ -6,6 +6,7 @@ from typing import Any
 
 from dermis.frame.asked import Asked
 from dermis.frame.atlas_layout import AtlasLayout
+from dermis.frame.label_space import label_space
 from dermis.frame.light_space import light_space
 from dermis.frame.outputs import OUTPUTS
 from dermis.frame.passes.outputs.planes import OutputResources, make_planes
@@ -38,6 +39,7 @@ def output_resources(
         centres=None if settings.samples == 1 else keep(_centres, device, settings.size),
         before=keep(make_shape, device, tables, of="before") if moves else None,
         light=light_space(memo, device, asked, layouts),
+        labels=label_space(memo, device, asked),
     )
 
 

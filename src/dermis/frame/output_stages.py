@@ -8,7 +8,7 @@ from typing import Any
 from dermis.frame import light_stages
 from dermis.frame.inputs import Inputs
 from dermis.frame.passes import shape
-from dermis.frame.passes.outputs import alpha, geometry, motion
+from dermis.frame.passes.outputs import alpha, geometry, labels, motion
 from dermis.frame.passes.outputs.planes import Drawn, Planes
 from dermis.frame.passes.visibility_buffer import draw_layers
 from dermis.frame.projection import MIDDLE, Views
@@ -58,6 +58,15 @@ def _alpha(graph: Graph, planes: Planes, inputs: Inputs, drawn: Drawn) -> None:
     alpha.draw(graph, planes, inputs.resources.picture)
 
 
+def _label(graph: Graph, planes: Planes, inputs: Inputs, drawn: Drawn) -> None:
+    made = inputs.resources
+    assert made.outputs is not None
+    space = made.outputs.labels
+    if made.strands and space.classes is not None:
+        labels.draw_hairs(graph, space, made.strands, inputs.view, made.head, drawn.centres)
+    labels.draw(graph, planes, inputs.lit, _look(inputs), drawn.centres, space)
+
+
 def _look(inputs: Inputs) -> tuple[Any, Any]:
     return inputs.view, inputs.centre_mm
 
@@ -71,5 +80,6 @@ STAGES: Mapping[str, Stage] = {
     "visibility": light_stages.draw_visibility,
     "pigments": light_stages.draw_pigments,
     "thickness": light_stages.draw_thickness,
+    "label": _label,
 }
 """By the names of their shaders, passes/outputs/STAGE.wgsl."""

@@ -87,6 +87,7 @@ class OutputResources:
     centres : triangles at the pixels' centres; None where the picture's only sample lies there
     before : the shape in the scene before, None where nothing reads it
     light : what outputs of light take besides, a `LightSpace`
+    labels : what labels are made from, a `LabelSpace`
     """
 
     names: tuple[str, ...]
@@ -94,6 +95,7 @@ class OutputResources:
     centres: Layers | None
     before: Shape | None
     light: Any
+    labels: Any
 
     def planes_of(self, name: str) -> Planes:
         """Those that hold an output."""
