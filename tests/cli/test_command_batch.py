@@ -42,6 +42,16 @@ def test_a_part_says_that_others_are_missing(run: Run, spec: Path) -> None:
     assert [path.name for path in Path("out").glob("shard-*")] == [f"shard-{last:05d}.tar"]
 
 
+def test_a_dry_run_writes_a_sheet_alone(run: Run, spec: Path) -> None:
+    before = set(spec.parent.iterdir())
+    ended = run("batch", spec, "--dry-run", "-o", "sheet.png", "--adapter", "cpu", "--count", 2)
+    assert (ended.code, ended.stderr) == (0, "") and "camera.yaw_deg" in ended.stdout
+    assert {path.name for path in set(spec.parent.iterdir()) - before} == {"sheet.png"}
+    rows = json.loads(run("batch", spec, "--dry-run", "--adapter", "cpu", "--count", 2, "--json").stdout)
+    assert [row for row in rows["parameters"] if row["parameter"] == "camera.yaw_deg"]
+    assert run("batch", spec, "--dry-run", "-o", "folder").code == 2
+
+
 def test_the_example_is_a_spec(run: Run, tmp_path: Path) -> None:
     from dermis.batch.spec import load_spec
 

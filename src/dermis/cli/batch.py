@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -214,16 +213,17 @@ def _tell(report: Report, out: Path, as_json: bool) -> None:
 
 
 def _dry_run(spec: Spec, adapter: str, sheet: Path, as_json: bool) -> int:
-    from dermis.batch.preview import dry_run
+    from dermis.batch.preview import dry_run, table_lines
     from dermis.images.io import check_output, write_png
 
     check_output(sheet)
+    if sheet.suffix.lower() != ".png":
+        refuse(sheet, "a name that ends in .png", "it does not", "Name the contact sheet, or leave -o out")
     with working_on("drawing a contact sheet"):
         rows, picture = dry_run(spec, adapter)
     write_png(sheet, picture)
     if as_json:
         print_json({"sheet": str(sheet), "parameters": rows})
     else:
-        sys.stdout.write("\n".join(map(str, rows)) + "\n")
-        print_lines(str(sheet))
+        print_lines(*table_lines(rows), str(sheet))
     return 0
