@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 from scipy.special import ndtr, ndtri
@@ -17,6 +17,7 @@ from dermis.batch.tables import ANGLES, MIXTURE, NONE, RIG
 Parameters = dict[str, float | int | str]
 _PERSON = "person."
 _SEEDS = 2**32
+_DIALS = "intensity", "asymmetry", "variation"
 _LAMPS = tuple(f"light.{lamp}." for lamp in ("key", "fill", "rim"))
 _COLOUR = "background.red", "background.green", "background.blue"
 _APPLIES: tuple[tuple[str | tuple[str, ...], Callable[[Parameters], bool]], ...] = (
@@ -87,8 +88,8 @@ class Drawing:
             weights: Weights = mixed(lambda part: self._uniform(k, f"expression.mixture.{part}"))
         else:
             weights = self.expressions[name]
-        dials: list[Any] = [found[f"expression.{dial}"] for dial in ("intensity", "asymmetry", "variation")]
-        made = performed(weights, *dials, partial(self._varied, k))
+        intensity, asymmetry, variation = (float(found[f"expression.{dial}"]) for dial in _DIALS)
+        made = performed(weights, intensity, asymmetry, variation, partial(self._varied, k))
         for target, one in self._own.items():
             drawn: Any = self._value(k, f"pose.{target}", one)
             made |= dict.fromkeys(targets_of([target]), drawn)
@@ -97,11 +98,11 @@ class Drawing:
     def _varied(self, k: int, name: str) -> float:
         return self._normal(k, f"expression.variation.{name}")
 
-    @property
+    @cached_property
     def _own(self) -> dict[str, Distribution]:
         return {name[5:]: one for name, one in self.drawn.items() if name.startswith("pose.")}
 
-    @property
+    @cached_property
     def targets(self) -> tuple[str, ...]:
         """Names of all targets that the spec can move, sorted."""
         names = {name for end in self.drawn["expression.name"].ends for name in self._moved(str(end))}

@@ -1,4 +1,4 @@
-"""What a data set draws: pictures, people, faces, light and cameras, from stated distributions by one seed."""
+"""What a data set draws: people, faces, light and cameras, from stated distributions by one seed."""
 
 from __future__ import annotations
 
@@ -187,7 +187,9 @@ def spec_of(tables: Mapping[str, Any], folder: Path = Path()) -> Spec:
     """
     if "folder" in tables:
         refuse("folder", "no such key", "it came", "Files lie relative to the spec's own folder")
-    given = dict(matched(tables, folder))
+    given = {
+        name: table if name == "files" else matched(table, folder, name) for name, table in tables.items()
+    }
     given["render"] = _render(given.pop("size", (512, 512)), given.get("render", {}))
     if isinstance(groups := given.get("correlated", ()), list | tuple):
         given["correlated"] = tuple(_made(Correlated, "correlated", group) for group in groups)
