@@ -129,8 +129,7 @@ def steps(plan: Plan) -> dict[str, Any]:
         scene, settings = _timed(told, "scene", lambda: maker.scene(parameters))  # noqa: B023
 
         def seen(scene: Any = scene, settings: Any = settings) -> Any:
-            options: dict[str, Any] = {"landmarks": spec.landmarks}
-            return next(renderer.observe([scene], settings, outputs=spec.outputs, **options))
+            return next(renderer.observe([scene], settings, outputs=spec.outputs, landmarks=spec.landmarks))
 
         observation = _timed(told, "draw_and_read", seen)
         _timed(told, "encode", lambda: entries(number, observation, parameters, spec))  # noqa: B023

@@ -8,7 +8,7 @@ from typing import Any
 from dermis.frame import light_stages
 from dermis.frame.inputs import Inputs
 from dermis.frame.passes import shape
-from dermis.frame.passes.outputs import alpha, geometry, labels, motion
+from dermis.frame.passes.outputs import alpha, geometry, labels, landmarks, motion
 from dermis.frame.passes.outputs.planes import Drawn, Planes
 from dermis.frame.passes.visibility_buffer import draw_layers
 from dermis.frame.projection import MIDDLE, Views
@@ -32,6 +32,9 @@ def draw_outputs(graph: Graph, inputs: Inputs, below: Any) -> None:
         draw_layers(graph, "outputs", centres, views, inputs.resources.head)
     for planes in made.planes:
         STAGES[planes.stage](graph, planes, inputs, Drawn(centres.texture, below))
+    if made.landmarks:
+        look, shape_now = _look(inputs), inputs.resources.shape
+        landmarks.draw(graph, made.landmarks, inputs.lit, look, centres.texture, shape_now)
 
 
 def _geometry(graph: Graph, planes: Planes, inputs: Inputs, drawn: Drawn) -> None:
