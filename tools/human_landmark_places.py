@@ -18,11 +18,11 @@ Index = NDArray[np.int64]
 
 LEVELS = 3
 STEPS = 8  # places along a side of a quad
-AHEAD_MM = 900.0  # of the camera that sees the outline
 _UPPER, _LOWER = np.arange(13), np.r_[12:28, 0]  # rows of lid_rings.csv, from corner to corner
 _EDGE, _CREST = 1, 2  # columns of lid_rings.csv
 _SEAM_MM = np.array([[0.0, -67.3], [10, -66.7], [18, -67.2], [22.2, -67.9]])  # x, y where the lips meet
 _CORNER_MM = 22.2
+_AHEAD = 0.4  # how much of the way ahead counts as height, where the edge of a lip is sought
 _NEAR_MM = 1.2  # of a place in the front plane
 # Artist's values on the average human, seen from the front and the side: the outline of the face from in front of
 # the ear at the height of the eyes, over the angle of the jaw, to the chin [mm].
@@ -132,7 +132,8 @@ class Surface:
         for x in np.linspace(20.0, 0.0, 21):
             near = those[np.abs(self.at_mm[those, 0] - x) < 0.5]
             height = self.at_mm[near, 1] if upper else -self.at_mm[near, 1]
-            rows.append(self.at_mm[near[height.argmin()]] * [0, 1, 1] + [x, 0, 0])
+            edge = near[(height - _AHEAD * self.at_mm[near, 2]).argmin()]
+            rows.append(self.at_mm[edge] * [0, 1, 1] + [x, 0, 0])
         return np.concatenate([self.at_mm[[self.mouth_corner()]], np.stack(rows)])
 
     def on_inner_lip(self, place: Doubles, upper: bool) -> int:

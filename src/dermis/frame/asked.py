@@ -30,7 +30,7 @@ class Asked:
     shadow_layers : how many parts of lights cast shadows
     posed : whether the scene has a pose
     view : name of a scene among several that are drawn in turn
-    outputs : names of what is asked of the frame besides its picture
+    outputs, landmarks : names of what is asked of the frame besides its picture
     """
 
     head: Head
@@ -46,6 +46,7 @@ class Asked:
     posed: bool
     view: str
     outputs: tuple[str, ...] = ()
+    landmarks: tuple[str, ...] = ()
 
     @property
     def white(self) -> bool:

@@ -5,16 +5,33 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.passes.pack import Leaving
 from dermis.gpu.memo import same
+from dermis.scene.head_pose import gaze, head_pose
 from dermis.scene.model import Scene
 from dermis.scene.opencv import OpenCvCamera
 from dermis.scene.settings import Settings
 from dermis.summary import Summarised
+
+
+class Landmarks(NamedTuple):
+    """Landmarks of a set in a picture.
+
+    names : as the set has them, in order
+    positions_mm : (n, 3) in the world, from the head's centre [mm]
+    pixels : (n, 2) x to the right, y down; the middle of the upper left pixel is at (0, 0)
+    visible : (n,) whether the mesh leaves them free; hairs hide none
+    """
+
+    names: tuple[str, ...]
+    positions_mm: NDArray[np.float32]
+    pixels: NDArray[np.float64]
+    visible: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, repr=False)
@@ -24,11 +41,18 @@ class Observation(Summarised):
     picture : (h, w, 3), or with alpha (h, w, 4): sRGB bytes, or linear floats where these are asked
     outputs : by name, (h, w) or (h, w, c) with row 0 at the top; see `dermis.frame.outputs`
     camera : K, R and t; places of the scene are in mm from the head's centre
+    landmarks : by the name of their set
+    head_pose : (3, 4) rotation and shift [mm] from the head at rest to the camera, see `scene.head_pose`
+    gaze : (2, 3) unit vectors along which the left and the right eye look, in the camera's axes: x right,
+        y down, z forward; None for a head without eyes of true shape
     """
 
     picture: NDArray[Any]
     outputs: Mapping[str, NDArray[Any]]
     camera: OpenCvCamera
+    landmarks: Mapping[str, Landmarks]
+    head_pose: NDArray[np.float64]
+    gaze: NDArray[np.float64] | None
 
 
 def observed_frames(
@@ -47,7 +71,17 @@ def observed_frames(
 
 
 def _observed(scene: Scene, settings: Settings, leaving: Leaving) -> Observation:
-    return Observation(*leaving.all(), scene.camera.to_opencv(settings.size))
+    picture, outputs, found = leaving.all()
+    camera = scene.camera.to_opencv(settings.size)
+    landmarks = {name: _landmarks(camera, *one) for name, one in found.items()}
+    return Observation(picture, outputs, camera, landmarks, head_pose(scene), gaze(scene))
+
+
+def _landmarks(camera: OpenCvCamera, names: tuple[str, ...], rows: NDArray[np.float32]) -> Landmarks:
+    seen = (rows[:, :3].astype(np.float64) @ camera.R.T + camera.t) @ camera.K.T
+    with np.errstate(divide="ignore", invalid="ignore"):  # in the plane of the eye
+        pixels = seen[:, :2] / seen[:, 2:]
+    return Landmarks(names, rows[:, :3].copy(), pixels, rows[:, 3] > 0)
 
 
 def with_previous(

@@ -8,8 +8,9 @@ from pathlib import Path
 
 from dermis.frame.outputs import OUTPUTS, Output
 from dermis.gpu.wgsl_source import Member
+from dermis.human.labels.classes import class_number, label_classes
 
-STAGES = ("geometry", "surface", "motion", "alpha", "light", "visibility", "pigments", "thickness")
+STAGES = ("geometry", "surface", "motion", "alpha", "light", "visibility", "pigments", "thickness", "label")
 """Shaders that make outputs, passes/outputs/STAGE.wgsl."""
 
 
@@ -27,3 +28,9 @@ def _words(output: Output) -> tuple[tuple[str, str], ...]:
     kind = output.word if output.channels == 1 else f"vec{output.channels}f"
     nothing = output.background if kind == "f32" else int(output.background)
     return ("type", kind), ("nothing", f"{kind}({nothing})")
+
+
+def label_numbers() -> dict[str, float]:
+    """Numbers that the shaders of labels fill in."""
+    names = "right_brow", "left_brow", "hair", "beard", "lashes"
+    return {f"class_{name}": class_number(name) for name in names} | {"class_count": len(label_classes())}

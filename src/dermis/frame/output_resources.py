@@ -6,6 +6,8 @@ from typing import Any
 
 from dermis.frame.asked import Asked
 from dermis.frame.atlas_layout import AtlasLayout
+from dermis.frame.label_space import label_space
+from dermis.frame.landmark_space import landmark_space
 from dermis.frame.light_space import light_space
 from dermis.frame.outputs import OUTPUTS
 from dermis.frame.passes.outputs.planes import OutputResources, make_planes
@@ -21,7 +23,7 @@ def output_resources(
 
     Raises DermisError for more than the device has in one buffer, and for outputs that the scene has not.
     """
-    if not asked.outputs:
+    if not asked.outputs and not asked.landmarks:
         return None
     settings, keep = asked.settings, memo.keep
     stages: dict[str, list[tuple[str, int]]] = {}
@@ -38,6 +40,8 @@ def output_resources(
         centres=None if settings.samples == 1 else keep(_centres, device, settings.size),
         before=keep(make_shape, device, tables, of="before") if moves else None,
         light=light_space(memo, device, asked, layouts),
+        labels=label_space(memo, device, asked),
+        landmarks=keep(landmark_space, device, asked.head.bare, asked.landmarks) if asked.landmarks else None,
     )
 
 

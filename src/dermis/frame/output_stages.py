@@ -8,7 +8,7 @@ from typing import Any
 from dermis.frame import light_stages
 from dermis.frame.inputs import Inputs
 from dermis.frame.passes import shape
-from dermis.frame.passes.outputs import alpha, geometry, motion
+from dermis.frame.passes.outputs import alpha, geometry, labels, landmarks, motion
 from dermis.frame.passes.outputs.planes import Drawn, Planes
 from dermis.frame.passes.visibility_buffer import draw_layers
 from dermis.frame.projection import MIDDLE, Views
@@ -32,6 +32,9 @@ def draw_outputs(graph: Graph, inputs: Inputs, below: Any) -> None:
         draw_layers(graph, "outputs", centres, views, inputs.resources.head)
     for planes in made.planes:
         STAGES[planes.stage](graph, planes, inputs, Drawn(centres.texture, below))
+    if made.landmarks:
+        look, shape_now = _look(inputs), inputs.resources.shape
+        landmarks.draw(graph, made.landmarks, inputs.lit, look, centres.texture, shape_now)
 
 
 def _geometry(graph: Graph, planes: Planes, inputs: Inputs, drawn: Drawn) -> None:
@@ -58,6 +61,15 @@ def _alpha(graph: Graph, planes: Planes, inputs: Inputs, drawn: Drawn) -> None:
     alpha.draw(graph, planes, inputs.resources.picture)
 
 
+def _label(graph: Graph, planes: Planes, inputs: Inputs, drawn: Drawn) -> None:
+    made = inputs.resources
+    assert made.outputs is not None
+    space = made.outputs.labels
+    if made.strands and space.classes is not None:
+        labels.draw_hairs(graph, space, made.strands, inputs.view, made.head, drawn.centres)
+    labels.draw(graph, planes, inputs.lit, _look(inputs), drawn.centres, space)
+
+
 def _look(inputs: Inputs) -> tuple[Any, Any]:
     return inputs.view, inputs.centre_mm
 
@@ -71,5 +83,6 @@ STAGES: Mapping[str, Stage] = {
     "visibility": light_stages.draw_visibility,
     "pigments": light_stages.draw_pigments,
     "thickness": light_stages.draw_thickness,
+    "label": _label,
 }
 """By the names of their shaders, passes/outputs/STAGE.wgsl."""

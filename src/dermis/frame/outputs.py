@@ -90,7 +90,12 @@ _LIGHT = (
     Output("thickness", "thickness", "A", _FLOAT, "mm", "of the flesh below the skin", 0.0, _MICROMETRES),
 )
 
-OUTPUTS: Registry[Output] = Registry("output", {one.name: one for one in (*_GEOMETRY, *_LIGHT)})
+_LABELS = (
+    Output("label", "label", "I", np.uint8, "", "class of what is seen, see docs/labels.md"),
+    Output("label_face_synthetics", "label", "I", np.uint8, "", "the same in the classes of FaceSynthetics"),
+)
+
+OUTPUTS: Registry[Output] = Registry("output", {one.name: one for one in (*_GEOMETRY, *_LIGHT, *_LABELS)})
 """By the names that `Renderer.draw` and `dermis render --outputs` take."""
 
 

@@ -67,23 +67,25 @@ class Preparation:
         view: str = "",
         outputs: tuple[str, ...] = (),
         previous: Scene | None = None,
+        landmarks: tuple[str, ...] = (),
     ) -> Inputs:
         """Everything that a frame reads; what it does not is let go of.
 
         view : name of a scene among several that are drawn in turn: each has light and shadows of its own
         outputs : names of what is asked besides the picture
         previous : scene of the same head that motion is counted from, this one itself when left out
+        landmarks : names of sets that are asked
 
         Raises DermisError for sizes over the device's limits.
         """
-        inputs = self._inputs(scene, settings, TECHNIQUES[settings.technique], view, outputs)
+        inputs = self._inputs(scene, settings, TECHNIQUES[settings.technique], view, (outputs, landmarks))
         if "motion" in outputs:
             inputs = replace(inputs, before=self._before(scene, previous or scene, inputs))
         self.memo.end()
         return inputs
 
     def _inputs(
-        self, scene: Scene, settings: Settings, technique: Technique, view: str, outputs: tuple[str, ...]
+        self, scene: Scene, settings: Settings, technique: Technique, view: str, more: tuple[tuple[str, ...], ...]
     ) -> Inputs:
         keep, device, head, around = self.memo.keep, self.device, scene.head.bare, scene.environment
         profile = self.profile_of(scene.skin)
@@ -94,7 +96,7 @@ class Preparation:
         record, layers, parts = keep(_lights, *lit_by, using=(device, scene))
         who = scene.head, scene.skin, profile, _person(scene)
         counts = parts, len(layers.clips), scene.motion is not None
-        asked = Asked(*who, settings, around, surroundings, technique, *counts, view, outputs)
+        asked = Asked(*who, settings, around, surroundings, technique, *counts, view, *more)
         try:
             resources = keep(make_resources, self.memo, device, asked)
         except NoRoomError as error:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from dermis.errors import refuse, shown_value
 from dermis.frame.in_flight import arriving
+from dermis.frame.landmark_space import asked_landmarks
 from dermis.frame.observation import Observation, observed_frames
 from dermis.frame.outputs import asked_outputs
 from dermis.frame.passes import warm_up
@@ -179,6 +180,7 @@ class Renderer(Submitter):
         alpha: bool = False,
         linear: bool = False,
         previous: Scene | Iterable[Scene | None] | None = None,
+        landmarks: Iterable[str] = (),
     ) -> Iterator[Observation]:
         """What is seen of each scene in turn, each yielded while the next ones are drawn.
 
@@ -186,12 +188,13 @@ class Renderer(Submitter):
         alpha, linear : as of `render_many`
         previous : the scene before the first, as motion is counted from one to the next of the same head; or
             those before each
+        landmarks : names of sets (`dermis.human.landmarks.points.SETS`), or files of rows name,vertex
 
         Raises DermisError as `draw` does.
         """
         chosen = given_plain(Settings, settings or {}, "settings", "size=(512, 512)")
-        asked = asked_outputs(outputs)
-        send = partial(self._send, settings=chosen, linear=linear, alpha=alpha, outputs=asked)
+        given = {"outputs": asked_outputs(outputs), "landmarks": asked_landmarks(landmarks)}
+        send = partial(self._send, settings=chosen, linear=linear, alpha=alpha, **given)
         frames = observed_frames(send, scenes, previous, chosen)
         return arriving(self.kept_open, lambda: self.device, frames)
 

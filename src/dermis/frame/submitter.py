@@ -83,9 +83,10 @@ class Submitter:
         linear: bool,
         alpha: bool,
         outputs: tuple[str, ...] = (),
+        landmarks: tuple[str, ...] = (),
     ) -> Leaving:
         """Submit a frame and start reading it back."""
-        inputs = self.prepare(scene, settings, "", outputs, previous)
+        inputs = self.prepare(scene, settings, "", outputs, previous, landmarks)
         coverage, more = settings if alpha else None, inputs.resources.outputs
         leave = partial(pack.draw, linear=linear, alpha=coverage, outputs=more)
         _, leaving = self._submit(inputs, False, False, leave)

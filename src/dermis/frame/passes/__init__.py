@@ -11,7 +11,7 @@ from dermis.frame.levels import FLOATS, HALVES, usual_texel
 from dermis.frame.lights import light_numbers
 from dermis.frame.lights.kind import light_shaders
 from dermis.frame.metering import meter_numbers
-from dermis.frame.output_lists import output_lists
+from dermis.frame.output_lists import label_numbers, output_lists
 from dermis.frame.painting import painting_numbers, texture_names
 from dermis.frame.strands import strand_numbers
 from dermis.frame.surface import eye_numbers, lobe_shaders, surface_numbers
@@ -28,6 +28,7 @@ SHARED_SHADERS = ShaderFolder(
     PASSES.parent / "wgsl",
     lists={"lights": light_shaders, "lobes": lobe_shaders, **texture_names(), **output_lists()},
     numbers=lambda: {
+        **label_numbers(),
         **light_numbers(),
         **surface_numbers(),
         **atlas_numbers(),

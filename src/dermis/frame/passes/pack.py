@@ -43,14 +43,18 @@ class Leaving:
         """(h, w, 3 or 4) sRGB bytes or linear floats; waits for them. To be called once."""
         return self._image(self.fetched.array())
 
-    def all(self) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:
-        """The same with the outputs by name; in its place, to be called once."""
+    def all(self) -> tuple[NDArray[Any], dict[str, NDArray[Any]], dict[str, Any]]:
+        """The same, outputs by name and `LandmarkSpace.found`; in its place, to be called once."""
         raw, start, found = self.fetched.array(), _WORD * self.words, dict[str, NDArray[Any]]()
-        for planes in self.outputs.planes if self.outputs else ():
+        if self.outputs is None:
+            return self._image(raw), {}, {}
+        for planes in self.outputs.planes:
             end = start + planes.buffer.size
             found |= planes.arrays(raw[start:end])
             start = end
-        return self._image(raw), {name: found[name] for name in self.outputs.names} if self.outputs else {}
+        places = self.outputs.landmarks
+        landmarks = places.found(raw[start : start + places.buffer.size]) if places else {}
+        return self._image(raw), {name: found[name] for name in self.outputs.names}, landmarks
 
     def _image(self, raw: NDArray[np.uint8]) -> NDArray[Any]:
         width, height = self.size
@@ -89,7 +93,7 @@ def draw(
         shader, words, bound = program(device, "pack.wgsl"), _WORDS * count, {"bytes": picture.bytes}
     _check(device, _WORD * words, pixels)
     packed = _packed(device, picture, words)
-    buffers = [packed, *(planes.buffer for planes in (outputs.planes if outputs else ()))]
+    buffers = [packed, *(outputs.buffers if outputs else ())]
     _check_sum(device, buffers, pixels)
     graph.compute("pack", shader, bound | {"packed": packed}, (_ROW, -(-count // _ROW)))
     kind = np.float32 if linear else np.uint8

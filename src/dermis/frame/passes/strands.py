@@ -10,7 +10,7 @@ from dermis.frame.geometry import HeadResources
 from dermis.frame.passes import each, program
 from dermis.frame.shape import Shape
 from dermis.frame.strands import TILE, StrandResources, StrandTables, drawn_of
-from dermis.gpu import Constants, Device, Recorder
+from dermis.gpu import ComputeProgram, Constants, Device, Recorder
 from dermis.gpu.program import Resources
 
 Look = tuple[Resources, Any, Constants]
@@ -61,13 +61,7 @@ def draw(
     """
     made, picture, (lit, view, lights) = strands.tables, strands.picture, look
     light = program(graph.device, "strands_light.wgsl", made.constants + lights)
-    looked = ("eye", "forward", "right", "up", "shift", "samples", "jitter", "shown")
-    record = light.record("StrandView", **{name: view[name] for name in looked})
-    size = picture.result.size[:2]
-    pixel_mm = _pixel_mm(view, made, size[1])
-    coarse = drawn_of(made, pixel_mm)
-    record["coarse"], record["size"], record["skin"] = coarse, size, strands.skin
-    record["wider"] = made.coarse.hairs / max(1, coarse)
+    record, coarse = view_record(light, strands, view)
     seen = {"strand_view": record, "drawn": made.drawn, "hairs": made.record}
     knots = made.fine.hairs * made.fine.knots + coarse * made.coarse.knots
     pieces = made.fine.pieces() + made.coarse.pieces(coarse)
@@ -83,10 +77,32 @@ def draw(
         shader = program(graph.device, "strands_draw_tiles.wgsl", made.constants + ways)
         graph.compute("strands", shader, bound, (width, height))
         return picture.result
-    rows = rows_of(graph.device, _most_in_tile(made, pieces, pixel_mm))
+    rows = rows_for(graph.device, strands, view)
     shader = program(graph.device, "strands_draw.wgsl", (*made.constants, ("ROWS", rows)))
     graph.compute("strands", shader, bound, (width, -(-height // rows)))
     return picture.result
+
+
+def view_record(shader: ComputeProgram, strands: StrandResources, view: Any) -> tuple[Any, int]:
+    """A shader's record StrandView, and how many coarse hairs stand for all.
+
+    view : record of the shading
+    """
+    made, size = strands.tables, strands.picture.result.size[:2]
+    looked = ("eye", "forward", "right", "up", "shift", "samples", "jitter", "shown")
+    record = shader.record("StrandView", **{name: view[name] for name in looked})
+    coarse = drawn_of(made, _pixel_mm(view, made, size[1]))
+    record["coarse"], record["size"], record["skin"] = coarse, size, strands.skin
+    record["wider"] = made.coarse.hairs / max(1, coarse)
+    return record, coarse
+
+
+def rows_for(device: Device, strands: StrandResources, view: Any) -> int:
+    """`rows_of` what tiles of this picture may list."""
+    made = strands.tables
+    pixel_mm = _pixel_mm(view, made, strands.picture.result.size[1])
+    pieces = made.fine.pieces() + made.coarse.pieces(drawn_of(made, pixel_mm))
+    return rows_of(device, _most_in_tile(made, pieces, pixel_mm))
 
 
 def _pixel_mm(view: Any, made: StrandTables, height: int) -> float:

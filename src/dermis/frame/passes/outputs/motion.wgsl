@@ -1,6 +1,7 @@
 // How far the points that pixels see have moved in the picture since the scene before.
 //#include "seen.wgsl"
 //#include "planes.wgsl"
+//#include "in_picture.wgsl"
 
 //#each motion_outputs: override {NAME}_FIRST: u32 = UNASKED;
 
@@ -23,21 +24,13 @@ fn place_now(vertex: u32) -> vec3f {
     return position_of(vertex);
 }
 
-// Where a point is in the picture [pixel].
-fn projected(rays: Rays, p: vec3f, size: vec2f) -> vec2f {
-    let way = p - rays.eye;
-    let across = vec2f(dot(way, rays.right) / dot(rays.right, rays.right), dot(way, rays.up) / dot(rays.up, rays.up));
-    let ndc = across / dot(way, rays.forward) - rays.shift;
-    return (0.5 + vec2f(0.5, -0.5) * ndc) * size;
-}
-
 fn motion_output(seen: Seen) -> vec2f {
     let w = seen.weights;
     let t = seen.corners;
     let size = vec2f(textureDimensions(centres));
     let now = w.x * place_now(t.x) + w.y * place_now(t.y) + w.z * place_now(t.z);
     let then = w.x * place_before(t.x) + w.y * place_before(t.y) + w.z * place_before(t.z);
-    return projected(look.rays, now, size) - projected(before.rays, then, size);
+    return in_picture(look.rays, now, size) - in_picture(before.rays, then, size);
 }
 
 @compute @workgroup_size(8, 8)

@@ -87,6 +87,8 @@ class OutputResources:
     centres : triangles at the pixels' centres; None where the picture's only sample lies there
     before : the shape in the scene before, None where nothing reads it
     light : what outputs of light take besides, a `LightSpace`
+    labels : what labels are made from, a `LabelSpace`
+    landmarks : those that are asked, a `LandmarkSpace`, or None
     """
 
     names: tuple[str, ...]
@@ -94,6 +96,14 @@ class OutputResources:
     centres: Layers | None
     before: Shape | None
     light: Any
+    labels: Any
+    landmarks: Any
+
+    @property
+    def buffers(self) -> list[Any]:
+        """Those that are read back, in order."""
+        last = [self.landmarks.buffer] if self.landmarks else []
+        return [*(planes.buffer for planes in self.planes), *last]
 
     def planes_of(self, name: str) -> Planes:
         """Those that hold an output."""

@@ -1,0 +1,66 @@
+"""Landmarks that are asked of a frame: their table on the device, and space for where they are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.errors import refuse, shown_value
+from dermis.gpu import Device
+from dermis.human.landmarks.points import LandmarkPoints, check_landmarks, landmark_points
+from dermis.mesh.head import Head
+
+_ROW = np.dtype([("corner", "u4", 4), ("share", "f4", 4), ("material", "u4", 4)])  # as landmarks.wgsl reads it
+_FOUND = 4  # floats of each: place, and whether it is seen
+
+
+@dataclass(frozen=True, eq=False)
+class LandmarkSpace:
+    """Landmarks of all sets that are asked, one after the other.
+
+    sets : by their names
+    table, buffer : as landmarks.wgsl reads and writes them
+    count : of all
+    """
+
+    sets: dict[str, LandmarkPoints]
+    table: Any
+    buffer: Any
+    count: int
+
+    def found(self, raw: NDArray[np.uint8]) -> dict[str, tuple[tuple[str, ...], NDArray[np.float32]]]:
+        """Names of each set, and (n, 4) places [mm] with 1 for those that are seen, of the buffer's bytes."""
+        rows, first, found = raw.view(np.float32).reshape(-1, _FOUND), 0, {}
+        for name, points in self.sets.items():
+            found[name] = points.names, rows[first : first + len(points.names)]
+            first += len(points.names)
+        return found
+
+
+def asked_landmarks(names: Iterable[str]) -> tuple[str, ...]:
+    """The names of sets and tables, each once.
+
+    Raises DermisError for what is neither.
+    """
+    if isinstance(names, str) or not isinstance(names, Iterable):
+        came = f"{shown_value(names)} came"
+        refuse("landmarks", "several names", came, 'Write landmarks=("ibug-68",)')
+    return tuple(dict.fromkeys(check_landmarks(name) for name in names))
+
+
+def landmark_space(device: Device, head: Head, names: tuple[str, ...]) -> LandmarkSpace:
+    """Space for the landmarks of a head.
+
+    Raises DermisError as `landmark_points` does.
+    """
+    sets = {name: landmark_points(head, name) for name in names}
+    rows = np.zeros(sum(len(points.names) for points in sets.values()), _ROW)
+    for part in ("corner", "share"):
+        rows[part] = np.concatenate([getattr(points, part) for points in sets.values()])
+    rows["material"][:, 0] = np.concatenate([points.material for points in sets.values()]) + 1
+    table = device.buffer(rows.view(np.uint32), "STORAGE")
+    return LandmarkSpace(sets, table, device.space(4 * _FOUND * len(rows), "landmarks"), len(rows))
