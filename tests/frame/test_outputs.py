@@ -86,6 +86,16 @@ def test_positions_project_to_the_centres_of_their_pixels(
     assert np.abs(off).max() < PIXEL
 
 
+def test_triangles_seen_along_their_plane_are_met_where_they_look_nearest(renderer: Renderer) -> None:
+    """At the rim of a fine ball: rasterisers find some a little beside, and the ray meets their plane far off."""
+    fine, size = head_of(uv_sphere(30.0, 200, 100)), (256, 256)
+    scene = scene_of(fine, frontal(), camera=CAMERA)
+    rendered = renderer.draw(scene, settings_of(size=size), outputs=("position", "triangle"))
+    places, mask = projected(CAMERA.to_opencv(size), rendered.output("position")), rendered.output("triangle")
+    off = (places - np.dstack(np.meshgrid(*map(np.arange, size))))[mask >= 0]
+    assert len(off) > 20_000 and np.abs(off).max() < PIXEL
+
+
 def test_depth_is_along_the_optical_axis(found: dict[str, NDArray[Any]], seen: NDArray[np.bool_]) -> None:
     camera = CAMERA.to_opencv(SIZE)
     along = (found["position"].astype(float) @ camera.R.T + camera.t)[..., 2]

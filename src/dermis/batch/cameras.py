@@ -22,7 +22,7 @@ _FACE_MM = ((-90.0, -95.0, 5.0), (90.0, 100.0, 130.0))
 Doubles = NDArray[np.float64]
 
 
-def face_points(head: Head, count: int = 64) -> NDArray[np.int64]:
+def face_points(head: Head, count: int = 64) -> NDArray[np.int32]:
     """(n,) control points that stand out of a face: all others lie between them."""
     places = head.control.positions_mm - np.array(head.centre_mm, np.float32)
     low, high = np.array(_FACE_MM, np.float32)
@@ -30,11 +30,11 @@ def face_points(head: Head, count: int = 64) -> NDArray[np.int64]:
     if not len(inside):
         inside = np.arange(len(places))
     ways = np.array([towards(*way) for way in _spiral(count)], np.float32)
-    return np.unique(inside[(places[inside] @ ways.T).argmax(axis=0)]).astype(np.int64)
+    return np.unique(inside[(places[inside] @ ways.T).argmax(axis=0)]).astype(np.int32)
 
 
 def camera_of(
-    parameters: Mapping[str, Any], head: Head, points: NDArray[np.int64], motion: Motion, aspect: float
+    parameters: Mapping[str, Any], head: Head, points: NDArray[np.int32], motion: Motion, aspect: float
 ) -> Camera:
     """The camera of an image by its parameters.
 
@@ -75,9 +75,7 @@ def _aimed(
     target = middle - across * right - along * above
     scale = float(np.linalg.norm(target - position)) / distance  # the angle of view stays
     x, y, z = map(float, position)
-    return Camera(
-        position=(x, y, z), target=_triple(target), up=_triple(up), frame_mm=frame_mm * scale
-    )
+    return Camera(position=(x, y, z), target=_triple(target), up=_triple(up), frame_mm=frame_mm * scale)
 
 
 def _seen(camera: Camera, places: Doubles, aspect: float) -> tuple[Doubles, Doubles]:

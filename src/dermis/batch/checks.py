@@ -7,8 +7,10 @@ from typing import Any
 
 from dermis.batch.dials import check_looks, check_skin, check_weights
 from dermis.batch.distributions import Distribution
-from dermis.batch.tables import MIXTURE
-from dermis.errors import refuse
+from dermis.batch.tables import MIXTURE, NONE
+from dermis.errors import about, refuse
+from dermis.frame.outputs import asked_outputs
+from dermis.scene.lights import NO_LIGHTS
 
 _ANCESTRY = "person.african", "person.asian", "person.caucasian"
 _HEAD = "person.head"
@@ -16,12 +18,15 @@ _HEAD = "person.head"
 
 def check_spec(spec: Any, drawn: Mapping[str, Distribution], expressions: Mapping[str, Any]) -> None:
     """Refuse a spec that cannot be drawn, by table and key."""
+    with about("outputs"):
+        asked_outputs(spec.outputs)
     check_looks(spec.person)
     check_skin(spec.skin)
     check_weights(spec.pose)
     _check_person(drawn)
     _check_expression(spec.expression.name, expressions)
     _check_correlated(spec.correlated, drawn)
+    _check_light(drawn)
 
 
 def _check_person(drawn: Mapping[str, Distribution]) -> None:
@@ -30,7 +35,7 @@ def _check_person(drawn: Mapping[str, Distribution]) -> None:
         remedy = "Leave one out"
         refuse(given[0], "people that are drawn", f"{_HEAD} names heads", remedy)
     shares = [drawn[name] for name in _ANCESTRY if name in drawn]
-    if shares and not any(min(share.ends) > 0 for share in shares):  # type: ignore[type-var, operator]
+    if shares and not any(min(share.ends) > 0 for share in shares):  # type: ignore[operator]
         came = "all of them can be 0 at once"
         refuse("person", "a share of african, asian or caucasian above 0", came, "Raise the low end of one")
 
@@ -57,3 +62,11 @@ def _check_correlated(groups: Any, drawn: Mapping[str, Distribution]) -> None:
             came = f"{group.of[people.index(False)]} comes before one"
             refuse("correlated: of", "parameters of the person first", came, "Change their order")
         seen |= set(group.of)
+
+
+def _check_light(drawn: Mapping[str, Distribution]) -> None:
+    lamps = NO_LIGHTS not in drawn["light.kind"].ends and 0.0 not in drawn["light.strength"].ends
+    around = NONE not in drawn["environment.name"].ends and 0.0 not in drawn["environment.strength"].ends
+    if not lamps and not around:
+        came = "there can be neither lamps nor an environment"
+        refuse("light", "some light in each image", came, "Take none or 0 out of one of both")

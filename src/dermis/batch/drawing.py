@@ -17,6 +17,7 @@ from dermis.batch.tables import ANGLES, MIXTURE, NONE, RIG
 Parameters = dict[str, float | int | str]
 _PERSON = "person."
 _SEEDS = 2**32
+_DIALS = "intensity", "asymmetry", "variation"
 _LAMPS = tuple(f"light.{lamp}." for lamp in ("key", "fill", "rim"))
 _COLOUR = "background.red", "background.green", "background.blue"
 _APPLIES: tuple[tuple[str | tuple[str, ...], Callable[[Parameters], bool]], ...] = (
@@ -87,8 +88,8 @@ class Drawing:
             weights: Weights = mixed(lambda part: self._uniform(k, f"expression.mixture.{part}"))
         else:
             weights = self.expressions[name]
-        dials: list[Any] = [found[f"expression.{dial}"] for dial in ("intensity", "asymmetry", "variation")]
-        made = performed(weights, *dials, partial(self._varied, k))
+        intensity, asymmetry, variation = (float(found[f"expression.{dial}"]) for dial in _DIALS)
+        made = performed(weights, intensity, asymmetry, variation, partial(self._varied, k))
         for target, one in self._own.items():
             drawn: Any = self._value(k, f"pose.{target}", one)
             made |= dict.fromkeys(targets_of([target]), drawn)

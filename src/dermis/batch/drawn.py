@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from dermis.batch.distributions import Distribution, distribution
+from dermis.batch.distributions import Constant, Distribution
+from dermis.batch.stated import stated
 
-_REACH = "which normal reaches to 6 sd either way, and truncated to its ends"
+_REACH = "; normal reaches to 6 sd either way, truncated to its ends"
 
 
 class Anything:
@@ -20,7 +21,7 @@ class Anything:
         """
         if told is None:
             return None
-        found = distribution(told)
+        found = stated(told)
         self.check_ends(found)
         return found
 
@@ -49,7 +50,8 @@ class Within(Anything):
     def check_ends(self, found: Distribution) -> None:
         if any(isinstance(end, str) or not self.ge <= end <= self.le for end in found.ends):
             why = f" ({self.why})" if self.why else ""
-            raise ValueError(f"numbers from {self.ge:.10g} to {self.le:.10g}{why}, {_REACH}")
+            reach = "" if isinstance(found, Constant) else _REACH
+            raise ValueError(f"numbers from {self.ge:.10g} to {self.le:.10g}{why}{reach}")
 
 
 class OneOf(Anything):

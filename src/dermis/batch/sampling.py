@@ -14,7 +14,8 @@ def uniform(seed: int, number: int, name: str) -> float:
     A hash of the three as text (BLAKE2b), so that no draw moves another.
     """
     digest = hashlib.blake2b(f"{seed} {number} {name}".encode(), digest_size=8).digest()
-    return ((int.from_bytes(digest, "little") >> (64 - _BITS)) + 0.5) / 2**_BITS
+    whole = int.from_bytes(digest, "little") >> (64 - _BITS)
+    return (whole + 0.5) / float(1 << _BITS)
 
 
 def rounded(value: float) -> float:

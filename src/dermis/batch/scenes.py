@@ -48,7 +48,7 @@ class _Seen:
     """
 
     head: Head
-    points: NDArray[np.int64]
+    points: NDArray[np.int32]
     skin: Skin
 
 
@@ -72,7 +72,7 @@ class SceneMaker:
         motion = pose.motion(head.control)
         camera = camera_of(parameters, head, seen.points, motion, width_height[0] / width_height[1])
         looking = _looking(parameters, head, pose, camera.position)
-        dials = {name: value for name, value in _below(parameters, "skin").items()}
+        dials = _below(parameters, "skin")
         if "profile" in dials:
             dials["profile"] = self._named(dials["profile"])
         scene = Scene(

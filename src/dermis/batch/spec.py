@@ -1,4 +1,4 @@
-"""What a data set draws: pictures, people, faces, light and cameras, from stated distributions by one seed."""
+"""What a data set draws: people, faces, light and cameras, from stated distributions by one seed."""
 
 from __future__ import annotations
 

@@ -61,6 +61,11 @@ class Renderer(Submitter):
         self.on(device, self._depth)
         self._opening_ms = 1e3 * (time.perf_counter() - self._opening_began)
 
+    def forget(self) -> None:
+        """Forget all that is kept; the next frame makes it again."""
+        self.memo.forget()
+        self.graph.forget()
+
     def draw(
         self,
         scene: Scene,

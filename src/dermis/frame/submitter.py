@@ -42,11 +42,6 @@ class Submitter:
         self.profile_of = preparation.profile_of
         self._in_flight.clear()
 
-    def forget(self) -> None:
-        """Forget all that is kept; the next frame makes it again."""
-        self.memo.forget()
-        self.graph.forget()
-
     def _submit(
         self, inputs: Inputs, timed: Timed, anew: bool, leave: Callable[[Graph, Picture], T] | None = None
     ) -> tuple[Frame, T | None]:

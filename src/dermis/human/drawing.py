@@ -63,7 +63,8 @@ def drawn(seed: int, given: Mapping[str, Any]) -> dict[str, Any]:
         "targets": {**dict(_details(rng)), **given.get("targets", {})},
     }
     found |= dict(zip(_ANCESTRY, map(float, shares), strict=True)) | macro
-    origin = Origin(*shares, found["sex"], found["age"])
+    african, asian, caucasian = shares
+    origin = Origin(african, asian, caucasian, found["sex"], found["age"])
     skin, eyes = drawn_look(rng, origin), drawn_eyes(rng, origin)
     brown, red = _hair(np.random.default_rng((int(seed), 1)), shares)
     colour = {"hair_eumelanin": brown, "hair_pheomelanin": red} | macro
@@ -79,7 +80,7 @@ def _ancestry(given: Mapping[str, float], own: NDArray[np.float64]) -> NDArray[n
     shares = np.array([given.get(name, 0.0) for name in _ANCESTRY])
     if not shares.sum() > 0:
         refuse("ancestry", "a share of african, asian or caucasian", "all that are given are 0", "Raise one")
-    return shares / shares.sum()
+    return np.asarray(shares / shares.sum())
 
 
 def _hairdo(

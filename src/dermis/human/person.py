@@ -92,8 +92,8 @@ class Human:
         """A plausible adult, the same for the same seed: mostly of one ancestry, a little asymmetric.
 
         seed : 0 to 2**32 - 1
-        given : fields that are not drawn, such as `age=70`; of targets, skin, eyes and hair some by name, such
-            as `skin={"melanin": 0.1}`. Skin and hair go with the age, the sex and the ancestry that are given
+        given : fields that are not drawn, such as `age=70`; some of targets, skin, eyes and hair by name, as
+            `skin={"melanin": 0.1}`. Skin and hair go with the age, the sex and the ancestry that are given
 
         Raises DermisError for other seeds and for values out of range.
         """

@@ -1,7 +1,6 @@
 // How far the points that pixels see have moved in the picture since the scene before.
 //#include "seen.wgsl"
 //#include "planes.wgsl"
-//#include "in_picture.wgsl"
 
 //#each motion_outputs: override {NAME}_FIRST: u32 = UNASKED;
 
@@ -30,7 +29,7 @@ fn motion_output(seen: Seen) -> vec2f {
     let size = vec2f(textureDimensions(centres));
     let now = w.x * place_now(t.x) + w.y * place_now(t.y) + w.z * place_now(t.z);
     let then = w.x * place_before(t.x) + w.y * place_before(t.y) + w.z * place_before(t.z);
-    return in_picture(look.rays, now, size) - in_picture(before.rays, then, size);
+    return projected(look.rays, now, size).xy - projected(before.rays, then, size).xy;
 }
 
 @compute @workgroup_size(8, 8)

@@ -1,0 +1,32 @@
+"""The page of outputs says what the registry holds, and its Python runs."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from dermis.frame.outputs import OUTPUTS
+
+ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "docs" / "outputs.md").read_text("utf-8")
+
+
+def test_the_table_is_that_of_the_registry(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Written anew by python tools/outputs_page.py."""
+    monkeypatch.syspath_prepend(ROOT / "tools")
+    from outputs_page import page
+
+    assert page(PAGE) == PAGE
+    assert all(f"| `{name}` |" in PAGE for name in OUTPUTS)
+
+
+def test_its_python_runs(monkeypatch: pytest.MonkeyPatch, device: object) -> None:
+    """At a small size."""
+    monkeypatch.setattr("dermis.frame.renderer.open_device", lambda adapter: device)
+    text = "".join(re.findall(r"^```python\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL))
+    names: dict[str, object] = {}
+    exec(text.replace("size=512", "size=48, atlas=128, samples=1, shadow_size=128"), names)
+    assert getattr(names["depth"], "shape", None) == (48, 48)
+    assert abs(names["moved"]).max() > 0.1  # type: ignore[arg-type]

@@ -1,0 +1,56 @@
+"""Writes the table of outputs into docs/outputs.md from their registry.
+
+python tools/outputs_page.py
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from dermis.frame.outputs import OUTPUTS, Output
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "outputs.md"
+_BEGIN, _END = "<!-- outputs -->\n", "<!-- end -->\n"
+
+
+def page(text: str) -> str:
+    """The page's text with the table of now."""
+    before, _, rest = text.partition(_BEGIN)
+    return f"{before}{_BEGIN}{table()}{_END}{rest.partition(_END)[2]}"
+
+
+def table() -> str:
+    """A row for each output."""
+    columns = "name", "what", "unit", "numbers", "channels in OpenEXR", "PNG", "where nothing is seen"
+    rows = [columns, ["---"] * len(columns), *map(_cells, OUTPUTS.values())]
+    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
+def _cells(output: Output) -> list[str]:
+    numbers = np.dtype(output.kind).name
+    each = f"{output.channels} x {numbers}" if output.channels else f"{numbers} for each light"
+    channels = ", ".join(f"`{output.name}.{letter}`" for letter in output.letters or "012")
+    channels += "" if output.letters else ", ..."
+    cells = [f"`{output.name}`", output.description, output.unit, each.removeprefix("1 x ")]
+    return [
+        *cells,
+        channels + (", ..." if not output.letters else ""),
+        _png(output),
+        f"{output.background:g}",
+    ]
+
+
+def _png(output: Output) -> str:
+    if output.kind is np.uint8:
+        return "8 bit, as it is"
+    if output.levels is None:
+        return "none"
+    step, zero = output.levels
+    shown = f"{step:g}" if round(step, 3) == step else f"1/{round(1 / step)}"
+    return f"(level - {zero}) x {shown}" if zero else f"level x {shown}"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(PAGE.read_text("utf-8")), "utf-8")
