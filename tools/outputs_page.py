@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from dermis.frame.outputs import OUTPUTS, Output
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "outputs.md"
@@ -29,7 +27,7 @@ def table() -> str:
 
 
 def _cells(output: Output) -> list[str]:
-    numbers = np.dtype(output.kind).name
+    numbers = output.kind
     each = f"{output.channels} x {numbers}" if output.channels else f"{numbers} for each light"
     channels = ", ".join(f"`{output.name}.{letter}`" for letter in output.letters or "012")
     channels += "" if output.letters else ", ..."
@@ -43,7 +41,7 @@ def _cells(output: Output) -> list[str]:
 
 
 def _png(output: Output) -> str:
-    if output.kind is np.uint8:
+    if output.kind == "uint8":
         return "8 bit, as it is"
     if output.levels is None:
         return "none"

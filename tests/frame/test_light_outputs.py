@@ -20,7 +20,7 @@ from dermis.scene.techniques import TECHNIQUES
 
 Arrays = dict[str, NDArray[Any]]
 SUM = 1e-6
-"""Of the parts of the picture against the whole, of the brightest pixel: the order in which floats are added."""
+"""Parts of the picture against the whole, of the brightest pixel: the order in which floats are added."""
 
 COLOURS = 0.2 + 0.6 * np.random.default_rng(3).random((16, 16, 3))
 BALL = head_of(uv_sphere(30.0, 32, 16), colour=COLOURS)
@@ -99,7 +99,8 @@ def test_translucent_is_what_the_diffuse_light_lacks_without_it(renderer: Render
 def test_of_two_layouts_the_light_through_is_blended_as_theirs(renderer: Renderer) -> None:
     thin = found(renderer, LIT_THROUGH, "diffuse", "translucent", seams="multi-uv")
     thick = found(renderer, LIT_THROUGH, "diffuse", seams="multi-uv", transmission="none")
-    assert np.abs(thin["diffuse"] - thin["translucent"] - thick["diffuse"]).max() < 1e-5 * thin["diffuse"].max()
+    off = np.abs(thin["diffuse"] - thin["translucent"] - thick["diffuse"])
+    assert off.max() < 1e-5 * thin["diffuse"].max()
 
 
 def test_visibility_is_none_of_a_lamp_behind_and_all_of_one_in_front(renderer: Renderer) -> None:
@@ -108,22 +109,25 @@ def test_visibility_is_none_of_a_lamp_behind_and_all_of_one_in_front(renderer: R
     behind, before = np.moveaxis(got["visibility"], -1, 0)
     seen = got["irradiance"].any(axis=-1)
     inner = seen & np.roll(seen, 2, 0) & np.roll(seen, -2, 0) & np.roll(seen, 2, 1) & np.roll(seen, -2, 1)
-    assert seen.sum() > 500 and not behind[inner].any() and (before[inner] == 1).all()
+    assert seen.sum() > 500 and not behind[inner].any() and before[inner].min() > 1 - SUM
     assert not got["visibility"][~seen].any()
 
 
 def test_a_light_gives_irradiance_where_it_is_visible(renderer: Renderer) -> None:
     """On a wall behind a small ball: hard and soft shadows, and a lamp so wide that it is shaded in parts."""
-    head = head_of(joined((plane(120.0, 8), (0, 0, 0), (0, 0, 0.5)), (uv_sphere(8.0, 24, 12), (0, 0, 30), (0.5, 0, 0.5))))
+    ball = uv_sphere(8.0, 24, 12), (0, 0, 30), (0.5, 0, 0.5)
+    head = head_of(joined((plane(120.0, 8), (0, 0, 0), (0, 0, 0.5)), ball))
     camera, where = front_camera(head, (-20, 0, 0), 60.0), place(head, (40, 0, 160))
     lamps = [
         PointLight(position=where, target=place(head, (0, 0, 0)), softness_mm=0.01),
         RectangleLight(position=where, target=place(head, (0, 0, 0)), width_mm=150.0, height_mm=150.0),
     ]
     for lamp in lamps:
-        alone = found(renderer, scene_of(head, lamp, camera=camera), "visibility", "irradiance", shadow_size=512)
+        scene = scene_of(head, lamp, camera=camera)
+        alone = found(renderer, scene, "visibility", "irradiance", shadow_size=512)
         shown = alone["visibility"][..., 0]
-        assert alone["visibility"].shape[-1] == 1 and shown.min() < 0.2 and shown.max() == 1
+        assert alone["visibility"].shape[-1] == 1 and shown.max() == pytest.approx(1, abs=SUM)
+        assert shown.min() < (0.6 if lamp is lamps[1] else 0.1)
         assert np.array_equal(shown > 0, alone["irradiance"][..., 0] > 0)
         soft = ((shown > 0.05) & (shown < 0.95)).mean()
         assert soft > 0.2 if lamp is lamps[1] else soft < 0.1
@@ -148,7 +152,7 @@ def test_thickness_ends_where_no_light_passes(renderer: Renderer) -> None:
     row = got[40, 12:68].astype(float)
     true = 1.0 + 15.0 * (np.arange(12, 68) + 0.5 - 10) / 60
     reach = row.max()
-    assert 8 < reach < 9.5 and not got[:, :8].any() and got[40, -14] == pytest.approx(reach, abs=0.1)
+    assert 8 < reach < 9.5 and not got[:, :8].any() and got[40, 56] == pytest.approx(reach, abs=0.1)
     thin = true < 0.6 * reach
     assert np.abs(row - true)[thin].max() < 0.35 and (np.diff(row)[thin[1:]] > 0).all()
 
@@ -206,7 +210,7 @@ def test_eyes_and_teeth_have_a_surface_too(face: tuple[Human, Arrays]) -> None:
         white = np.percentile(got["albedo"][seen], 90, axis=0)
         assert seen.sum() > 10 and 0.35 < white.min() <= white.max() < 0.6
         assert white[2] > np.median(skin, axis=0)[2] and got["albedo"][seen].min() < 0.1
-        assert got["specular"][seen].max() > 0.2 and got["irradiance"][seen].max() > 0.5
+        assert got["specular"][seen].max() > 0.01 and got["irradiance"][seen].max() > 0.5
     both = np.abs(got["diffuse"] + got["specular"] - got["linear"])
     assert both.max() < SUM * got["linear"].max()
 

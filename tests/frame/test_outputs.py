@@ -87,7 +87,7 @@ def test_positions_project_to_the_centres_of_their_pixels(
 
 
 def test_triangles_seen_along_their_plane_are_met_where_they_look_nearest(renderer: Renderer) -> None:
-    """At the rim of a fine ball: rasterisers find some a little beside, and the ray meets their plane far off."""
+    """At the rim of a fine ball: rasterisers find some a little beside, and rays meet their plane far off."""
     fine, size = head_of(uv_sphere(30.0, 200, 100)), (256, 256)
     scene = scene_of(fine, frontal(), camera=CAMERA)
     rendered = renderer.draw(scene, settings_of(size=size), outputs=("position", "triangle"))

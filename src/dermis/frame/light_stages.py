@@ -38,7 +38,8 @@ def draw_pigments(graph: Graph, planes: Planes, inputs: Inputs, drawn: Drawn) ->
     """Read the skin's pigments."""
     made = inputs.resources.outputs
     assert made is not None and made.light.pigmented is not None
-    pigments.draw(graph, planes, inputs.lit, (inputs.view, inputs.centre_mm), drawn.centres, made.light.pigmented)
+    look = inputs.view, inputs.centre_mm
+    pigments.draw(graph, planes, inputs.lit, look, drawn.centres, made.light.pigmented)
 
 
 def draw_thickness(graph: Graph, planes: Planes, inputs: Inputs, drawn: Drawn) -> None:

@@ -24,7 +24,7 @@ _PICTURE = "rgba"  # of a file's first part, as compositing programs call it
 def check_formats(names: Iterable[str], kind: Format) -> None:
     """Raises DermisError for an output that a format cannot hold."""
     for name in names:
-        if kind == "png" and OUTPUTS[name].levels is None and OUTPUTS[name].kind is not np.uint8:
+        if kind == "png" and OUTPUTS[name].levels is None and OUTPUTS[name].kind != "uint8":
             refuse(f"output {name}", "exr or npy", "png came, which cannot hold it", "Choose one of these")
 
 

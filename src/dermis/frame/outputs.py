@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
-
-import numpy as np
+from typing import Literal, NamedTuple
 
 from dermis.errors import refuse, shown_value
 from dermis.registry import Registry
 
-_WORDS = {"f": "f32", "i": "i32", "u": "u32"}
+_WORDS = {"float32": "f32", "int32": "i32", "uint8": "u32"}
+
+Kind = Literal["float32", "int32", "uint8"]
 
 
 class Levels(NamedTuple):
@@ -32,7 +32,7 @@ class Output:
     stage : the shader that makes it, passes/outputs/STAGE.wgsl; it has `fn NAME_output(seen: Seen)`, which
         returns a number or a vector
     letters : of its channels, by which files name them; empty for a channel for each light
-    kind : of its numbers
+    kind : of its numbers, as NumPy names it; a word and not NumPy's own, for a command's help to be quick
     unit : of its numbers, empty for none
     description : of it, in a few words for the help texts
     background : its value where nothing is seen
@@ -42,7 +42,7 @@ class Output:
     name: str
     stage: str
     letters: str
-    kind: type[np.float32 | np.int32 | np.uint8]
+    kind: Kind
     unit: str
     description: str
     background: float = 0.0
@@ -56,10 +56,11 @@ class Output:
     @property
     def word(self) -> str:
         """Its numbers' type in shaders: a word of four bytes each."""
-        return _WORDS[np.dtype(self.kind).kind]
+        return _WORDS[self.kind]
 
 
-_FLOAT, _MIDDLE = np.float32, 1 << 15
+_FLOAT: Kind = "float32"
+_MIDDLE = 1 << 15
 _TENTHS, _SHARE = Levels(0.1), Levels(1 / 65535)
 _AROUND_0, _UNIT, _MOVED = Levels(0.1, _MIDDLE), Levels(1 / 32767, _MIDDLE), Levels(1 / 64, _MIDDLE)
 _GEOMETRY = (
@@ -69,7 +70,7 @@ _GEOMETRY = (
     Output("normal_geometric", "geometry", "XYZ", _FLOAT, "", "normal of the flat triangle", 0.0, _UNIT),
     Output("normal_camera", "surface", "XYZ", _FLOAT, "", "normal with relief, to the camera", 0.0, _UNIT),
     Output("uv", "geometry", "UV", _FLOAT, "", "place in the maps", 0.0, _SHARE),
-    Output("triangle", "geometry", "I", np.int32, "", "number of the mesh's triangle", -1.0),
+    Output("triangle", "geometry", "I", "int32", "", "number of the mesh's triangle", -1.0),
     Output("barycentric", "geometry", "ABC", _FLOAT, "", "weights of the triangle's corners", 0.0, _SHARE),
     Output(
         "motion", "motion", "XY", _FLOAT, "pixel", "way in the picture from the scene before", 0.0, _MOVED
@@ -79,7 +80,7 @@ _GEOMETRY = (
 
 _RADIANCE, _MICROMETRES = Levels(1 / 4096), Levels(0.001)
 _LIGHT = (
-    Output("albedo", "light", "RGB", _FLOAT, "", "share of the light below the skin that leaves", 0.0, _SHARE),
+    Output("albedo", "light", "RGB", _FLOAT, "", "share of the light that comes back", 0.0, _SHARE),
     Output("irradiance", "light", "RGB", _FLOAT, "", "light that enters, not yet spread", 0.0, _RADIANCE),
     Output("diffuse", "light", "RGB", _FLOAT, "", "radiance that leaves below the skin", 0.0, _RADIANCE),
     Output("specular", "light", "RGB", _FLOAT, "", "radiance off the surface", 0.0, _RADIANCE),
@@ -91,8 +92,8 @@ _LIGHT = (
 )
 
 _LABELS = (
-    Output("label", "label", "I", np.uint8, "", "class of what is seen, see docs/labels.md"),
-    Output("label_face_synthetics", "label", "I", np.uint8, "", "the same in the classes of FaceSynthetics"),
+    Output("label", "label", "I", "uint8", "", "class of what is seen, see docs/labels.md"),
+    Output("label_face_synthetics", "label", "I", "uint8", "", "the same in the classes of FaceSynthetics"),
 )
 
 OUTPUTS: Registry[Output] = Registry("output", {one.name: one for one in (*_GEOMETRY, *_LIGHT, *_LABELS)})

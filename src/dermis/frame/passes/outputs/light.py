@@ -1,4 +1,4 @@
-"""Outputs of light: albedo, irradiance, what leaves below the surface and off it, and how much of each light arrives."""
+"""Outputs of light: albedo, irradiance, what leaves below the surface and off it, shares of lights."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MOST_LIGHTS = 64  # as in visibility.wgsl
 
 @dataclass(frozen=True, eq=False)
 class LightSpace:
-    """What outputs of light, and of what is below the skin, take besides their planes; nothing that is not asked.
+    """What outputs of light and of the skin take besides their planes; nothing that is not asked.
 
     parts : how many lights each light is shaded as
     apart : what the technique keeps apart to spread it over the picture

@@ -24,7 +24,7 @@ struct Reach {
 // Squares of how far places beside the inward normal count: of a part of their depth, and of a part of the spacing.
 const CONE: f32 = 0.05;
 const GRAIN: f32 = 0.4;
-const BEYOND: f32 = 0.11; // of the radius' square: what lies deeper than pairs reach counts like a cell so far aside
+const BEYOND: f32 = 1e-3; // how much what lies deeper than pairs reach counts, where a wall below counts about 1
 const FADES: f32 = 0.7; // of the radius, from which places count less and less
 
 // Depth along the inward normal of the far side, and how much it counts: cells right below count most.
@@ -37,7 +37,7 @@ fn far_side(receiver: Receiver, source: Source) -> vec2f {
     let even = aside2 + grain;
     let within = 1.0 - rise(FADES, 1.0, sqrt(lie.square) / reach.radius_mm);
     let share = select(0.0, within * share_of(lie.cosine, lie.inward), depth > 0.0);
-    return vec2f(depth, share * source.area * near / (even * even * even));
+    return vec2f(depth, share * source.area * near * grain * grain / (even * even * even));
 }
 
 @compute @workgroup_size(EACH)
@@ -51,9 +51,8 @@ fn main(
         return;
     }
     let one = listed[index];
-    let square = BEYOND * reach.radius_mm * reach.radius_mm;
-    var total = reach.spacing2_mm2 / (square * square * square);
-    var sum = reach.radius_mm * total;
+    var total = BEYOND;
+    var sum = BEYOND * reach.radius_mm;
     for (var k = one.first; k < one.end; k++) {
         let found = far_side(receiver_points[pairs[3u * k + 1u]], source_points[pairs[3u * k]]);
         sum += found.x * found.y;
