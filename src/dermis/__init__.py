@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from dermis.batch.dataset import read_dataset
     from dermis.errors import DermisError
     from dermis.frame.renderer import Renderer, render
     from dermis.human.person import Human
@@ -76,6 +77,7 @@ _HOME = {
     "Pose": "scene.pose",
     "Settings": "scene.settings",
     "Skin": "scene.skin",
+    "read_dataset": "batch.dataset",
     "view": "viewer.windows",
 }
 
@@ -108,6 +110,7 @@ __all__ = [
     "load_tissue",
     "portrait",
     "profile",
+    "read_dataset",
     "render",
     "studio",
     "three_quarter",

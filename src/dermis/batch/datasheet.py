@@ -108,7 +108,7 @@ def _landmarks(spec: Spec) -> str:
 def _labels(spec: Spec) -> str:
     found = classes(spec)
     return "\n".join(
-        f"## Classes of {name}\n\n{_table(('level', 'class'), enumerate(names))}" for name, names in found.items()
+        f"## Classes of {name}\n\n{_table(('level', 'classes'), names.items())}" for name, names in found.items()
     )
 
 

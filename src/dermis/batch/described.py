@@ -7,6 +7,10 @@ from typing import Any
 from dermis.batch.encodings import file_kind, stored_as
 from dermis.batch.spec import Spec
 from dermis.frame.outputs import OUTPUTS
+from dermis.human.labels.classes import label_classes
+from dermis.tables import read_rows
+
+_LABELS = "label", "label_face_synthetics"
 
 
 def outputs_of(spec: Spec) -> dict[str, dict[str, Any]]:
@@ -23,6 +27,22 @@ def outputs_of(spec: Spec) -> dict[str, dict[str, Any]]:
         }
         for name in spec.outputs
     }
+
+
+def classes(spec: Spec) -> dict[str, dict[int, str]]:
+    """Names of the classes by level, of each output of the spec that holds labels."""
+    found: dict[str, dict[int, str]] = {}
+    for one in label_classes():
+        for output, level in zip(_LABELS, (one.number, one.face_synthetics), strict=True):
+            if output in spec.outputs:
+                named = found.setdefault(output, {})
+                named[level] = f"{named[level]}, {one.name}" if level in named else one.name
+    return {output: dict(sorted(named.items())) for output, named in found.items()}
+
+
+def landmark_names(name: str) -> list[str]:
+    """Of the points of a set, in their order."""
+    return [row["landmark"] for row in read_rows("dermis.human.landmarks", name)]
 
 
 def _levels(name: str, spec: Spec) -> tuple[float, int]:

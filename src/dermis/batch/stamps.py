@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import platform
 from dataclasses import asdict, dataclass, field
 from functools import cache
 from importlib.metadata import version
-from typing import Any
 
 from dermis.reading import parse_json, understood
 
@@ -36,8 +36,10 @@ class Stamp:
     made_with: dict[str, str] = field(default_factory=dict)
 
     def data(self) -> bytes:
-        """Its bytes."""
-        return (json.dumps(asdict(self), ensure_ascii=False, indent=1) + "\n").encode()
+        """Its bytes, the last of which are a hash of the others."""
+        told = asdict(self)
+        check = hashlib.sha256(json.dumps(told).encode()).hexdigest()
+        return (json.dumps({**told, "check": check}, indent=1) + "\n").encode()
 
 
 def read_stamp(data: bytes, culprit: object) -> Stamp:
@@ -56,7 +58,10 @@ def read_stamp(data: bytes, culprit: object) -> Stamp:
             isinstance(text, str) for text in texts
         ):
             raise ValueError("its values are of other kinds")
-        return Stamp(told["spec"], *whole, left_out, told["sha256"], dict(told["made_with"]))
+        found = Stamp(told["spec"], *whole, left_out, told["sha256"], dict(told["made_with"]))
+        if found.data() != data:
+            raise ValueError("its hash is that of another text")
+        return found
 
 
 @cache
@@ -65,6 +70,6 @@ def versions() -> dict[str, str]:
     return {"dermis": version("dermis"), "wgpu": version("wgpu"), "python": platform.python_version()}
 
 
-def made_with(adapter: str) -> dict[str, Any]:
+def made_with(adapter: str) -> dict[str, str]:
     """What a shard is made with."""
     return {"adapter": adapter, **versions()}

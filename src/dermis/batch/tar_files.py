@@ -87,10 +87,10 @@ def tar_stamp(file: BinaryIO) -> tuple[int, bytes]:
     if at < 0 or (start + at) % _BLOCK:
         raise ValueError("it is cut off")
     member = _member(tail[at : at + _BLOCK], start + at)
-    end = member.place + member.size + -member.size % _BLOCK
-    if member.name != NAME or tail[end - start :] != _END:
+    end = member.place - start + member.size
+    if member.name != NAME or tail[end:] != bytes(-member.size % _BLOCK) + _END:
         raise ValueError("it is cut off")
-    return start + at, tail[member.place - start :][: member.size]
+    return start + at, tail[member.place - start : end]
 
 
 def tar_sha256(file: BinaryIO, stop: int) -> str:
