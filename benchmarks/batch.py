@@ -109,10 +109,9 @@ def table(told: dict[str, Any]) -> list[str]:
         runs = told.get(name, [])
         for one in runs:
             ratio = one["images_per_s"] / runs[0]["images_per_s"]
-            lines.append(
-                f"{name:8}{one['workers']:3} workers on {one['adapters']} adapters, {one['encoders']} encoders each"
-                f"{one['images_per_s']:9.3g} images/s, {ratio:.2f} x the first, {one['bytes_per_image'] / 1e3:.0f} kB"
-            )
+            who = f"{one['workers']:3} workers on {one['adapters']} adapters, {one['encoders']} encoders each"
+            rate = f"{one['images_per_s']:9.3g} images/s, {ratio:.2f} x the first"
+            lines.append(f"{name:8}{who}{rate}, {one['bytes_per_image'] / 1e3:.0f} kB an image")
     if dask := told.get("dask"):
         lines.append(f"dask    {dask['workers']:3} workers: {dask['dask_over_plain']:.3f} x plain processes")
     if steps := told.get("steps"):

@@ -69,4 +69,8 @@ def drawn(spec: Spec, out: Path, workers: int = 1, encoders: int = 0, **more: ob
 
 def contents(out: Path) -> dict[str, bytes]:
     """All files of a data set by their names."""
-    return {path.relative_to(out).as_posix(): path.read_bytes() for path in sorted(out.rglob("*")) if path.is_file()}
+    return {
+        path.relative_to(out).as_posix(): path.read_bytes()
+        for path in sorted(out.rglob("*"))
+        if path.is_file()
+    }

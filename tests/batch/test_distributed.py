@@ -71,7 +71,7 @@ def test_a_disk_of_its_own_is_refused(tmp_path: Path) -> None:
     client = SimpleNamespace(run=lambda sees, mark: {"tcp://a": sees(mark), "tcp://b": False})
     with (
         module._mark(tmp_path) as mark,
-        pytest.raises(DermisError, match="a disk that all workers share.*tcp://b"),
+        pytest.raises(DermisError, match=r"a disk that all workers share.*tcp://b"),
     ):
         module._check_disks(client, mark)
     assert list(tmp_path.iterdir()) == []
@@ -81,7 +81,7 @@ def test_a_scheduler_that_is_not_there_is_told(
     small_spec: Spec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "_WAIT_S", 0.5)
-    with pytest.raises(DermisError, match="a scheduler of dask.distributed"):
+    with pytest.raises(DermisError, match=r"a scheduler of dask\.distributed"):
         run(Work(small_spec, tmp_path), Cluster("tcp://127.0.0.1:9", None))
     with pytest.raises(DermisError, match=r"cluster\.json: expected the file that dask's scheduler wrote"):
         run(Work(small_spec, tmp_path), Cluster(None, tmp_path / "cluster.json"))

@@ -32,7 +32,9 @@ def test_order_and_bytes_are_those_of_no_process_at_all() -> None:
     numbers = range(9)
     with Encoders(0, encode) as here, Encoders(2, encode) as there:
         expected, found = list(here.encoded(jobs(*numbers))), list(there.encoded(jobs(*numbers)))
-    assert [(number, one["raw"]) for number, one in found] == [(number, one["raw"]) for number, one in expected]
+    assert [(number, one["raw"]) for number, one in found] == [
+        (number, one["raw"]) for number, one in expected
+    ]
     pids = {one["pid"] for _, one in found}
     assert str(os.getpid()).encode() not in pids and len(pids) >= 2
 

@@ -44,7 +44,9 @@ def test_two_workers_that_have_encoders_write_the_same(
     small_spec: Spec, undisturbed: Files, tmp_path: Path
 ) -> None:
     told: list[tuple[int, int]] = []
-    report = drawn(small_spec, tmp_path / "out", 2, 1, told=lambda now: told.append((now.images, now.to_draw)))
+    report = drawn(
+        small_spec, tmp_path / "out", 2, 1, told=lambda now: told.append((now.images, now.to_draw))
+    )
     assert contents(tmp_path / "out") == undisturbed
     assert (report.images, report.shards, report.skipped) == (COUNT, SHARDS, 0)
     assert told[-1] == (COUNT, COUNT)

@@ -37,7 +37,9 @@ def test_a_set_is_drawn_and_reported(run: Run, spec: Path) -> None:
 
 def test_a_part_says_that_others_are_missing(run: Run, spec: Path) -> None:
     last = COUNT // SHARD_SIZE - 1
-    ended = run("batch", spec, "-o", "out", "--shard", f"{last}/{last + 1}", "--adapter", "cpu", "--workers", 1)
+    ended = run(
+        "batch", spec, "-o", "out", "--shard", f"{last}/{last + 1}", "--adapter", "cpu", "--workers", 1
+    )
     assert ended.code == 0 and "1 shards" in ended.stdout and "missing still" in ended.stdout
     assert [path.name for path in Path("out").glob("shard-*")] == [f"shard-{last:05d}.tar"]
 

@@ -132,6 +132,7 @@ def _serve(pipe: Any, memory: Any, encode: Callable[..., Encoded]) -> None:
         except EOFError:
             return
         job = pickle.loads(head, buffers=arrays)
+        answer: tuple[Encoded | None, str]
         try:
             answer = encode(*job), ""
         except DermisError as fault:

@@ -120,9 +120,7 @@ class Worker:
                     alone = [deque([plan.number]) for plan in sent]
                 groups.extendleft(reversed([*alone, numbers]))
 
-    def _plans(
-        self, numbers: deque[int], sent: deque[_Plan], failed: list[Failure]
-    ) -> Iterator[_Plan]:
+    def _plans(self, numbers: deque[int], sent: deque[_Plan], failed: list[Failure]) -> Iterator[_Plan]:
         """Take numbers, and note what is sent to be drawn."""
         while numbers:
             number = numbers.popleft()

@@ -15,7 +15,6 @@ from dermis.errors import refuse
 
 if TYPE_CHECKING:
     from dermis.batch.run import Crew, Report
-    from dermis.batch.seats import Seating
     from dermis.batch.spec import Spec
 
 _MOST_PROCESSES = 1024
@@ -88,7 +87,7 @@ def batch(
     scheduler:
         Address of dask's scheduler, such as tcp://head:8786: each of its workers draws on a GPU of its own.
     cluster:
-        The file that dask's scheduler wrote (`dask scheduler --scheduler-file FILE`), in place of its address.
+        The file that dask's scheduler wrote (dask scheduler --scheduler-file FILE), for its address.
     keep_going:
         Leave out images that cannot be made, and list them.
     dry_run:
@@ -190,7 +189,9 @@ def _drawn(
     from dermis.batch.worker import Work
 
     with rate_of_images() as told:
-        return run(Work(spec, out, encoders or 0, keep_going), crew, part, lambda now: told(now.images, now.to_draw))
+        return run(
+            Work(spec, out, encoders or 0, keep_going), crew, part, lambda now: told(now.images, now.to_draw)
+        )
 
 
 def _tell(report: Report, out: Path, as_json: bool) -> None:

@@ -40,7 +40,7 @@ Json = Annotated[
 Adapter = Annotated[
     str,
     Parameter(
-        help="auto (the best), cpu (software), a part of an adapter's name, or its number in `dermis doctor`, as #1."
+        help="auto (the best), cpu (software), a part of an adapter's name, or its number as #1 (see doctor)."
     ),
 ]
 Output = Annotated[Path | None, Parameter(name=("--output", "-o"))]

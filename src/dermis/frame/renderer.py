@@ -201,8 +201,8 @@ class Renderer(Submitter):
         """
         if settings is None or isinstance(settings, Settings | Mapping):
             settings = repeat(given_plain(Settings, settings or {}, "settings", "size=(512, 512)"))
-        given = {"outputs": asked_outputs(outputs), "landmarks": asked_landmarks(landmarks)}
-        send = partial(self._send, linear=linear, alpha=alpha, **given)
+        asked = asked_outputs(outputs), asked_landmarks(landmarks)
+        send = partial(self._send, linear=linear, alpha=alpha, outputs=asked[0], landmarks=asked[1])
         frames = observed_frames(send, scenes, previous, settings)
         return arriving(self.kept_open, lambda: self.device, frames)
 
