@@ -65,6 +65,12 @@ def test_commands_are_understood(page: Path) -> None:
     assert refused == []
 
 
+def test_the_readme_lists_every_command() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^\| `dermis (\w+)", text, re.MULTILINE)
+    assert set(listed) == set(COMMANDS)
+
+
 def test_an_option_that_is_none_would_be_found() -> None:
     with pytest.raises(Exception, match="frobnicate"):
         app().parse_args(["render", "--frobnicate"], exit_on_error=False, print_error=False)
