@@ -56,6 +56,7 @@ REFUSED = {
     "counts = 1": "spec: counts: expected count",
     "folder = '/'": "folder: expected no such key",
     "outputs = ['smell']": "output: expected one of depth",
+    "landmarks = ['dlib']": "landmarks: expected some of ibug-68",
     "format = 'zip'": "spec: format",
     "[[correlated]]\nof = ['camera.yaw_deg', 'x']\ncorrelation = 0.5": "correlated: of: .*'x' is none",
     "[[correlated]]\nof = ['camera.yaw_deg']\ncorrelation = 0.5": "correlated: .*2 to 50 names",
