@@ -195,14 +195,14 @@ class Renderer(Submitter):
         alpha, linear : as of `render_many`
         previous : the scene before the first, as motion is counted from one to the next of the same head; or
             those before each
-        landmarks : names of sets (`dermis.human.landmarks.points.SETS`), or files of rows name,vertex
+        landmarks : names of sets (`dermis.human.landmarks.sets.SETS`), or files of rows name,vertex
 
         Raises DermisError as `draw` does.
         """
         if settings is None or isinstance(settings, Settings | Mapping):
             settings = repeat(given_plain(Settings, settings or {}, "settings", "size=(512, 512)"))
-        asked = asked_outputs(outputs), asked_landmarks(landmarks)
-        send = partial(self._send, linear=linear, alpha=alpha, outputs=asked[0], landmarks=asked[1])
+        asked = partial(self._send, outputs=asked_outputs(outputs), landmarks=asked_landmarks(landmarks))
+        send = partial(asked, linear=linear, alpha=alpha)
         frames = observed_frames(send, scenes, previous, settings)
         return arriving(self.kept_open, lambda: self.device, frames)
 
