@@ -80,7 +80,9 @@ def test_whole_shards_are_known(tmp_path: Path, spec: Spec) -> None:
     first, *_, last = shards_of(spec)
     assert not is_there(tmp_path, first, spec) and not is_whole(tmp_path, first, spec)
     write_all(tmp_path, spec)
-    assert all(is_whole(tmp_path, shard, spec) and is_there(tmp_path, shard, spec) for shard in shards_of(spec))
+    assert all(
+        is_whole(tmp_path, shard, spec) and is_there(tmp_path, shard, spec) for shard in shards_of(spec)
+    )
     stamp = stamp_of(shard_path(tmp_path, last, spec))
     assert (stamp.spec, stamp.first, stamp.stop) == (spec.digest(), 6, 7)
     assert stamp.made_with["adapter"] == "an adapter" and stamp.made_with["wgpu"]
@@ -152,7 +154,10 @@ def test_what_killed_runs_left_is_removed_but_that_of_others_stays(tmp_path: Pat
     assert sum(path.name.startswith(".shard-00001") for path in tmp_path.iterdir()) == 1
     assert len(list(tmp_path.iterdir())) == 3
     remove_leftovers(tmp_path)
-    assert {path.name for path in tmp_path.iterdir()} == {".mine", shard_path(tmp_path, shards_of(spec)[2], spec).name}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        ".mine",
+        shard_path(tmp_path, shards_of(spec)[2], spec).name,
+    }
 
 
 def test_nothing_is_left_of_a_shard_that_fails(tmp_path: Path, spec: Spec) -> None:
@@ -160,9 +165,15 @@ def test_nothing_is_left_of_a_shard_that_fails(tmp_path: Path, spec: Spec) -> No
     with pytest.raises(KeyboardInterrupt), ShardWriter(tmp_path, shard, spec) as writer:
         writer.add(0, {"json": b"{}"})
         raise KeyboardInterrupt
-    with pytest.raises(ValueError, match="1 images and 0 left out"), ShardWriter(tmp_path, shard, spec) as writer:
+    with (
+        pytest.raises(ValueError, match="1 images and 0 left out"),
+        ShardWriter(tmp_path, shard, spec) as writer,
+    ):
         writer.add(0, {"json": b"{}"})
-    with pytest.raises(ValueError, match="image 0 comes after 0"), ShardWriter(tmp_path, shard, spec) as writer:
+    with (
+        pytest.raises(ValueError, match="image 0 comes after 0"),
+        ShardWriter(tmp_path, shard, spec) as writer,
+    ):
         writer.add(0, {"json": b"{}"})
         writer.add(0, {"json": b"{}"})
     assert list(tmp_path.iterdir()) == []

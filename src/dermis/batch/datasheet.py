@@ -43,7 +43,7 @@ def _description(spec: Spec) -> dict[str, Any]:
         "size": list(spec.size),
         "outputs": outputs_of(spec),
         "labels": classes(spec),
-        "landmarks": {name: landmark_names(name) for name in spec.landmarks},
+        "landmarks": {name: landmark_names(name, spec) for name in spec.landmarks},
     }
 
 
@@ -73,12 +73,17 @@ def _readme(spec: Spec, stamps: Sequence[Stamp], drawn: Rows) -> str:
     ]
     if left_out:
         listed = left_out[:_MOST_LISTED]
-        parts += [f"## Left out\n\n{len(left_out):,} images could not be made.\n", _table(("image", "why"), listed)]
+        parts += [
+            f"## Left out\n\n{len(left_out):,} images could not be made.\n",
+            _table(("image", "why"), listed),
+        ]
     return "\n".join(parts)
 
 
 def _files(spec: Spec) -> str:
-    rows: list[Sequence[object]] = [("png", "picture, sRGB" + (", with alpha" if _has_alpha(spec) else ""), "", "8-bit PNG", "")]
+    rows: list[Sequence[object]] = [
+        ("png", "picture, sRGB" + (", with alpha" if _has_alpha(spec) else ""), "", "8-bit PNG", "")
+    ]
     rows += [
         (f"{name}.{one['file']}", one["description"], one["unit"], one["stored"], f"{one['background']:g}")
         for name, one in outputs_of(spec).items()
@@ -99,7 +104,7 @@ def _has_alpha(spec: Spec) -> bool:
 def _landmarks(spec: Spec) -> str:
     if not spec.landmarks:
         return ""
-    rows = [(name, len(landmark_names(name))) for name in spec.landmarks]
+    rows = [(name, len(landmark_names(name, spec))) for name in spec.landmarks]
     return "## Landmarks\n\nTheir names stand in `dataset.json`, in the order of the records.\n\n" + _table(
         ("set", "points"), rows
     )
@@ -108,13 +113,17 @@ def _landmarks(spec: Spec) -> str:
 def _labels(spec: Spec) -> str:
     found = classes(spec)
     return "\n".join(
-        f"## Classes of {name}\n\n{_table(('level', 'classes'), names.items())}" for name, names in found.items()
+        f"## Classes of {name}\n\n{_table(('level', 'classes'), names.items())}"
+        for name, names in found.items()
     )
 
 
 def _made_with(stamps: Sequence[Stamp]) -> str:
     counted = Counter(tuple(sorted(stamp.made_with.items())) for stamp in stamps)
-    rows = [(count, ", ".join(f"{name} {value}" for name, value in made)) for made, count in sorted(counted.items())]
+    rows = [
+        (count, ", ".join(f"{name} {value}" for name, value in made))
+        for made, count in sorted(counted.items())
+    ]
     return _table(("shards", "by"), rows)
 
 

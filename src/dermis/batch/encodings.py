@@ -116,7 +116,7 @@ def _decode_npy(data: bytes) -> Array:
         raise ValueError("its first bytes are not those of an array of NumPy's")
     file = io.BytesIO(data[len(_NPY) :])
     shape, fortran, kind = np.lib.format.read_array_header_1_0(file)
-    if len(shape) not in (2, 3) or fortran or kind.kind not in "fiu" :
+    if len(shape) not in (2, 3) or fortran or kind.kind not in "fiu":
         raise ValueError(f"it holds {kind} of shape {shape}, which is no picture")
     check_size(shape[1], shape[0])  # of no lights there are no channels
     stored = np.frombuffer(file.read(), kind)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from dermis.batch.encodings import EFFORT, encode_output, file_kind
 from dermis.batch.spec import Spec
-from dermis.frame.observation import Observation
+from dermis.frame.observation import Landmarks, Observation
 from dermis.images.codecs import encode_png
 
 PICTURE, RECORD = "png", "json"
@@ -41,7 +41,7 @@ def entries(
 
 
 def _record(number: int, observation: Observation, parameters: Mapping[str, Any]) -> dict[str, Any]:
-    camera, pose, gaze = observation.camera, observation.head_pose, observation.gaze
+    camera, gaze = observation.camera, observation.gaze
     return {
         "number": number,
         "parameters": dict(parameters),
@@ -50,13 +50,13 @@ def _record(number: int, observation: Observation, parameters: Mapping[str, Any]
             "R": _rounded(camera.R, _UNIT_DIGITS),
             "t": _rounded(camera.t, _MM_DIGITS),
         },
-        "head_pose": None if pose is None else _rounded(pose, _UNIT_DIGITS),
+        "head_pose": _rounded(observation.head_pose, _UNIT_DIGITS),
         "gaze": None if gaze is None else _rounded(gaze, _UNIT_DIGITS),
         "landmarks": {name: _landmarks(one) for name, one in observation.landmarks.items()},
     }
 
 
-def _landmarks(found: Any) -> dict[str, Any]:
+def _landmarks(found: Landmarks) -> dict[str, Any]:
     return {
         "pixels": _rounded(found.pixels, _PIXEL_DIGITS),
         "positions_mm": _rounded(found.positions_mm, _MM_DIGITS),
