@@ -96,7 +96,7 @@ def test_a_folder_without_shards_and_shards_that_are_none_are_refused(tmp_path: 
         dermis.read_dataset(tmp_path)
     with pytest.raises(DermisError, match="the folder of a data set, but it cannot be read"):
         dermis.read_dataset(tmp_path / "none")
-    with pytest.raises(DermisError, match="numbers of the 3 shards in .* but 3 came"):
+    with pytest.raises(DermisError, match=r"numbers of the 3 shards in .* but 3 came"):
         dermis.read_dataset(written, shards=[3])
     with pytest.raises(DermisError, match="a data set, but a NoneType came"):
         dermis.read_dataset(None)  # type: ignore[arg-type]
@@ -175,7 +175,7 @@ def test_links_and_folders_in_a_tar_are_refused(tmp_path: Path) -> None:
         link = tarfile.TarInfo("000000000.png")
         link.type, link.linkname = tarfile.SYMTYPE, "/etc/passwd"
         shard.addfile(link)
-    with pytest.raises(DermisError, match="'000000000.png', which is no regular file"):
+    with pytest.raises(DermisError, match=r"'000000000\.png', which is no regular file"):
         list(dermis.read_dataset(tmp_path))
 
 

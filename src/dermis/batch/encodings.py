@@ -32,7 +32,7 @@ def file_kind(name: str, encoding: Encoding) -> str:
     output = OUTPUTS[name]
     if encoding == "npy" or not output.channels:
         return "npy"
-    fits = output.levels is not None or output.kind is np.uint8
+    fits = output.levels is not None or output.kind == "uint8"
     return "png" if fits and encoding == "png" else "exr"
 
 
@@ -106,7 +106,7 @@ def decode_png(data: bytes) -> Array:
 
 def _stored_kind(output: Output, encoding: Encoding) -> np.dtype[Any]:
     """Of its numbers in a file, little-endian on every machine."""
-    half = encoding == "png" and output.kind is np.float32 and output.levels is None
+    half = encoding == "png" and output.kind == "float32" and output.levels is None
     return np.dtype(np.float16 if half else output.kind).newbyteorder("<")
 
 

@@ -67,9 +67,9 @@ def _landmarks(found: Landmarks) -> dict[str, Any]:
 def _rounded(values: ArrayLike, digits: int) -> Any:
     """Numbers as lists, null for those that are not finite; -0 is 0."""
     numbers = np.round(np.asarray(values, np.float64), digits) + 0.0
-    if np.isfinite(numbers).all():
-        return numbers.tolist()
-    return np.where(np.isfinite(numbers), numbers, None).tolist()
+    told = numbers.astype(object)
+    told[~np.isfinite(numbers)] = None
+    return told.tolist()
 
 
 def _json(value: Mapping[str, Any]) -> bytes:

@@ -42,7 +42,7 @@ def decoded(files: Mapping[str, Any], culprit: object = "") -> dict[str, Any]:
     number, parameters : which image of the data set it is, and all that was drawn for it, by name
     picture : (h, w, 3 or 4) sRGB bytes
     camera : K, R and t as OpenCV has them
-    head_pose, gaze : (3, 4) and (2, 3), as of `Observation`; gaze is None for heads without eyes of true shape
+    head_pose, gaze : (3, 4) and (2, 3), as of `Observation`; gaze may be None
     landmarks : `Points` by the name of their set
     depth, normal, ... : the outputs of the data set, float32 or integers
 
