@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from dermis.batch.entries import entries
 from dermis.batch.shards import Shard, ShardWriter, shards_of
 from dermis.batch.spec import Spec, spec_of
+from dermis.frame.observation import Landmarks, Observation
 from dermis.frame.outputs import OUTPUTS
 from dermis.scene.opencv import OpenCvCamera
 
@@ -24,18 +24,18 @@ def small_spec(**values: Any) -> Spec:
     return spec_of({**told, **values})
 
 
-def observation(number: int, alpha: bool = False, outputs: tuple[str, ...] = OUTPUT_NAMES) -> Any:
+def observation(number: int, alpha: bool = False, outputs: tuple[str, ...] = OUTPUT_NAMES) -> Observation:
     """Values as outputs can have them, by the image's number."""
     rng = np.random.default_rng(number)
     width, height = SIZE
     camera = OpenCvCamera(np.diag([500.0, 500.0, 1.0]), np.eye(3), np.array([0.0, 1.0, 600.0 + number]))
-    points = SimpleNamespace(
+    points = Landmarks(
         names=("left", "right"),
-        positions_mm=rng.normal(0, 50, (2, 3)),
+        positions_mm=rng.normal(0, 50, (2, 3)).astype(np.float32),
         pixels=rng.uniform(0, 16, (2, 2)),
         visible=np.array([True, False]),
     )
-    return SimpleNamespace(
+    return Observation(
         picture=rng.integers(0, 256, (height, width, 4 if alpha else 3), np.uint8),
         outputs={name: _values(name, rng) for name in outputs},
         camera=camera,
@@ -52,7 +52,7 @@ def _values(name: str, rng: np.random.Generator) -> Any:
     if np.dtype(output.kind).kind in "iu":
         return rng.integers(0, 200, shape).astype(output.kind)
     if name == "depth":
-        return rng.uniform(400, 900, shape).astype(np.float32) * rng.integers(0, 2, shape)
+        return (rng.uniform(400, 900, shape) * rng.integers(0, 2, shape)).astype(np.float32)
     if name.startswith("normal"):
         found = rng.normal(size=shape)
         found /= np.linalg.norm(found, axis=-1, keepdims=True)

@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 import tarfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,12 @@ import pytest
 from observed import OUTPUT_NAMES, observation, small_spec, write_all
 
 import dermis
+from dermis.batch.encodings import encode_output
+from dermis.batch.entries import entries
 from dermis.batch.samples import decoded
 from dermis.errors import DermisError
 from dermis.extras import needed
+from dermis.frame.observation import Landmarks
 
 EXACT = tuple(small_spec(encoding="exr").outputs)
 
@@ -62,7 +66,7 @@ def test_neither_pyarrow_nor_webdataset_is_needed_to_read(written: Path) -> None
     subprocess.run([sys.executable, "-W", "error", "-c", code], check=True)
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_webdataset_reads_the_shards(tmp_path: Path) -> None:
     """As the documentation has it."""
     spec = small_spec()
@@ -76,7 +80,7 @@ def test_webdataset_reads_the_shards(tmp_path: Path) -> None:
         np.testing.assert_array_equal(one["picture"], ours["picture"])
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_webdataset_decodes_pictures_and_records_itself(tmp_path: Path) -> None:
     spec = small_spec(outputs=("depth",))
     write_all(tmp_path, spec)
@@ -92,7 +96,7 @@ def test_a_folder_without_shards_and_shards_that_are_none_are_refused(tmp_path: 
         dermis.read_dataset(tmp_path)
     with pytest.raises(DermisError, match="the folder of a data set, but it cannot be read"):
         dermis.read_dataset(tmp_path / "none")
-    with pytest.raises(DermisError, match="numbers of the 3 shards in .* but 3 came"):
+    with pytest.raises(DermisError, match=r"numbers of the 3 shards in .* but 3 came"):
         dermis.read_dataset(written, shards=[3])
     with pytest.raises(DermisError, match="a data set, but a NoneType came"):
         dermis.read_dataset(None)  # type: ignore[arg-type]
@@ -157,10 +161,12 @@ def test_records_and_sizes_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     refused("texts for numbers", head_pose=[["1"] * 4] * 3)
     refused("true and false", landmarks={"a": {"pixels": [], "positions_mm": [], "visible": [1]}})
     refused("cannot be understood", gaze=[[0, 0, 1], [0, 1]])
-    small = dermis.batch.encodings.encode_output("depth", np.ones((3, 4), np.float32), "png")  # type: ignore[attr-defined]
+    small = encode_output("depth", np.ones((3, 4), np.float32), "png")
     repacked(path, replaced("000000000.json", json.dumps(record).encode()))
     repacked(path, replaced("000000000.depth.png", small))
-    with pytest.raises(DermisError, match=r"outputs of the picture's size, but \.depth\.png has 4 x 3 pixels"):
+    with pytest.raises(
+        DermisError, match=r"outputs of the picture's size, but \.depth\.png has 4 x 3 pixels"
+    ):
         list(dermis.read_dataset(tmp_path))
 
 
@@ -169,16 +175,13 @@ def test_links_and_folders_in_a_tar_are_refused(tmp_path: Path) -> None:
         link = tarfile.TarInfo("000000000.png")
         link.type, link.linkname = tarfile.SYMTYPE, "/etc/passwd"
         shard.addfile(link)
-    with pytest.raises(DermisError, match="'000000000.png', which is no regular file"):
+    with pytest.raises(DermisError, match=r"'000000000\.png', which is no regular file"):
         list(dermis.read_dataset(tmp_path))
 
 
 def test_no_landmarks_of_a_set_are_read_too() -> None:
     seen = observation(0)
-    points = seen.landmarks["ibug-68"]
-    points.pixels, points.positions_mm, points.visible = (np.empty((0, n)) for n in (2, 3, 0))
-    from dermis.batch.entries import entries
-
-    spec = small_spec()
+    none = Landmarks((), np.empty((0, 3), np.float32), np.empty((0, 2)), np.empty(0, bool))
+    spec, seen = small_spec(), replace(seen, landmarks={"ibug-68": none})
     found = decoded(entries(0, seen, spec.parameters(0), spec))["landmarks"]["ibug-68"]
     assert found.pixels.shape == (0, 2) and found.positions_mm.shape == (0, 3) and found.visible.shape == (0,)

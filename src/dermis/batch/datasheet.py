@@ -18,6 +18,23 @@ from dermis.batch.statistics import statistics
 
 README, DESCRIPTION = "README.md", "dataset.json"
 _MOST_LISTED = 50
+_TITLE = """# Images of faces with ground truth
+
+Drawn by dermis. `dermis batch spec.toml -o FOLDER` draws all of it again: with the same versions the same to
+the bit on the same kind of adapter.
+"""
+_DRAWN = """## What was drawn
+
+`spec.toml` says from which distributions, `index.parquet` what for each image.
+"""
+_FILES = """## Files of each image
+
+Named by the image's number, as in 000000012.png. Outputs are those of each pixel's middle, not filtered.
+Cameras are OpenCV's, K (R X + t): x to the right, y down, z forward, and the middle of the first pixel is (0, 0).
+Places are in mm from the head's centre, and `head_pose` goes from the head at rest to the camera. In Python,
+`dermis.read_dataset(FOLDER)` reads all of it.
+
+"""
 
 Rows = Iterable[Sequence[object]]
 
@@ -25,7 +42,8 @@ Rows = Iterable[Sequence[object]]
 def write_datasheet(out: Path, spec: Spec) -> None:
     """Write what the data set in a folder says of itself, by its spec, its index and its shards.
 
-    The same shards give the same bytes. Raises DermisError where the index is missing or nothing can be written.
+    The same shards give the same bytes. Raises DermisError where the index is missing, and where nothing can
+    be written.
     """
     there = [shard for shard in shards_of(spec) if is_there(out, shard, spec)]
     stamps = [stamp_of(shard_path(out, shard, spec)) for shard in there]
@@ -43,7 +61,7 @@ def _description(spec: Spec) -> dict[str, Any]:
         "size": list(spec.size),
         "outputs": outputs_of(spec),
         "labels": classes(spec),
-        "landmarks": {name: landmark_names(name) for name in spec.landmarks},
+        "landmarks": {name: landmark_names(name, spec) for name in spec.landmarks},
     }
 
 
@@ -58,13 +76,12 @@ def _readme(spec: Spec, stamps: Sequence[Stamp], drawn: Rows) -> str:
         ("SHA-256 of the spec", f"`{spec.digest()}`"),
     ]
     parts = [
-        "# Images of faces with ground truth\n\nDrawn by dermis. All of it is drawn again, the same to the bit on the same"
-        " kind of adapter with the same\nversions, by `dermis batch spec.toml -o FOLDER`.\n",
+        _TITLE,
         _table(("", ""), faces),
         _files(spec),
         _landmarks(spec),
         _labels(spec),
-        "## What was drawn\n\n`spec.toml` says from which distributions, `index.parquet` what for each image.\n",
+        _DRAWN,
         _table(("parameter", "images", "values"), drawn),
         "## Licences\n",
         _table(("part", "by", "licence"), licences(spec)),
@@ -73,23 +90,23 @@ def _readme(spec: Spec, stamps: Sequence[Stamp], drawn: Rows) -> str:
     ]
     if left_out:
         listed = left_out[:_MOST_LISTED]
-        parts += [f"## Left out\n\n{len(left_out):,} images could not be made.\n", _table(("image", "why"), listed)]
+        parts += [
+            f"## Left out\n\n{len(left_out):,} images could not be made.\n",
+            _table(("image", "why"), listed),
+        ]
     return "\n".join(parts)
 
 
 def _files(spec: Spec) -> str:
-    rows: list[Sequence[object]] = [("png", "picture, sRGB" + (", with alpha" if _has_alpha(spec) else ""), "", "8-bit PNG", "")]
+    rows: list[Sequence[object]] = [
+        ("png", "picture, sRGB" + (", with alpha" if _has_alpha(spec) else ""), "", "8-bit PNG", "")
+    ]
     rows += [
         (f"{name}.{one['file']}", one["description"], one["unit"], one["stored"], f"{one['background']:g}")
         for name, one in outputs_of(spec).items()
     ]
     rows.append(("json", "parameters, camera, head_pose, gaze, landmarks", "", "", ""))
-    heading = (
-        "## Files of each image\n\nNamed by the image's number, as 000000012.png. Outputs are those of each pixel's middle, not"
-        " filtered. Cameras are\nOpenCV's: K (R X + t), x to the right, y down, z forward; places are in mm from the head's"
-        " centre, and the middle of the\nfirst pixel is (0, 0). `dermis.read_dataset(FOLDER)` reads all of it.\n"
-    )
-    return heading + "\n" + _table(("file", "content", "unit", "stored as", "where nothing is seen"), rows)
+    return _FILES + _table(("file", "content", "unit", "stored as", "where nothing is seen"), rows)
 
 
 def _has_alpha(spec: Spec) -> bool:
@@ -99,7 +116,7 @@ def _has_alpha(spec: Spec) -> bool:
 def _landmarks(spec: Spec) -> str:
     if not spec.landmarks:
         return ""
-    rows = [(name, len(landmark_names(name))) for name in spec.landmarks]
+    rows = [(name, len(landmark_names(name, spec))) for name in spec.landmarks]
     return "## Landmarks\n\nTheir names stand in `dataset.json`, in the order of the records.\n\n" + _table(
         ("set", "points"), rows
     )
@@ -108,13 +125,17 @@ def _landmarks(spec: Spec) -> str:
 def _labels(spec: Spec) -> str:
     found = classes(spec)
     return "\n".join(
-        f"## Classes of {name}\n\n{_table(('level', 'classes'), names.items())}" for name, names in found.items()
+        f"## Classes of {name}\n\n{_table(('level', 'classes'), names.items())}"
+        for name, names in found.items()
     )
 
 
 def _made_with(stamps: Sequence[Stamp]) -> str:
     counted = Counter(tuple(sorted(stamp.made_with.items())) for stamp in stamps)
-    rows = [(count, ", ".join(f"{name} {value}" for name, value in made)) for made, count in sorted(counted.items())]
+    rows = [
+        (count, ", ".join(f"{name} {value}" for name, value in made))
+        for made, count in sorted(counted.items())
+    ]
     return _table(("shards", "by"), rows)
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import csv
 from typing import Any
 
 from dermis.batch.encodings import file_kind, stored_as
 from dermis.batch.spec import Spec
 from dermis.frame.outputs import OUTPUTS
 from dermis.human.labels.classes import label_classes
-from dermis.tables import read_rows
+from dermis.human.landmarks.points import SETS
+from dermis.reading import read_text, understood
+from dermis.tables import parse_rows, read_rows
 
 _LABELS = "label", "label_face_synthetics"
 
@@ -40,9 +43,13 @@ def classes(spec: Spec) -> dict[str, dict[int, str]]:
     return {output: dict(sorted(named.items())) for output, named in found.items()}
 
 
-def landmark_names(name: str) -> list[str]:
-    """Of the points of a set, in their order."""
-    return [row["landmark"] for row in read_rows("dermis.human.landmarks", name)]
+def landmark_names(name: str, spec: Spec) -> list[str]:
+    """Of the points of a set, or of a table that the spec names, in their order."""
+    if name in SETS:
+        return [row["landmark"] for row in read_rows("dermis.human.landmarks", name)]
+    text = read_text(spec.folder / name, "a table of landmarks")
+    with understood(name, "a table of landmarks", KeyError, csv.Error):
+        return [row["name"] for row in parse_rows(text)]
 
 
 def _levels(name: str, spec: Spec) -> tuple[float, int]:

@@ -32,7 +32,7 @@ def file_kind(name: str, encoding: Encoding) -> str:
     output = OUTPUTS[name]
     if encoding == "npy" or not output.channels:
         return "npy"
-    fits = output.levels is not None or output.kind is np.uint8
+    fits = output.levels is not None or output.kind == "uint8"
     return "png" if fits and encoding == "png" else "exr"
 
 
@@ -106,7 +106,7 @@ def decode_png(data: bytes) -> Array:
 
 def _stored_kind(output: Output, encoding: Encoding) -> np.dtype[Any]:
     """Of its numbers in a file, little-endian on every machine."""
-    half = encoding == "png" and output.kind is np.float32 and output.levels is None
+    half = encoding == "png" and output.kind == "float32" and output.levels is None
     return np.dtype(np.float16 if half else output.kind).newbyteorder("<")
 
 
@@ -116,7 +116,7 @@ def _decode_npy(data: bytes) -> Array:
         raise ValueError("its first bytes are not those of an array of NumPy's")
     file = io.BytesIO(data[len(_NPY) :])
     shape, fortran, kind = np.lib.format.read_array_header_1_0(file)
-    if len(shape) not in (2, 3) or fortran or kind.kind not in "fiu" :
+    if len(shape) not in (2, 3) or fortran or kind.kind not in "fiu":
         raise ValueError(f"it holds {kind} of shape {shape}, which is no picture")
     check_size(shape[1], shape[0])  # of no lights there are no channels
     stored = np.frombuffer(file.read(), kind)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from dermis.batch.encodings import EFFORT, encode_output, file_kind
 from dermis.batch.spec import Spec
-from dermis.frame.observation import Observation
+from dermis.frame.observation import Landmarks, Observation
 from dermis.images.codecs import encode_png
 
 PICTURE, RECORD = "png", "json"
@@ -41,7 +41,7 @@ def entries(
 
 
 def _record(number: int, observation: Observation, parameters: Mapping[str, Any]) -> dict[str, Any]:
-    camera, pose, gaze = observation.camera, observation.head_pose, observation.gaze
+    camera, gaze = observation.camera, observation.gaze
     return {
         "number": number,
         "parameters": dict(parameters),
@@ -50,13 +50,13 @@ def _record(number: int, observation: Observation, parameters: Mapping[str, Any]
             "R": _rounded(camera.R, _UNIT_DIGITS),
             "t": _rounded(camera.t, _MM_DIGITS),
         },
-        "head_pose": None if pose is None else _rounded(pose, _UNIT_DIGITS),
+        "head_pose": _rounded(observation.head_pose, _UNIT_DIGITS),
         "gaze": None if gaze is None else _rounded(gaze, _UNIT_DIGITS),
         "landmarks": {name: _landmarks(one) for name, one in observation.landmarks.items()},
     }
 
 
-def _landmarks(found: Any) -> dict[str, Any]:
+def _landmarks(found: Landmarks) -> dict[str, Any]:
     return {
         "pixels": _rounded(found.pixels, _PIXEL_DIGITS),
         "positions_mm": _rounded(found.positions_mm, _MM_DIGITS),
@@ -67,9 +67,9 @@ def _landmarks(found: Any) -> dict[str, Any]:
 def _rounded(values: ArrayLike, digits: int) -> Any:
     """Numbers as lists, null for those that are not finite; -0 is 0."""
     numbers = np.round(np.asarray(values, np.float64), digits) + 0.0
-    if np.isfinite(numbers).all():
-        return numbers.tolist()
-    return np.where(np.isfinite(numbers), numbers, None).tolist()
+    told = numbers.astype(object)
+    told[~np.isfinite(numbers)] = None
+    return told.tolist()
 
 
 def _json(value: Mapping[str, Any]) -> bytes:

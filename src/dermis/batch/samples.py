@@ -18,7 +18,6 @@ from dermis.scene.opencv import OpenCvCamera
 
 _OUTPUT_NAME = re.compile(r"([a-z0-9_]+)\.(png|exr|npy)")
 _KNOWN = frozenset(("number", "picture", "parameters", "camera", "head_pose", "gaze", "landmarks"))
-_SHAPES = {"head_pose": (3, 4), "gaze": (2, 3)}
 _PLAIN = int | float | str | bool | None
 
 
@@ -43,7 +42,7 @@ def decoded(files: Mapping[str, Any], culprit: object = "") -> dict[str, Any]:
     number, parameters : which image of the data set it is, and all that was drawn for it, by name
     picture : (h, w, 3 or 4) sRGB bytes
     camera : K, R and t as OpenCV has them
-    head_pose, gaze : (3, 4) and (2, 3) in the camera's axes, None where the head has none
+    head_pose, gaze : (3, 4) and (2, 3), as of `Observation`; gaze may be None
     landmarks : `Points` by the name of their set
     depth, normal, ... : the outputs of the data set, float32 or integers
 
@@ -86,8 +85,8 @@ def record_of(data: bytes, culprit: object) -> dict[str, Any]:
             if not all(isinstance(one, _PLAIN) for one in parts):
                 raise ValueError(f"{name[:60]!r} is neither a number nor a text")
         _camera(told["camera"])
-        for name in _SHAPES:
-            _pose(told, name)
+        _array(told["head_pose"], (3, 4))
+        _gaze(told["gaze"])
         return dict(told)
 
 
@@ -98,7 +97,8 @@ def _record(data: bytes, culprit: object) -> dict[str, Any]:
             "number": told["number"],
             "parameters": told["parameters"],
             "camera": _camera(told["camera"]),
-            **{name: _pose(told, name) for name in _SHAPES},
+            "head_pose": _array(told["head_pose"], (3, 4)),
+            "gaze": _gaze(told["gaze"]),
             "landmarks": {name: _points(one) for name, one in told["landmarks"].items()},
         }
 
@@ -107,8 +107,8 @@ def _camera(told: Mapping[str, Any]) -> OpenCvCamera:
     return OpenCvCamera(_array(told["K"], (3, 3)), _array(told["R"], (3, 3)), _array(told["t"], (3,)))
 
 
-def _pose(told: Mapping[str, Any], name: str) -> NDArray[np.float64] | None:
-    return None if told[name] is None else _array(told[name], _SHAPES[name])
+def _gaze(told: Any) -> NDArray[np.float64] | None:
+    return None if told is None else _array(told, (2, 3))
 
 
 def _points(told: Mapping[str, Any]) -> Points:

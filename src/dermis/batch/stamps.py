@@ -49,16 +49,16 @@ def read_stamp(data: bytes, culprit: object) -> Stamp:
     """
     told = parse_json(data, culprit, "what a whole shard says of itself")
     with understood(culprit, "what a whole shard says of itself", KeyError, TypeError, AttributeError):
-        whole = [told[name] for name in ("index", "first", "stop")]
+        index, first, stop = (told[name] for name in ("index", "first", "stop"))
         texts = [told["spec"], told["sha256"], *told["made_with"], *told["made_with"].values()]
         left_out = tuple((number, reason) for number, reason in told["left_out"])
-        numbers = [*whole, *(number for number, _ in left_out)]
+        numbers = [index, first, stop, *(number for number, _ in left_out)]
         texts += [reason for _, reason in left_out]
         if any(type(one) is not int or one < 0 for one in numbers) or not all(
             isinstance(text, str) for text in texts
         ):
             raise ValueError("its values are of other kinds")
-        found = Stamp(told["spec"], *whole, left_out, told["sha256"], dict(told["made_with"]))
+        found = Stamp(told["spec"], index, first, stop, left_out, told["sha256"], dict(told["made_with"]))
         if found.data() != data:
             raise ValueError("its hash is that of another text")
         return found

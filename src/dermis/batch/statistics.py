@@ -46,7 +46,9 @@ def _values(column: Any) -> str:
     if ends["min"] == ends["max"]:
         return _number(ends["min"])
     mean, spread = compute.mean(column).as_py(), compute.stddev(column).as_py()
-    return f"{_number(ends['min'])} to {_number(ends['max'])}, mean {mean:.4g}, standard deviation {spread:.4g}"
+    return (
+        f"{_number(ends['min'])} to {_number(ends['max'])}, mean {mean:.4g}, standard deviation {spread:.4g}"
+    )
 
 
 def _number(value: float) -> str:
