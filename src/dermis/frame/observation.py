@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
+from itertools import zip_longest
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.errors import refuse
 from dermis.frame.passes.pack import Leaving
 from dermis.gpu.memo import same
 from dermis.scene.head_pose import gaze, head_pose
@@ -17,6 +19,8 @@ from dermis.scene.model import Scene
 from dermis.scene.opencv import OpenCvCamera
 from dermis.scene.settings import Settings
 from dermis.summary import Summarised
+
+_MISSING: Any = object()
 
 
 class Landmarks(NamedTuple):
@@ -94,7 +98,10 @@ def with_previous(
         those of all scenes
     """
     if isinstance(previous, Iterable):
-        yield from zip(map(Scene.of, scenes), previous, strict=True)
+        for given, told in zip_longest(scenes, previous, fillvalue=_MISSING):
+            if given is _MISSING or told is _MISSING:
+                refuse("previous", "one for each scene", "there are fewer or more", "Write None for none")
+            yield Scene.of(given), told and Scene.of(told)
         return
     before = previous
     for given in scenes:

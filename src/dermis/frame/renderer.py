@@ -91,7 +91,7 @@ class Renderer(Submitter):
         Raises DermisError for sizes over the device's limits and when the device fails.
         """
         settings = given_plain(Settings, settings or {}, "settings", "size=(512, 512)")
-        what = Scene.of(scene), settings, view, asked_outputs(outputs), previous
+        what = Scene.of(scene), settings, view, asked_outputs(outputs), previous and Scene.of(previous)
         return self.kept_open.run(partial(self._draw, anew, timed, *what))
 
     def _draw(self, anew: bool, timed: Timed, *what: Any) -> Rendered:
