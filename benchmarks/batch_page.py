@@ -43,8 +43,8 @@ def _machine(told: Told) -> str:
     parts = [
         f"## {', '.join(machine['adapters'])}, {machine['cores']} cores\n",
         f"{width} x {height}, atlas {machine['atlas']}; with each picture {', '.join(machine['outputs'])}, "
-        f"landmarks and parameters.\n{told['date'][:10]}, dermis {versions['dermis']}, wgpu {versions['wgpu']}; "
-        f"load average before: {told['load']}.\n",
+        f"landmarks and parameters.\n{told['date'][:10]}, dermis {versions['dermis']}, "
+        f"wgpu {versions['wgpu']}; load average before: {told['load']}.\n",
         "### Measured\n",
         _rates(told),
     ]
@@ -113,12 +113,13 @@ def _table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
 _HEAD = f"""\
 # Data sets at scale
 
-What {IMAGES:,} images take, extrapolated from what `python benchmarks/batch.py` measures in one run on a machine.
-`python benchmarks/batch_page.py` writes this page.
+What {IMAGES:,} images take, extrapolated from what `python benchmarks/batch.py` measures in one run on a
+machine. `python benchmarks/batch_page.py` writes this page.
 
-Rates are those between a quarter and nine tenths of a run, when all processes are at work. Steps are timed one after
-the other in one process, the device waiting for Python and Python for the device; in a run they overlap, so that
-workers can draw more than "by the workers' own time" says. On a machine that others use too, only ratios mean something.
+Rates are those between a quarter and nine tenths of a run, when all processes are at work. Steps are timed one
+after the other in one process, the device waiting for Python and Python for the device; in a run they overlap,
+so that workers can draw more than "by the workers' own time" says. On a machine that others use too, only ratios
+mean something.
 """
 
 if __name__ == "__main__":
