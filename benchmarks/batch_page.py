@@ -116,10 +116,10 @@ _HEAD = f"""\
 What {IMAGES:,} images take, extrapolated from what `python benchmarks/batch.py` measures in one run on a
 machine. `python benchmarks/batch_page.py` writes this page.
 
-Rates are those between a quarter and nine tenths of a run, when all processes are at work. Steps are timed one
-after the other in one process, the device waiting for Python and Python for the device; in a run they overlap,
-so that workers can draw more than "by the workers' own time" says. On a machine that others use too, only ratios
-mean something.
+Rates are those between a quarter and nine tenths of a run, when all processes are at work. Steps are timed
+one after the other in one process, the device waiting for Python and Python for the device; in a run they
+overlap, so that workers can draw more than "by the workers' own time" says. On a machine that others use too,
+only ratios mean something.
 """
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
-from batch.small_set import SHARDS, contents
+from small_set import SHARDS, contents
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processes are listed by /proc")
 _LONGEST_S = 20.0

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from batch.small_set import COUNT, SHARD_SIZE, write_spec
+from small_set import COUNT, SHARD_SIZE, write_spec
 
 from dermis.cli.rate import Lines, Pace
 
