@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dermis.frame.observation import Landmarks, Observation
 from dermis.frame.renderer import Renderer
 from dermis.human.labels.classes import class_number
-from dermis.human.landmarks.points import SETS
+from dermis.human.landmarks.sets import SETS
 from dermis.human.person import Human
 from dermis.mesh.head import Head
 from dermis.scene.camera import Camera

@@ -12,7 +12,7 @@ from dermis.batch.tables import MIXTURE, NONE
 from dermis.environment.panorama import UNIFORM
 from dermis.errors import about, refuse
 from dermis.frame.outputs import asked_outputs
-from dermis.human.landmarks.points import SETS
+from dermis.human.landmarks.sets import SETS
 from dermis.mesh.samples import SAMPLES
 from dermis.reading import is_file
 from dermis.scene.heads import HUMAN

@@ -15,6 +15,7 @@ from dermis.batch.correlation import Correlated
 from dermis.batch.distributions import Distribution
 from dermis.batch.drawing import Drawing, Parameters
 from dermis.batch.drawn import Anything
+from dermis.batch.encodings import Encoding
 from dermis.batch.expressions import package_expressions, targets_of
 from dermis.batch.matching import check_hashes, hashes, matched
 from dermis.batch.spec_text import plain_values, tables_text
@@ -73,6 +74,8 @@ class Spec(Plain):
     """Images in a shard."""
     format: Literal["webdataset", "folder"] = "webdataset"
     """Shards as tar files, or as folders."""
+    encoding: Encoding = "png"
+    """Files of the outputs: png (16 bits where they suffice), exr or npy (all bits)."""
     render: Settings = Field(default_factory=_settings)
     """How pictures are computed; `size` and the background stand elsewhere."""
     person: PersonTable = PersonTable()
