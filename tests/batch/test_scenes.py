@@ -16,6 +16,7 @@ from dermis.batch.spec import Spec, example_text, spec_of
 from dermis.errors import DermisError
 from dermis.human.person import Human
 from dermis.human.person_file import write_numbers
+from dermis.mesh.turns import angles_matrix
 from dermis.scene.lights import light_presets, preset_lights
 from dermis.scene.model import Scene
 from dermis.scene.pose import Pose
@@ -94,6 +95,15 @@ def test_roll_turns_the_camera_clockwise() -> None:
     )
     assert np.dot(rolled.camera.up, upright.camera.up) == pytest.approx(np.cos(np.radians(20)), abs=1e-6)
     assert rolled.camera.up[0] > 0.3  # the head's left, which is right in the picture
+
+
+def test_neck_and_head_turn_as_far_as_is_drawn(wild: Any) -> None:
+    for parameters, scene in wild[1][:8]:
+        head, names = scene.head, scene.head.control.skeleton.names
+        nod, turn, tilt = (parameters[f"head.{name}_deg"] for name in ("pitch", "yaw", "roll"))
+        made = scene.motion.matrices[names.index("head")][:3, :3]
+        assert made == pytest.approx(np.array(angles_matrix((nod, turn, tilt))), abs=1e-5)
+        assert set(scene.pose.bones) == {"head", "neck01", "neck02", "neck03"} and head.rig is not None
 
 
 def test_eyes_look_at_the_camera_or_by_the_angles() -> None:
