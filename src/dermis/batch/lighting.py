@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache, lru_cache
-from math import cos, expm1, pi, radians, sin
+from math import cos, pi, radians, sin
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.batch.tables import RIG
+from dermis.images.colour import luminance
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.scene.lights import Light, RectangleLight, preset_lights
 
@@ -37,19 +39,17 @@ def towards(yaw_deg: float, pitch_deg: float) -> tuple[float, float, float]:
 
 @lru_cache(maxsize=64)
 def colour_of(kelvin: float) -> tuple[float, float, float]:
-    """A black body's light, linear Rec. 709 of luminance 1; white at 6500 K."""
-    red, green, blue = np.maximum(rgb_weights() @ _planck(kelvin), 0.0)
-    grey = 0.2126 * red + 0.7152 * green + 0.0722 * blue
-    return float(red / grey), float(green / grey), float(blue / grey)
+    """A black body's light by Planck's law, linear Rec. 709 of luminance 1; white at 6500 K."""
+    white, own = (np.expm1(_SECOND_NM_K / (WAVELENGTHS_NM * one)) for one in (_WHITE_K, kelvin))
+    colour = np.maximum(_weights() @ (white / own), 0.0)
+    red, green, blue = map(float, colour / luminance(colour))
+    return red, green, blue
 
 
-def _planck(kelvin: float) -> np.ndarray[Any, Any]:
-    """Planck's law over that of white, as the weights take an even spectrum to be white."""
-    return np.array([_bent(nm, _WHITE_K) / _bent(nm, kelvin) for nm in WAVELENGTHS_NM])
-
-
-def _bent(nm: float, kelvin: float) -> float:
-    return expm1(_SECOND_NM_K / (nm * kelvin))
+@cache
+def _weights() -> NDArray[np.float64]:
+    """Matrix (3, n) from spectra, which are relative to white's, to colours."""
+    return rgb_weights()
 
 
 def _lamp(parameters: Mapping[str, Any], lamp: str, turn_deg: float, strength: float) -> Light:
