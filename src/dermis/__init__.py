@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from dermis.batch.dataset import read_dataset
     from dermis.errors import DermisError
     from dermis.frame.observation import Observation
     from dermis.frame.renderer import Renderer, render
@@ -78,6 +79,7 @@ _HOME = {
     "Pose": "scene.pose",
     "Settings": "scene.settings",
     "Skin": "scene.skin",
+    "read_dataset": "batch.dataset",
     "view": "viewer.windows",
 }
 
@@ -111,6 +113,7 @@ __all__ = [
     "load_tissue",
     "portrait",
     "profile",
+    "read_dataset",
     "render",
     "studio",
     "three_quarter",

@@ -16,7 +16,7 @@ import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, BinaryIO, NoReturn
 
 from dermis.errors import DermisError, refuse
 
@@ -48,14 +48,31 @@ def read_file(path: str | Path, expected: str, most: int, name: object = None) -
             most_now = min(most, max(told, _PAGE))  # a file of the system tells no size
             data = file.read(most_now + 1) if told <= most else b""
     except (OSError, ValueError, TypeError) as fault:  # a NUL in the name; what is no name
-        reason = getattr(fault, "strerror", None) or str(fault)
-        refuse(culprit, expected, f"it cannot be read ({reason})", "Check its name")
+        refuse(culprit, expected, f"it cannot be read ({_reason_of(fault)})", "Check its name")
     if data is None:
         refuse(culprit, expected, "nothing can be read from it", "Copy its contents to a file first")
     if told > most or len(data) > most_now:
         came = f"it has {_megabytes(told)}" if told > most else "it grows while it is read"
         refuse(culprit, f"{expected} of at most {_megabytes(most)}", came, "Check its name or its size")
     return data
+
+
+@contextmanager
+def opened(path: str | Path, expected: str) -> Iterator[BinaryIO]:
+    """A regular file of any size, of which the caller takes no more at a time than it checked.
+
+    expected : what it should be, for messages
+    DermisError : it is missing, no regular file, or cannot be read
+    """
+    try:
+        descriptor = _open_regular(path, path, expected)
+    except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
+        refuse(path, expected, f"it cannot be read ({_reason_of(fault)})", "Check its name")
+    try:
+        with os.fdopen(descriptor, "rb") as file:
+            yield file
+    except OSError as fault:
+        refuse(path, expected, f"it cannot be read ({_reason_of(fault)})", "Check the disk")
 
 
 def is_file(path: str | Path) -> bool:
@@ -135,6 +152,10 @@ def _open_regular(path: str | Path, culprit: object, expected: str) -> int:
         os.close(descriptor)
         refuse(culprit, expected, "it is no regular file", "Copy its contents to a file first")
     return descriptor
+
+
+def _reason_of(fault: Exception) -> str:
+    return getattr(fault, "strerror", None) or str(fault)
 
 
 def _finite(text: str) -> float:

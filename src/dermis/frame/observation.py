@@ -60,18 +60,19 @@ class Observation(Summarised):
 
 
 def observed_frames(
-    send: Callable[[Scene, Scene | None], Leaving],
+    send: Callable[..., Leaving],
     scenes: Iterable[Scene],
     previous: Scene | Iterable[Scene | None] | None,
-    settings: Settings,
+    settings: Iterable[Settings],
 ) -> Iterator[tuple[Callable[[], Leaving], Callable[[Leaving], Observation]]]:
     """What submits the frame of each scene, and what takes what has arrived of it, for `arriving`.
 
-    send : submits the frame of a scene after another
+    send : submits the frame of a scene after another, with `settings`
     previous : as of `with_previous`
+    settings : of each
     """
-    for scene, before in with_previous(scenes, previous):
-        yield partial(send, scene, before), partial(_observed, scene, settings)
+    for (scene, before), chosen in zip(with_previous(scenes, previous), settings, strict=False):
+        yield partial(send, scene, before, settings=chosen), partial(_observed, scene, chosen)
 
 
 def _observed(scene: Scene, settings: Settings, leaving: Leaving) -> Observation:

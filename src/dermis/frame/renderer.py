@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
+from itertools import repeat
 from typing import Any, Literal, TypeVar, overload
 
 import numpy as np
@@ -179,7 +180,7 @@ class Renderer(Submitter):
     def observe(
         self,
         scenes: Iterable[Scene],
-        settings: Settings | None = None,
+        settings: Settings | Iterable[Settings] | None = None,
         *,
         outputs: Iterable[str] = (),
         alpha: bool = False,
@@ -189,6 +190,7 @@ class Renderer(Submitter):
     ) -> Iterator[Observation]:
         """What is seen of each scene in turn, each yielded while the next ones are drawn.
 
+        settings : for all of them, or those of each
         outputs : names of what is wanted besides the picture
         alpha, linear : as of `render_many`
         previous : the scene before the first, as motion is counted from one to the next of the same head; or
@@ -197,10 +199,11 @@ class Renderer(Submitter):
 
         Raises DermisError as `draw` does.
         """
-        chosen = given_plain(Settings, settings or {}, "settings", "size=(512, 512)")
+        if settings is None or isinstance(settings, Settings | Mapping):
+            settings = repeat(given_plain(Settings, settings or {}, "settings", "size=(512, 512)"))
         asked = partial(self._send, outputs=asked_outputs(outputs), landmarks=asked_landmarks(landmarks))
-        send = partial(asked, settings=chosen, linear=linear, alpha=alpha)
-        frames = observed_frames(send, scenes, previous, chosen)
+        send = partial(asked, linear=linear, alpha=alpha)
+        frames = observed_frames(send, scenes, previous, settings)
         return arriving(self.kept_open, lambda: self.device, frames)
 
 

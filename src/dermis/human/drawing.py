@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.errors import refuse
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.usual import drawn_hair, shaved_shows, usual_hair, usual_recession
 from dermis.human.published import OLD, YOUNG, human_targets
@@ -39,43 +40,59 @@ _SIDES = 0.2  # of the spread, by which left and right differ
 _ASYMMETRY = 0.1
 _SHAPES = ("diamond", "invertedtriangular", "oval", "rectangular", "round", "square", "triangular")
 _MOST_SHAPE = 0.3
+_ANCESTRY = "african", "asian", "caucasian"
+_LOOKS = "targets", "skin", "eyes", "hair"
 
 
-def drawn(seed: int) -> dict[str, Any]:
+def drawn(seed: int, given: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of `Human`, see `Human.drawn`."""
+    macro = {name: float(value) for name, value in given.items() if name not in _LOOKS}
     rng = np.random.default_rng(whole_number("seed", seed, 0, _MOST_SEED))
-    african, asian, caucasian = rng.dirichlet((_ALIKE,) * 3)
+    shares = _ancestry(macro, rng.dirichlet((_ALIKE,) * 3))
     sex = min(abs(rng.normal(0.0, _BETWEEN)), 0.3)
-    sex = 1.0 - sex if rng.random() < 0.5 else sex
+    sex = macro.get("sex", 1.0 - sex if rng.random() < 0.5 else sex)
     share = rng.beta(1.2, 2.2)
+    share = (macro["age"] - YOUNG) / (OLD - YOUNG) if "age" in macro else share
     weight = rng.normal(0.3 * share - 0.1, 0.25)
     muscle = rng.normal(0.2 * sex - 0.1 - 0.3 * share, 0.2)
-    age = float(YOUNG + (OLD - YOUNG) * share)
-    found = {
-        "african": float(african),
-        "asian": float(asian),
-        "caucasian": float(caucasian),
+    found: dict[str, Any] = {
         "sex": float(sex),
-        "age": age,
+        "age": float(YOUNG + (OLD - YOUNG) * share),
         "weight": float(np.clip(weight, -0.7, 0.8)),
         "muscle": float(np.clip(muscle, -0.6, 0.6)),
-        "targets": dict(_details(rng)),
+        "targets": {**dict(_details(rng)), **given.get("targets", {})},
     }
-    origin = Origin(african, asian, caucasian, sex, age)
+    found |= dict(zip(_ANCESTRY, map(float, shares), strict=True)) | macro
+    african, asian, caucasian = shares
+    origin = Origin(african, asian, caucasian, found["sex"], found["age"])
     skin, eyes = drawn_look(rng, origin), drawn_eyes(rng, origin)
-    brown, red = _hair(np.random.default_rng((int(seed), 1)), np.array([african, asian, caucasian]))
-    found |= {"hair_eumelanin": brown, "hair_pheomelanin": red, "eyes": eyes}
-    usual = usual_hair(origin, brown, red)
-    return found | _hairdo(np.random.default_rng((int(seed), 2)), origin, usual, skin)
+    brown, red = _hair(np.random.default_rng((int(seed), 1)), shares)
+    colour = {"hair_eumelanin": brown, "hair_pheomelanin": red} | macro
+    found |= colour | {"eyes": replace(eyes, **given.get("eyes", {}))}
+    usual = usual_hair(origin, colour["hair_eumelanin"], colour["hair_pheomelanin"])
+    return found | _hairdo(np.random.default_rng((int(seed), 2)), origin, usual, skin, given)
 
 
-def _hairdo(rng: np.random.Generator, origin: Origin, usual: HairLook, skin: SkinLook) -> dict[str, Any]:
+def _ancestry(given: Mapping[str, float], own: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3,) shares of the ancestries that are given, which need not add up to 1; else the person's own."""
+    if not any(name in given for name in _ANCESTRY):
+        return own
+    shares = np.array([given.get(name, 0.0) for name in _ANCESTRY])
+    if not shares.sum() > 0:
+        refuse("ancestry", "a share of african, asian or caucasian", "all that are given are 0", "Raise one")
+    return np.asarray(shares / shares.sum())
+
+
+def _hairdo(
+    rng: np.random.Generator, origin: Origin, usual: HairLook, skin: SkinLook, given: Mapping[str, Any]
+) -> dict[str, Any]:
     """Hair, and the skin with what shows of it there."""
     hair, recession = drawn_hair(rng, origin, usual), usual_recession(rng, origin)
+    hair = replace(hair, **given.get("hair", {}))
     shown = shaved_shows(hair)
     beard = shown * max(skin.beard, _BEARDED if hair.beard_mm else 0.0)
     seen = replace(skin, stubble=shown * skin.stubble, beard=beard, recession=recession)
-    return {"hair": hair, "skin": seen}
+    return {"hair": hair, "skin": replace(seen, **given.get("skin", {}))}
 
 
 def _hair(rng: np.random.Generator, shares: NDArray[np.float64]) -> tuple[float, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,14 +89,18 @@ class Human:
                 refuse(name, f"a {kind.__name__}", f"{shown_value(look)} came", "Make one, or leave it out")
 
     @classmethod
-    def drawn(cls, seed: int) -> Human:
+    def drawn(cls, seed: int, **given: Any) -> Human:
         """A plausible adult, the same for the same seed: mostly of one ancestry, a little asymmetric.
 
         seed : 0 to 2**32 - 1
+        given : fields that are not drawn, such as `age=70`; some of targets, skin, eyes and hair by name, as
+            `skin={"melanin": 0.1}`. Skin and hair go with the age, the sex and the ancestry that are given
 
-        Raises DermisError for other seeds.
+        Raises DermisError for other seeds and for values out of range.
         """
-        return cls(**drawn(seed))
+        for name in given.keys() & _RANGES.keys():
+            number(name, given[name], *_RANGES[name])
+        return cls(**drawn(seed, given))
 
     def head(self, maps: Maps | None = None, layout: Layout = "own", subdivide: Levels = 1) -> Head:
         """The person at rest, with expressions and bones to move by.

@@ -12,6 +12,7 @@ from dermis.images.sizes import MOST_PIXELS, TooLargeError, check_size
 
 EXR_START = b"\x76\x2f\x31\x01"
 _CHANNELS = ("RGBA", "RGB", "Y")
+_NAMES = {1: "Y", 3: "RGB"}  # by channels
 _MOST_NUMBERS = 3 * MOST_PIXELS  # in all channels of all parts: the library decodes all of them
 _MOST_CHANNELS = 1024
 
@@ -80,3 +81,19 @@ def _judged(file: Any) -> str:
 def _size(window: Any) -> tuple[int, int]:
     low, high = ([int(value) for value in corner] for corner in window)
     return high[0] - low[0] + 1, high[1] - low[1] + 1
+
+
+def encode_exr(picture: NDArray[np.floating[Any]]) -> bytes:
+    """An OpenEXR file of (H, W, 1 or 3) float16 or float32, as the channels Y or R, G, B.
+
+    Runs of equal bytes alone are compressed: pictures with noise pack no better otherwise, and slower.
+    """
+    import OpenEXR
+
+    channels = {
+        name: np.ascontiguousarray(picture[..., k]) for k, name in enumerate(_NAMES[picture.shape[2]])
+    }
+    header = {"compression": OpenEXR.RLE_COMPRESSION, "type": OpenEXR.scanlineimage}
+    file = io.BytesIO()
+    OpenEXR.File(header, channels).write(file)
+    return file.getvalue()

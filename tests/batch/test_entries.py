@@ -1,0 +1,101 @@
+"""The files of one image: what comes back, and that they are the same to the byte."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from observed import OUTPUT_NAMES, observation, small_spec
+
+from dermis.batch.encodings import Encoding, decode_output, encode_output, file_kind, stored_as
+from dermis.batch.entries import entries
+from dermis.batch.samples import decoded
+from dermis.errors import DermisError
+from dermis.frame.outputs import OUTPUTS
+
+ALL = tuple(OUTPUTS.names)
+
+
+def image(number: int, **spec: Any) -> tuple[Any, dict[str, bytes]]:
+    told = small_spec(**spec)
+    seen = observation(number, outputs=told.outputs)
+    return seen, entries(number, seen, told.parameters(number), told)
+
+
+@pytest.mark.parametrize("encoding", ["png", "exr", "npy"])
+@pytest.mark.parametrize("name", ALL)
+def test_each_output_comes_back_as_exactly_as_is_said(name: str, encoding: Encoding) -> None:
+    values = observation(4, outputs=(name,)).outputs[name]
+    kind, output = file_kind(name, encoding), OUTPUTS[name]
+    found = decode_output(name, kind, encode_output(name, values, encoding))
+    assert found.shape == values.shape and found.dtype == output.kind
+    told = stored_as(name, encoding)
+    if "16-bit PNG" in told:
+        assert output.levels is not None
+        np.testing.assert_allclose(found, values, rtol=1e-6, atol=0.51 * output.levels.step)
+    elif "16" in told:
+        np.testing.assert_allclose(found, values, rtol=2**-11, atol=1e-7)
+    else:
+        np.testing.assert_array_equal(found, values)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_the_background_comes_back_exactly(name: str) -> None:
+    output = OUTPUTS[name]
+    values = np.full((3, 4, output.channels or 2), output.background, output.kind)
+    values = values[..., 0] if output.channels == 1 else values
+    found = decode_output(name, file_kind(name, "png"), encode_output(name, values, "png"))
+    np.testing.assert_array_equal(found, values)
+
+
+def test_equal_observations_give_equal_bytes_and_others_do_not() -> None:
+    assert image(3)[1] == image(3)[1]
+    assert image(3)[1]["png"] != image(4)[1]["png"]
+
+
+def test_names_and_order_of_the_files() -> None:
+    _, files = image(1, outputs=("depth", "triangle"))
+    assert set(files) == {"png", "depth.png", "triangle.exr", "json"}
+    assert set(image(1, outputs=("depth",), encoding="npy")[1]) == {"png", "depth.npy", "json"}
+    assert set(image(1, outputs=("depth",), encoding="exr")[1]) == {"png", "depth.exr", "json"}
+
+
+def test_all_that_is_known_comes_back() -> None:
+    seen, files = image(1)
+    found = decoded(files)
+    assert found["number"] == 1 and found["parameters"] == small_spec().parameters(1)
+    np.testing.assert_array_equal(found["picture"], seen.picture)
+    for ours, theirs in zip(found["camera"], seen.camera, strict=True):
+        np.testing.assert_allclose(ours, theirs, atol=1e-4)
+    np.testing.assert_allclose(found["head_pose"], seen.head_pose)
+    np.testing.assert_allclose(found["gaze"], seen.gaze)
+    points, truth = found["landmarks"]["ibug-68"], seen.landmarks["ibug-68"]
+    np.testing.assert_allclose(points.pixels, truth.pixels, atol=0.0005)
+    np.testing.assert_allclose(points.positions_mm, truth.positions_mm, atol=0.00005)
+    np.testing.assert_array_equal(points.visible, truth.visible)
+    assert set(OUTPUT_NAMES) < set(found)
+
+
+def test_what_is_not_known_is_none_and_places_without_one_are_nan() -> None:
+    spec, seen = small_spec(), observation(2)
+    seen.landmarks["ibug-68"].pixels[1] = np.nan
+    found = decoded(entries(2, seen, spec.parameters(2), spec))
+    assert found["gaze"] is None
+    assert np.isnan(found["landmarks"]["ibug-68"].pixels[1]).all()
+    assert np.isfinite(found["landmarks"]["ibug-68"].pixels[0]).all()
+
+
+def test_records_are_plain_json_without_minus_zero() -> None:
+    spec, seen = small_spec(), observation(1)
+    seen.camera.t[:] = -0.0, -1e-9, 5.0
+    record = entries(1, seen, spec.parameters(1), spec)["json"]
+    assert b"-0.0," not in record and json.loads(record)["camera"]["t"] == [0.0, 0.0, 5.0]
+
+
+def test_numbers_that_are_none_are_refused() -> None:
+    spec, seen = small_spec(outputs=("depth",)), observation(1)
+    seen.outputs["depth"][2, 3] = np.nan
+    with pytest.raises(DermisError, match="output depth: expected finite numbers"):
+        entries(1, seen, spec.parameters(1), spec)

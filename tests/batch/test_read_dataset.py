@@ -1,0 +1,187 @@
+"""Data sets read back, in both formats, by this package and by the library webdataset."""
+
+from __future__ import annotations
+
+import io
+import json
+import subprocess
+import sys
+import tarfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from observed import OUTPUT_NAMES, observation, small_spec, write_all
+
+import dermis
+from dermis.batch.encodings import encode_output
+from dermis.batch.entries import entries
+from dermis.batch.samples import decoded
+from dermis.errors import DermisError
+from dermis.extras import needed
+from dermis.frame.observation import Landmarks
+
+EXACT = tuple(small_spec(encoding="exr").outputs)
+
+
+@pytest.fixture(scope="module", params=["webdataset", "folder"])
+def written(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Seven images in three shards, every bit of their outputs kept."""
+    folder: Path = tmp_path_factory.mktemp(request.param)
+    write_all(folder, small_spec(format=request.param, encoding="exr"))
+    return folder
+
+
+def test_what_is_read_is_what_was_written(written: Path) -> None:
+    alpha, count = written.name.startswith("folder"), 0
+    for count, found in enumerate(dermis.read_dataset(written), start=1):  # noqa: B007
+        truth = observation(found["number"], alpha)
+        np.testing.assert_array_equal(found["picture"], truth.picture)
+        for name in OUTPUT_NAMES:
+            np.testing.assert_array_equal(found[name], truth.outputs[name])
+            assert found[name].dtype == truth.outputs[name].dtype
+        assert found["parameters"] == small_spec().parameters(found["number"])
+    assert count == 7
+
+
+def test_images_come_in_order_or_by_a_seed_or_shard_by_shard(written: Path) -> None:
+    def numbers(**how: Any) -> list[int]:
+        return [one["number"] for one in dermis.read_dataset(written, **how)]
+
+    assert numbers() == list(range(7))
+    first, again, other = (numbers(shuffle=seed) for seed in (1, 1, 2))
+    assert first == again != other and sorted(first) == sorted(other) == list(range(7))
+    assert numbers(shards=[2, 0]) == [6, 0, 1, 2]
+    (shard,) = written.glob("shard-00001*")
+    assert [one["number"] for one in dermis.read_dataset(shard)] == [3, 4, 5]
+
+
+def test_neither_pyarrow_nor_webdataset_is_needed_to_read(written: Path) -> None:
+    code = (
+        "import sys; sys.modules.update(dict.fromkeys(['pyarrow', 'webdataset', 'av'], None))\n"
+        f"import dermis; assert len(list(dermis.read_dataset({str(written)!r}))) == 7"
+    )
+    subprocess.run([sys.executable, "-W", "error", "-c", code], check=True)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_webdataset_reads_the_shards(tmp_path: Path) -> None:
+    """As the documentation has it."""
+    spec = small_spec()
+    write_all(tmp_path, spec)
+    webdataset = needed("webdataset", "a test")
+    shards = sorted(map(str, tmp_path.glob("shard-*.tar")))
+    found = list(webdataset.WebDataset(shards, shardshuffle=False).map(decoded))
+    assert [one["number"] for one in found] == list(range(7))
+    for one, ours in zip(found, dermis.read_dataset(tmp_path), strict=True):
+        np.testing.assert_array_equal(one["depth"], ours["depth"])
+        np.testing.assert_array_equal(one["picture"], ours["picture"])
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_webdataset_decodes_pictures_and_records_itself(tmp_path: Path) -> None:
+    spec = small_spec(outputs=("depth",))
+    write_all(tmp_path, spec)
+    webdataset = needed("webdataset", "a test")
+    shards = sorted(map(str, tmp_path.glob("shard-*.tar")))
+    pipeline = webdataset.WebDataset(shards, shardshuffle=False).decode("rgb8")
+    for one in pipeline.to_tuple("png", "json"):
+        np.testing.assert_array_equal(one[0], observation(one[1]["number"]).picture)
+
+
+def test_a_folder_without_shards_and_shards_that_are_none_are_refused(tmp_path: Path, written: Path) -> None:
+    with pytest.raises(DermisError, match="no shard is in it"):
+        dermis.read_dataset(tmp_path)
+    with pytest.raises(DermisError, match="the folder of a data set, but it cannot be read"):
+        dermis.read_dataset(tmp_path / "none")
+    with pytest.raises(DermisError, match=r"numbers of the 3 shards in .* but 3 came"):
+        dermis.read_dataset(written, shards=[3])
+    with pytest.raises(DermisError, match="a data set, but a NoneType came"):
+        dermis.read_dataset(None)  # type: ignore[arg-type]
+    with pytest.raises(DermisError, match="shuffle: expected a whole number"):
+        dermis.read_dataset(written, shuffle="yes")  # type: ignore[arg-type]
+
+
+def repacked(path: Path, change: Any) -> None:
+    """Write a shard anew with other members: (name, bytes) as `change` returns them."""
+    with tarfile.open(path) as old:
+        members = [(one.name, old.extractfile(one).read()) for one in old.getmembers()]  # type: ignore[union-attr]
+    with tarfile.open(path, "w") as new:
+        for name, data in change(members):
+            head = tarfile.TarInfo(name)
+            head.size = len(data)
+            new.addfile(head, io.BytesIO(data))
+
+
+def replaced(name: str, data: bytes) -> Any:
+    return lambda members: [(one, data if one == name else held) for one, held in members]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda members: members[:-1], "its end is missing"),
+        (lambda members: [("../../evil.png", b""), *members], r"it holds '\.\./\.\./evil\.png'"),
+        (lambda members: [("/etc/passwd", b""), *members], "it holds '/etc/passwd'"),
+        (lambda members: [*members, members[0]], "two files in it have one name"),
+        (lambda members: [one for one in members if one[0] != "000000000.png"], r"its \.png is missing"),
+        (lambda members: [one for one in members if one[0] != "000000000.json"], r"its \.json is missing"),
+        (lambda members: [("000000000.picture.png", b""), *members], r"\.picture\.png is none"),
+        (lambda members: [("000000000.cls", b"1"), *members], r"\.cls is none"),
+        (replaced("000000000.png", b"\x89PNG\r\n\x1a\n"), r"000000000\.png: .* cannot be decoded"),
+        (replaced("000000000.depth.png", b"GIF89a"), r"000000000\.depth\.png: .* cannot be decoded"),
+        (replaced("000000000.json", b"{}"), "a record of an image, but it cannot be understood"),
+        (replaced("000000000.json", b"[" * 9999), "nested too deeply"),
+        (replaced("000000000.json", b" " * (2 << 20)), "2,097,152 bytes"),
+    ],
+)
+def test_damaged_tars_are_refused_by_name(tmp_path: Path, change: Any, said: str) -> None:
+    write_all(tmp_path, small_spec(count=1, outputs=("depth",)))
+    repacked(tmp_path / "shard-00000.tar", change)
+    with pytest.raises(DermisError, match=rf"shard-00000\.tar.*{said}"):
+        list(dermis.read_dataset(tmp_path))
+
+
+def test_records_and_sizes_that_do_not_fit_are_refused(tmp_path: Path) -> None:
+    write_all(tmp_path, small_spec(count=1, outputs=("depth",)))
+    path = tmp_path / "shard-00000.tar"
+    with tarfile.open(path) as shard:
+        record = json.loads(shard.extractfile("000000000.json").read())  # type: ignore[union-attr]
+
+    def refused(said: str, **changes: Any) -> None:
+        repacked(path, replaced("000000000.json", json.dumps({**record, **changes}).encode()))
+        with pytest.raises(DermisError, match=said):
+            list(dermis.read_dataset(tmp_path))
+
+    refused("the record of image 0, but that of 5 came", number=5)
+    refused("neither a number nor a text", parameters={"a": {"b": 1}})
+    refused(r"an array has shape \(2, 2\), not \(3, 3\)", camera={**record["camera"], "K": [[1, 2], [3, 4]]})
+    refused("texts for numbers", head_pose=[["1"] * 4] * 3)
+    refused("true and false", landmarks={"a": {"pixels": [], "positions_mm": [], "visible": [1]}})
+    refused("cannot be understood", gaze=[[0, 0, 1], [0, 1]])
+    small = encode_output("depth", np.ones((3, 4), np.float32), "png")
+    repacked(path, replaced("000000000.json", json.dumps(record).encode()))
+    repacked(path, replaced("000000000.depth.png", small))
+    with pytest.raises(
+        DermisError, match=r"outputs of the picture's size, but \.depth\.png has 4 x 3 pixels"
+    ):
+        list(dermis.read_dataset(tmp_path))
+
+
+def test_links_and_folders_in_a_tar_are_refused(tmp_path: Path) -> None:
+    with tarfile.open(tmp_path / "shard-00000.tar", "w") as shard:
+        link = tarfile.TarInfo("000000000.png")
+        link.type, link.linkname = tarfile.SYMTYPE, "/etc/passwd"
+        shard.addfile(link)
+    with pytest.raises(DermisError, match=r"'000000000\.png', which is no regular file"):
+        list(dermis.read_dataset(tmp_path))
+
+
+def test_no_landmarks_of_a_set_are_read_too() -> None:
+    seen = observation(0)
+    none = Landmarks((), np.empty((0, 3), np.float32), np.empty((0, 2)), np.empty(0, bool))
+    spec, seen = small_spec(), replace(seen, landmarks={"ibug-68": none})
+    found = decoded(entries(0, seen, spec.parameters(0), spec))["landmarks"]["ibug-68"]
+    assert found.pixels.shape == (0, 2) and found.positions_mm.shape == (0, 3) and found.visible.shape == (0,)

@@ -1,0 +1,75 @@
+"""What a renderer would have seen, made from numbers: for tests of the files of data sets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dermis.batch.entries import entries
+from dermis.batch.shards import Shard, ShardWriter, shards_of
+from dermis.batch.spec import Spec, spec_of
+from dermis.frame.observation import Landmarks, Observation
+from dermis.frame.outputs import OUTPUTS
+from dermis.scene.opencv import OpenCvCamera
+
+SIZE = 24, 16
+OUTPUT_NAMES = "depth", "normal", "uv", "triangle", "motion", "alpha"
+
+
+def small_spec(**values: Any) -> Spec:
+    """Seven images in shards of three."""
+    told = {"count": 7, "shard_size": 3, "size": SIZE, "outputs": OUTPUT_NAMES}
+    return spec_of({**told, **values})
+
+
+def observation(number: int, alpha: bool = False, outputs: tuple[str, ...] = OUTPUT_NAMES) -> Observation:
+    """Values as outputs can have them, by the image's number."""
+    rng = np.random.default_rng(number)
+    width, height = SIZE
+    camera = OpenCvCamera(np.diag([500.0, 500.0, 1.0]), np.eye(3), np.array([0.0, 1.0, 600.0 + number]))
+    points = Landmarks(
+        names=("left", "right"),
+        positions_mm=rng.normal(0, 50, (2, 3)).astype(np.float32),
+        pixels=rng.uniform(0, 16, (2, 2)),
+        visible=np.array([True, False]),
+    )
+    return Observation(
+        picture=rng.integers(0, 256, (height, width, 4 if alpha else 3), np.uint8),
+        outputs={name: _values(name, rng) for name in outputs},
+        camera=camera,
+        head_pose=np.eye(3, 4),
+        gaze=None if number == 2 else np.array([[0, 0, -1.0], [0, 0.6, -0.8]]),
+        landmarks={"ibug-68": points},
+    )
+
+
+def _values(name: str, rng: np.random.Generator) -> Any:
+    width, height = SIZE
+    output = OUTPUTS[name]
+    shape = (height, width) if output.channels == 1 else (height, width, output.channels or 2)
+    if np.dtype(output.kind).kind in "iu":
+        return rng.integers(0, 200, shape).astype(output.kind)
+    if name == "depth":
+        return (rng.uniform(400, 900, shape) * rng.integers(0, 2, shape)).astype(np.float32)
+    if name.startswith("normal"):
+        found = rng.normal(size=shape)
+        found /= np.linalg.norm(found, axis=-1, keepdims=True)
+        return (found * rng.integers(0, 2, (height, width, 1))).astype(np.float32)
+    return rng.uniform(0, 1, shape).astype(np.float32)
+
+
+def write_shard(out: Path, shard: Shard, spec: Spec) -> None:
+    """A shard as a worker writes it."""
+    with ShardWriter(out, shard, spec, "an adapter") as writer:
+        for number in range(shard.first, shard.stop):
+            seen = observation(number, spec.format == "folder", spec.outputs)
+            writer.add(number, entries(number, seen, spec.parameters(number), spec))
+
+
+def write_all(out: Path, spec: Spec) -> None:
+    """A data set without its index."""
+    out.mkdir(parents=True, exist_ok=True)
+    for shard in shards_of(spec):
+        write_shard(out, shard, spec)
