@@ -8,6 +8,20 @@ from typing import Any
 
 import dermis
 from dermis import cite
+from dermis.batch.correlation import Correlated
+from dermis.batch.distributions import Distribution
+from dermis.batch.spec import Spec
+from dermis.batch.tables import (
+    BackgroundTable,
+    CameraTable,
+    EnvironmentTable,
+    ExpressionTable,
+    GazeTable,
+    LampTable,
+    LightTable,
+    PersonTable,
+    TurnTable,
+)
 from dermis.cli.head_options import HEAD
 from dermis.cli.options import is_option, option_name
 from dermis.cli.scene_options import AROUND
@@ -18,6 +32,7 @@ from dermis.scene.lights import LIGHTS
 from dermis.scene.plain import Plain, help_of, shown, values_of
 from dermis.scene.pose_table import PoseTable
 from dermis.scene.skin import Pigments, TissueLayer
+from dermis.scene.toml_text import value_text
 
 HERE = Path(__file__).parent
 TABLES: dict[str, tuple[type[Plain], dict[str, str] | None]] = {
@@ -33,6 +48,19 @@ TABLES: dict[str, tuple[type[Plain], dict[str, str] | None]] = {
     "[render]": (Settings, {}),
 }
 """The tables of a scene's file: their models, and options by field where these are called otherwise."""
+SPEC_TABLES: dict[str, type[Plain]] = {
+    "Above all tables": Spec,
+    "[person]": PersonTable,
+    "[expression]": ExpressionTable,
+    "[head]": TurnTable,
+    "[gaze]": GazeTable,
+    "[camera]": CameraTable,
+    "[light]": LightTable,
+    "[light.key], [light.fill], [light.rim]": LampTable,
+    "[environment]": EnvironmentTable,
+    "[background]": BackgroundTable,
+    "[[correlated]]": Correlated,
+}
 _FIELD = re.compile(r"^(?P<names>\w+(?:, \w+)*) : (?P<meaning>.*)$")
 _PARTS = re.compile(
     r"_(?P<index>[A-Za-z]{2,})|\^(?:\((?P<power>[^()]*)\)|(?P<name>[A-Za-z]{2,}))"
@@ -56,7 +84,7 @@ def setup(app: Any) -> dict[str, bool]:
 def write_pages(folder: Path) -> None:
     """Write the pages."""
     folder.mkdir(exist_ok=True)
-    pages = {"gallery": gallery(), "settings": settings()}
+    pages = {"gallery": gallery(), "settings": settings(), "spec": spec()}
     pages |= {"reference": reference(), "bibliography": bibliography()}
     for name, text in pages.items():
         (folder / f"{name}.md").write_text(text, encoding="utf-8")
@@ -97,6 +125,14 @@ def settings() -> str:
     return "\n".join(["# Settings", "", intro, "", *parts])
 
 
+def spec() -> str:
+    """The tables of a data set's spec, key by key."""
+    intro = "The tables of a spec, from which `dermis batch` draws [data sets](../batch.md). `size`, width and "
+    intro += "height, stands above all tables too; of `person.skin` and the like the keys are those of their names."
+    parts = [f"## {title}\n\n{table_of(model, None)}" for title, model in SPEC_TABLES.items()]
+    return "\n".join(["# Keys of a spec", "", intro, "", *parts])
+
+
 def table_of(model: type[Plain], names: dict[str, str] | None) -> str:
     """A model's fields as a table.
 
@@ -105,14 +141,24 @@ def table_of(model: type[Plain], names: dict[str, str] | None) -> str:
     columns = ["key", *(["option"] if names is not None else []), "values", "default", "meaning"]
     rows = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
     for field, info in model.model_fields.items():
+        if info.exclude:
+            continue
         cells = [f"`{field}`"]
         if names is not None:
             known = names.get(field) != "" and is_option(model, field)
             cells.append(f"`{option_name(field, names)}`" if known else "")
-        default = "needed" if info.is_required() else shown(info.get_default())
+        default = "needed" if info.is_required() else _default(info.get_default())
         cells += [values_of(model, field), default, help_of(model, field)]
         rows.append(f"| {' | '.join(cells)} |")
     return "\n".join([*rows, ""])
+
+
+def _default(value: Any) -> str:
+    """A default as it is typed, nothing for a table's."""
+    if isinstance(value, Distribution):
+        told = value.told()
+        return shown(told) if isinstance(told, str | float) else f"`{value_text(told)}`"
+    return "" if isinstance(value, Plain) else shown(value)
 
 
 def reference() -> str:

@@ -46,6 +46,7 @@ def visited(browser: Any, url: str, expected: str = "no error", **given: Any) ->
     errors: list[str] = []
     one.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
     one.on("pageerror", lambda error: errors.append(str(error)))
+    listen(one)
     one.goto(url)
     wait_for_picture(one)
     yield one
@@ -65,6 +66,22 @@ def wait(page: Any, reached: Callable[[], Any]) -> bool:
     return bool(reached())
 
 
+def listen(page: Any) -> None:
+    """Remember the kinds of the frames that come to the page; before it goes anywhere."""
+    page.frames_come = []
+
+    def hear(message: Any) -> None:
+        if isinstance(message, str) and '"framebufferdata"' in message:
+            page.frames_come.append("image/png" if "image/png" in message else "image/jpeg")
+
+    page.on("websocket", lambda socket: socket.on("framereceived", hear))
+
+
+def is_final(page: Any) -> bool:
+    """Whether the last frame that came is without loss: those come when nothing changes any more."""
+    return bool(page.frames_come) and page.frames_come[-1] == "image/png"
+
+
 def pixels(page: Any) -> NDArray[np.int64]:
     from PIL import Image
 
@@ -75,9 +92,9 @@ def still(page: Any, judge: Callable[[NDArray[np.int64]], bool]) -> NDArray[np.i
     """The first picture that satisfies `judge` and does not change any more."""
     last, end = pixels(page), time.monotonic() + PATIENCE_S
     while time.monotonic() < end:
-        time.sleep(0.4)
+        page.wait_for_timeout(400)
         found = pixels(page)
-        if judge(found) and np.abs(found - last).max() == 0:
+        if is_final(page) and judge(found) and np.abs(found - last).max() == 0:
             return found
         last = found
     raise AssertionError("the page never shows that")

@@ -44,8 +44,8 @@ def app() -> App:
 
 
 def words(command: str) -> list[str]:
-    """What is typed: no comment, no dots for more, no brackets around what may be left out."""
-    shown = command.replace("\\|", "|").split("...")[0]
+    """What is typed: no comment, no file that it is written to, no dots for more, no brackets around what may be left out."""
+    shown = command.replace("\\|", "|").split("...")[0].split(" > ")[0]
     typed = shlex.split(re.sub(r"[\[\]]", "", shown), comments=True)[1:]
     return ["8765" if word == "N" else word for word in typed]
 
@@ -63,6 +63,12 @@ def test_commands_are_understood(page: Path) -> None:
         except Exception as error:
             refused.append(f"{command}: {error}")
     assert refused == []
+
+
+def test_the_readme_lists_every_command() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^\| `dermis (\w+)", text, re.MULTILINE)
+    assert set(listed) == set(COMMANDS)
 
 
 def test_an_option_that_is_none_would_be_found() -> None:

@@ -1,4 +1,4 @@
-"""Places on the average human's surface, densely, and the curves along which landmarks lie; of the left side."""
+"""Places all over the average human, and the curves of its left side along which landmarks lie."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ _SEAM_MM = np.array([[0.0, -67.3], [10, -66.7], [18, -67.2], [22.2, -67.9]])  # 
 _CORNER_MM = 22.2
 _AHEAD = 0.4  # how much of the way ahead counts as height, where the edge of a lip is sought
 _NEAR_MM = 1.2  # of a place in the front plane
-# Artist's values on the average human, seen from the front and the side: the outline of the face from in front of
-# the ear at the height of the eyes, over the angle of the jaw, to the chin [mm].
+# Artist's values on the average human, seen from the front and the side: the outline of the face from in
+# front of the ear at the height of the eyes, over the angle of the jaw, to the chin [mm].
 _JAW_MM = np.array([[69.5, 0, -57], [68.6, -15, -56], [67, -30, -53], [65.2, -42, -50], [61.6, -52, -45],
                     [58.4, -62, -40], [54.8, -72, -35], [50.4, -81, -31], [45, -88.5, -26], [38, -95, -20],
                     [30, -100.4, -10], [20, -104.6, 0], [10, -106.3, 7], [0, -106.8, 12.5]])  # fmt: skip
@@ -123,7 +123,7 @@ class Surface:
         return self.frontmost(x, y)
 
     def inner_lip(self, upper: bool) -> Doubles:
-        """(n, 3) the lowest of the upper lip or the highest of the lower one, from the corner to the middle."""
+        """(n, 3) the lower edge of the upper lip or the upper one of the lower, from the corner inwards."""
         seam = np.interp(np.abs(self.at_mm[:, 0]), *_SEAM_MM.T)
         above = self.at_mm[:, 1] - seam
         side = (above > 0) & (above < 3) if upper else (above < 0) & (above > -3)

@@ -105,7 +105,10 @@ def _oval(surface: Surface) -> Pairs:
     half, middle, top = _OVAL_MM
     angle = np.linspace(np.pi / 2, 0.0, 9)
     x, y = half * np.cos(angle), middle + (top - middle) * np.sin(angle)
-    above = [surface.midline(top), *(surface.frontmost(0.97 * a, b) for a, b in zip(x[1:], y[1:], strict=True))]
+    above = [
+        surface.midline(top),
+        *(surface.frontmost(0.97 * a, b) for a, b in zip(x[1:], y[1:], strict=True)),
+    ]
     below = [surface.nearest(p) for p in arcs(surface.jaw()[2:], np.arange(1, 11) / 10)]
     left = "10 338 297 332 284 251 389 356 454 323 361 288 397 365 379 378 400 377 152"
     right = "10 109 67 103 54 21 162 127 234 93 132 58 172 136 150 149 176 148 152"
@@ -121,9 +124,7 @@ def _eye(surface: Surface) -> Pairs:
 
 
 def _brows(surface: Surface) -> Pairs:
-    above, below = (
-        [surface.nearest(place) for place in _brow(surface, across, 5)] for across in (0.9, -0.9)
-    )
+    above, below = ([surface.nearest(place) for place in _brow(surface, across, 5)] for across in (0.9, -0.9))
     return _pairs("336 296 334 293 300", "107 66 105 63 70", above) | _pairs(
         "285 295 282 283 276", "55 65 52 53 46", below
     )

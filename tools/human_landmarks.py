@@ -15,8 +15,8 @@ OUT = Path(__file__).parent.parent / "src" / "dermis" / "human" / "landmarks"
 SOURCE = "tools/human_landmarks.py, by geometry and by eye on the average human"
 HEADER = """\
 # quantity: {what}; left is the person's own
-# unit: number of the human's quad, how far along its first side and across it (0 to 1), how far from there on the
-#   way to the back of the eyeball (0 to 1)
+# unit: number of the human's quad, how far along its first side and across it (0 to 1), how far from there
+#   on the way to the back of the eyeball (0 to 1)
 # source: {source}
 # licence: CC0
 landmark,quad,along,across,sunk
@@ -27,7 +27,10 @@ SETS = {
         face_synthetics,
         "the 70 landmarks of FaceSynthetics in their order: those of iBUG, then the right and the left pupil",
     ),
-    "mediapipe": (mediapipe, "points of MediaPipe's face mesh by their numbers there: outlines and the midline"),
+    "mediapipe": (
+        mediapipe,
+        "points of MediaPipe's face mesh by their numbers there: outlines and the midline",
+    ),
 }
 
 

@@ -27,17 +27,11 @@ def table() -> str:
 
 
 def _cells(output: Output) -> list[str]:
-    numbers = output.kind
-    each = f"{output.channels} x {numbers}" if output.channels else f"{numbers} for each light"
+    each = f"{output.channels} x {output.kind}" if output.channels else f"{output.kind} for each light"
     channels = ", ".join(f"`{output.name}.{letter}`" for letter in output.letters or "012")
     channels += "" if output.letters else ", ..."
     cells = [f"`{output.name}`", output.description, output.unit, each.removeprefix("1 x ")]
-    return [
-        *cells,
-        channels + (", ..." if not output.letters else ""),
-        _png(output),
-        f"{output.background:g}",
-    ]
+    return [*cells, channels, _png(output), f"{output.background:g}"]
 
 
 def _png(output: Output) -> str:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from dermis.batch.dataset import read_dataset
     from dermis.errors import DermisError
+    from dermis.frame.observation import Observation
     from dermis.frame.renderer import Renderer, render
     from dermis.human.person import Human
     from dermis.human.published import human_targets
@@ -56,6 +57,7 @@ _HOME = {
     "Tissue": "optics.tissue",
     "load_tissue": "optics.tissue",
     "Renderer": "frame.renderer",
+    "Observation": "frame.observation",
     "render": "frame.renderer",
     "Camera": "scene.camera",
     "portrait": "scene.camera",
@@ -90,6 +92,7 @@ __all__ = [
     "Head",
     "Human",
     "MovieWriter",
+    "Observation",
     "PointLight",
     "Pose",
     "RectangleLight",

@@ -49,7 +49,7 @@ def test_a_process_renders(folder: Path) -> None:
     assert (folder / "a.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize("words", [["--help"], ["render", "--help"], ["cite", "--help"], ["--version"]])
+@pytest.mark.parametrize("words", [["--help"], ["render", "--help"], ["batch", "--help"], ["cite", "--help"], ["--version"]])
 def test_help_loads_nothing_heavy(words: list[str]) -> None:
     """The help of a command that takes a model's fields needs the model, and with it pydantic."""
     heavy = {"numpy", "wgpu", "trimesh", "scipy"} | ({"pydantic"} if len(words) == 1 else set())
@@ -72,7 +72,7 @@ def test_help_of_the_whole_names_each_command(run: Run) -> None:
         assert len(line.split()) > 5  # with a sentence of what it does
 
 
-@pytest.mark.parametrize("command", ["render", "animate", "compare", "doctor", "cite"])
+@pytest.mark.parametrize("command", ["render", "animate", "batch", "compare", "doctor", "cite"])
 def test_help_of_each_command_shows_examples(run: Run, command: str) -> None:
     ended = run(command, "--help")
     assert (ended.code, ended.stderr) == (0, "")

@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 
 import pytest
+from observed import observed
 from tolerances import HALVES, TWIN
 
 from dermis.frame.levels import FLOATS, usual_texel
+from dermis.frame.observation import Observation
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device
 
@@ -26,3 +28,9 @@ def close(device: Device) -> float:
 @pytest.fixture(scope="session")
 def device(renderer: Renderer) -> Device:
     return renderer.device
+
+
+@pytest.fixture(scope="session")
+def seen(renderer: Renderer) -> dict[str, Observation]:
+    """People with labels and landmarks."""
+    return observed(renderer)

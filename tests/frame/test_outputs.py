@@ -11,6 +11,9 @@ from setups import front_camera, frontal, head_of, place, scene_of, settings_of
 from strand_setups import hairy
 
 from dermis.errors import DermisError
+from dermis.frame import resources
+from dermis.frame.asked import Asked
+from dermis.frame.limits import frame_bytes
 from dermis.frame.outputs import OUTPUTS
 from dermis.frame.rendered import Rendered
 from dermis.frame.renderer import Renderer
@@ -240,6 +243,9 @@ def test_heads_that_follow_another_begin_anew(renderer: Renderer) -> None:
     assert [bool(one.outputs["motion"].any()) for one in given] == [False, True]
     with pytest.raises(DermisError, match="previous: expected a scene of the same head"):
         drawn(renderer, SCENE, cut)
+    for fewer in ([], [None] * 2):
+        with pytest.raises(DermisError, match="previous: expected one for each scene"):
+            list(renderer.observe([SCENE], settings_of(), outputs=["motion"], previous=fewer))
 
 
 def test_what_is_not_asked_costs_nothing(renderer: Renderer) -> None:
@@ -256,6 +262,23 @@ def test_what_is_not_asked_costs_nothing(renderer: Renderer) -> None:
     assert 1 < len(depth) - len(bare) < len(most) - len(bare)
     one_sample = renderer.draw(SCENE, settings_of(size=SIZE), outputs=["depth"]).shown.outputs
     assert one_sample is not None and one_sample.centres is None
+
+
+def test_what_is_known_is_not_made_again(renderer: Renderer) -> None:
+    shapes = ["depth", "uv", "normal_geometric", "motion"]
+    renderer.draw(SCENE, settings_of(size=SIZE, samples=2), outputs=shapes)
+    renderer.draw(SCENE, settings_of(size=SIZE, samples=2), outputs=shapes)
+    assert renderer.graph.ran == []
+
+
+def test_outputs_count_where_sizes_are_refused(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As memory that the frame takes: 24 bytes a pixel for a normal and its copy."""
+    asked: list[Asked] = []
+    monkeypatch.setattr(resources, "check_limits", lambda _, one: asked.append(one))
+    for names in ([], ["normal"]):
+        renderer.draw(SCENE, settings_of(size=(10, 11)), outputs=names)
+    bare, more = (frame_bytes(one)["size"] for one in asked)
+    assert more == bare + 24 * 110
 
 
 @pytest.mark.parametrize("names", ["depth", ["depth", "colour"], [3], None])

@@ -15,7 +15,7 @@ import pytest
 from dermis.errors import DermisError
 from dermis.gpu import adapters as module
 from dermis.gpu import list_adapters, open_device
-from dermis.gpu.adapters import INSTALL_HINT, WANTED_FEATURES, fitting_adapters
+from dermis.gpu.adapters import INSTALL_HINT, WANTED_FEATURES, alike_adapters, fitting_adapters
 from dermis.gpu.default_limits import DEFAULT_LIMITS
 
 
@@ -70,6 +70,24 @@ def test_cpu_takes_the_software_adapter_with_all_features(machine: Any) -> None:
 def test_part_of_a_name_is_enough(machine: Any, wanted: str) -> None:
     machine(CPU, GPU)
     assert fitting_adapters(wanted)[0][0].name == "GeForce"
+
+
+def test_adapters_of_one_name_are_told_apart_by_their_numbers(machine: Any) -> None:
+    first, second = fake("H200", "DiscreteGPU"), fake("H200", "DiscreteGPU")
+    machine(CPU, first, second)
+    assert [one.number for one in list_adapters()] == [0, 1, 2]
+    assert fitting_adapters("#0")[0][0].handle is first
+    assert [one.handle for one in fitting_adapters("#1")[0]] == [second]
+    with pytest.raises(DermisError, match=r"adapter '#3': .*#0 H200 \(Vulkan\).*#2 llvmpipe"):
+        fitting_adapters("#3")
+
+
+def test_all_gpus_of_the_best_kind_are_taken_once_each(machine: Any) -> None:
+    twice = [fake("H200", "DiscreteGPU"), fake("H200", "DiscreteGPU")]
+    machine(CPU, fake("Iris", "IntegratedGPU"), *twice, fake("H200", "DiscreteGPU", "D3D12"), CPU)
+    assert [one.handle for one in alike_adapters("auto")] == twice
+    assert [one.handle for one in alike_adapters("#1")] == twice[1:]
+    assert [one.name for one in alike_adapters("cpu")] == ["llvmpipe"]
 
 
 def test_missing_features_are_told() -> None:

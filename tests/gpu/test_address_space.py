@@ -21,7 +21,7 @@ TOLD = re.compile(
     r"dermis: address space \(ulimit -v\): expected at least 2\.\d GB for .+, but the limit is [\d.]+ GB, "
     r"of which [\d.]+ GB are taken\. Raise it: ulimit -v unlimited\.\n"
 )
-ENOUGH = 2.5 * GB  # with the two threads of the software adapter that the test allows
+TOO_LITTLE, ENOUGH = 1.4, 4.0  # [GB] with the two threads of the software adapter that the test allows
 DRAW = "render", "ball.obj", "--size", "32x32", "--atlas", "64", "--shadow-size", "64", "--adapter", "cpu"
 
 
@@ -48,13 +48,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made
 
 
-@pytest.mark.parametrize("limit", [0.6, 1.4, 2.5])
+@pytest.mark.parametrize("limit", [0.6, TOO_LITTLE, 2.5, ENOUGH])
 def test_a_picture_under_a_limit_is_drawn_or_refused(folder: Path, limit: float) -> None:
+    """Between the two, what the machine's own libraries take decides; it never ends in a driver."""
     ended = limited(limit * GB, folder, *DRAW, "-o", f"{limit}.png")
-    drawn = limit * GB >= ENOUGH
-    assert ended.returncode == (0 if drawn else 2), ended.stderr[-1000:]
-    assert drawn == (folder / f"{limit}.png").exists()
+    drawn = ended.returncode == 0
     assert drawn or TOLD.fullmatch(ended.stderr), ended.stderr[-1000:]
+    assert drawn or (ended.returncode == 2 and limit < ENOUGH), ended.stderr[-1000:]
+    assert drawn == (folder / f"{limit}.png").exists()
+    assert not drawn or limit > TOO_LITTLE
 
 
 @pytest.mark.parametrize("limit", [1.0, 1.8])

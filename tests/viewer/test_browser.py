@@ -18,12 +18,15 @@ from chromium_input import (
     drag,
     head,
     height,
+    is_final,
+    listen,
     looks_like,
     pixels,
     shows_head,
     still,
     touch,
     visited,
+    wait,
     wait_for_picture,
 )
 from numpy.typing import NDArray
@@ -71,7 +74,10 @@ def url(head_file: Path) -> Iterator[str]:
 @pytest.fixture
 def page(browser: Any, url: str) -> Iterator[Any]:
     with visited(browser, url) as one:
+        assert wait(one, lambda: is_final(one))
+        known = len(one.frames_come)
         one.keyboard.press("1")  # the portrait, wherever the test before left the camera
+        assert wait(one, lambda: len(one.frames_come) > known)
         yield one
 
 
@@ -121,6 +127,7 @@ def test_a_reloaded_page_shows_the_head_again(page: Any) -> None:
 def watcher(browser: Any) -> Iterator[Any]:
     """A second page, closed whatever happens: it would watch the other tests, or be in command of them."""
     one = browser.new_page(viewport=SIZE)
+    listen(one)
     yield one
     one.close()
 
@@ -141,6 +148,7 @@ def test_a_second_page_watches_and_does_not_touch(page: Any, watcher: Any, url: 
 
 def test_one_finger_turns_the_head_and_two_come_nearer_and_pan(browser: Any, url: str) -> None:
     page = browser.new_context(viewport=SIZE, has_touch=True).new_page()
+    listen(page)
     page.goto(url)
     wait_for_picture(page)
     before = still(page, shows_head)

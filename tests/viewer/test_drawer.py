@@ -72,4 +72,4 @@ def test_a_phone_s_fingers_turn_the_head_and_open_the_drawer(browser: Any, shown
         assert wait(page, lambda: session.state.scene.camera.frame_mm < 0.9 * turned.frame_mm)
         page.touchscreen.tap(*session.positions["panel"])
         assert wait(page, lambda: panel.opened)
-        assert session.view_size == PHONE and pixels(page)[300, 5].max() > 15
+        assert session.view_size == PHONE and wait(page, lambda: pixels(page)[300, 5].max() > 15)

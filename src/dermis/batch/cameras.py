@@ -16,7 +16,7 @@ from dermis.scene.camera import Camera
 
 _SENSOR_MM = 24.0
 _MARGIN = 0.96  # of half the picture that the face may reach
-_STEPS = 8
+_STEPS = 10
 _FACE_MM = ((-90.0, -95.0, 5.0), (90.0, 100.0, 130.0))
 """Least and greatest places of a face, from the head's centre at rest."""
 Doubles = NDArray[np.float64]
@@ -49,17 +49,21 @@ def camera_of(
     back = np.array(towards(values["yaw_deg"], values["pitch_deg"]))
     position, up = middle + distance * back, _up(back, values["roll_deg"])
     shift = np.array([values["offset_x"], values["offset_y"]])
+
+    def aimed(share: float) -> tuple[Camera, float]:
+        """The camera with a share of the shift, and how far the face reaches, of half the picture."""
+        camera = _aimed(position, middle, up, frame, share * shift, aspect)
+        return camera, _reach(camera, face, aspect)
+
+    frame *= max(aimed(0.0)[1] / _MARGIN, 1.0)
+    camera, reach = aimed(1.0)
+    if reach <= _MARGIN:
+        return camera
+    least, most = 0.0, 1.0
     for _ in range(_STEPS):
-        camera = _aimed(position, middle, up, frame, shift, aspect)
-        low, high = _seen(camera, face, aspect)
-        size = float((high - low).max()) / (2.0 * _MARGIN)
-        if size <= 1.0 and min(low.min(), -high.max()) >= -_MARGIN - 1e-3:
-            break
-        if size > 1.0:
-            frame *= 1.01 * size
-            continue
-        shift = shift + np.maximum(-_MARGIN - low, 0.0) - np.maximum(high - _MARGIN, 0.0)
-    return camera
+        share = 0.5 * (least + most)
+        least, most = (share, most) if aimed(share)[1] <= _MARGIN else (least, share)
+    return aimed(least)[0]
 
 
 def _aimed(
@@ -78,12 +82,12 @@ def _aimed(
     return Camera(position=(x, y, z), target=_triple(target), up=_triple(up), frame_mm=frame_mm * scale)
 
 
-def _seen(camera: Camera, places: Doubles, aspect: float) -> tuple[Doubles, Doubles]:
-    """The least and the greatest x and y of points in the picture, -1 to 1 from edge to edge."""
+def _reach(camera: Camera, places: Doubles, aspect: float) -> float:
+    """How far from the picture's middle points are seen, 1 at its edges; far beyond what is not before it."""
     _, R, t = camera.to_opencv((1, 1))
     x, y, z = R @ places.T + t[:, None]
-    seen = np.stack([x / (aspect * z), -y / z]) / camera.half_tangent
-    return seen.min(axis=1), seen.max(axis=1)
+    seen = np.abs(np.stack([x / aspect, y])) / (camera.half_tangent * np.maximum(z, 1e-3))
+    return float(seen.max())
 
 
 def _up(back: Doubles, roll_deg: float) -> Doubles:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dermis.batch.dials import check_looks, check_skin, check_weights
@@ -10,6 +10,7 @@ from dermis.batch.distributions import Distribution
 from dermis.batch.tables import MIXTURE, NONE
 from dermis.errors import about, refuse
 from dermis.frame.outputs import asked_outputs
+from dermis.human.landmarks.points import SETS
 from dermis.scene.lights import NO_LIGHTS
 
 _ANCESTRY = "person.african", "person.asian", "person.caucasian"
@@ -20,6 +21,7 @@ def check_spec(spec: Any, drawn: Mapping[str, Distribution], expressions: Mappin
     """Refuse a spec that cannot be drawn, by table and key."""
     with about("outputs"):
         asked_outputs(spec.outputs)
+    _check_landmarks(spec.landmarks)
     check_looks(spec.person)
     check_skin(spec.skin)
     check_weights(spec.pose)
@@ -27,6 +29,12 @@ def check_spec(spec: Any, drawn: Mapping[str, Distribution], expressions: Mappin
     _check_expression(spec.expression.name, expressions)
     _check_correlated(spec.correlated, drawn)
     _check_light(drawn)
+
+
+def _check_landmarks(names: Sequence[str]) -> None:
+    for name in names:
+        if name not in SETS:
+            refuse("landmarks", f"some of {', '.join(SETS)}", f"{name!r} came", "Correct it")
 
 
 def _check_person(drawn: Mapping[str, Distribution]) -> None:

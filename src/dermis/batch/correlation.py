@@ -9,21 +9,25 @@ from pydantic import Field, model_validator
 
 from dermis.scene.plain import Plain
 
+_MOST_NAMES = 50
 _Coefficient = Annotated[float, Field(ge=-1, le=1)]
 
 
 class Correlated(Plain):
-    """Parameters by name, and the correlation of the normal numbers that they are drawn by."""
+    """Parameters by name, and the correlation of the normal numbers that they are drawn by.
 
-    of: Annotated[tuple[str, ...], Field(min_length=2, max_length=50)]
+    A greater number gives a greater value, and of a choice a later one.
+    """
+
+    of: tuple[str, ...]
     """Names of parameters, such as ["camera.yaw_deg", "head.yaw_deg"]; those of a person first."""
     correlation: _Coefficient | tuple[tuple[_Coefficient, ...], ...]
     """Of all pairs alike, or the matrix: rows of as many numbers as there are names."""
 
     @model_validator(mode="after")
     def _possible(self) -> Correlated:
-        if len(set(self.of)) < len(self.of):
-            raise ValueError("each name once")
+        if not 2 <= len(set(self.of)) == len(self.of) <= _MOST_NAMES:
+            raise ValueError(f"2 to {_MOST_NAMES} names, each once")
         if isinstance(self.correlation, tuple) and {len(self.of), *map(len, self.correlation)} != {
             len(self.correlation)
         }:

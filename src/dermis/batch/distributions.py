@@ -178,7 +178,7 @@ class Choice(Distribution):
         return {"choice": values, "weights": _floats(*self.weights)}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Files(Distribution):
     """One of the files of a pattern, each alike.
 
@@ -197,6 +197,9 @@ class Files(Distribution):
 
     def told(self) -> dict[str, Any]:
         return {"files": self.pattern}
+
+    def __repr__(self) -> str:
+        return repr(self.told())
 
 
 def _floats(*values: float) -> list[float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 from scipy.special import ndtr, ndtri
@@ -98,11 +98,11 @@ class Drawing:
     def _varied(self, k: int, name: str) -> float:
         return self._normal(k, f"expression.variation.{name}")
 
-    @property
+    @cached_property
     def _own(self) -> dict[str, Distribution]:
         return {name[5:]: one for name, one in self.drawn.items() if name.startswith("pose.")}
 
-    @property
+    @cached_property
     def targets(self) -> tuple[str, ...]:
         """Names of all targets that the spec can move, sorted."""
         names = {name for end in self.drawn["expression.name"].ends for name in self._moved(str(end))}

@@ -16,17 +16,17 @@ _MOST_FILES = 100_000
 _MOST_BYTES = 4 << 30
 
 
-def matched(value: Any, folder: Path, key: str = "") -> Any:
-    """The tables of a spec with the files of each {files = PATTERN} found, in the order of their names.
+def matched(value: Any, folder: Path, key: str) -> Any:
+    """A value of a spec with the files of each {files = PATTERN} in it found, in the order of their names.
+
+    key : of the value
 
     Raises DermisError for patterns that no file matches.
     """
     if isinstance(value, Mapping):
-        if value.keys() == {"files"} and isinstance(value["files"], str) and key:
+        if value.keys() == {"files"} and isinstance(value["files"], str):
             return _files(value["files"], folder, key)
-        return {
-            name: matched(one, folder, f"{key}.{name}" if key else str(name)) for name, one in value.items()
-        }
+        return {name: matched(one, folder, f"{key}.{name}") for name, one in value.items()}
     return value
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -99,7 +99,7 @@ class SceneMaker:
             head, skin = self._loaded(self._named(parameters[_HEAD]))
         else:
             person = drawn_person(parameters)
-            head, skin = person.head(subdivide=self._levels), skin_of(person)
+            head, skin = person.head(subdivide=_levels(self.spec.size)), skin_of(person)
         return _Seen(head, face_points(head), skin)
 
     def _loaded(self, name: str) -> tuple[Head, Skin]:
@@ -113,11 +113,6 @@ class SceneMaker:
         """The file of a name in the spec's folder, else the name, of something in the package."""
         file = self.spec.folder / name
         return str(file) if is_file(file) else name
-
-    @cached_property
-    def _levels(self) -> int:
-        """Levels of subdivision, alike for all drawn people, who share their topology then."""
-        return max(LEAST_OF_PEOPLE, SmoothIn(size=self.spec.size)(Human().head(subdivide=0)))
 
     def _weights(self, parameters: Mapping[str, Any], head: Head) -> dict[str, float]:
         """Weights of the targets that the head has, and of those that the spec's [pose] names."""
@@ -146,6 +141,12 @@ def drawn_person(parameters: Mapping[str, Any]) -> Human:
         elif f"person.{name}" not in _UNKNOWING:
             given[name] = value
     return Human.drawn(int(parameters[_SEED]), **given)
+
+
+@cache
+def _levels(size: tuple[int, int]) -> int:
+    """Levels of subdivision, alike for all drawn people, who share their topology then."""
+    return max(LEAST_OF_PEOPLE, SmoothIn(size=size)(Human().head(subdivide=0)))
 
 
 def _makes(name: str) -> bool:

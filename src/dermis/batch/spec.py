@@ -25,9 +25,9 @@ from dermis.batch.tables import (
     EnvironmentTable,
     ExpressionTable,
     GazeTable,
-    HeadTable,
     LightTable,
     PersonTable,
+    TurnTable,
 )
 from dermis.errors import about, refuse, shown_value
 from dermis.quantities import whole_number
@@ -86,7 +86,7 @@ class Spec(Plain):
     """Expressions of the spec's own: weights of targets, or of pairs without Left and Right."""
     pose: dict[str, Annotated[Distribution, Anything()]] = Field(default_factory=dict)
     """Weights of morph targets, or of pairs, in place of those that the expression gives."""
-    head: HeadTable = HeadTable()
+    head: TurnTable = TurnTable()
     """How the head is turned."""
     gaze: GazeTable = GazeTable()
     """Where the eyes look."""
@@ -104,7 +104,7 @@ class Spec(Plain):
     """Parameters that go together."""
     files: dict[str, str] = Field(default_factory=dict)
     """SHA-256 of each file that the spec names; found when it is read, and checked where it is stated."""
-    folder: Path = Path()
+    folder: Path = Field(default=Path(), exclude=True)
     """Where those files lie; no part of a spec's text."""
 
     _drawing: Drawing = PrivateAttr()
@@ -187,7 +187,9 @@ def spec_of(tables: Mapping[str, Any], folder: Path = Path()) -> Spec:
     """
     if "folder" in tables:
         refuse("folder", "no such key", "it came", "Files lie relative to the spec's own folder")
-    given = dict(matched(tables, folder))
+    given = {
+        name: table if name == "files" else matched(table, folder, name) for name, table in tables.items()
+    }
     given["render"] = _render(given.pop("size", (512, 512)), given.get("render", {}))
     if isinstance(groups := given.get("correlated", ()), list | tuple):
         given["correlated"] = tuple(_made(Correlated, "correlated", group) for group in groups)

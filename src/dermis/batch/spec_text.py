@@ -36,4 +36,4 @@ def _tables(title: str, values: Mapping[str, Any]) -> list[str]:
             below += [table_text(f"[[{whole}]]", plain_values(one)) for one in value]
         else:
             own[name] = value.told() if isinstance(value, Distribution) else value
-    return [table_text(f"[{title}]" if title else "", own), *below] if own else below
+    return [table_text(f"[{title}]" if title else "", own), *below] if own or not below else below

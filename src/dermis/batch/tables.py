@@ -80,7 +80,7 @@ class ExpressionTable(Plain):
     """How much each movement differs from what the expression says: standard deviation of the logarithm."""
 
 
-class HeadTable(Plain):
+class TurnTable(Plain):
     """How the head is turned by the neck."""
 
     yaw_deg: Annotated[Distribution, Within(-60, 60, "degrees that a neck turns")] = Constant(0.0)
@@ -131,7 +131,7 @@ class LampTable(Plain):
     pitch_deg: Annotated[Distribution, _LEAN] = Constant(0.0)
     """Above it [degrees]."""
     distance_mm: Annotated[Distribution, Within(400, 20_000, "mm: not in the face")] = Constant(1300.0)
-    """From the middle of the face [mm]."""
+    """From the middle of the head [mm]."""
     size_mm: Annotated[Distribution, Within(10, 3000, "mm: from a flashlight to a wall")] = Constant(500.0)
     """Length of its sides [mm]."""
     strength: Annotated[Distribution, _STOPS] = Constant(1.0)

@@ -10,6 +10,7 @@ from typing import Any
 COMMANDS = {
     "render": "Render a head to a PNG (sRGB) or EXR (linear float) image.",
     "animate": "Draw a head that moves, as a movie or as numbered pictures.",
+    "batch": "Draw a data set of many people, with ground truth, on one machine or many.",
     "view": "Turn a head, its skin and its light in a window or a web page.",
     "profile": "Compute how light spreads below a skin, and fit Gaussians to it.",
     "head": "Make a person of the parametric human and write it as glTF.",

@@ -39,7 +39,7 @@ def examine(wanted: str) -> dict[str, Any]:
     from dermis.private import cache_folder
 
     found = [
-        {"name": a.name, "driver": a.driver, "kind": a.kind, "backend": a.backend}
+        {"number": a.number, "name": a.name, "driver": a.driver, "kind": a.kind, "backend": a.backend}
         | {"features": {feature: feature in a.features for feature in WANTED_FEATURES}}
         for a in list_adapters()
     ]
@@ -109,7 +109,7 @@ def _lines(report: dict[str, Any]) -> list[str]:
     lines = ["adapters:"]
     for one in report["adapters"]:
         features = ", ".join(f"{name} {mark[has]}" for name, has in one["features"].items())
-        lines.append(f"  {one['name']}, {one['backend']} ({one['kind']}): {features}")
+        lines.append(f"  #{one['number']} {one['name']}, {one['backend']} ({one['kind']}): {features}")
     if used := report["used"]:
         test = report["self_test"]
         lines.append(f"used: {used['name']}, {used['backend']}, because {used['reason']}")

@@ -37,7 +37,12 @@ def _colour(_: type, tokens: Sequence[Token]) -> tuple[float, float, float]:
 Json = Annotated[
     bool, Parameter(name="--json", negative="", show_default=False, help="Print one JSON object.")
 ]
-Adapter = Annotated[str, Parameter(help="auto (the best), cpu (software), or a part of an adapter's name.")]
+Adapter = Annotated[
+    str,
+    Parameter(
+        help="auto (the best), cpu (software), a part of an adapter's name, or its number as #1 (see doctor)."
+    ),
+]
 Output = Annotated[Path | None, Parameter(name=("--output", "-o"))]
 _LENGTHS_MM = 1e-6, 1e4
 NOTHING: dict[str, Any] = {}

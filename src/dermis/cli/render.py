@@ -13,6 +13,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from dermis.cli.console import note, print_json, print_lines, working_on
+from dermis.cli.frame_landmarks import FrameLandmarks, Landmarks
 from dermis.cli.frame_outputs import Format, FrameOutputs, Outputs
 from dermis.cli.options import Adapter, Json
 from dermis.cli.scene_options import DEFAULTS, SceneOptions, assemble, note_levels
@@ -31,6 +32,7 @@ def render(
     scene: SceneOptions = DEFAULTS,
     outputs: Outputs = None,
     outputs_format: Format = None,
+    landmarks: Landmarks = None,
     adapter: Adapter = "auto",
     as_json: Json = False,
 ) -> int:
@@ -52,6 +54,8 @@ def render(
 
         dermis render --outputs depth,normal,uv -o face.exr
 
+        dermis render human:7 --outputs label --landmarks ibug-68 -o face.png
+
     Parameters
     ----------
     head:
@@ -68,6 +72,7 @@ def render(
 
     check_output(output)
     more = FrameOutputs(outputs, outputs_format, output)
+    marked = FrameLandmarks(landmarks, output)
     from dermis.frame.renderer import Renderer
     from dermis.gpu.address_space import check_listing
 
@@ -76,8 +81,9 @@ def render(
         opening = beside.submit(Renderer, adapter)  # its driver starts and compiles while the head loads
         with working_on("loading"):
             described, settings = assemble(head, scene)
+            marked.check(described.head)
         note_levels(head, scene, described.head)
-        return _draw_and_report(described, settings, output, more, opening, as_json, started)
+        return _draw_and_report(described, settings, output, (more, marked), opening, as_json, started)
 
 
 @contextlib.contextmanager
@@ -96,11 +102,12 @@ def _draw_and_report(
     scene: Any,
     settings: Any,
     output: Path,
-    more: FrameOutputs,
+    besides: tuple[FrameOutputs, FrameLandmarks],
     opening: Future[Any],
     as_json: bool,
     started: float,
 ) -> int:
+    more, marked = besides
     with working_on("rendering"):
         renderer = opening.result()
         rendered = renderer.draw(scene, settings, outputs=more.names)
@@ -116,9 +123,11 @@ def _draw_and_report(
     _note_light(scene, settings, rendered.suns)
     _write(rendered, settings, output, more, values)
     _note_clipped(rendered)
+    marked.write(renderer, scene, settings)
     report = {
         "image": str(output),
         **({"outputs": more.report} if more.names else {}),
+        **({"landmarks": str(marked.path)} if marked.names else {}),
         "adapter": renderer.device.adapter.name,
         "size": list(settings.size),
         "atlas": settings.atlas,

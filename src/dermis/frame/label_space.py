@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from dermis.frame.asked import Asked
+from dermis.frame.passes.outputs.labels import LabelSpace
 from dermis.frame.strands import has_strands
 from dermis.gpu import Device, Memo
 from dermis.human.labels.classes import label_classes
@@ -16,22 +16,6 @@ from dermis.human.labels.of_human import hair_classes
 from dermis.mesh.head import Head
 
 STAGE = "label"
-
-
-@dataclass(frozen=True, eq=False)
-class LabelSpace:
-    """Buffers as label.wgsl and hair_label.wgsl read them.
-
-    tables : by their names there
-    fields : how many there are
-    classes : of the hairs, None for no hairs
-    hairs : what hairs make of each pixel
-    """
-
-    tables: dict[str, Any]
-    fields: int
-    classes: Any | None
-    hairs: Any
 
 
 def label_space(memo: Memo, device: Device, asked: Asked) -> LabelSpace | None:

@@ -14,7 +14,9 @@ from dermis.gpu import Device
 from dermis.human.landmarks.points import LandmarkPoints, check_landmarks, landmark_points
 from dermis.mesh.head import Head
 
-_ROW = np.dtype([("corner", "u4", 4), ("share", "f4", 4), ("material", "u4", 4)])  # as landmarks.wgsl reads it
+_ROW = np.dtype(
+    [("corner", "u4", 4), ("share", "f4", 4), ("material", "u4", 4)]
+)  # as landmarks.wgsl reads it
 _FOUND = 4  # floats of each: place, and whether it is seen
 
 

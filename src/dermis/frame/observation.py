@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
+from itertools import zip_longest
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.errors import refuse
 from dermis.frame.passes.pack import Leaving
 from dermis.gpu.memo import same
 from dermis.scene.head_pose import gaze, head_pose
@@ -17,6 +19,8 @@ from dermis.scene.model import Scene
 from dermis.scene.opencv import OpenCvCamera
 from dermis.scene.settings import Settings
 from dermis.summary import Summarised
+
+_MISSING: Any = object()
 
 
 class Landmarks(NamedTuple):
@@ -56,18 +60,19 @@ class Observation(Summarised):
 
 
 def observed_frames(
-    send: Callable[[Scene, Scene | None], Leaving],
+    send: Callable[..., Leaving],
     scenes: Iterable[Scene],
     previous: Scene | Iterable[Scene | None] | None,
-    settings: Settings,
+    settings: Iterable[Settings],
 ) -> Iterator[tuple[Callable[[], Leaving], Callable[[Leaving], Observation]]]:
     """What submits the frame of each scene, and what takes what has arrived of it, for `arriving`.
 
-    send : submits the frame of a scene after another
+    send : submits the frame of a scene after another, with `settings`
     previous : as of `with_previous`
+    settings : of each
     """
-    for scene, before in with_previous(scenes, previous):
-        yield partial(send, scene, before), partial(_observed, scene, settings)
+    for (scene, before), chosen in zip(with_previous(scenes, previous), settings, strict=False):
+        yield partial(send, scene, before, settings=chosen), partial(_observed, scene, chosen)
 
 
 def _observed(scene: Scene, settings: Settings, leaving: Leaving) -> Observation:
@@ -93,7 +98,10 @@ def with_previous(
         those of all scenes
     """
     if isinstance(previous, Iterable):
-        yield from zip(map(Scene.of, scenes), previous, strict=True)
+        for given, told in zip_longest(scenes, previous, fillvalue=_MISSING):
+            if given is _MISSING or told is _MISSING:
+                refuse("previous", "one for each scene", "there are fewer or more", "Write None for none")
+            yield Scene.of(given), told and Scene.of(told)
         return
     before = previous
     for given in scenes:

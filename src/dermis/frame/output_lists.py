@@ -30,7 +30,7 @@ def _words(output: Output) -> tuple[tuple[str, str], ...]:
     return ("type", kind), ("nothing", f"{kind}({nothing})")
 
 
-def label_numbers() -> dict[str, float]:
+def label_numbers() -> dict[str, int]:
     """Numbers that the shaders of labels fill in."""
     names = "right_brow", "left_brow", "hair", "beard", "lashes"
     return {f"class_{name}": class_number(name) for name in names} | {"class_count": len(label_classes())}

@@ -29,8 +29,8 @@ class Levels(NamedTuple):
 class Output:
     """Something that a frame can tell of each pixel's centre.
 
-    stage : the shader that makes it, passes/outputs/STAGE.wgsl; it has `fn NAME_output(seen: Seen)`, which
-        returns a number or a vector
+    stage : the shader that makes it, passes/outputs/STAGE.wgsl; it has `fn NAME_output(seen: Seen)`, or of
+        what else the stage finds, which returns a number or a vector
     letters : of its channels, by which files name them; empty for a channel for each light
     kind : of its numbers, as NumPy names it; a word and not NumPy's own, for a command's help to be quick
     unit : of its numbers, empty for none

@@ -40,6 +40,7 @@ from dermis.scene.techniques import TECHNIQUES
 
 _SLACK_MM = 10.0  # that a rig's outermost points may miss of a pose
 Lights = tuple[Light, ...]
+Names = tuple[str, ...]
 
 
 class Moved(NamedTuple):
@@ -85,7 +86,12 @@ class Preparation:
         return inputs
 
     def _inputs(
-        self, scene: Scene, settings: Settings, technique: Technique, view: str, more: tuple[tuple[str, ...], ...]
+        self,
+        scene: Scene,
+        settings: Settings,
+        technique: Technique,
+        view: str,
+        more: tuple[Names, Names],
     ) -> Inputs:
         keep, device, head, around = self.memo.keep, self.device, scene.head.bare, scene.environment
         profile = self.profile_of(scene.skin)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
+from itertools import repeat
 from typing import Any, Literal, TypeVar, overload
 
 import numpy as np
@@ -90,7 +91,7 @@ class Renderer(Submitter):
         Raises DermisError for sizes over the device's limits and when the device fails.
         """
         settings = given_plain(Settings, settings or {}, "settings", "size=(512, 512)")
-        what = Scene.of(scene), settings, view, asked_outputs(outputs), previous
+        what = Scene.of(scene), settings, view, asked_outputs(outputs), previous and Scene.of(previous)
         return self.kept_open.run(partial(self._draw, anew, timed, *what))
 
     def _draw(self, anew: bool, timed: Timed, *what: Any) -> Rendered:
@@ -179,7 +180,7 @@ class Renderer(Submitter):
     def observe(
         self,
         scenes: Iterable[Scene],
-        settings: Settings | None = None,
+        settings: Settings | Iterable[Settings] | None = None,
         *,
         outputs: Iterable[str] = (),
         alpha: bool = False,
@@ -189,18 +190,20 @@ class Renderer(Submitter):
     ) -> Iterator[Observation]:
         """What is seen of each scene in turn, each yielded while the next ones are drawn.
 
+        settings : for all of them, or those of each
         outputs : names of what is wanted besides the picture
         alpha, linear : as of `render_many`
         previous : the scene before the first, as motion is counted from one to the next of the same head; or
             those before each
-        landmarks : names of sets (`dermis.human.landmarks.points.SETS`), or files of rows name,vertex
+        landmarks : names of sets (`dermis.human.landmarks.sets.SETS`), or files of rows name,vertex
 
         Raises DermisError as `draw` does.
         """
-        chosen = given_plain(Settings, settings or {}, "settings", "size=(512, 512)")
-        given = {"outputs": asked_outputs(outputs), "landmarks": asked_landmarks(landmarks)}
-        send = partial(self._send, settings=chosen, linear=linear, alpha=alpha, **given)
-        frames = observed_frames(send, scenes, previous, chosen)
+        if settings is None or isinstance(settings, Settings | Mapping):
+            settings = repeat(given_plain(Settings, settings or {}, "settings", "size=(512, 512)"))
+        asked = partial(self._send, outputs=asked_outputs(outputs), landmarks=asked_landmarks(landmarks))
+        send = partial(asked, linear=linear, alpha=alpha)
+        frames = observed_frames(send, scenes, previous, settings)
         return arriving(self.kept_open, lambda: self.device, frames)
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from dermis.errors import refuse
@@ -28,6 +29,7 @@ class Adapter:
     backend : "Vulkan" | "Metal" | "D3D12" | "OpenGL"
     features : the wanted features that it has
     handle : wgpu's own object
+    number : its place in `list_adapters`, by which "#1" names it: GPUs of one name are told apart by it
     """
 
     name: str
@@ -36,6 +38,7 @@ class Adapter:
     backend: str
     features: tuple[str, ...]
     handle: Any
+    number: int = 0
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -59,11 +62,14 @@ def list_adapters() -> list[Adapter]:
             found = [_describe(handle) for handle in wgpu.gpu.enumerate_adapters_sync()]
     except Exception as error:  # a broken driver may raise anything
         refuse("graphics drivers", "a list of adapters", f"they fail: {error}", INSTALL_HINT)
-    return sorted(found, key=lambda a: (_rank(a.kind), len(a.missing), a.backend == "OpenGL"))
+    found.sort(key=lambda a: (_rank(a.kind), len(a.missing), a.backend == "OpenGL"))
+    return [replace(one, number=number) for number, one in enumerate(found)]
 
 
 def fitting_adapters(wanted: str) -> tuple[list[Adapter], str]:
-    """Adapters for `wanted` ("auto", "cpu" or part of a name), the best first, and the reason for the choice.
+    """Adapters for `wanted`, the best first, and the reason for the choice.
+
+    wanted : "auto", "cpu", part of a name, or "#1" for the one at that place of `list_adapters`, from 0 on
 
     Raises DermisError when there is none.
     """
@@ -73,6 +79,8 @@ def fitting_adapters(wanted: str) -> tuple[list[Adapter], str]:
     if not adapters or (wanted in ("auto", "cpu") and not right):
         came = "this machine shows only OpenGL's" if adapters else "this machine shows none"
         refuse("adapter", "a Vulkan, Metal or DX12 adapter", came, INSTALL_HINT)
+    if match := re.fullmatch(r"#(\d{1,4})", wanted):
+        return [_numbered(adapters, int(match[1]))], f"it is the one with the number {match[1]}"
     if wanted == "auto":
         return right, "it is the fastest kind, with the most features"
     if wanted == "cpu":
@@ -82,9 +90,27 @@ def fitting_adapters(wanted: str) -> tuple[list[Adapter], str]:
         reason = f"its name contains {wanted!r}"
     if not fitting:
         names = ", ".join(f"{a.name} ({a.backend})" for a in adapters)
-        hint = INSTALL_HINT if wanted == "cpu" else "Choose auto, cpu or a part of one of those names"
+        hint = INSTALL_HINT if wanted == "cpu" else "Choose auto, cpu, a part of one of those names, or #0"
         refuse(f"adapter {wanted!r}", "one of this machine's adapters", f"it has {names}", hint)
     return fitting, reason
+
+
+def alike_adapters(wanted: str) -> list[Adapter]:
+    """The best adapter for `wanted` and those of its kind and backend, a GPU once whatever lists it too.
+
+    Raises DermisError as `fitting_adapters`.
+    """
+    (best, *others), _ = fitting_adapters(wanted)
+    if best.kind == "CPU":
+        return [best]
+    return [best, *(one for one in others if (one.kind, one.backend) == (best.kind, best.backend))]
+
+
+def _numbered(adapters: list[Adapter], number: int) -> Adapter:
+    if number >= len(adapters):
+        names = ", ".join(f"#{k} {one.name} ({one.backend})" for k, one in enumerate(adapters))
+        refuse(f"adapter '#{number}'", "one of this machine's adapters", f"it has {names}", "Correct it")
+    return adapters[number]
 
 
 def _describe(handle: Any) -> Adapter:

@@ -14,16 +14,20 @@ T = TypeVar("T")
 _REMEDY = "Close other programs that use the GPU, or try --adapter cpu"
 
 
-class DeviceLostError(DermisError):
+class DeviceError(DermisError):
+    """The device failed, or has no room: another one, or this one later, may do the same work."""
+
+
+class DeviceLostError(DeviceError):
     """A device that is gone, with all that was on it: its driver was reset, updated, or gave up."""
 
     def __init__(self, device: Device) -> None:
         self.name = device.adapter.name
         super().__init__(f"{self.name}: expected the device to last, but its driver lost it. {_REMEDY}.")
 
-    def again(self) -> DermisError:
+    def again(self) -> DeviceError:
         """What to say when the device that was opened after it is lost too."""
-        return DermisError(
+        return DeviceError(
             f"device: expected {self.name} to last for a frame, but it was lost twice. {_REMEDY}."
         )
 
@@ -45,7 +49,7 @@ def gpu_failures(device: Device) -> Iterator[None]:
             raise DeviceLostError(device) from error
         if not isinstance(error, wgpu.GPUError | MemoryError):
             raise
-        raise DermisError(
+        raise DeviceError(
             f"{device.adapter.name}: expected the frame to run, but the driver says: {error}. "
             "Lower --size, --samples or --atlas, close other programs that use the GPU, or try --adapter cpu."
         ) from error

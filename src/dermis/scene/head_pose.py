@@ -16,8 +16,8 @@ _BONE = "head"
 def head_pose(scene: Scene) -> Doubles:
     """(3, 4) from the head at rest to the camera: X_cam = R X + t [mm].
 
-    X is a place on the rigid head, from its centre where it rests: x to its left, y up, z ahead. The head goes
-    with the bone of that name; one without it stays, and R and t are the camera's own.
+    X is a place on the rigid head, from its centre where it rests: x to its left, y up, z ahead. The head
+    goes with the bone of that name; one without it stays, and R and t are the camera's own.
     """
     rotation, shift = _camera(scene)
     turned, moved = _rigid(scene)

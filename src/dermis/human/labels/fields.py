@@ -1,4 +1,4 @@
-"""How triangles are labelled: a class each, and distances over the surface by which parts of it are others."""
+"""How a mesh is labelled: a class for each triangle, and distances by which parts of them are of others."""
 
 from __future__ import annotations
 
@@ -46,8 +46,9 @@ def labelling(head: Head) -> Labelling:
     """The labelling of a head; of parametric humans the same for all of one layout and level."""
     if not is_human(head):
         return _labelling(head)
-    triangles = np.ascontiguousarray(head.mesh.triangles)
-    key = hashlib.blake2b(triangles, digest_size=16).digest() + bytes([head.strands is not None])
+    key = hashlib.blake2b(head.mesh.triangles.tobytes(), digest_size=16).digest() + bytes(
+        [head.strands is not None]
+    )
     with _ALONE:
         if key not in _KEPT:
             while len(_KEPT) >= _MOST_KEPT:
@@ -61,7 +62,8 @@ def _labelling(head: Head) -> Labelling:
     for material, side in zip(() if head.eyes is None else head.eyes.material, reversed(SIDES), strict=False):
         of_material[material] = class_number(f"{side}_eye")
     fields = _irises(head) | _skin(head)
-    points = np.stack(list(fields.values()), axis=1) if fields else np.zeros((int(head.mesh.point.max()) + 1, 0))
+    none = np.zeros((int(head.mesh.point.max()) + 1, 0))
+    points = np.stack(list(fields.values()), axis=1) if fields else none
     classes = np.array([class_number(name) for name in fields], np.uint8)
     return Labelling(
         of_material[head.mesh.material], classes, np.ascontiguousarray(points[head.mesh.point], np.float32)

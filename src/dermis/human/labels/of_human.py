@@ -71,7 +71,7 @@ def dense_fields() -> tuple[Doubles, Doubles]:
 
 
 def hair_classes(head: Head) -> NDArray[np.uint8]:
-    """(n,) class of each of the head's hairs, brows and lashes first; all are hair where nobody knows more."""
+    """(n,) class of each of the head's hairs, brows and lashes first; all hair where nobody knows."""
     both = [part for part in (head.strands, head.hair) if part is not None]
     quads = [part.roots.quad >> (2 * head.levels) for part in both]
     if not quads:

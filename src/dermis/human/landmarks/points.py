@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse, shown_value
+from dermis.human.landmarks.sets import SETS
 from dermis.human.regions.average import average_head, is_human
 from dermis.mesh.head import Head
 from dermis.mesh.strands import Roots, corners, finer_roots, weights
@@ -18,12 +19,6 @@ from dermis.quantities import whole_number
 from dermis.reading import named_path, read_text, understood
 from dermis.tables import Rows, parse_rows, read_rows
 
-SETS = {
-    "ibug-68": "the 68 of iBUG's 300-W",
-    "face-synthetics-70": "the same and both pupils, as in FaceSynthetics",
-    "mediapipe": "142 of MediaPipe's 478: outlines, the middle of the nose, the irises",
-}
-"""The package's tables and what is in them, for heads of the parametric human."""
 _MOST = 10_000
 _EXPECTED = "landmarks in CSV: rows of name,vertex"
 

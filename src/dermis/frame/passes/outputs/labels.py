@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from dermis.frame.geometry import HeadResources
-from dermis.frame.label_space import LabelSpace
 from dermis.frame.passes import program, strands
 from dermis.frame.passes.outputs import planes as outputs
 from dermis.frame.passes.outputs.geometry import look_of
@@ -14,6 +14,22 @@ from dermis.frame.projection import Triple
 from dermis.frame.strands import StrandResources
 from dermis.gpu import Recorder
 from dermis.gpu.program import Resources
+
+
+@dataclass(frozen=True, eq=False)
+class LabelSpace:
+    """Buffers as label.wgsl and hair_label.wgsl read them.
+
+    tables : by their names there
+    fields : how many there are
+    classes : of the hairs, None for no hairs
+    hairs : what hairs make of each pixel
+    """
+
+    tables: dict[str, Any]
+    fields: int
+    classes: Any | None
+    hairs: Any
 
 
 def draw(

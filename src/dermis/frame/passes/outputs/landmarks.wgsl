@@ -1,7 +1,6 @@
 // Where landmarks are, and whether the picture shows them.
 //#include "each.wgsl"
 //#include "seen.wgsl"
-//#include "in_picture.wgsl"
 
 override TOLERANCE_MM: f32; // by which the mesh may lie before a landmark that is seen
 
@@ -34,8 +33,9 @@ fn is_free(pixel: vec2u, size: vec2u, p: vec3f, material: u32) -> bool {
 // Whether one of the four pixels whose centres are around a place is free.
 fn is_seen(p: vec3f, material: u32) -> bool {
     let size = textureDimensions(centres);
-    let place = in_picture(look.rays, p, vec2f(size));
-    if (dot(p - look.rays.eye, look.rays.forward) <= 0.0 || any(place < vec2f(0.0)) || any(place >= vec2f(size))) {
+    let at = projected(look.rays, p, vec2f(size));
+    let place = at.xy;
+    if (at.z <= 0.0 || any(place < vec2f(0.0)) || any(place >= vec2f(size))) {
         return false;
     }
     let last = vec2i(size) - 1;

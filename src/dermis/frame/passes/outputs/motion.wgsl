@@ -19,17 +19,17 @@ fn place_before(vertex: u32) -> vec3f {
     return textureLoad(before_table, vertex_texel(vertex), 0).xyz;
 }
 
-fn place_now(vertex: u32) -> vec3f {
-    return position_of(vertex);
+fn mixed(w: vec3f, a: vec3f, b: vec3f, c: vec3f) -> vec3f {
+    return w.x * a + w.y * b + w.z * c;
 }
 
+// Not the difference of pixels, which is not 0 for equal ones where a product and the difference are rounded as one.
 fn motion_output(seen: Seen) -> vec2f {
-    let w = seen.weights;
     let t = seen.corners;
-    let size = vec2f(textureDimensions(centres));
-    let now = w.x * place_now(t.x) + w.y * place_now(t.y) + w.z * place_now(t.z);
-    let then = w.x * place_before(t.x) + w.y * place_before(t.y) + w.z * place_before(t.z);
-    return projected(look.rays, now, size).xy - projected(before.rays, then, size).xy;
+    let now = mixed(seen.weights, position_of(t.x), position_of(t.y), position_of(t.z));
+    let then = mixed(seen.weights, place_before(t.x), place_before(t.y), place_before(t.z));
+    let moved = in_picture(look.rays, now).xy - in_picture(before.rays, then).xy;
+    return vec2f(0.5, -0.5) * moved * vec2f(textureDimensions(centres));
 }
 
 @compute @workgroup_size(8, 8)

@@ -18,13 +18,18 @@ struct Seen {
 @group(0) @binding(50) var<uniform> look: Look;
 @group(0) @binding(51) var centres: texture_2d_array<u32>; // triangle + 1 at the centre of each pixel
 
-// Where a point is in the picture [pixel], and its depth [mm].
-fn projected(rays: Rays, p: vec3f, size: vec2f) -> vec3f {
+// Where a point is in the picture, from -1 to 1 to the right and up, and its depth [mm].
+fn in_picture(rays: Rays, p: vec3f) -> vec3f {
     let way = p - rays.eye;
     let depth = dot(way, rays.forward);
     let across = vec2f(dot(way, rays.right) / dot(rays.right, rays.right), dot(way, rays.up) / dot(rays.up, rays.up));
-    let ndc = across / depth - rays.shift;
-    return vec3f((0.5 + vec2f(0.5, -0.5) * ndc) * size, depth);
+    return vec3f(across / depth - rays.shift, depth);
+}
+
+// The same in pixels to the right and down.
+fn projected(rays: Rays, p: vec3f, size: vec2f) -> vec3f {
+    let seen = in_picture(rays, p);
+    return vec3f((0.5 + vec2f(0.5, -0.5) * seen.xy) * size, seen.z);
 }
 
 // The point of an edge that is nearest to a place in the picture: weights of its ends, and the distance [pixel].

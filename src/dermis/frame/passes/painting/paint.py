@@ -35,8 +35,8 @@ class PaintedTextures(NamedTuple):
 class PaintedTexels(NamedTuple):
     """What is painted, as skin.wgsl of the painting keeps it.
 
-    colour, specular, roughness : (n, n, 4) with how much there is of pores and of furrows, and the binary
-        logarithm of the mm in a unit of uv, in the channels beside
+    colour, specular, roughness : (n, n, 4); beside the specular how much there is of pores, and the binary
+        logarithm of the mm in a unit of uv; beside the roughness furrows, and shares of melanin and of blood
     height_mm : (n, n)
     """
 

@@ -1,0 +1,171 @@
+"""Data sets by Cycles and by us on one CPU, in one run: seconds for an image of a new person, and its noise.
+
+DERMIS_BLENDER_PYTHON=blender/bin/python python benchmarks/batch_peers.py
+
+Cycles renders people that `dermis head` wrote, with light below their skin, depth, normals and the number of
+the material, as those who make data sets with Blender do; ours come from `dermis batch`, with hair, brows and
+lashes, which the files for Cycles lack, and with labels and landmarks. Ten minutes on two idle cores.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from datetime import date
+from pathlib import Path
+from statistics import mean
+from typing import Annotated, Any
+
+from cyclopts import Parameter, run
+from peers import cpu_model
+
+import dermis
+from dermis.cli.console import print_lines
+from dermis.errors import DermisError, refuse
+from dermis.outputs import replacing
+from dermis.reference.cycles import blender_python
+
+ROOT = Path(__file__).resolve().parent
+RESULTS = ROOT / "results" / "batch_peers.json"
+SCRIPT = ROOT / "batch_peers_script.py"
+_LONGEST_S = 3600
+
+
+def main(
+    *,
+    people: int = 3,
+    images: int = 24,
+    side: int = 256,
+    samples: str = "16,64,256",
+    adapter: str = "cpu",
+    output: Annotated[Path, Parameter(name=("--output", "-o"))] = RESULTS,
+) -> int:
+    """Measure, print Markdown, and write the raw figures.
+
+    Parameters
+    ----------
+    people:
+        That Cycles renders.
+    images:
+        That dermis batch draws, each of a new person.
+    side:
+        Of pictures [pixel].
+    samples:
+        Paths through each pixel, with commas; each with and without denoising.
+    output:
+        Raw figures.
+    """
+    python = blender_python(None)
+    settings = [
+        {"name": f"{count} paths{', denoised' * clean}", "samples": int(count), "denoised": clean}
+        for count in samples.split(",")
+        for clean in (False, True)
+    ]
+    with tempfile.TemporaryDirectory(prefix="dermis-batch-peers-") as name:
+        folder = Path(name)
+        rows = [*_cycles(python, folder, people, side, settings), _ours(folder, images, side, adapter)]
+    report = {
+        "date": date.today().isoformat(),
+        "cpu": cpu_model(),
+        "cores": os.cpu_count(),
+        "side": side,
+        "versions": {"dermis": dermis.__version__, "python": platform.python_version()},
+        "rows": rows,
+    }
+    with replacing(output) as trial:
+        trial.write_text(json.dumps(report, indent=1), encoding="utf-8")
+    print_lines(table(report))
+    return 0
+
+
+def table(report: dict[str, Any]) -> str:
+    """The rows as Markdown."""
+    head = "| renderer | setting | s an image, by the clock | of all cores | noise |\n|---|---|---|---|---|"
+    return "\n".join([head, *map(_line, report["rows"])])
+
+
+def _line(row: dict[str, Any]) -> str:
+    noise = f"{row['noise']:.1%}" if row["noise"] else "none"
+    times = f"{row['seconds']:.3g} | {row['core_seconds']:.3g}"
+    return f"| {row['renderer']} | {row['setting']} | {times} | {noise} |"
+
+
+def _cycles(
+    python: Path, folder: Path, people: int, side: int, settings: list[dict[str, Any]]
+) -> list[dict[str, Any]]:
+    """A row for each setting, reading a person and building its scene included."""
+    for seed in range(people):
+        _run([*_DERMIS, "head", "--seed", str(seed), "--size", "1024", "-o", str(folder / f"{seed}.glb")])
+    plan = {"size": [side, side], "settings": settings}
+    (folder / "plan.json").write_text(json.dumps(plan), encoding="utf-8")
+    _run([str(python), "-I", str(SCRIPT), str(folder)])
+    done = json.loads((folder / "done.json").read_text(encoding="utf-8"))
+    rows = []
+    for name in (setting["name"] for setting in settings):
+        found = [(one["made"], one["settings"][name]) for one in done["people"]]
+        clock, cores = (mean(made[k] + one["times"][k] for made, one in found) for k in (0, 1))
+        noise = mean(one["noise"] for _, one in found)
+        renderer = f"Cycles of Blender {done['version']}"
+        rows.append(_row(renderer, name, clock, cores, noise))
+    return rows
+
+
+def _ours(folder: Path, images: int, side: int, adapter: str) -> dict[str, Any]:
+    """A row: what a run takes with its start, less what one of a single image takes."""
+    spec = folder / "spec.toml"
+    spec.write_text(_run([*_DERMIS, "batch", "--example"]), encoding="utf-8")
+    spent = [_batch(spec, folder / f"of-{count}", count, side, adapter) for count in (1, 1, 1 + images)]
+    clock, cores = ((spent[2][k] - spent[1][k]) / images for k in (0, 1))
+    return _row("dermis batch", "as its example", clock, cores, 0.0)
+
+
+def _batch(spec: Path, out: Path, count: int, side: int, adapter: str) -> tuple[float, float]:
+    """Seconds on the clock and of all cores for a data set of so many images."""
+    began, worked = time.perf_counter(), _cores_s()
+    size = ["--size", f"{side}x{side}", "--count", str(count), "--adapter", adapter]
+    _run([*_DERMIS, "batch", str(spec), "-o", str(out), *size, "--json"])
+    return time.perf_counter() - began, _cores_s() - worked
+
+
+def _row(renderer: str, setting: str, clock: float, cores: float, noise: float) -> dict[str, Any]:
+    return {
+        "renderer": renderer,
+        "setting": setting,
+        "seconds": clock,
+        "core_seconds": cores,
+        "noise": noise,
+    }
+
+
+def _cores_s() -> float:
+    """Of all processes that were started and have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+_DERMIS = (sys.executable, "-m", "dermis")
+
+
+def _run(command: list[str]) -> str:
+    """What a command prints.
+
+    Raises DermisError when it fails.
+    """
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST_S, check=False)
+    if ran.returncode != 0:
+        said = (ran.stderr.strip() or ran.stdout.strip() or "it said nothing").splitlines()[-1]
+        refuse(" ".join(command[:4]), "a command that works", said, "Try it by hand")
+    return ran.stdout
+
+
+if __name__ == "__main__":
+    try:
+        run(main)
+    except DermisError as error:
+        sys.exit(f"batch_peers: {error}")

@@ -1,0 +1,30 @@
+"""What a frame knows besides its colour.
+
+Depth, normals, motion since the frame before, light before and after it spreads, pigments, labels: each at
+the centre of every pixel, so that they agree. Hair is drawn over them.
+
+Deck: +
+Columns: 7
+"""
+
+import dermis
+from dermis.frame.outputs import OUTPUTS
+from dermis.gallery.output_colours import coloured
+from dermis.gallery.picture import main
+
+NAMES = [name for name in OUTPUTS if name not in ("normal_geometric", "label_face_synthetics")]
+BEFORE = dermis.Pose(bones={"head": (0, 12, 0)})
+SUN = dermis.DirectionalLight(direction=(0.75, -0.1, 0.65), irradiance=(6.0, 5.2, 4.2))  # from behind
+NOW = dermis.Pose({"jawOpen": 0.3}, bones={"head": (3, 18, 0)})
+
+
+def draw(studio):
+    camera = dermis.Camera(position=(-250, 10, 1050), frame_mm=270)
+    before = dermis.Scene("human:7", (*dermis.studio(), SUN), camera, pose=BEFORE)
+    now, settings = before.replace(pose=NOW), studio.settings()
+    rendered = studio.renderer.draw(now, settings, outputs=NAMES, previous=before)
+    return {"picture": rendered.srgb8()} | {name: coloured(name, rendered.output(name)) for name in NAMES}
+
+
+if __name__ == "__main__":
+    main(draw)

@@ -1,0 +1,230 @@
+"""`dermis batch`: a data set of many people, with what is known about each picture."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from dermis.cli.console import print_json, print_lines, working_on
+from dermis.cli.options import Adapter, Json, Whole, given, parse_size
+from dermis.cli.rate import rate_of_images
+from dermis.errors import refuse
+
+if TYPE_CHECKING:
+    from dermis.batch.run import Crew, Report
+    from dermis.batch.spec import Spec
+
+_MOST_PROCESSES = 1024
+Flag = Annotated[bool, Parameter(negative="", show_default=False)]
+
+
+def batch(
+    spec: Path | None = None,
+    /,
+    *,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    count: Whole = None,
+    size: str | None = None,
+    seed: Whole = None,
+    format: Literal["webdataset", "folder"] | None = None,
+    shard: str = "0/1",
+    adapter: Adapter = "auto",
+    adapters: str | None = None,
+    workers: Whole = None,
+    workers_per_gpu: Whole = None,
+    encoders: Whole = None,
+    scheduler: str | None = None,
+    cluster: Path | None = None,
+    keep_going: Flag = False,
+    dry_run: Flag = False,
+    example: Flag = False,
+    as_json: Json = False,
+) -> int:
+    """Draw a data set: people, faces, light and cameras from stated distributions, with ground truth.
+
+    An interrupted command goes on where it was when it is given again: shards that are whole are kept. The
+    same spec gives the same bytes on the same kind of adapter, however many workers draw it and wherever.
+
+    Examples:
+
+        dermis batch --example > spec.toml
+
+        dermis batch spec.toml --dry-run -o sheet.png
+
+        dermis batch spec.toml -o faces --count 2000 --size 512x512
+
+        dermis batch spec.toml -o /shared/faces --shard 3/16 --adapter "#0"
+
+        dermis batch spec.toml -o /shared/faces --scheduler tcp://head:8786
+
+    Parameters
+    ----------
+    spec:
+        What is drawn (.toml), see --example.
+    output:
+        Folder of the data set, made if it is not there; with --dry-run the contact sheet (.png).
+    count:
+        Number of images, in place of the spec's.
+    size:
+        Of the images, WIDTHxHEIGHT, in place of the spec's.
+    seed:
+        By which all is drawn, in place of the spec's.
+    format:
+        Shards as tar files of WebDataset, or as folders; in place of the spec's.
+    shard:
+        I/N: every N-th shard from the I-th on, counted from 0, for arrays of jobs that share a disk.
+    adapters:
+        Numbers of several, such as 0,1, as `dermis doctor` has them [all GPUs of the best kind].
+    workers:
+        Processes that draw [one for each GPU; on a software adapter one for two cores].
+    workers_per_gpu:
+        Processes that share a GPU, which Python alone does not fill [1].
+    encoders:
+        Processes of each worker that encode pictures; 0 lets it encode itself [by the number of cores].
+    scheduler:
+        Address of dask's scheduler, such as tcp://head:8786: each of its workers draws on a GPU of its own.
+    cluster:
+        The file that dask's scheduler wrote (dask scheduler --scheduler-file FILE), for its address.
+    keep_going:
+        Leave out images that cannot be made, and list them.
+    dry_run:
+        Print what would be drawn, draw the first 16 images as a contact sheet, and write no data set.
+    example:
+        Print a spec with comments that can be drawn as it is.
+    as_json:
+        Print one JSON object: counts, seconds, images/s, shards, what was skipped and what was left out.
+    """
+    if example:
+        from dermis.batch.spec import example_text
+
+        print_lines(example_text().rstrip("\n"))
+        return 0
+    part = _part(shard)
+    if spec is None:
+        refuse("SPEC", "a file", "none was named", "Print one to start from with --example")
+    read = _spec(spec, given(count=count, size=size and parse_size(size), seed=seed, format=format))
+    if dry_run:
+        return _dry_run(read, adapter, output or Path("dry-run.png"), as_json)
+    if output is None:
+        refuse("--output", "the folder of the data set", "none was named", "Name one with -o")
+    if scheduler is not None or cluster is not None:
+        elsewhere = given(adapters=adapters, workers=workers, workers_per_gpu=workers_per_gpu)
+        crew, each = _cluster(scheduler, cluster, adapter, elsewhere), _number("--encoders", encoders, 0)
+    else:
+        crew, each = _crew(adapter, adapters, workers, workers_per_gpu, encoders)
+    report = _drawn(read, output, crew, each, part, keep_going)
+    _tell(report, output, as_json)
+    return 0
+
+
+def _spec(path: Path, values: dict[str, Any]) -> Spec:
+    from dermis.batch.spec import load_spec
+
+    with working_on("reading the spec"):
+        return load_spec(path, **values)
+
+
+def _part(text: str) -> tuple[int, int]:
+    """What of --shard I/N."""
+    match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text)
+    if not match or int(match[1]) >= int(match[2]):
+        refuse("--shard", "I/N with I from 0 to N - 1, such as 3/16", f"{text!r} came", "Correct it")
+    return int(match[1]), int(match[2])
+
+
+def _number(option: str, value: int | None, least: int) -> int | None:
+    if value is not None and not least <= value <= _MOST_PROCESSES:
+        refuse(option, f"{least} to {_MOST_PROCESSES}", f"{value} came", "Correct it")
+    return value
+
+
+def _crew(
+    adapter: str, adapters: str | None, workers: int | None, per_gpu: int | None, encoders: int | None
+) -> tuple[Crew, int]:
+    """Processes of this machine, and how many encoders each has."""
+    from dermis.batch.processes import Processes
+    from dermis.batch.seats import Seating
+
+    if workers is not None and per_gpu is not None:
+        refuse("--workers-per-gpu", "no such option beside --workers", "it came", "Leave one of them out")
+    seating = Seating(
+        adapter,
+        _numbers(adapter, adapters),
+        _number("--workers", workers, 1),
+        _number("--workers-per-gpu", per_gpu, 1) or 1,
+        _number("--encoders", encoders, 0),
+    )
+    seats, each = seating.seats()
+    return Processes(seats), each
+
+
+def _numbers(adapter: str, adapters: str | None) -> tuple[int, ...]:
+    if adapters is None:
+        return ()
+    if adapter != "auto":
+        refuse("--adapters", "no such option beside --adapter", "it came", "Leave one of them out")
+    if not re.fullmatch(r"\d{1,4}(,\d{1,4})*", adapters):
+        refuse("--adapters", "numbers with commas, such as 0,1", f"{adapters!r} came", "Correct it")
+    return tuple(map(int, adapters.split(",")))
+
+
+def _cluster(address: str | None, file: Path | None, adapter: str, elsewhere: dict[str, Any]) -> Crew:
+    from dermis.batch.distributed import Cluster
+
+    if address is not None and file is not None:
+        refuse("--cluster", "no such option beside --scheduler", "it came", "Leave one of them out")
+    for name in elsewhere:
+        option = f"--{name.replace('_', '-')}"
+        refuse(option, "no such option with dask's workers", "it came", "Start as many of them as you want")
+    return Cluster(address, file, adapter)
+
+
+def _drawn(
+    spec: Spec, out: Path, crew: Crew, encoders: int | None, part: tuple[int, int], keep_going: bool
+) -> Report:
+    from dermis.batch.run import run
+    from dermis.batch.worker import Work
+
+    with rate_of_images() as told:
+        return run(
+            Work(spec, out, encoders or 0, keep_going), crew, part, lambda now: told(now.images, now.to_draw)
+        )
+
+
+def _tell(report: Report, out: Path, as_json: bool) -> None:
+    rate = report.images / report.seconds if report.images else 0.0
+    if as_json:
+        failed = [{"image": one.number, "reason": one.reason} for one in report.failed]
+        values = {"folder": str(out), "images": report.images, "seconds": round(report.seconds, 3)}
+        values |= {"images_per_s": round(rate, 3), "shards": report.shards, "skipped": report.skipped}
+        print_json({**values, "failed": failed, "whole": report.is_whole})
+        return
+    kept = f" ({report.skipped} were there)" if report.skipped else ""
+    lines = [
+        f"{out}  {report.images:,} images in {report.shards:,} shards{kept}  {report.seconds:.1f} s"
+        + (f", {rate:.3g} images/s" if rate else "")
+    ]
+    lines += [f"left out: image {one.number}: {one.reason}" for one in report.failed]
+    if not report.is_whole:
+        lines.append("shards of other parts are missing still: index and datasheet come with the last one")
+    print_lines(*lines)
+
+
+def _dry_run(spec: Spec, adapter: str, sheet: Path, as_json: bool) -> int:
+    from dermis.batch.preview import dry_run, table_lines
+    from dermis.images.io import check_output, write_png
+
+    check_output(sheet)
+    if sheet.suffix.lower() != ".png":
+        refuse(sheet, "a name that ends in .png", "it does not", "Name the contact sheet, or leave -o out")
+    with working_on("drawing a contact sheet"):
+        rows, picture = dry_run(spec, adapter)
+    write_png(sheet, picture)
+    if as_json:
+        print_json({"sheet": str(sheet), "parameters": rows})
+    else:
+        print_lines(*table_lines(rows), str(sheet))
+    return 0

@@ -1,0 +1,8 @@
+"""Names of the package's sets of landmarks."""
+
+SETS = {
+    "ibug-68": "the 68 of iBUG's 300-W",
+    "face-synthetics-70": "the same and both pupils, as in FaceSynthetics",
+    "mediapipe": "142 of MediaPipe's 478: outlines, the middle of the nose, both irises",
+}
+"""The package's tables and what is in them, for heads of the parametric human."""

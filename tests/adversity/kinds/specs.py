@@ -1,0 +1,63 @@
+"""Specs of data sets, with the files that they name."""
+
+from __future__ import annotations
+
+from functools import cache
+from random import Random
+
+from adversity.case import WRONG, FoundError, Input, Plan
+from adversity.checks import check_finite
+from adversity.kind import Kind
+from adversity.kinds.pictures import picture_bytes
+
+_MORE = """
+images_per_person = 2
+[person.skin]
+melanin = {log_uniform = [0.005, 0.2]}
+[person.hair]
+style = {choice = ["none", "short"]}
+[person.targets]
+"nose/nose-hump-incr" = {normal = [0, 0.1]}
+[expression]
+name = {choice = ["own", "mixture"]}
+[expressions.own]
+mouthSmile = 0.4
+[pose]
+jawOpen = {uniform = [0, 0.3]}
+[environment]
+name = {files = "*.hdr"}
+[[correlated]]
+of = ["camera.yaw_deg", "camera.pitch_deg", "head.yaw_deg"]
+correlation = [[1, 0.2, 0.5], [0.2, 1, 0], [0.5, 0, 1]]
+"""
+_IMAGES = 8
+
+
+@cache
+def _texts() -> tuple[str, ...]:
+    """The package's example, one with what that leaves out, and its whole text."""
+    from dermis.batch.spec import example_text, spec_of
+
+    return example_text(), _MORE, spec_of({"seed": 3}).text()
+
+
+def _spec(rng: Random) -> Input:
+    files = {"spec.toml": rng.choice(_texts()).encode(), "sky.hdr": picture_bytes("sky.hdr")}
+    return Input(files, {"file": "spec.toml"}, ("spec.toml",))
+
+
+def _take_spec(plan: Plan) -> None:
+    """Whatever is taken is drawn, and reads as the same from its own text."""
+    import tomllib
+    from pathlib import Path
+
+    from dermis.batch.spec import load_spec, spec_of
+
+    spec = load_spec(plan["file"])
+    for k in range(min(spec.count, _IMAGES)):
+        check_finite(spec.parameters(k), "parameters")
+    if spec_of(tomllib.loads(spec.text()), Path(plan["file"]).parent) != spec:
+        raise FoundError(WRONG, "the text of a spec reads as another one")
+
+
+KINDS = (Kind("spec", _spec, _take_spec, share=12),)

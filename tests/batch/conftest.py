@@ -1,0 +1,31 @@
+"""A small data set, drawn once and undisturbed, which others have to equal byte for byte."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from batch.small_set import contents, drawn, read, write_spec
+
+from dermis.batch.spec import Spec
+
+
+@pytest.fixture(scope="package")
+def small_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """With spec.toml and what it names."""
+    folder = tmp_path_factory.mktemp("batch")
+    write_spec(folder)
+    return folder
+
+
+@pytest.fixture(scope="package")
+def small_spec(small_folder: Path) -> Spec:
+    return read(small_folder / "spec.toml")
+
+
+@pytest.fixture(scope="package")
+def undisturbed(small_folder: Path, small_spec: Spec) -> dict[str, bytes]:
+    """Files of the data set by their names."""
+    report = drawn(small_spec, small_folder / "undisturbed")
+    assert report.is_whole and not report.failed
+    return contents(small_folder / "undisturbed")

@@ -1,0 +1,76 @@
+"""A data set that is drawn in a moment: a ball of two sizes, seen from around."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from small_head import obj_text
+
+from dermis.batch.processes import Processes, Seat
+from dermis.batch.run import Report, run
+from dermis.batch.spec import Spec, load_spec
+from dermis.batch.worker import Work
+
+COUNT = 10
+SHARD_SIZE = 2
+SHARDS = COUNT // SHARD_SIZE
+HERE = Seat("cpu", 1)
+_TEXT = f"""
+count = {COUNT}
+seed = 3
+size = [32, 32]
+shard_size = {SHARD_SIZE}
+outputs = ["depth", "normal"]
+landmarks = []
+
+[render]
+atlas = 64
+samples = 1
+shadow_size = 64
+transmission = "none"
+
+[person]
+head = {{choice = ["head.obj", "large.obj"]}}
+
+[gaze]
+at = "angles"
+
+[camera]
+yaw_deg = {{uniform = [-90, 90]}}
+"""
+
+
+def write_spec(folder: Path, *bad: str) -> Path:
+    """The spec and its heads in a folder.
+
+    bad : names of heads that cannot be read, which some images show
+    """
+    (folder / "head.obj").write_text(obj_text())
+    larger = re.sub(r"(?m)^v (\S+)", lambda match: f"v {float(match[1]) * 1.3:.6g}", obj_text())
+    (folder / "large.obj").write_text(larger)
+    for name in bad:
+        (folder / name).write_text("no head\n")
+    path = folder / "spec.toml"
+    listed = "".join(f', "{name}"' for name in bad)
+    path.write_text(_TEXT.replace('"large.obj"]', f'"large.obj"{listed}]'))
+    return path
+
+
+def read(path: Path) -> Spec:
+    return load_spec(path)
+
+
+def drawn(spec: Spec, out: Path, workers: int = 1, encoders: int = 0, **more: object) -> Report:
+    """Run to the end with processes."""
+    keep_going = bool(more.pop("keep_going", False))
+    return run(Work(spec, out, encoders, keep_going), Processes([HERE] * workers), **more)  # type: ignore[arg-type]
+
+
+def contents(out: Path) -> dict[str, bytes]:
+    """All files of a data set by their names."""
+    return {
+        path.relative_to(out).as_posix(): path.read_bytes()
+        for path in sorted(out.rglob("*"))
+        if path.is_file()
+    }

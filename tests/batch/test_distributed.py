@@ -1,0 +1,87 @@
+"""Workers of dask on this machine write the same bytes, also when some of them die."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from batch.small_set import COUNT, SHARDS, contents, read, write_spec
+
+from dermis.batch import distributed as module
+from dermis.batch.distributed import Cluster
+from dermis.batch.run import Progress, Report, run
+from dermis.batch.spec import Spec
+from dermis.batch.worker import Work
+from dermis.errors import DermisError
+
+Files = dict[str, bytes]
+pytestmark = pytest.mark.filterwarnings("ignore")  # dask's own
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    """Two processes with a thread each, which is how a worker of ours wants them."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(2, threads_per_worker=1, processes=True, dashboard_address=None) as made:
+        yield made
+
+
+def drawn(cluster: Any, spec: Spec, out: Path, told: Callable[[Progress], None] = lambda now: None) -> Report:
+    return run(Work(spec, out, encoders=1), Cluster(cluster.scheduler_address, None, "cpu"), told=told)
+
+
+def test_they_write_the_same(cluster: Any, small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
+    report = drawn(cluster, small_spec, tmp_path)
+    assert (report.images, report.shards, report.is_whole) == (COUNT, SHARDS, True)
+    assert contents(tmp_path) == undisturbed
+
+
+def test_one_that_is_killed_loses_nothing(
+    cluster: Any, small_spec: Spec, undisturbed: Files, tmp_path: Path
+) -> None:
+    killed: list[int] = []
+
+    def told(progress: Progress) -> None:
+        if not killed:
+            killed.append(next(iter(cluster.workers.values())).pid)
+            os.kill(killed[0], 9)
+
+    assert drawn(cluster, small_spec, tmp_path, told).is_whole
+    assert killed and contents(tmp_path) == undisturbed
+
+
+def test_a_bad_head_ends_the_run(cluster: Any, tmp_path: Path) -> None:
+    spec = read(write_spec(tmp_path, "bad.obj"))
+    with pytest.raises(DermisError, match=r"image \d: .*bad\.obj"):
+        drawn(cluster, spec, tmp_path / "out")
+
+
+def test_files_that_differ_on_a_worker_are_refused(cluster: Any, tmp_path: Path) -> None:
+    spec = read(write_spec(tmp_path))
+    (tmp_path / "head.obj").write_text((tmp_path / "large.obj").read_text())
+    with pytest.raises(DermisError, match=r"files: head\.obj: expected the file of hash"):
+        drawn(cluster, spec, tmp_path / "out")
+
+
+def test_a_disk_of_its_own_is_refused(tmp_path: Path) -> None:
+    client = SimpleNamespace(run=lambda sees, mark: {"tcp://a": sees(mark), "tcp://b": False})
+    with (
+        module._mark(tmp_path) as mark,
+        pytest.raises(DermisError, match=r"a disk that all workers share.*tcp://b"),
+    ):
+        module._check_disks(client, mark)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_scheduler_that_is_not_there_is_told(
+    small_spec: Spec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "_WAIT_S", 0.5)
+    with pytest.raises(DermisError, match=r"a scheduler of dask\.distributed"):
+        run(Work(small_spec, tmp_path), Cluster("tcp://127.0.0.1:9", None))
+    with pytest.raises(DermisError, match=r"cluster\.json: expected the file that dask's scheduler wrote"):
+        run(Work(small_spec, tmp_path), Cluster(None, tmp_path / "cluster.json"))

@@ -1,0 +1,92 @@
+"""The command as a process: ended at any moment it leaves nothing running, and goes on where it was."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from batch.small_set import SHARDS, contents
+
+pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processes are listed by /proc")
+_LONGEST_S = 20.0
+Files = dict[str, bytes]
+
+
+def started(spec: Path, out: Path) -> subprocess.Popen[bytes]:
+    """In a session of its own, by which its workers are found; Ctrl-C is not ignored."""
+    words = f"batch {spec} -o {out} --adapter cpu --workers 2 --encoders 1".split()
+    usual = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        return subprocess.Popen(
+            [sys.executable, "-m", "dermis", *words],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+        )
+    finally:
+        signal.signal(signal.SIGINT, usual)
+
+
+def session(number: int) -> list[int]:
+    """Its processes that are still running."""
+    found = []
+    for place in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, _, _, of = place.read_text().rpartition(")")[2].split()[:4]
+        except OSError:
+            continue
+        if int(of) == number and state != "Z":
+            found.append(int(place.parent.name))
+    return found
+
+
+def wait_for_shards(out: Path, count: int) -> None:
+    end = time.monotonic() + 120
+    while len(list(out.glob("shard-*.tar"))) < count and time.monotonic() < end:
+        time.sleep(0.01)
+
+
+def wait_until_all_left(number: int) -> None:
+    end = time.monotonic() + _LONGEST_S
+    while session(number) and time.monotonic() < end:
+        time.sleep(0.02)
+    assert session(number) == []
+
+
+def test_a_killed_driver_leaves_nobody_and_is_gone_on_with(
+    small_folder: Path, undisturbed: Files, tmp_path: Path
+) -> None:
+    rng, skipped = random.Random(5), 0
+    for shards in (0, 2):
+        driver = started(small_folder / "spec.toml", tmp_path)
+        wait_for_shards(tmp_path, shards)
+        time.sleep(rng.uniform(0.0, 1.0))
+        driver.kill()
+        driver.communicate()
+        wait_until_all_left(driver.pid)
+    skipped = len(list(tmp_path.glob("shard-*.tar")))
+    last = started(small_folder / "spec.toml", tmp_path)
+    said, notes = last.communicate()
+    assert (last.returncode, notes) == (0, b"") and session(last.pid) == []
+    assert f"({skipped} were there)".encode() in said and 2 <= skipped <= SHARDS
+    assert contents(tmp_path) == undisturbed
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_one_that_is_asked_to_end_keeps_what_is_whole(
+    small_folder: Path, undisturbed: Files, tmp_path: Path, number: signal.Signals
+) -> None:
+    driver = started(small_folder / "spec.toml", tmp_path)
+    wait_for_shards(tmp_path, 1)
+    # Ctrl-C reaches all that the terminal has started, not the driver alone.
+    os.killpg(driver.pid, number) if number == signal.SIGINT else driver.send_signal(number)
+    said, notes = driver.communicate()
+    assert (driver.returncode, said, notes) == (128 + number, b"", b"")
+    wait_until_all_left(driver.pid)
+    assert set(contents(tmp_path)) < set(undisturbed)

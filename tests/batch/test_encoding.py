@@ -1,0 +1,65 @@
+"""Encoders take arrays as they are, keep the order, and end with a word where one of them dies."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from dermis.batch.encoding import Encoders
+from dermis.batch.faults import LostProcessError
+from dermis.errors import DermisError
+
+
+def encode(number: int, array: np.ndarray) -> tuple[int, dict[str, bytes]]:
+    if number == 90:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if number == 80:
+        raise DermisError("image 80 cannot be encoded")
+    return number, {"raw": array.tobytes(), "pid": str(os.getpid()).encode()}
+
+
+def jobs(*numbers: int) -> Iterator[tuple[int, np.ndarray]]:
+    for number in numbers:
+        size = 50 if number < 6 else 200_000  # later ones need more room than the first
+        yield number, np.full((size, 3), number, np.float32)[:, ::2]
+
+
+def test_order_and_bytes_are_those_of_no_process_at_all() -> None:
+    numbers = range(9)
+    with Encoders(0, encode) as here, Encoders(2, encode) as there:
+        expected, found = list(here.encoded(jobs(*numbers))), list(there.encoded(jobs(*numbers)))
+    assert [(number, one["raw"]) for number, one in found] == [
+        (number, one["raw"]) for number, one in expected
+    ]
+    pids = {one["pid"] for _, one in found}
+    assert str(os.getpid()).encode() not in pids and len(pids) >= 2
+
+
+def test_jobs_are_asked_for_only_a_few_ahead() -> None:
+    asked: list[int] = []
+
+    def watched() -> Iterator[tuple[int, np.ndarray]]:
+        for job in jobs(*[1] * 20):
+            asked.append(1)
+            yield job
+
+    with Encoders(1, encode) as encoders:
+        found = encoders.encoded(watched())
+        next(found)
+        assert len(asked) <= 4
+        found.close()  # type: ignore[attr-defined]
+        assert [number for number, _ in encoders.encoded(jobs(1, 2))] == [1, 2]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are POSIX's")
+def test_one_that_dies_is_told_and_others_come_in_its_place() -> None:
+    with Encoders(1, encode) as encoders:
+        with pytest.raises(LostProcessError, match="SIGKILL"):
+            list(encoders.encoded(jobs(1, 90, 2)))
+        with pytest.raises(DermisError, match="image 80"):
+            list(encoders.encoded(jobs(1, 80, 2)))
+        assert [number for number, _ in encoders.encoded(jobs(1, 2))] == [1, 2]

@@ -1,0 +1,85 @@
+"""Expressions of data sets: names that the human has, and mixtures in which nothing works against itself."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from dermis.batch.expressions import mixed, mixture, package_expressions, performed, targets_of
+from dermis.batch.sampling import uniform
+from dermis.human.person import Human
+
+MANY = 3000
+AGAINST = (
+    {"mouthSmile", "mouthFrown"},
+    {"browDown", "browInnerUp"},
+    {"eyeWide", "eyeSquint"},
+    {"eyeWide", "eyeBlink"},
+    {"jawLeft", "jawRight"},
+    {"mouthLeft", "mouthRight"},
+    {"mouthPucker", "mouthPress"},
+)
+
+
+def drawn(seed: int) -> dict[str, float]:
+    return {name: one for name, one in mixed(partial(uniform, seed, 0)).items() if one > 0}
+
+
+def none(name: str) -> float:
+    return 0.0
+
+
+@pytest.fixture(scope="module")
+def targets() -> set[str]:
+    return {*Human().head(subdivide=0).targets}
+
+
+def test_all_that_the_package_moves_the_human_has(targets: set[str]) -> None:
+    moved = [name for weights in package_expressions().values() for name in weights]
+    moved += [name for part in mixture().values() for one in part for name in one.moves]
+    assert set(targets_of(moved)) <= targets
+    assert targets_of(["mouthSmile", "jawOpen", "mouthLeft"]) == (
+        "mouthSmileLeft",
+        "mouthSmileRight",
+        "jawOpen",
+        "mouthLeft",
+    )
+
+
+def test_chances_of_a_part_leave_it_room_to_rest() -> None:
+    for part in mixture().values():
+        assert 0 < sum(one.chance for one in part) < 1
+        assert all(0 < one.most <= 1 and 0 <= one.shuts <= 1 for one in part)
+
+
+def test_in_mixtures_nothing_works_against_itself() -> None:
+    found = [drawn(seed) for seed in range(MANY)]
+    assert not [one for one in found for pair in AGAINST if pair <= one.keys()]
+    for name, chance in (("mouthSmile", 0.35), ("jawLeft", 0.04), ("browInnerUp", 0.35)):
+        assert np.mean([name in one for one in found]) == pytest.approx(chance, abs=0.03)
+    shut = [one["jawOpen"] for one in found if "jawOpen" in one and one.get("mouthPress", 0) > 0.45]
+    free = [
+        one["jawOpen"]
+        for one in found
+        if "jawOpen" in one and not {"mouthPress", "mouthRollLower"} & one.keys()
+    ]
+    assert shut and max(shut) < 0.15 < max(free)
+
+
+def test_left_and_right_differ_by_the_asymmetry_alone() -> None:
+    smile = package_expressions()["smile"]
+    even = performed(smile, 1.0, 0.0, 0.0, none)
+    assert even["mouthSmileLeft"] == even["mouthSmileRight"] == smile["mouthSmile"]
+    leaning = performed(smile, 0.5, 0.2, 0.0, none)
+    assert leaning["mouthSmileLeft"] == pytest.approx(0.6 * smile["mouthSmile"])
+    assert leaning["mouthSmileRight"] == pytest.approx(0.4 * smile["mouthSmile"])
+    middle = performed({"jawOpen": 0.5, "mouthLeft": 0.5}, 1.0, 1.0, 0.0, none)
+    assert middle == {"jawOpen": 0.5, "mouthLeft": 0.5}
+    assert performed({"mouthSmileLeft": 0.4}, 1.0, 0.5, 0.0, none) == {"mouthSmileLeft": pytest.approx(0.6)}
+
+
+def test_weights_stay_within_what_faces_do() -> None:
+    found = performed({"jawOpen": 0.9, "browDown": 0.0}, 1.5, -1.0, 1.0, lambda name: 6.0)
+    assert found == {"jawOpen": 1.0, "browDownLeft": 0.0, "browDownRight": 0.0}

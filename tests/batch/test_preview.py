@@ -1,0 +1,55 @@
+"""What a data set would be: a table of what is drawn, and a contact sheet."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dermis.batch.preview import dry_run, parameter_rows, table_lines
+from dermis.batch.spec import spec_of
+
+ADAPTER = os.environ.get("DERMIS_TEST_ADAPTER", "cpu")
+SPEC = """
+count = 3
+images_per_person = 3
+size = [400, 200]
+[render]
+atlas = 128
+shadow_size = 64
+samples = 1
+strands = false
+[camera]
+yaw_deg = {choice = [-40, 40]}
+distance_mm = {uniform = [500, 900]}
+[gaze]
+at = {choice = ["camera", "angles"]}
+"""
+
+
+def test_rows_tell_what_is_drawn_and_what_comes_of_it() -> None:
+    rows = {row["parameter"]: row for row in parameter_rows(spec_of(tomllib.loads(SPEC) | {"count": 400}))}
+    assert set(rows) == {"camera.yaw_deg", "camera.distance_mm", "gaze.at"}
+    distance, gaze = rows["camera.distance_mm"], rows["gaze.at"]
+    assert distance["drawn"] == "{uniform = [500.0, 900.0]}" and distance["images"] == 400
+    assert 500 < distance["min"] < 510 and 890 < distance["max"] < 900
+    assert distance["mean"] == pytest.approx(700, abs=20) and len(distance["first"]) == 16
+    assert sum(gaze["counts"].values()) == 400 and set(gaze["counts"]) == {"camera", "angles"}
+    lines = table_lines(list(rows.values()))
+    assert len(lines) == 4 and lines[0].split() == ["parameter", "drawn", "images", "min", "mean", "max"]
+    assert f"camera {gaze['counts']['camera']}" in lines[
+        -1
+    ] or f"camera {gaze['counts']['camera']}" in "".join(lines)
+
+
+def test_the_contact_sheet_shows_the_first_images_small() -> None:
+    rows, sheet = dry_run(spec_of(tomllib.loads(SPEC)), ADAPTER)
+    assert rows and sheet.dtype == np.uint8 and sheet.shape == (96, 3 * 192 + 2 * 4, 3)
+    pictures: list[Any] = [sheet[:, k * 196 : k * 196 + 192] for k in range(3)]
+    for picture in pictures:
+        middle = picture[30:70, 76:116].astype(float)  # a face, neither black nor blown out
+        assert 30 < middle.mean() < 220 and middle[..., 0].mean() > 1.05 * middle[..., 2].mean()
+    assert (pictures[0] != pictures[1]).any()

@@ -1,0 +1,159 @@
+"""Data sets are the same bytes whoever draws them, and whatever happens meanwhile."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import random
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from batch.small_set import COUNT, HERE, SHARD_SIZE, SHARDS, contents, drawn, read, write_spec
+
+from dermis.batch.processes import Processes
+from dermis.batch.run import Progress, run
+from dermis.batch.spec import Spec
+from dermis.batch.worker import Work
+from dermis.errors import DermisError
+
+Files = dict[str, bytes]
+
+
+def killing(moments: set[int], rng: random.Random) -> Callable[[Progress], None]:
+    """Kills one of the workers when so many images are done."""
+
+    def told(progress: Progress) -> None:
+        if progress.images in moments:
+            moments.discard(progress.images)
+            workers = sorted(multiprocessing.active_children(), key=lambda one: one.pid or 0)
+            if workers:
+                rng.choice(workers).kill()
+
+    return told
+
+
+def test_the_set_has_all_that_it_should(undisturbed: Files) -> None:
+    shards = [name for name in undisturbed if name.startswith("shard-")]
+    assert len(shards) == SHARDS
+    assert {"spec.toml", "index.parquet", "README.md"} <= undisturbed.keys()
+    assert not [name for name in undisturbed if "part" in Path(name).stem or "tmp" in name]
+
+
+def test_two_workers_that_have_encoders_write_the_same(
+    small_spec: Spec, undisturbed: Files, tmp_path: Path
+) -> None:
+    told: list[tuple[int, int]] = []
+    report = drawn(
+        small_spec, tmp_path / "out", 2, 1, told=lambda now: told.append((now.images, now.to_draw))
+    )
+    assert contents(tmp_path / "out") == undisturbed
+    assert (report.images, report.shards, report.skipped) == (COUNT, SHARDS, 0)
+    assert told[-1] == (COUNT, COUNT)
+
+
+def test_parts_make_the_whole_in_any_order(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
+    first = drawn(small_spec, tmp_path, part=(1, 2))
+    assert not first.is_whole and "index.parquet" not in contents(tmp_path)
+    second = drawn(small_spec, tmp_path, part=(0, 2))
+    assert second.is_whole and first.shards + second.shards == SHARDS
+    assert contents(tmp_path) == undisturbed
+
+
+def test_what_is_whole_is_not_drawn_again(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
+    put(undisturbed, tmp_path)
+    (tmp_path / "index.parquet").unlink()
+    report = drawn(small_spec, tmp_path)
+    assert (report.images, report.shards, report.skipped) == (0, 0, SHARDS)
+    assert contents(tmp_path) == undisturbed
+
+
+def test_a_shard_that_was_damaged_is_drawn_again(
+    small_spec: Spec, undisturbed: Files, tmp_path: Path
+) -> None:
+    put(undisturbed, tmp_path)
+    name = next(name for name in sorted(undisturbed) if name.startswith("shard-"))
+    data = bytearray(undisturbed[name])
+    data[700] ^= 1
+    (tmp_path / name).write_bytes(data)
+    report = drawn(small_spec, tmp_path)
+    assert (report.shards, report.skipped) == (1, SHARDS - 1)
+    assert contents(tmp_path) == undisturbed
+
+
+def test_killed_workers_lose_nothing(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
+    rng = random.Random(1)
+    moments = set(rng.sample(range(1, COUNT - 1), 2))
+    with pytest.warns(UserWarning, match=r"SIGKILL; its shard is drawn again"):
+        report = drawn(small_spec, tmp_path, 2, 1, told=killing(moments, rng))
+    assert report.is_whole and contents(tmp_path) == undisturbed
+
+
+def test_a_shard_that_no_worker_survives_is_given_up(
+    small_spec: Spec, undisturbed: Files, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dermis.batch.processes.MOST_ATTEMPTS", 2)
+    put(undisturbed, tmp_path)
+    lost = next(name for name in sorted(undisturbed) if name.startswith("shard-"))
+    (tmp_path / lost).unlink()
+    always = lambda now: [one.kill() for one in multiprocessing.active_children()]  # noqa: E731
+    with (
+        pytest.warns(UserWarning, match="drawn again"),
+        pytest.raises(DermisError, match=r"shard 0: .*2 failed.*SIGKILL"),
+    ):
+        drawn(small_spec, tmp_path, told=always)
+    assert contents(tmp_path).keys() == undisturbed.keys() - {lost}
+
+
+def test_another_data_set_is_refused(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
+    put(undisturbed, tmp_path)
+    with pytest.raises(DermisError, match=r"spec\.toml in it is another's"):
+        drawn(small_spec.replace(seed=4), tmp_path)
+    assert contents(tmp_path) == undisturbed
+
+
+def test_a_bad_head_is_refused_and_what_is_whole_stays(tmp_path: Path) -> None:
+    spec = read(write_spec(tmp_path, "bad.obj"))
+    with pytest.raises(DermisError, match=r"image \d: .*bad\.obj"):
+        drawn(spec, tmp_path / "out")
+    left = contents(tmp_path / "out")
+    assert all(name == "spec.toml" or name.startswith("shard-") for name in left)
+
+
+def test_bad_heads_are_left_out_the_same_by_all(tmp_path: Path) -> None:
+    spec = read(write_spec(tmp_path, "bad.obj"))
+    bad = [k for k in range(COUNT) if spec.parameters(k)["person.head"] == "bad.obj"]
+    assert bad and len(bad) < COUNT - SHARD_SIZE
+    reports = [
+        drawn(spec, tmp_path / str(workers), workers, workers - 1, keep_going=True) for workers in (1, 2)
+    ]
+    for report in reports:
+        assert [one.number for one in report.failed] == bad and report.images == COUNT - len(bad)
+        assert all("bad.obj" in one.reason for one in report.failed)
+    assert contents(tmp_path / "1") == contents(tmp_path / "2")
+    assert "bad.obj" in contents(tmp_path / "1")["README.md"].decode()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits of files are POSIX's")
+def test_a_full_disk_keeps_what_is_whole(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
+    import resource
+
+    lost = [name for name in undisturbed if name.startswith("shard-00003")]
+    put({name: data for name, data in undisturbed.items() if name not in lost}, tmp_path)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2048, before[1]))  # its error is another's, its way the same
+    try:
+        with pytest.raises(DermisError, match="cannot be written"):
+            run(Work(small_spec, tmp_path), Processes([HERE]))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert contents(tmp_path).keys() == undisturbed.keys() - set(lost)
+    assert drawn(small_spec, tmp_path).skipped == SHARDS - 1
+    assert contents(tmp_path) == undisturbed
+
+
+def put(files: Files, folder: Path) -> None:
+    """Write them there."""
+    for name, data in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(data)

@@ -1,0 +1,55 @@
+"""Workers are spread over GPUs in turn; on a host each finds a number of its own."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from dermis.batch import seats
+from dermis.batch.ranks import taken_rank
+from dermis.batch.seats import Seating
+
+
+def pretend(monkeypatch: pytest.MonkeyPatch, cores: int, kind: str, *numbers: int) -> None:
+    found = [SimpleNamespace(kind=kind, number=number) for number in numbers]
+    by_name: dict[str, Any] = {f"#{one.number}": [one] for one in found} | {"auto": found}
+    monkeypatch.setattr(seats, "alike_adapters", by_name.__getitem__)
+    monkeypatch.setattr(seats, "available_cores", lambda: cores)
+
+
+def places(seating: Seating) -> list[str]:
+    return [seat.adapter for seat in seating.seats()[0]]
+
+
+def test_each_gpu_has_a_worker_or_several(monkeypatch: pytest.MonkeyPatch) -> None:
+    pretend(monkeypatch, 16, "DiscreteGPU", 0, 1)
+    assert places(Seating()) == ["#0", "#1"]
+    assert places(Seating(workers_per_gpu=2)) == ["#0", "#1", "#0", "#1"]
+    assert places(Seating(workers=3)) == ["#0", "#1", "#0"]
+    assert places(Seating(numbers=(1,))) == ["#1"]
+
+
+@pytest.mark.parametrize(("workers", "encoders"), [(1, 7), (2, 3), (8, 1), (16, 1)])
+def test_encoders_share_the_cores(monkeypatch: pytest.MonkeyPatch, workers: int, encoders: int) -> None:
+    pretend(monkeypatch, 8, "DiscreteGPU", 0)
+    found, each = Seating(workers=workers).seats()
+    assert each == encoders and all(seat.threads == 0 for seat in found)
+    assert Seating(workers=workers, encoders=5).seats()[1] == 5
+
+
+@pytest.mark.parametrize(("cores", "workers", "threads"), [(1, 1, 1), (2, 1, 2), (8, 4, 2)])
+def test_a_software_adapter_shares_the_cores(
+    monkeypatch: pytest.MonkeyPatch, cores: int, workers: int, threads: int
+) -> None:
+    pretend(monkeypatch, cores, "CPU", 0)
+    found, encoders = Seating().seats()
+    assert (len(found), found[0].threads, encoders) == (workers, threads, 0)
+
+
+def test_ranks_of_a_host_are_its_own_and_free_again() -> None:
+    with taken_rank() as first, taken_rank() as second:
+        assert (first, second) == (0, 1)
+    with taken_rank() as again:
+        assert again == 0

@@ -1,0 +1,266 @@
+"""Specs of data sets: what is drawn, the same everywhere, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+import dermis
+from dermis.batch.drawing import Parameters
+from dermis.batch.spec import Spec, example_text, load_spec, spec_of
+from dermis.errors import DermisError
+
+COUNT = 5000
+REFUSED = {
+    "camera = 3": "camera: expected a table with distance_mm",
+    "[camera]\nyaw = 3": "camera: yaw: expected one of distance_mm",
+    "[camera]\nyaw_deg = {uniform = [1, 0]}": "camera: yaw_deg: expected a low end",
+    "[camera]\npitch_deg = {normal = [0, 20]}": "camera: pitch_deg: .* normal reaches to 6 sd",
+    "[light.key]\nyaw_deg = 500": r"light\.key: yaw_deg: expected numbers from -180 to 180",
+    '[light]\nkind = "candle"': "light: kind: expected one of rig, ",
+    '[light]\nkind = "none"': "light: expected some light in each image",
+    "[light]\nkind = {files = '*.toml'}": "light: kind: expected one of rig, ",
+    "[person]\nage = 20": "person: age: expected numbers from 25 to 90",
+    "[person]\nage = 'old'": "person: age: expected numbers",
+    "[person]\nafrican = 0": "person: expected a share of african",
+    '[person]\nhead = "human"\nage = 30': r"person\.age: expected people that are drawn",
+    "[person.skin]\nshine = 1": r"person\.skin: shine: expected one of melanin",
+    "[person.skin]\nmelanin = 2": r"person\.skin: melanin: expected a number from 0 to 1",
+    "[person.hair]\nstyle = 'mohawk'": r"person\.hair: style: expected one of none",
+    "[person.eyes]\nseed = 3": r"person\.eyes: seed: expected one of eumelanin",
+    "[person.targets]\n'nose/none' = 1": r"person\.targets: nose/none",
+    "[skin]\nroughness = 3": "skin: .*roughness: expected a number from 0.05",
+    "[skin]\nseed = 3": "skin: seed: expected one of",
+    '[expression]\nname = "x"': "expression: name: expected one of neutral",
+    "[expressions.x]\njawOpen = 3": r"expressions\.x\.jawOpen: expected a number",
+    "[pose]\njawOpen = {uniform = [0, 1e3]}": "pose: jawOpen: expected numbers from -100",
+    "[environment]\nname = {files = '*.hdr'}": r"environment\.name: expected files that match",
+    "[environment]\nname = {files = '/**'}": r"environment\.name: expected a pattern",
+    "[render]\nsize = [64, 64]": "render: size: .* Write it as size, above",
+    "[render]\nbackground = 'none'": r"render: background: .* Write it as \[background\]",
+    "[render]\natlas = 1": "render: atlas: expected a whole number from 64",
+    "size = 0": "render: size",
+    "count = 0": "spec: count: expected a whole number from 1",
+    "counts = 1": "spec: counts: expected count",
+    "folder = '/'": "folder: expected no such key",
+    "outputs = ['smell']": "output: expected one of depth",
+    "landmarks = ['dlib']": "landmarks: expected some of ibug-68",
+    "format = 'zip'": "spec: format",
+    "[[correlated]]\nof = ['camera.yaw_deg', 'x']\ncorrelation = 0.5": "correlated: of: .*'x' is none",
+    "[[correlated]]\nof = ['camera.yaw_deg']\ncorrelation = 0.5": "correlated: .*2 to 50 names",
+    "[[correlated]]\nof = ['camera.yaw_deg', 'head.yaw_deg']\ncorrelation = 1": "correlated: .*definite",
+    "[[correlated]]\nof = ['a', 'b']\ncorrelation = [[1, 0]]": "correlated: .*2 rows of 2",
+    "[[correlated]]\nof = ['a', 'b']\ncorrelation = [[1, 0.2], [0.3, 1]]": "correlated: .*symmetric",
+    "[[correlated]]\nof = ['camera.yaw_deg', 'person.age']\ncorrelation = 0.5\n[person]\nage = 30": "first",
+    "correlated = 3": "correlated",
+}
+FIRST = {
+    "person.seed": 489798491,
+    "person.age": 59.3503,
+    "camera.distance_mm": 1523.67,
+    "head.yaw_deg": -28.0143,
+}
+"""Of the first image of the example."""
+
+
+def spec(text: str = "", **more: Any) -> Spec:
+    return spec_of(tomllib.loads(text) | {"count": COUNT} | more)
+
+
+@pytest.fixture(scope="module")
+def example() -> Spec:
+    return spec_of(tomllib.loads(example_text()) | {"count": COUNT})
+
+
+@pytest.fixture(scope="module")
+def found(example: Spec) -> list[Parameters]:
+    return [example.parameters(k) for k in range(COUNT)]
+
+
+@pytest.mark.parametrize("text", REFUSED)
+def test_what_cannot_be_drawn_is_refused_by_table_and_key(text: str, tmp_path: Path) -> None:
+    file = tmp_path / "spec.toml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(DermisError, match=REFUSED[text]) as refused:
+        load_spec(file)
+    assert str(refused.value).startswith(str(file))
+
+
+def test_the_example_is_a_spec_and_says_what_it_does(tmp_path: Path) -> None:
+    file = tmp_path / "spec.toml"
+    file.write_text(example_text(), encoding="utf-8")
+    drawn = load_spec(file)
+    assert (drawn.count, drawn.size, drawn.shard_size, drawn.files) == (1000, (512, 512), 1000, {})
+    assert load_spec(file, count=3, seed=9, size=(64, 32)).size == (64, 32)
+    assert len(drawn.parameters(999)) > 60
+    with pytest.raises(DermisError, match="image: expected a whole number from 0 to 999"):
+        drawn.parameters(1000)
+
+
+def test_files_that_the_example_mentions_could_be_taken(tmp_path: Path) -> None:
+    text = example_text()
+    for line in [line[2:] for line in text.splitlines() if line.startswith("# name = ")]:
+        (tmp_path / "panoramas").mkdir(exist_ok=True)
+        (tmp_path / "panoramas" / "sky.hdr").write_bytes(b"light")
+        told = tomllib.loads(text) | {"environment": tomllib.loads(line.partition("  #")[0])}
+        assert spec_of(told, tmp_path).parameters(0)["environment.name"] in (
+            "lebombo", "royal_esplanade", "panoramas/sky.hdr",
+        )  # fmt: skip
+
+
+def test_statistics_are_those_that_are_stated(found: list[Parameters]) -> None:
+    ages = [one["person.age"] for one in found]
+    assert stats.kstest(ages, stats.truncnorm(-17 / 22, 48 / 22, 42, 22).cdf).pvalue > 0.01
+    distances = [one["camera.distance_mm"] for one in found]
+    assert stats.kstest(distances, stats.loguniform(600, 2500).cdf).pvalue > 0.01
+    yaws = [one["camera.yaw_deg"] for one in found]
+    assert stats.kstest(yaws, stats.truncnorm(-75 / 24, 75 / 24, 0, 24).cdf).pvalue > 0.01
+    kinds = [one["light.kind"] for one in found]
+    assert kinds.count("rig") / COUNT == pytest.approx(0.6, abs=0.02)
+    rigs = [one for one in found if one["light.kind"] == "rig"]
+    assert [one for one in found if "light.key.yaw_deg" in one] == rigs
+    assert stats.kstest([one["light.key.yaw_deg"] for one in rigs], stats.uniform(-75, 150).cdf).pvalue > 0.01
+
+
+def test_correlated_parameters_keep_their_own_distributions(found: list[Parameters]) -> None:
+    names = "background.red", "background.green", "background.blue"
+    walls = np.array([[one[name] for name in names] for one in found if names[0] in one]).T
+    assert all(stats.kstest(one, stats.uniform(0.01, 0.49).cdf).pvalue > 0.01 for one in walls)
+    for a, b in ((0, 1), (0, 2), (1, 2)):  # the ranks of a Gaussian copula
+        rank = stats.spearmanr(walls[a], walls[b]).statistic
+        assert rank == pytest.approx(6 / np.pi * np.arcsin(0.4), abs=0.03)
+    yaws = np.array([[one["head.yaw_deg"], one["camera.yaw_deg"]] for one in found])
+    assert stats.spearmanr(yaws).statistic == pytest.approx(6 / np.pi * np.arcsin(0.15), abs=0.04)
+
+
+def test_one_parameter_more_or_another_distribution_moves_no_other() -> None:
+    base = spec("[person]\nage = {uniform = [30, 60]}\n[expression]\nname = 'mixture'")
+    other = spec(
+        "[person]\nage = {normal = [50, 2]}\nsex = {uniform = [0, 1]}\n"
+        "[person.eyes]\nredness = {uniform = [0, 1]}\n[expression]\nname = 'mixture'\n"
+        "[pose]\njawOpen = {uniform = [0, 1]}\n[skin]\noiliness = {uniform = [0, 1]}"
+    )
+    changed = {"person.age", "person.sex", "person.eyes.redness", "pose.jawOpen", "skin.oiliness"}
+    for k in range(40):
+        before, after = base.parameters(k), other.parameters(k)
+        assert {name for name in before | after if before.get(name) != after.get(name)} == changed
+    assert [base.parameters(k) for k in range(5)] != [base.replace(seed=1).parameters(k) for k in range(5)]
+
+
+def test_images_share_people_as_many_as_are_stated() -> None:
+    drawn = spec(
+        "images_per_person = 3\n[person]\nage = {uniform = [25, 90]}\n[head]\nyaw_deg = {uniform = [-9, 9]}"
+    )
+    found = [drawn.parameters(k) for k in range(9)]
+    assert [one["person.number"] for one in found] == [0, 0, 0, 1, 1, 1, 2, 2, 2]
+    for first in (0, 3, 6):
+        assert len({(one["person.seed"], one["person.age"]) for one in found[first : first + 3]}) == 1
+    assert (
+        len({one["person.seed"] for one in found}) == 3 and len({one["head.yaw_deg"] for one in found}) == 9
+    )
+    alone = spec("[person]\nage = {uniform = [25, 90]}")
+    assert alone.parameters(2)["person.age"] == found[8]["person.age"]
+
+
+def test_other_processes_draw_the_same(example: Spec) -> None:
+    code = (
+        "import json, tomllib; from dermis.batch.spec import example_text, spec_of; "
+        "spec = spec_of(tomllib.loads(example_text()) | {'count': 5000}); "
+        "print(json.dumps([spec.text(), *(spec.parameters(k) for k in (4999, 0, 17))]))"
+    )
+    own = json.dumps([example.text(), *(example.parameters(k) for k in (4999, 0, 17))])
+    source = Path(dermis.__file__).parents[1]
+    for hashes in ("1", "2"):
+        environment = {**os.environ, "PYTHONHASHSEED": hashes, "PYTHONPATH": str(source)}
+        run = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True
+        )
+        assert run.stdout.strip() == own
+    assert pickle.loads(pickle.dumps(example)).parameters(3) == example.parameters(3)
+
+
+def test_the_first_image_of_the_example_stays_what_it_was(example: Spec) -> None:
+    """On every machine, and in every version that claims to draw the same data set."""
+    found = example.parameters(0)
+    told = {name: found[name] for name in ("person.seed", "person.age", "camera.distance_mm", "head.yaw_deg")}
+    assert told == FIRST
+
+
+def test_text_is_canonical(example: Spec) -> None:
+    text = example.text()
+    again = spec_of(tomllib.loads(text))
+    assert again == example and again.text() == text and again.digest() == example.digest()
+    assert [again.parameters(k) for k in range(9)] == [example.parameters(k) for k in range(9)]
+    assert example.replace(seed=5).digest() != example.digest()
+
+
+NUMBER = st.floats(-20, 20)
+DRAWN: st.SearchStrategy[Any] = st.one_of(
+    NUMBER,
+    st.builds(lambda low, more: {"uniform": [low, low + more]}, NUMBER, st.floats(0.1, 9)),
+    st.builds(lambda mean, sd: {"truncated": [mean, sd, mean - 1, mean + 1]}, NUMBER, st.floats(0.1, 9)),
+    st.builds(lambda each: {"choice": each}, st.lists(NUMBER, min_size=1, max_size=4)),
+)
+KEYS = ("yaw_deg", "pitch_deg", "roll_deg")
+TABLES = st.fixed_dictionaries(
+    {},
+    optional={
+        "count": st.integers(1, 10**9),
+        "seed": st.integers(0, 2**32 - 1),
+        "size": st.tuples(st.integers(1, 2048), st.integers(1, 2048)).map(list),
+        "images_per_person": st.integers(1, 99),
+        "outputs": st.lists(st.sampled_from(["depth", "uv", "alpha"]), unique=True),
+        "format": st.sampled_from(["folder", "webdataset"]),
+        "render": st.fixed_dictionaries(
+            {}, optional={"atlas": st.integers(64, 4096), "strands": st.booleans()}
+        ),
+        "camera": st.dictionaries(st.sampled_from(KEYS), DRAWN),
+        "head": st.dictionaries(st.sampled_from(KEYS), DRAWN),
+        "pose": st.dictionaries(st.text(max_size=9), DRAWN, max_size=4),
+        "expressions": st.dictionaries(
+            st.text(max_size=9), st.dictionaries(st.text(max_size=9), st.floats(0, 1)), max_size=2
+        ),
+        "correlated": st.just(
+            [{"of": ["camera.yaw_deg", "head.yaw_deg"], "correlation": [[1, 0.5], [0.5, 1]]}]
+        ),
+    },
+)
+
+
+@settings(deadline=None, max_examples=60)
+@given(TABLES)
+def test_any_spec_is_the_same_after_its_text(tables: dict[str, Any]) -> None:
+    made = spec_of(tables)
+    again = spec_of(tomllib.loads(made.text()))
+    assert again == made and again.text() == made.text()
+    assert again.parameters(0) == made.parameters(0)
+
+
+def test_files_are_sorted_known_by_their_contents_and_checked(tmp_path: Path) -> None:
+    for name, data in (("b.hdr", b"2"), ("a.hdr", b"1"), ("c.txt", b"3")):
+        (tmp_path / name).write_bytes(data)
+    (tmp_path / "d.hdr").mkdir()
+    tables = tomllib.loads("[environment]\nname = {files = '*.hdr'}")
+    first = spec_of(tables, tmp_path)
+    assert list(first.files) == ["a.hdr", "b.hdr"]
+    assert {first.parameters(k)["environment.name"] for k in range(30)} == {"a.hdr", "b.hdr"}
+    assert spec_of(tomllib.loads(first.text()), tmp_path) == first
+    (tmp_path / "a.hdr").write_bytes(b"other")
+    assert spec_of(tables, tmp_path).digest() != first.digest()
+    with pytest.raises(DermisError, match=r"files: a\.hdr: expected the file of hash"):
+        spec_of(tomllib.loads(first.text()), tmp_path)
+    (tmp_path / "a.hdr").unlink()
+    with pytest.raises(DermisError, match=r"files: a\.hdr: .* there is none"):
+        spec_of(tomllib.loads(first.text()), tmp_path)
