@@ -25,7 +25,20 @@ from adversity.kinds import (
     specs,
 )
 
-_PARTS = meshes, pictures, scenes, specs, clips, caches, machine_code, frames, datasets, pages, large, commands
+_PARTS = (
+    meshes,
+    pictures,
+    scenes,
+    specs,
+    clips,
+    caches,
+    machine_code,
+    frames,
+    datasets,
+    pages,
+    large,
+    commands,
+)
 KINDS: dict[str, Kind] = {kind.name: kind for part in _PARTS for kind in part.KINDS}
 _WARMED = 24  # sound inputs of each kind: all that it can begin with
 
