@@ -10,7 +10,7 @@ from dermis.batch.distributions import Distribution
 from dermis.batch.tables import MIXTURE, NONE
 from dermis.errors import about, refuse
 from dermis.frame.outputs import asked_outputs
-from dermis.human.landmarks.points import SETS
+from dermis.human.landmarks.sets import SETS
 from dermis.scene.lights import NO_LIGHTS
 
 _ANCESTRY = "person.african", "person.asian", "person.caucasian"

@@ -9,7 +9,7 @@ from dermis.batch.encodings import file_kind, stored_as
 from dermis.batch.spec import Spec
 from dermis.frame.outputs import OUTPUTS
 from dermis.human.labels.classes import label_classes
-from dermis.human.landmarks.points import SETS
+from dermis.human.landmarks.sets import SETS
 from dermis.reading import read_text, understood
 from dermis.tables import parse_rows, read_rows
 
