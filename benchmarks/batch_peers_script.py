@@ -10,12 +10,15 @@ from __future__ import annotations
 import json
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import bpy  # type: ignore[import-not-found,unused-ignore]
 import numpy as np
-from mathutils import Vector  # type: ignore[import-not-found,unused-ignore]
+
+with suppress(ImportError):  # which only Blender's Python has
+    import bpy  # type: ignore[import-not-found,unused-ignore]
+    from mathutils import Vector  # type: ignore[import-not-found,unused-ignore]
 
 _RADIUS_M = (0.0037, 0.0014, 0.0007)  # of Blender's own default for skin, in proportion
 _LIGHTS = (((-0.8, -1.0, 0.5), 12.0), ((0.9, -0.8, 0.2), 5.0), ((0.3, 0.9, 0.8), 8.0))  # places [m], watts

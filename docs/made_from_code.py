@@ -127,8 +127,12 @@ def settings() -> str:
 
 def spec() -> str:
     """The tables of a data set's spec, key by key."""
-    intro = "The tables of a spec, from which `dermis batch` draws [data sets](../batch.md). `size`, width and "
-    intro += "height, stands above all tables too; of `person.skin` and the like the keys are those of their names."
+    intro = (
+        "The tables of a spec, from which `dermis batch` draws [data sets](../batch.md). `size`, width and"
+    )
+    intro += (
+        " height, stands above all tables too; keys of tables below `[person]` are names of what is drawn."
+    )
     parts = [f"## {title}\n\n{table_of(model, None)}" for title, model in SPEC_TABLES.items()]
     return "\n".join(["# Keys of a spec", "", intro, "", *parts])
 

@@ -44,7 +44,7 @@ def app() -> App:
 
 
 def words(command: str) -> list[str]:
-    """What is typed: no comment, no file that it is written to, no dots for more, no brackets around what may be left out."""
+    """What is typed: no comment or redirection, no dots for more, no brackets around what may be left out."""
     shown = command.replace("\\|", "|").split("...")[0].split(" > ")[0]
     typed = shlex.split(re.sub(r"[\[\]]", "", shown), comments=True)[1:]
     return ["8765" if word == "N" else word for word in typed]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from batch.small_set import contents, drawn, read, write_spec
+from small_set import contents, drawn, read, write_spec
 
 from dermis.batch.spec import Spec
 

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from batch.small_set import COUNT, SHARDS, contents, read, write_spec
+from small_set import COUNT, SHARDS, contents, read, write_spec
 
 from dermis.batch import distributed as module
 from dermis.batch.distributed import Cluster

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from batch.small_set import COUNT, HERE, SHARD_SIZE, SHARDS, contents, drawn, read, write_spec
+from small_set import COUNT, HERE, SHARD_SIZE, SHARDS, contents, drawn, read, write_spec
 
 from dermis.batch.processes import Processes
 from dermis.batch.run import Progress, run

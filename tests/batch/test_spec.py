@@ -47,6 +47,8 @@ REFUSED = {
     "[expressions.x]\njawOpen = 3": r"expressions\.x\.jawOpen: expected a number",
     "[pose]\njawOpen = {uniform = [0, 1e3]}": "pose: jawOpen: expected numbers from -100",
     "[environment]\nname = {files = '*.hdr'}": r"environment\.name: expected files that match",
+    "[environment]\nname = {choice = ['none', 'night.hdr']}": "environment: name: .*'night.hdr' is neither",
+    "[person]\nhead = 'mannequin'": "person: head: expected a file in the spec's folder, or one of human",
     "[environment]\nname = {files = '/**'}": r"environment\.name: expected a pattern",
     "[render]\nsize = [64, 64]": "render: size: .* Write it as size, above",
     "[render]\nbackground = 'none'": r"render: background: .* Write it as \[background\]",

@@ -49,7 +49,9 @@ def test_a_process_renders(folder: Path) -> None:
     assert (folder / "a.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize("words", [["--help"], ["render", "--help"], ["batch", "--help"], ["cite", "--help"], ["--version"]])
+@pytest.mark.parametrize(
+    "words", [["--help"], ["render", "--help"], ["batch", "--help"], ["cite", "--help"], ["--version"]]
+)
 def test_help_loads_nothing_heavy(words: list[str]) -> None:
     """The help of a command that takes a model's fields needs the model, and with it pydantic."""
     heavy = {"numpy", "wgpu", "trimesh", "scipy"} | ({"pydantic"} if len(words) == 1 else set())

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from math import radians
 from typing import Any
 
 import numpy as np
@@ -16,10 +16,11 @@ from dermis.scene.camera import Camera
 
 _SENSOR_MM = 24.0
 _MARGIN = 0.96  # of half the picture that the face may reach
-_STEPS = 10
+_STEPS = 12
 _FACE_MM = ((-90.0, -95.0, 5.0), (90.0, 100.0, 130.0))
 """Least and greatest places of a face, from the head's centre at rest."""
 Doubles = NDArray[np.float64]
+Aim = tuple[float, float]
 
 
 def face_points(head: Head, count: int = 64) -> NDArray[np.int32]:
@@ -46,56 +47,69 @@ def camera_of(
     distance = values["distance_mm"]
     frame = values.get("frame_mm") or distance * _SENSOR_MM / values["focal_mm"]
     middle = 0.5 * (face.min(axis=0) + face.max(axis=0))
-    back = np.array(towards(values["yaw_deg"], values["pitch_deg"]))
-    position, up = middle + distance * back, _up(back, values["roll_deg"])
-    shift = np.array([values["offset_x"], values["offset_y"]])
+    axes = _axes(values["yaw_deg"], values["pitch_deg"], values["roll_deg"])
+    placed = (face - middle) @ axes.T  # right, up and towards the camera, from the face's middle
+    offset = values["offset_x"] * aspect, values["offset_y"]
+    frame *= max(_reach(placed, distance, (0.0, 0.0), frame, aspect) / _MARGIN, 1.0)
 
-    def aimed(share: float) -> tuple[Camera, float]:
-        """The camera with a share of the shift, and how far the face reaches, of half the picture."""
-        camera = _aimed(position, middle, up, frame, share * shift, aspect)
-        return camera, _reach(camera, face, aspect)
+    def aim(share: float) -> Aim:
+        """Where the camera is aimed for a share of the offset."""
+        return -0.5 * frame * share * offset[0], -0.5 * frame * share * offset[1]
 
-    frame *= max(aimed(0.0)[1] / _MARGIN, 1.0)
-    camera, reach = aimed(1.0)
-    if reach <= _MARGIN:
-        return camera
-    least, most = 0.0, 1.0
+    share, least, most = 1.0, 0.0, 1.0
     for _ in range(_STEPS):
+        if _reach(placed, distance, aim(share), frame, aspect) > _MARGIN:
+            most = share
+        elif share == 1.0:
+            return _aimed(middle, axes, distance, frame, aim(1.0))
+        else:
+            least = share
         share = 0.5 * (least + most)
-        least, most = (share, most) if aimed(share)[1] <= _MARGIN else (least, share)
-    return aimed(least)[0]
+    return _aimed(middle, axes, distance, frame, aim(least))
 
 
-def _aimed(
-    position: Doubles, middle: Doubles, up: Doubles, frame_mm: float, shift: Doubles, aspect: float
-) -> Camera:
-    """A camera that sees the middle of the face so far from the middle of its picture."""
-    back = position - middle
-    distance = float(np.linalg.norm(back))
-    right = np.cross(up, back)
-    right /= np.linalg.norm(right)
-    above = np.cross(back, right) / distance
-    across, along = 0.5 * frame_mm * shift * [aspect, 1.0]
-    target = middle - across * right - along * above
-    scale = float(np.linalg.norm(target - position)) / distance  # the angle of view stays
-    x, y, z = map(float, position)
-    return Camera(position=(x, y, z), target=_triple(target), up=_triple(up), frame_mm=frame_mm * scale)
+def _aimed(middle: Doubles, axes: Doubles, distance: float, frame_mm: float, aim: Aim) -> Camera:
+    """A camera that is aimed at a place beside the middle of the face.
+
+    axes : (3, 3) rows: right, up, and back towards the camera
+    frame_mm : height of what it would show at the middle were it aimed there
+    aim : how far right and above the middle [mm]
+    """
+    scale = math.hypot(distance, *aim) / distance  # the angle of view stays
+    return Camera(
+        position=_triple(middle + distance * axes[2]),
+        target=_triple(middle + aim[0] * axes[0] + aim[1] * axes[1]),
+        up=_triple(axes[1]),
+        frame_mm=frame_mm * scale,
+    )
 
 
-def _reach(camera: Camera, places: Doubles, aspect: float) -> float:
-    """How far from the picture's middle points are seen, 1 at its edges; far beyond what is not before it."""
-    _, R, t = camera.to_opencv((1, 1))
-    x, y, z = R @ places.T + t[:, None]
-    seen = np.abs(np.stack([x / aspect, y])) / (camera.half_tangent * np.maximum(z, 1e-3))
-    return float(seen.max())
+def _reach(placed: Doubles, distance: float, aim: Aim, frame_mm: float, aspect: float) -> float:
+    """How far from the picture's middle points are seen, 1 at its edges; far beyond what is not before it.
+
+    placed : (n, 3) right, up and back from the middle of the face [mm]
+    """
+    x, y, z = placed.T
+    back = np.array([-aim[0], -aim[1], distance])
+    back /= math.hypot(*back)
+    right = np.array([back[2], 0.0, -back[0]]) / math.hypot(back[0], back[2])
+    up = back[1] * right[2], back[2] * right[0] - back[0] * right[2], -back[1] * right[0]
+    away = distance - z
+    depth = np.maximum(back[2] * away - back[0] * x - back[1] * y, 1e-3)
+    seen_x = (right[0] * x - right[2] * away) / (aspect * depth)
+    seen_y = (up[0] * x + up[1] * y - up[2] * away) / depth
+    return float(max(np.abs(seen_x).max(), np.abs(seen_y).max()) * 2.0 * distance / frame_mm)
 
 
-def _up(back: Doubles, roll_deg: float) -> Doubles:
-    """What is upwards in the picture of a camera that is turned clockwise about its axis."""
-    right = np.cross([0.0, 1.0, 0.0], back)
-    right /= np.linalg.norm(right)
-    angle = radians(roll_deg)
-    return np.asarray(np.cos(angle) * np.cross(back, right) + np.sin(angle) * right)
+def _axes(yaw_deg: float, pitch_deg: float, roll_deg: float) -> Doubles:
+    """(3, 3) rows: right, up and back of a camera around the head, turned clockwise about its axis."""
+    back = np.array(towards(yaw_deg, pitch_deg))
+    yaw, roll = math.radians(yaw_deg), math.radians(roll_deg)
+    right = np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
+    pitch = math.radians(pitch_deg)
+    up = np.array([-math.sin(yaw) * math.sin(pitch), math.cos(pitch), -math.cos(yaw) * math.sin(pitch)])
+    cosine, sine = math.cos(roll), math.sin(roll)
+    return np.stack([cosine * right - sine * up, cosine * up + sine * right, back])
 
 
 def _triple(vector: Doubles) -> tuple[float, float, float]:

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from dermis.batch.dials import check_looks, check_skin, check_weights
 from dermis.batch.distributions import Distribution
 from dermis.batch.tables import MIXTURE, NONE
+from dermis.environment.panorama import UNIFORM
 from dermis.errors import about, refuse
 from dermis.frame.outputs import asked_outputs
 from dermis.human.landmarks.sets import SETS
+from dermis.mesh.samples import SAMPLES
+from dermis.reading import is_file
+from dermis.scene.heads import HUMAN
 from dermis.scene.lights import NO_LIGHTS
 
 _ANCESTRY = "person.african", "person.asian", "person.caucasian"
@@ -29,6 +34,7 @@ def check_spec(spec: Any, drawn: Mapping[str, Distribution], expressions: Mappin
     _check_expression(spec.expression.name, expressions)
     _check_correlated(spec.correlated, drawn)
     _check_light(drawn)
+    _check_named(drawn, spec.folder)
 
 
 def _check_landmarks(names: Sequence[str]) -> None:
@@ -78,3 +84,15 @@ def _check_light(drawn: Mapping[str, Distribution]) -> None:
     if not lamps and not around:
         came = "there can be neither lamps nor an environment"
         refuse("light", "some light in each image", came, "Take none or 0 out of one of both")
+
+
+def _check_named(drawn: Mapping[str, Distribution], folder: Path) -> None:
+    """Refuse heads and environments that are neither the package's nor files."""
+    heads = [HUMAN, *(name for name, sample in SAMPLES.items() if sample.kind == "head")]
+    around = [NONE, UNIFORM, *(name for name, sample in SAMPLES.items() if sample.kind == "environment")]
+    for parameter, known in ((_HEAD, heads), ("environment.name", around)):
+        for name in map(str, drawn[parameter].ends if parameter in drawn else ()):
+            person = parameter == _HEAD and name.startswith(f"{HUMAN}:")
+            if name not in known and not person and not is_file(folder / name):
+                expected = f"a file in the spec's folder, or one of {', '.join(known)}"
+                refuse(parameter.replace(".", ": "), expected, f"{name!r} is neither", "Check the name")

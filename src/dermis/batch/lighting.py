@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, lru_cache
 from math import cos, expm1, pi, radians, sin
 from typing import Any
 
@@ -21,11 +21,12 @@ _LAMPS = "key", "fill", "rim"
 
 def lights_of(parameters: Mapping[str, Any]) -> tuple[Light, ...]:
     """The lights of an image by its parameters."""
-    kind, strength = parameters["light.kind"], parameters["light.strength"]
+    kind, strength, turn = (parameters[f"light.{name}"] for name in ("kind", "strength", "turn_deg"))
     if not strength:
         return ()
-    lights = tuple(map(_lamp(parameters), _LAMPS)) if kind == RIG else preset_lights(kind)
-    return tuple(_turned(one, parameters["light.turn_deg"], strength) for one in lights)
+    if kind == RIG:
+        return tuple(_lamp(parameters, f"light.{lamp}.", turn, strength) for lamp in _LAMPS)
+    return tuple(_turned(one, turn, strength) for one in _preset(kind))
 
 
 def towards(yaw_deg: float, pitch_deg: float) -> tuple[float, float, float]:
@@ -34,7 +35,7 @@ def towards(yaw_deg: float, pitch_deg: float) -> tuple[float, float, float]:
     return sin(yaw) * cos(pitch), sin(pitch), cos(yaw) * cos(pitch)
 
 
-@cache
+@lru_cache(maxsize=64)
 def colour_of(kelvin: float) -> tuple[float, float, float]:
     """A black body's light, linear Rec. 709 of luminance 1; white at 6500 K."""
     red, green, blue = np.maximum(rgb_weights() @ _planck(kelvin), 0.0)
@@ -51,21 +52,23 @@ def _bent(nm: float, kelvin: float) -> float:
     return expm1(_SECOND_NM_K / (nm * kelvin))
 
 
-def _lamp(parameters: Mapping[str, Any]) -> Any:
-    def made(lamp: str) -> Light:
-        told = {key: parameters[f"light.{lamp}.{key}"] for key in _KEYS}
-        way = towards(told["yaw_deg"], told["pitch_deg"])
-        x, y, z = (told["distance_mm"] * one for one in way)
-        red, green, blue = (pi * told["strength"] * one for one in colour_of(told["kelvin"]))
-        size = told["size_mm"]
-        return RectangleLight(
-            position=(x, y, z), irradiance=(red, green, blue), width_mm=size, height_mm=size
-        )
+def _lamp(parameters: Mapping[str, Any], lamp: str, turn_deg: float, strength: float) -> Light:
+    """A lamp of the rig, by the parameters that begin with its name."""
+    distance, size = parameters[f"{lamp}distance_mm"], parameters[f"{lamp}size_mm"]
+    x, y, z = towards(parameters[f"{lamp}yaw_deg"] + turn_deg, parameters[f"{lamp}pitch_deg"])
+    much = pi * strength * parameters[f"{lamp}strength"]
+    red, green, blue = (much * one for one in colour_of(parameters[f"{lamp}kelvin"]))
+    return RectangleLight(
+        position=(distance * x, distance * y, distance * z),
+        irradiance=(red, green, blue),
+        width_mm=size,
+        height_mm=size,
+    )
 
-    return made
 
-
-_KEYS = "yaw_deg", "pitch_deg", "distance_mm", "size_mm", "strength", "kelvin"
+@cache
+def _preset(kind: str) -> tuple[Light, ...]:
+    return preset_lights(kind)
 
 
 def _turned(light: Light, degrees: float, strength: float) -> Light:

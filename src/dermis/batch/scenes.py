@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from dermis.batch.cameras import camera_of, face_points
 from dermis.batch.lighting import lights_of, towards
@@ -18,9 +19,9 @@ from dermis.batch.spec import Spec
 from dermis.batch.tables import ANGLES, NONE
 from dermis.human.person import Human
 from dermis.mesh.head import Head
-from dermis.mesh.turns import angles_matrix, matrix_quaternion
+from dermis.mesh.turns import angles_matrix, matrix_angles
 from dermis.reading import is_file
-from dermis.scene.clips.turning import head_turns, turning_bones
+from dermis.scene.clips.turning import turning_bones
 from dermis.scene.environment import Environment
 from dermis.scene.files import load_scene
 from dermis.scene.gaze import looking_at
@@ -44,11 +45,13 @@ class _Seen:
     """A head with what it is seen by.
 
     points : of its face, see `face_points`
+    bones : by name, which share of a turn of the head each takes
     skin : of the person, before the spec's dials
     """
 
     head: Head
     points: NDArray[np.int32]
+    bones: Mapping[str, float]
     skin: Skin
 
 
@@ -68,7 +71,7 @@ class SceneMaker:
         """
         seen = self._person(parameters)
         head, width_height = seen.head, self.spec.size
-        pose = Pose(self._weights(parameters, head), _turns(parameters, head))
+        pose = Pose(self._weights(parameters, head), _turns(_turned(parameters), seen.bones))
         motion = pose.motion(head.control)
         camera = camera_of(parameters, head, seen.points, motion, width_height[0] / width_height[1])
         looking = _looking(parameters, head, pose, camera.position)
@@ -100,7 +103,7 @@ class SceneMaker:
         else:
             person = drawn_person(parameters)
             head, skin = person.head(subdivide=_levels(self.spec.size)), skin_of(person)
-        return _Seen(head, face_points(head), skin)
+        return _Seen(head, face_points(head), turning_bones(head.control.skeleton).head, skin)
 
     def _loaded(self, name: str) -> tuple[Head, Skin]:
         """A head by its name, with the skin of the scene that it is of."""
@@ -159,17 +162,23 @@ def _below(parameters: Mapping[str, Any], table: str) -> dict[str, Any]:
     return {name.removeprefix(start): one for name, one in parameters.items() if name.startswith(start)}
 
 
-def _angles(parameters: Mapping[str, Any]) -> NDArray[np.float64]:
+def _turned(parameters: Mapping[str, Any]) -> NDArray[np.float64]:
     """(3, 3) the turn of the head."""
     nod, turn, tilt = (parameters[f"head.{name}_deg"] for name in ("pitch", "yaw", "roll"))
     return np.array(angles_matrix((nod, turn, tilt)))
 
 
-def _turns(parameters: Mapping[str, Any], head: Head) -> dict[str, list[float]]:
-    """Angles of the bones that turn the head."""
-    bones = turning_bones(head.control.skeleton)
-    turns = head_turns(bones, matrix_quaternion(_angles(parameters)[None]))
-    return {name: angles[0].tolist() for name, angles in turns.items()}
+def _turns(turned: NDArray[np.float64], bones: Mapping[str, float]) -> dict[str, tuple[float, float, float]]:
+    """Angles of the bones that turn the head together.
+
+    turned : (3, 3) the turn of the head
+    bones : by name, which share of it each takes
+    """
+    about = Rotation.from_matrix(turned).as_rotvec()
+    shares = {
+        share: matrix_angles(Rotation.from_rotvec(share * about).as_matrix()) for share in {*bones.values()}
+    }
+    return {name: shares[share] for name, share in bones.items()}
 
 
 def _looking(
@@ -181,7 +190,7 @@ def _looking(
     place = np.array(camera_mm)
     if parameters["gaze.at"] == ANGLES:
         ahead = towards(parameters["gaze.yaw_deg"], -parameters["gaze.pitch_deg"])
-        place = _angles(parameters) @ np.array(ahead) * _FAR_MM
+        place = _turned(parameters) @ np.array(ahead) * _FAR_MM
     return looking_at(head, place, pose)
 
 

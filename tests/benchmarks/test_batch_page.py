@@ -1,0 +1,58 @@
+"""The page of data sets at scale says what follows from what was measured."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
+
+
+@pytest.fixture(autouse=True)
+def scripts(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Last, for a name there is also one of the standard library's.
+    monkeypatch.setattr(sys, "path", [*sys.path, str(FOLDER)])
+
+
+def told(**more: Any) -> dict[str, Any]:
+    machine = {"adapters": ["H200"], "cores": 16, "size": [512, 512], "atlas": 1024, "outputs": ["depth"]}
+    run = {"workers": 2, "adapters": 2, "encoders": 4, "images_per_s": 200.0, "bytes_per_image": 1e6}
+    return {
+        "machine": machine,
+        "versions": {"dermis": "1", "wgpu": "2"},
+        "date": "2026-01-01T",
+        "load": "0.1",
+        "new": [{**run, "images_per_s": 100.0, "worker_bytes": []}, {**run, "worker_bytes": [10**9, 10**9]}],
+        **more,
+    }
+
+
+def test_paper_goes_on_with_the_fastest_run() -> None:
+    from batch_page import paper
+
+    steps = {"parameters": 1.0, "scene": 5.0, "draw_and_read": 4.0, "encode": 50.0}
+    rows = dict(paper(told(steps=steps, disk={"bytes_per_s": 5e8})))
+    assert (rows["hours of this machine"], rows["hours of an adapter"]) == ("14", "28")
+    assert (rows["bytes"], rows["files"]) == ("10 TB", "10,000 shards of 1,000 MB")
+    assert rows["at most, by the workers' own time"] == "200 images/s"
+    assert rows["at most, by encoding"] == "160 images/s"
+    assert rows["at most, by the disk"] == "500 images/s"
+    assert rows["what is reached first"] == "encoding"
+
+
+def test_the_page_has_each_run_with_its_ratio() -> None:
+    from batch_page import page
+
+    text = page([told(dask={"workers": 2, "dask_over_plain": 0.98})])
+    assert "| new people | 2 | 2 | 4 | 200 | 2.00 | 1000 to 1000 |" in text
+    assert "0.980 times" in text and "what is reached first" not in text
+
+
+def test_the_rate_is_that_of_the_middle() -> None:
+    from batch_sections import Clock
+
+    clock = Clock([(10.0 if n == 1 else 20.0 + 0.5 * n, n) for n in range(1, 101)])
+    assert clock.rate() == pytest.approx(2.0)
