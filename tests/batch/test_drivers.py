@@ -59,6 +59,11 @@ def wait_until_all_left(number: int) -> None:
     assert session(number) == []
 
 
+def besides_progress(notes: bytes) -> list[bytes]:
+    """Lines of stderr but for those that a slow machine gets every half minute."""
+    return [line for line in notes.splitlines() if b" images/s, " not in line]
+
+
 def test_a_killed_driver_leaves_nobody_and_is_gone_on_with(
     small_folder: Path, undisturbed: Files, tmp_path: Path
 ) -> None:
@@ -73,7 +78,7 @@ def test_a_killed_driver_leaves_nobody_and_is_gone_on_with(
     skipped = len(list(tmp_path.glob("shard-*.tar")))
     last = started(small_folder / "spec.toml", tmp_path)
     said, notes = last.communicate()
-    assert (last.returncode, notes) == (0, b"") and session(last.pid) == []
+    assert (last.returncode, besides_progress(notes)) == (0, []) and session(last.pid) == []
     assert f"({skipped} were there)".encode() in said and 2 <= skipped <= SHARDS
     assert contents(tmp_path) == undisturbed
 
@@ -87,6 +92,6 @@ def test_one_that_is_asked_to_end_keeps_what_is_whole(
     # Ctrl-C reaches all that the terminal has started, not the driver alone.
     os.killpg(driver.pid, number) if number == signal.SIGINT else driver.send_signal(number)
     said, notes = driver.communicate()
-    assert (driver.returncode, said, notes) == (128 + number, b"", b"")
+    assert (driver.returncode, said, besides_progress(notes)) == (128 + number, b"", [])
     wait_until_all_left(driver.pid)
     assert set(contents(tmp_path)) < set(undisturbed)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import subprocess
 import sys
 import tarfile
@@ -18,12 +19,13 @@ from observed import OUTPUT_NAMES, observation, small_spec, write_all
 import dermis
 from dermis.batch.encodings import encode_output
 from dermis.batch.entries import entries
+from dermis.batch.index import write_index
 from dermis.batch.samples import decoded
 from dermis.errors import DermisError
 from dermis.extras import needed
 from dermis.frame.observation import Landmarks
 
-EXACT = tuple(small_spec(encoding="exr").outputs)
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "dataset_files.md"
 
 
 @pytest.fixture(scope="module", params=["webdataset", "folder"])
@@ -67,17 +69,24 @@ def test_neither_pyarrow_nor_webdataset_is_needed_to_read(written: Path) -> None
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-def test_webdataset_reads_the_shards(tmp_path: Path) -> None:
-    """As the documentation has it."""
-    spec = small_spec()
-    write_all(tmp_path, spec)
-    webdataset = needed("webdataset", "a test")
-    shards = sorted(map(str, tmp_path.glob("shard-*.tar")))
-    found = list(webdataset.WebDataset(shards, shardshuffle=False).map(decoded))
+def test_what_the_documentation_shows_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    spec = small_spec(head={"yaw_deg": {"uniform": [-20, 20]}}, camera={"yaw_deg": {"uniform": [-40, 40]}})
+    write_all(tmp_path / "faces", spec)
+    write_index(tmp_path / "faces", spec)
+    monkeypatch.chdir(tmp_path)
+    reading, pipeline, asking = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(reading, names)
+    assert names["points"].shape == (1, 2) and -20 <= names["turned"] <= 20
+    exec(pipeline, names)
+    found = sorted(names["images"], key=lambda one: one["number"])
     assert [one["number"] for one in found] == list(range(7))
-    for one, ours in zip(found, dermis.read_dataset(tmp_path), strict=True):
+    for one, ours in zip(found, dermis.read_dataset("faces"), strict=True):
         np.testing.assert_array_equal(one["depth"], ours["depth"])
         np.testing.assert_array_equal(one["picture"], ours["picture"])
+    exec(asking, names)
+    truth = [k for k in range(7) if abs(float(spec.parameters(k)["camera.yaw_deg"])) > 20]  # type: ignore[arg-type]
+    assert names["profiles"] == [f"{k:09d}" for k in truth] and truth
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")

@@ -68,6 +68,19 @@ def test_what_is_whole_is_not_drawn_again(small_spec: Spec, undisturbed: Files, 
     assert contents(tmp_path) == undisturbed
 
 
+def test_a_shard_that_was_damaged_is_drawn_again(
+    small_spec: Spec, undisturbed: Files, tmp_path: Path
+) -> None:
+    put(undisturbed, tmp_path)
+    name = next(name for name in sorted(undisturbed) if name.startswith("shard-"))
+    data = bytearray(undisturbed[name])
+    data[700] ^= 1
+    (tmp_path / name).write_bytes(data)
+    report = drawn(small_spec, tmp_path)
+    assert (report.shards, report.skipped) == (1, SHARDS - 1)
+    assert contents(tmp_path) == undisturbed
+
+
 def test_killed_workers_lose_nothing(small_spec: Spec, undisturbed: Files, tmp_path: Path) -> None:
     rng = random.Random(1)
     moments = set(rng.sample(range(1, COUNT - 1), 2))

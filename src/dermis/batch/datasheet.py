@@ -30,7 +30,7 @@ _DRAWN = """## What was drawn
 _FILES = """## Files of each image
 
 Named by the image's number, as in 000000012.png. Outputs are those of each pixel's middle, not filtered.
-Cameras are OpenCV's, K (R X + t): x to the right, y down, z forward, and the middle of the first pixel is (0, 0).
+Cameras are OpenCV's, K (R X + t): x to the right, y down, z forward; the middle of the first pixel is (0, 0).
 Places are in mm from the head's centre, and `head_pose` goes from the head at rest to the camera. In Python,
 `dermis.read_dataset(FOLDER)` reads all of it.
 

@@ -25,7 +25,7 @@ def outputs_of(spec: Spec) -> dict[str, dict[str, Any]]:
             "step": _levels(name, spec)[0],
             "zero": _levels(name, spec)[1],
             "unit": OUTPUTS[name].unit,
-            "description": OUTPUTS[name].description,
+            "description": OUTPUTS[name].description.partition(", see ")[0],  # pages are elsewhere
             "background": OUTPUTS[name].background,
         }
         for name in spec.outputs

@@ -10,12 +10,13 @@ from typing import Protocol
 
 from dermis.batch.datasheet import write_datasheet
 from dermis.batch.index import write_index
-from dermis.batch.shards import Shard, is_there, remove_leftovers, shards_of
+from dermis.batch.settling import settle
+from dermis.batch.shards import Shard, is_there, is_whole, remove_leftovers, shards_of
 from dermis.batch.spec import Spec
 from dermis.batch.told import Told
 from dermis.batch.worker import Failure, Work
 from dermis.errors import notify, refuse
-from dermis.outputs import refuse_output, replacing
+from dermis.outputs import refuse_output
 from dermis.reading import read_text
 
 SPEC_FILE = "spec.toml"
@@ -79,7 +80,7 @@ def run(
     claim(work.out, work.spec)
     every = shards_of(work.spec)
     mine = every[part[0] :: part[1]]
-    missing = [shard for shard in mine if not is_there(work.out, shard, work.spec)]
+    missing = [shard for shard in mine if not is_whole(work.out, shard, work.spec)]
     remove_leftovers(work.out, mine)
     try:
         images, failed = _drawn(crew, work, missing, told)
@@ -109,8 +110,7 @@ def claim(out: Path, spec: Spec) -> None:
             remedy = "Choose another folder, or give the spec that it was begun with"
             refuse(out, "a folder for this data set", f"{SPEC_FILE} in it is another's", remedy)
         return
-    with replacing(place) as trial:
-        trial.write_text(spec.text(), encoding="utf-8")
+    settle(place, lambda path: path.write_text(spec.text(), encoding="utf-8"))
 
 
 def _drawn(

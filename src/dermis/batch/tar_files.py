@@ -25,9 +25,7 @@ class TarWriter:
 
     def add(self, name: str, data: bytes) -> None:
         """Raises OSError when the disk is full."""
-        head = tarfile.TarInfo(name)
-        head.size = len(data)
-        for piece in (head.tobuf(tarfile.USTAR_FORMAT), data, bytes(-len(data) % _BLOCK)):
+        for piece in _pieces(name, data):
             self._file.write(piece)
             self._hash.update(piece)
 
@@ -87,10 +85,10 @@ def tar_stamp(file: BinaryIO) -> tuple[int, bytes]:
     if at < 0 or (start + at) % _BLOCK:
         raise ValueError("it is cut off")
     member = _member(tail[at : at + _BLOCK], start + at)
-    end = member.place - start + member.size
-    if member.name != NAME or tail[end:] != bytes(-member.size % _BLOCK) + _END:
-        raise ValueError("it is cut off")
-    return start + at, tail[member.place - start : end]
+    stamp = tail[member.place - start :][: member.size]
+    if tail[at:] != b"".join(_pieces(NAME, stamp)) + _END:
+        raise ValueError("it is cut off or damaged")
+    return start + at, stamp
 
 
 def tar_sha256(file: BinaryIO, stop: int) -> str:
@@ -101,6 +99,13 @@ def tar_sha256(file: BinaryIO, stop: int) -> str:
         digest.update(piece)
         stop -= len(piece)
     return digest.hexdigest()
+
+
+def _pieces(name: str, data: bytes) -> tuple[bytes, bytes, bytes]:
+    """A file in a tar file: its header, its bytes, and what fills the last block."""
+    head = tarfile.TarInfo(name)
+    head.size = len(data)
+    return head.tobuf(tarfile.USTAR_FORMAT), data, bytes(-len(data) % _BLOCK)
 
 
 def _member(block: bytes, place: int) -> TarMember:

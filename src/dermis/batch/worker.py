@@ -14,7 +14,7 @@ from dermis.batch.drawing import Parameters
 from dermis.batch.encoding import Encoded, Encoders
 from dermis.batch.entries import entries
 from dermis.batch.scenes import SceneMaker
-from dermis.batch.shards import Shard, ShardWriter, is_there
+from dermis.batch.shards import Shard, ShardWriter, is_whole
 from dermis.batch.spec import Spec
 from dermis.errors import DermisError
 from dermis.frame.observation import Observation
@@ -77,7 +77,7 @@ class Worker:
         lost twice, LostProcessError where a process that encodes ended.
         """
         work = self._work
-        if is_there(work.out, shard, work.spec):
+        if is_whole(work.out, shard, work.spec):
             return ()
         failed: list[Failure] = []
         adapter = self._renderer.device.adapter.name
