@@ -63,11 +63,13 @@ def human_fields() -> Doubles:
 
 
 def dense_fields() -> tuple[Doubles, Doubles]:
-    """(n, 3) places all over the average human's skin [mm], and (k, n) the fields there."""
+    """(n, 3) places all over the average human's outer skin [mm], and (k, n) the fields there."""
     head = AVERAGE.head(subdivide=_LEVELS)
     assert head.control.stencils is not None
     skin = np.unique(head.mesh.point[head.mesh.triangles[head.mesh.material == 0]])
-    return points_of(head.mesh)[skin], head.control.stencils.points(human_fields().T.copy())[skin].T
+    fields = head.control.stencils.points(human_fields().T.copy())[skin].T
+    outer = fields[HUMAN_FIELDS.index("mouth_interior")] < 0
+    return points_of(head.mesh)[skin][outer], fields[:, outer]
 
 
 def hair_classes(head: Head) -> NDArray[np.uint8]:

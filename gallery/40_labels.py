@@ -1,0 +1,35 @@
+"""Ground truth of a face.
+
+Landmarks, green where they are seen and red where they are hidden, and the parts of the face: known to the
+renderer, not guessed from the picture. Left and right are the person's own.
+
+Deck: +
+Columns: 3
+"""
+
+import dermis
+from dermis.gallery.marks import marked
+from dermis.gallery.output_colours import coloured
+from dermis.gallery.picture import main
+
+SET = "face-synthetics-70"
+PEOPLE = {
+    1: dermis.Pose({"eyeBlinkLeft": 1.0}),
+    4: dermis.Pose({"jawOpen": 0.6}, {"head": (0, 20, 0)}),
+    6: dermis.Pose(bones={"neck03": (0, -20, 0), "head": (0, -30, 0)}),
+}
+
+
+def draw(studio):
+    camera = dermis.Camera(position=(0, 0, 1100), target=(0, -6, 0), frame_mm=250)
+    scenes = [dermis.Scene(f"human:{seed}", camera=camera, pose=pose) for seed, pose in PEOPLE.items()]
+    settings = studio.settings(exposure=1.5)
+    seen = list(studio.renderer.observe(scenes, settings, outputs=("label",), landmarks=(SET,)))
+    named = {f"human:{seed}": one for seed, one in zip(PEOPLE, seen, strict=True)}
+    panels = {name: marked(one.picture, one.landmarks[SET]) for name, one in named.items()}
+    labels = {f"{name}, label": coloured("label", one.outputs["label"]) for name, one in named.items()}
+    return panels | labels
+
+
+if __name__ == "__main__":
+    main(draw)
