@@ -15,6 +15,7 @@ from tolerances import FURNACE_OF_HAIR
 from dermis.frame import strands as hairs
 from dermis.frame.passes import strands as drawing
 from dermis.frame.renderer import Renderer
+from dermis.frame.strand_space import make_space, room_of
 from dermis.gpu import download
 from dermis.mesh.head import Head
 from dermis.scene.environment import Environment
@@ -65,7 +66,8 @@ def test_brightness_does_not_depend_on_how_many_hairs_are_drawn(
 
 
 def test_coarse_hairs_are_drawn_as_wide_as_pixels_are(renderer: Renderer) -> None:
-    tables = hairs.make_tables(renderer.device, wool(20_000, 1.0))
+    head, device = wool(20_000, 1.0), renderer.device
+    tables = hairs.make_tables(device, head, make_space(device, room_of(head)))
     near, far = (hairs.drawn_of(tables, pixel_mm) for pixel_mm in (0.01, 0.5))
     assert near == 20_000 and hairs._LEAST_DRAWN <= far < 12_000
     assert tables.coarse == (20_000, 5) and tables.fine.hairs == 0
@@ -96,5 +98,5 @@ def test_hair_shades_hair(renderer: Renderer, absorption: float, low: float, hig
         made = run_frame(renderer, scene, technique="none", size=(SIZE, SIZE)).resources.strands
         assert made is not None
         raw = renderer.device.handle.queue.read_buffer(made.tables.drawn)
-        seen.append(np.frombuffer(raw, np.float32).reshape(-1, 5, 8)[0, 2, 4:7].mean())
+        seen.append(np.frombuffer(raw, np.float32, 5 * 8).reshape(5, 8)[2, 4:7].mean())
     assert low <= seen[1] / seen[0] < high

@@ -304,6 +304,7 @@ def test_an_output_that_was_not_asked_is_refused(renderer: Renderer) -> None:
 
 def test_more_than_buffers_hold_is_refused(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = settings_of(size=(30, 31))
+    renderer.draw(SCENE, settings)  # what a frame takes otherwise
     with monkeypatch.context() as patch:
         patch.setattr(renderer.device, "max_storage_bytes", 4 * 3 * 929)
         with pytest.raises(DermisError, match=r"size: expected at most 929 pixels with position at once"):

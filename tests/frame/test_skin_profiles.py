@@ -41,7 +41,7 @@ def test_the_first_move_of_a_slider_starts_from_the_profile_as_it_is(monkeypatch
     assert starts == [plain]
     assert first.albedo == pytest.approx(fresh.albedo, rel=1e-4)
     profiles.of(Skin(profile="dark", pigments=Pigments(melanin=0.03)))
-    assert starts[1] is None
+    assert starts[1] is load_profile("dark")
 
 
 def test_the_same_pigments_are_not_fitted_again() -> None:

@@ -13,7 +13,7 @@ from strand_setups import hairy, shuffled
 from tolerances import FURNACE, LOBE_TWIN, TWIN
 
 from dermis.errors import DermisError
-from dermis.frame import strands as hairs
+from dermis.frame import strand_space
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
 from dermis.gpu.textures import texture_from
@@ -192,7 +192,7 @@ def test_hairs_follow_the_skin(renderer: Renderer) -> None:
     made = inputs.resources.strands
     assert made is not None and head.strands is not None
     raw = renderer.device.handle.queue.read_buffer(made.tables.posed)
-    rows = np.frombuffer(raw, np.float32).reshape(1, 7, 4)
+    rows = np.frombuffer(raw, np.float32, 7 * 4).reshape(1, 7, 4)
     there = head.strands.places_mm(head.mesh, moved)
     assert np.abs(rows[:, 2:, :3] - there).max() < 1e-4
     still = head.strands.places_mm(head.mesh, head.positions_mm)
@@ -236,7 +236,7 @@ def test_tiles_of_a_workgroup_draw_the_same(
     """As GPUs do it: many chains for each tile, followed side by side."""
     scene, shown = lit(tangle(700, absorption=0.4)), []
     for ways in (1, 64):
-        monkeypatch.setattr(hairs, "ways_of", lambda device, tiles, ways=ways: ways)
+        monkeypatch.setattr(strand_space, "ways_of", lambda device, tiles, ways=ways: ways)
         renderer.forget()
         shown.append(picture(renderer, scene, size=size))
     renderer.forget()

@@ -14,10 +14,12 @@ from dermis.human.hair import hairy_skin
 from dermis.human.hair.head_hair import MOST_PER_CM2
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.skin import Skin
+from dermis.human.skin.surface import average
 from dermis.mesh.head import Head
 from dermis.mesh.strands import Strands, points_of
 
 Floats = NDArray[np.float64]
+ALL = np.ones(len(average()[0]), bool)
 LOOKS = {
     "cropped": HairLook(style="cropped"),
     "short": HairLook(style="short", length_mm=32.0, beard_mm=10.0),
@@ -57,7 +59,7 @@ def test_the_same_seed_has_the_same_hair() -> None:
 
 def test_roots_are_as_dense_as_is_said() -> None:
     mesh, rng = Human().head(subdivide=0).mesh, np.random.default_rng(0)
-    found = hairy_skin.rooted(mesh, everywhere, 40.0, rng).roots
+    found = hairy_skin.rooted(mesh, hairy_skin.Where(everywhere, ALL), 40.0, rng).roots
     quads, count = np.unique(found.quad, return_counts=True)
     area = hairy_skin.areas_cm2(mesh, quads.astype(np.int64))
     assert count.sum() / area.sum() == pytest.approx(40.0, rel=0.02)
@@ -116,10 +118,19 @@ def test_it_moves_with_the_head_and_stays_with_the_face() -> None:
     assert np.median(moved[chin]) > 5.0 and moved[still[:, 0, 1] > 60].max() < 0.5
 
 
+@pytest.mark.parametrize("where", [hairy_skin.scalp(0.0), hairy_skin.scalp(0.8), hairy_skin.beard()])
+def test_no_hair_is_lost_where_none_is_looked_for(where: hairy_skin.Where) -> None:
+    mesh = Human().head(subdivide=0).mesh
+    both = where, where._replace(near=ALL)
+    some, every = (hairy_skin.rooted(mesh, one, 60.0, np.random.default_rng(0)) for one in both)
+    assert not where.near.all() and len(some.places) > 1000
+    assert np.array_equal(some.places, every.places) and np.array_equal(some.roots.quad, every.roots.quad)
+
+
 def test_recession_bares_temples_and_crown() -> None:
     temple, crown = np.array([[33.0, 75.0, -12.0, -50.0]]), np.array([[0.0, 95.0, -122.0, -50.0]])
     middle = np.array([[0.0, 100.0, -50.0, -50.0]])
-    full, thin = hairy_skin.scalp(0.0), hairy_skin.scalp(1.0)
+    full, thin = hairy_skin.scalp(0.0).amount, hairy_skin.scalp(1.0).amount
     assert full(temple) > 0.4 > 0.05 > thin(temple)
     assert full(crown) > 0.95 and thin(crown) < 0.3 and thin(middle) > 0.9 * full(middle)
 

@@ -25,7 +25,7 @@ from dermis.scene.skin import Skin
 class Asked:
     """What resources are made for.
 
-    person : (p, 3) places of the head's control points where another person rests, None for the head's own
+    person : (p, 3) places of the control points where the person rests, None for those of the head's topology
     parts : how many parts each light is shaded as, those of the environment last
     shadow_layers : how many parts of lights cast shadows
     posed : whether the scene has a pose
@@ -47,6 +47,24 @@ class Asked:
     view: str
     outputs: tuple[str, ...] = ()
     landmarks: tuple[str, ...] = ()
+
+    @property
+    def topology(self) -> Head:
+        """The bare head that atlas and tables are made for."""
+        return self.head.topology
+
+    @property
+    def shares(self) -> bool:
+        """Whether these are made for other people too."""
+        return self.topology is not self.head.bare
+
+    @property
+    def searched(self) -> Any:
+        """Where control points rest as thin parts are looked for, None for those of the head's topology.
+
+        All people of a template share its own: what passes through these is weighed for each.
+        """
+        return None if self.shares else self.person
 
     @property
     def white(self) -> bool:
@@ -71,7 +89,8 @@ class Asked:
     @property
     def occlusion_moves(self) -> bool:
         """Whether that follows the head's shape."""
-        return self.occluded and self.posed and self.settings.occlusion == "baked"
+        elsewhere = self.posed or self.person is not None
+        return self.occluded and elsewhere and self.settings.occlusion == "baked"
 
     @cached_property
     def remedy(self) -> Remedy:

@@ -40,22 +40,22 @@ class Translucency:
 
     pairs : translucent pairs
     surface : resources of geometry.wgsl and of the atlas, for where they are now
-    weighing, gaussians : record of translucency_weights.wgsl for a profile, and how many it has
     receiver_points, source_points : buffers of where the pairs' places are
     weights : buffer of the share of light that each pair lets pass
-    layer : blurred level, counted from 0, whose light passes
     gathered : buffer for the light of the sources
+    weighing, gaussians : record of translucency_weights.wgsl for a profile, and how many it has
+    layer : blurred level, counted from 0, whose light passes
     """
 
     pairs: PairBuffers
     surface: Resources
-    weighing: Any
-    gaussians: int
     receiver_points: Any
     source_points: Any
     weights: Any
-    layer: int
     gathered: Any
+    weighing: Any = None
+    gaussians: int = 0
+    layer: int = 0
 
     @property
     def light(self) -> Any:

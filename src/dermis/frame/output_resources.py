@@ -12,12 +12,12 @@ from dermis.frame.light_space import light_space
 from dermis.frame.outputs import OUTPUTS
 from dermis.frame.passes.outputs.planes import OutputResources, make_planes
 from dermis.frame.passes.visibility_buffer import make_layers
-from dermis.frame.shape import make_shape, shape_tables
+from dermis.frame.shape import ShapeTables, make_shape
 from dermis.gpu import Device, Memo
 
 
 def output_resources(
-    memo: Memo, device: Device, asked: Asked, layouts: tuple[AtlasLayout, ...]
+    memo: Memo, device: Device, asked: Asked, layouts: tuple[AtlasLayout, ...], tables: ShapeTables
 ) -> OutputResources | None:
     """Space for the outputs that are asked, None for none.
 
@@ -33,7 +33,6 @@ def output_resources(
         keep(make_planes, device, stage, tuple(of), settings.size, of=stage) for stage, of in stages.items()
     ]
     moves = any(OUTPUTS[name].stage == "motion" for name in asked.outputs)
-    tables = keep(shape_tables, device, asked.head.bare)
     return OutputResources(
         names=asked.outputs,
         planes=tuple(planes),

@@ -9,17 +9,18 @@ from dermis.gpu.wgsl_source import Member
 from dermis.human.skin.detail import TILE_MM
 from dermis.human.skin.face import AMOUNTS, DEGREES, sizes
 from dermis.human.skin.movements import FOLDING
-from dermis.human.skin.textures import DOTS, NOISES, noise_table
+from dermis.human.skin.textures import DOTS, GROUNDS, NOISES, WANDERING, noise_table
 
-_NAMES = {
+_NAMES: dict[str, Sequence[str]] = {
     "noises": [noise.name for noise in NOISES],
     "dots": [dots.name for dots in DOTS],
     "amounts": list(AMOUNTS),
+    "grounds": list(GROUNDS),
 }
 
 
 def texture_names() -> Mapping[str, Callable[[], Sequence[Member]]]:
-    """Lists of the names of noises, dots and amounts, numbered in order."""
+    """Lists of the names of noises, dots, amounts and grounds, numbered in order."""
     return {name: _members(names) for name, names in _NAMES.items()}
 
 
@@ -27,7 +28,8 @@ def painting_numbers() -> dict[str, float]:
     """Numbers that the shaders fill in."""
     names = {name: len(names) for name, names in _NAMES.items()}
     own = {"degrees": float(DEGREES), "tile_mm": TILE_MM, "folding": FOLDING}
-    return own | names | sizes() | {"noise_rows": len(noise_table()), "amount_rows": len(AMOUNTS) // 4}
+    rows = {"noise_rows": len(noise_table()), "wander_rows": WANDERING, "amount_rows": len(AMOUNTS) // 4}
+    return own | names | sizes() | rows
 
 
 def _members(names: Sequence[str]) -> Callable[[], Sequence[Member]]:

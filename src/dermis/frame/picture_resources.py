@@ -13,11 +13,12 @@ from dermis.frame.passes.background import Backdrop
 from dermis.frame.passes.bloom import make_glow
 from dermis.frame.passes.meter import make_meter
 from dermis.frame.passes.post import make_picture
+from dermis.frame.shape import ShapeTables
 from dermis.gpu import Device, Memo, make_texture
 
 
 def picture_resources(
-    memo: Memo, device: Device, asked: Asked, layouts: tuple[AtlasLayout, ...]
+    memo: Memo, device: Device, asked: Asked, layouts: tuple[AtlasLayout, ...], tables: ShapeTables
 ) -> dict[str, Any]:
     """By their names among the frame's resources.
 
@@ -29,7 +30,7 @@ def picture_resources(
         "meter": keep(make_meter, device) if settings.exposure == "auto" else None,
         "backdrop": _backdrop(memo, device, asked),
         "glow": keep(make_glow, device, settings.size) if settings.bloom else None,
-        "outputs": output_resources(memo, device, asked, layouts),
+        "outputs": output_resources(memo, device, asked, layouts, tables),
     }
 
 

@@ -130,7 +130,7 @@ class Preparation:
 
     def _around(self, head: Head, motion: Motion | None, outline: Outline) -> tuple[Look, Any]:
         """How the sky sees the head as it is posed, and the shader's record of it."""
-        anchors = self.memo.keep(anchors_of, head)
+        anchors, motion = self.memo.keep(anchors_of, head.topology), motion or head.control.rest
         return self.memo.keep(_looked, outline, using=(motion, self.device, head, anchors))
 
     def _before(self, scene: Scene, previous: Scene, inputs: Inputs) -> Before:
@@ -142,7 +142,7 @@ class Preparation:
         if not same(previous.head.bare, head):
             came, remedy = f"{previous.head.name!r} came", "Leave it out where a head follows another"
             refuse("previous", "a scene of the same head", came, remedy)
-        moved = self.memo.keep(_resting, head).motion
+        moved = self.memo.keep(_resting, head)
         if previous.motion is not None:
             moved = self.memo.keep(_bytes_of, head, previous.motion, moved, of="before")
         seen_from = pinhole(previous.camera, head, inputs.settings)
@@ -151,21 +151,23 @@ class Preparation:
 
     def _moved(self, head: Head, motion: Motion | None) -> Moved:
         """The head as it is posed, or at rest where no motion came."""
-        resting = self.memo.keep(_resting, head)
-        return self.memo.keep(_posed, head, motion, resting.motion) if motion else resting
+        at_rest = self.memo.keep(_resting, head)
+        return self.memo.keep(_posed, head, motion or head.control.rest, at_rest)
 
 
 def _bytes_of(head: Head, motion: Motion, at_rest: MotionBytes) -> MotionBytes:
     """A motion as the shaders read it; the bytes of a head's own points are always the same object."""
     weights, matrices = motion.weights.tobytes(), motion.matrices.tobytes()
     same = motion.positions_mm is head.control.positions_mm
-    return MotionBytes(at_rest.positions if same else motion.positions_mm.tobytes(), weights, matrices)
+    positions = at_rest.positions if same else motion.positions_mm.tobytes()
+    return at_rest._replace(positions=positions, weights=weights, matrices=matrices)
 
 
 def _person(scene: Scene) -> Any:
-    """Where the control points rest, if not where the head's own do."""
-    motion, own = scene.motion, scene.head.control.positions_mm
-    return None if motion is None or motion.positions_mm is own else motion.positions_mm
+    """Where the control points rest, if not where those of the head's topology do."""
+    motion = scene.motion or scene.head.control.rest
+    places = motion.positions_mm
+    return None if places is scene.head.topology.control.positions_mm else places
 
 
 def _movements(head: Head, motion: Motion | None) -> NDArray[np.float32]:
@@ -173,8 +175,8 @@ def _movements(head: Head, motion: Motion | None) -> NDArray[np.float32]:
     return movements(head.targets, motion.weights)
 
 
-def _resting(head: Head) -> Moved:
-    return Moved(resting(head.control), head.mesh.outline, _eyes(head, head.control.rest))
+def _resting(head: Head) -> MotionBytes:
+    return resting(head.control)
 
 
 def _eyes(head: Head, motion: Motion) -> EyesSeen | None:

@@ -26,15 +26,14 @@ from dermis.frame.passes.shape import still_shape
 from dermis.frame.picture_resources import picture_resources
 from dermis.frame.resting import resting
 from dermis.frame.shape import Shape, ShapeTables, make_shape, shape_tables
-from dermis.frame.strands import (
-    StrandResources,
-    has_strands,
+from dermis.frame.strand_space import (
+    make_space,
     make_strand_picture,
     make_strand_shadows,
-    make_tables,
     no_strand_shadows,
-    skin_under,
+    room_of,
 )
+from dermis.frame.strands import StrandResources, has_strands, make_tables, skin_under
 from dermis.frame.techniques.technique import AtlasTechnique, Technique
 from dermis.frame.translucency import translucency_of
 from dermis.gpu import Constants, Device, Memo
@@ -55,10 +54,10 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     reading = device, asked.head, asked.white, settings.gamma == "right", asked.painted_side, asked.moving
     maps = memo.soon(device.executor, upload_maps, *reading)  # which take long to read
     shadow_maps = _shadows(memo, device, asked)
-    tables = keep(shape_tables, device, asked.head.bare)
+    tables = keep(shape_tables, device, asked.topology, of="shared" if asked.shares else "")
     shape = keep(make_shape, device, tables)
     person = keep(still_shape, device, tables) if asked.person is not None else None
-    curvature = keep(_curvature, device, asked.head.bare) if technique.curved else None
+    curvature = keep(_curvature, device, asked.topology) if technique.curved else None
     strands = _strands(memo, device, asked)
     shared = _shared(memo, device, asked, shadow_maps, curvature, strands)
     atlases = [_atlas(memo, device, asked, name, k) for k, name in enumerate(asked.atlases.layouts)]
@@ -86,8 +85,8 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         sky=_sky(memo, device, asked, layouts[0], tables) if asked.occlusion_moves else None,
         gaussians=len(asked.profile.variance_mm2),
         strands=strands,
-        unscattered=keep(atlases[0][0].unscattered, asked.head.mesh),
-        **picture_resources(memo, device, asked, tuple(layouts)),
+        unscattered=keep(atlases[0][0].unscattered, asked.topology.mesh),
+        **picture_resources(memo, device, asked, tuple(layouts), tables),
     )
 
 
@@ -109,16 +108,17 @@ def _shading(memo: Memo, device: Device, asked: Asked) -> tuple[Any, Any]:
 def _strands(memo: Memo, device: Device, asked: Asked) -> StrandResources | None:
     if not has_strands(asked.head, asked.settings):
         return None
-    tables = memo.keep(make_tables, device, asked.head.bare)
-    picture = memo.keep(make_strand_picture, device, tables, asked.settings.size)
-    shadows = memo.keep(make_strand_shadows, device, asked.shadow_layers, tables, of=asked.view)
+    room = room_of(asked.head)
+    tables = memo.keep(make_tables, device, asked.head.bare, memo.keep(make_space, device, room))
+    picture = memo.keep(make_strand_picture, device, room, asked.settings.size)
+    shadows = memo.keep(make_strand_shadows, device, asked.shadow_layers, room, of=asked.view)
     return StrandResources(tables, picture, shadows, memo.keep(skin_under, asked.head))
 
 
 def _shadows(memo: Memo, device: Device, asked: Asked) -> shadows.ShadowMaps:
     layers = asked.shadow_layers
     size = asked.settings.shadow_size if layers else 1
-    return memo.keep(_shadow_maps, device, asked.head.bare, layers, size, of=asked.view)
+    return memo.keep(_shadow_maps, device, asked.topology, layers, size, of=asked.view)
 
 
 def _shared(
@@ -147,13 +147,13 @@ def _shared(
 
 def _sky(memo: Memo, device: Device, asked: Asked, layout: AtlasLayout, tables: ShapeTables) -> Sky:
     """The open sky at the head's vertices, known as it rests."""
-    at_rest = resting(memo, device, layout.head, tables, asked.head.bare, None, 0)
-    return memo.keep(make_sky, device, asked.head.bare, using=(at_rest,))
+    at_rest = resting(memo, device, layout.head, tables, asked.topology, None, 0)
+    return memo.keep(make_sky, device, asked.topology, using=(at_rest,))
 
 
 def _atlas(memo: Memo, device: Device, asked: Asked, name: str, index: int) -> Laid:
     stretch = asked.technique.stretch(asked.settings)
-    atlas = memo.keep(_cached_atlas, asked.head.bare, asked.atlases.side, name, of=str(index))
+    atlas = memo.keep(_cached_atlas, asked.topology, asked.atlases.side, name, of=str(index))
     return atlas, memo.keep(upload_atlas, device, atlas, stretch, asked.remedy, of=str(index))
 
 
@@ -171,9 +171,9 @@ def _layout(
 
     person : the shape of another person at rest
     """
-    keep, number, head, (atlas, textures) = memo.keep, str(index), asked.head.bare, laid
+    keep, number, head, (atlas, textures) = memo.keep, str(index), asked.topology, laid
     held = keep(upload_geometry, device, head.mesh, atlas, shape, of=number)
-    at_rest = partial(resting, memo, device, held, shape.tables, head, asked.person, index)
+    at_rest = partial(resting, memo, device, held, shape.tables, head, asked.searched, index)
     lit = held.resources | shared
     walked = None
     if person and textures.gutter:

@@ -54,7 +54,7 @@ class ShapeTables:
 class Shape:
     """What the passes of the shape read and write, by the names in their shaders.
 
-    rest, weights, matrices : buffers that each frame's motion is written to
+    rest, weights, matrices : buffers that each frame's motion is written to, beside `morphs`' displacements
     morphs, stencils, surface : of shape_pose.wgsl, shape_refine.wgsl, shape_vertices.wgsl; empty for no pass
     tables : those that it is made by
     """
@@ -134,23 +134,25 @@ def _vertices(device: Device, count: int) -> dict[str, Any]:
 def _morph_tables(rig: Rig) -> dict[str, NDArray[Any]]:
     """Displacements and influences point by point."""
     count = len(rig.positions_mm)
-    first, displacements = _by_point(rig.targets, count)
     return {
-        "first": first,
-        "displacements": displacements,
+        "first": _starts(rig.targets.point, count),
+        "displacements": displacements(rig.targets, rig.targets),
         "influences": _influences(rig.skeleton, count),
         "contacts": _contacts(rig.contact, count),
     }
 
 
-def _by_point(targets: MorphTargets, count: int) -> tuple[Words, NDArray[np.float32]]:
-    """(p + 1,) where each point's displacements begin, and (n, 4) these with their target's number."""
+def displacements(targets: MorphTargets, template: MorphTargets) -> NDArray[np.float32]:
+    """(n, 4) displacements point by point, each with its target's number, as shape_pose.wgsl reads them.
+
+    template : targets that move the same points
+    """
     number = np.repeat(np.arange(len(targets.names), dtype=np.uint32), np.diff(targets.first))
-    order = np.argsort(targets.point, kind="stable")
+    order = template.by_point
     table = np.zeros((max(1, len(order)), 4), np.float32)
     table[: len(order), :3] = targets.delta_mm[order]
     table[: len(order), 3] = number[order].view(np.float32)
-    return _starts(targets.point, count), table
+    return table
 
 
 def _influences(skeleton: Skeleton | None, count: int) -> Words:

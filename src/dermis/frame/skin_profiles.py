@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.profiles import fit_profile, load_profile
+from dermis.optics.profiles import fit_profile, load_profile, preset_names
 from dermis.scene.skin import Pigments, Skin
 from dermis.scene.tissue import tissue_of
 
@@ -13,8 +13,10 @@ _KEPT = 4  # the live skin, one to compare with, and those just before
 
 
 class SkinProfiles:
-    """Profiles of skins; each fit starts from the last one of its kind, which is several times faster.
+    """Profiles of skins; fits start from a similar one, which is several times faster.
 
+    With pigments alone that is the profile's own, so that a person's never follows from who was drawn before;
+    with layers or a structure of one's own, as a hand changes them in a window, it is the last of the kind.
     Files are checked for changes when the skin changes, not for each frame of the same skin.
     """
 
@@ -43,6 +45,9 @@ class SkinProfiles:
         return profile
 
     def _near(self, skin: Skin) -> GaussianSum | None:
+        plain = skin.pigments is not None and skin.pigments.structure is None and not skin.layers
+        if plain and skin.profile in preset_names():
+            return load_profile(skin.profile)
         fit = self._last(_kind, skin)
         return fit and fit[1]
 

@@ -3,27 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse
+from dermis.frame.strand_space import (
+    HEAD_WORDS,
+    LAYERS,
+    TILE,
+    Counts,
+    StrandPicture,
+    StrandSpace,
+    counts_of,
+    window_of,
+)
 from dermis.frame.surface import DEFAULT_COLOUR
-from dermis.gpu import Constants, Device, make_texture
+from dermis.gpu import Constants, Device
 from dermis.mesh.head import Head
 from dermis.mesh.strands import Strands, corners, weights
 from dermis.scene.settings import Settings
 from dermis.specular.hair import hair_numbers
 
-TILE = 8
-"""Pixels along a side of the tiles that hairs are listed in."""
-_WAYS = 64  # chains of a tile on GPUs: one for each pixel's invocation to follow
-_FINE_WINDOW, _WINDOW = 256, 288  # texels across what hairs hold back of a light, half as many down
-_LAYERS = 6  # of depth there
-_HEAD_WORDS = 8  # before them
-_LINKS_OF_PIECE = 4  # for hairs in no more than a few tiles
-_MOST_LINKS = 1 << 22
 _SHADING = 32_000  # coarse hairs that shade as all do
 _LEAST_DRAWN = 5_000
 _DRAWN_PIXELS = 0.45  # width of the coarse hairs that are drawn
@@ -34,23 +36,12 @@ _HAIRS = np.dtype(
 )  # in strand_knots.wgsl
 
 
-class Counts(NamedTuple):
-    """How many hairs, and how many knots each has."""
-
-    hairs: int
-    knots: int
-
-    def pieces(self, hairs: int | None = None) -> int:
-        """Between the knots of all or of some."""
-        return (self.hairs if hairs is None else hairs) * (self.knots - 1)
-
-
 @dataclass(frozen=True, eq=False)
 class StrandTables:
     """What hairs are, in buffers.
 
     strands, knots : by hair and by knot, as strands_pose.wgsl reads them
-    posed, drawn : knots in space and in the picture
+    posed, drawn : see `StrandSpace`
     record : Hairs of strand_knots.wgsl
     fine, coarse : of brows and lashes, and of head and beard
     shading : coarse hairs that shade
@@ -76,21 +67,6 @@ class StrandTables:
 
 
 @dataclass(frozen=True, eq=False)
-class StrandPicture:
-    """Space for hairs in a picture.
-
-    chains, links : pieces of hair tile by tile, see strands_bin.wgsl
-    result : the picture with hairs
-    ways : chains of a tile
-    """
-
-    chains: Any
-    links: Any
-    result: Any
-    ways: int
-
-
-@dataclass(frozen=True, eq=False)
 class StrandResources:
     """What the passes of hairs read and write.
 
@@ -106,7 +82,7 @@ class StrandResources:
 
 def strand_numbers() -> dict[str, float]:
     """Numbers that the shaders of hairs fill in."""
-    window = {"strand_layers": _LAYERS, "strand_window_words": _HEAD_WORDS}
+    window = {"strand_layers": LAYERS, "strand_window_words": HEAD_WORDS}
     return {"strand_tile": TILE, **window, **hair_numbers()}
 
 
@@ -119,12 +95,7 @@ def strand_constants(head: Head, settings: Settings) -> Constants:
     """Pipeline constants of what is lit, for the shadows of hairs."""
     if not has_strands(head, settings):
         return ()
-    return (("STRANDS", 1), ("STRAND_WINDOW", window_of(0 if head.hair is None else len(head.hair))))
-
-
-def window_of(coarse: int) -> int:
-    """Texels across what hairs hold back of a light: brows and lashes alone take a small part of the head."""
-    return _WINDOW if coarse else _FINE_WINDOW
+    return (("STRANDS", 1), ("STRAND_WINDOW", window_of(head.hair is not None and len(head.hair) > 0)))
 
 
 def drawn_of(tables: StrandTables, pixel_mm: float) -> int:
@@ -134,14 +105,14 @@ def drawn_of(tables: StrandTables, pixel_mm: float) -> int:
     return int(min(tables.coarse.hairs, max(_LEAST_DRAWN, everything / wide)))
 
 
-def make_tables(device: Device, head: Head) -> StrandTables:
+def make_tables(device: Device, head: Head, space: StrandSpace) -> StrandTables:
     """The hairs of a head.
 
     Raises DermisError for hairs of another mesh.
     """
     both = head.strands, head.hair
     parts = [part for part in both if part is not None]
-    fine, coarse = (Counts(0, 2) if part is None else Counts(*part.radius_mm.shape) for part in both)
+    fine, coarse = map(counts_of, both)
     table = np.concatenate([_rows(head, part) for part in parts])
     rows = [np.concatenate([part.knots_mm, part.radius_mm[..., None]], axis=-1) for part in parts]
     knots = np.concatenate([one.astype(np.float32).reshape(-1, 4) for one in rows])
@@ -150,8 +121,8 @@ def make_tables(device: Device, head: Head) -> StrandTables:
     return StrandTables(
         strands=device.buffer(table.view(np.uint32), "STORAGE"),
         knots=device.buffer(knots, "STORAGE"),
-        posed=_words(device, 4 * (len(knots) + 2 * len(table))),
-        drawn=_words(device, 8 * len(knots)),
+        posed=space.posed,
+        drawn=space.drawn,
         record=record,
         fine=fine,
         coarse=coarse,
@@ -160,7 +131,7 @@ def make_tables(device: Device, head: Head) -> StrandTables:
         wide_mm=0.0 if head.hair is None else 2.0 * float(head.hair.radius_mm[:, 0].mean()),
         cover=0.0 if head.hair is None or head.hair.cover is None else float(head.hair.cover.mean()),
         constants=(("KNOTS", fine.knots), ("COARSE_KNOTS", coarse.knots)),
-        window=(("STRAND_WINDOW", window_of(coarse.hairs)),),
+        window=(("STRAND_WINDOW", window_of(coarse.hairs > 0)),),
     )
 
 
@@ -182,35 +153,3 @@ def skin_under(head: Head) -> tuple[float, ...]:
     """(3,) albedo of the skin that hairs see below them."""
     colour = head.maps.mean_colour
     return (DEFAULT_COLOUR,) * 3 if colour is None else tuple(colour.tolist())
-
-
-def make_strand_picture(device: Device, tables: StrandTables, size: tuple[int, int]) -> StrandPicture:
-    """Space for hairs in a picture of size (width, height), where each may cross all of it."""
-    across, down = (-(-side // TILE) for side in size)
-    pieces = tables.fine.pieces() + tables.coarse.pieces()
-    links = _LINKS_OF_PIECE * pieces + tables.fine.hairs * (across + down)
-    links = min(links, _MOST_LINKS, device.max_storage_bytes // 8)
-    ways = ways_of(device, across * down)
-    chains = _words(device, 1 + ways * across * down)
-    return StrandPicture(chains, _words(device, 2 * links), make_texture(device, size, "rgba32float"), ways)
-
-
-def ways_of(device: Device, tiles: int) -> int:
-    """Chains of a tile: as many as pixels, but on software adapters and for pictures of too many tiles."""
-    fits = 4 * (1 + _WAYS * tiles) <= device.max_storage_bytes
-    return _WAYS if fits and device.adapter.kind != "CPU" else 1
-
-
-def make_strand_shadows(device: Device, layers: int, tables: StrandTables) -> Any:
-    """Space for what hairs hold back of so many lights."""
-    texels = window_of(tables.coarse.hairs) ** 2 // 2
-    return _words(device, (_HEAD_WORDS + (1 + _LAYERS) * texels) * max(1, layers))
-
-
-def no_strand_shadows(device: Device) -> Any:
-    """Placeholder where there are no hairs."""
-    return device.shared("no strand shadows", lambda: _words(device, _HEAD_WORDS))
-
-
-def _words(device: Device, count: int) -> Any:
-    return device.buffer(np.zeros(count, np.uint32), "STORAGE")

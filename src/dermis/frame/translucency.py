@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import count
 from typing import Any
 
@@ -22,6 +23,7 @@ from dermis.preparing import preparing
 
 Floats = NDArray[np.float64]
 _WIDTHS_TO_DOUBLE, _LEAST_SHARED_MM = 2, 0.5
+_WIDTHS = 4  # whose pairs are kept
 _COARSER = 1.5  # times the side of cells whose pairs memory does not hold
 
 
@@ -45,10 +47,32 @@ def translucency_of(
     """
     widest = float(np.sqrt(variance_mm2[-1]))
     widest = shared_width(widest) if changing else widest
-    cells = memo.keep(divide, atlas, widest, of=of)
-    tables = memo.keep(cell_tables, device, cells, of=of)
-    pairs = memo.keep(find_pairs, device, at_rest, atlas, cells, tables, of=of)
-    return memo.keep(translucency_from, device, surface, pairs, variance_mm2, weight, of=of)
+    pairs = memo.keep(PairsByWidth, device, at_rest, atlas, of=of).of(widest)
+    made = memo.keep(_unweighed, device, surface, pairs, of=of)
+    return memo.keep(_weighed, device, made, variance_mm2, weight, of=of)
+
+
+class PairsByWidth:
+    """Pairs of a surface, kept for a few widths of skins that come in turn.
+
+    surface : resources of geometry.wgsl and of the atlas, for the search
+    """
+
+    def __init__(self, device: Device, surface: Resources, atlas: Atlas) -> None:
+        self._device, self._surface, self._atlas = device, surface, atlas
+        self._kept: dict[float, PairBuffers] = {}
+
+    def of(self, widest_mm: float) -> PairBuffers:
+        """Those that Gaussians of at most this standard deviation reach."""
+        made = self._kept.pop(widest_mm, None)
+        if made is None:
+            while len(self._kept) >= _WIDTHS:
+                self._kept.pop(next(iter(self._kept)))
+            cells = divide(self._atlas, widest_mm)
+            tables = cell_tables(self._device, cells)
+            made = find_pairs(self._device, self._surface, self._atlas, cells, tables)
+        self._kept[widest_mm] = made
+        return made
 
 
 def shared_width(widest_mm: float) -> float:
@@ -106,15 +130,25 @@ def translucency_from(
     device: Device, surface: Resources, pairs: PairBuffers, variance_mm2: Floats, weight: Floats
 ) -> Translucency:
     """What a profile lets pass between pairs, and space for it."""
+    return _weighed(device, _unweighed(device, surface, pairs), variance_mm2, weight)
+
+
+def _weighed(device: Device, made: Translucency, variance_mm2: Floats, weight: Floats) -> Translucency:
+    return replace(
+        made,
+        weighing=weighing(device, made.pairs, variance_mm2, weight),
+        gaussians=len(weight),
+        layer=source_level(made.pairs.cells.spacing_mm, variance_mm2),
+    )
+
+
+def _unweighed(device: Device, surface: Resources, pairs: PairBuffers) -> Translucency:
     receivers, sources = pairs.receivers[1], pairs.sources[1]
     return Translucency(
         pairs=pairs,
         surface=surface,
-        weighing=weighing(device, pairs, variance_mm2, weight),
-        gaussians=len(weight),
         receiver_points=scratch(device, space(device, receivers, RECEIVER_BYTES)),
         source_points=space(device, sources, SOURCE_BYTES),
         weights=space(device, pairs.count, 8),
-        layer=source_level(pairs.cells.spacing_mm, variance_mm2),
         gathered=scratch(device, space(device, sources, 8)),
     )

@@ -40,11 +40,17 @@ MATERIALS = {
 
 
 class _Laid(NamedTuple):
-    """The quads of a layout: points (q, 4), corners in uv (q, 4), and what they are made of (q,)."""
+    """The faces of a layout, the same for all people.
 
+    point : (v,) of each vertex
+    uv : (v, 2)
+    quads : (q, 4) vertices
+    material : (q,) index into `MATERIALS`
+    """
+
+    point: Index
     uv: Points
     quads: Index
-    corner: Index
     material: Index
 
 
@@ -53,22 +59,18 @@ def human_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: E
 
     weights : of published targets
     """
-    places, laid = places_mm(weights), _layout(layout)
+    places, laid = places_mm(weights), _laid(layout)
     sockets = _sockets(places)
     (left, left_centre), (right, right_centre) = map(globes.placed, sockets)
     points = np.concatenate([lids.conformed(places, sockets)[: count()], left, right])
-    pairs, vertex = np.unique(
-        np.stack([laid.quads, laid.corner], axis=-1).reshape(-1, 2), axis=0, return_inverse=True
-    )
-    faces = vertex.reshape(-1, 4)
     mesh = build_mesh(
-        points[pairs[:, 0]],
-        laid.uv[pairs[:, 1]],
-        halves(faces),
+        points[laid.point],
+        laid.uv,
+        halves(laid.quads),
         np.repeat(laid.material, 2),
         tuple(MATERIALS.values()),
-        point=pairs[:, 0].astype(np.int32),
-        quads=np.arange(2 * len(faces)).reshape(-1, 2),
+        point=laid.point,
+        quads=np.arange(2 * len(laid.quads)).reshape(-1, 2),
     )
     bones = skeleton(places[count() :], (left_centre, right_centre), len(left))
     moved = expressions(lids.conformed_targets(places, sockets))
@@ -108,8 +110,18 @@ def _eyes(look: EyeLook) -> Eyes:
 
 
 @cache
-def _layout(layout: Layout) -> _Laid:
-    """All quads, with eyeballs of true shape instead of the published ones."""
+def _laid(layout: Layout) -> _Laid:
+    uv, quads, corner, material = _quads(layout)
+    both = np.stack([quads, corner], axis=-1).reshape(-1, 2)
+    pairs, vertex = np.unique(both, axis=0, return_inverse=True)
+    return _Laid(pairs[:, 0], uv[pairs[:, 1]], vertex.reshape(-1, 4), material)
+
+
+def _quads(layout: Layout) -> tuple[Points, Index, Index, Index]:
+    """All quads, with eyeballs of true shape instead of the published ones.
+
+    uv (u, 2), points of quads (q, 4), their corners in uv (q, 4), and what they are made of (q,).
+    """
     found = data()
     if layout == "own":
         uv, corner = found["uv"].astype(np.float64), found["quads_uv"].astype(np.int64)
@@ -126,7 +138,7 @@ def _layout(layout: Layout) -> _Laid:
         corner[those] = len(uv) + np.searchsorted(own, points[those])
         uv = np.concatenate([uv, places])
     eyes = [np.full(len(quads), list(MATERIALS).index(name)) for name in (LEFT_EYE, RIGHT_EYE)]
-    return _Laid(
+    return (
         np.concatenate([uv, globe.layout()]),
         np.concatenate([points[stays], count() + quads, count() + size + quads]),
         np.concatenate([corner[stays], len(uv) + quads, len(uv) + quads]),

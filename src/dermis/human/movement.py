@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.human.published import EXPRESSIONS, Points, data, moves
+from dermis.mesh.mesh import Ints
 from dermis.mesh.rig import MorphTargets, Skeleton, Turn
 
 _BEGINS: dict[str, tuple[str, str, float]] = {  # a joint, or how far on the way between two
@@ -49,17 +50,21 @@ def expressions(delta_mm: NDArray[np.float32]) -> MorphTargets:
 
     delta_mm : (m, 3) of all published targets
     """
-    moved, chosen = moves(), list[tuple[str, slice]]()
+    names, first, point, chosen = _expressions()
+    return MorphTargets(names, first, point, delta_mm[chosen])
+
+
+@cache
+def _expressions() -> tuple[tuple[str, ...], Ints, Ints, NDArray[np.intp]]:
+    """Names, where the displacements of each begin, the points, and which of all published ones these are."""
+    moved, names, rows = moves(), list[str](), list[NDArray[np.intp]]()
     for index, name in enumerate(moved.names):
         if name.startswith(EXPRESSIONS):
-            chosen.append((name.removeprefix(EXPRESSIONS), slice(*moved.first[index : index + 2])))
-    kept = [_moving()[moved.point[part]] for _, part in chosen]
-    points = [moved.point[part][those] for (_, part), those in zip(chosen, kept, strict=True)]
-    deltas = [delta_mm[part][those] for (_, part), those in zip(chosen, kept, strict=True)]
-    first = np.cumsum([0, *map(len, points)])
-    names = tuple(name for name, _ in chosen)
-    point = np.concatenate(points).astype(np.int32)
-    return MorphTargets(names, first.astype(np.int32), point, np.concatenate(deltas))
+            part = np.arange(*moved.first[index : index + 2])
+            names.append(name.removeprefix(EXPRESSIONS))
+            rows.append(part[_moving()[moved.point[part]]])
+    first, chosen = np.cumsum([0, *map(len, rows)]), np.concatenate(rows)
+    return tuple(names), first.astype(np.int32), moved.point[chosen].astype(np.int32), chosen
 
 
 @cache
@@ -89,11 +94,12 @@ def skeleton(joint_mm: Points, centres: tuple[Points, Points], globe: int) -> Sk
     local, bind = (np.tile(np.eye(4), (len(names), 1, 1)) for _ in range(2))
     local[:, :3, 3] = begin - np.where(parent[:, None] >= 0, begin[parent], 0.0)
     bind[:, :3, 3] = -begin
-    bone, weight = _influences([names.index(name) for name in ("eye.L", "eye.R")], globe)
+    bone, weight = _influences(tuple(names.index(name) for name in ("eye.L", "eye.R")), globe)
     return Skeleton(names, parent, local, bind, np.eye(4), bone, weight)
 
 
-def _influences(eyes: list[int], globe: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+@cache
+def _influences(eyes: tuple[int, ...], globe: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """(p, 4) bones of all points and their weights: an eyeball follows its own alone."""
     found = data()
     shares = found["weight"].astype(np.float32)

@@ -20,10 +20,11 @@ from dermis.human.published import OLD, YOUNG
 from dermis.human.skin.look import SkinLook
 from dermis.human.skin.painted import PaintedMaps
 from dermis.human.skin.usual import Origin, usual_eyes, usual_look
+from dermis.human.template import template
 from dermis.mesh.eyes import EyeLook
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
-from dermis.mesh.subdivide import subdivide_head
+from dermis.mesh.subdivide import levels_of
 from dermis.quantities import check_numbers, number
 
 _RANGES = {
@@ -115,9 +116,9 @@ class Human:
             refuse("layout", f"one of {', '.join(get_args(Layout))}", came, "Choose one")
         painted = maps or PaintedMaps(look=self.look)
         plain = human_head(self.weights(), painted, layout, self.iris)
-        head = subdivide_head(plain, subdivide)
-        mean_mm = control_mm(_MEAN.weights()).astype(np.float64)
-        return groomed(head, plain, mean_mm, head.levels, self.hairdo, self.look.recession)
+        shared = template(layout, levels_of(plain, subdivide))
+        head = shared.shaped(plain)
+        return groomed(head, plain, shared.rooting, head.levels, self.hairdo, self.look.recession)
 
     def on(self, head: Head) -> Head:
         """The head of another person with this one's skin and eyes.
@@ -210,7 +211,3 @@ class Human:
 def _steps(value: float) -> dict[str, float]:
     """Shares of the least, the average and the most, for a value from -1 to 1."""
     return {"min": max(-value, 0.0), "average": 1.0 - abs(value), "max": max(value, 0.0)}
-
-
-_MEAN = Human(sex=0.5, age=YOUNG)
-"""Whose brows are where the artist has them."""

@@ -28,6 +28,8 @@ class Head:
     hair : of head and beard, in no order: from afar the first few, wider, stand for all; None for none
     note : what could not be made of its file, and why; empty for nothing
     levels : of subdivision that its mesh has come through
+    template : the head whose atlas and tables serve this one too, and all others with its layout, triangles
+        and points; None for a head with its own
     """
 
     name: str
@@ -40,6 +42,7 @@ class Head:
     hair: Strands | None = None
     note: str = ""
     levels: int = 0
+    template: Head | None = None
 
     def __repr__(self) -> str:
         """Name, size, maps and what moves it, on two lines."""
@@ -67,6 +70,13 @@ class Head:
             return self
         eyes = self.eyes and self.eyes.with_look(EyeLook())
         return replace(self, maps=Maps(), eyes=eyes)
+
+    @property
+    def topology(self) -> Head:
+        """The bare head that atlas and tables are made for: its template, while its rig is of that, or itself."""
+        shared = self.template
+        own = shared is None or self.rig is None or self.rig.template is not shared.rig
+        return self.bare if shared is None or own else shared
 
     @property
     def positions_mm(self) -> Floats:

@@ -36,6 +36,11 @@ class MorphTargets(Summarised):
         """Number of each target by its name."""
         return {name: index for index, name in enumerate(self.names)}
 
+    @cached_property
+    def by_point(self) -> NDArray[np.intp]:
+        """(n,) the displacements in the order of their points, and of targets for each."""
+        return np.argsort(self.point, kind="stable")
+
     def of(self, target: int) -> slice:
         """Which of the displacements are a target's."""
         return slice(int(self.first[target]), int(self.first[target + 1]))

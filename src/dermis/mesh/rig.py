@@ -101,6 +101,8 @@ class Rig(Summarised):
     turns : of bones, by targets
     carried : points that the file has not, after all of its own
     contact : points that stay off the eyes; None for none
+    template : a rig of the same points whose outermost ones are this one's too, beside the corners of its own
+        convex hull; None where they are looked for
     """
 
     positions_mm: Floats
@@ -111,6 +113,7 @@ class Rig(Summarised):
     turns: tuple[Turn, ...] = ()
     carried: tuple[Carried, ...] = ()
     contact: Contact | None = None
+    template: Rig | None = None
 
     @cached_property
     def rest(self) -> Motion:
@@ -166,6 +169,8 @@ class Rig(Summarised):
 
     @cached_property
     def _outline_points(self) -> NDArray[np.intp]:
+        if self.template is not None:
+            return np.union1d(self.template._outline_points, corners_of(self.positions_mm))
         targets, skeleton = self.targets, self.skeleton
         sources: list[NDArray[Any]] = [self.positions_mm, targets.first, targets.point, targets.delta_mm]
         if skeleton is not None:

@@ -65,7 +65,11 @@ class Strands(Summarised):
 
 def seen_from(mesh: Mesh, roots: Roots, ways_mm: Doubles) -> Floats:
     """(n, k, 3) ways in space from roots to knots, as `Strands.knots_mm` has them on a mesh at rest [mm]."""
-    _, frame = frames(mesh, roots, points_of(mesh))
+    return seen_in(frames(mesh, roots, points_of(mesh))[1], ways_mm)
+
+
+def seen_in(frame: Doubles, ways_mm: Doubles) -> Floats:
+    """The same in frames (n, 3, 3) of the roots, from `frames`."""
     return np.asarray(np.einsum("nic,nkc->nki", frame, ways_mm), np.float32)
 
 

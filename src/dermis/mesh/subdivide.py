@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -12,11 +12,14 @@ from dermis.disk import Arrays, cached_arrays
 from dermis.errors import refuse, shown_value
 from dermis.mesh.geometry import build_mesh
 from dermis.mesh.head import Head
-from dermis.mesh.mesh import Mesh
+from dermis.mesh.mesh import Floats, Ints, Mesh
 from dermis.mesh.quads import halves, polygons
 from dermis.mesh.rig import Stencils
 from dermis.mesh.subdivision_rules import Cage, catmull_clark_limit, refine_catmull_clark, refine_loop
 from dermis.preparing import preparing
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 MAX_LEVELS = 3
 _FORM = "subdivision 1"  # raise when weights or corners change for the same mesh
@@ -31,19 +34,61 @@ class Subdivided(NamedTuple):
     stencils: Stencils | None
 
 
+@dataclass(frozen=True, eq=False)
+class Refinement:
+    """How meshes of one topology are refined.
+
+    weights : (q, p) of the control points in each finer point
+    stencils : the same, as single numbers
+    uv, point : (v, 2) and (v,) of the finer vertices
+    triangles, material, quads : as `Mesh` has them
+    """
+
+    weights: csr_array
+    stencils: Stencils
+    uv: Floats
+    point: Ints
+    triangles: Ints
+    material: Ints
+    quads: Ints
+
+    def mesh(self, coarse: Mesh) -> Mesh:
+        """The finer mesh of one with this topology."""
+        control = np.zeros((self.weights.shape[1], 3))
+        control[coarse.point] = coarse.positions
+        places, kinds = (self.weights @ control)[self.point], coarse.materials
+        rest = {"point": self.point, "quads": self.quads}
+        return build_mesh(places, self.uv, self.triangles, self.material, kinds, **rest)
+
+
 def subdivide_head(head: Head, levels: int | Callable[[Head], int]) -> Head:
     """The head on a finer mesh; what moved its points now moves the control points of that mesh.
 
     head : not subdivided yet
     levels : 0 to 3, or what finds them for the head
     """
-    levels = levels(head) if callable(levels) else levels
+    levels = levels_of(head, levels)
     mesh, stencils = subdivide(head.mesh, levels)
     if stencils is None:
         return head
     strands, hair = (part and part.refined(head.mesh, mesh, levels) for part in (head.strands, head.hair))
     rig = replace(head.control, stencils=stencils)
-    return replace(head, mesh=mesh, rig=rig, strands=strands, hair=hair, levels=int(levels))
+    return replace(head, mesh=mesh, rig=rig, strands=strands, hair=hair, levels=int(levels), template=None)
+
+
+def levels_of(head: Head, levels: int | Callable[[Head], int]) -> int:
+    """Levels of subdivision, or those that are found for a head.
+
+    Raises DermisError for other numbers than 0 to 3.
+    """
+    return _checked(levels(head) if callable(levels) else levels)
+
+
+def _checked(levels: int) -> int:
+    if not isinstance(levels, int | np.integer) or levels not in range(MAX_LEVELS + 1):
+        came = f"{shown_value(levels)} came"
+        refuse("subdivide", f"0 to {MAX_LEVELS} levels", came, "Each level takes 4x the memory")
+    return int(levels)
 
 
 def subdivide(mesh: Mesh, levels: int) -> Subdivided:
@@ -56,24 +101,33 @@ def subdivide(mesh: Mesh, levels: int) -> Subdivided:
 
     levels : 0 to 3, each takes four times the triangles
     """
-    if not isinstance(levels, int | np.integer) or levels not in range(MAX_LEVELS + 1):
-        came = f"{shown_value(levels)} came"
-        refuse("subdivide", f"0 to {MAX_LEVELS} levels", came, "Each level takes 4x the memory")
-    if levels == 0:
+    if _checked(levels) == 0:
         return Subdivided(mesh, None)
+    found = refinement(mesh, levels)
+    return Subdivided(found.mesh(mesh), found.stencils)
+
+
+def refinement(mesh: Mesh, levels: int) -> Refinement:
+    """How meshes of this one's topology are refined `levels` times, see `subdivide`.
+
+    levels : 1 to 3
+    """
     from scipy.sparse import csr_array
 
     by_quads = 2 * len(mesh.quads) > len(mesh.triangles) - len(mesh.quads)
     finer = _kept(mesh, levels, by_quads)
-    control = np.zeros((int(mesh.point.max()) + 1, 3))
-    control[mesh.point] = mesh.positions
     first, column, weight, point = (finer[name] for name in ("first", "control", "weight", "point"))
-    places = csr_array((weight, column, first), shape=(len(first) - 1, len(control))) @ control
     triangles = halves(finer["corner"].reshape(-1, 4)) if by_quads else finer["corner"].reshape(-1, 3)
-    quads = np.arange(len(triangles)).reshape(-1, 2) if by_quads else ()
-    uv, material = finer["uv"], finer["material"]
-    made = build_mesh(places[point], uv, triangles, material, mesh.materials, point=point, quads=quads)
-    return Subdivided(made, Stencils(first, column, weight.astype(np.float32)))
+    quads = np.arange(len(triangles) if by_quads else 0, dtype=np.int32).reshape(-1, 2)
+    return Refinement(
+        csr_array((weight, column, first), shape=(len(first) - 1, int(mesh.point.max()) + 1)),
+        Stencils(first, column, weight.astype(np.float32)),
+        finer["uv"],
+        point,
+        triangles.astype(np.int32),
+        finer["material"],
+        quads,
+    )
 
 
 def _kept(mesh: Mesh, levels: int, by_quads: bool) -> Arrays:

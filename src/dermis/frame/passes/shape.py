@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.passes import each, program
-from dermis.frame.shape import LEAST_ACROSS, Shape, ShapeTables, make_shape
+from dermis.frame.shape import LEAST_ACROSS, Shape, ShapeTables, displacements, make_shape
 from dermis.gpu import Device, Frame, Graph, Recorder
 from dermis.gpu.program import Resources
 from dermis.mesh.geometry import MIN_UV_CROSS
@@ -21,11 +21,13 @@ class MotionBytes(NamedTuple):
     positions : three floats for each control point at rest [mm]
     weights : a float for each morph target
     matrices : twelve floats for each bone, row by row, from rest to pose [mm]
+    displacements : by morph targets, from `frame.shape.displacements`, of a person whose tables are shared
     """
 
     positions: bytes
     weights: bytes = b""
     matrices: bytes = b""
+    displacements: bytes = b""
 
     @property
     def at_rest(self) -> MotionBytes:
@@ -40,6 +42,8 @@ def draw(graph: Frame | Graph, shape: Shape, motion: MotionBytes) -> None:
         graph.write("shape", shape.weights, motion.weights)
     if motion.matrices:
         graph.write("shape", shape.matrices, motion.matrices)
+    if motion.displacements:
+        graph.write("shape", shape.morphs["displacements"], motion.displacements)
     graph.repeat(_evaluate, shape)
 
 
@@ -62,7 +66,10 @@ def rest_shape(device: Device, tables: ShapeTables, positions_mm: NDArray[np.flo
 def resting(rig: Rig) -> MotionBytes:
     """The motion that leaves a rig where it is."""
     weights, matrices, positions = (array.tobytes() for array in rig.rest)
-    return MotionBytes(positions, weights, matrices)
+    if rig.template is None or not rig.targets.names:
+        return MotionBytes(positions, weights, matrices)
+    own = displacements(rig.targets, rig.template.targets)
+    return MotionBytes(positions, weights, matrices, own.tobytes())
 
 
 def _evaluate(graph: Recorder, shape: Shape) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 from dermis.frame.geometry import HeadResources
 from dermis.frame.passes import each, program
 from dermis.frame.shape import Shape
-from dermis.frame.strands import TILE, StrandResources, StrandTables, drawn_of
+from dermis.frame.strand_space import TILE
+from dermis.frame.strands import StrandResources, StrandTables, drawn_of
 from dermis.gpu import ComputeProgram, Constants, Device, Recorder
 from dermis.gpu.program import Resources
 

@@ -10,9 +10,10 @@ from dermis.human.hair import brows, lashes
 from dermis.human.hair.grown import Grown
 from dermis.human.hair.head_hair import Ground, beard_hair, scalp_hair
 from dermis.human.hair.look import HairLook
-from dermis.human.hair.skin import Skin, beside_edges, front_places, mirrored
+from dermis.human.hair.rooting import Rooting, eye_middles
+from dermis.human.hair.skin import Skin
 from dermis.mesh.head import Head
-from dermis.mesh.strands import Doubles, Roots, Strands, finer_roots, frames, points_of, seen_from
+from dermis.mesh.strands import Doubles, Roots, Strands, finer_roots, frames, points_of, seen_in
 from dermis.specular.hair import absorption_per_mm
 
 _LASHES_DARKER = 1.6
@@ -21,21 +22,20 @@ _LEAST_EUMELANIN = 0.07  # white hair is not quite white
 
 
 def groomed(
-    head: Head, plain: Head, mean_mm: Doubles, levels: int, look: HairLook, recession: float = 0.0
+    head: Head, plain: Head, rooting: Rooting, levels: int, look: HairLook, recession: float = 0.0
 ) -> Head:
     """The head with hair, beard, brows and lashes.
 
     plain : the head before it was subdivided `levels` times
-    mean_mm : (p, 3) control points of the person whose brows are where the artist has them
+    rooting : on the person whose brows are where the artist has them
     recession : see `SkinLook`
     """
     skin, parts = Skin(head.mesh), list[Grown]()
-    eyes = _eyes(plain)
-    for side, eye in zip((1.0, -1.0), eyes, strict=True):
+    for side, eye in zip((1.0, -1.0), eye_middles(plain.mesh), strict=True):
         rng = np.random.default_rng((look.seed, int(side > 0)))
-        parts.append(_brow(head, plain, mean_mm, levels, look, skin, side, rng))
+        parts.append(_brow(head, rooting, levels, look, skin, side, rng))
         for lid in (lashes.UPPER, lashes.LOWER):
-            parts.append(_lashes(head, plain, mean_mm, levels, lid, side, eye, rng))
+            parts.append(_lashes(head, rooting, levels, lid, side, eye, rng))
     head = replace(head, strands=_joined(head, parts, _absorption(parts, look)))
     ground = Ground(head, plain, levels, skin)
     hair = [*scalp_hair(ground, look, recession), *beard_hair(ground, look)]
@@ -55,8 +55,7 @@ def _shuffled(strands: Strands, seed: int) -> Strands:
 
 def _brow(
     head: Head,
-    plain: Head,
-    mean_mm: Doubles,
+    rooting: Rooting,
     levels: int,
     look: HairLook,
     skin: Skin,
@@ -64,17 +63,16 @@ def _brow(
     rng: np.random.Generator,
 ) -> Grown:
     u, v, x, y = brows.places(rng)
-    roots, there = front_places(plain.mesh, mean_mm, side * x, y)
+    roots, there = rooting.in_front(side * x, y)
     kept = np.flatnonzero(there)[: brows.count(look)]
-    roots = finer_roots(plain.mesh, Roots(roots.quad[kept], roots.place[kept]), levels)
+    roots = finer_roots(rooting.mesh, Roots(roots.quad[kept], roots.place[kept]), levels)
     root, _ = frames(head.mesh, roots, points_of(head.mesh))
     return Grown(roots, *brows.grown(skin, root, side, u[kept], v[kept], rng, look), 1.0)
 
 
 def _lashes(
     head: Head,
-    plain: Head,
-    mean_mm: Doubles,
+    rooting: Rooting,
     levels: int,
     lid: lashes.Lid,
     side: float,
@@ -82,21 +80,9 @@ def _lashes(
     rng: np.random.Generator,
 ) -> Grown:
     u, across = lashes.places(lid, rng)
-    loop = np.array(lid.loop)
-    loop = loop if side > 0 else mirrored(mean_mm, loop)
-    roots = finer_roots(plain.mesh, beside_edges(plain.mesh, mean_mm, loop, u, across, eye), levels)
+    roots = finer_roots(rooting.mesh, rooting.beside_lid(lid, side, u, across), levels)
     root, _ = frames(head.mesh, roots, points_of(head.mesh))
     return Grown(roots, *lashes.grown(lid, root, eye, side, u, rng), _LASHES_DARKER)
-
-
-def _eyes(plain: Head) -> list[Doubles]:
-    """Middles of the left and of the right eye [mm]."""
-    mesh, names = plain.mesh, [one.name for one in plain.mesh.materials]
-    found = []
-    for name in ("left eye", "right eye"):
-        places = mesh.positions[np.unique(mesh.triangles[mesh.material == names.index(name)])]
-        found.append(0.5 * (places.min(axis=0) + places.max(axis=0)).astype(np.float64))
-    return found
 
 
 def _joined(head: Head, parts: list[Grown], absorption: Doubles) -> Strands:
@@ -107,8 +93,8 @@ def _joined(head: Head, parts: list[Grown], absorption: Doubles) -> Strands:
     roots = Roots(*(np.concatenate(each) for each in zip(*(part.roots for part in parts), strict=True)))
     knots, radius = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
     bundle, cover = (_each(parts, name) for name in ("bundle", "cover"))
-    root, _ = frames(head.mesh, roots, points_of(head.mesh))
-    ways = seen_from(head.mesh, roots, knots - root[:, None])
+    root, frame = frames(head.mesh, roots, points_of(head.mesh))
+    ways = seen_in(frame, knots - root[:, None])
     numbers = radius, absorption / bundle[:, None], cover
     return Strands(roots, ways, *(one.astype(np.float32) for one in numbers))
 

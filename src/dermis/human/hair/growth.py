@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dermis.human.hair.combing import Combed, along_skin, turned
+from dermis.human.hair.combing import Combed, along_skin
 from dermis.human.hair.skin import Skin
 from dermis.mesh.strands import Doubles
 
@@ -64,58 +64,71 @@ def grown(
     root_mm, normal : (n, 3) of the hairs
     guide_mm, ways : (g, 3) and (g, k, 3) of the guides
     """
-    n, t = len(root_mm), np.linspace(0.0, 1.0, ways.shape[1])
+    t = np.linspace(0.0, 1.0, ways.shape[1])
     found = _astray(_between(root_mm, guide_mm, ways), normal, rough, rng)
-    found *= np.clip(1.0 + rough.uneven * rng.normal(size=n), 0.35, 1.2)[:, None, None]
     found = _tufted(root_mm, found, t, rough.tufts, rng)
     size = rough.frizz * np.linalg.norm(found[:, -1], axis=1)
-    found = found + size[:, None, None] * _waves(n, t, rng)
+    found += _waves(size, t, rng)
     if rough.coil_mm:
-        found = found + _coils(found[:, -1], t, rough, rng)
+        found += _coils(found[:, -1], t, rough, rng)
     return _over_skin(found, normal, t)
 
 
 def _between(root_mm: Doubles, guide_mm: Doubles, ways: Doubles) -> Doubles:
     """Means of the nearest guides' ways."""
+    from scipy.sparse import csr_array
     from scipy.spatial import cKDTree
 
+    n, g = len(root_mm), len(guide_mm)
     far, near = cKDTree(guide_mm).query(root_mm, k=_BESIDE)
     share = 1.0 / (np.asarray(far) ** 2 + 4.0)
     share /= share.sum(axis=1, keepdims=True)
-    found = np.zeros((len(root_mm), *ways.shape[1:]))
-    for beside, which in zip(share.T, np.asarray(near).T, strict=True):
-        found += beside[:, None, None] * ways[which]
-    return found
+    first = np.arange(0, _BESIDE * n + 1, _BESIDE)
+    shares = csr_array((share.ravel(), np.asarray(near).ravel(), first), shape=(n, g))
+    return np.asarray(shares @ ways.reshape(g, -1)).reshape(n, *ways.shape[1:])
 
 
 def _astray(ways: Doubles, normal: Doubles, rough: Roughness, rng: np.random.Generator) -> Doubles:
-    """Turned about the skin's normal, each as a whole, and leaning more or less."""
-    n, k, _ = ways.shape
-    angle = np.repeat(rough.astray * rng.standard_t(4, size=n), k)
-    lean = np.repeat(1.0 + rough.astray * rng.normal(size=n), k)[:, None]
-    around, flat = np.repeat(normal, k, axis=0), ways.reshape(-1, 3)
-    up = (flat * around).sum(axis=1, keepdims=True) * around
-    return np.asarray((lean * up + turned(flat - up, around, angle)).reshape(n, k, 3))
+    """Turned about the skin's normal, each as a whole, leaning more or less, and longer or shorter."""
+    n = len(ways)
+    angle, lean = rough.astray * rng.standard_t(4, size=n), 1.0 + rough.astray * rng.normal(size=n)
+    length = np.clip(1.0 + rough.uneven * rng.normal(size=n), 0.35, 1.2)[:, None, None]
+    cos, sin = np.cos(angle), np.sin(angle)
+    x, y, z = normal.T
+    along = normal[:, :, None] * ((lean - cos)[:, None] * normal)[:, None, :]
+    across = np.zeros((n, 3, 3))
+    for i, j, part in ((0, 1, -z), (0, 2, y), (1, 2, -x)):
+        across[:, i, j], across[:, j, i] = sin * part, -sin * part
+    turn = length * (along + across + cos[:, None, None] * np.eye(3))
+    return np.asarray(ways @ turn.transpose(0, 2, 1))
 
 
 def _tufted(root_mm: Doubles, ways: Doubles, t: Doubles, much: float, rng: np.random.Generator) -> Doubles:
     """Tips drawn to those of a few."""
     from scipy.spatial import cKDTree
 
-    _, first = np.unique(np.floor(root_mm / _TUFT_MM).astype(np.int64), axis=0, return_index=True)
+    cell = np.floor(root_mm / _TUFT_MM).astype(np.int64)
+    cell -= cell.min(axis=0)
+    wide, high, deep = (cell.max(axis=0) + 1).tolist()
+    _, first = np.unique(np.ravel_multi_index(cell.T, (wide, high, deep)), return_index=True)
     _, near = cKDTree(root_mm[first]).query(root_mm)
-    apart = (root_mm + ways.transpose(1, 0, 2)).transpose(1, 0, 2)
-    drawn = much * rng.uniform(0.3, 1.0, len(root_mm))[:, None, None] * (t**1.3)[None, :, None]
-    return np.asarray(ways + drawn * (apart[first[near]] - apart))
+    which = first[near]
+    drawn = (much * rng.uniform(0.3, 1.0, len(root_mm)))[:, None] * t**1.3
+    apart = ways[which] - ways + (root_mm[which] - root_mm)[:, None]
+    apart *= drawn[:, :, None]
+    apart += ways
+    return np.asarray(apart)
 
 
-def _waves(n: int, t: Doubles, rng: np.random.Generator) -> Doubles:
-    """(n, k, 3) smooth, 0 at roots."""
-    found = np.zeros((n, len(t), 3))
+def _waves(size: Doubles, t: Doubles, rng: np.random.Generator) -> Doubles:
+    """(n, k, 3) smooth, 0 at roots; size : (n,)."""
+    n, fade, parts, basis = len(size), np.minimum(2 * t, 1.0), list[Doubles](), list[Doubles]()
     for waves in (0.5, 1.1):
-        phase, size = rng.uniform(0, 2 * np.pi, (n, 1, 3)), rng.uniform(-1, 1, (n, 1, 3))
-        found += size * np.sin(2 * np.pi * waves * t[None, :, None] + phase) / waves
-    return np.asarray((found - found[:, :1]) * np.minimum(2 * t, 1.0)[None, :, None])
+        phase, much = rng.uniform(0, 2 * np.pi, (n, 3)), rng.uniform(-1, 1, (n, 3))
+        much *= size[:, None] / waves
+        parts += [much * np.cos(phase), much * np.sin(phase)]  # of a sum of angles
+        basis += [fade * np.sin(2 * np.pi * waves * t), fade * (np.cos(2 * np.pi * waves * t) - 1.0)]
+    return np.asarray(np.stack(basis, axis=-1) @ np.stack(parts, axis=1))
 
 
 def _coils(tips: Doubles, t: Doubles, rough: Roughness, rng: np.random.Generator) -> Doubles:
@@ -131,7 +144,7 @@ def _coils(tips: Doubles, t: Doubles, rough: Roughness, rng: np.random.Generator
 
 def _over_skin(ways: Doubles, normal: Doubles, t: Doubles) -> Doubles:
     """Lifted where a knot would be in the skin, taken as round as a head."""
-    height = (ways * normal[:, None]).sum(axis=2)
-    flat = np.linalg.norm(ways - height[..., None] * normal[:, None], axis=2)
-    least = _LEAST_OVER_MM * np.minimum(3 * t, 1.0) - flat**2 / (2 * _HEAD_MM)
+    height = (ways @ normal[:, :, None])[..., 0]
+    flat2 = np.einsum("nkc,nkc->nk", ways, ways) - height**2
+    least = _LEAST_OVER_MM * np.minimum(3 * t, 1.0) - flat2 / (2 * _HEAD_MM)
     return np.asarray(ways + np.maximum(least - height, 0.0)[..., None] * normal[:, None])

@@ -7,8 +7,9 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from dermis.human.hair.skin import Index
+from dermis.human.hair.rooting import Index
 from dermis.human.skin.face import AMOUNTS, DEGREES, hairline, zones
 from dermis.human.skin.surface import FIELDS, average
 from dermis.mesh.mesh import Floats, Mesh
@@ -24,7 +25,20 @@ _LIPS_MM = (1.5, 4.5)  # beside the lips, between which the beard does
 _BEARDED = (0.25, 0.75)  # amount of the zones between which it does
 _RAGGED = np.array([[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]])  # waves of the hairline [rad/mm]
 
-Amount = Callable[[Doubles], Doubles]
+_BELOW_MM = 25.0  # the hairline, to where quads may have a little hair
+_BESIDE = 0.02  # amount of the zones from which on quads may have a beard
+
+
+class Where(NamedTuple):
+    """Where hair grows.
+
+    amount : share of the density (n,) at places (n, 4): on the average person, and how far inside the lips
+        these are [mm]
+    near : (p,) control points of quads on which any may grow
+    """
+
+    amount: Callable[[Doubles], Doubles]
+    near: NDArray[np.bool_]
 
 
 class Rooted(NamedTuple):
@@ -34,22 +48,24 @@ class Rooted(NamedTuple):
     places: Doubles
 
 
-def rooted(plain: Mesh, amount: Amount, per_cm2: float, rng: np.random.Generator) -> Rooted:
+def rooted(plain: Mesh, where: Where, per_cm2: float, rng: np.random.Generator) -> Rooted:
     """Roots on the skin, evenly but for chance; none on ears, lips and in the mouth.
 
     plain : the person's mesh of control points
-    amount : share of the density (n,) at places (n, 4): on the average person, and how far inside the lips
-        these are [mm]
     per_cm2 : density where the share is 1
     """
     quad = _hairy_quads(plain)
     around = corners(plain, quad)
     many = np.floor(per_cm2 * areas_cm2(plain, quad) + rng.random(len(quad))).astype(np.int64)
-    which = np.repeat(np.arange(len(quad)), many)
-    step = np.arange(len(which)) - np.repeat(np.cumsum(many) - many, many)
-    place = np.mod(rng.random((len(quad), 2))[which] + step[:, None] * _STEPS, 1.0)
+    began, chance = rng.random((len(quad), 2)), rng.random(int(many.sum()))
+    near = where.near[around].any(axis=1)
+    which = np.repeat(np.flatnonzero(near), many[near])
+    ends = np.cumsum(many)[near]
+    number = np.arange(len(which)) + np.repeat(ends - np.cumsum(many[near]), many[near])
+    step = number - (np.cumsum(many) - many)[which]
+    place = np.mod(began[which] + step[:, None] * _STEPS, 1.0)
     told = np.einsum("nk,nkc->nc", weights(place), _told()[around[which]])
-    kept = np.flatnonzero(rng.random(len(which)) < amount(told))
+    kept = np.flatnonzero(chance[number] < where.amount(told))
     rng.shuffle(kept)
     return Rooted(Roots(quad[which[kept]].astype(np.int32), place[kept].astype(np.float32)), told[kept, :3])
 
@@ -64,8 +80,8 @@ def above_hairline(places: Doubles, recession: float = 0.0) -> Doubles:
     return np.asarray(places[:, 1] - np.interp(angle, DEGREES * np.arange(len(edge)), edge))
 
 
-def scalp(recession: float) -> Amount:
-    """Hair of the head, see `rooted`."""
+def scalp(recession: float) -> Where:
+    """Hair of the head."""
 
     def amount(places: Doubles) -> Doubles:
         above = above_hairline(places, recession) + np.sin(places[:, :3] @ _RAGGED.T).sum(axis=1)
@@ -73,11 +89,25 @@ def scalp(recession: float) -> Amount:
         thinned = _amount("hair", zones(recession), places) - _amount("hair", zones(), places)
         return np.asarray(share * np.clip(1.0 + thinned, 0.0, 1.0))
 
-    return amount
+    return Where(amount, _near_scalp())
 
 
-def beard(places: Doubles) -> Doubles:
-    """Hair of the beard, see `rooted`."""
+def beard() -> Where:
+    """Hair of the beard."""
+    return Where(_bearded, _near_beard())
+
+
+@cache
+def _near_scalp() -> NDArray[np.bool_]:
+    return above_hairline(_told()) > -_BELOW_MM
+
+
+@cache
+def _near_beard() -> NDArray[np.bool_]:
+    return _amount("beard", zones(), _told()) > _BESIDE
+
+
+def _bearded(places: Doubles) -> Doubles:
     bare = smoothstep(*_LIPS_MM, -places[:, 3])
     return np.asarray(smoothstep(*_BEARDED, _amount("beard", zones(), places)) * bare)
 
@@ -99,9 +129,10 @@ def areas_cm2(plain: Mesh, quad: Index) -> Doubles:
 def _amount(name: str, rows: Floats, places: Doubles) -> Doubles:
     """Sum (n,) of an amount of zones, see zones.csv."""
     column, found = 8 + AMOUNTS.index(name), np.zeros(len(places))
-    left = np.column_stack([np.abs(places[:, 0]), places[:, 1:3]])
+    left = np.abs(places[:, 0]), places[:, 1], places[:, 2]
     for zone in rows[rows[:, column] != 0.0].astype(np.float64):
-        found += zone[column] * np.exp(-(((left - zone[:3]) * zone[4:7]) ** 2).sum(axis=1))
+        away = sum(((left[c] - zone[c]) * zone[4 + c]) ** 2 for c in range(3))
+        found += zone[column] * np.exp(-away)
     return found
 
 

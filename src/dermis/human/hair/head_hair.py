@@ -14,7 +14,7 @@ from dermis.human.hair.hairy_skin import Rooted
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.skin import Skin
 from dermis.mesh.head import Head
-from dermis.mesh.strands import Doubles, finer_roots, frames, points_of
+from dermis.mesh.strands import Doubles, Roots, finer_roots, frames, points_of
 
 MOST_PER_CM2 = 200.0
 """Hairs of the densest heads."""
@@ -27,6 +27,14 @@ _TIGHT = 0.5  # curl from which on there are coils
 _LONG_BEARD_MM = 8.0
 
 
+class Set(NamedTuple):
+    """Roots, where they are (n, 3) [mm], and the skin's normals there (n, 3)."""
+
+    roots: Roots
+    places: Doubles
+    normals: Doubles
+
+
 class Ground(NamedTuple):
     """What hair grows on: the head as it is drawn, and before it was subdivided so many times."""
 
@@ -35,11 +43,11 @@ class Ground(NamedTuple):
     levels: int
     skin: Skin
 
-    def rooted(self, where: Rooted) -> tuple[Doubles, Doubles]:
-        """Roots and the skin's normals there (n, 3) [mm]."""
+    def rooted(self, where: Rooted) -> Set:
+        """Roots on the head as it is drawn."""
         roots = finer_roots(self.plain.mesh, where.roots, self.levels)
         place, frame = frames(self.head.mesh, roots, points_of(self.head.mesh))
-        return place, frame[:, 2]
+        return Set(roots, place, frame[:, 2])
 
 
 def knots_of(look: HairLook) -> int:
@@ -56,12 +64,11 @@ def scalp_hair(ground: Ground, look: HairLook, recession: float) -> list[Grown]:
     rng, where = np.random.default_rng((look.seed, 3)), hairy_skin.scalp(recession)
     drawn = 22.0 + 53.0 * look.density
     few, many = (hairy_skin.rooted(ground.plain.mesh, where, n, rng) for n in (_GUIDES_PER_CM2, drawn))
-    few_mm, few_normal = ground.rooted(few)
-    lie = combed(few.places, few_normal, look, recession)
-    ways = guides(ground.skin, few_mm, lie, knots_of(look))
-    root, normal = ground.rooted(many)
-    found = grown(root, normal, few_mm, ways, _roughness(look), rng)
-    return [_stranded(ground, many, root, found, drawn, MOST_PER_CM2 * look.density, _HAIR_MM, rng)]
+    guide, hair = ground.rooted(few), ground.rooted(many)
+    lie = combed(few.places, guide.normals, look, recession)
+    ways = guides(ground.skin, guide.places, lie, knots_of(look))
+    found = grown(hair.places, hair.normals, guide.places, ways, _roughness(look), rng)
+    return [_stranded(hair, found, drawn, MOST_PER_CM2 * look.density, _HAIR_MM, rng)]
 
 
 def beard_hair(ground: Ground, look: HairLook) -> list[Grown]:
@@ -69,21 +76,19 @@ def beard_hair(ground: Ground, look: HairLook) -> list[Grown]:
     if look.beard_mm == 0.0:
         return []
     rng, mesh = np.random.default_rng((look.seed, 4)), ground.plain.mesh
-    few, many = (hairy_skin.rooted(mesh, hairy_skin.beard, n, rng) for n in (_GUIDES_PER_CM2, BEARD_PER_CM2))
-    few_mm, few_normal = ground.rooted(few)
-    lie = combed_beard(few.places, few_normal, look)
-    ways = guides(ground.skin, few_mm, lie, knots_of(look))
-    root, normal = ground.rooted(many)
+    both = _GUIDES_PER_CM2, BEARD_PER_CM2
+    few, many = (hairy_skin.rooted(mesh, hairy_skin.beard(), density, rng) for density in both)
+    guide, hair = ground.rooted(few), ground.rooted(many)
+    lie = combed_beard(few.places, guide.normals, look)
+    ways = guides(ground.skin, guide.places, lie, knots_of(look))
     tight = max(look.curl - _TIGHT, 0.0) * 2
     rough = Roughness(0.3, 0.22, 0.2, 0.05 + 0.1 * look.curl, 0.5 * tight, 1.5)
-    found = grown(root, normal, few_mm, ways, rough, rng)
-    return [_stranded(ground, many, root, found, BEARD_PER_CM2, BEARD_PER_CM2, _BEARD_MM, rng)]
+    found = grown(hair.places, hair.normals, guide.places, ways, rough, rng)
+    return [_stranded(hair, found, BEARD_PER_CM2, BEARD_PER_CM2, _BEARD_MM, rng)]
 
 
 def _stranded(
-    ground: Ground,
-    where: Rooted,
-    root: Doubles,
+    hair: Set,
     ways: Doubles,
     drawn: float,
     true: float,
@@ -95,12 +100,12 @@ def _stranded(
     drawn, true : how many are made and how many there are on a square centimetre
     """
     bundle, t = true / drawn, np.linspace(0.0, 1.0, ways.shape[1])
-    thick = bundle * radius_mm * rng.uniform(0.8, 1.2, len(root))
+    thick = bundle * radius_mm * rng.uniform(0.8, 1.2, len(ways))
     radius = thick[:, None] * np.where(t < 1.0, 1.0, 0.6)
     length = np.linalg.norm(np.diff(ways, axis=1), axis=2).sum(axis=1)
     area = float(np.mean(2.0 * radius.mean(axis=1) * length))  # seen from the side; halved as hair leans
-    roots = finer_roots(ground.plain.mesh, where.roots, ground.levels)
-    return Grown(roots, root[:, None] + ways, radius, 1.0, bundle, 0.5 * area * drawn / 100.0)
+    knots = hair.places[:, None] + ways
+    return Grown(hair.roots, knots, radius, 1.0, bundle, 0.5 * area * drawn / 100.0)
 
 
 def _roughness(look: HairLook) -> Roughness:

@@ -61,7 +61,7 @@ def _labelling(head: Head) -> Labelling:
     of_material = np.array([class_number(_named(one)) for one in head.mesh.materials], np.uint8)
     for material, side in zip(() if head.eyes is None else head.eyes.material, reversed(SIDES), strict=False):
         of_material[material] = class_number(f"{side}_eye")
-    fields = _irises(head) | _skin(head)
+    fields = _irises(head.template or head) | _skin(head)
     none = np.zeros((int(head.mesh.point.max()) + 1, 0))
     points = np.stack(list(fields.values()), axis=1) if fields else none
     classes = np.array([class_number(name) for name in fields], np.uint8)

@@ -13,6 +13,9 @@ Space = Literal["body", "lip", "level", "ring"]
 SPACES: tuple[Space, ...] = ("body", "lip", "level", "ring")
 """What noise is a function of: the place on the body; that with x bent along the creases of the lips; with y
 bent along the lines of the forehead; and the distance from the eye with x and y."""
+Ground = Literal["all", "lips", "lines", "furrows", "folds", "veins", "hairline"]
+GROUNDS: tuple[Ground, ...] = ("all", "lips", "lines", "furrows", "folds", "veins", "hairline")
+"""Where noise shows: all over, on lips, fine lines, these or folds, folds, veins, or at the hairline."""
 _TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 """From each size of a fractal to the next: their lattices never line up."""
 _SHRINK = 0.49
@@ -24,6 +27,7 @@ class Noise(NamedTuple):
     blob_mm : size of its blobs along the three axes of its space [mm]
     gain, octaves : of a fractal: strength of each size over that of the one before, and how many
     fades : whether it is left out where texels cannot show it
+    ground : where it shows; elsewhere it is not made
     """
 
     name: str
@@ -32,17 +36,25 @@ class Noise(NamedTuple):
     gain: float = 1.0
     octaves: int = 1
     fades: bool = False
+    ground: Ground = "all"
 
 
-def _even(name: str, blob_mm: float, gain: float = 1.0, octaves: int = 1, fades: bool = False) -> Noise:
-    return Noise(name, (blob_mm, blob_mm, blob_mm), "body", gain, octaves, fades)
+def _even(
+    name: str,
+    blob_mm: float,
+    gain: float = 1.0,
+    octaves: int = 1,
+    fades: bool = False,
+    ground: Ground = "all",
+) -> Noise:
+    return Noise(name, (blob_mm, blob_mm, blob_mm), "body", gain, octaves, fades, ground)
 
 
-# Artist's values [mm]. Those that bend a space come before the ones in it.
+# Artist's values [mm]. Those that bend a space come before the ones in it, and those that bend zones first.
 NOISES = (
     _even("wander-x", 17.0),
     _even("wander-y", 17.0),
-    _even("lip-edge", 1.6),
+    _even("lip-edge", 1.6, ground="lips"),
     _even("patches", 24.0, 0.75, 5, fades=True),
     _even("blotches", 19.0, 0.86, 6, fades=True),
     _even("oil-film", 8.0),
@@ -53,22 +65,24 @@ NOISES = (
     _even("sun", 14.0),
     _even("ragged-x", 1.3),
     _even("ragged-y", 1.3),
-    _even("hairline", 14.0),
-    _even("fine-hairline", 3.0),
-    _even("veins", 11.0),
-    _even("line-bend", 5.0),
-    _even("line-depth", 7.0),
-    _even("crease-bend", 3.2),
-    _even("crease-depth", 4.0),
-    _even("fold-bend-x", 19.0),
-    _even("fold-bend-y", 21.0),
-    _even("fine-fold-bend", 5.5),
-    Noise("creases", (1.7, 9.0, 14.0), "lip", fades=True),
-    Noise("fine-creases", (0.8, 5.0, 9.0), "lip", fades=True),
-    Noise("lip-streaks", (1.6, 9.0, 9.0), "lip"),
-    Noise("level-lines", (11.0, 1.5, 11.0), "level", fades=True),
-    Noise("eye-lines", (1.1, 9.0, 9.0), "ring", fades=True),
+    _even("hairline", 14.0, ground="hairline"),
+    _even("fine-hairline", 3.0, ground="hairline"),
+    _even("veins", 11.0, ground="veins"),
+    _even("line-bend", 5.0, ground="lines"),
+    _even("line-depth", 7.0, ground="furrows"),
+    _even("crease-bend", 3.2, ground="lips"),
+    _even("crease-depth", 4.0, ground="lips"),
+    _even("fold-bend-x", 19.0, ground="folds"),
+    _even("fold-bend-y", 21.0, ground="folds"),
+    _even("fine-fold-bend", 5.5, ground="folds"),
+    Noise("creases", (1.7, 9.0, 14.0), "lip", fades=True, ground="lips"),
+    Noise("fine-creases", (0.8, 5.0, 9.0), "lip", fades=True, ground="lips"),
+    Noise("lip-streaks", (1.6, 9.0, 9.0), "lip", ground="lips"),
+    Noise("level-lines", (11.0, 1.5, 11.0), "level", fades=True, ground="lines"),
+    Noise("eye-lines", (1.1, 9.0, 9.0), "ring", fades=True, ground="lines"),
 )
+WANDERING = 2
+"""How many of the first noises, of a single octave, bend the borders of zones."""
 
 
 class Dots(NamedTuple):
@@ -100,23 +114,25 @@ def noise_table() -> NDArray[np.float32]:
     """(n, 16) a row for each octave of each noise, as spot.wgsl reads it.
 
     Three rows of the matrix from its space to its lattice [1/mm], each with a number behind it: which size of
-    texel shows it [mm], 0 for any; its strength; its seed. Then which noise it belongs to, and which space.
+    texel shows it [mm], 0 for any; its strength; its seed. Then which noise it belongs to, which space, and
+    where it shows.
     """
     rows = list(_rows())
     table = np.zeros((len(rows), 16), np.float32)
-    for row, (matrix, finest_mm, gain, seed, into, space) in zip(table, rows, strict=True):
+    for row, (matrix, finest_mm, gain, seed, *which) in zip(table, rows, strict=True):
         row[:12].reshape(3, 4)[:, :3] = matrix
         row[3], row[7] = finest_mm, gain
-        row[[11, 12, 13]] = np.array([seed, into, space], np.uint32).view(np.float32)
+        row[11:15] = np.array([seed, *which], np.uint32).view(np.float32)
     return table
 
 
-def _rows() -> Iterator[tuple[NDArray[np.float64], float, float, int, int, int]]:
+def _rows() -> Iterator[tuple[NDArray[np.float64], float, float, int, int, int, int]]:
     seed = 0
     for into, noise in enumerate(NOISES):
         matrix, gain, finest = np.diag(1.0 / np.array(noise.blob_mm)), 1.0, min(noise.blob_mm)
+        space, ground = SPACES.index(noise.space), GROUNDS.index(noise.ground)
         for _ in range(noise.octaves):
-            yield matrix, finest if noise.fades else 0.0, gain, seed, into, SPACES.index(noise.space)
+            yield matrix, finest if noise.fades else 0.0, gain, seed, into, space, ground
             matrix, gain, finest = matrix @ _TURN / _SHRINK, gain * noise.gain, finest * _SHRINK
             seed += 1
 

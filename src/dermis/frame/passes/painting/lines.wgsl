@@ -6,10 +6,8 @@ const MOVED: f32 = 0.7; // depth that a full movement adds, over that of an old 
 const MOVED_OLD: f32 = 0.4;
 const GRAIN_MM: f32 = 0.040;
 const LINE_MM: f32 = 0.07;
-const LIP_MM: f32 = 0.16;
+const CREASE_MM: f32 = 0.16;
 const MOLE_MM: f32 = 0.18;
-const FOLD_WANDER_MM: f32 = 2.4;
-const FOLD_REACH: f32 = 6.0; // in widths
 
 // Depth of a groove where noise crosses zero, no sharper than texels can show.
 fn groove(n: f32, sharpness: f32, texel_mm: f32, blob_mm: f32) -> f32 {
@@ -22,15 +20,15 @@ var<private> deepened: array<f32, FOLDING>; // height that each full movement ad
 
 fn relief(spot: Spot, lip: f32) -> f32 {
     let texel = spot.texel_mm;
-    let bare = max(1.0 + zone[ZONE_FURROWS], 0.2) * (1.0 - 0.85 * lip);
+    let bare = max(1.0 + zone_of(ZONE_FURROWS), 0.2) * (1.0 - 0.85 * lip);
     var height = bare * GRAIN_MM * (0.6 + 0.5 * noise[NOISE_ROUGHNESS]) * (noise[NOISE_GRAIN] + 0.9 * abs(noise[NOISE_LUMPS]));
     let uneven = max(0.45 + 0.9 * noise[NOISE_LINE_DEPTH], 0.0);
-    let lines = zone[ZONE_LEVEL] * uneven * groove(noise[NOISE_LEVEL_LINES], 3.5, texel, 1.5)
-        + zone[ZONE_AROUND] * (0.3 + uneven) * 0.9 * groove(noise[NOISE_EYE_LINES], 3.0, texel, 1.1);
+    let lines = zone_of(ZONE_LEVEL) * uneven * groove(noise[NOISE_LEVEL_LINES], 3.5, texel, 1.5)
+        + zone_of(ZONE_AROUND) * (0.3 + uneven) * 0.9 * groove(noise[NOISE_EYE_LINES], 3.0, texel, 1.1);
     height -= (0.3 + 4.0 * paint.age) * LINE_MM * lines;
     let creases = (0.6 + 0.6 * noise[NOISE_CREASE_DEPTH]) * groove(noise[NOISE_CREASES], 2.2, texel, 1.7)
         + 0.3 * groove(noise[NOISE_FINE_CREASES], 2.5, texel, 0.8);
-    height -= lip * LIP_MM * creases * smoothstep(0.2, 2.0, abs(spot.fields.y));
+    height -= lip * CREASE_MM * creases * smoothstep(0.2, 2.0, abs(spot.fields.y));
     return height + MOLE_MM * smoothstep(0.1, 0.6, dotted[DOT_MOLES]) + folded(spot);
 }
 
@@ -46,23 +44,38 @@ fn folded(spot: Spot) -> f32 {
         0.0,
     );
     let p = spot.left + FOLD_WANDER_MM * bend;
-    for (var k = 0u; k < FOLDS; k++) {
-        let fold = tables.folds[k];
-        let own = fold.size.x;
-        let width = sqrt(own * own + 0.64 * spot.texel_mm * spot.texel_mm);
-        if (distance(p, fold.ball.xyz) < fold.ball.w + FOLD_REACH * width) {
-            let near = nearest(p, fold.knots);
-            let square = near.x / (width * width);
-            let shape = (0.35 * exp(-square / 7.0) - exp(-square)) * (1.0 - smoothstep(0.6 * 36.0, 36.0, square));
-            let ends = 1.0 - pow(2.0 * near.y - 1.0, 4.0);
-            let part = ends * shape * own / width * max(0.8 + 0.6 * noise[NOISE_LINE_DEPTH], 0.0);
-            height += mix(fold.size.y, fold.size.z, paint.age) * part;
-            if (fold.size.w > 0.0) {
-                deepened[u32(fold.size.w) - 1u] += (MOVED + MOVED_OLD * paint.age) * fold.size.z * part;
+    var k = 0u;
+    loop { // over those that reach here, as in make_noise
+        loop {
+            if (k >= FOLDS) {
+                break;
             }
+            if (reaches(tables.folds[k], p, spot.texel_mm)) {
+                break;
+            }
+            k++;
         }
+        if (k >= FOLDS) {
+            break;
+        }
+        let fold = tables.folds[k];
+        let width = width_of(fold, spot.texel_mm);
+        let near = nearest(p, fold.knots);
+        let square = near.x / (width * width);
+        let shape = (0.35 * exp(-square / 7.0) - exp(-square)) * (1.0 - smoothstep(0.6 * 36.0, 36.0, square));
+        let ends = 1.0 - pow(2.0 * near.y - 1.0, 4.0);
+        let part = ends * shape * fold.size.x / width * max(0.8 + 0.6 * noise[NOISE_LINE_DEPTH], 0.0);
+        height += mix(fold.size.y, fold.size.z, paint.age) * part;
+        if (fold.size.w > 0.0) {
+            deepened[u32(fold.size.w) - 1u] += (MOVED + MOVED_OLD * paint.age) * fold.size.z * part;
+        }
+        k++;
     }
     return height;
+}
+
+fn reaches(fold: Fold, p: vec3f, texel_mm: f32) -> bool {
+    return distance(p, fold.ball.xyz) < fold.ball.w + FOLD_REACH * width_of(fold, texel_mm);
 }
 
 // Squared distance to a fold [mm2], and how far along it that is.

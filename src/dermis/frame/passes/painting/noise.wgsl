@@ -18,6 +18,8 @@ fn shares(words: vec3u) -> vec3f {
     return vec3f(words >> vec3u(8u)) * (1.0 / 16777216.0);
 }
 
+const MOST_NOISE: f32 = 2.1; // which all that follows stays below
+
 // Smooth noise of about -1 to 1, its blobs one unit large. Source: [Perlin2002], with directions of any length.
 fn gradient_noise(place: vec3f, seed: u32) -> f32 {
     let cell = floor(place);

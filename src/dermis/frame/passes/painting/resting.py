@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from dermis.frame.passes import each, map_mips, program
 from dermis.frame.passes.painting.given import OWNER, SKIN, Given, key_of
 from dermis.gpu import Device, Frame, make_texture, upload
 from dermis.gpu.textures import download
+from dermis.human.skin.surface import Painting
 from dermis.preparing import preparing
 
 _FOLDER = "painted"
@@ -55,23 +57,35 @@ def resting(device: Device, given: Given, side: int, moving: bool = False) -> Re
 @preparing("painting the skin")
 def painted(device: Device, given: Given, side: int) -> Resting:
     """The maps, painted."""
-    surface = given.surface
-    owned = {
-        "paint": given.paint,
-        "vertices": device.buffer(surface.vertices, "STORAGE"),
-        "triangles": device.buffer(surface.triangles, "STORAGE"),
-        "owners": device.space(_WORD * side * side),
-    }
+    owned = {"paint": given.paint} | _owned(device, given, side)
     maps = {name: map_mips.empty(device, (side, side)) for name in _MAPS}
     heights = device.space(_WORD * (side + 2) ** 2)
     moved = make_texture(device, (side, side), HALVES, layers=2)
     into = {name: one.levels[0] for name, one in maps.items()} | {"heights": heights, "moved": moved}
     tables = {"tables": given.tables, "colour_tables": _colours(device, given)}
     frame = Frame(device, timed=False)
-    frame.dispatch("maps", program(device, OWNER), owned, each(surface.count))
     frame.compute("maps", program(device, SKIN), owned | tables | into, (side, side))
     frame.submit()
     return Resting(**maps, heights=heights, moved=moved)
+
+
+def _owned(device: Device, given: Given, side: int) -> dict[str, Any]:
+    """Buffers of the surface, and of whose each texel is; made once for all people with its layout."""
+    surface = given.surface
+    known = device.shared("painted surfaces", WeakKeyDictionary[Painting, dict[int, dict[str, Any]]])
+    sides: dict[int, dict[str, Any]] = known.setdefault(surface, {})
+    if side not in sides:
+        sides.clear()
+        made = {
+            "vertices": device.buffer(surface.vertices, "STORAGE"),
+            "triangles": device.buffer(surface.triangles, "STORAGE"),
+            "owners": device.space(_WORD * side * side),
+        }
+        frame = Frame(device, timed=False)
+        frame.dispatch("maps", program(device, OWNER), {"paint": given.paint} | made, each(surface.count))
+        frame.submit()
+        sides[side] = made
+    return sides[side]
 
 
 def _colours(device: Device, given: Given) -> Any:

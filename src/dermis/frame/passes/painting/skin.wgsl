@@ -1,5 +1,6 @@
 // Colour, relief and gloss of the skin at each texel of its maps, from pigments, marks and lines of the face.
 //#include "spot.wgsl"
+//#include "marks.wgsl"
 //#include "lines.wgsl"
 
 @group(0) @binding(3) var<storage, read> owners: array<u32>;
@@ -56,7 +57,7 @@ fn entry(table: u32, at: vec2u) -> vec3f {
 // Thin branching lines, where noise is near zero.
 fn veins() -> f32 {
     let near = 1.0 - smoothstep(0.0, 0.10, abs(noise[NOISE_VEINS] + 0.08 * noise[NOISE_SUN]));
-    return near * saturate(zone[ZONE_VEINS]) * paint.veins;
+    return near * saturate(zone_of(ZONE_VEINS)) * paint.veins;
 }
 
 // Where lids face the eye, pink and covered by tears.
@@ -65,12 +66,12 @@ fn inner_lid(spot: Spot) -> f32 {
 }
 
 fn pigments(spot: Spot, lip: f32, mucosa: f32) -> vec2f {
-    var brown = zone[ZONE_MELANIN] * (1.0 - lip) + LIP_MELANIN * lip + PATCHES * noise[NOISE_PATCHES];
+    var brown = zone_of(ZONE_MELANIN) * (1.0 - lip) + LIP_MELANIN * lip + PATCHES * noise[NOISE_PATCHES];
     brown += FRECKLE * smoothstep(0.02, 0.3, dotted[DOT_FRECKLES] + 0.7 * dotted[DOT_SMALL_FRECKLES]);
     brown += AGE_SPOT * smoothstep(0.05, 0.4, dotted[DOT_AGE_SPOTS]) + MOLE * smoothstep(0.1, 0.6, dotted[DOT_MOLES]);
     let clothed = smoothstep(-165.0, -205.0, spot.body.y + 6.0 * noise[NOISE_WANDER_Y]);
-    brown += TAN * paint.tan * (0.35 * saturate(zone[ZONE_SUN]) - 0.5 * clothed);
-    var red = 2.0 * paint.redness * zone[ZONE_BLOOD] * (1.0 - lip) + BLOTCHES * noise[NOISE_BLOTCHES];
+    brown += TAN * paint.tan * (0.35 * saturate(zone_of(ZONE_SUN)) - 0.5 * clothed);
+    var red = 2.0 * paint.redness * zone_of(ZONE_BLOOD) * (1.0 - lip) + BLOTCHES * noise[NOISE_BLOTCHES];
     let slit = RED_SLIT * (1.0 - smoothstep(0.0, 2.2, spot.fields.y));
     red += lip * (LIP_BLOOD + 0.3 * noise[NOISE_LIP_STREAKS] + slit) + mucosa * (MUCOSA_BLOOD - lip * (LIP_BLOOD + RED_SLIT));
     red += RED_LIDS * (1.0 - smoothstep(0.3, 1.8, spot.fields.z));
@@ -86,9 +87,9 @@ fn over(below: vec3f, above: vec3f, share: f32) -> vec3f {
 fn gloss(lip: f32, wet: f32, hair: f32, tears: f32) -> vec2f {
     let film = noise[NOISE_OIL_FILM] + 0.7 * noise[NOISE_FINE_FILM];
     let zones = 0.5 + 1.25 * paint.oil;
-    var strength = STRENGTH + OILY_STRENGTH * paint.oil + zones * zone[ZONE_STRENGTH] + LIP_STRENGTH * lip + WET_STRENGTH * wet;
+    var strength = STRENGTH + OILY_STRENGTH * paint.oil + zones * zone_of(ZONE_STRENGTH) + LIP_STRENGTH * lip + WET_STRENGTH * wet;
     strength *= (1.0 + UNEVEN * film) * (1.0 - 0.4 * hair);
-    var m = ROUGHNESS + OILY_ROUGHNESS * paint.oil + zones * zone[ZONE_ROUGHNESS] + LIP_ROUGHNESS * lip + WET_ROUGHNESS * wet;
+    var m = ROUGHNESS + OILY_ROUGHNESS * paint.oil + zones * zone_of(ZONE_ROUGHNESS) + LIP_ROUGHNESS * lip + WET_ROUGHNESS * wet;
     m *= 1.0 - 0.5 * UNEVEN * film;
     return vec2f(clamp(strength, 0.3, 2.2), mix(clamp(m, 0.15, 0.6), TEARS, tears));
 }
@@ -119,9 +120,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let spot = spot_of(owner, id.xy);
-    make_noise(spot);
-    sum_zones(spot);
-    let lip = smoothstep(-1.1, 1.3, spot.fields.x + 0.45 * noise[NOISE_LIP_EDGE]);
+    make_textures(spot);
+    let lip = smoothstep(LIP_MM.x, LIP_MM.y, spot.fields.x + LIP_WANDER_MM * noise[NOISE_LIP_EDGE]);
     let mucosa = smoothstep(0.5, -2.5, spot.fields.y);
     let scalp = scalp_at(spot);
     scatter_dots(spot, scalp, lip);
@@ -130,7 +130,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var rgb = mix(colour_of(0u, p.x, p.y), colour_of(1u, p.x, p.y), lip);
     rgb *= mix(vec3f(1.0), VEIN_COLOUR, veins());
     let bristles = 0.6 + 0.4 * dotted[DOT_STUBBLE];
-    let beard = 0.55 * paint.beard * saturate(zone[ZONE_BEARD]) * (1.0 - lip) * (0.45 + 0.9 * dotted[DOT_STUBBLE]);
+    let beard = 0.55 * paint.beard * saturate(zone_of(ZONE_BEARD)) * (1.0 - lip) * (0.45 + 0.9 * dotted[DOT_STUBBLE]);
     rgb = over(rgb, STUBBLE_COLOUR, paint.stubble * scalp * bristles);
     rgb = over(rgb, BEARD_COLOUR, beard);
     let wet = max(mucosa, 1.0 - smoothstep(0.2, 1.2, spot.fields.z));
@@ -138,9 +138,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let away = f32(NEAREST - (owner >> ID_BITS)) / STEPS;
     let runs_out = 1.0 - smoothstep(0.5 * MARGIN, MARGIN, away); // beside the charts
     let height = relief(spot, lip) * runs_out * (1.0 - inner);
-    keep_moved(id.xy, runs_out, saturate(zone[ZONE_BLOOD]) * (1.0 - lip), lip);
+    keep_moved(id.xy, runs_out, saturate(zone_of(ZONE_BLOOD)) * (1.0 - lip), lip);
     let bare = (1.0 - lip) * (1.0 - mucosa) * (1.0 - inner);
-    let pores = saturate(0.45 + zone[ZONE_PORES]) * bare;
-    let furrows = max(1.0 + zone[ZONE_FURROWS], 0.2) * bare * (0.8 + 2.2 * paint.age * paint.age);
+    let pores = saturate(0.45 + zone_of(ZONE_PORES)) * bare;
+    let furrows = max(1.0 + zone_of(ZONE_FURROWS), 0.2) * bare * (0.8 + 2.2 * paint.age * paint.age);
     keep(id.xy, rgb, gloss(lip, wet, max(scalp * paint.stubble, beard), inner), height, vec3f(pores, furrows, spot.density), p);
 }

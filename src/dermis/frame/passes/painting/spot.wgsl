@@ -5,10 +5,12 @@
 //#each noises: const NOISE_{NAME}: u32 = {number};
 //#each dots: const DOT_{NAME}: u32 = {number};
 //#each amounts: const ZONE_{NAME}: u32 = {number};
+//#each grounds: const GROUND_{NAME}: u32 = {number};
 //#fill const NOISES: u32 = {noises}u;
 //#fill const NOISE_ROWS: u32 = {noise_rows}u;
+//#fill const WANDER_ROWS: u32 = {wander_rows}u;
 //#fill const DOTS: u32 = {dots}u;
-//#fill const AMOUNTS: u32 = {amounts}u;
+//#fill const AMOUNT_ROWS: u32 = {amount_rows}u;
 //#fill const ZONES: u32 = {zones}u;
 //#fill const FOLDS: u32 = {folds}u;
 //#fill const FOLDING: u32 = {folding}u;
@@ -19,7 +21,7 @@ struct Noise {
     x: vec4f, // rows of the matrix to the lattice; the size of texel that shows it [mm], 0 for always
     y: vec4f, // strength
     z: vec4f, // seed, as bits
-    which: vec4f, // noise and space, as bits
+    which: vec4f, // noise, space and where it shows, as bits
 }
 
 struct Zone {
@@ -47,8 +49,16 @@ struct Tables {
 
 // Artist's values.
 const WANDER_MM: f32 = 5.0; // of the zones' borders
+const LIP_WANDER_MM: f32 = 0.45; // and of the lips'
+const LIP_MM: vec2f = vec2f(-1.1, 1.3); // beside their border, between which skin turns into them
+const HAIRLINE_MM: vec2f = vec2f(-9.0, 16.0); // beside the hairline, between which hair gets dense
+const HAIRLINE_WANDER_MM: vec2f = vec2f(5.0, 4.0);
+const LOWEST_HAIR_MM: f32 = -80.0;
 const EYE: vec2f = vec2f(29.5, -0.5); // that lines run around [mm]
 const HEAD_AXIS_Z: f32 = -72.0;
+
+const FOLD_WANDER_MM: f32 = 2.4;
+const FOLD_REACH: f32 = 6.0; // in widths
 
 // What is known of a texel.
 struct Spot {
@@ -62,7 +72,11 @@ struct Spot {
 
 var<private> noise: array<f32, NOISES>;
 var<private> dotted: array<f32, DOTS>;
-var<private> zone: array<f32, AMOUNTS>;
+var<private> zone: array<vec4f, AMOUNT_ROWS>;
+
+fn zone_of(amount: u32) -> f32 {
+    return zone[amount / 4u][amount % 4u];
+}
 
 fn spot_of(owner: u32, at: vec2u) -> Spot {
     let t = triangle_of((owner & ((1u << ID_BITS) - 1u)) - 1u);
@@ -102,67 +116,129 @@ fn in_space(spot: Spot, space: u32) -> vec3f {
     }
 }
 
-fn make_noise(spot: Spot) {
+// How much of a row of noise shows at a texel.
+// grounds: bits of where the texel is; noise that shows elsewhere alone is left 0
+fn shown(row: u32, texel_mm: f32, grounds: u32) -> f32 {
+    let blob_mm = tables.noises[row].x.w;
+    let here = (grounds & (1u << bitcast<u32>(tables.noises[row].which.z))) != 0u;
+    return select(0.0, select(visible(blob_mm, texel_mm), 1.0, blob_mm == 0.0), here);
+}
+
+// Noise of all sizes, of rows from the first on. Software adapters run what is in a branch for nothing, but for no row
+// that is passed over here.
+fn make_noise(spot: Spot, first: u32, end: u32, grounds: u32) {
+    var k = first;
+    loop {
+        var much = 0.0;
+        loop {
+            if (k >= end) {
+                break;
+            }
+            much = shown(k, spot.texel_mm, grounds);
+            if (much > 0.0) {
+                break;
+            }
+            k++;
+        }
+        if (k >= end) {
+            break;
+        }
+        let one = tables.noises[k];
+        let p = in_space(spot, bitcast<u32>(one.which.y));
+        let lattice = vec3f(dot(one.x.xyz, p), dot(one.y.xyz, p), dot(one.z.xyz, p));
+        let seed = bitcast<u32>(one.z.w) + 64u * paint.seed;
+        noise[bitcast<u32>(one.which.x)] += one.y.w * much * gradient_noise(lattice, seed);
+        k++;
+    }
+}
+
+// All that noise makes up: where zones reach to comes first, as noise shows in some of them alone.
+fn make_textures(spot: Spot) {
     for (var k = 0u; k < NOISES; k++) {
         noise[k] = 0.0;
     }
-    for (var k = 0u; k < NOISE_ROWS; k++) {
-        let one = tables.noises[k];
-        let shown = select(visible(one.x.w, spot.texel_mm), 1.0, one.x.w == 0.0);
-        if (shown > 0.0) {
-            let p = in_space(spot, bitcast<u32>(one.which.y));
-            let lattice = vec3f(dot(one.x.xyz, p), dot(one.y.xyz, p), dot(one.z.xyz, p));
-            let seed = bitcast<u32>(one.z.w) + 64u * paint.seed;
-            noise[bitcast<u32>(one.which.x)] += one.y.w * shown * gradient_noise(lattice, seed);
-        }
+    make_noise(spot, 0u, WANDER_ROWS, 1u << GROUND_ALL);
+    sum_zones(spot);
+    make_noise(spot, WANDER_ROWS, NOISE_ROWS, grounds_of(spot));
+}
+
+// Bits of where a texel is, no wider than noise bends their borders.
+fn grounds_of(spot: Spot) -> u32 {
+    let lips = spot.fields.x > LIP_MM.x - LIP_WANDER_MM * MOST_NOISE;
+    let lines = zone_of(ZONE_LEVEL) != 0.0 || zone_of(ZONE_AROUND) != 0.0;
+    let veined = zone_of(ZONE_VEINS) > 0.0 && paint.veins > 0.0;
+    let above = above_hairline(spot);
+    let bent = MOST_NOISE * (HAIRLINE_WANDER_MM.x + HAIRLINE_WANDER_MM.y);
+    let edge = spot.left.y >= LOWEST_HAIR_MM && above > HAIRLINE_MM.x - bent && above < HAIRLINE_MM.y + bent;
+    let folds = near_folds(spot);
+    return (1u << GROUND_ALL)
+        | (u32(lips) << GROUND_LIPS)
+        | (u32(lines) << GROUND_LINES)
+        | (u32(lines || folds) << GROUND_FURROWS)
+        | (u32(folds) << GROUND_FOLDS)
+        | (u32(veined) << GROUND_VEINS)
+        | (u32(edge) << GROUND_HAIRLINE);
+}
+
+fn width_of(fold: Fold, texel_mm: f32) -> f32 {
+    return sqrt(fold.size.x * fold.size.x + 0.64 * texel_mm * texel_mm);
+}
+
+// Whether a fold may reach a texel, however it is bent.
+fn near_folds(spot: Spot) -> bool {
+    var near = false;
+    for (var k = 0u; k < FOLDS; k++) {
+        let fold = tables.folds[k];
+        let reach = fold.ball.w + FOLD_REACH * width_of(fold, spot.texel_mm) + 1.5 * MOST_NOISE * FOLD_WANDER_MM;
+        near = near || distance(spot.left, fold.ball.xyz) < reach;
     }
+    return near;
 }
 
 fn sum_zones(spot: Spot) {
-    for (var k = 0u; k < AMOUNTS; k++) {
-        zone[k] = 0.0;
+    for (var k = 0u; k < AMOUNT_ROWS; k++) {
+        zone[k] = vec4f(0.0);
     }
     let p = spot.left + WANDER_MM * vec3f(noise[NOISE_WANDER_X], noise[NOISE_WANDER_Y], 0.0);
-    for (var k = 0u; k < ZONES; k++) {
-        let off = (p - tables.zones[k].centre.xyz) * tables.zones[k].reach.xyz;
-        let away = dot(off, off);
-        if (away < 14.0) {
-            let weight = exp(-away);
-            for (var c = 0u; c < AMOUNTS; c++) {
-                zone[c] += weight * tables.zones[k].amounts[c / 4u][c % 4u];
+    var k = 0u;
+    loop { // over those that reach here, as in make_noise
+        var away = 0.0;
+        loop {
+            if (k >= ZONES) {
+                break;
             }
+            let off = (p - tables.zones[k].centre.xyz) * tables.zones[k].reach.xyz;
+            away = dot(off, off);
+            if (away < 14.0) {
+                break;
+            }
+            k++;
         }
+        if (k >= ZONES) {
+            break;
+        }
+        let weight = exp(-away);
+        for (var c = 0u; c < AMOUNT_ROWS; c++) {
+            zone[c] += weight * tables.zones[k].amounts[c];
+        }
+        k++;
     }
 }
 
-fn scatter_dots(spot: Spot, scalp: f32, lip: f32) {
-    var kept: array<f32, DOTS>;
-    let sun = saturate(zone[ZONE_SUN]);
-    let freckled = paint.freckles * (0.12 + 0.88 * sun) * (0.75 + 0.75 * noise[NOISE_SUN]) * (1.0 - lip);
-    kept[DOT_FRECKLES] = 0.7 * freckled;
-    kept[DOT_SMALL_FRECKLES] = freckled;
-    kept[DOT_MOLES] = 0.3 * paint.moles * (1.0 - lip);
-    kept[DOT_AGE_SPOTS] = 0.8 * paint.spots * (0.1 + 0.9 * sun) * (1.0 - lip);
-    kept[DOT_STUBBLE] = select(0.0, 1.0, max(scalp * paint.stubble, saturate(zone[ZONE_BEARD]) * paint.beard) > 0.0);
-    for (var k = 0u; k < DOTS; k++) {
-        dotted[k] = 0.0;
-        if (kept[k] > 0.0) {
-            let kind = tables.dot_kinds[k];
-            let bent = spot.body + kind.ragged_mm * vec3f(noise[NOISE_RAGGED_X], noise[NOISE_RAGGED_Y], 0.0);
-            dotted[k] = dots(bent, spot.normal, kind, kept[k], spot.texel_mm, 64u * paint.seed + 40u + 2u * k);
-        }
-    }
-}
-
-fn scalp_at(spot: Spot) -> f32 {
+fn above_hairline(spot: Spot) -> f32 {
     let p = spot.left;
-    if (p.y < -80.0) {
-        return 0.0;
-    }
     let angle = degrees(atan2(p.x, p.z - HEAD_AXIS_Z)) / DEGREES;
     let before = min(u32(angle), EDGES - 2u);
     let heights = tables.hairline[before];
     let edge = mix(heights.x, heights.y, angle - f32(before));
-    let above = p.y - edge + 5.0 * noise[NOISE_HAIRLINE] + 4.0 * noise[NOISE_FINE_HAIRLINE];
-    return smoothstep(-9.0, 16.0, above) * saturate(1.0 + zone[ZONE_HAIR]);
+    return p.y - edge;
+}
+
+fn scalp_at(spot: Spot) -> f32 {
+    if (spot.left.y < LOWEST_HAIR_MM) {
+        return 0.0;
+    }
+    let bent = HAIRLINE_WANDER_MM * vec2f(noise[NOISE_HAIRLINE], noise[NOISE_FINE_HAIRLINE]);
+    let above = above_hairline(spot) + bent.x + bent.y;
+    return smoothstep(HAIRLINE_MM.x, HAIRLINE_MM.y, above) * saturate(1.0 + zone_of(ZONE_HAIR));
 }

@@ -1,0 +1,163 @@
+"""Where brows and lashes are rooted: places of the mean person's quads, found once for all people."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.human.hair import lashes
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.strands import Doubles, Roots, corners
+
+Index = NDArray[np.int64]
+_ENDS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)  # of a quad
+_CELL_MM = 2.0  # of the grid that triangles are listed in
+_LOW, _HIGH = np.array([-70.0, -20.0]), np.array([70.0, 50.0])  # of places in front, around the brows [mm]
+
+
+class _Front(NamedTuple):
+    """Triangles that face the viewer, by cells of a grid over the front plane.
+
+    listed : (columns, rows, most) in order, -1 for none
+    quad, half : (t,) whose they are, and which corners
+    corner : (t, 3, 3) [mm]
+    """
+
+    listed: Index
+    quad: Index
+    half: Index
+    corner: Doubles
+
+
+class _Row(NamedTuple):
+    """Edges in a row, with a quad beside each.
+
+    run : (m,) how far along the row each begins and the last ends [mm]
+    quad : (m - 1,)
+    frame : (m - 1, 4, 2) places on these: the edge's ends, and what lies beside each
+    """
+
+    run: Doubles
+    quad: Index
+    frame: Doubles
+
+
+class Rooting:
+    """Roots on a mesh of quads.
+
+    mesh : with control points at points_mm (p, 3)
+    eyes_mm : (2, 3) middles of the left and of the right eye
+    """
+
+    def __init__(self, mesh: Mesh, points_mm: Doubles, eyes_mm: Doubles) -> None:
+        self.mesh, self._points_mm, self._eyes_mm = mesh, points_mm, eyes_mm
+        self._rows: dict[tuple[tuple[int, ...], float], _Row] = {}
+
+    def in_front(self, x: Doubles, y: Doubles) -> tuple[Roots, NDArray[np.bool_]]:
+        """Roots on what faces the viewer at places of the front plane (n,) [mm], and which there are."""
+        front = self._front
+        cell = np.floor((np.column_stack([x, y]) - _LOW) / _CELL_MM).astype(np.int64)
+        column, row = np.clip(cell, 0, np.array(front.listed.shape[:2]) - 1).T
+        quad, place = np.zeros(len(x), np.int32), np.zeros((len(x), 2), np.float32)
+        best = np.full(len(x), -np.inf)
+        for which in front.listed[column, row].T:
+            a, b, c = front.corner[which].transpose(1, 2, 0)
+            det = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+            v = ((x - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (y - a[1])) / det
+            w = ((b[0] - a[0]) * (y - a[1]) - (x - a[0]) * (b[1] - a[1])) / det
+            share = np.stack([1 - v - w, v, w], axis=-1)
+            z = share[:, 0] * a[2] + share[:, 1] * b[2] + share[:, 2] * c[2]
+            won = (which >= 0) & (share >= -1e-9).all(axis=1) & (z > best)
+            best[won], quad[won] = z[won], front.quad[which[won]]
+            ends = _ENDS[_HALVES[front.half[which[won]]]]
+            place[won] = np.clip(np.einsum("nk,nkc->nc", share[won], ends), 0.0, 1.0)
+        return Roots(quad, place), np.isfinite(best)
+
+    def beside_lid(self, lid: lashes.Lid, side: float, u: Doubles, across: Doubles) -> Roots:
+        """Roots along a lid's edge, on the quads beside it that are farther from the eye.
+
+        side : 1 for the left one
+        u : (n,) how far along it, from 0 to 1 by length
+        across : (n,) how far from the edge into the quad, 0 to 1
+        """
+        key = lid.loop, side
+        if key not in self._rows:
+            self._rows[key] = self._row(np.array(lid.loop), side)
+        run, quad, frame = self._rows[key]
+        at = np.clip(np.searchsorted(run, u * run[-1], "right") - 1, 0, len(quad) - 1)
+        part = (u * run[-1] - run[at]) / (run[at + 1] - run[at])
+        frame = frame[at]
+        low = (1 - part)[:, None] * frame[:, 0] + part[:, None] * frame[:, 1]
+        high = (1 - part)[:, None] * frame[:, 2] + part[:, None] * frame[:, 3]
+        place = (1 - across)[:, None] * low + across[:, None] * high
+        return Roots(quad[at].astype(np.int32), place.astype(np.float32))
+
+    def _row(self, loop: Index, side: float) -> _Row:
+        points, around, away = self._points_mm, self._around, self._eyes_mm[0 if side > 0 else 1]
+        loop = loop if side > 0 else _mirrored(points, loop)
+        off = np.linalg.norm(points[around].mean(axis=1) - away, axis=1)
+        run = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points[loop], axis=0), axis=1))])
+        quads, frames = [], []
+        for a, b in pairwise(loop.tolist()):
+            both = np.flatnonzero((around == a).any(axis=1) & (around == b).any(axis=1))
+            quad = int(both[off[both].argmax()])
+            i, j = (int(np.flatnonzero(around[quad] == p)[0]) for p in (a, b))
+            quads.append(quad)
+            frames.append(_ENDS[[i, j, (2 * i - j) % 4, (2 * j - i) % 4]])  # beside a, beside b
+        return _Row(run, np.array(quads), np.array(frames))
+
+    @cached_property
+    def _around(self) -> NDArray[np.int32]:
+        """(q, 4) points of all quads."""
+        return corners(self.mesh, np.arange(len(self.mesh.quads)))
+
+    @cached_property
+    def _front(self) -> _Front:
+        quad = np.repeat(np.arange(len(self.mesh.quads)), 2)
+        half = np.tile([0, 1], len(self.mesh.quads))
+        corner = self._points_mm[np.take_along_axis(self._around[quad], _HALVES[half], axis=1)]
+        (ab, ac), low, high = np.diff(corner[..., :2], axis=1).transpose(1, 0, 2), *_box(corner)
+        ac = ab + ac
+        seen = ab[:, 0] * ac[:, 1] - ac[:, 0] * ab[:, 1] > 1e-9
+        seen &= ((high >= _LOW) & (low <= _HIGH)).all(axis=1)
+        quad, half, corner = quad[seen], half[seen], corner[seen]
+        shape = np.ceil((_HIGH - _LOW) / _CELL_MM).astype(np.int64)
+        first, last = (np.clip(np.floor((at[seen] - _LOW) / _CELL_MM).astype(np.int64), 0, shape - 1)
+                       for at in (low, high))  # fmt: skip
+        cells: dict[tuple[int, int], list[int]] = {}
+        for number, ((x0, y0), (x1, y1)) in enumerate(zip(first.tolist(), last.tolist(), strict=True)):
+            for x in range(x0, x1 + 1):
+                for y in range(y0, y1 + 1):
+                    cells.setdefault((x, y), []).append(number)
+        listed = np.full((*shape, max(map(len, cells.values()))), -1)
+        for (x, y), numbers in cells.items():
+            listed[x, y, : len(numbers)] = numbers
+        return _Front(listed, quad, half, corner)
+
+
+_HALVES = np.array([[0, 1, 2], [2, 3, 0]])
+
+
+def _box(corner: Doubles) -> tuple[Doubles, Doubles]:
+    return corner[..., :2].min(axis=1), corner[..., :2].max(axis=1)
+
+
+def _mirrored(points_mm: Doubles, index: Index) -> Index:
+    """Points opposite to some of a symmetric head."""
+    from scipy.spatial import cKDTree
+
+    return np.asarray(cKDTree(points_mm).query(points_mm[index] * [-1, 1, 1])[1], np.int64)
+
+
+def eye_middles(mesh: Mesh) -> Doubles:
+    """(2, 3) middles of the left and of the right eye [mm]."""
+    names = [one.name for one in mesh.materials]
+    found = []
+    for name in ("left eye", "right eye"):
+        places = mesh.positions[np.unique(mesh.triangles[mesh.material == names.index(name)])]
+        found.append(0.5 * (places.min(axis=0) + places.max(axis=0)).astype(np.float64))
+    return np.array(found)
