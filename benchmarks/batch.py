@@ -1,4 +1,4 @@
-"""How fast data sets are drawn: python benchmarks/batch.py -o benchmarks/results/batch.json
+"""How fast data sets are drawn: python benchmarks/batch.py -o benchmarks/results/scale_NAME.json
 
 On any machine: new people and one person moving, by one worker and by several, and by those of dask. All
 numbers of a file are of one run; ratios among them are what to go by on a machine that others use too.

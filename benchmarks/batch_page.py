@@ -1,6 +1,6 @@
 """Writes docs/scale.md from what `batch.py` has measured: python benchmarks/batch_page.py
 
-Each results/batch_*.json is a machine.
+Each results/scale_*.json is a machine.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Told = dict[str, Any]
 
 def main() -> int:
     """Write the page."""
-    measured = [json.loads(path.read_text("utf-8")) for path in sorted(RESULTS.glob("batch_*.json"))]
+    measured = [json.loads(path.read_text("utf-8")) for path in sorted(RESULTS.glob("scale_*.json"))]
     with replacing(PAGE) as trial:
         trial.write_text(page(measured), encoding="utf-8")
     return 0
@@ -86,7 +86,7 @@ def paper(told: Told) -> list[tuple[str, str]]:
         ("files", f"{IMAGES // _SHARD:,} shards of {_SHARD * size / 1e6:,.0f} MB"),
         *((f"at most, by {name}", f"{limit:,.3g} images/s") for name, limit in limits.items()),
     ]
-    if limits:
+    if "steps" in told and "disk" in told:
         rows.append(("what is reached first", min(limits, key=lambda name: limits[name])))
     return rows
 
