@@ -73,7 +73,7 @@ class Head:
 
     @property
     def topology(self) -> Head:
-        """The bare head that atlas and tables are made for: its template if its rig is of that, or itself."""
+        """The bare head that atlas and tables are made for: the template of its rig, or itself."""
         shared = self.template
         own = shared is None or self.rig is None or self.rig.template is not shared.rig
         return self.bare if shared is None or own else shared
