@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from observed import OUTPUT_NAMES, observation, small_spec
+from small_observation import OUTPUT_NAMES, observation, small_spec
 
 from dermis.batch.encodings import Encoding, decode_output, encode_output, file_kind, stored_as
 from dermis.batch.entries import entries

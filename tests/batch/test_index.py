@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from observed import observation, small_spec, write_all, write_shard
+from small_observation import observation, small_spec, write_all, write_shard
 
 from dermis.batch.datasheet import write_datasheet
 from dermis.batch.entries import entries

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from observed import OUTPUT_NAMES, observation, small_spec, write_all
+from small_observation import OUTPUT_NAMES, observation, small_spec, write_all
 
 import dermis
 from dermis.batch.encodings import encode_output

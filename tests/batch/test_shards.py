@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from observed import observation, small_spec, write_all, write_shard
+from small_observation import observation, small_spec, write_all, write_shard
 
 from dermis.batch.entries import entries
 from dermis.batch.settling import settle

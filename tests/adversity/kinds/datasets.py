@@ -15,7 +15,7 @@ from adversity.case import WRONG, FoundError, Input, Plan
 from adversity.checks import check_finite
 from adversity.damage import damaged, scarred
 from adversity.kind import Kind
-from observed import small_spec, write_all
+from small_observation import small_spec, write_all
 
 _ENCODINGS = "png", "exr", "npy"
 _SHARD = "shard-00000"
