@@ -18,6 +18,7 @@ import sys
 import tempfile
 import time
 from datetime import date
+from importlib.metadata import version
 from pathlib import Path
 from statistics import mean
 from typing import Annotated, Any
@@ -25,7 +26,6 @@ from typing import Annotated, Any
 from cyclopts import Parameter, run
 from peers import cpu_model
 
-import dermis
 from dermis.cli.console import print_lines
 from dermis.errors import DermisError, refuse
 from dermis.outputs import replacing
@@ -75,7 +75,7 @@ def main(
         "cpu": cpu_model(),
         "cores": os.cpu_count(),
         "side": side,
-        "versions": {"dermis": dermis.__version__, "python": platform.python_version()},
+        "versions": {"dermis": version("dermis"), "python": platform.python_version()},
         "rows": rows,
     }
     with replacing(output) as trial:
