@@ -12,6 +12,7 @@ from setups import frontal, head_of, scene_of, settings_of
 from test_memory import Held
 
 from dermis.errors import DermisError
+from dermis.frame import limits
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.settings import Settings
@@ -72,6 +73,19 @@ def test_what_is_told_to_fit_does(
     assert option in said["options"]
     smaller = chosen(said["options"], settings)
     assert renderer.draw(LIT, smaller).linear().max() > 0.1
+
+
+def test_what_others_of_the_process_hold_is_no_room(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(limits, "held_bytes", lambda: 10**9)
+    settings = settings_of(transmission="none", atlas=512)
+    Small(renderer, monkeypatch, 24e6)
+    with pytest.raises(DermisError) as caught:
+        renderer.draw(LIT, settings)
+    said = SAID.fullmatch(str(caught.value))
+    assert said and "--atlas" in said["options"]
+    assert renderer.draw(LIT, chosen(said["options"], settings)).linear().max() > 0.1
 
 
 def test_buffers_over_the_limit_are_told(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:

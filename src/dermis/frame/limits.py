@@ -49,8 +49,12 @@ def no_room(error: NoRoomError, device: Device, asked: Asked) -> NoRoomError:
     """The same error, with what would fit in place of what did not; what was made of that is released."""
     for one in filter(None, (error, error.__cause__)):
         traceback.clear_frames(one.__traceback__)
-    most = held_bytes() + found_room(device, sum(frame_bytes(asked).values()))
-    return NoRoomError(error.expected, error.came, error.size, fitting(asked, _SHARE * most))
+    needed = sum(frame_bytes(asked).values())
+    found = found_room(device, needed)
+    most = _SHARE * (held_bytes() + found)
+    if needed <= most:  # and yet it did not fit: others of this process hold the rest
+        most = _SHARE * found
+    return NoRoomError(error.expected, error.came, error.size, fitting(asked, most))
 
 
 def fitting(asked: Asked, most: float) -> str:
