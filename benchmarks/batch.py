@@ -6,13 +6,11 @@ numbers of a file are of one run; ratios among them are what to go by on a machi
 
 from __future__ import annotations
 
-import json
 import os
 import platform
 import sys
 from collections.abc import Callable
 from datetime import UTC, datetime
-from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,11 +18,12 @@ from typing import Annotated, Any
 import batch_sections as sections
 from batch_sections import Plan
 from cyclopts import Parameter, run
+from figures_file import write_figures
 
 from dermis.cli.console import note, print_lines
 from dermis.cli.options import parse_size
 from dermis.errors import DermisError
-from dermis.outputs import check_output, replacing
+from dermis.outputs import check_output
 
 PARTS = ("steps", "new", "moving", "dask", "disk")
 _DIGITS = 4
@@ -69,7 +68,7 @@ def main(
         target = check_output(output, (".json",), "Choose such a name")
         plan = Plan(adapter, parse_size(size), atlas, images, encoders, disk)
         counts = [int(one) for one in workers.split(",")]
-        told = measure(plan, counts, parts.split(","), partial(_write, target))
+        told = measure(plan, counts, parts.split(","), lambda told: write_figures(target, told, _DIGITS))
     except DermisError as fault:
         note(f"batch: {fault}")
         return 2
@@ -129,20 +128,6 @@ def _about() -> dict[str, Any]:
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "load": load,
     }
-
-
-def _write(path: Path, told: dict[str, Any]) -> None:
-    with replacing(path) as unfinished:
-        unfinished.write_text(json.dumps(_rounded(told), indent=1) + "\n", encoding="utf-8")
-
-
-def _rounded(value: Any) -> Any:
-    """Floats with as many digits as mean something."""
-    if isinstance(value, float):
-        return float(f"{value:.{_DIGITS}g}")
-    if isinstance(value, dict):
-        return {str(key): _rounded(one) for key, one in value.items()}
-    return [_rounded(one) for one in value] if isinstance(value, list | tuple) else value
 
 
 if __name__ == "__main__":

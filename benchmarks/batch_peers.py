@@ -24,17 +24,17 @@ from statistics import mean
 from typing import Annotated, Any
 
 from cyclopts import Parameter, run
+from figures_file import write_figures
 from peers import cpu_model
 
 from dermis.cli.console import print_lines
 from dermis.errors import DermisError, refuse
-from dermis.outputs import replacing
 from dermis.reference.cycles import blender_python
 
 ROOT = Path(__file__).resolve().parent
 RESULTS = ROOT / "results" / "batch_peers.json"
 SCRIPT = ROOT / "batch_peers_script.py"
-_LONGEST_S = 3600
+_LONGEST_S, _DIGITS = 3600, 4
 
 
 def main(
@@ -78,8 +78,7 @@ def main(
         "versions": {"dermis": version("dermis"), "python": platform.python_version()},
         "rows": rows,
     }
-    with replacing(output) as trial:
-        trial.write_text(json.dumps(report, indent=1), encoding="utf-8")
+    write_figures(output, report, _DIGITS)
     print_lines(table(report))
     return 0
 

@@ -6,7 +6,6 @@ a run that is cut short loses little. --quick tries all parts at tiny sizes, on 
 
 from __future__ import annotations
 
-import json
 import platform
 import sys
 import time
@@ -18,13 +17,14 @@ from typing import Annotated, Any
 
 import gpu_sections
 from cyclopts import Parameter, run
+from figures_file import write_figures
 from gpu_sections import Plan, plan_of, quick_plan
 
 import dermis
 from dermis.cli.console import note
 from dermis.errors import DermisError
 from dermis.mesh.samples import cached
-from dermis.outputs import check_output, replacing
+from dermis.outputs import check_output
 
 PARTS = ("bench", "lobes", "sequences", "lights", "options", "start", "viewer", "film")
 """What matters most first; lobes while the device is at work, for an idle one is three times as slow."""
@@ -62,7 +62,7 @@ def main(
         target = check_output(output, (".json",), "Choose such a name")
         name = ("lee_perry_smith" if cached("lee_perry_smith") else "human") if head == "auto" else head
         plan = (quick_plan if quick else plan_of)(adapter, name)
-        measure(plan, _chosen(parts), minutes, lambda told: _write(target, told))
+        measure(plan, _chosen(parts), minutes, lambda told: write_figures(target, told, _DIGITS))
     except DermisError as fault:
         note(f"gpu_server: {fault}")
         return 2
@@ -120,20 +120,6 @@ def _chosen(parts: str) -> list[str]:
                 f"--parts: expected names of {', '.join(PARTS)}, but {name!r} came. Correct it."
             )
     return names
-
-
-def _write(path: Path, told: dict[str, Any]) -> None:
-    with replacing(path) as unfinished:
-        unfinished.write_text(json.dumps(_rounded(told), indent=1) + "\n", encoding="utf-8")
-
-
-def _rounded(value: Any) -> Any:
-    """Floats with as many digits as mean something."""
-    if isinstance(value, float):
-        return float(f"{value:.{_DIGITS}g}")
-    if isinstance(value, dict):
-        return {str(key): _rounded(one) for key, one in value.items()}
-    return [_rounded(one) for one in value] if isinstance(value, list | tuple) else value
 
 
 if __name__ == "__main__":

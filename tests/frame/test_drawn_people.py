@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from dermis.frame.renderer import Renderer
 from dermis.gpu import Device
 from dermis.human.hair.look import HairLook
-from dermis.human.people import People
 from dermis.human.person import Human
+from dermis.human.template import template
 from dermis.scene.lights import preset_lights
 from dermis.scene.model import Scene
 from dermis.scene.people import skin_of
@@ -30,7 +30,7 @@ def scene_of(number: int, **others: object) -> Scene:
     person, face = PEOPLE[number], FACES[number]
     light = preset_lights(("studio", "backlit", "studio")[number])[:2]
     pose = Pose(weights=face) if face else None
-    return Scene(People().head(person), lights=light, pose=pose, skin=skin_of(person), **others)  # type: ignore[arg-type]
+    return Scene(person.head(), lights=light, pose=pose, skin=skin_of(person), **others)  # type: ignore[arg-type]
 
 
 def pictures(
@@ -82,8 +82,7 @@ def test_a_new_person_takes_what_is_new_to_the_device(
 
 
 def test_all_heads_share_the_template() -> None:
-    people = People()
-    heads = [people.head(person) for person in PEOPLE[:2]]
-    assert all(head.topology is people.template for head in heads)
+    heads = [person.head() for person in PEOPLE[:2]]
+    assert all(head.topology is template("own", 1).head for head in heads)
     assert np.array_equal(heads[0].mesh.positions, PEOPLE[0].head().mesh.positions)
     assert not np.array_equal(heads[0].mesh.positions, heads[1].mesh.positions)

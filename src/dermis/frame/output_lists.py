@@ -10,13 +10,11 @@ from dermis.frame.outputs import OUTPUTS, Output
 from dermis.gpu.wgsl_source import Member
 from dermis.human.labels.classes import class_number, label_classes
 
-STAGES = ("geometry", "surface", "motion", "alpha", "light", "visibility", "pigments", "thickness", "label")
-"""Shaders that make outputs, passes/outputs/STAGE.wgsl."""
-
 
 def output_lists() -> Mapping[str, Callable[[], Sequence[Member]]]:
-    """A list for each stage: STAGE_outputs, the outputs that it can make."""
-    return {f"{stage}_outputs": partial(_made_by, stage) for stage in STAGES}
+    """A list for each stage, passes/outputs/STAGE.wgsl: STAGE_outputs, the outputs that it can make."""
+    stages = {one.stage for one in OUTPUTS.values()}
+    return {f"{stage}_outputs": partial(_made_by, stage) for stage in sorted(stages)}
 
 
 def _made_by(stage: str) -> list[Member]:

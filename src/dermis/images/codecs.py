@@ -13,15 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.extras import needed
-from dermis.images.png_rows import decode_rows
+from dermis.images.png_rows import PNG_START, decode_rows, png_parts
 from dermis.images.sizes import MOST_PIXELS, check_size
 
 Pixels = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32]
 
-_PNG_START = b"\x89PNG\r\n\x1a\n"
 _PNG_KINDS = {1: 0, 3: 2, 4: 6}  # by channels
 _UP = 2  # PNG's number for differences from the row above
-PILLOW_STARTS = (_PNG_START, b"\xff\xd8\xff", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+PILLOW_STARTS = (PNG_START, b"\xff\xd8\xff", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 
 _PILLOW_LOCK = threading.Lock()
 _STRIP = 1 << 20  # pixels converted at a time
@@ -109,7 +108,7 @@ def _open_header(data: bytes) -> Any:
 
 def _format_of_16_bit(data: bytes, picture: Any) -> str | None:
     """FFmpeg's name of the pixel format where Pillow would drop the lower 8 of 16 bits, else None."""
-    if data.startswith(_PNG_START):
+    if data.startswith(PNG_START):
         depth, kind = data[24], data[25]
         return {0: "gray16", 2: "rgb48", 4: "ya16", 6: "rgba64"}[kind] if depth == 16 else None
     bits = picture.tag_v2.get(258, ()) if picture.format == "TIFF" else ()
@@ -156,7 +155,7 @@ def encode_png(levels: NDArray[Any], effort: int = 6, runs: bool = False) -> byt
     kind = zlib.Z_RLE if runs else zlib.Z_DEFAULT_STRATEGY
     packer = zlib.compressobj(effort, zlib.DEFLATED, zlib.MAX_WBITS, zlib.DEF_MEM_LEVEL, kind)
     pixels = packer.compress(filtered.data) + packer.flush()  # releases the GIL
-    return _PNG_START + _chunk(b"IHDR", header) + _chunk(b"IDAT", pixels) + _chunk(b"IEND", b"")
+    return PNG_START + _chunk(b"IHDR", header) + _chunk(b"IDAT", pixels) + _chunk(b"IEND", b"")
 
 
 def _chunk(kind: bytes, data: bytes) -> bytes:
@@ -168,16 +167,9 @@ def png_size(data: bytes) -> tuple[int, int]:
 
     ValueError : it is another file, cut off or damaged
     """
-    if not data.startswith(_PNG_START):
+    if not data.startswith(PNG_START):
         raise ValueError("its first bytes are not those of PNG")
-    view, place, kind = memoryview(data), len(_PNG_START), b""
-    while kind != b"IEND":
-        if place + 12 > len(data):
-            raise ValueError("it is cut off")
-        (length,), kind = struct.unpack_from(">I", data, place), data[place + 4 : place + 8]
-        end = place + 8 + length
-        if data[end : end + 4] != struct.pack(">I", zlib.crc32(view[place + 4 : end])):
-            raise ValueError(f"its part {kind!r} is damaged")
-        place = end + 4
+    for _ in png_parts(data):
+        pass
     width, height = struct.unpack_from(">II", data, 16)
     return width, height

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from dermis.images.sizes import check_size
 
-_START = b"\x89PNG\r\n\x1a\n"
+PNG_START = b"\x89PNG\r\n\x1a\n"
 _UP = 2
 _CHANNELS = {0: 1, 2: 3, 6: 4}  # by PNG's kinds of colour
 
@@ -22,7 +23,7 @@ def decode_rows(data: bytes) -> NDArray[Any] | None:
     data : of which the checksums are tested
     ValueError : it is damaged, or too large
     """
-    if not data.startswith(_START) or len(data) < 33:
+    if not data.startswith(PNG_START) or len(data) < 33:
         return None
     width, height, bits, colour, *how = struct.unpack_from(">IIBBBBB", data, 16)
     if bits not in (8, 16) or colour not in _CHANNELS or how != [0, 0, 0]:
@@ -50,7 +51,21 @@ def decode_rows(data: bytes) -> NDArray[Any] | None:
 
 def _packed(data: bytes) -> bytes | None:
     """The compressed pixels; None where other parts that change them are there."""
-    view, place, packed, kind = memoryview(data), len(_START), list[memoryview](), b""
+    packed = list[memoryview]()
+    for kind, part in png_parts(data):
+        if kind == b"tRNS":
+            return None
+        if kind == b"IDAT":
+            packed.append(part)
+    return b"".join(packed)
+
+
+def png_parts(data: bytes) -> Iterator[tuple[bytes, memoryview]]:
+    """Kind and content of each part of a PNG file up to its end, by their checksums.
+
+    ValueError : it is cut off or damaged
+    """
+    view, place, kind = memoryview(data), len(PNG_START), b""
     while kind != b"IEND":
         if place + 12 > len(data):
             raise ValueError("it is cut off")
@@ -58,9 +73,5 @@ def _packed(data: bytes) -> bytes | None:
         end = place + 8 + length
         if data[end : end + 4] != struct.pack(">I", zlib.crc32(view[place + 4 : end])):
             raise ValueError(f"its part {kind!r} is damaged")
-        if kind == b"tRNS":
-            return None
-        if kind == b"IDAT":
-            packed.append(view[place + 8 : end])
+        yield kind, view[place + 8 : end]
         place = end + 4
-    return b"".join(packed)
