@@ -15,6 +15,7 @@ from typing import Any
 
 _CONTEXT = multiprocessing.get_context("spawn")
 _BLOCKS = hasattr(signal, "pthread_sigmask")
+_ENDING_S = 1.0  # that a process may take to end after its pipe has broken
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,12 @@ def _begin(target: Callable[..., None], pipe: Any, args: tuple[Any, ...]) -> Non
     parent = multiprocessing.parent_process()
     assert parent is not None
     threading.Thread(target=_leave_with, args=(parent.sentinel,), daemon=True).start()
-    target(pipe, *args)
+    try:
+        target(pipe, *args)
+    except (EOFError, ConnectionError):
+        if connection.wait([parent.sentinel], _ENDING_S):
+            os._exit(1)  # its pipe broke as it ended: nobody is left to be told
+        raise
 
 
 def _leave_with(sentinel: int) -> None:
