@@ -19,6 +19,32 @@ if TYPE_CHECKING:
     from dermis.gpu.device import Device
 
 _UNSET = "DERMIS_DATA is not set"
+_BY_THE_CLOCK = [
+    "test_address_space",
+    "test_browser",
+    "test_browser_drags",
+    "test_browser_files",
+    "test_campaign",
+    "test_children",
+    "test_command_view",
+    "test_console",
+    "test_distributed",
+    "test_drawer",
+    "test_drivers",
+    "test_gpu_server",
+    "test_hostile_clients",
+    "test_hostile_pictures",
+    "test_interruption",
+    "test_opening",
+    "test_page",
+    "test_served",
+    "test_streams",
+    "test_viewer_heads",
+    "test_window",
+]
+"""Modules that watch other programs by the clock, and a busy machine may hold those up: what fails there is
+tried a second time, and the summary tells of it.
+"""
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -26,6 +52,12 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "photographed: commands expose and choose backgrounds by themselves")
     if os.environ.get("DERMIS_DATA"):  # a relative path must survive a test that changes folder
         os.environ["DERMIS_DATA"] = str(Path(os.environ["DERMIS_DATA"]).expanduser().resolve())
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if item.path.stem in _BY_THE_CLOCK:
+            item.add_marker(pytest.mark.flaky(reruns=1, reruns_delay=1))
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
