@@ -18,7 +18,7 @@ _FACTORS = 0.0, 100.0
 class Share:
     """What becomes of a map of shares: a factor times it, or one of another median.
 
-    A larger median adds the same everywhere, because noise of pale skin would be multiplied with it; a smaller
+    A larger median adds the same everywhere, because pale skin's noise would be multiplied with it; a smaller
     one multiplies.
     """
 

@@ -31,10 +31,10 @@ _SHADES = -3.0, 1.5  # logarithms
 class SkinModel:
     """Colours of skins that differ in melanin, blood and a third number.
 
-    logs : (k, n, n, 3) logarithms of diffuse reflectance in linear Rec. 709, at the squares of n evenly spaced
-        numbers from 0 to 1 of melanin and blood, and at k evenly spaced ones of oxygen
-    third : oxygen is the share of haemoglobin that carries it; shade is the logarithm of a factor on all three
-        channels, as light that was not even leaves it in a photograph
+    logs : (k, n, n, 3) logarithms of diffuse reflectance in linear Rec. 709, at the squares of n evenly
+        spaced numbers from 0 to 1 of melanin and blood, and at k evenly spaced ones of oxygen
+    third : oxygen is the share of haemoglobin that carries it; shade is the logarithm of a factor on all
+        three channels, as light that was not even leaves it in a photograph
     span : of the third number
     usual, spread : mean and standard deviation of what it is believed to be, before any colour is seen
     """

@@ -39,8 +39,8 @@ class Unmixer:
         frame.submit()
 
     def unmix(self, colours: Pixels, told: Told = lambda done, of: None) -> tuple[Pixels, Pixels, Pixels]:
-        """Melanin, blood and the third number (h, w, 3), the first two's deviations (h, w, 2) and the residual
-        (h, w, 3) of colours (h, w, 3).
+        """Of colours (h, w, 3): melanin, blood and the third number (h, w, 3), standard deviations of the
+        first two (h, w, 2), and the residual (h, w, 3).
         """
         height, width = colours.shape[:2]
         made, unsure, residual = (np.empty((height, width, n), np.float32) for n in (3, 2, 3))
@@ -53,14 +53,18 @@ class Unmixer:
 
     def strip(self, colours: Any) -> tuple[Any, Any, Any]:
         """The three textures of what a texture's colours are made of."""
+        frame = Frame(self.device, timed=False)
+        made = self.record(frame, colours)
+        frame.submit()
+        return made
+
+    def record(self, frame: Frame, colours: Any) -> tuple[Any, Any, Any]:
+        """Record the pass that makes them, new ones, of a texture's colours."""
         size = colours.size[:2]
         shader = _program(self.device, "unmix", self.model)
         made, unsure, residual = (make_texture(self.device, size, _TEXEL) for _ in range(3))
         bound = {"colours": colours, "made": made, "unsure": unsure, "residual": residual}
-        bound |= self._bound(shader, _STEPS)
-        frame = Frame(self.device, timed=False)
-        frame.compute("unmix", shader, bound, size)
-        frame.submit()
+        frame.compute("unmix", shader, bound | self._bound(shader, _STEPS), size)
         return made, unsure, residual
 
     def _bound(self, shader: ComputeProgram, steps: int) -> dict[str, Any]:

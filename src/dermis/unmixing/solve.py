@@ -87,7 +87,7 @@ def _limited(model: SkinModel, x: Floats) -> Floats:
 
 
 def _step(model: SkinModel, x: Floats, logs: Floats, weights: Floats, damping: Floats) -> Floats:
-    """A step of each estimate; a number that would leave its limits is held, and the others go on without it."""
+    """A step of each estimate; a number at a limit is held there, and the others go on without it."""
     H, g = _system(model, x, logs, weights)
     diagonal = np.einsum("tii->ti", H)
     diagonal *= 1.0 + damping[:, None]
@@ -115,5 +115,6 @@ def _estimate(model: SkinModel, x: Floats, logs: Floats, weights: Floats) -> Est
     p, q = x[:, 0], x[:, 1]
     sd = np.sqrt(np.maximum(np.einsum("tii->ti", covariance)[:, :2], 0.0))
     residual = np.exp(logs - model.read(x)[0])
-    # A share is the square of its root: twice the root times that of the root, and its square where that is all.
-    return Estimate(p**2, q**2, x[:, 2], *(2.0 * r * s + s**2 for r, s in ((p, sd[:, 0]), (q, sd[:, 1]))), residual)
+    # A share is the square of its root: its deviation is twice the root times the root's, and that squared.
+    melanin_sd, blood_sd = (2.0 * root * one + one**2 for root, one in zip((p, q), sd.T, strict=True))
+    return Estimate(p**2, q**2, x[:, 2], melanin_sd, blood_sd, residual)

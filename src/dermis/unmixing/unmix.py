@@ -43,7 +43,7 @@ class Unmixed:
     melanin_sd, blood_sd : standard deviations that noise leaves at least, by the Cramér-Rao bound [-]
     third : oxygen, the share of haemoglobin that carries it, where that was asked for [-]
     shading : (h, w) light that was taken out of the colours, where that was asked for [-]
-    residual : (h, w, 3) the colour over that of the model's skin: paint, hair, and what else is no such skin [-]
+    residual : (h, w, 3) the colour over that of the model's skin: paint, hair, and all else that is none [-]
     """
 
     melanin: Pixels
@@ -58,7 +58,9 @@ class Unmixed:
 
     def maps(self) -> dict[str, Pixels]:
         """Those that are there, by the names of their files."""
-        named = {name: getattr(self, name) for name in ("melanin", "blood", "melanin_sd", "blood_sd", "residual")}
+        named = {
+            name: getattr(self, name) for name in ("melanin", "blood", "melanin_sd", "blood_sd", "residual")
+        }
         further = {"oxygen": self.third, "shading": self.shading}
         return named | {name: one for name, one in further.items() if one is not None}
 
@@ -69,7 +71,9 @@ class Unmixed:
         """
         apart = max(1, max(self.melanin.shape) // _JUDGED)
         maps = {name: one[::apart, ::apart].astype(np.float64) for name, one in self.maps().items()}
-        m, b, third = (maps[name].ravel() if name in maps else None for name in ("melanin", "blood", "oxygen"))
+        m, b, third = (
+            maps[name].ravel() if name in maps else None for name in ("melanin", "blood", "oxygen")
+        )
         assert m is not None and b is not None
         back = self.model.colours(m, b, third)
         colours = back * maps["residual"].reshape(-1, 3)
@@ -158,7 +162,9 @@ def _array(colours: ArrayLike) -> Pixels:
     found = np.asarray(colours)
     if found.ndim != 3 or found.shape[2] != 3 or not found.size or found.dtype.kind != "f":
         came = f"shape {found.shape} and type {found.dtype} came"
-        refuse("colours", "floats (h, w, 3), linear Rec. 709", came, "Decode sRGB first, or give the file's name")
-    if not (np.isfinite(found).all() and 0.0 <= found.min() and found.max() <= 1.0):
+        refuse(
+            "colours", "floats (h, w, 3), linear Rec. 709", came, "Decode sRGB first, or give the file's name"
+        )
+    if not (np.isfinite(found).all() and found.min() >= 0.0 and found.max() <= 1.0):
         refuse("colours", "reflectances from 0 to 1", "some are outside, or no numbers", "Scale them")
     return found.astype(np.float32, copy=False)

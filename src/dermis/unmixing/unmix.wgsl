@@ -20,7 +20,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let r = reduced(found.system);
     let sd = sqrt(vec2f(r[2], r[0]) / max(r[0] * r[2] - r[1] * r[1], 1e-9 * r[0] * r[2]));
     let x = found.x;
-    // A share is the square of its root: twice the root times that of the root, and its square where that is all.
+    // A share is the square of its root: its deviation is twice the root times the root's, and that squared.
     textureStore(made, id.xy, vec4f(x.xy * x.xy, x.z, 0.0));
     textureStore(unsure, id.xy, vec4f(2.0 * x.xy * sd + sd * sd, 0.0, 0.0));
     textureStore(residual, id.xy, vec4f(exp(found.system.off), 1.0));
