@@ -28,9 +28,9 @@ from dermis.optics.pigments.skin import SkinParameters, spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.tissue import load_tissue
 from dermis.reference.slab_mc import counted_profile
-from dermis.unmixing.model import FACE, Third, skin_model
+from dermis.unmixing.model import FACE, SkinModel, Third, skin_model
 from dermis.unmixing.on_device import Unmixer
-from dermis.unmixing.solve import solve
+from dermis.unmixing.solve import solve, weights_of
 from dermis.unmixing.unmix import unmix
 
 RESULTS = Path(__file__).parent / "results" / "unmixing.json"
@@ -84,8 +84,8 @@ def known(skin: SkinParameters) -> list[dict[str, Any]]:
     random = np.random.default_rng(SEED)
     noisy = colours * (1.0 + NOISE * random.standard_normal((TRIALS, *colours.shape)))
     found = solve(model, noisy.reshape(-1, 3), NOISE)
-    melanin, blood, bound = (one.reshape(TRIALS, -1) for one in (found.melanin, found.blood, found.blood_sd))
-    certain = solve(model, colours, NOISE)
+    melanin, blood, stated = (one.reshape(TRIALS, -1) for one in (found.melanin, found.blood, found.blood_sd))
+    least = bound(model, m, b, colours)
     back = model.colours(plain.melanin, plain.blood)
     rows = []
     for low, high in pairwise(BANDS):
@@ -100,11 +100,20 @@ def known(skin: SkinParameters) -> list[dict[str, Any]]:
                 "delta_e": float(delta_e_2000(back, colours)[one].max()),
                 "melanin_error": float(np.median(np.abs(melanin / m - 1.0)[:, one])),
                 "blood_error": float(np.median(np.abs(blood / b - 1.0)[:, one])),
-                "blood_bound": float(np.median((certain.blood_sd / b)[one])),
-                "blood_over_bound": float(np.median((rms / np.median(bound, axis=0))[one])),
+                "blood_bound": float(np.median(least[one])),
+                "blood_over_bound": float(np.median((rms / b / least)[one])),
+                "blood_over_stated": float(np.median((rms / np.median(stated, axis=0))[one])),
             }
         )
     return rows
+
+
+def bound(model: SkinModel, m: Floats, b: Floats, colours: Floats) -> Floats:
+    """Relative Cramér-Rao bound of blood where nothing is believed of it, for noise alone."""
+    found = np.stack([np.sqrt(m), np.sqrt(b), np.full(len(m), model.usual)], axis=-1)
+    slopes = model.read(found)[1][:, :, :2]
+    weighed = np.einsum("tci,tc,tcj->tij", slopes, weights_of(colours, NOISE), slopes)
+    return np.asarray(2.0 * np.sqrt(np.linalg.inv(weighed)[:, 1, 1] / b))
 
 
 def mistaken() -> dict[str, Any]:

@@ -21,6 +21,10 @@ FACE = SkinParameters(melanin=0.0, blood=0.0, epidermis_mm=EPIDERMIS_MM)
 """The skin whose melanin and blood are looked for, unless another is given."""
 DARKEST = 1e-4
 """What darker colours are taken for: no skin is [-]."""
+USUAL_BLOOD, BLOOD_SPREAD = 0.1, 0.1
+"""What the root of the share of blood is believed to be, mean and standard deviation: it decides where
+melanin hides the blood, and nowhere else.
+"""
 _NODES = 129  # along melanin and along blood
 _OXYGENS = 5
 _OXYGEN_SPREAD, _SHADE_SPREAD, _HELD = 0.1, 0.3, 1e-3

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.gpu import ComputeProgram, Device, Frame, compiled, download, make_texture
 from dermis.gpu.textures import texture_from, upload
-from dermis.unmixing.model import DARKEST, SkinModel
+from dermis.unmixing.model import BLOOD_SPREAD, DARKEST, USUAL_BLOOD, SkinModel
 from dermis.unmixing.solve import FLOOR
 
 Pixels = NDArray[np.float32]
@@ -129,4 +129,5 @@ def _program(device: Device, name: str, model: SkinModel) -> ComputeProgram:
 
 def _record(shader: ComputeProgram, model: SkinModel, noise: float, steps: int) -> Any:
     numbers = {"usual": model.usual, "spread": model.spread, "noise": noise, "floor": FLOOR}
-    return shader.record("Model", span=model.span, darkest=DARKEST, steps=steps, **numbers)
+    believed = {"blood": (USUAL_BLOOD, BLOOD_SPREAD), "darkest": DARKEST}
+    return shader.record("Model", span=model.span, steps=steps, **believed, **numbers)

@@ -12,6 +12,7 @@ struct Model {
     floor: f32, // below which no colour is known
     darkest: f32,
     steps: u32,
+    blood: vec2f, // what its root is believed to be, and how far from it
 }
 
 // Logarithms of a colour, and their slopes along the three unknowns.
@@ -89,16 +90,17 @@ fn system_at(x: vec3f, logs: vec3f, weights: vec3f) -> System {
     let off = logs - there.logs;
     let belief = 1.0 / (model.spread * model.spread);
     let away = x.z - model.usual;
+    let bled = (x.y - model.blood.x) / model.blood.y;
     let w = weights;
     return System(
         dot(w, there.p * there.p) + CURVED,
         dot(w, there.p * there.q),
-        dot(w, there.q * there.q) + CURVED,
+        dot(w, there.q * there.q) + 1.0 / (model.blood.y * model.blood.y),
         dot(w, there.p * there.t),
         dot(w, there.q * there.t),
         dot(w, there.t * there.t) + belief,
-        vec3f(dot(w, there.p * off), dot(w, there.q * off), dot(w, there.t * off) - belief * away),
-        dot(w, off * off) + belief * away * away,
+        vec3f(dot(w, there.p * off), dot(w, there.q * off) - bled / model.blood.y, dot(w, there.t * off) - belief * away),
+        dot(w, off * off) + belief * away * away + bled * bled,
         off,
     );
 }

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dermis.optics.media import Floats
-from dermis.unmixing.model import DARKEST, SkinModel
+from dermis.unmixing.model import BLOOD_SPREAD, DARKEST, USUAL_BLOOD, SkinModel
 
 STEPS = 40  # at most; colours of skin take four to six
 _DONE = 1e-10
@@ -23,7 +23,7 @@ class Estimate:
     melanin, blood : (t,) shares of volume [-]
     third : (t,) the model's third number
     melanin_sd, blood_sd : (t,) standard deviations that noise of the stated size must leave at least, by the
-        Cramér-Rao bound with what is believed of the third number [-]
+        Cramér-Rao bound with what is believed of blood and the third number [-]
     residual : (t, 3) the colour over that of the model
     """
 
@@ -41,14 +41,15 @@ def weights_of(colours: Floats, noise: float) -> Floats:
 
 
 def solve(model: SkinModel, colours: Floats, noise: float = 0.01, start: Floats | None = None) -> Estimate:
-    """Melanin, blood and the third number by maximum likelihood, in float64.
+    """Melanin, blood and the third number of greatest probability, in float64.
 
     colours : (t, 3) diffuse reflectance, linear Rec. 709
     noise : standard deviation of a channel, relative [-]
     start : (t, 3) first guess of the unknowns, found when left out
 
-    The logarithms' squared differences over their variances, and that of the third number from the usual one,
-    are made least by Gauss and Newton's steps, damped by Levenberg's rule; numbers at a limit are held there.
+    The logarithms' squared differences over their variances, and those of blood and the third number from
+    what is usual, are made least by Gauss and Newton's steps, damped by Levenberg's rule; numbers at a limit
+    are held there.
     """
     logs = np.log(np.maximum(colours, DARKEST))
     weights = weights_of(colours, noise)
@@ -79,7 +80,8 @@ def _start(model: SkinModel, logs: Floats) -> Floats:
 
 def _cost(model: SkinModel, x: Floats, logs: Floats, weights: Floats) -> Floats:
     fault = weights * (logs - model.read(x)[0]) ** 2
-    return np.asarray(fault.sum(axis=1) + ((x[:, 2] - model.usual) / model.spread) ** 2)
+    believed = ((x[:, 1] - USUAL_BLOOD) / BLOOD_SPREAD) ** 2 + ((x[:, 2] - model.usual) / model.spread) ** 2
+    return np.asarray(fault.sum(axis=1) + believed)
 
 
 def _limited(model: SkinModel, x: Floats) -> Floats:
@@ -105,6 +107,8 @@ def _system(model: SkinModel, x: Floats, logs: Floats, weights: Floats) -> tuple
     H = np.einsum("tci,tcj->tij", weighed, J)
     g = np.einsum("tci,tc->ti", weighed, logs - found)
     H[:, [0, 1], [0, 1]] += _CURVED
+    H[:, 1, 1] += BLOOD_SPREAD**-2
+    g[:, 1] -= (x[:, 1] - USUAL_BLOOD) / BLOOD_SPREAD**2
     H[:, 2, 2] += model.spread**-2
     g[:, 2] -= (x[:, 2] - model.usual) / model.spread**2
     return H, g
