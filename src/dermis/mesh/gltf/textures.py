@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,32 @@ _COAT = 0.52  # of glTF's coat, which reflects 0.04 straight ahead: tears and th
 _HAIR_ROUGH = 0.45
 _ROUGH = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # perceptual roughness by a word in the name
 _ROUGH_ELSE = 0.8
+
+
+@dataclass(frozen=True)
+class Added:
+    """What the material of skin has besides.
+
+    surface : members of its pbrMetallicRoughness, which then has no others for colour
+    extensions, extras : by name
+    pictures : PNG files by the names that textures in these have: {"index": name}
+    """
+
+    surface: Mapping[str, Any] = field(default_factory=dict)
+    extensions: Mapping[str, Any] = field(default_factory=dict)
+    extras: Mapping[str, Any] = field(default_factory=dict)
+    pictures: Mapping[str, bytes] = field(default_factory=dict)
+
+    def to(self, material: Mapping[str, Any]) -> dict[str, Any]:
+        """The material with it; where a picture of colours is shown no more, this package still finds it."""
+        told = dict(material) | {"extensions": {**material.get("extensions", {}), **self.extensions}}
+        surface, extras = dict(material["pbrMetallicRoughness"]), {**material.get("extras", {}), **self.extras}
+        if self.surface:
+            colours = surface.pop("baseColorTexture", None)
+            surface |= self.surface
+            if colours is not None:
+                extras["dermis"] = {**extras["dermis"], "colour": colours}
+        return told | {"pbrMetallicRoughness": surface, "extras": extras}
 
 
 def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, bytes], dict[str, Any]]:
