@@ -22,10 +22,12 @@ class HeadResources:
     """What the shaders read of a head's surface.
 
     resources : textures and buffers by their names in geometry.wgsl
+    indices : buffer of the triangles' vertices, for the rasteriser
     triangles : count
     """
 
     resources: dict[str, Any]
+    indices: Any
     triangles: int
 
     def shaped(self, shape: Shape) -> HeadResources:
@@ -41,7 +43,8 @@ def upload_geometry(device: Device, mesh: Mesh, atlas: Atlas, shape: Shape) -> H
         "triangle_table": texture_from(device, triangles, "rgba32uint"),
         "triangle_buffer": device.buffer(triangles if read else triangles[:1, :3], "STORAGE"),
     }
-    return HeadResources(resources | shape.vertices, len(mesh.triangles))
+    indices = device.buffer(mesh.triangles.astype(np.uint32), "INDEX")
+    return HeadResources(resources | shape.vertices, indices, len(mesh.triangles))
 
 
 def _triangle_table(mesh: Mesh, atlas: Atlas) -> NDArray[np.uint32]:
