@@ -1,6 +1,6 @@
 """Walks through a half-space under a refracting surface: writes `export/data/refracted_walk.csv`.
 
-    python tools/refracted_walk.py [PHOTONS]
+python tools/refracted_walk.py [PHOTONS]
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ RADII = np.concatenate([[0.0], np.geomspace(0.02, 400.0, 40)])
 """Within which light is counted [mean free paths]."""
 PLACE = Path(__file__).resolve().parents[1] / "src" / "dermis" / "export" / "data" / "refracted_walk.csv"
 HEADER = """\
-# quantity: share of the light that enters a half-space straight down and leaves it within a radius: isotropic walks under a smooth
-#   surface of index {eta}. root: sqrt(1 - albedo of single scattering)
+# quantity: share of the light that enters a half-space straight down and leaves it within a radius: isotropic
+#   walks under a smooth surface of index {eta}. root: sqrt(1 - albedo of single scattering)
 # unit: radius in mean free paths; within: dimensionless
 # source: {photons} photons an albedo, counted by tools/refracted_walk.py (seed 11)
 # licence: Apache-2.0

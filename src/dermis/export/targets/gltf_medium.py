@@ -1,4 +1,4 @@
-"""What glTF's volume means for light: a random walk under a refracting surface, by the draft's own inversion."""
+"""What glTF's volume means for light: a walk under a refracting surface, by the draft's own inversion."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from dermis.export.curve import Curve
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.export.curve import Curve
 from dermis.tables import numbers, read_rows
 
 Floats = NDArray[np.float64]
 
 _LEAST, _MOST, _NODES = 1e-2, 60.0, 400  # radii that a fit is judged at, by the true median
 _DARKEST = 1e-4  # a colour from which some light still comes back
+_ROOTS = 4001
 _RANGE = 8.0  # of mean free paths that are tried, by the first guess: times and through it
 
 
@@ -61,16 +62,14 @@ def multiscatter_of(albedo: ArrayLike) -> Floats:
 
 def shown_energy(multiscatter: ArrayLike) -> Floats:
     """Share of the light that enters and comes back, by the colour (...,) [-]."""
-    walk = _walk()
-    root = np.sqrt(1.0 - single_scattering(multiscatter))
-    return np.asarray(np.interp(root, walk.root, walk.energy))
+    return _energy(np.sqrt(1.0 - single_scattering(multiscatter)))
 
 
 def colour_for(energy: ArrayLike) -> Floats:
     """The colour with which a share (...,) of the light that enters comes back [-]."""
-    walk = _walk()
-    root = np.interp(np.maximum(energy, _DARKEST), walk.energy[::-1], walk.root[::-1])
-    return multiscatter_of(1.0 - root**2)
+    root = np.linspace(0.0, 1.0, _ROOTS)
+    found = np.interp(np.maximum(energy, _DARKEST), _energy(root)[::-1], root[::-1])
+    return multiscatter_of(1.0 - found**2)
 
 
 def walked(volume: Volume) -> Curve:
@@ -125,6 +124,14 @@ def _walk() -> _Walk:
     share = within / within[:, -1:]
     ends = np.concatenate([[0.0], root, [1.0]]), np.concatenate([[1.0], within[:, -1], [0.0]])
     return _Walk(ends[0], radius, ends[1], np.concatenate([share[:1], share, share[-1:]]))
+
+
+def _energy(root: ArrayLike) -> Floats:
+    """Share of what enters that comes back."""
+    from scipy.interpolate import PchipInterpolator
+
+    walk = _walk()
+    return np.asarray(PchipInterpolator(walk.root, walk.energy)(root), np.float64)
 
 
 def _share(root: float, radius: Floats) -> Floats:

@@ -45,7 +45,10 @@ class Added:
     def to(self, material: Mapping[str, Any]) -> dict[str, Any]:
         """The material with it; where a picture of colours is shown no more, this package still finds it."""
         told = dict(material) | {"extensions": {**material.get("extensions", {}), **self.extensions}}
-        surface, extras = dict(material["pbrMetallicRoughness"]), {**material.get("extras", {}), **self.extras}
+        surface, extras = (
+            dict(material["pbrMetallicRoughness"]),
+            {**material.get("extras", {}), **self.extras},
+        )
         if self.surface:
             colours = surface.pop("baseColorTexture", None)
             surface |= self.surface
