@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from dermis.export.curve import Curve
@@ -31,13 +31,13 @@ _TYPED = 0.5  # share of the light that a user lets through who sees the slider
 class Gltf(Target):
     """A .glb file."""
 
-    name = "gltf"
-    title = "glTF 2.0"
-    suffixes = (".glb",)
-    versions = ("2.0",)
-    variants = (SCATTER, DIFFUSE)
-    needs_maps = True
-    wrong = (
+    name: ClassVar[str] = "gltf"
+    title: ClassVar[str] = "glTF"
+    suffixes: ClassVar[tuple[str, ...]] = (".glb",)
+    versions: ClassVar[tuple[str, ...]] = ("2.0",)
+    variants: ClassVar[tuple[str, ...]] = (SCATTER, DIFFUSE)
+    needs_maps: ClassVar[bool] = True
+    wrong: ClassVar[str] = (
         f"{DRAFT}. Programs that trace rays and know it show this table's numbers; those that know"
         " transmission and volume alone show dark glass; those that rasterise take the multiscatter colour"
         f" for the one that is seen, and show skin too light. The variant {DIFFUSE} looks like skin"
@@ -48,7 +48,7 @@ class Gltf(Target):
         """The volume whose walk comes nearest, or what an ear lets through."""
         if self.variant == DIFFUSE:
             return _diffuse(subject, *_through(subject))
-        return _scatter(fitted(subject.curve.with_energy(subject.albedo)))
+        return _scatter(fitted(subject.curve))
 
     def naive(self, subject: Subject, version: str) -> Rows:
         """The skin's colour for every colour, and the mean radius of the light for the distance."""
@@ -61,7 +61,7 @@ class Gltf(Target):
     def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
         """A walk under a refracting surface; for diffuse transmission all light where it falls."""
         if self.variant == DIFFUSE:
-            back = (1.0 - numbers_of(rows, _FACTOR)[0]) * np.array(numbers_of(rows, _BASE))
+            back = (1.0 - numbers_of(rows, _FACTOR)[0]) * subject.curve.energy
             return Curve.of(lambda r: np.repeat((r > 0.0)[:, None], 3, axis=1), back)
         return walked(_volume(rows))
 
@@ -93,8 +93,8 @@ def _scatter(volume: Volume) -> Rows:
             "m",
             "above 0 for a volume",
         ),
-        Row(_DISTANCE, volume.distance_m, "m", "the longest mean free path of the three"),
-        Row(_COLOUR, colour, "-", "share of the light without an event over that way: exp(-distance / path)"),
+        Row(_DISTANCE, volume.distance_m, "m", "the longest mean free path"),
+        Row(_COLOUR, colour, "-", "of light without an event on that way"),
         Row(
             "KHR_materials_scatter.scatterStrengthFactor",
             1.0,
@@ -105,7 +105,7 @@ def _scatter(volume: Volume) -> Rows:
             _MULTISCATTER,
             multiscatter,
             "-",
-            "of the albedo by van de Hulst; the mean of a map",
+            "by van de Hulst, of all light; a head has a map",
         ),
         Row("KHR_materials_scatter.scatterAnisotropy", 0.0, "-", "mean cosine: the paths are reduced ones"),
         Row("KHR_materials_ior.ior", SKIN_ETA, "-", "of the surface, which reflects 0.028 straight ahead"),
