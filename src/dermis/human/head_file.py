@@ -36,8 +36,9 @@ def write_person(
     eyes : what its eyes look like; of one colour where None
     """
     notes = {"person": numbers_of(person)}
-    told = {"weights": weights, "slopes": relief(head), "notes": notes, "eyes": eyes}
-    data = encode_head(head, roughness=roughness, **told)
+    data = encode_head(
+        head, roughness=roughness, weights=weights, slopes=relief(head), notes=notes, eyes=eyes
+    )
     with replacing(path) as trial:
         trial.write_bytes(data)
     return len(data)
