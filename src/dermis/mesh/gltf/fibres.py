@@ -20,7 +20,7 @@ COLOURS = 64
 _SIDES = 3
 _WIDER = 2.0 * np.pi / (_SIDES * np.sqrt(3.0))  # a triangle is as wide as a circle, seen from all around
 _LEAST_MM = 0.01  # a smaller displacement is none
-_ALBEDO = 5.89  # of a fibre of roughness 0.3 among others, see [Chiang2016]
+_ALBEDO = 5.89  # of a fibre of roughness 0.3 among others: [Chiang2016] equation 9
 _TINY = 1e-9
 
 
