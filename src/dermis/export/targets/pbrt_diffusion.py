@@ -20,14 +20,20 @@ _DENSE = 8.0
 class Table(NamedTuple):
     """What pbrt computes for an index of refraction.
 
+    albedo : (n,) [-]
     radius : (m,) [mean free paths]
     reflectance : (n,) of each albedo [-]
     within : (n, m) share of what enters that leaves within the radii [-]
     """
 
+    albedo: Floats
     radius: Floats
     reflectance: Floats
     within: Floats
+
+    def reflectance_of(self, albedo: float) -> float:
+        """All that leaves a medium of an albedo of single scattering, per light that enters [-]."""
+        return float(np.interp(albedo, self.albedo, self.reflectance))
 
     def curve(self, radius: ArrayLike, reflectance: float) -> Floats:
         """Share of what enters that leaves within radii, for the albedo that pbrt finds for a reflectance."""
@@ -48,7 +54,7 @@ def diffusion_table(eta: float) -> Table:
     several = np.stack([_scattered_often(radius, one, eta) for one in albedo])
     profile = 2.0 * np.pi * radius * (several + albedo[:, None] * _scattered_once(radius, eta))
     within = _integrated(radius, profile)
-    return Table(radius, within[:, -1], within)
+    return Table(albedo, radius, within[:, -1], within)
 
 
 def _scattered_often(radius: Floats, albedo: float, eta: float) -> Floats:
