@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from dermis.scene.pose import Pose
     from dermis.scene.settings import Settings
     from dermis.scene.skin import Skin
+    from dermis.unmixing.unmix import unmix
     from dermis.viewer.windows import view
 
 _HOME = {
@@ -80,6 +81,7 @@ _HOME = {
     "Settings": "scene.settings",
     "Skin": "scene.skin",
     "read_dataset": "batch.dataset",
+    "unmix": "unmixing.unmix",
     "view": "viewer.windows",
 }
 
@@ -117,6 +119,7 @@ __all__ = [
     "render",
     "studio",
     "three_quarter",
+    "unmix",
     "view",
     "with_regions",
     "write_image",

@@ -32,14 +32,14 @@ class Studio:
     ) -> None:
         self.name = name or (_SCAN if cached(_SCAN) else HUMAN)
         self.side = side
-        self._adapter, self._settings = adapter, settings
+        self.adapter, self._settings = adapter, settings
         self.frames_ms: list[float] = []
         self._load = cache(load_head)
 
     @cached_property
     def renderer(self) -> Renderer:
         """The renderer, opened on first use."""
-        return Renderer(self._adapter)
+        return Renderer(self.adapter)
 
     def head(self, name: str | None = None, **options: Any) -> Head:
         """The head to show, or another one; subdivided once.

@@ -15,7 +15,7 @@ from dermis.optics.pigments.skin import SkinParameters, mixed_layers
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 
 _NODES = 65
-_PARTS = 13  # of a table, small enough for a processor's cache
+_TOGETHER = 5  # rows of a table, small enough for a processor's cache
 _COEFFICIENTS = ("sigma_a", "sigma_s_prime")
 
 
@@ -51,19 +51,22 @@ def _split(share: Floats, nodes: int) -> tuple[NDArray[np.int64], Floats]:
     return before, (place - before)[:, None]
 
 
-def colour_table(parameters: SkinParameters) -> ColourTable:
-    """The colours of all skins like this one, by layered diffusion; its own melanin and blood are ignored."""
-    epidermis, dermis = mixed_layers(parameters, np.linspace(0.0, 1.0, _NODES) ** 2)
-    bloods = np.arange(_NODES)
+def colour_table(parameters: SkinParameters, nodes: int = _NODES) -> ColourTable:
+    """The colours of all skins like this one, by layered diffusion; its own melanin and blood are ignored.
+
+    nodes : along each side of the table
+    """
+    epidermis, dermis = mixed_layers(parameters, np.linspace(0.0, 1.0, nodes) ** 2)
+    bloods = np.arange(nodes)
     spectra = []
-    for melanins in np.array_split(np.arange(_NODES), _PARTS):
-        rows, columns = np.repeat(melanins, _NODES), np.tile(bloods, len(melanins))
+    for melanins in np.array_split(np.arange(nodes), -(-nodes // _TOGETHER)):
+        rows, columns = np.repeat(melanins, nodes), np.tile(bloods, len(melanins))
         medium = Medium("skins", (_picked(epidermis, rows), _picked(dermis, columns)), SKIN_ETA)
         total = transform(medium, "layered", "layer", STILL)[0]
         spectra.append(total.reshape(-1, len(WAVELENGTHS_NM)))
     entering = 1.0 - normal_reflectance(SKIN_ETA)
     colours = entering * np.concatenate(spectra) @ rgb_weights(WAVELENGTHS_NM).T
-    return ColourTable(np.maximum(colours, 0.0).reshape(_NODES, _NODES, 3))
+    return ColourTable(np.maximum(colours, 0.0).reshape(nodes, nodes, 3))
 
 
 def _picked(layer: Layer, rows: NDArray[np.int64]) -> Layer:

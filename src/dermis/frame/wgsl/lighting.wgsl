@@ -52,6 +52,18 @@ fn next_that_may_shine(first: u32, p: vec3f, n: vec3f) -> u32 {
     return i;
 }
 
+// The first part of a light that is in front of a surface; how many parts there are where none is.
+fn first_that_faces(light: Light, p: vec3f, n: vec3f) -> u32 {
+    var part = 0u;
+    loop {
+        if (dot(n, incident(light, p, part).direction) > 0.0 || part >= parts_of(light)) {
+            break;
+        }
+        part++;
+    }
+    return part;
+}
+
 // Share of a light from a direction that reaches a point, past the head and its hairs.
 fn reaching(light: Light, point: Point, l: vec3f) -> f32 {
     return visibility(light, point, l) * past_strands(light, point.position);
@@ -77,29 +89,30 @@ fn light_through(point: Point, surface: Surface, film: Film, v: vec3f, open: f32
             i = next_that_may_shine(i, point.position, surface.normal);
         }
         let light = lights.light[i];
-        var seen = -1.0; // visibility of the light, -1 where not known yet
-        var part = 0u;
-        loop {
-            let arriving = incident(light, point.position, part);
-            let cosine = dot(surface.normal, arriving.direction);
-            if (cosine > 0.0) {
-                if (seen < 0.0) {
-                    seen = reaching(light, point, arriving.direction);
+        var part = first_that_faces(light, point.position, surface.normal);
+        if (part < parts_of(light)) {
+            // Once for all parts, and not where the first of them is shaded: software adapters run what is in a branch for
+            // each round of the loop around it.
+            let seen = reaching(light, point, incident(light, point.position, part).direction);
+            loop {
+                let arriving = incident(light, point.position, part);
+                let cosine = dot(surface.normal, arriving.direction);
+                if (cosine > 0.0) {
+                    let e = arriving.irradiance * seen;
+                    let filled = arriving.irradiance * max(vec3f(seen), film.scattered);
+                    var entering = filled * (cosine * enters(cosine, surface.roughness, surface.rho_s));
+                    if (by_direction) {
+                        lit.directional += entering * beyond_mean(cosine, facing);
+                        entering *= coming_back(cosine);
+                    }
+                    lit.entered += entering;
+                    let share = surface.rho_s * max(dot(mirror, arriving.direction), 0.0);
+                    lit.reflected += e * (share * lobe(mirror, arriving.direction, v, surface.roughness));
                 }
-                let e = arriving.irradiance * seen;
-                let filled = arriving.irradiance * max(vec3f(seen), film.scattered);
-                var entering = filled * (cosine * enters(cosine, surface.roughness, surface.rho_s));
-                if (by_direction) {
-                    lit.directional += entering * beyond_mean(cosine, facing);
-                    entering *= coming_back(cosine);
+                part++;
+                if (part >= parts_of(light)) {
+                    break;
                 }
-                lit.entered += entering;
-                let share = surface.rho_s * max(dot(mirror, arriving.direction), 0.0);
-                lit.reflected += e * (share * lobe(mirror, arriving.direction, v, surface.roughness));
-            }
-            part++;
-            if (part >= parts_of(light)) {
-                break;
             }
         }
         i++;

@@ -1,0 +1,210 @@
+"""How well melanin and blood are found: python benchmarks/unmixing.py [-o results/unmixing.json]
+
+Colours of known skins go in, computed by layered diffusion without the table that unmixing reads, or counted
+by Monte Carlo; `unmixing_page.py` writes docs/fit.md from what comes out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from figures_file import write_figures
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from dermis.gpu import Device, Frame, open_device
+from dermis.gpu.textures import texture_from
+from dermis.images.difference import delta_e_2000
+from dermis.optics.diffusion.boundary import normal_reflectance
+from dermis.optics.diffusion.models import diffusion_profile
+from dermis.optics.pigments.skin import SkinParameters, spectral_medium
+from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
+from dermis.optics.tissue import load_tissue
+from dermis.reference.slab_mc import counted_profile
+from dermis.unmixing.model import FACE, SkinModel, Third, skin_model
+from dermis.unmixing.on_device import Unmixer
+from dermis.unmixing.solve import solve, weights_of
+from dermis.unmixing.unmix import unmix
+
+RESULTS = Path(__file__).parent / "results" / "unmixing.json"
+Floats = NDArray[np.float64]
+SKINS, TRIALS, NOISE, SEED = 200, 64, 0.01, 7
+BANDS = (0.0, 0.01, 0.05, 0.2, 0.5)
+THICK_MM = 0.05, 0.25
+_MELANIN, _BLOOD = (-2.5, -0.35), (-3.0, -1.0)  # decimal exponents
+_COUNTED = ((0.005, 0.005), (0.02, 0.01), (0.06, 0.02), (0.15, 0.01), (0.3, 0.03))
+_PHOTONS = 40_000
+_SIDE = 192
+
+
+def main(words: list[str]) -> int:
+    """Measure, and write the figures."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("-o", "--output", type=Path, default=RESULTS)
+    parser.add_argument("--adapter", default="auto")
+    asked = parser.parse_args(words)
+    device = open_device(asked.adapter)
+    told: dict[str, Any] = {"skins": SKINS, "noise": NOISE, "photons": _PHOTONS}
+    told["known"] = {str(mm): known(replace(FACE, epidermis_mm=mm)) for mm in THICK_MM}
+    told["mistaken"] = mistaken()
+    told["counted"] = counted()
+    told["shading"] = shading(asked.adapter)
+    told["speed"] = {"adapter": device.adapter.name} | {
+        str(side): speed_ms(device, side) for side in (1024, 2048, 4096)
+    }
+    write_figures(asked.output, told, 4)
+    return 0
+
+
+def skins(seed: int = SEED) -> tuple[Floats, Floats]:
+    """Random melanin and blood, even in their logarithms."""
+    random = np.random.default_rng(seed)
+    return 10.0 ** random.uniform(*_MELANIN, SKINS), 10.0 ** random.uniform(*_BLOOD, SKINS)
+
+
+def colour_of(skin: SkinParameters) -> Floats:
+    """(3,) diffuse reflectance of a skin by layered diffusion at each wavelength, linear Rec. 709."""
+    total = diffusion_profile(spectral_medium("dj2006", skin), "layered", "layer").total
+    return np.asarray((1.0 - normal_reflectance(1.4)) * total @ rgb_weights(WAVELENGTHS_NM).T)
+
+
+def known(skin: SkinParameters) -> list[dict[str, Any]]:
+    """Errors on skins of the model itself, by bands of melanin, without noise and with it."""
+    m, b = skins()
+    colours = np.stack([colour_of(replace(skin, melanin=x, blood=y)) for x, y in zip(m, b, strict=True)])
+    model = skin_model(skin)
+    plain = solve(model, colours, 1e-3)
+    random = np.random.default_rng(SEED)
+    noisy = colours * (1.0 + NOISE * random.standard_normal((TRIALS, *colours.shape)))
+    found = solve(model, noisy.reshape(-1, 3), NOISE)
+    melanin, blood, stated = (one.reshape(TRIALS, -1) for one in (found.melanin, found.blood, found.blood_sd))
+    least = bound(model, m, b, colours)
+    back = model.colours(plain.melanin, plain.blood)
+    rows = []
+    for low, high in pairwise(BANDS):
+        one = (low < m) & (m <= high)
+        rms = np.sqrt(((blood - b) ** 2).mean(axis=0))
+        rows.append(
+            {
+                "melanin": [low, high],
+                "skins": int(one.sum()),
+                "plain_melanin": float(np.abs(plain.melanin / m - 1.0)[one].max()),
+                "plain_blood": float(np.abs(plain.blood / b - 1.0)[one].max()),
+                "delta_e": float(delta_e_2000(back, colours)[one].max()),
+                "melanin_error": float(np.median(np.abs(melanin / m - 1.0)[:, one])),
+                "blood_error": float(np.median(np.abs(blood / b - 1.0)[:, one])),
+                "blood_bound": float(np.median(least[one])),
+                "blood_over_bound": float(np.median((rms / b / least)[one])),
+                "blood_over_stated": float(np.median((rms / np.median(stated, axis=0))[one])),
+            }
+        )
+    return rows
+
+
+def bound(model: SkinModel, m: Floats, b: Floats, colours: Floats) -> Floats:
+    """Relative Cramér-Rao bound of blood where nothing is believed of it, for noise alone."""
+    found = np.stack([np.sqrt(m), np.sqrt(b), np.full(len(m), model.usual)], axis=-1)
+    slopes = model.read(found)[1][:, :, :2]
+    weighed = np.einsum("tci,tc,tcj->tij", slopes, weights_of(colours, NOISE), slopes)
+    return np.asarray(2.0 * np.sqrt(np.linalg.inv(weighed)[:, 1, 1] / b))
+
+
+def mistaken() -> dict[str, Any]:
+    """What melanin and blood come out as when the skin is not quite the one that was believed."""
+    cases: dict[str, dict[str, float]] = {
+        "oxygen 0.6 for 0.75": {"oxygen": 0.6},
+        "eumelanin 0.5 for 0.7": {"eumelanin": 0.5},
+        "epidermis of 0.07 mm for 0.05": {"epidermis_mm": 0.07},
+    }
+    m, b = skins(SEED + 1)
+    usual = (m > 0.005) & (m < 0.2) & (b > 0.003) & (b < 0.05)
+    m, b = m[usual], b[usual]
+    told = {}
+    for name, other in cases.items():
+        skin = replace(FACE, **other)
+        colours = np.stack([colour_of(replace(skin, melanin=x, blood=y)) for x, y in zip(m, b, strict=True)])
+        told[name] = {third: _off(third, colours, m, b) for third in ("none", "oxygen")}
+    return told
+
+
+def _off(third: Third, colours: Floats, m: Floats, b: Floats) -> dict[str, float]:
+    found = solve(skin_model(FACE, third), colours, NOISE)
+    ratios = {"melanin": found.melanin / m, "blood": found.blood / b}
+    left = delta_e_2000(colours, colours / found.residual)
+    return {name: float(np.median(one)) for name, one in ratios.items()} | {"delta_e": float(np.median(left))}
+
+
+def counted() -> list[dict[str, Any]]:
+    """Skins whose colour was counted photon by photon: what diffusion itself is off by is in it."""
+    told = []
+    for m, b in _COUNTED:
+        pigments = {"melanin": m, "blood": b, "epidermis_mm": FACE.epidermis_mm}
+        tissue = load_tissue("spectral", pigments=pigments)
+        colour = counted_profile(tissue.medium, tissue.rgb, _PHOTONS, seed=SEED).total[None]
+        found = solve(skin_model(), colour, NOISE)
+        own = skin_model().colours(np.array([m]), np.array([b]))
+        told.append(
+            {
+                "melanin": m,
+                "blood": b,
+                "found_melanin": float(found.melanin[0]),
+                "found_blood": float(found.blood[0]),
+                "delta_e": float(delta_e_2000(colour / found.residual, colour)[0]),
+                "delta_e_forward": float(delta_e_2000(own, colour)[0]),
+            }
+        )
+    return told
+
+
+def shading(adapter: str) -> dict[str, Any]:
+    """A made-up map under light that is not even: what is taken out, and what melanin and blood gain."""
+    random = np.random.default_rng(SEED)
+    fields = [gaussian_filter(random.standard_normal((_SIDE, _SIDE)), s, mode="wrap") for s in (3, 4, 40)]
+    m, b, light = (one / one.std() for one in fields)
+    m, b, light = 0.03 * np.exp(0.3 * m), 0.01 * np.exp(0.3 * b), np.exp(0.2 * light)
+    colours = skin_model().colours(m.ravel(), b.ravel()).reshape(_SIDE, _SIDE, 3) * light[..., None]
+    colours *= 1.0 + NOISE * random.standard_normal(colours.shape)
+    colours = np.clip(colours, 0.0, 1.0)
+    told: dict[str, Any] = {"light": float(np.log(light).std())}
+    for name, taken in (("kept", False), ("divided", True)):
+        found = unmix(colours, shading=taken, adapter=adapter)
+        told[name] = {
+            "melanin": float(np.median(np.abs(found.melanin / m - 1.0))),
+            "blood": float(np.median(np.abs(found.blood / b - 1.0))),
+        }
+        if found.shading is not None:
+            told["left"] = float((np.log(light) - np.log(found.shading)).std())
+    return told
+
+
+def speed_ms(device: Device, side: int) -> float:
+    """Median of five passes over a square picture, by the device's clock where it has one [ms]."""
+    random = np.random.default_rng(SEED)
+    m, b = gaussian_filter(random.standard_normal((2, 256, 256)), (0, 2, 2))
+    share = np.stack([0.05 * np.exp(2 * m), 0.01 * np.exp(2 * b)]).reshape(2, -1)
+    tile = skin_model().colours(*np.clip(share, 0.0, 1.0)).reshape(256, 256, 3)
+    tiled = np.ones((side, side, 4), np.float32)
+    tiled[..., :3] = np.tile(tile, (side // 256, side // 256, 1))
+    unmixer = Unmixer(device, skin_model(), NOISE)
+    colours = texture_from(device, tiled, "rgba32float")
+    times = []
+    for _ in range(6):
+        started = time.perf_counter()
+        frame = Frame(device)
+        unmixer.record(frame, colours)
+        frame.submit()
+        frame.wait()
+        stages = frame.stage_ms()
+        times.append(stages["unmix"] if stages else 1e3 * (time.perf_counter() - started))
+    return float(np.median(times[1:]))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

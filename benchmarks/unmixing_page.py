@@ -1,0 +1,114 @@
+"""Writes docs/fit.md from what `unmixing.py` has measured: python benchmarks/unmixing_page.py"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from dermis.outputs import replacing
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "fit.md"
+TEXT = ROOT / "docs" / "fit.in.md"
+RESULTS = ROOT / "benchmarks" / "results" / "unmixing.json"
+
+Told = dict[str, Any]
+
+
+def main() -> int:
+    """Write the page."""
+    with replacing(PAGE) as trial:
+        trial.write_text(page(json.loads(RESULTS.read_text("utf-8"))), encoding="utf-8")
+    return 0
+
+
+def page(told: Told) -> str:
+    """The page's text."""
+    text = TEXT.read_text("utf-8")
+    tables = {"known": _known(told), "mistaken": _mistaken(told), "counted": _counted(told)}
+    tables |= {"shading": _shading(told["shading"]), "speed": _speed(told["speed"])}
+    for name, table in tables.items():
+        text = text.replace(f"<!-- {name} -->", table)
+    return text
+
+
+def _known(told: Told) -> str:
+    heads = (
+        "epidermis [mm]",
+        "melanin",
+        "skins",
+        "without noise: melanin, blood, CIEDE2000",
+        "1 % noise: melanin",
+        "blood",
+        "its bound",
+        "RMS over the bound",
+        "RMS over what the map states",
+    )
+    rows = []
+    for mm, bands in told["known"].items():
+        for one in bands:
+            low, high = one["melanin"]
+            plain = f"{_percent(one['plain_melanin'])}, {_percent(one['plain_blood'])}, {one['delta_e']:.3f}"
+            noisy = (_percent(one[key]) for key in ("melanin_error", "blood_error", "blood_bound"))
+            over = (f"{one[key]:.2f}" for key in ("blood_over_bound", "blood_over_stated"))
+            rows.append((mm, f"{low:g} to {high:g}", one["skins"], plain, *noisy, *over))
+    return _table(heads, rows)
+
+
+def _mistaken(told: Told) -> str:
+    heads = "the skin is", "oxygen", "melanin found over true", "blood found over true", "CIEDE2000 left"
+    words = {"none": "held", "oxygen": "found too"}
+    rows = [
+        (name, words[third], f"{one['melanin']:.2f}", f"{one['blood']:.2f}", f"{one['delta_e']:.2f}")
+        for name, both in told["mistaken"].items()
+        for third, one in both.items()
+    ]
+    return _table(heads, rows)
+
+
+def _counted(told: Told) -> str:
+    heads = "melanin", "found", "blood", "found", "CIEDE2000 left", "of the true skin's colour by diffusion"
+    rows = [
+        (
+            one["melanin"],
+            f"{one['found_melanin']:.3g}",
+            one["blood"],
+            f"{one['found_blood']:.3g}",
+            f"{one['delta_e']:.2f}",
+            f"{one['delta_e_forward']:.2f}",
+        )
+        for one in told["counted"]
+    ]
+    return _table(heads, rows)
+
+
+def _shading(told: Told) -> str:
+    rows = [
+        (words, _percent(told[key]["melanin"]), _percent(told[key]["blood"]))
+        for key, words in (("kept", "left in the colours"), ("divided", "found and divided by"))
+    ]
+    light = (
+        f"The light varies by {_percent(told['light'])}; {_percent(told['left'])} of it is left afterwards.\n"
+    )
+    return _table(("light", "melanin off by (median)", "blood"), rows) + "\n" + light
+
+
+def _speed(told: Told) -> str:
+    rows = [(f"{side} x {side}", f"{ms:.3g}") for side, ms in told.items() if side != "adapter"]
+    return _table(("texels", f"{told['adapter']} [ms]"), rows)
+
+
+def _percent(share: float) -> str:
+    return "over 300 %" if share > 3.0 else f"{100.0 * share:.{2 if share < 0.995 else 3}g} %"
+
+
+def _table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines) + "\n"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,40 @@
+"""The scan in other skins.
+
+Each texel's melanin and blood are found from its colour alone, changed, and turned into colour again; brows,
+lips and stubble, which are no such skin, stay.
+
+Deck: S24
+Columns: 4
+Sources: DonnerJensen2006, Jacques1998
+"""
+
+from dataclasses import replace
+
+import dermis
+from dermis.frame.painted import with_painted_maps
+from dermis.gallery.picture import main
+from dermis.unmixing.change import Change, Share
+
+SKINS = {
+    "as scanned": Change(),
+    "pale": Change(blood=Share(0.3)),
+    "flushed": Change(blood=Share(2.5)),
+    "cold: little oxygen": Change(oxygen=0.2, blood=Share(1.4)),
+    **{f"{100 * m:g} % melanosomes": Change(melanin=Share(median=m)) for m in (0.05, 0.12, 0.25, 0.4)},
+}
+
+
+def draw(studio):
+    head = studio.head()
+    if head.maps.painted:  # the human's skin lies in no picture
+        head = with_painted_maps(studio.renderer.device, head, 1024)
+    found, panels = dermis.unmix(head.maps.colour, adapter=studio.adapter), {}
+    for name, change in SKINS.items():
+        colour = found.recoloured(change, studio.adapter).clip(0.0, 1.0)
+        own = replace(head, maps=replace(head.maps, colour=colour))
+        panels[name] = studio.render(dermis.Scene(own, camera=dermis.portrait(head)), scale=0.75)
+    return panels
+
+
+if __name__ == "__main__":
+    main(draw)

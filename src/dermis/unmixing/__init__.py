@@ -1,0 +1,1 @@
+"""From the colours of skin back to what it is made of."""

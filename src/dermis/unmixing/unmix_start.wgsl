@@ -1,0 +1,29 @@
+// Where the search for each colour starts: the nearest skins by red, and by blue over green.
+//#include "skin_model.wgsl"
+//#include "first_guess.wgsl"
+
+const CANDIDATES: u32 = 64u; // along the roots of melanin and of blood
+
+@group(0) @binding(2) var<storage, read_write> starts: array<vec2f>;
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if (any(id.xy >= vec2u(SIDE))) {
+        return;
+    }
+    let red = mix(REDS.x, REDS.y, f32(id.x) / f32(SIDE - 1u));
+    let blue = mix(BLUES.x, BLUES.y, f32(id.y) / f32(SIDE - 1u));
+    var best = vec2f(0.0);
+    var least = 3.4e38;
+    for (var i = 0u; i < CANDIDATES; i++) {
+        for (var j = 0u; j < CANDIDATES; j++) {
+            let p = (vec2f(f32(i), f32(j)) + 0.5) / f32(CANDIDATES); // none at a limit, where numbers are held
+            let skin = slopes_at(vec3f(p, model.usual)).logs;
+            let off = vec2f(red - skin.r, blue - skin.b + skin.g);
+            let cost = dot(off, off);
+            best = select(best, p, cost < least);
+            least = min(least, cost);
+        }
+    }
+    starts[id.y * SIDE + id.x] = best;
+}

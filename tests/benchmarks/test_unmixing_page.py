@@ -1,0 +1,21 @@
+"""The page of unmixing says what was measured."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
+
+
+def test_the_page_is_that_of_the_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "path", [*sys.path, str(FOLDER)])
+    from unmixing_page import PAGE, RESULTS, page
+
+    told = json.loads(RESULTS.read_text("utf-8"))
+    text = page(told)
+    assert text == PAGE.read_text("utf-8") and "<!--" not in text
+    assert f"| {told['known']['0.05'][0]['skins']} |" in text

@@ -1,0 +1,66 @@
+"""`dermis unmix`: the maps it writes, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dermis.images.io import read_image, write_image
+from dermis.unmixing.model import skin_model
+
+Run = Callable[..., Any]
+
+
+@pytest.fixture
+def picture(folder: Path) -> Path:
+    """An artist's map of 2 % melanin, 1 % blood, with a black edge."""
+    colours = np.zeros((24, 32, 3), np.float32)
+    colours[:, 4:] = skin_model().colours(np.array([0.02]), np.array([0.01]))[0]
+    write_image(folder / "skin.png", colours)
+    return folder / "skin.png"
+
+
+def test_writes_maps_a_table_and_other_colours(run: Run, picture: Path, folder: Path) -> None:
+    ended = run("unmix", "skin.png", "-o", "maps", "--melanin", "x3", "--adapter", "cpu", "--json")
+    assert (ended.code, ended.stderr) == (0, "")
+    told = json.loads(ended.stdout)
+    names = ["melanin.exr", "blood.exr", "melanin_sd.exr", "blood_sd.exr", "residual.exr", "recoloured.png"]
+    assert told["files"] == [f"maps/{name}" for name in (*names, "unmixed.json")]
+    assert told["skin"] == pytest.approx(28 / 32)
+    assert told["melanin"]["median"] == pytest.approx(0.02, rel=0.1)
+    assert told["blood"]["median"] == pytest.approx(0.01, rel=0.1)
+    kept = json.loads((folder / "maps" / "unmixed.json").read_text())
+    assert {key: told[key] for key in kept} == kept
+    melanin = read_image(folder / "maps" / "melanin.exr")
+    assert melanin.shape == (24, 32, 1) and melanin[12, 20] == pytest.approx(0.02, rel=0.1)
+    assert (read_image(folder / "maps" / "recoloured.png")[12, 20] < read_image(picture)[12, 20]).all()
+    assert not [one for one in (folder / "maps").iterdir() if one.name.startswith(".")]
+
+
+def test_tells_medians_in_words(run: Run, picture: Path) -> None:
+    ended = run("unmix", "skin.png", "--adapter", "cpu", "--shading", "--find", "oxygen")
+    assert ended.code == 0 and "melanin  median 0.0" in ended.stdout
+    assert {"maps/oxygen.exr", "maps/shading.exr"} <= set(ended.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["nothing.png"], "nothing.png: expected"),
+        (["skin.png", "--melanin", "much"], "--melanin: expected a factor, such as x2"),
+        (["skin.png", "--oxygen", "nan"], "--oxygen: expected a number from 0 to 1"),
+        (["skin.png", "--noise", "0"], "noise: expected a number from 0.0001"),
+        (["skin.png", "--model-oxygen", "2"], "--oxygen: expected a number from 0 to 1"),
+        (["skin.png", "-o", "skin.png"], "skin.png: expected a folder or a free name"),
+        (["skin.png", "-o", "no/maps"], "no/maps: expected a folder inside one that exists"),
+    ],
+)
+def test_refusals(run: Run, picture: Path, folder: Path, words: list[str], told: str) -> None:
+    ended = run("unmix", *words, "--adapter", "cpu")
+    assert ended.code == 2 and told in ended.stderr and ended.stderr.count("\n") == 1
+    assert not list(folder.rglob("*.exr"))

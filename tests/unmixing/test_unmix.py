@@ -1,0 +1,176 @@
+"""Melanin and blood of known skins are found again, on the device and in float64."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dermis.errors import DermisError
+from dermis.gpu.device import Device
+from dermis.optics.diffusion.boundary import normal_reflectance
+from dermis.optics.diffusion.models import diffusion_profile
+from dermis.optics.pigments.skin import spectral_medium
+from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
+from dermis.unmixing.change import Change, Share, share_of
+from dermis.unmixing.model import FACE, Third, skin_model
+from dermis.unmixing.on_device import Unmixer
+from dermis.unmixing.solve import solve, weights_of
+from dermis.unmixing.unmix import unmix
+
+Floats = NDArray[np.float64]
+Pixels = NDArray[np.float32]
+SIDE = 48
+
+
+def shares(count: int, seed: int = 3) -> tuple[Floats, Floats]:
+    random = np.random.default_rng(seed)
+    return 10.0 ** random.uniform(-2.3, -0.5, count), 10.0 ** random.uniform(-2.7, -1.2, count)
+
+
+def exact(melanin: float, blood: float) -> Floats:
+    """The colour by diffusion at each wavelength, without a table."""
+    medium = spectral_medium("dj2006", replace(FACE, melanin=melanin, blood=blood))
+    total = diffusion_profile(medium, "layered", "layer").total
+    return np.asarray((1.0 - normal_reflectance(1.4)) * total @ rgb_weights(WAVELENGTHS_NM).T)
+
+
+@pytest.fixture(scope="module")
+def colours() -> Pixels:
+    """A made-up map of skin."""
+    m, b = shares(SIDE * SIDE)
+    return skin_model().colours(m, b).reshape(SIDE, SIDE, 3).astype(np.float32)
+
+
+def test_known_skins_are_found_without_noise() -> None:
+    m, b = shares(24)
+    found = solve(skin_model(), np.stack([exact(x, y) for x, y in zip(m, b, strict=True)]), noise=1e-3)
+    np.testing.assert_allclose(found.melanin, m, rtol=0.01)
+    np.testing.assert_allclose(found.blood, b, rtol=0.02)
+    np.testing.assert_allclose(found.residual, 1.0, atol=5e-3)
+
+
+def test_with_noise_they_are_as_far_off_as_is_said() -> None:
+    m, b = shares(40)
+    plain = skin_model().colours(m, b)
+    random = np.random.default_rng(0)
+    noisy = plain * (1.0 + 0.01 * random.standard_normal((60, *plain.shape)))
+    found = solve(skin_model(), noisy.reshape(-1, 3), noise=0.01)
+    for known, one, sd in ((m, found.melanin, found.melanin_sd), (b, found.blood, found.blood_sd)):
+        off = np.sqrt(((one.reshape(60, -1) - known) ** 2).mean(axis=0))
+        ratio = np.median(off / np.median(sd.reshape(60, -1), axis=0))
+        assert 0.75 < ratio < 1.25
+
+
+def test_slopes_are_those_of_the_colours() -> None:
+    for third in ("none", "oxygen", "shade"):
+        model = skin_model(third=third)
+        x = np.random.default_rng(1).uniform(0.11, 0.89, (30, 3))
+        logs, slopes = model.read(x)
+        for k in range(3):
+            step = np.where(np.arange(3) == k, 1e-7, 0.0)
+            off = (model.read(x + step)[0] - logs) / 1e-7 - slopes[:, :, k]
+            assert np.abs(off).max() < 1e-4 or (third == "none" and k == 2)
+
+
+@pytest.mark.parametrize("third", ["none", "oxygen"])
+def test_the_device_finds_what_float64_finds(device: Device, colours: Pixels, third: Third) -> None:
+    noisy = colours * (1.0 + 0.01 * np.random.default_rng(2).standard_normal(colours.shape))
+    noisy = noisy.astype(np.float32)
+    model = skin_model(third=third)
+    made, sd, residual = Unmixer(device, model, 0.01).unmix(noisy)
+    twin = solve(model, noisy.reshape(-1, 3).astype(np.float64), 0.01)
+    pairs = [(made[..., 0], twin.melanin), (made[..., 1], twin.blood), (made[..., 2], twin.third)]
+    pairs += [(sd[..., 0], twin.melanin_sd), (sd[..., 1], twin.blood_sd)]
+    for got, wanted in pairs:
+        assert np.percentile(np.abs(got.ravel() - wanted) / (np.abs(wanted) + 1e-4), 99.0) < 2e-3
+    cost = (weights_of(noisy.reshape(-1, 3), 0.01) * np.log(residual.reshape(-1, 3)) ** 2).sum(axis=1)
+    least = (weights_of(noisy.reshape(-1, 3), 0.01) * np.log(twin.residual) ** 2).sum(axis=1)
+    assert np.mean(cost > least + 0.1) < 2e-3
+
+
+def test_blood_that_melanin_hides_is_what_is_usual() -> None:
+    thick = replace(FACE, epidermis_mm=0.25)
+    found = solve(skin_model(thick), skin_model(thick).colours(np.array([0.4]), np.array([0.1])))
+    assert 0.005 < found.blood[0] < 0.03 and found.blood_sd[0] > found.blood[0]
+    assert found.melanin[0] == pytest.approx(0.4, rel=0.02)
+
+
+def test_oxygen_is_found_where_it_shows() -> None:
+    pale = replace(FACE, oxygen=0.4)
+    colour = skin_model(pale).colours(np.array([0.01]), np.array([0.03]))
+    held, free = (solve(skin_model(third=one), colour) for one in ("none", "oxygen"))
+    assert 0.35 < free.third[0] < 0.6
+    assert abs(np.log(free.residual)).max() < 0.3 * abs(np.log(held.residual)).max()
+
+
+def test_the_same_skin_comes_back_and_twice_the_melanin_is_found_as_that(
+    colours: Pixels,
+) -> None:
+    found = unmix(colours, adapter="cpu")
+    np.testing.assert_allclose(found.recoloured(Change(), "cpu"), colours, atol=1e-5)
+    darker = unmix(found.recoloured(Change(melanin=Share(2.0)), "cpu"), adapter="cpu")
+    ratio = darker.melanin / found.melanin
+    assert np.median(ratio) == pytest.approx(2.0, rel=0.01)
+    assert np.median(darker.blood / found.blood) == pytest.approx(1.0, rel=0.02)
+    cold = found.recoloured(Change(oxygen=0.2), "cpu")
+    assert (cold[..., 0] < colours[..., 0]).mean() > 0.99  # blood without oxygen takes more of the red
+
+
+def test_a_larger_median_adds_and_a_smaller_one_multiplies() -> None:
+    change = Change(melanin=Share(median=0.2), blood=Share(median=0.005))
+    factors, added = change.over(0.05, 0.01)
+    np.testing.assert_allclose(factors, [1.0, 0.5, 1.0])
+    np.testing.assert_allclose(added, [0.15, 0.0, 0.0])
+    assert share_of("--melanin", "x2") == Share(factor=2.0) and share_of("--blood", "0.1") == Share(
+        median=0.1
+    )
+    for wrong in ("", "x", "2", "-0.1", "nan", "xnan", "x1e9"):
+        with pytest.raises(DermisError, match="--melanin: expected"):
+            share_of("--melanin", wrong)
+
+
+def test_paint_stays(colours: Pixels) -> None:
+    painted = colours.copy()
+    painted[10:20, 10:20] = (0.05, 0.4, 0.1)
+    found = unmix(painted, adapter="cpu")
+    again = found.recoloured(Change(blood=Share(0.5)), "cpu")
+    assert (again[12:18, 12:18, 1] > 3.0 * again[12:18, 12:18, 0]).all()
+    assert found.summary()["skin"] < 1.0 - 90.0 / SIDE**2
+
+
+def test_light_in_the_map_is_found_and_divided_by() -> None:
+    m, b = shares(128 * 128)
+    plain = skin_model().colours(0.02 + 0.2 * m, 0.01 + 0.1 * b).reshape(128, 128, 3)
+    across = np.linspace(-0.3, 0.3, 128)
+    light = np.exp(across[:, None] * np.cos(across))
+    found = unmix(plain * light[..., None], shading=True, adapter="cpu")
+    assert found.shading is not None
+    off = np.log(found.shading / light)
+    assert (off - off.mean()).std() < 0.25 * np.log(light).std()
+    kept = unmix(plain * light[..., None], adapter="cpu")
+    true = (0.02 + 0.2 * m).reshape(128, 128)
+    error, before = (np.median(np.abs(one.melanin / true - 1.0)) for one in (found, kept))
+    assert error < 0.5 * before
+
+
+@pytest.mark.parametrize(
+    ("picture", "expected"),
+    [
+        (np.zeros((4, 4)), "floats \\(h, w, 3\\)"),
+        (np.zeros((4, 4, 3), np.uint8), "floats \\(h, w, 3\\)"),
+        (np.full((4, 4, 3), 2.0), "reflectances from 0 to 1"),
+        (np.full((4, 4, 3), np.nan), "reflectances from 0 to 1"),
+    ],
+)
+def test_what_is_no_colour_map_is_refused(picture: NDArray[np.float64], expected: str) -> None:
+    with pytest.raises(DermisError, match=f"colours: expected {expected}"):
+        unmix(picture, adapter="cpu")
+
+
+def test_black_maps_have_no_skin() -> None:
+    found = unmix(np.zeros((8, 8, 3)), adapter="cpu")
+    assert found.summary() == {"texels": 64, "skin": 0.0}
+    assert all(np.isfinite(one).all() for one in found.maps().values())
