@@ -31,17 +31,17 @@ def input_name(shader: str, name: str) -> str:
     return name if shader == OPEN_PBR else _IN_STANDARD[name]
 
 
-def document_of(looks: Sequence[Look], shader: str, folder: str) -> Any:
+def document_of(looks: Sequence[Look], shader: str, prefix: str) -> Any:
     """The document, checked by MaterialX's own library; lengths in metres, colours linear Rec. 709.
 
     shader : `OPEN_PBR` or `STANDARD`
-    folder : of the maps, from the document
+    prefix : of the maps' names, which lie beside the document
     """
     mx = needed("MaterialX", TASK)
     made = mx.createDocument()
     made.setColorSpace("lin_rec709")
     for look in looks:
-        _add_material(mx, made, look, shader, folder)
+        _add_material(mx, made, look, shader, prefix)
     made.setDataLibrary(library())
     valid, message = made.validate()
     if not valid:
@@ -58,7 +58,7 @@ def library() -> Any:
     return found
 
 
-def _add_material(mx: Any, made: Any, look: Look, shader: str, folder: str) -> None:
+def _add_material(mx: Any, made: Any, look: Look, shader: str, prefix: str) -> None:
     name = mx.createValidName(look.name) or "material"
     node = made.addNode(shader, made.createValidChildName(f"{name}_surface"), "surfaceshader")
     for key, value in look.values.items():
@@ -69,7 +69,7 @@ def _add_material(mx: Any, made: Any, look: Look, shader: str, folder: str) -> N
     if look.maps:
         graph = made.addNodeGraph(made.createValidChildName(f"{name}_maps"))
         for key, role in look.maps.items():
-            output = _add_map(graph, role, f"{folder}/{role}.png")
+            output = _add_map(graph, role, f"{prefix}{role}.png")
             one = node.addInput(input_name(shader, key), output.getType())
             one.setNodeGraphString(graph.getName())
             one.setOutputString(output.getName())

@@ -17,7 +17,7 @@ from dermis.scene.skin import USUAL_ROUGHNESS, Skin
 from dermis.specular.fresnel import SKIN_ETA
 
 Floats = NDArray[np.float32]
-Value = float | tuple[float, float, float]
+Value = float | tuple[float, ...]
 
 _EYE_IOR = 1.376
 _ROUGH = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # by a word in the name
@@ -67,7 +67,7 @@ def skin_look(
     name: str,
     skin: Skin,
     radius_m: tuple[float, float, float],
-    colour: tuple[float, float, float],
+    colour: tuple[float, ...],
     roles: Iterable[str],
 ) -> Look:
     """Of skin.

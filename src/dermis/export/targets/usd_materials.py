@@ -19,20 +19,20 @@ _PREVIEWED = {
 _UV = "st"
 
 
-def add_material(stage: Any, path: Any, look: Look, folder: str) -> Any:
+def add_material(stage: Any, path: Any, look: Look, prefix: str) -> Any:
     """Write a material; its prim.
 
-    folder : of the maps, from the stage
+    prefix : of the maps' names, which lie beside the stage
     """
     shade = needed("pxr.UsdShade", TASK)
     material = shade.Material.Define(stage, path)
     material.GetPrim().SetDisplayName(look.name)
-    _add_open_pbr(stage, material, look, folder)
-    _add_preview(stage, material, look, folder)
+    _add_open_pbr(stage, material, look, prefix)
+    _add_preview(stage, material, look, prefix)
     return material
 
 
-def _add_open_pbr(stage: Any, material: Any, look: Look, folder: str) -> None:
+def _add_open_pbr(stage: Any, material: Any, look: Look, prefix: str) -> None:
     sdf = needed("pxr.Sdf", TASK)
     prim = material.GetPrim()
     prim.AddAppliedSchema("MaterialXConfigAPI")  # of a plug-in that usd-core comes without
@@ -49,7 +49,7 @@ def _add_open_pbr(stage: Any, material: Any, look: Look, folder: str) -> None:
         usd_type = {"color3": types.Color3f, "float": types.Float, "vector3": types.Float3}[kind.type]
         image = _shader(stage, material, f"{role}_image", _NODES[kind.type])
         file = image.CreateInput("file", types.Asset)
-        file.Set(sdf.AssetPath(f"./{folder}/{role}.png"))
+        file.Set(sdf.AssetPath(f"./{prefix}{role}.png"))
         file.GetAttr().SetColorSpace(kind.space or "raw")
         image.CreateInput("texcoord", types.Float2).ConnectToSource(uv)
         last = image.CreateOutput("out", usd_type)
@@ -62,7 +62,7 @@ def _add_open_pbr(stage: Any, material: Any, look: Look, folder: str) -> None:
     material.CreateSurfaceOutput("mtlx").ConnectToSource(out)
 
 
-def _add_preview(stage: Any, material: Any, look: Look, folder: str) -> None:
+def _add_preview(stage: Any, material: Any, look: Look, prefix: str) -> None:
     """The preview has no scattering below the surface: its colour alone."""
     sdf = needed("pxr.Sdf", TASK)
     types = sdf.ValueTypeNames
@@ -79,7 +79,7 @@ def _add_preview(stage: Any, material: Any, look: Look, folder: str) -> None:
             place.CreateInput("varname", types.String).Set(_UV)
             reader = place.CreateOutput("result", types.Float2)
         texture = _shader(stage, material, f"preview_{role}", "UsdUVTexture")
-        texture.CreateInput("file", types.Asset).Set(sdf.AssetPath(f"./{folder}/{role}.png"))
+        texture.CreateInput("file", types.Asset).Set(sdf.AssetPath(f"./{prefix}{role}.png"))
         texture.CreateInput("sourceColorSpace", types.Token).Set(MAPS[role].preview_space)
         texture.CreateInput("st", types.Float2).ConnectToSource(reader)
         for side in ("wrapS", "wrapT"):

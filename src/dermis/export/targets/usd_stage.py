@@ -16,12 +16,12 @@ from dermis.mesh.gltf.moved_points import MovedPoints
 from dermis.mesh.head import Head
 
 
-def stage_of(head: Head, name: str, looks: Mapping[int, Look], folder: str) -> Any:
+def stage_of(head: Head, name: str, looks: Mapping[int, Look], prefix: str) -> Any:
     """The stage.
 
     name : what the head is called
     looks : by the mesh's materials
-    folder : of the maps, from the stage
+    prefix : of the maps' names, which lie beside the stage
     """
     usd, geometry, sdf = (needed(f"pxr.{one}", TASK) for one in ("Usd", "UsdGeom", "Sdf"))
     stage = usd.Stage.CreateInMemory()
@@ -39,7 +39,7 @@ def stage_of(head: Head, name: str, looks: Mapping[int, Look], folder: str) -> A
     subsets = add_mesh(stage, path, head, moved)
     if moves(moved):
         add_motion(stage, root, stage.GetPrimAtPath(path), moved)
-    _add_materials(stage, root.AppendChild("materials"), subsets, looks, folder)
+    _add_materials(stage, root.AppendChild("materials"), subsets, looks, prefix)
     _add_hairs(stage, root, head)
     return stage
 
@@ -55,12 +55,12 @@ def _root(stage: Any, path: Any, moved: MovedPoints) -> Any:
     return kind.Define(stage, path).GetPrim()
 
 
-def _add_materials(stage: Any, scope: Any, subsets: Mapping[int, Any], looks: Any, folder: str) -> None:
+def _add_materials(stage: Any, scope: Any, subsets: Mapping[int, Any], looks: Any, prefix: str) -> None:
     geometry, shade = needed("pxr.UsdGeom", TASK), needed("pxr.UsdShade", TASK)
     geometry.Scope.Define(stage, scope)
     names = valid_names([looks[kind].name for kind in subsets])
     for (kind, subset), name in zip(subsets.items(), names, strict=True):
-        material = add_material(stage, scope.AppendChild(name), looks[kind], folder)
+        material = add_material(stage, scope.AppendChild(name), looks[kind], prefix)
         shade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)
 
 
