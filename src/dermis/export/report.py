@@ -82,7 +82,9 @@ class Report:
         lines.append(f"{'d [mm]':12}{_numbers(self.d_mm)}  of the nearest lobe")
         for name, told in _ERRORS.items():
             lines.append(f"{name:12}{_numbers(getattr(self.error, name))}  {told}")
-            lines.append(f"{'  naive':12}{_numbers(getattr(self.naive_error, name))}  as typed without knowing")
+            lines.append(
+                f"{'  naive':12}{_numbers(getattr(self.naive_error, name))}  as typed without knowing"
+            )
         return [*lines, "", self.wrong]
 
     def markdown(self) -> str:
