@@ -7,11 +7,8 @@ from typing import Any
 import pytest
 
 pytest.importorskip("MaterialX")
-import MaterialX as mx
-import MaterialX.PyMaterialXGenGlsl as glsl
-import MaterialX.PyMaterialXGenMdl as mdl
-import MaterialX.PyMaterialXGenOsl as osl
-import MaterialX.PyMaterialXGenShader as gen
+import MaterialX
+from MaterialX import PyMaterialXGenGlsl, PyMaterialXGenMdl, PyMaterialXGenOsl, PyMaterialXGenShader
 
 from dermis.export.targets.openpbr_document import OPEN_PBR, STANDARD, document_of, library
 from dermis.export.targets.openpbr_look import Look, plain_look, skin_look
@@ -20,9 +17,9 @@ from dermis.scene.skin import Skin
 
 RADIUS_M = (1.234e-3, 4e-4, 2e-4)
 GENERATORS = {
-    "glsl": glsl.GlslShaderGenerator,
-    "osl": osl.OslShaderGenerator,
-    "mdl": mdl.MdlShaderGenerator,
+    "glsl": PyMaterialXGenGlsl.GlslShaderGenerator,
+    "osl": PyMaterialXGenOsl.OslShaderGenerator,
+    "mdl": PyMaterialXGenMdl.MdlShaderGenerator,
 }
 HOSTILE = '"/><input name="x" /><!-- \n ; import os'
 
@@ -33,8 +30,8 @@ def looks(name: str = "skin") -> list[Look]:
 
 
 def read_back(made: Any) -> Any:
-    again = mx.createDocument()
-    mx.readFromXmlString(again, mx.writeToXmlString(made))
+    again = MaterialX.createDocument()
+    MaterialX.readFromXmlString(again, MaterialX.writeToXmlString(made))
     again.setDataLibrary(library())
     assert again.validate() == (True, "")
     return again
@@ -42,7 +39,7 @@ def read_back(made: Any) -> Any:
 
 @pytest.mark.parametrize("shader", [OPEN_PBR, STANDARD])
 def test_what_is_written_is_valid_when_read_back(shader: str) -> None:
-    again = read_back(document_of(looks(), shader, "maps"))
+    again = read_back(document_of(looks(), shader, "a_"))
     nodes = {node.getName(): node for node in again.getNodes(shader)}
     assert set(nodes) == {"skin_surface", "left_eye_surface"}
     for node in nodes.values():
@@ -53,23 +50,23 @@ def test_what_is_written_is_valid_when_read_back(shader: str) -> None:
 
 
 def test_pictures_have_their_colour_spaces() -> None:
-    (graph,) = read_back(document_of(looks(), OPEN_PBR, "maps")).getNodeGraphs()
+    graph = read_back(document_of(looks(), OPEN_PBR, "a_")).getNodeGraph("skin_maps")
     files = {one.getName(): one.getInput("file") for one in graph.getNodes("image")}
     assert files["colour_image"].getColorSpace() == "srgb_texture"
     assert not any(one.getColorSpace() for name, one in files.items() if name != "colour_image")
-    assert files["normal_image"].getValueString() == "maps/normal.png"
+    assert files["normal_image"].getValueString() == "a_normal.png"
 
 
 @pytest.mark.parametrize("language", GENERATORS)
 @pytest.mark.parametrize("shader", [OPEN_PBR, STANDARD])
 def test_code_is_generated_that_reads_lengths_in_other_units(shader: str, language: str) -> None:
-    code = generated(document_of(looks(), shader, "maps"), GENERATORS[language].create())
+    code = generated(document_of(looks(), shader, "a_"), GENERATORS[language].create())
     assert "0.00123" in code and "100.0" in code  # metres, and centimetres in one
     assert "srgb_texture_to_lin_rec709" in code
 
 
 def test_a_hostile_name_is_text() -> None:
-    again = read_back(document_of(looks(HOSTILE), OPEN_PBR, "maps"))
+    again = read_back(document_of(looks(HOSTILE), OPEN_PBR, "a_"))
     named = [one for one in again.getMaterialNodes() if one.getAttribute("uiname")]
     assert HOSTILE in [one.getAttribute("uiname") for one in named]
     assert [node.getCategory() for node in again.getNodes()] == [OPEN_PBR, "surfacematerial"] * 2
@@ -77,15 +74,15 @@ def test_a_hostile_name_is_text() -> None:
 
 def generated(made: Any, generator: Any) -> str:
     """A pixel shader of the first material, in a scene in centimetres."""
-    context = gen.GenContext(generator)
-    context.registerSourceCodeSearchPath(mx.getDefaultDataSearchPath())
-    colours = gen.DefaultColorManagementSystem.create(generator.getTarget())
+    context = PyMaterialXGenShader.GenContext(generator)
+    context.registerSourceCodeSearchPath(MaterialX.getDefaultDataSearchPath())
+    colours = PyMaterialXGenShader.DefaultColorManagementSystem.create(generator.getTarget())
     colours.loadLibrary(library())
     generator.setColorManagementSystem(colours)
-    units = gen.UnitSystem.create(generator.getTarget())
+    units = PyMaterialXGenShader.UnitSystem.create(generator.getTarget())
     units.loadLibrary(library())
-    registry, distance = mx.UnitConverterRegistry.create(), library().getUnitTypeDef("distance")
-    registry.addUnitConverter(distance, mx.LinearUnitConverter.create(distance))
+    registry, distance = MaterialX.UnitConverterRegistry.create(), library().getUnitTypeDef("distance")
+    registry.addUnitConverter(distance, MaterialX.LinearUnitConverter.create(distance))
     units.setUnitConverterRegistry(registry)
     generator.setUnitSystem(units)
     context.getOptions().targetDistanceUnit = "centimeter"

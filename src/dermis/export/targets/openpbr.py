@@ -12,6 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from dermis.export.curve import Curve
+from dermis.export.deviation import deviation
 from dermis.export.subject import Subject
 from dermis.export.target import Row, Rows, Target, numbers_of
 from dermis.export.targets.openpbr_document import (
@@ -21,10 +22,10 @@ from dermis.export.targets.openpbr_document import (
     document_of,
     input_name,
 )
-from dermis.export.targets.openpbr_files import looks_of, place_of, write_pictures
-from dermis.export.targets.openpbr_fit import fitted_mm, typed_mm, walk
+from dermis.export.targets.openpbr_files import looks_of, place_of, skin_of, write_pictures
+from dermis.export.targets.openpbr_fit import fitted_mm, profile_of_specification, typed_mm, walk
 from dermis.extras import needed
-from dermis.scene.skin import Skin
+from dermis.optics.media import Floats
 from dermis.specular.fresnel import SKIN_ETA
 
 _M = 1e-3
@@ -41,10 +42,10 @@ class OpenPbr(Target):
     variants: ClassVar[tuple[str, ...]] = tuple(_SHADERS)
     needs_maps: ClassVar[bool] = True
     wrong: ClassVar[str] = (
-        "True for renderers that walk as OpenPBR says. MaterialX's own specification also allows a profile whose "
-        "d is the radius itself: there light spreads 1.1 to 3 times as far as meant, farther the darker the "
-        "skin. MaterialX's generated GLSL only bends the shading by curvature. With a map of the colour the "
-        "spread is right at the mean colour and smaller where the skin is darker."
+        "Right in renderers that walk as OpenPBR says. MaterialX's specification also allows a profile whose "
+        "d is the radius: there light spreads up to 3.6 times as far, most in dark skin (see the radius); "
+        "MaterialX's GLSL only bends the shading by curvature. With a map of the colour the spread is right "
+        "at its mean, and smaller where the skin is darker."
     )
 
     @property
@@ -76,34 +77,31 @@ class OpenPbr(Target):
         return [file, *pictures.values()]
 
 
-def surface_rows(subject: Subject, shader: str, mfp_mm: np.ndarray[tuple[int], np.dtype[np.float64]]) -> Rows:
+def surface_rows(subject: Subject, shader: str, mfp_mm: Floats) -> Rows:
     """What is typed into a shader for mean free paths."""
-    longest = float(mfp_mm.max())
-    skin = Skin() if subject.scene is None else subject.scene.skin
+    longest, skin = float(mfp_mm.max()), skin_of(subject)
+    colour = tuple(map(float, np.clip(subject.albedo, 0.0, 1.0)))
+    rough = float(np.sqrt(skin.roughness * skin.smoothing))
     told = (
         ("subsurface_weight", 1.0, "-", "all that is not reflected goes into the skin"),
-        (
-            "subsurface_color",
-            tuple(map(float, np.clip(subject.albedo, 0.0, 1.0))),
-            "-",
-            "colour seen; the map's mean",
-        ),
-        ("subsurface_radius", _M * longest, "m", "mean free path of the widest channel; the document has its unit"),
+        ("subsurface_color", colour, "-", "colour that is seen; the mean of the map where there is one"),
+        ("subsurface_radius", _M * longest, "m", f"longest mean free path; {_misread(mfp_mm, subject)}"),
         ("subsurface_radius_scale", tuple((mfp_mm / longest).tolist()), "-", "mean free paths over that"),
         ("subsurface_scatter_anisotropy", 0.0, "-", "the paths are those of isotropic scattering"),
         ("specular_ior", SKIN_ETA, "-", "index of the surface, which reflects 0.028 straight ahead"),
         ("specular_weight", skin.strength, "-", "share of that; the map's mean"),
-        (
-            "specular_roughness",
-            float(np.sqrt(skin.roughness * skin.smoothing)),
-            "-",
-            "root of Beckmann's m, or its map",
-        ),
+        ("specular_roughness", rough, "-", "root of Beckmann's m, or its map"),
     )
     return tuple(Row(input_name(shader, name), value, unit, meaning) for name, value, unit, meaning in told)
 
 
-def radii_mm(rows: Rows, shader: str) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _misread(mfp_mm: Floats, subject: Subject) -> str:
+    """How wrong renderers are that take the radius for the d of a profile."""
+    off = deviation(subject.curve, profile_of_specification(mfp_mm, subject)).edge
+    return f"taken for a profile's d, edges of shadows are off by {', '.join(f'{one:.3f}' for one in off)}"
+
+
+def radii_mm(rows: Rows, shader: str) -> Floats:
     """(3,) mean free paths of rows."""
     longest = numbers_of(rows, input_name(shader, "subsurface_radius"))[0] / _M
     return np.asarray(longest * np.array(numbers_of(rows, input_name(shader, "subsurface_radius_scale"))))

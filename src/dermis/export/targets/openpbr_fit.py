@@ -47,5 +47,5 @@ def walk(colour: Floats, mfp_mm: Floats, subject: Subject) -> Curve:
 
 
 def profile_of_specification(mfp_mm: Floats, subject: Subject) -> Curve:
-    """What a renderer shows that takes the lobe of MaterialX's specification, whose d is the radius itself."""
+    """What a renderer shows that takes the lobe of MaterialX's specification: its d is the radius."""
     return lobe(mfp_mm, subject.curve.energy)

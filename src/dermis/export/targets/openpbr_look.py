@@ -111,7 +111,9 @@ def hair_look(absorption: Floats, radius_mm: float) -> Look:
     """
     depth = np.sqrt(np.maximum(absorption.mean(axis=0), 0.0) * radius_mm)
     red, green, blue = (float(part) for part in np.exp(-5.888 * depth))
-    return Look("hair", {"base_color": (red, green, blue), "specular_roughness": 0.4, "specular_ior": 1.55}, {})
+    return Look(
+        "hair", {"base_color": (red, green, blue), "specular_roughness": 0.4, "specular_ior": 1.55}, {}
+    )
 
 
 def drawn_maps(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str, Floats]:

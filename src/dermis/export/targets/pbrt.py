@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from dermis.export.sized import nearest_size, resized
 from dermis.export.subject import Subject
 from dermis.export.target import Row, Rows, Target, numbers_of
 from dermis.export.targets.openpbr_files import place_of, skin_of
-from dermis.export.targets.openpbr_fit import lowest, typed_mm
+from dermis.export.targets.openpbr_fit import typed_mm
 from dermis.export.targets.pbrt_diffusion import diffusion_table
 from dermis.export.targets.pbrt_scene import (
     Lines,
@@ -22,11 +22,14 @@ from dermis.export.targets.pbrt_scene import (
     view_of,
 )
 from dermis.export.targets.pbrt_textures import textures_of
+from dermis.mesh.head import Head
 from dermis.optics.media import SKIN_ETA, Floats
+from dermis.scene.camera import Camera
 from dermis.scene.model import Scene
 
-_REFLECTANCE, _PATH, _ABSORBS, _SCATTERS = "reflectance", "mfp", "sigma_a", "sigma_s"
+_REFLECTANCE, _PATH = "reflectance", "mfp"
 _ROUGH_ELSE = 0.3  # of what is not skin
+_FAR, _ROOM = 10.0, 1.4  # of a ball's picture, by its size
 
 
 class Pbrt(Target):
@@ -39,22 +42,20 @@ class Pbrt(Target):
     needs_maps: ClassVar[bool] = True
     not_run: ClassVar[bool] = True
     wrong: ClassVar[str] = (
-        "Diffusion as on a plane, at every point: thin parts and folds are not like skin. A smooth surface reflects "
-        "all that Fresnel says, for the material has no strength of reflection; hairs and the eyes' colours are "
-        "left out. Scenes must stay in millimetres: scale multiplies mfp in one way of stating a medium, and "
-        "sigma, which is its inverse, in another."
+        "Diffusion as on a plane, at every point: thin parts and folds are not like skin. The surface "
+        "reflects all that Fresnel says, for the material has no strength of reflection; hairs and the eyes' "
+        "colours are left out; colours become smooth spectra. The scene must stay in millimetres: scale "
+        "multiplies mfp here, but sigma, which is its inverse, where a medium is stated by that."
     )
 
     def parameters(self, subject: Subject, version: str) -> Rows:
         """Reflectance and mean free path whose table is nearest."""
         path = nearest_size(subject.curve, _unit(subject.albedo))
-        told = ((_REFLECTANCE, subject.albedo, "-", "of light that enters; a texture where there is a map"),)
-        return _rows(subject, (*told, (_PATH, path, "mm", "1 / (sigma_a + sigma_s); 1 unit is 1 mm at scale 1")))
+        return _rows(subject, path, "1 / (sigma_a + sigma_s); a unit is 1 mm")
 
     def naive(self, subject: Subject, version: str) -> Rows:
         """The skin's colour, and the diffuse mean free paths of published tables as mean free paths."""
-        told = ((_REFLECTANCE, subject.albedo, "-", "the skin's colour"),)
-        return _rows(subject, (*told, (_PATH, typed_mm(subject), "mm", "as published, 1 / sigma_tr")))
+        return _rows(subject, typed_mm(subject), "as published, 1 / sigma_tr")
 
     def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
         """pbrt's table at these numbers."""
@@ -65,7 +66,7 @@ class Pbrt(Target):
     def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
         """The scene, a mesh for each material, and the maps."""
         file, prefix = place_of(place, subject, ".pbrt")
-        scene = subject.scene or Scene(subject.shape)
+        scene = subject.scene or _ball(subject.shape)
         text, files = _text(subject, rows, scene, prefix)
         for name, data in files.items():
             (file.parent / name).write_bytes(data)
@@ -76,20 +77,21 @@ class Pbrt(Target):
 def _unit(reflectance: Floats) -> Curve:
     """The curve of media of these reflectances, in mean free paths."""
     table = diffusion_table(SKIN_ETA)
-    total = np.array([float(table.curve(table.radius[-1], float(one))) for one in reflectance])
+    total = np.array([table.curve(table.radius[-1], float(one)) for one in reflectance], np.float64)
 
     def within(radius: Floats) -> Floats:
         columns = [table.curve(radius, float(one)) for one in reflectance]
-        return np.clip(np.stack(columns, axis=-1) / np.maximum(total, 1e-9), 0.0, 1.0)
+        return np.asarray(np.clip(np.stack(columns, axis=-1) / np.maximum(total, 1e-9), 0.0, 1.0))
 
     return Curve.of(within, total)
 
 
-def _rows(subject: Subject, medium: tuple[tuple[str, Floats, str, str], ...]) -> Rows:
+def _rows(subject: Subject, path_mm: Floats, meaning: str) -> Rows:
     skin = skin_of(subject)
-    told = [Row(name, tuple(map(float, value)), unit, meaning) for name, value, unit, meaning in medium]
+    colour = tuple(map(float, np.clip(subject.albedo, 0.0, 1.0)))
     return (
-        *told,
+        Row(_REFLECTANCE, colour, "-", "of light that enters; a texture where there is a map"),
+        Row(_PATH, tuple(map(float, path_mm)), "mm", meaning),
         Row("scale", 1.0, "-", "of mfp; not to be changed"),
         Row("g", 0.0, "-", "the paths are those of isotropic scattering"),
         Row("eta", SKIN_ETA, "-", "index of the skin"),
@@ -98,11 +100,22 @@ def _rows(subject: Subject, medium: tuple[tuple[str, Floats, str, str], ...]) ->
     )
 
 
+def _ball(ball: Head) -> Scene:
+    """A ball in the middle of the picture."""
+    x, y, z = (float(one) for one in -np.array(ball.centre_mm))
+    size = float(ball.mesh.size_mm[1])
+    camera = Camera(position=(x, y, z + _FAR * size), target=(x, y, z), frame_mm=_ROOM * size)
+    return Scene(ball, camera=camera)
+
+
 def _text(subject: Subject, rows: Rows, scene: Scene, prefix: str) -> tuple[Lines, dict[str, bytes]]:
     """The scene's lines, and the files beside it by name."""
     head = scene.head
     textures = textures_of(subject, prefix)
-    lines = ["# Millimetres from the head's centre, by dermis", *view_of(scene.camera, f"{prefix}picture.exr")]
+    lines = [
+        "# Millimetres from the head's centre, by dermis",
+        *view_of(scene.camera, f"{prefix}picture.exr"),
+    ]
     lines += ["WorldBegin", *lights_of(scene.lights, scene.environment), *textures.lines]
     files = dict(textures.files)
     for kind in np.unique(head.mesh.material).tolist():
@@ -118,7 +131,7 @@ def _text(subject: Subject, rows: Rows, scene: Scene, prefix: str) -> tuple[Line
 def _skin(rows: Rows, driven: dict[str, tuple[str, str]]) -> str:
     """The skin's material; what a map drives is a texture's name in place of the row's numbers."""
     kinds = {_REFLECTANCE: "rgb", _PATH: "rgb", "remaproughness": "bool"}
-    told = {}
+    told: dict[str, Any] = {}
     for row in rows:
         if row.name in driven:
             kind, name = driven[row.name]

@@ -23,12 +23,12 @@ METRES = 1e-3
 class Faces(NamedTuple):
     """Polygons: quads first, then triangles that are no half of one.
 
-    count : (f,) corners of each
+    sides : (f,) corners of each
     corner : (n,) vertices of the mesh, face after face
     material : (f,)
     """
 
-    count: Ints
+    sides: Ints
     corner: Ints
     material: Ints
 
@@ -62,7 +62,7 @@ def add_mesh(stage: Any, path: Any, head: Head, moved: MovedPoints) -> dict[int,
     points = vt.Vec3fArray.FromNumpy(metres(moved.positions_mm[one]))
     made.CreatePointsAttr(points)
     made.CreateExtentAttr(geometry.PointBased.ComputeExtent(points))
-    made.CreateFaceVertexCountsAttr(vt.IntArray.FromNumpy(faces.count))
+    made.CreateFaceVertexCountsAttr(vt.IntArray.FromNumpy(faces.sides))
     made.CreateFaceVertexIndicesAttr(vt.IntArray.FromNumpy(mesh.point[faces.corner].astype(np.int32)))
     made.CreateNormalsAttr(vt.Vec3fArray.FromNumpy(np.ascontiguousarray(moved.normals[one])))
     made.SetNormalsInterpolation(geometry.Tokens.vertex)

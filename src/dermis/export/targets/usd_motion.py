@@ -67,13 +67,16 @@ def _add_joints(made: Any, skeleton: Skeleton | None) -> list[str]:
             joints.append(f"{joints[parent]}/{name}" if parent >= 0 else name)
         local, bound = _places(skeleton)
     made.CreateJointsAttr(joints)
-    for attribute, matrices in ((made.CreateRestTransformsAttr, local), (made.CreateBindTransformsAttr, bound)):
+    for attribute, matrices in (
+        (made.CreateRestTransformsAttr, local),
+        (made.CreateBindTransformsAttr, bound),
+    ):
         attribute(vt.Matrix4dArray([gf.Matrix4d(matrix.T) for matrix in matrices]))
     return joints
 
 
 def _places(skeleton: Skeleton) -> tuple[Doubles, Doubles]:
-    """(b, 4, 4) from each bone to its parent at rest, and to the head where its points are bound, in metres."""
+    """(b, 4, 4) from each bone to its parent at rest, and to the head where its points are bound [m]."""
     to_file = np.diag([METRES, METRES, METRES, 1.0]) @ skeleton.to_head
     size = float(np.cbrt(abs(np.linalg.det(to_file[:3, :3]))))
     grown, shrunk = (np.diag([one, one, one, 1.0]) for one in (size, 1.0 / size))
@@ -84,16 +87,13 @@ def _places(skeleton: Skeleton) -> tuple[Doubles, Doubles]:
 
 def _bind_joints(binding: Any, moved: MovedPoints) -> None:
     count = int(moved.head.mesh.point.max()) + 1
-    bone, share = np.zeros((count, 1), np.int32), np.ones((count, 1), np.float32)
-    if moved.rig.skeleton is not None:
-        bone, share = influences(moved.rig, moved.finer)
+    still = np.zeros((count, 1), np.int64), np.ones((count, 1))
+    bone, share = still if moved.rig.skeleton is None else influences(moved.rig, moved.finer)
     gf, vt = needed("pxr.Gf", TASK), needed("pxr.Vt", TASK)
-    primvars = (
-        (binding.CreateJointIndicesPrimvar, vt.IntArray.FromNumpy(np.ascontiguousarray(bone, np.int32).ravel())),
-        (binding.CreateJointWeightsPrimvar, vt.FloatArray.FromNumpy(share.astype(np.float32).ravel())),
-    )
-    for create, values in primvars:
-        create(False, bone.shape[1]).Set(values)
+    bones = vt.IntArray.FromNumpy(np.ascontiguousarray(bone, np.int32).ravel())
+    shares = vt.FloatArray.FromNumpy(np.ascontiguousarray(share, np.float32).ravel())
+    binding.CreateJointIndicesPrimvar(False, bone.shape[1]).Set(bones)
+    binding.CreateJointWeightsPrimvar(False, bone.shape[1]).Set(shares)
     binding.CreateGeomBindTransformAttr(gf.Matrix4d(1.0))
 
 
@@ -108,7 +108,9 @@ def _add_shapes(stage: Any, mesh: Any, moved: MovedPoints, names: Sequence[str])
         kept = point[target.vertex] >= 0
         order = np.argsort(point[target.vertex][kept])
         shape.CreateOffsetsAttr(vt.Vec3fArray.FromNumpy(metres(target.delta_mm[kept][order])))
-        shape.CreateNormalOffsetsAttr(vt.Vec3fArray.FromNumpy(np.ascontiguousarray(target.normal[kept][order])))
+        shape.CreateNormalOffsetsAttr(
+            vt.Vec3fArray.FromNumpy(np.ascontiguousarray(target.normal[kept][order]))
+        )
         shape.CreatePointIndicesAttr(vt.IntArray.FromNumpy(point[target.vertex][kept][order]))
         if name != told:
             shape.GetPrim().SetDisplayName(told)
