@@ -112,9 +112,7 @@ def _made(place: Path) -> Iterator[Path]:
         return
     with folder_beside(place) as folder:
         yield folder / place.name
-        for part in sorted(
-            folder.iterdir(), key=lambda part: part.name == place.name
-        ):  # the file itself last
+        for part in sorted(folder.iterdir(), key=lambda part: part.name == place.name):  # it comes last
             _move(part, place.with_name(part.name))
 
 

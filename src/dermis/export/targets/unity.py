@@ -15,7 +15,7 @@ from dermis.export.curve import Curve
 from dermis.export.lobe import fit_d, lobe
 from dermis.export.naming import yaml_text
 from dermis.export.subject import Subject
-from dermis.export.target import Row, Rows, Target, numbers_of
+from dermis.export.target import Row, Rows, Target, Value, numbers_of
 from dermis.export.textures import write_maps
 from dermis.optics.fits.burley import BurleyProfile, unity_parameters
 from dermis.optics.media import Floats
@@ -49,15 +49,16 @@ class Unity(Target):
             *_distances(d, version),
             Row(_SCALE, 1.0, "m", "metres of a unit of the scene"),
             Row(_IOR, _SKIN_IOR, "-", "of the surface reflection"),
-            Row(
-                _TINT, (1.0, 1.0, 1.0), "-", "colour of what passes thin parts; the base colour tints it too"
-            ),
+            Row(_TINT, (1.0, 1.0, 1.0), "-", "of light through thin parts, times the base colour"),
             Row(_DEPTHS, (0.0, _THICKEST * float(d.max())), "mm", "black and white of a thickness map"),
         )
 
     def naive(self, subject: Subject, version: str) -> Rows:
-        """The skin's colour as the scattering colour, as the inspector advises, and the multiplier as it is."""
-        typed = {_COLOUR: tuple(map(float, np.clip(subject.albedo, 0.0, 1.0))), _MULTIPLIER: _TYPED_MM}
+        """The skin's colour as the scattering colour, as the inspector advises, and a multiplier of 1."""
+        typed: dict[str, Value] = {
+            _COLOUR: tuple(map(float, np.clip(subject.albedo, 0.0, 1.0))),
+            _MULTIPLIER: _TYPED_MM,
+        }
         rows = self.parameters(subject, version)
         return tuple(Row(r.name, typed.get(r.name, r.value), r.unit, r.meaning) for r in rows)
 
