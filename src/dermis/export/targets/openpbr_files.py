@@ -14,7 +14,7 @@ from dermis.export.targets.openpbr_look import (
     plain_look,
     skin_look,
 )
-from dermis.human.head_file import relief
+from dermis.human.head_file import relief_slopes
 from dermis.optics.media import Floats
 from dermis.scene.skin import Skin
 
@@ -42,7 +42,7 @@ def write_pictures(subject: Subject, folder: Path, prefix: str) -> dict[str, Pat
     """The maps of the skin by role; none for a skin by itself."""
     if subject.head is None:
         return {}
-    found = drawn_maps(subject.head.maps, skin_of(subject), relief(subject.head))
+    found = drawn_maps(subject.head.maps, skin_of(subject), relief_slopes(subject.head))
     written = {}
     for role, data in encoded_maps(found).items():
         written[role] = folder / f"{prefix}{role}.png"

@@ -8,7 +8,7 @@ from dermis.export.subject import Subject
 from dermis.export.targets.openpbr_files import skin_of
 from dermis.export.targets.openpbr_look import drawn_maps, encoded_maps
 from dermis.export.targets.pbrt_scene import Lines, directive
-from dermis.human.head_file import relief
+from dermis.human.head_file import relief_slopes
 
 
 class Textures(NamedTuple):
@@ -35,7 +35,7 @@ def textures_of(subject: Subject, prefix: str) -> Textures:
     made = Textures([], {}, {})
     if subject.head is None:
         return made
-    found = drawn_maps(subject.head.maps, skin_of(subject), relief(subject.head))
+    found = drawn_maps(subject.head.maps, skin_of(subject), relief_slopes(subject.head))
     if "roughness" in found:
         found["roughness"] = found["roughness"] ** 2  # pbrt takes alpha itself, OpenPBR its root
     for role, data in encoded_maps({role: found[role] for role in found if role != "specular"}).items():
