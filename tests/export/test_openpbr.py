@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dermis.export.deviation import deviation
 from dermis.export.run import export_skin, judged
 from dermis.export.subject import subject_of
 from dermis.export.target import numbers_of
@@ -50,7 +51,15 @@ def test_radii_grow_with_the_skin() -> None:
     assert 1.9 < ratio[0] < 2.4 and 2.7 < ratio[1] < 3.2 and ratio[2] > ratio[1]
 
 
-@pytest.mark.parametrize("variant", ["open-pbr", "standard-surface"])
+def test_a_profile_is_fitted_where_the_renderer_has_one() -> None:
+    subject = subject_of("skin1")
+    profile, walk = (TARGET.with_variant(one) for one in ("open-pbr-profile", "open-pbr"))
+    assert judged(subject, profile, "1.1.1").error.edge.max() < EDGE
+    radii = walk.parameters(subject, "1.1.1")
+    assert deviation(subject.curve, profile.shown(radii, subject, "1.1.1")).edge.max() > 0.08
+
+
+@pytest.mark.parametrize("variant", TARGET.variants)
 def test_the_document_has_what_was_told(variant: str, tmp_path: Path) -> None:
     report = export_skin("skin1", "openpbr", tmp_path / "skin.mtlx", variant=variant)
     document = MaterialX.createDocument()

@@ -12,7 +12,7 @@ from dermis.errors import refuse
 from dermis.export.curve import Curve
 from dermis.export.subject import Subject
 from dermis.export.target import Row, Rows, Target, numbers_of
-from dermis.export.targets.openpbr import radii_mm, surface_rows
+from dermis.export.targets.openpbr import TYPED, misread, radii_mm, surface_rows
 from dermis.export.targets.openpbr_document import OPEN_PBR
 from dermis.export.targets.openpbr_files import looks_of, place_of, write_pictures
 from dermis.export.targets.openpbr_fit import fitted_mm, typed_mm, walk
@@ -40,11 +40,13 @@ class Usd(Target):
 
     def parameters(self, subject: Subject, version: str) -> Rows:
         """The walk whose curve is nearest."""
-        return (*surface_rows(subject, OPEN_PBR, fitted_mm(subject)), _UNIT)
+        path = fitted_mm(subject)
+        meaning = f"longest mean free path; {misread(path, subject)}"
+        return (*surface_rows(subject, OPEN_PBR, path, meaning), _UNIT)
 
     def naive(self, subject: Subject, version: str) -> Rows:
         """The diffuse mean free paths of published tables, typed in as mean free paths."""
-        return (*surface_rows(subject, OPEN_PBR, typed_mm(subject)), _UNIT)
+        return (*surface_rows(subject, OPEN_PBR, typed_mm(subject), TYPED), _UNIT)
 
     def shown(self, rows: Rows, subject: Subject, version: str) -> Curve:
         """The walk of these rows."""
