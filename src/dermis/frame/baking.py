@@ -28,6 +28,7 @@ Floats = NDArray[np.float32]
 LOGGER = logging.getLogger("dermis")
 _AT_ONCE = 1 << 20  # places; their numbers fit a buffer of WebGPU's default limits
 _PICTURE = (64, 64)  # of the frame that lights the atlas, which nobody looks at
+_COLOURS_ATLAS, _COLOURS_SIDE = 512, 2048  # of colours alone: the light's map, texels that they are means of
 _CONDITIONAL = {
     ("thickness",): "light passes no thin parts: transmission none, or no blurred light",
     ("melanin", "blood"): "the skin is not made of pigments",
@@ -67,6 +68,19 @@ def bake(renderer: Renderer, scene: Scene, settings: Settings, side: int) -> Bak
     texel, places = layout_places(scene.head.mesh, side)
     numbers = renderer.kept_open.run(partial(_baked, renderer, scene, settings, outputs, places, side))
     return _filled(side, texel, numbers, absent)
+
+
+def baked_colours(
+    renderer: Renderer, scene: Scene, triangle: NDArray[np.integer], weights: NDArray[np.floating]
+) -> Floats:
+    """(n, 3) albedo at places of triangles, those of eyes and mouths included; linear Rec. 709 [-].
+
+    weights : (n, 2) of the triangles' second and third corner
+    """
+    settings = Settings(size=_PICTURE, samples=1, atlas=_COLOURS_ATLAS, strands=False)
+    places = baking_pass.places_of(triangle, weights)
+    found = renderer.kept_open.run(partial(_baked, renderer, scene, settings, (), places, _COLOURS_SIDE))
+    return np.ascontiguousarray(found[:, : CHANNELS["albedo"]])
 
 
 def layout_places(mesh: Mesh, side: int) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:

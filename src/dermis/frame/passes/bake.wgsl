@@ -1,4 +1,4 @@
-// What the frame knows of the skin at places of the maps, rather than of the picture, seen from straight above.
+// What the frame knows of the head at places of its surface, rather than of the picture, seen from straight above.
 //#include "shading.wgsl"
 //#include "each.wgsl"
 
@@ -21,9 +21,19 @@ fn met_from_above(triangle: u32, weights: vec3f) -> Met {
     var point = interpolate(corner_at(t.x), corner_at(t.y), corner_at(t.z), weights, t.w);
     point.place = place_of_point(triangle, weights);
     point.curvature = dot(weights, vec3f(curvatures[t.x], curvatures[t.y], curvatures[t.z]));
-    let surface = surface_at(point, baking.footprint);
+    var surface: Surface;
+    if (is_opaque(point)) {
+        surface = Surface(point.normal, shade.material_colour[point.flags >> 8u].rgb, WET_ROUGHNESS, 1.0);
+    } else {
+        surface = surface_at(point, baking.footprint);
+    }
     let open = open_sky(point, t, weights);
-    return Met(point, surface, Film(surface.normal, vec3f(0.0)), vec3f(1.0), surface.normal, baking.footprint, open);
+    let film = Film(surface.normal, vec3f(0.0));
+    var met = Met(point, surface, film, vec3f(1.0), surface.normal, baking.footprint, open);
+    if (EYES) {
+        made_true(&met);
+    }
+    return met;
 }
 
 // The normal with relief as a map of slopes has it: what `bend` makes of these slopes is that normal again.
@@ -69,7 +79,7 @@ fn main(
     let light = shaded(met, lit);
     let at = NUMBERS * index;
     let pigments = pigments_at(met.point);
-    put_three(at, shade.total * surface.colour);
+    put_three(at, select(shade.total, vec3f(1.0), is_opaque(met.point)) * surface.colour / met.lids);
     put_three(at + 3u, tangent_normal(met.point, surface.normal));
     put_three(at + 6u, lit.entered);
     put_three(at + 9u, PI * (light.below * light.leaving + light.still));
