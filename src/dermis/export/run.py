@@ -60,9 +60,9 @@ def export_skin(
         subject = subject_of(subject, **told)
     elif given := [name for name, value in told.items() if value is not None]:
         refuse(given[0], "a subject that is still to be made", "it came with one", "Leave it out")
-    report = judged(subject, target, known)
     if target.needs_maps:
         subject = painted(subject, side, adapter)
+    report = judged(subject, target, known)
     with _made(place) as inside:
         files = target.write(subject, report.rows, inside, known)
         moved = [place.parent / file.relative_to(inside.parent) for file in files] if place.suffix else [

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from dermis.export.targets.maps_encoding import exr
 from dermis.export.targets.mitsuba_shapes import Surfaces, files_of, surfaces
-from dermis.export.targets.mitsuba_walks import Homogeneous
 from dermis.export.targets.mitsuba_words import (
 
     Given,
@@ -39,10 +38,21 @@ REFLECTED = 0.03
 _WET = 0.1
 
 
+class Walked(NamedTuple):
+    """A medium of isotropic scattering.
+
+    sigma_t : (3,) extinction [1/mm]
+    albedo : (3,) of one scattering [-]
+    """
+
+    sigma_t: tuple[float, ...]
+    albedo: tuple[float, ...]
+
+
 class Looks(NamedTuple):
     """What is below and on the skin.
 
-    media : of each boundary, three channels
+    media : of each boundary
     roughness : Beckmann m, one number or (n, n)
     passing : (n, n, 3) share that a refracting surface lets pass each way, of skin that differs from place to
         place; None for skin that is alike everywhere
@@ -50,7 +60,7 @@ class Looks(NamedTuple):
     opaque : files of other materials, by their indices
     """
 
-    media: Mapping[Boundary, tuple[Homogeneous, Homogeneous, Homogeneous]]
+    media: Mapping[Boundary, Walked]
     roughness: float | Floats
     passing: Floats | None = None
     held_back: Floats | None = None
@@ -82,13 +92,13 @@ def scene_files(
         yield picture_file(index), exr("light", np.asarray(values, np.float32))
 
 
-def medium_words(media: tuple[Homogeneous, Homogeneous, Homogeneous]) -> dict[str, Any]:
+def medium_words(medium: Walked) -> dict[str, Any]:
     """A homogeneous medium [mm]; colours hold at most 1, so the largest extinction goes into the scale."""
-    extinction = np.array([one.sigma_t for one in media])
+    extinction = np.asarray(medium.sigma_t)
     return {
         "type": "homogeneous",
         "id": "skin_medium",
-        "albedo": rgb([one.albedo for one in media]),
+        "albedo": rgb(medium.albedo),
         "sigma_t": rgb(extinction / extinction.max()),
         "scale": float(extinction.max()),
         "phase": {"type": "isotropic"},
