@@ -35,7 +35,7 @@ BOUNDARIES: Mapping[Boundary, float] = {"matched": 1.0, "smooth": SKIN_ETA, "rou
 """Surfaces of the skin and their index of refraction."""
 REFLECTED = 0.03
 """Share of the light that a matched surface reflects, from all directions alike: that of rough skin."""
-_WET = 0.1
+_WET = 0.3  # the square root of Beckmann's m
 
 
 class Walked(NamedTuple):
@@ -150,7 +150,7 @@ def _frame(
     if scene.environment is not None:
         parts.append(surroundings(words, scene.environment))
     colour = {"type": "mesh_attribute", "name": "vertex_color"}
-    plain = {"type": "roughplastic", "alpha": _WET, "int_ior": SKIN_ETA, "diffuse_reflectance": colour}
+    plain = {"type": "principled", "roughness": _WET, "eta": SKIN_ETA, "base_color": colour}
     for index in looks.opaque:
         parts.append({"type": "ply", "filename": _opaque_file(index), "bsdf": plain})
     described = [element(part, "", words) for part in parts]

@@ -16,7 +16,7 @@ _POINTS, _VECTORS = ("position", "center"), ("direction",)
 _KINDS = {
     "emitter": ("point", "projector", "directional", "area", "constant", "envmap", "spot"),
     "shape": ("rectangle", "sphere", "disk", "ply"),
-    "bsdf": ("null", "diffuse", "roughplastic", "dielectric", "roughdielectric", "mask", "roughconductor"),
+    "bsdf": ("null", "diffuse", "principled", "dielectric", "roughdielectric", "mask", "roughconductor"),
     "texture": ("bitmap", "mesh_attribute"),
     "medium": ("homogeneous",),
     "phase": ("isotropic", "hg"),
