@@ -25,14 +25,17 @@ def write_person(
     weights : of expressions with which the file rests
     """
     notes = {"person": numbers_of(person)}
-    data = encode_head(head, roughness=roughness, weights=weights, slopes=_relief(head), notes=notes)
+    data = encode_head(head, roughness=roughness, weights=weights, slopes=relief_slopes(head), notes=notes)
     with replacing(path) as trial:
         trial.write_bytes(data)
     return len(data)
 
 
-def _relief(head: Head) -> NDArray[np.float32] | None:
-    """(n, n, 2) rise of a height map to the right and upwards, if other programs need it [-]."""
+def relief_slopes(head: Head) -> NDArray[np.float32] | None:
+    """(n, n, 2) rise of a head's height map to the right and upwards, if other programs need it [-].
+
+    None where it has a map of normals, or no square height map: they need none.
+    """
     height = head.maps.height
     if head.maps.normal is not None or height is None:
         return None
