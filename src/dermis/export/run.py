@@ -53,7 +53,7 @@ def export_skin(
 
     DermisError : an unknown target, version, variant or model, and what cannot be read or written
     """
-    target = TARGETS[to].with_variant(variant)
+    target = replace(TARGETS[to].with_variant(variant), side=side, adapter=adapter)
     known, place = target.known_version(version), _checked(target, output)
     told = {"model": model, "profile": profile, **head}
     if not isinstance(subject, Subject):

@@ -73,7 +73,7 @@ class Mitsuba(Target):
         """The scene with a file for each surface, meshes and textures."""
         colours, scene = colours_of(subject), subject.scene or Scene(subject.shape)
         media = {each: medium_for(subject.curve, colours, each) for each in BOUNDARIES}
-        looks = Looks(media, *textures(subject, colours), _painted(scene))
+        looks = Looks(media, *textures(subject, colours), _painted(scene, self.adapter))
         written = []
         for name, content in scene_files(scene, looks, self._boundary, _SIZE, _SAMPLES):
             file = place / name
@@ -113,14 +113,14 @@ def _crossing(boundary: Boundary) -> float:
     return 1.0 - REFLECTED if boundary == "matched" else 1.0
 
 
-def _painted(scene: Scene) -> dict[int, bytes]:
+def _painted(scene: Scene, adapter: str) -> dict[int, bytes]:
     """Files of the head's other materials."""
     if all(material.kind == "skin" for material in scene.head.mesh.materials):
         return {}
     from dermis.export.targets.mitsuba_painted import painted_meshes
     from dermis.frame.renderer import Renderer
 
-    return painted_meshes(Renderer(), scene)
+    return painted_meshes(Renderer(adapter), scene)
 
 
 TARGET = Mitsuba()
