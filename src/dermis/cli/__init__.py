@@ -15,6 +15,7 @@ COMMANDS = {
     "profile": "Compute how light spreads below a skin, and fit Gaussians to it.",
     "head": "Make a person of the parametric human and write it as glTF.",
     "unmix": "Find the melanin and blood of a picture of skin, and recolour it.",
+    "export": "Write a skin or a head for another program, and say how wrong it will be there.",
     "lights": "Print a rig of lights as a file to start from.",
     "compare": "Compare techniques with the truth, or the models of the surface.",
     "gallery": "Draw every comparison of the talk, and a page that explains them.",
