@@ -16,6 +16,9 @@ from dermis.mesh.gltf.write import encode_head
 from dermis.mesh.head import Head
 from dermis.outputs import replacing
 
+_STRETCH = 1024
+"""Side of the atlas that tells how long texels are, which changes little from one to the next."""
+
 
 def write_person(
     path: Path,
@@ -33,14 +36,14 @@ def write_person(
     eyes : what its eyes look like; of one colour where None
     """
     notes = {"person": numbers_of(person)}
-    told = {"weights": weights, "slopes": _relief(head), "notes": notes, "eyes": eyes}
+    told = {"weights": weights, "slopes": relief(head), "notes": notes, "eyes": eyes}
     data = encode_head(head, roughness=roughness, **told)
     with replacing(path) as trial:
         trial.write_bytes(data)
     return len(data)
 
 
-def _relief(head: Head) -> NDArray[np.float32] | None:
+def relief(head: Head) -> NDArray[np.float32] | None:
     """(n, n, 2) rise of a height map to the right and upwards, if other programs need it [-]."""
     height = head.maps.height
     if head.maps.normal is not None or height is None:
@@ -49,5 +52,9 @@ def _relief(head: Head) -> NDArray[np.float32] | None:
     if side != height.shape[1] or side < SMALLEST:
         return None
     down, right = np.gradient(height)
-    stretch = build_atlas(head.mesh, side).stretch.astype(np.float32)
+    coarse = max(SMALLEST, min(side, _STRETCH))
+    stretch = build_atlas(head.mesh, coarse).stretch.astype(np.float32)
+    if side > coarse:
+        places = np.arange(side) * coarse // side
+        stretch = stretch[places][:, places] * np.float32(side / coarse)
     return np.asarray(np.stack([right, -down], axis=-1) * stretch, np.float32)

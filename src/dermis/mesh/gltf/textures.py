@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -45,7 +46,10 @@ class Added:
     def to(self, material: Mapping[str, Any]) -> dict[str, Any]:
         """The material with it; where a picture of colours is shown no more, this package still finds it."""
         told = dict(material) | {"extensions": {**material.get("extensions", {}), **self.extensions}}
-        surface, extras = dict(material["pbrMetallicRoughness"]), {**material.get("extras", {}), **self.extras}
+        surface, extras = (
+            dict(material["pbrMetallicRoughness"]),
+            {**material.get("extras", {}), **self.extras},
+        )
         if self.surface:
             colours = surface.pop("baseColorTexture", None)
             surface |= self.surface
@@ -59,30 +63,32 @@ def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, b
 
     slopes : (n, n, 2) of the relief for other programs, where `maps` has a height map and no normals
     """
-    found: dict[str, bytes] = {}
+    found: dict[str, NDArray[Any]] = {}
     roles: dict[str, Any] = {}
     if maps.colour is not None:
-        found["colour"] = colours_png(maps.colour)
+        found["colour"] = encode_srgb8(maps.colour)
     shown = slopes if maps.normal is None else maps.normal
     if shown is not None:
-        found["normal"] = encode_png(_normals(shown))
+        found["normal"] = _normals(shown)
     if maps.normal is not None:
         roles["normal"] = {"index": "normal"}
     if maps.height is not None:
         low, span = float(maps.height.min()), float(np.ptp(maps.height)) or 1.0
         grey = np.rint((maps.height.astype(np.float64) - low) / span * 65535).astype(np.uint16)
-        found["height"], roles["height_mm"] = encode_png(grey[..., None]), span / 255
+        found["height"], roles["height_mm"] = grey[..., None], span / 255
     if maps.roughness is not None:
         perceptual = np.zeros((*maps.roughness.shape, 3), np.float32)
         perceptual[..., 1] = np.sqrt(np.clip(maps.roughness, 0.0, 1.0))
-        found["metallic roughness"] = encode_png(_bytes(perceptual))
+        found["metallic roughness"] = _bytes(perceptual)
     for role in ("specular", "roughness"):
         if (grey_map := getattr(maps, role)) is not None:
-            found[role] = encode_png(_bytes(grey_map)[..., None])
+            found[role] = _bytes(grey_map)[..., None]
     if maps.region is not None:
-        found["region"] = encode_png(maps.region[..., None])
+        found["region"] = maps.region[..., None]
     own = (role for role in ("height", "specular", "roughness", "region") if role in found)
-    return found, roles | {role: {"index": role} for role in own}
+    roles |= {role: {"index": role} for role in own}
+    with ThreadPoolExecutor() as beside:
+        return dict(zip(found, beside.map(encode_png, found.values()), strict=True)), roles
 
 
 def material_of(
