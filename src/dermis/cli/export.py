@@ -32,6 +32,7 @@ def export(
     diffuse_transmission: Annotated[bool, Parameter(negative="", show_default=False)] = False,
     model: Model | None = None,
     profile: str | None = None,
+    library: Path | None = None,
     map_side: int = 2048,
     head: HeadOptions = NOTHING,
     adapter: Adapter = "auto",
@@ -53,6 +54,8 @@ def export(
 
         dermis export human:7 --to gltf --diffuse-transmission -o person.glb
 
+        dermis export human --to babylon -o head.html
+
         dermis export head.glb --profile medium --to unity --version 14 -o head --json
 
     Parameters
@@ -73,6 +76,9 @@ def export(
         What the true profile is by [montecarlo for one layer without end, layered for others].
     profile:
         Skin of a head [a person's own pigments, or gpu-gems-3].
+    library:
+        For pages: the folder node_modules that npm has installed the library into, which is then put into the
+        page; else it is loaded from a public server.
     map_side:
         Of maps that are painted, a power of two from 256 to 4096 [texels].
     adapter:
@@ -86,7 +92,8 @@ def export(
     if diffuse_transmission:
         _check_alone(variant)
         variant = "diffuse-transmission"
-    told: dict[str, Any] = given(version=version, variant=variant, model=model, profile=profile)
+    told: dict[str, Any] = given(version=version, variant=variant, model=model)
+    told |= given(profile=profile, library=library)
     with working_on(f"exporting {what}"):
         report = export_skin(what, to, output, side=map_side, adapter=adapter, **told, **head)
     if as_json:

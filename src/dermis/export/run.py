@@ -34,6 +34,7 @@ def export_skin(
     variant: str | None = None,
     model: ModelName | None = None,
     profile: str | Path | None = None,
+    library: str | Path | None = None,
     side: int = _SIDE,
     adapter: str = "auto",
     **head: Any,
@@ -47,6 +48,7 @@ def export_skin(
     variant : of what it can do, a method of scattering say, its first by default
     model : of the profile, see `true_curve`
     profile : skin of a head
+    library : of a page, the folder that npm has installed its library into, which it then holds
     side : of maps that are painted [texels]
     adapter : that paints them
     head : options of `load_head`
@@ -54,6 +56,7 @@ def export_skin(
     DermisError : an unknown target, version, variant or model, and what cannot be read or written
     """
     target = replace(TARGETS[to].with_variant(variant), side=side, adapter=adapter)
+    target = target if library is None else target.with_library(library)
     known, place = target.known_version(version), _checked(target, output)
     told = {"model": model, "profile": profile, **head}
     if not isinstance(subject, Subject):

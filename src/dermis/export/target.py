@@ -86,6 +86,13 @@ class Target(ABC):
             refuse("variant", expected, f"{shown_value(variant)} came", "Correct it")
         return replace(self, variant=variant)
 
+    def with_library(self, folder: str | Path) -> Target:
+        """This target with the library that it draws with inside what is written.
+
+        DermisError : it draws with none
+        """
+        refuse("library", f"none for {self.name}", f"{shown_value(str(folder))} came", "Leave it out")
+
     def known_version(self, version: str | None) -> str:
         """The version asked for, the newest where None.
 
