@@ -35,7 +35,10 @@ def main(file: str, folder: Path) -> None:
         "uv": [layer.name for layer in face.data.uv_layers],
     }
     (folder / "told.json").write_text(json.dumps(told))
-    render(folder / "picture.png")
+    render(folder / "picture.png", (0.0, -1.0, 0.0), 85.0)
+    face.parent.data.pose_position = "REST"
+    x, _, z = armature.data.bones["eye.L"].head_local
+    render(folder / "eye.png", (x, -1.0, z), 1300.0)
 
 
 def places(face: object) -> np.ndarray:
@@ -53,14 +56,14 @@ def turn(bone: object) -> None:
     bone.matrix = there @ Matrix.Rotation(math.radians(DEGREES), 4, "Z") @ there.inverted() @ bone.matrix
 
 
-def render(path: Path) -> None:
+def render(path: Path, place: tuple[float, float, float], lens: float) -> None:
     """A small picture from the front, under white light from everywhere."""
     bpy.ops.preferences.addon_enable(module="cycles")
     scene = bpy.context.scene
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     scene.collection.objects.link(camera)
-    camera.location, camera.rotation_euler = (0.0, -1.0, 0.0), (math.pi / 2, 0.0, 0.0)
-    scene.camera, camera.data.lens = camera, 85.0
+    camera.location, camera.rotation_euler = place, (math.pi / 2, 0.0, 0.0)
+    scene.camera, camera.data.lens = camera, lens
     scene.world = bpy.data.worlds.new("world")
     scene.world.use_nodes = True
     scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from dermis import Human, Pose, load_head
-from dermis.frame.painted import with_painted_maps
+from dermis.frame.painted import painted_head
 from dermis.gpu import open_device
 from dermis.human.head_file import write_person
 from dermis.images.io import read_image
@@ -37,8 +37,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """With the file, and what Blender found in it."""
     made = tmp_path_factory.mktemp("blender")
     device = open_device(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
-    painted = with_painted_maps(device, PERSON.head(), 512)
-    write_person(made / "person.glb", PERSON, painted, roughness=0.3)
+    painted, eyes = painted_head(device, PERSON.head(), 512)
+    write_person(made / "person.glb", PERSON, painted, roughness=0.3, eyes=eyes)
     command = [os.environ[PYTHON_VARIABLE], str(SCRIPT), str(made / "person.glb"), str(made)]
     apart = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     run = subprocess.run(command, capture_output=True, text=True, timeout=300, env=apart)
@@ -60,7 +60,9 @@ def head(folder: Path) -> Head:
 def test_names_are_those_of_the_head(told: dict[str, Any], head: Head) -> None:
     assert told["keys"] == ["Basis", *head.targets]
     assert set(told["bones"]) == set(head.bones)
-    assert told["materials"] == [one.name for one in head.mesh.materials] and len(told["uv"]) == 1
+    hairs = ["brows and lashes", "hair"]
+    assert told["materials"] == [*(one.name for one in head.mesh.materials), *hairs]
+    assert len(told["uv"]) == 1
 
 
 @pytest.mark.parametrize("move", MOVES)
@@ -69,7 +71,7 @@ def test_vertices_move_as_a_pose_says(folder: Path, head: Head, move: str) -> No
     motion = MOVES[move].motion(head.control)
     meant = head.control.points_mm(motion)[head.mesh.point]
     with np.load(folder / "places.npz") as found:
-        x, y, z = 1e3 * found[move].T
+        x, y, z = 1e3 * found[move][: len(meant)].T  # hairs come last
     assert np.abs(np.column_stack([x, z, -y]) - meant).max() < SAME_MM
 
 
@@ -80,3 +82,13 @@ def test_the_picture_shows_skin(folder: Path) -> None:
     assert (forehead[..., 3] > 250).all()
     red, green, blue = (float(forehead[..., k].mean()) for k in range(3))
     assert red > green + 10 and green > blue + 5 and red > 90
+
+
+def test_an_eye_shows_a_pupil_an_iris_and_the_white(folder: Path) -> None:
+    """Seen along its axis; the person has brown eyes."""
+    picture = read_image(folder / "eye.png")[..., :3].astype(float)
+    pupil, iris, white = (
+        picture[30:36, those].mean(axis=(0, 1)) for those in (slice(29, 35), slice(39, 42), slice(46, 51))
+    )
+    assert pupil.mean() < 0.75 * iris.mean() and iris.mean() < 0.5 * white.mean(), (pupil, iris, white)
+    assert iris[0] > 1.1 * iris[2]

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from dermis.human.hair.look import HairLook
     from dermis.human.person import Human
     from dermis.human.skin.look import SkinLook
+    from dermis.mesh.eye_layout import EyePictures
     from dermis.mesh.eyes import EyeLook
     from dermis.mesh.head import Head
 
@@ -125,7 +126,7 @@ def head(
     list_targets:
         Print the names of the published targets, and write nothing.
     """
-    from dermis.frame.painted import with_painted_maps
+    from dermis.frame.painted import painted_head
     from dermis.gpu.failures import on_device
     from dermis.human.person_file import write_numbers
     from dermis.outputs import check_output
@@ -146,8 +147,8 @@ def head(
     with working_on("making the head"):
         made = person.head(layout=layout, **given(subdivide=subdivide))
         made = _with_maps(made, given(colour=colour, normal=normal, roughness=roughness))
-        made = on_device(adapter, lambda device: with_painted_maps(device, made, size))
-        length = _write(output, person, made, resting)
+        made, eyes = on_device(adapter, lambda device: painted_head(device, made, size))
+        length = _write(output, person, made, resting, eyes)
     _report(output, person, made, as_json, bytes=length, seconds=round(time.perf_counter() - started, 3))
     return 0
 
@@ -194,13 +195,15 @@ def _with_maps(made: Head, files: dict[str, Any]) -> Head:
     return replace(made, maps=replace(made.maps, **chosen))
 
 
-def _write(output: Path, person: Human, made: Head, expression: dict[str, float]) -> int:
+def _write(
+    output: Path, person: Human, made: Head, expression: dict[str, float], eyes: EyePictures | None
+) -> int:
     from dermis.human.head_file import write_person
     from dermis.scene.pose import Pose
     from dermis.scene.skin import Skin
 
     Pose(expression).motion(made.control, EXPRESSION)  # names and weights that can be
-    return write_person(output, person, made, roughness=Skin().roughness, weights=expression)
+    return write_person(output, person, made, roughness=Skin().roughness, weights=expression, eyes=eyes)
 
 
 def _report(output: Path, person: Human, made: Head, as_json: bool, **told: Any) -> None:

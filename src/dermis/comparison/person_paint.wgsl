@@ -16,8 +16,7 @@ struct Asked {
 @group(0) @binding(31) var painted: texture_storage_2d<rgba32float, write>;
 
 fn on_iris(uv: vec2f) -> vec3f {
-    let q = asked.reach_mm * (2.0 * uv - 1.0);
-    return iris_colour(asked.eye, q * min(1.0, IRIS_MM / max(length(q), 1e-3)));
+    return iris_colour(asked.eye, on_iris_at(asked.reach_mm * (2.0 * uv - 1.0)));
 }
 
 fn on_white(uv: vec2f) -> vec3f {

@@ -39,6 +39,7 @@ from dermis.frame.samples import pixel_samples
 from dermis.frame.shape import Shape
 from dermis.frame.sky import Look
 from dermis.frame.strands import StrandResources
+from dermis.frame.surface import fill_eye
 from dermis.gpu import ComputeProgram, Constants
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import PARTS
@@ -47,7 +48,6 @@ from dermis.scene.camera import Camera, Window
 from dermis.scene.settings import Settings
 
 Floats = NDArray[np.float64]
-_EYE_SEEDS = 1000  # that look different
 _MOST_MATERIALS = 64
 _PARTS = {"all": (1.0, 1.0), "diffuse": (1.0, 0.0), "specular": (0.0, 1.0)}  # from below, off the surface
 
@@ -217,9 +217,7 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Sp
         jitter=jitter,
     )
     if head.eyes is not None:
-        for name in ("eumelanin", "pupil_mm", "redness"):
-            record["eyes"][name] = getattr(head.eyes.look, name)
-        record["eyes"]["seed"] = head.eyes.look.seed % _EYE_SEEDS
+        fill_eye(record["eyes"], head.eyes.look)
         record["eyes"]["material"] = head.eyes.material
         record["eyes"]["middle_mm"] = head.eyes.middle_mm
     return record

@@ -6,10 +6,18 @@ from dataclasses import fields, replace
 
 from dermis.errors import refuse
 from dermis.frame.passes.painting import paint
+from dermis.frame.passes.painting.eye_pictures import eye_pictures
 from dermis.gpu import Device
 from dermis.human.skin.painted import PaintedMaps
 from dermis.human.skin.surface import painting
+from dermis.mesh.eye_layout import EyePictures
 from dermis.mesh.head import Head
+
+
+def painted_head(device: Device, head: Head, side: int) -> tuple[Head, EyePictures | None]:
+    """The head `with_painted_maps`, and what its eyes look like, if they are of true shape."""
+    eyes = None if head.eyes is None else eye_pictures(device, head.eyes.look)
+    return with_painted_maps(device, head, side), eyes
 
 
 def with_painted_maps(device: Device, head: Head, side: int) -> Head:

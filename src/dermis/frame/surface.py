@@ -11,6 +11,7 @@ from dermis.gpu.shader_types import struct_dtype
 from dermis.gpu.wgsl_source import Member
 from dermis.human import teeth
 from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_mm
+from dermis.mesh.eyes import EyeLook
 from dermis.mesh.maps import Maps
 from dermis.optics.directions import directions
 from dermis.optics.gaussians import GaussianSum
@@ -22,6 +23,7 @@ from dermis.specular.models import MODELS
 
 DEFAULT_COLOUR = 0.8
 """Albedo of heads without a colour map."""
+_EYE_SEEDS = 1000  # that look different
 _NO_BAND = -1.0
 
 
@@ -55,6 +57,13 @@ def eye_numbers() -> dict[str, float]:
         "bite": teeth.BITE,
         "middle": teeth.MIDDLE,
     }
+
+
+def fill_eye(record: Any, look: EyeLook) -> None:
+    """Tell a shader's `Eye`, or some of them, what eyes look like."""
+    for name in ("eumelanin", "pupil_mm", "redness"):
+        record[name] = getattr(look, name)
+    record["seed"] = look.seed % _EYE_SEEDS
 
 
 def constants(skin: Skin) -> tuple[tuple[str, int], ...]:

@@ -11,21 +11,30 @@ from numpy.typing import NDArray
 from dermis.atlas.build import SMALLEST, build_atlas
 from dermis.human.person import Human
 from dermis.human.person_file import numbers_of
+from dermis.mesh.eye_layout import EyePictures
 from dermis.mesh.gltf.write import encode_head
 from dermis.mesh.head import Head
 from dermis.outputs import replacing
 
 
 def write_person(
-    path: Path, person: Human, head: Head, *, roughness: float, weights: Mapping[str, float] | None = None
+    path: Path,
+    person: Human,
+    head: Head,
+    *,
+    roughness: float,
+    weights: Mapping[str, float] | None = None,
+    eyes: EyePictures | None = None,
 ) -> int:
     """Write a person's head as a .glb file, whole or not at all; its length [byte].
 
     roughness : Beckmann's m of skin without a map of it [-]
     weights : of expressions with which the file rests
+    eyes : what its eyes look like; of one colour where None
     """
     notes = {"person": numbers_of(person)}
-    data = encode_head(head, roughness=roughness, weights=weights, slopes=_relief(head), notes=notes)
+    told = {"weights": weights, "slopes": _relief(head), "notes": notes, "eyes": eyes}
+    data = encode_head(head, roughness=roughness, **told)
     with replacing(path) as trial:
         trial.write_bytes(data)
     return len(data)

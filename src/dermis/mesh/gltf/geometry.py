@@ -85,7 +85,8 @@ class _Reader:
     def _mesh(self, mesh: Tree, node: int | None) -> Iterator[Part]:
         names = target_names(mesh)
         for primitive in mesh["primitives"]:
-            if primitive.get("mode", _TRIANGLES) in (_TRIANGLES, _STRIP, _FAN):
+            drawn = primitive.get("mode", _TRIANGLES) in (_TRIANGLES, _STRIP, _FAN)
+            if drawn and _told(primitive).get("hair") is not True:
                 yield self._part(mesh, names, primitive, node)
 
     def _part(self, mesh: Tree, names: tuple[str, ...], primitive: Tree, node: int | None) -> Part:
@@ -119,9 +120,7 @@ class _Reader:
         if moved is not positions:
             normals = None  # they belong to another shape
         triangles = self._triangles(primitive, len(positions))
-        extras = primitive.get("extras")
-        told = extras.get("dermis") if isinstance(extras, dict) else None
-        own = told if isinstance(told, dict) else {}
+        own = _told(primitive)
         sides = np.full(len(triangles) // 2 if own.get("quads") is True else 0, 4)
         return Part(
             self._group(mesh, primitive),
@@ -155,6 +154,13 @@ class _Reader:
         names = tuple(str(thing["name"]) for thing in (material, mesh) if thing.get("name"))
         factor = material.get("pbrMetallicRoughness", {}).get("baseColorFactor")
         return Group(names, colour_of(factor) if factor else GREY)
+
+
+def _told(primitive: Tree) -> Tree:
+    """What this package wrote beside a primitive."""
+    extras = primitive.get("extras")
+    told = extras.get("dermis") if isinstance(extras, dict) else None
+    return told if isinstance(told, dict) else {}
 
 
 def _placed(part: Part, targets: dict[str, Displaced], matrix: Array) -> Part:

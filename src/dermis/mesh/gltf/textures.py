@@ -10,12 +10,19 @@ from numpy.typing import NDArray
 
 from dermis.images.codecs import encode_png
 from dermis.images.colour import encode_srgb8
+from dermis.mesh.eye_layout import EyePictures
 from dermis.mesh.maps import Maps
 from dermis.mesh.mesh import Material
+from dermis.specular.hair import ETA
 
 Floats = NDArray[np.float32]
 
 _IOR = {"KHR_materials_ior": {"ior": 1.4}}
+EYE, EYE_NORMAL = "eye", "eye normal"
+"""Names of an eye's pictures."""
+_TEARS = 0.15  # perceptual roughness of their film
+_COAT = 0.52  # of glTF's coat, which reflects 0.04 straight ahead: tears and the cornea do 0.021
+_HAIR_ROUGH = 0.45
 _ROUGH = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # perceptual roughness by a word in the name
 _ROUGH_ELSE = 0.8
 
@@ -28,7 +35,7 @@ def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, b
     found: dict[str, bytes] = {}
     roles: dict[str, Any] = {}
     if maps.colour is not None:
-        found["colour"] = encode_png(encode_srgb8(maps.colour))
+        found["colour"] = colours_png(maps.colour)
     shown = slopes if maps.normal is None else maps.normal
     if shown is not None:
         found["normal"] = encode_png(_normals(shown))
@@ -72,6 +79,38 @@ def material_of(
     if "normal" in pictures:
         told["normalTexture"] = {"index": "normal"}
     return told | {"extensions": _IOR, "extras": {"dermis": dict(roles)}}
+
+
+def eye_pictures(eyes: EyePictures) -> dict[str, bytes]:
+    """PNG files of an eyeball by name."""
+    return {EYE: colours_png(eyes.colour), EYE_NORMAL: encode_png(_bytes(0.5 * eyes.normal + 0.5))}
+
+
+def eye_material(one: Material) -> dict[str, Any]:
+    """An eyeball that is painted as seen through its cornea, whose film of tears is a coat over it.
+
+    What lies below faces otherwise than the coat, and shines by itself only where a program has none.
+    """
+    surface = _plain(one, _TEARS) | {"baseColorTexture": {"index": EYE}}
+    del surface["baseColorFactor"]
+    coat = {"clearcoatFactor": _COAT, "clearcoatRoughnessFactor": _TEARS}
+    return {
+        "name": one.name,
+        "pbrMetallicRoughness": surface,
+        "normalTexture": {"index": EYE_NORMAL},
+        "extensions": {"KHR_materials_clearcoat": coat, "KHR_materials_specular": {"specularFactor": 0.0}},
+    }
+
+
+def hair_material(name: str) -> dict[str, Any]:
+    """Hairs with a picture of their own name."""
+    surface = {"baseColorTexture": {"index": name}, "metallicFactor": 0.0, "roughnessFactor": _HAIR_ROUGH}
+    return {"name": name, "pbrMetallicRoughness": surface, "extensions": {"KHR_materials_ior": {"ior": ETA}}}
+
+
+def colours_png(linear: Floats) -> bytes:
+    """A PNG file of linear colours (h, w, 3)."""
+    return encode_png(encode_srgb8(linear))
 
 
 def _plain(one: Material, roughness: float) -> dict[str, Any]:

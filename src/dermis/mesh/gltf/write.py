@@ -9,15 +9,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.mesh.gltf.binary import CLAMPED, VERTICES, Binary, glb_bytes, placed
-from dermis.mesh.gltf.moved_points import MovedPoints, Target
-from dermis.mesh.gltf.textures import material_of, skin_pictures
+from dermis.mesh.eye_layout import EyePictures
+from dermis.mesh.gltf.binary import CLAMPED, Binary, glb_bytes, placed
+from dermis.mesh.gltf.fibres import Fibres
+from dermis.mesh.gltf.moved_points import MovedPoints
+from dermis.mesh.gltf.parts import Hairs, Part, Surface
+from dermis.mesh.gltf.textures import (
+    colours_png,
+    eye_material,
+    eye_pictures,
+    hair_material,
+    material_of,
+    skin_pictures,
+)
 from dermis.mesh.head import Head
 from dermis.mesh.skeleton import Skeleton
 
 Doubles = NDArray[np.float64]
 Tree = dict[str, Any]
 
+BROWS, HAIR = "brows and lashes", "hair"
+"""Names of the materials of hairs, and of their pictures."""
+_KNOTS = {BROWS: 5, HAIR: 4}
+_MOST_HAIRS = 12_000  # fewer stand for all, wider
 _M = 1e-3  # of a millimetre
 
 
@@ -28,34 +42,37 @@ def encode_head(
     weights: Mapping[str, float] | None = None,
     slopes: NDArray[np.float32] | None = None,
     notes: Mapping[str, Any] | None = None,
+    eyes: EyePictures | None = None,
 ) -> bytes:
     """The bytes of a .glb file: metres, a primitive for each material, morph targets, a skin of four bones.
+
+    Hairs are thin tubes, of which this package reads none back.
 
     roughness : Beckmann's m of skin without a map of it [-]
     weights : of morph targets at rest, beside the head's own
     slopes : (n, n, 2) of the relief for programs that read no height map
     notes : what goes into the file's extras
+    eyes : what its eyes look like; of one colour where None
 
     The same head gives the same bytes.
     """
     binary, points = Binary(), MovedPoints(head)
     pictures, roles = skin_pictures(head.maps, slopes)
+    parts, kinds = _parts(points, pictures, roles, roughness, eyes)
     images = [
         {"bufferView": binary.view(data), "mimeType": "image/png", "name": name}
         for name, data in pictures.items()
     ]
-    used = np.unique(head.mesh.material)
     places = {name: index for index, name in enumerate(pictures)}
-    kinds = [material_of(head.mesh.materials[k], pictures, roles, roughness) for k in used]
-    nodes, roots, skin = _nodes(head, binary)
+    nodes, roots, bound = _nodes(head, binary)
     tree = {
         "asset": _asset(head, notes),
         "extensionsUsed": sorted({name for kind in kinds for name in kind.get("extensions", {})}),
         "scene": 0,
         "scenes": [{"nodes": roots}],
         "nodes": nodes,
-        "meshes": [_mesh(head, points, binary, used, weights or {})],
-        "skins": skin,
+        "meshes": [_mesh(points, binary, parts, weights or {})],
+        "skins": bound,
         "materials": [placed(kind, places) for kind in kinds],
         "textures": [{"source": index, "sampler": 0} for index in range(len(images))],
         "samplers": [CLAMPED] if images else [],
@@ -67,6 +84,33 @@ def encode_head(
     return glb_bytes({key: value for key, value in tree.items() if value != []}, binary.data)
 
 
+def _parts(
+    points: MovedPoints,
+    pictures: dict[str, bytes],
+    roles: Mapping[str, Any],
+    roughness: float,
+    eyes: EyePictures | None,
+) -> tuple[list[Part], list[Tree]]:
+    """What becomes primitives, and the material of each; adds the pictures of eyes and hairs."""
+    head = points.head
+    painted = [] if eyes is None or head.eyes is None else head.eyes.material.tolist()
+    if eyes is not None and painted:
+        pictures |= eye_pictures(eyes)
+    parts, kinds = list[Part](), list[Tree]()
+    for kind in np.unique(head.mesh.material).tolist():
+        eye = painted.index(kind) if kind in painted else -1
+        parts.append(Surface(points, np.flatnonzero(head.mesh.material == kind), eye))
+        one = head.mesh.materials[kind]
+        kinds.append(material_of(one, pictures, roles, roughness) if eye < 0 else eye_material(one))
+    for name, strands in ((BROWS, head.strands), (HAIR, head.hair)):
+        if strands is not None and len(strands):
+            fibres = Fibres.of(strands, head.mesh, _MOST_HAIRS, _KNOTS[name])
+            parts.append(Hairs(points, fibres))
+            kinds.append(hair_material(name))
+            pictures[name] = colours_png(fibres.colours()[0])
+    return parts, kinds
+
+
 def _asset(head: Head, notes: Mapping[str, Any] | None) -> Tree:
     asset: Tree = {"version": "2.0", "generator": "dermis"}
     if head.attribution:
@@ -74,70 +118,19 @@ def _asset(head: Head, notes: Mapping[str, Any] | None) -> Tree:
     return asset | ({"extras": dict(notes)} if notes else {})
 
 
-def _mesh(
-    head: Head, points: MovedPoints, binary: Binary, used: NDArray[Any], weights: Mapping[str, float]
-) -> Tree:
-    """A primitive for each material, each with the vertices that it uses."""
-    faces = [np.flatnonzero(head.mesh.material == kind) for kind in used]
-    vertices = [np.unique(head.mesh.triangles[those]) for those in faces]
-    primitives: list[Tree] = []
-    for number, (own, those) in enumerate(zip(vertices, faces, strict=True)):
-        index = binary.triangles(np.searchsorted(own, head.mesh.triangles[those]), len(own))
-        attributes = _attributes(head, points, binary, own)
-        primitives.append({"attributes": attributes, "indices": index, "material": number})
-        kept = {"quads": _halves_of_quads(head, those), "alone": _alone(head, those)}
-        if any(kept.values()):
-            primitives[-1]["extras"] = {"dermis": {key: True for key, value in kept.items() if value}}
-    mesh: Tree = {"name": _name(head), "primitives": primitives}
+def _mesh(points: MovedPoints, binary: Binary, parts: list[Part], weights: Mapping[str, float]) -> Tree:
+    """A primitive for each part; its material has the same number."""
+    primitives = [part.primitive(binary) | {"material": number} for number, part in enumerate(parts)]
+    mesh: Tree = {"name": _name(points.head), "primitives": primitives}
     names, rest = points.rig.targets.names, points.rig.targets.rest
     if not names:
         return mesh
     for target in points.targets():
-        for primitive, own in zip(primitives, vertices, strict=True):
-            primitive.setdefault("targets", []).append(_target(binary, target, own))
+        for primitive, part in zip(primitives, parts, strict=True):
+            primitive.setdefault("targets", []).append(part.target(binary, target))
     resting = {} if rest is None else dict(zip(names, rest.tolist(), strict=True))
     told = [float({**resting, **weights}.get(name, 0.0)) for name in names]
     return mesh | {"weights": told, "extras": {"targetNames": list(names)}}
-
-
-def _attributes(head: Head, points: MovedPoints, binary: Binary, own: NDArray[Any]) -> dict[str, int]:
-    """Accessors of some vertices."""
-    found = {
-        "POSITION": binary.array(_metres(points.positions_mm[own]), VERTICES, bounded=True),
-        "NORMAL": binary.array(points.normals[own], VERTICES),
-        "TEXCOORD_0": binary.array(head.mesh.uv[own], VERTICES),
-    }
-    if points.rig.skeleton is not None:
-        bone, share = points.bones
-        found["JOINTS_0"] = binary.array(bone[own], VERTICES)
-        found["WEIGHTS_0"] = binary.array(share[own], VERTICES)
-    return found
-
-
-def _halves_of_quads(head: Head, faces: NDArray[Any]) -> bool:
-    """Whether of some triangles each two are the halves of a quad."""
-    other = np.full(len(head.mesh.triangles), -1)
-    other[head.mesh.quads[:, 0]] = head.mesh.quads[:, 1]
-    return len(faces) % 2 == 0 and bool((other[faces[::2]] == faces[1::2]).all())
-
-
-def _alone(head: Head, faces: NDArray[Any]) -> bool:
-    """Whether no other triangles have points of these."""
-    others = np.delete(np.arange(len(head.mesh.triangles)), faces)
-    own, foreign = (head.mesh.point[head.mesh.triangles[part]] for part in (faces, others))
-    return len(others) > 0 and len(np.intersect1d(own, foreign)) == 0
-
-
-def _target(binary: Binary, target: Target, own: NDArray[Any]) -> dict[str, int]:
-    """Accessors of what a target does to some vertices."""
-    here = np.flatnonzero(np.isin(target.vertex, own, assume_unique=True))
-    row = np.searchsorted(own, target.vertex[here])
-    columns = [_metres(target.delta_mm[here]), target.normal[here]]
-    return dict(zip(("POSITION", "NORMAL"), binary.displacements(row, columns, len(own)), strict=True))
-
-
-def _metres(places_mm: NDArray[np.float32]) -> NDArray[np.float32]:
-    return (places_mm.astype(np.float64) * _M).astype(np.float32)
 
 
 def _name(head: Head) -> str:
