@@ -29,9 +29,10 @@ ETA = 1.4
 ENTRIES = ("straight", "skin")
 PLACE = Path(__file__).resolve().parents[1] / "src" / "dermis" / "export" / "data" / "cycles_walk.csv"
 HEADER = """\
-# quantity: share of the light seen along the normal of a half-space that fell on it within a radius of the place seen: walks of
-#   Cycles, isotropic, of at most {most} steps, that leave an index-matched surface. entry: where walks begin, "straight" down, or as
-#   RANDOM_WALK_SKIN has it: half of them diffuse, half refracted at index {eta} by facets of GGX's roughness 1. root: sqrt(1 - albedo)
+# quantity: share of the light seen along the normal of a half-space that fell on it within a radius of the
+#   place seen: walks of Cycles, isotropic, of at most {most} steps, that leave an index-matched surface.
+#   entry: where walks begin, "straight" down, or as RANDOM_WALK_SKIN has it: half of them diffuse, half
+#   refracted at index {eta} by facets of GGX's roughness 1. root: sqrt(1 - albedo of single scattering)
 # unit: radius in mean free paths; within: dimensionless
 # source: {photons} photons an entry, counted by tools/cycles_walk.py (seed 7)
 # licence: Apache-2.0
@@ -84,7 +85,9 @@ def main() -> None:
         _walks(photons, entry == "skin", powers, RADII, words, found)
         within = np.cumsum(found, axis=1)[:, 1:-1] / photons
         for root, row in zip(ROOTS, within, strict=True):
-            lines += [f"{entry},{root:g},{r:.5g},{share:.5f}" for r, share in zip(RADII[1:], row, strict=True)]
+            lines += [
+                f"{entry},{root:g},{r:.5g},{share:.5f}" for r, share in zip(RADII[1:], row, strict=True)
+            ]
     header = HEADER.format(photons=f"{photons:,}", most=MOST, eta=ETA)
     PLACE.write_text(header + "\n".join(lines) + "\n", encoding="utf-8")
 

@@ -16,7 +16,8 @@ from typing import Any
 import bmesh  # type: ignore[import-not-found,unused-ignore]
 import bpy  # type: ignore[import-not-found,unused-ignore]
 import numpy as np
-from mathutils import Matrix  # type: ignore[import-not-found,unused-ignore]
+
+from dermis.reference.cycles_script import add_light, add_object, set_camera, set_world
 
 DESCRIBED: dict[str, Any] = {}
 
@@ -55,8 +56,8 @@ def check_version() -> None:
     if now < tuple(least) or (below is not None and now >= tuple(below)):
         until = "" if below is None else f" and before {below[0]}.{below[1]}"
         raise SystemExit(
-            f"this file: expected Blender from {least[0]}.{least[1]}{until}, but {now[0]}.{now[1]} runs it. Export "
-            f"it again with --version {now[0]}.{now[1]}: the subsurface radius means something else there."
+            f"this file: expected Blender from {least[0]}.{least[1]}{until}, but {now[0]}.{now[1]} runs it. "
+            f"Export it again with --version {now[0]}.{now[1]}: the radius means something else there."
         )
 
 
@@ -148,9 +149,6 @@ def finish(asked: argparse.Namespace) -> None:
         scene.render.image_settings.color_depth = "32" if linear else "8"
         scene.render.filepath = str(asked.render.resolve())
         bpy.ops.render.render(write_still=True)
-
-
-# BORROWED
 
 
 if __name__ == "__main__":
