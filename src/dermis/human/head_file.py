@@ -33,14 +33,14 @@ def write_person(
     eyes : what its eyes look like; of one colour where None
     """
     notes = {"person": numbers_of(person)}
-    told = {"weights": weights, "slopes": _relief(head), "notes": notes, "eyes": eyes}
+    told = {"weights": weights, "slopes": relief(head), "notes": notes, "eyes": eyes}
     data = encode_head(head, roughness=roughness, **told)
     with replacing(path) as trial:
         trial.write_bytes(data)
     return len(data)
 
 
-def _relief(head: Head) -> NDArray[np.float32] | None:
+def relief(head: Head) -> NDArray[np.float32] | None:
     """(n, n, 2) rise of a height map to the right and upwards, if other programs need it [-]."""
     height = head.maps.height
     if head.maps.normal is not None or height is None:

@@ -112,11 +112,19 @@ def make_skin() -> Any:
 
 
 def set_skin(shader: Any) -> None:
-    """Subsurface scattering and the surface's strength; maps stay as they are."""
+    """Subsurface scattering and the surface's strength; maps stay, the roughness for Blender's facets."""
     if DESCRIBED["method"] != "EEVEE":
         shader.subsurface_method = DESCRIBED["method"]
     for name, value in DESCRIBED["inputs"].items():
         shader.inputs[name].default_value = value
+    rough = shader.inputs["Roughness"]
+    rough.default_value *= DESCRIBED["smoother"]
+    if rough.links:
+        tree = shader.id_data
+        factor = tree.nodes.new("ShaderNodeMath")
+        factor.operation, factor.inputs[1].default_value = "MULTIPLY", DESCRIBED["smoother"]
+        tree.links.new(rough.links[0].from_socket, factor.inputs[0])
+        tree.links.new(factor.outputs[0], rough)
 
 
 def set_render(scene: Any) -> None:
