@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import secrets
+import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -57,6 +58,51 @@ def replacing(path: str | Path) -> Iterator[Path]:
         if isinstance(fault, OSError | RuntimeError):  # OpenEXR reports a full disk as a RuntimeError
             refuse_output(path, fault)
         raise
+
+
+@contextmanager
+def replacing_folder(path: str | Path, kept: str) -> Iterator[Path]:
+    """A new empty folder beside, moved to `path` when all went well and removed when not.
+
+    kept : a file that a folder of this name has to hold if it is to be replaced; an empty one is anyway
+
+    Raises DermisError for another folder there, and for what cannot be written.
+    """
+    try:
+        target = Path(os.path.realpath(path))
+        if target.exists() and not (target.is_dir() and (_is_empty(target) or (target / kept).is_file())):
+            expected, came = f"a free name, or a folder of before that holds {kept}", "something else is there"
+            refuse(path, expected, came, "Choose another name")
+        temporary = _temporary_name(target)
+        temporary.mkdir()
+    except (OSError, ValueError) as fault:
+        refuse_output(path, fault)
+    try:
+        yield temporary
+        _move_folder(temporary, target)
+    except OSError as fault:
+        refuse_output(path, fault)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _is_empty(folder: Path) -> bool:
+    return next(folder.iterdir(), None) is None
+
+
+def _move_folder(made: Path, target: Path) -> None:
+    """In place of a folder that is there, which goes only when the new one is in its place."""
+    if not target.exists():
+        made.replace(target)
+        return
+    old = _temporary_name(target)
+    target.replace(old)
+    try:
+        made.replace(target)
+    except OSError:
+        old.replace(target)
+        raise
+    shutil.rmtree(old, ignore_errors=True)
 
 
 def refuse_output(path: str | Path, fault: Exception) -> NoReturn:

@@ -211,12 +211,16 @@ def _human(
     given: dict[str, Any] = {role: file for role, file in maps.items() if file is not None}
     loaded = load_maps(**given, height_mm=height_mm, normal_y=normal_y) if given else None
     found = levels if callable(levels) else lambda plain: levels
-    made = _person(name).head(subdivide=lambda plain: max(LEAST_OF_PEOPLE, found(plain)))
+    made = person_of(name).head(subdivide=lambda plain: max(LEAST_OF_PEOPLE, found(plain)))
     own = {role: getattr(loaded, role) for role in given}  # all others are painted
     return replace(made, name=name, maps=replace(made.maps, **own))
 
 
-def _person(name: str) -> Human:
+def person_of(name: str) -> Human:
+    """The person of a name that `is_person`: the usual one, one drawn by a seed, or that of a file.
+
+    DermisError : no such seed or file
+    """
     from dermis.human.person import Human
     from dermis.human.person_file import read_person
 

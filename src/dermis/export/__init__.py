@@ -1,0 +1,1 @@
+"""Skin for other programs: what each of them needs to be told, and how wrong it will be."""

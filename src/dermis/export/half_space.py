@@ -1,0 +1,78 @@
+"""Homogeneous half-spaces by Monte Carlo, from tables: scattering is isotropic, and lengths scale."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dermis.export.curve import Curve, between
+from dermis.optics.media import Floats
+from dermis.tables import read_rows
+
+Kind = Literal["skin", "matched", "walk"]
+"""A smooth surface of index 1.4 lit at right angles, an index-matched one, and an index-matched one that
+light enters by the cosine of all directions."""
+
+_PLAIN = ("kind", "albedo", "total")
+
+
+class _Table(NamedTuple):
+    """of all albedos: how far (m,) each is from 1 as `_scale` has it, total (m,), edges (k,), share (m, k)."""
+
+    scale: Floats
+    total: Floats
+    edges: Floats
+    share: Callable[[Floats], Floats]
+    totals: Callable[[Floats], Floats]
+
+
+def half_space(kind: Kind, albedo: ArrayLike, mfp_mm: ArrayLike) -> Curve:
+    """The curve of a half-space in three channels.
+
+    albedo : (3,) of one scattering, 0 to 1; beyond the table's 0.02 and 0.99999 as there [-]
+    mfp_mm : (3,) mean free path [mm]
+
+    Source: [Wang1995].
+    """
+    table = _table(kind)
+    place = np.clip(_scale(albedo), table.scale[0], table.scale[-1])
+    share, mfp = table.share(place), np.asarray(mfp_mm, np.float64)
+
+    def within(radius_mm: Floats) -> Floats:
+        columns = [between(radius_mm / mfp[i], table.edges, share[i, :, None])[:, 0] for i in range(3)]
+        return np.stack(columns, axis=-1)
+
+    return Curve.of(within, table.totals(place))
+
+
+def albedo_of(kind: Kind, total: ArrayLike) -> Floats:
+    """Albedos of one scattering with which half-spaces return these totals, within the table's range [-]."""
+    table = _table(kind)
+    fine = np.linspace(table.scale[0], table.scale[-1], 2000)
+    place = np.interp(np.asarray(total, np.float64), table.totals(fine)[::-1], fine[::-1])
+    return np.asarray(1.0 - place**2)
+
+
+def _scale(albedo: ArrayLike) -> Floats:
+    """Roots of what is absorbed: totals and profiles are smooth by them up to an albedo of 1."""
+    return np.sqrt(np.maximum(1.0 - np.asarray(albedo, np.float64), 0.0))
+
+
+@cache
+def _table(kind: Kind) -> _Table:
+    from scipy.interpolate import PchipInterpolator
+
+    rows = [row for row in read_rows("dermis.export", "data/half_space") if row["kind"] == kind]
+    columns = [name for name in rows[0] if name not in _PLAIN]
+    scale = _scale([float(row["albedo"]) for row in rows])
+    total = np.array([float(row["total"]) for row in rows])
+    share = np.array([[float(row[name]) for name in columns] for row in rows])
+    order = np.argsort(scale)
+    known: Any = [PchipInterpolator(scale[order], values[order], axis=0) for values in (share, total)]
+    edges = np.array([0.0, *map(float, columns)])
+    from_axis = lambda place: np.pad(known[0](place), ((0, 0), (1, 0)))  # noqa: E731
+    return _Table(scale[order], total[order], edges, from_axis, known[1])
