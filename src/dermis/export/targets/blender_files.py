@@ -10,7 +10,7 @@ import numpy as np
 
 from dermis.export.subject import BALL_MM, Subject
 from dermis.export.target import Rows
-from dermis.export.targets.blender_scene import PANORAMA, M, skin_slots, surroundings
+from dermis.export.targets.blender_scene import PANORAMA, M, before_ball, skin_slots, surroundings
 from dermis.export.targets.blender_text import script_text
 from dermis.mesh.head import Head
 from dermis.reference.blender_process import Errand, blender_python, run_blender
@@ -73,7 +73,11 @@ def _described(subject: Subject, rows: Rows, method: str, versions: Any) -> dict
 def _write(subject: Subject, described: dict[str, Any], script: Path, head: str) -> list[Path]:
     """The script and what it reads from beside it."""
     files = [script]
-    around, panorama = surroundings(subject.scene or Scene(subject.shape))
+    scene = subject.scene
+    if scene is None:
+        around, panorama = surroundings(before_ball(subject.shape), np.zeros(3))
+    else:
+        around, panorama = surroundings(scene, scene.head.centre_mm)
     told = described | around
     if subject.head is not None:
         told["head"] = head

@@ -11,6 +11,7 @@ from dermis.mesh.head import Head
 from dermis.reference.cycles_scene import camera_of
 from dermis.reference.described import UNIT_MM, world
 from dermis.reference.lights import lamp
+from dermis.scene.camera import Camera
 from dermis.scene.model import Scene
 
 Floats = NDArray[np.float64]
@@ -19,15 +20,23 @@ M = 1e-3
 PANORAMA = "panorama.npy"
 _UNIT_M = UNIT_MM * M
 _UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+_AWAY_MM, _FRAME_MM = 1100.0, 140.0  # of the camera before a ball
 _LENGTHS = ("shadow_soft_size", "size", "size_y")
 
 
-def surroundings(scene: Scene) -> tuple[dict[str, Any], NDArray[Any] | None]:
+def before_ball(ball: Head) -> Scene:
+    """Studio light and a camera before a ball."""
+    return Scene(ball, camera=Camera(position=(0.0, 0.0, _AWAY_MM), frame_mm=_FRAME_MM))
+
+
+def surroundings(scene: Scene, centre_mm: Any) -> tuple[dict[str, Any], NDArray[Any] | None]:
     """Lights, camera and world for the script, and the panorama that goes with them.
+
+    centre_mm : (3,) where they are placed around
 
     Raises DermisError for lights and cameras that Blender has not.
     """
-    centre = np.array(scene.head.centre_mm) * M
+    centre = np.array(centre_mm) * M
     lights = [_light(lamp(light, number), centre) for number, light in enumerate(scene.lights, start=1)]
     camera = camera_of(scene)
     around, panorama = world(scene.environment)

@@ -13,7 +13,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import bmesh  # type: ignore[import-not-found,unused-ignore]
 import bpy  # type: ignore[import-not-found,unused-ignore]
 import numpy as np
 
@@ -91,6 +90,8 @@ def place_head() -> None:
 
 
 def add_ball(diameter: float) -> None:
+    import bmesh  # type: ignore[import-not-found,unused-ignore]  # which is there once bpy is
+
     mesh, shape = bpy.data.meshes.new("ball"), bmesh.new()
     bmesh.ops.create_uvsphere(shape, u_segments=192, v_segments=96, radius=0.5 * diameter)
     shape.to_mesh(mesh)
