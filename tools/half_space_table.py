@@ -1,7 +1,7 @@
 """Makes src/dermis/export/data/half_space.csv: profiles of homogeneous half-spaces by Monte Carlo.
 
-python tools/half_space_table.py [PHOTONS], about ten minutes of two cores. Scattering is isotropic and lengths
-are in mean free paths, so that a profile depends on the albedo alone, the surface and how light enters.
+python tools/half_space_table.py [PHOTONS], minutes on two cores. Scattering is isotropic, and lengths are
+in mean free paths, so that a profile depends on the albedo alone, the surface and how light enters.
 """
 
 from __future__ import annotations
@@ -23,9 +23,10 @@ EDGES = np.concatenate([[0.0], np.geomspace(1e-3, 3e3, 96)])
 COUNTED = 2_000_000  # photons that leave
 MOST = 64_000_000
 HEAD = """\
-# quantity: cumulative share of the light leaving a homogeneous half-space around a thin beam, of all that leaves; total is that
-#   of what enters; kind skin has a smooth surface of index 1.4 lit at right angles, matched an index-matched one, walk an
-#   index-matched one that light enters by the cosine of all directions; albedo is that of a scattering
+# quantity: cumulative share of the light leaving a homogeneous half-space around a thin beam, of all that
+#   leaves; total is that of what enters; kind skin has a smooth surface of index 1.4 lit at right angles,
+#   matched an index-matched one, walk an index-matched one that light enters by the cosine of all
+#   directions; albedo is that of a scattering
 # unit: radii in mean free paths; shares dimensionless
 # source: tools/half_space_table.py, by the package's Monte Carlo with isotropic scattering
 # licence: Apache-2.0

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from dermis.batch.dataset import read_dataset
     from dermis.errors import DermisError
+    from dermis.export.run import export_skin
     from dermis.frame.observation import Observation
     from dermis.frame.renderer import Renderer, render
     from dermis.human.person import Human
@@ -79,6 +80,7 @@ _HOME = {
     "Pose": "scene.pose",
     "Settings": "scene.settings",
     "Skin": "scene.skin",
+    "export_skin": "export.run",
     "read_dataset": "batch.dataset",
     "view": "viewer.windows",
 }
@@ -104,6 +106,7 @@ __all__ = [
     "SpotLight",
     "StripeLight",
     "Tissue",
+    "export_skin",
     "human_targets",
     "load_head",
     "load_lights",

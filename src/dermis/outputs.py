@@ -71,19 +71,33 @@ def replacing_folder(path: str | Path, kept: str) -> Iterator[Path]:
     try:
         target = Path(os.path.realpath(path))
         if target.exists() and not (target.is_dir() and (_is_empty(target) or (target / kept).is_file())):
-            expected, came = f"a free name, or a folder of before that holds {kept}", "something else is there"
+            expected, came = (
+                f"a free name, or a folder of before that holds {kept}",
+                "something else is there",
+            )
             refuse(path, expected, came, "Choose another name")
-        temporary = _temporary_name(target)
-        temporary.mkdir()
     except (OSError, ValueError) as fault:
         refuse_output(path, fault)
-    try:
+    with folder_beside(target) as temporary:
         yield temporary
         _move_folder(temporary, target)
-    except OSError as fault:
-        refuse_output(path, fault)
+
+
+@contextmanager
+def folder_beside(target: Path) -> Iterator[Path]:
+    """A new empty folder for parts of what is to be written; whatever is left in it goes with it.
+
+    Raises DermisError when the folder cannot be made, or what is done inside cannot be written.
+    """
+    temporary = _temporary_name(target).with_suffix("")
+    try:
+        temporary.mkdir()
+        yield temporary
+    except (OSError, ValueError) as fault:
+        refuse_output(target, fault)
     finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+        with suppress(OSError):
+            shutil.rmtree(temporary, ignore_errors=True)
 
 
 def _is_empty(folder: Path) -> bool:

@@ -14,6 +14,7 @@ COMMANDS = {
     "view": "Turn a head, its skin and its light in a window or a web page.",
     "profile": "Compute how light spreads below a skin, and fit Gaussians to it.",
     "head": "Make a person of the parametric human and write it as glTF.",
+    "export": "Write a skin or a head for another program, and say how wrong it will be there.",
     "lights": "Print a rig of lights as a file to start from.",
     "compare": "Compare techniques with the truth, or the models of the surface.",
     "gallery": "Draw every comparison of the talk, and a page that explains them.",

@@ -21,7 +21,7 @@ _PLAIN = ("kind", "albedo", "total")
 
 
 class _Table(NamedTuple):
-    """of all albedos: how far (m,) each is from 1 as `_scale` has it, total (m,), edges (k,), share (m, k)."""
+    """By how far an albedo is from 1, as `_scale` has it (m,): totals, and shares within the edges (k,)."""
 
     scale: Floats
     total: Floats

@@ -13,5 +13,9 @@ if TYPE_CHECKING:
 
 TARGETS: Registry[Target] = Registry(
     "target",
-    {one.name: f"{home.__name__}.{one.name}:TARGET" for one in iter_modules(home.__path__) if "_" not in one.name},
+    {
+        one.name: f"{home.__name__}.{one.name}:TARGET"
+        for one in iter_modules(home.__path__)
+        if "_" not in one.name
+    },
 )

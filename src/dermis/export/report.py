@@ -77,12 +77,12 @@ class Report:
         head = f"{self.subject}, profile by {self.model}, for {what}"
         lines = [head, *(["not run: written by its manual"] if self.not_run else []), "", *_table(self.rows)]
         if naive:
-            lines += ["", "what one would type without knowing", *_table(self.naive_rows)]
+            lines += ["", "what one would type", *_table(self.naive_rows)]
         lines += ["", f"{'':12}" + "".join(f"{name:>9}" for name in _CHANNELS)]
         lines.append(f"{'d [mm]':12}{_numbers(self.d_mm)}  of the nearest lobe")
         for name, told in _ERRORS.items():
             lines.append(f"{name:12}{_numbers(getattr(self.error, name))}  {told}")
-            lines.append(f"{'  naive':12}{_numbers(getattr(self.naive_error, name))}  as typed without knowing")
+            lines.append(f"{'  naive':12}{_numbers(getattr(self.naive_error, name))}  as one would type it")
         return [*lines, "", self.wrong]
 
     def markdown(self) -> str:

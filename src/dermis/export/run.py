@@ -18,7 +18,7 @@ from dermis.export.subject import Subject, subject_of
 from dermis.export.target import Target
 from dermis.export.textures import painted
 from dermis.export.truth import ModelName
-from dermis.outputs import check_output, replacing, replacing_folder
+from dermis.outputs import check_output, folder_beside, replacing, replacing_folder
 
 TOLD = "export.json"
 _PAGE = "README.md"
@@ -64,11 +64,10 @@ def export_skin(
     if target.needs_maps:
         subject = painted(subject, side, adapter)
     with _made(place) as inside:
+        home = inside.parent if place.suffix else inside
         files = target.write(subject, report.rows, inside, known)
-        moved = [place.parent / file.relative_to(inside.parent) for file in files] if place.suffix else [
-            place / file.relative_to(inside) for file in files
-        ]
-        report = replace(report, files=tuple(moved))
+        ends = place.parent if place.suffix else place
+        report = replace(report, files=tuple(ends / file.relative_to(home) for file in files))
         _tell(report, inside)
     return report
 
@@ -111,16 +110,26 @@ def _made(place: Path) -> Iterator[Path]:
         with replacing_folder(place, TOLD) as folder:
             yield folder
         return
-    with replacing_folder(place.with_name(f".{place.name}.parts"), TOLD) as folder:
+    with folder_beside(place) as folder:
         yield folder / place.name
-        for file in sorted(folder.iterdir()):
-            with replacing(place.with_name(file.name)) as trial:
-                file.replace(trial)
+        for part in sorted(folder.iterdir(), key=lambda part: part.name == place.name):  # it comes last
+            _move(part, place.with_name(part.name))
+
+
+def _move(part: Path, end: Path) -> None:
+    if part.is_dir():
+        with replacing_folder(end, TOLD) as folder:
+            folder.rmdir()
+            part.replace(folder)
+        return
+    with replacing(end) as trial:
+        part.replace(trial)
 
 
 def _tell(report: Report, inside: Path) -> None:
     """The page and the numbers, in the folder or beside the file."""
     single = bool(inside.suffix)
-    page, told = (inside.with_suffix(".md"), inside.with_suffix(".json")) if single else (inside / _PAGE, inside / TOLD)
+    page = inside.with_name(f"{inside.name}.md") if single else inside / _PAGE
+    told = inside.with_name(f"{inside.name}.json") if single else inside / TOLD
     page.write_text(report.markdown(), encoding="utf-8")
     told.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")

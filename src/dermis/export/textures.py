@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.export.subject import Subject
 from dermis.images.colour import encode_srgb8
@@ -30,7 +32,7 @@ def painted(subject: Subject, side: int, adapter: str) -> Subject:
 
 
 def write_maps(subject: Subject, folder: Path, stem: str = "") -> Files:
-    """The maps that a head has, as PNG, by role: colour (sRGB), normal (green up), roughness, specular (grey).
+    """The maps that a head has, as PNG, by role: colour (sRGB), normal (green up), grey ones.
 
     stem : what their names begin with, such as "skin_"
     """
@@ -45,7 +47,7 @@ def write_maps(subject: Subject, folder: Path, stem: str = "") -> Files:
     return written
 
 
-def _pictures(maps: Maps) -> dict[str, np.ndarray]:  # type: ignore[type-arg]
+def _pictures(maps: Maps) -> dict[str, NDArray[Any]]:
     found = {}
     if maps.colour is not None:
         found["colour"] = encode_srgb8(maps.colour)
@@ -59,5 +61,5 @@ def _pictures(maps: Maps) -> dict[str, np.ndarray]:  # type: ignore[type-arg]
     return found
 
 
-def _levels(values: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+def _levels(values: NDArray[Any]) -> NDArray[np.uint8]:
     return np.asarray(np.rint(255.0 * np.clip(values, 0.0, 1.0)), np.uint8)

@@ -1,0 +1,87 @@
+"""`dermis export`: a skin or a head for another program, with how wrong it will be there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from dermis.cli.console import print_json, print_lines, working_on
+from dermis.cli.head_options import HeadOptions, check_head
+from dermis.cli.options import NOTHING, Adapter, Json, given
+from dermis.export.registry import TARGETS
+
+if TYPE_CHECKING:
+    TargetName = str
+else:
+    TargetName = Annotated[str, Parameter(help=f"Program to write for: {', '.join(TARGETS)}.")]
+
+Model = Literal["montecarlo", "layered", "multipole", "dipole", "better-dipole"]
+
+
+def export(
+    what: str,
+    /,
+    *,
+    to: TargetName,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))],
+    version: str | None = None,
+    variant: str | None = None,
+    model: Model | None = None,
+    profile: str | None = None,
+    map_side: int = 2048,
+    head: HeadOptions = NOTHING,
+    adapter: Adapter = "auto",
+    naive: Annotated[bool, Parameter(negative="", show_default=False)] = False,
+    as_json: Json = False,
+) -> int:
+    """Write a skin or a head for another program, and say how wrong it will be there.
+
+    The true profile is fitted with what the program can show, by the program's own formulas, and the
+    differences are stated: of light within a radius, beside a shadow's edge, and in all.
+
+    Examples:
+
+        dermis export skin1 --to unity -o skin1.asset
+
+        dermis export dj3 --to unreal --naive -o dj3
+
+        dermis export human:7 --to unity -o person
+
+        dermis export head.glb --profile medium --to unity --version 14 -o head --json
+
+    Parameters
+    ----------
+    what:
+        A skin (skin1, dj3, medium, gpu-gems-3 ..., a .toml or .csv file), or a head: human, human:7, a
+        person's .json, a sample, or a file.
+    output:
+        File to write, or a folder that is made where the name has no suffix. A table of parameters, meanings
+        and errors is written beside it, as a page and as JSON.
+    version:
+        Of the program [the newest that is known].
+    variant:
+        Of what the program can do, such as a method of scattering [its first].
+    model:
+        What the true profile is by [montecarlo for one layer without end, layered for others].
+    profile:
+        Skin of a head [a person's own pigments, or gpu-gems-3].
+    map_side:
+        Of maps that are painted, a power of two from 256 to 4096 [texels].
+    adapter:
+        Which adapter paints maps: auto, cpu or part of a name.
+    naive:
+        Also print what one would type without knowing what the numbers mean there.
+    """
+    from dermis.export.run import export_skin
+
+    check_head(what, head)
+    told: dict[str, Any] = given(version=version, variant=variant, model=model, profile=profile)
+    with working_on(f"exporting {what}"):
+        report = export_skin(what, to, output, side=map_side, adapter=adapter, **told, **head)
+    if as_json:
+        print_json(report.as_json())
+    else:
+        print_lines(*report.lines(naive), "", *map(str, report.files))
+    return 0
