@@ -16,6 +16,9 @@ from dermis.mesh.gltf.write import encode_head
 from dermis.mesh.head import Head
 from dermis.outputs import replacing
 
+_STRETCH = 1024
+"""Side of the atlas that tells how long texels are, which changes little from one to the next."""
+
 
 def write_person(
     path: Path,
@@ -49,5 +52,9 @@ def relief(head: Head) -> NDArray[np.float32] | None:
     if side != height.shape[1] or side < SMALLEST:
         return None
     down, right = np.gradient(height)
-    stretch = build_atlas(head.mesh, side).stretch.astype(np.float32)
+    coarse = max(SMALLEST, min(side, _STRETCH))
+    stretch = build_atlas(head.mesh, coarse).stretch.astype(np.float32)
+    if side > coarse:
+        places = np.arange(side) * coarse // side
+        stretch = stretch[places][:, places] * np.float32(side / coarse)
     return np.asarray(np.stack([right, -down], axis=-1) * stretch, np.float32)

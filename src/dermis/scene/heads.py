@@ -15,6 +15,7 @@ from dermis.mesh.check import check_head_height
 from dermis.mesh.eyes import EyeLook
 from dermis.mesh.fitted_eyes.fit import with_fitted_eyes
 from dermis.mesh.formats import is_gltf
+from dermis.mesh.gltf.notes import told_eyes
 from dermis.mesh.gltf.pictures import embedded_maps
 from dermis.mesh.head import Head
 from dermis.mesh.load import load_rigged
@@ -99,7 +100,7 @@ def load_head(
     told |= {"opaque": tuple(opaque), "eye_groups": tuple(eye_groups)}
     if is_person(name):
         return _with_look(_human(name, own, height_mm, normal_y, told | {"eyes": eyes}, levels), eye)
-    sample, files = SAMPLES.get(name), dict[str, Any]()
+    sample, files, look = SAMPLES.get(name), dict[str, Any](), dict[str, Any]()
     if sample is not None:
         _check_kind(sample)
         files = fetch(name)
@@ -110,7 +111,7 @@ def load_head(
     elif not is_file(path):
         _refuse_name(name)
     elif is_gltf(path):
-        files = embedded_maps(path)
+        files, look = embedded_maps(path), told_eyes(path)
     chosen = _chosen(own, files)
     if height is None and height_mm is None:
         height_mm = files.get("height_mm")
@@ -126,7 +127,8 @@ def load_head(
     thanks = f"{sample.attribution}, {sample.licence}" if sample else ""
     made = _subdivided(Head(name, rigged.mesh, maps, thanks, rigged.rig), levels)
     made = with_usual_regions(made) if regions == AUTO else made
-    return _with_look(with_fitted_eyes(made, rigged.mesh) if eyes == "fitted" else made, eye)
+    made = with_fitted_eyes(made, rigged.mesh) if eyes == "fitted" else made
+    return _with_look(_with_look(made, look if made.eyes else None), eye)
 
 
 def is_person(name: str) -> bool:

@@ -56,7 +56,7 @@ class Surface:
         return np.unique(self._head.mesh.triangles[self.faces])
 
     def primitive(self, binary: Binary) -> Tree:
-        """Corners and attributes; in the extras, whether its triangles are halves of quads and stand alone."""
+        """Corners and attributes; in the extras, whether triangles are halves of quads and stand alone."""
         own, mesh = self.vertices, self._head.mesh
         index = binary.triangles(np.searchsorted(own, mesh.triangles[self.faces]), len(own))
         uv = mesh.uv[own] if self.eye < 0 else self._eye_uv()

@@ -58,6 +58,7 @@ def _maps(document: Document) -> dict[str, Any]:
         found["normal"] = picture(skin.get("normalTexture"))
     else:
         found |= {role: picture(own.get(role)) for role in ROLES}
+        found["colour"] = picture(own.get("colour")) or found["colour"]
         found["height_mm"] = _relief(own.get("height_mm"))
     return {role: value for role, value in found.items() if value is not None}
 

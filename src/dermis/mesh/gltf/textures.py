@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -27,35 +29,66 @@ _ROUGH = {"eye": 0.1, "teeth": 0.3, "tongue": 0.4}  # perceptual roughness by a 
 _ROUGH_ELSE = 0.8
 
 
+@dataclass(frozen=True)
+class Added:
+    """What the material of skin has besides.
+
+    surface : members of its pbrMetallicRoughness, which then has no others for colour
+    extensions, extras : by name
+    pictures : PNG files by the names that textures in these have: {"index": name}
+    """
+
+    surface: Mapping[str, Any] = field(default_factory=dict)
+    extensions: Mapping[str, Any] = field(default_factory=dict)
+    extras: Mapping[str, Any] = field(default_factory=dict)
+    pictures: Mapping[str, bytes] = field(default_factory=dict)
+
+    def to(self, material: Mapping[str, Any]) -> dict[str, Any]:
+        """The material with it; where a picture of colours is shown no more, this package still finds it."""
+        told = dict(material) | {"extensions": {**material.get("extensions", {}), **self.extensions}}
+        surface, extras = (
+            dict(material["pbrMetallicRoughness"]),
+            {**material.get("extras", {}), **self.extras},
+        )
+        if self.surface:
+            colours = surface.pop("baseColorTexture", None)
+            surface |= self.surface
+            if colours is not None:
+                extras["dermis"] = {**extras["dermis"], "colour": colours}
+        return told | {"pbrMetallicRoughness": surface, "extras": extras}
+
+
 def skin_pictures(maps: Maps, slopes: Floats | None = None) -> tuple[dict[str, bytes], dict[str, Any]]:
     """PNG files by name, and what this package reads of them: {"index": name} by role.
 
     slopes : (n, n, 2) of the relief for other programs, where `maps` has a height map and no normals
     """
-    found: dict[str, bytes] = {}
+    found: dict[str, NDArray[Any]] = {}
     roles: dict[str, Any] = {}
     if maps.colour is not None:
-        found["colour"] = colours_png(maps.colour)
+        found["colour"] = encode_srgb8(maps.colour)
     shown = slopes if maps.normal is None else maps.normal
     if shown is not None:
-        found["normal"] = encode_png(_normals(shown))
+        found["normal"] = _normals(shown)
     if maps.normal is not None:
         roles["normal"] = {"index": "normal"}
     if maps.height is not None:
         low, span = float(maps.height.min()), float(np.ptp(maps.height)) or 1.0
         grey = np.rint((maps.height.astype(np.float64) - low) / span * 65535).astype(np.uint16)
-        found["height"], roles["height_mm"] = encode_png(grey[..., None]), span / 255
+        found["height"], roles["height_mm"] = grey[..., None], span / 255
     if maps.roughness is not None:
         perceptual = np.zeros((*maps.roughness.shape, 3), np.float32)
         perceptual[..., 1] = np.sqrt(np.clip(maps.roughness, 0.0, 1.0))
-        found["metallic roughness"] = encode_png(_bytes(perceptual))
+        found["metallic roughness"] = _bytes(perceptual)
     for role in ("specular", "roughness"):
         if (grey_map := getattr(maps, role)) is not None:
-            found[role] = encode_png(_bytes(grey_map)[..., None])
+            found[role] = _bytes(grey_map)[..., None]
     if maps.region is not None:
-        found["region"] = encode_png(maps.region[..., None])
+        found["region"] = maps.region[..., None]
     own = (role for role in ("height", "specular", "roughness", "region") if role in found)
-    return found, roles | {role: {"index": role} for role in own}
+    roles |= {role: {"index": role} for role in own}
+    with ThreadPoolExecutor() as beside:
+        return dict(zip(found, beside.map(encode_png, found.values()), strict=True)), roles
 
 
 def material_of(

@@ -15,6 +15,7 @@ from dermis.mesh.gltf.fibres import Fibres
 from dermis.mesh.gltf.moved_points import MovedPoints
 from dermis.mesh.gltf.parts import Hairs, Part, Surface
 from dermis.mesh.gltf.textures import (
+    Added,
     colours_png,
     eye_material,
     eye_pictures,
@@ -43,6 +44,7 @@ def encode_head(
     slopes: NDArray[np.float32] | None = None,
     notes: Mapping[str, Any] | None = None,
     eyes: EyePictures | None = None,
+    added: Added | None = None,
 ) -> bytes:
     """The bytes of a .glb file: metres, a primitive for each material, morph targets, a skin of four bones.
 
@@ -53,12 +55,16 @@ def encode_head(
     slopes : (n, n, 2) of the relief for programs that read no height map
     notes : what goes into the file's extras
     eyes : what its eyes look like; of one colour where None
+    added : to the materials of skin
 
     The same head gives the same bytes.
     """
     binary, points = Binary(), MovedPoints(head)
     pictures, roles = skin_pictures(head.maps, slopes)
+    pictures |= {} if added is None else added.pictures
     parts, kinds = _parts(points, pictures, roles, roughness, eyes)
+    if added is not None:
+        kinds = [added.to(kind) if "dermis" in kind.get("extras", {}) else kind for kind in kinds]
     images = [
         {"bufferView": binary.view(data), "mimeType": "image/png", "name": name}
         for name, data in pictures.items()

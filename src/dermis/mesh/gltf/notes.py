@@ -1,0 +1,28 @@
+"""What this package wrote into a glTF file for itself."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from dermis.errors import about
+from dermis.mesh.eyes import EyeLook
+from dermis.mesh.gltf.document import read_document
+from dermis.reading import BROKEN, understood
+
+
+def told_eyes(path: Path) -> dict[str, Any]:
+    """Fields of `EyeLook` that a .glb or .gltf file tells of its person; {} for others.
+
+    Raises DermisError for such that no eyes can have.
+    """
+    notes = read_document(path).tree.get("asset", {}).get("extras")
+    person = notes.get("person") if isinstance(notes, dict) else None
+    eyes = person.get("eyes") if isinstance(person, dict) else None
+    if not isinstance(eyes, dict):
+        return {}
+    told = {one.name: eyes[one.name] for one in fields(EyeLook) if one.name in eyes}
+    with about(path), understood(path, "sound numbers of eyes", *BROKEN):
+        EyeLook(**told)
+    return told
