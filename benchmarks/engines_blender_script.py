@@ -44,9 +44,18 @@ def main(folder: Path) -> None:
     scene.camera = placed
     skin.set_render(scene)
     asked = json.loads((folder / "passes.json").read_text(encoding="utf-8"))
-    columns = [columns_of(skin, camera, folder / f"{k}.exr", **one) for k, one in enumerate(asked)]
+    columns = []
+    for k, one in enumerate(asked):
+        show_channel(shader, skin.DESCRIBED, one.pop("channel"))
+        columns.append(columns_of(skin, camera, folder / f"{k}.exr", **one))
     done = {"version": bpy.app.version_string, "columns": columns}
     (folder / "done.json").write_text(json.dumps(done), encoding="utf-8")
+
+
+def show_channel(shader: Any, described: dict[str, Any], channel: int) -> None:
+    """Give all three channels the colour and the radius of one: paths then all serve it."""
+    shader.inputs["Base Color"].default_value = (*[described["colour"][channel]] * 3, 1.0)
+    shader.inputs["Subsurface Radius"].default_value = [described["inputs"]["Subsurface Radius"][channel]] * 3
 
 
 def rectangle(skin: Any, material: Any, left: float, right: float, height: float) -> Any:

@@ -1,4 +1,4 @@
-"""Blender: a script that builds the skin's material, the head, its lights and the camera, or a .blend of it."""
+"""Blender: a script that builds the skin's material, the head, its lights and camera, or a .blend of it."""
 
 from __future__ import annotations
 
@@ -62,18 +62,21 @@ class Blender(Target):
     title = "Blender"
     suffixes = ("", ".py", ".blend")
     versions = ("4.5", "5.0", "5.1", "5.2")
-    variants = ("random-walk", "random-walk-skin", "burley", "eevee")
+    variants = ("random-walk-skin", "random-walk", "burley", "eevee")
     needs_maps = True
     wrong = (
-        "Walks return 4 to 21 % less than the base colour to a camera before the skin, and more to one beside it; Burley's "
-        "profile knows no thin parts. All have one scattering layer, which holds no layered red."
+        "Walks return less than the base colour to a camera before the skin, and more to one beside it;"
+        " Burley's profile knows no thin parts. All scatter in one layer, which holds no layered red."
+        " EEVEE was not run."
     )
 
     def parameters(self, subject: Subject, version: str) -> Rows:
         """The radius whose curve lies nearest to the true one, by the method's own map of it."""
         units = self._units(subject, version)
         fitted = np.array([fit_length(subject.curve, channel, unit) for channel, unit in enumerate(units)])
-        return self._rows(tuple(round(float(x), 5) for x in fitted / self._lengths(subject, version)), version)
+        return self._rows(
+            tuple(round(float(x), 5) for x in fitted / self._lengths(subject, version)), version
+        )
 
     def naive(self, subject: Subject, version: str) -> Rows:
         """Published diffuse mean free paths of skin as the radius."""
@@ -99,7 +102,7 @@ class Blender(Target):
         return write_scene(subject, rows, place, method, self._holds(version))
 
     def _holds(self, version: str) -> list[Any]:
-        """The first version that the numbers hold for, and the first that they no longer hold for, or None."""
+        """The first version that the numbers hold for, and the first that they do not hold for, or None."""
         if self.variant != "random-walk":
             return [list(_FIRST), None]
         return [list(_MET), None] if _met(version) else [list(_FIRST), list(_MET)]

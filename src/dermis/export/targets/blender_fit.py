@@ -11,7 +11,10 @@ from dermis.optics.media import Floats
 
 _LEAST, _MOST, _NODES = 1e-2, 60.0, 400  # radii that a fit is judged at, by the true median
 _KNOWN = np.geomspace(1e-4, 1e4, 2000)
-_SPAN, _EXACT = 2.0, 1e-4  # logarithms of lengths: around the one of the same median, and as far as they matter
+_SPAN, _EXACT = (
+    2.0,
+    1e-4,
+)  # logarithms of lengths: around the one of the same median, and as far as they matter
 
 
 def fit_length(curve: Curve, channel: int, within: Callable[[Floats], Floats]) -> float:
