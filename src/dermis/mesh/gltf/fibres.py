@@ -53,7 +53,7 @@ class Fibres:
 
     @property
     def _knots(self) -> int:
-        return self.strands.knots_mm.shape[1]
+        return int(self.strands.knots_mm.shape[1])
 
     @property
     def each(self) -> int:
@@ -130,8 +130,8 @@ class Fibres:
         order = np.argsort(albedo.sum(axis=1), kind="stable")
         group = np.empty(len(order), np.int64)
         group[order] = np.arange(len(order)) * COLOURS // len(order)
-        row = np.stack([np.bincount(group, albedo[:, c], COLOURS) for c in range(3)], axis=-1)
-        row /= np.maximum(np.bincount(group, minlength=COLOURS), 1)[:, None]
+        sums = np.stack([np.bincount(group, albedo[:, c], COLOURS) for c in range(3)], axis=-1)
+        row = sums / np.maximum(np.bincount(group, minlength=COLOURS), 1)[:, None]
         u = np.repeat((group + 0.5) / COLOURS, self.each)
         return row[None].astype(np.float32), np.stack([u, np.full_like(u, 0.5)], axis=1).astype(np.float32)
 
