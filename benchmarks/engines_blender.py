@@ -1,8 +1,9 @@
 """Skin exported to Blender, measured in Cycles itself: writes benchmarks/results/engines_blender.json.
 
-    python benchmarks/engines_blender.py PYTHON_OF_4.5 PYTHON_OF_5.2   # edges, then heads; half an hour
+    python benchmarks/engines_blender.py PYTHON_OF_4.5 PYTHON_OF_5.2 [edges|heads|picture]   # half an hour
 
-Each PYTHON is one with the module bpy of that version.
+Each PYTHON is one with the module bpy of that version. A part that is named is measured alone, and the others
+stay as they were written.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from engines_blender_head import heads
+from engines_blender_head import heads, picture
 
 from dermis.export.lobe import fit_d
 from dermis.export.subject import subject_of
@@ -36,11 +37,17 @@ ERRAND = Errand("Cycles", "to render a half-lit plane", "See what it said")
 def main() -> None:
     """Measure with both and write the results."""
     pythons = {version: Path(path) for version, path in zip(("4.5", "5.2"), sys.argv[1:3], strict=True)}
-    found: dict[str, Any] = {"columns_in_d": columns().reshape(BINS, EACH).mean(axis=1).tolist()}
-    found["edges"] = list(edges(pythons))
-    save(found)
-    found["heads"] = heads(pythons)
-    save(found)
+    parts = sys.argv[3:] or ["edges", "heads", "picture"]
+    found: dict[str, Any] = json.loads(RESULTS.read_text("utf-8")) if RESULTS.exists() else {}
+    found["columns_in_d"] = columns().reshape(BINS, EACH).mean(axis=1).tolist()
+    if "edges" in parts:
+        found["edges"] = list(edges(pythons))
+        save(found)
+    if "heads" in parts:
+        found["heads"] = list(heads(pythons))
+        save(found)
+    if "picture" in parts:
+        picture(pythons)
 
 
 def save(found: dict[str, Any]) -> None:

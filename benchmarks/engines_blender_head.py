@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,27 +22,25 @@ from dermis.reference.metrics import relative_rmse
 from dermis.scene.settings import Settings
 
 PICTURE = Path(__file__).parent.parent / "docs" / "images" / "engines_blender.webp"
-SIDE, SAMPLES, SEEDS = 256, 64, 2
-SHOWN, SHOWN_SAMPLES = 512, 256
+SIDE, SAMPLES, SEEDS = 256, 32, 2
+SHOWN, SHOWN_SAMPLES = 384, 128
 METHODS = "random-walk-skin", "random-walk", "burley"
 LIT = 0.25  # of the mean: what is darker lies in shadow
 Floats = np.ndarray[Any, Any]
 
 
-def heads(pythons: dict[str, Path]) -> list[dict[str, Any]]:
+def heads(pythons: dict[str, Path]) -> Iterator[dict[str, Any]]:
     """Without hair, which both draw by other means: outlines and colours of each method and version."""
     subject = subject_of("human")
     assert subject.head is not None
     bald = subject.with_head(replace(subject.head, hair=None, strands=None))
     ours = drawn(bald, SIDE)
-    found = []
     for version, python in pythons.items():
         for method in METHODS:
             pictures = rendered(bald, method, version, python, SIDE, SAMPLES, SEEDS)
-            found.append({"version": version, "method": method, **compared(ours, np.stack(pictures))})
-            print(version, method, found[-1], flush=True)  # noqa: T201
-    picture(subject, pythons)
-    return found
+            found = {"version": version, "method": method, **compared(ours, np.stack(pictures))}
+            print(found, flush=True)  # noqa: T201
+            yield found
 
 
 def drawn(subject: Subject, side: int) -> Floats:
@@ -91,8 +90,9 @@ def compared(ours: Floats, theirs: Floats) -> dict[str, Any]:
     }
 
 
-def picture(subject: Subject, pythons: dict[str, Path]) -> None:
+def picture(pythons: dict[str, Path]) -> None:
     """Ours beside Cycles of each version, with hair."""
+    subject = subject_of("human")
     seen = [drawn(subject, SHOWN)]
     for version, python in pythons.items():
         seen += rendered(subject, METHODS[0], version, python, SHOWN, SHOWN_SAMPLES, 1)

@@ -94,7 +94,7 @@ def _glb(head: Head, scene: Scene | None) -> bytes:
     """The head with all that moves it, its eyes and its hairs."""
     from dermis.frame.passes.painting.eye_pictures import eye_pictures
     from dermis.gpu.failures import on_device
-    from dermis.human.head_file import relief
+    from dermis.human.head_file import relief_slopes
     from dermis.mesh.gltf.write import encode_head
 
     assert scene is not None
@@ -102,7 +102,7 @@ def _glb(head: Head, scene: Scene | None) -> bytes:
     pictures = None if eyes is None else on_device("auto", lambda device: eye_pictures(device, eyes.look))
     weights = {} if pose is None else dict(pose.weights)
     rough = scene.skin.roughness
-    return encode_head(head, roughness=rough, weights=weights, slopes=relief(head), eyes=pictures)
+    return encode_head(head, roughness=rough, weights=weights, slopes=relief_slopes(head), eyes=pictures)
 
 
 def _plain(value: Any) -> Any:
