@@ -22,7 +22,7 @@ VERSION = TARGET.versions[-1]
 
 
 def figures_of(name: str) -> dict[str, Any]:
-    """Of a skin: what was fitted, and the differences of it, of what one would type, and of A as the colour."""
+    """Of a skin: what was fitted, and the differences of it, of what one types, and of A as the colour."""
     subject = subject_of(name)
     volume = fitted(subject.curve, subject.albedo)
     coloured = walked(volume._replace(multiscatter=subject.curve.energy))
