@@ -37,6 +37,7 @@ MAPS: Mapping[str, MapKind] = {
     "roughness": MapKind("float", "", "raw"),
     "specular": MapKind("float", "", "raw"),
     "normal": MapKind("vector3", "", "raw"),
+    "eye": MapKind("color3", "srgb_texture", "sRGB"),
 }
 INPUTS: Mapping[str, str] = {
     "colour": "subsurface_color",
@@ -102,6 +103,12 @@ def plain_look(one: Material) -> Look:
     )
 
 
+def eye_look(name: str) -> Look:
+    """Of an eyeball with a map of its colour."""
+    wet: dict[str, Value] = {"specular_roughness": _ROUGH["eye"], "specular_ior": _EYE_IOR}
+    return Look(name, wet, {"base_color": "eye"})
+
+
 def hair_look(absorption: Floats, radius_mm: float) -> Look:
     """Of hairs, a plain surface of their mean colour.
 
@@ -140,7 +147,7 @@ def encoded_maps(found: Mapping[str, Floats]) -> dict[str, bytes]:
     """PNG files of 8 bits by role."""
     encoded = {}
     for role, values in found.items():
-        if role == "colour":
+        if role in ("colour", "eye"):
             levels = encode_srgb8(values)
         else:
             levels = np.rint(np.clip(values, 0.0, 1.0) * 255).astype(np.uint8)
