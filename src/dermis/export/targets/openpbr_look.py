@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -145,11 +146,12 @@ def drawn_maps(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str
 
 def encoded_maps(found: Mapping[str, Floats]) -> dict[str, bytes]:
     """PNG files of 8 bits by role."""
-    encoded = {}
-    for role, values in found.items():
-        if role in ("colour", "eye"):
-            levels = encode_srgb8(values)
-        else:
-            levels = np.rint(np.clip(values, 0.0, 1.0) * 255).astype(np.uint8)
-        encoded[role] = encode_png(levels if levels.ndim == 3 else levels[..., None])
-    return encoded
+    with ThreadPoolExecutor() as pool:  # zlib does not hold other threads up
+        return dict(zip(found, pool.map(_png, found, found.values()), strict=True))
+
+
+def _png(role: str, values: Floats) -> bytes:
+    if role in ("colour", "eye"):
+        return encode_png(encode_srgb8(values))
+    levels = np.rint(np.clip(values, 0.0, 1.0) * 255).astype(np.uint8)
+    return encode_png(levels if levels.ndim == 3 else levels[..., None])
