@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
 
+import numpy as np
 import pytest
 
 pytest.importorskip("pxr")
@@ -54,3 +55,19 @@ def test_a_person_comes_in_one_package(tmp_path: Path) -> None:
         if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset
     ]
     assert used and all(used)
+    uv = np.array(UsdGeom.PrimvarsAPI(mesh).GetPrimvar("st").ComputeFlattened())
+    eye = np.repeat(mesh_faces_of(stage, "left_eye"), np.array(mesh.GetFaceVertexCountsAttr().Get()))
+    assert surface(stage, "left_eye").GetInput("base_color").HasConnectedSource()
+    middle = np.hypot(*(uv[eye] - 0.5).T)  # of the picture, which shows the iris
+    assert middle.min() < 0.05 and 0.48 < middle.max() < 0.5
+
+
+def mesh_faces_of(stage: Any, material: str) -> Any:
+    """Which faces a material is bound to."""
+    counts = UsdGeom.Mesh(stage.GetPrimAtPath("/human/mesh")).GetFaceVertexCountsAttr().Get()
+    found = np.zeros(len(counts), bool)
+    for subset in UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Mesh(stage.GetPrimAtPath("/human/mesh"))):
+        bound = UsdShade.MaterialBindingAPI(subset.GetPrim()).GetDirectBinding().GetMaterialPath()
+        if bound.name == material:
+            found[list(subset.GetIndicesAttr().Get())] = True
+    return found

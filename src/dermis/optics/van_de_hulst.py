@@ -13,7 +13,7 @@ def albedo_of_colour(colour: ArrayLike, g: float = 0.0) -> Floats:
 
     g : mean cosine of the deflection [-]
 
-    Source: van de Hulst's formula inverted, [dEon2022] eq. 53.7.
+    Source: van de Hulst's formula inverted, [dEon2016] eq. 53.7.
     """
     C = np.clip(np.asarray(colour, np.float64), 0.0, 1.0)
     s = 4.09712 + 4.20863 * C - np.sqrt(9.59217 + 41.6808 * C + 17.7126 * C**2)
@@ -26,7 +26,7 @@ def colour_of_albedo(albedo: ArrayLike, g: float = 0.0) -> Floats:
 
     g : mean cosine of the deflection [-]
 
-    Source: van de Hulst's formula, [dEon2022].
+    Source: van de Hulst's formula, [dEon2016].
     """
     alpha = np.asarray(albedo, np.float64)
     s = np.sqrt((1.0 - alpha) / (1.0 - alpha * g))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -37,6 +38,7 @@ MAPS: Mapping[str, MapKind] = {
     "roughness": MapKind("float", "", "raw"),
     "specular": MapKind("float", "", "raw"),
     "normal": MapKind("vector3", "", "raw"),
+    "eye": MapKind("color3", "srgb_texture", "sRGB"),
 }
 INPUTS: Mapping[str, str] = {
     "colour": "subsurface_color",
@@ -102,6 +104,12 @@ def plain_look(one: Material) -> Look:
     )
 
 
+def eye_look(name: str) -> Look:
+    """Of an eyeball with a map of its colour."""
+    wet: dict[str, Value] = {"specular_roughness": _ROUGH["eye"], "specular_ior": _EYE_IOR}
+    return Look(name, wet, {"base_color": "eye"})
+
+
 def hair_look(absorption: Floats, radius_mm: float) -> Look:
     """Of hairs, a plain surface of their mean colour.
 
@@ -138,11 +146,12 @@ def drawn_maps(maps: Maps, skin: Skin, slopes: Floats | None = None) -> dict[str
 
 def encoded_maps(found: Mapping[str, Floats]) -> dict[str, bytes]:
     """PNG files of 8 bits by role."""
-    encoded = {}
-    for role, values in found.items():
-        if role == "colour":
-            levels = encode_srgb8(values)
-        else:
-            levels = np.rint(np.clip(values, 0.0, 1.0) * 255).astype(np.uint8)
-        encoded[role] = encode_png(levels if levels.ndim == 3 else levels[..., None])
-    return encoded
+    with ThreadPoolExecutor() as pool:  # zlib does not hold other threads up
+        return dict(zip(found, pool.map(_png, found, found.values()), strict=True))
+
+
+def _png(role: str, values: Floats) -> bytes:
+    if role in ("colour", "eye"):
+        return encode_png(encode_srgb8(values))
+    levels = np.rint(np.clip(values, 0.0, 1.0) * 255).astype(np.uint8)
+    return encode_png(levels if levels.ndim == 3 else levels[..., None])

@@ -16,9 +16,13 @@ from dermis.export.targets.openpbr import TYPED, misread, radii_mm, surface_rows
 from dermis.export.targets.openpbr_document import OPEN_PBR
 from dermis.export.targets.openpbr_files import looks_of, place_of, write_pictures
 from dermis.export.targets.openpbr_fit import fitted_mm, typed_mm, walk
+from dermis.export.targets.openpbr_look import encoded_maps, eye_look
 from dermis.export.targets.usd_geometry import TASK
 from dermis.export.targets.usd_stage import stage_of
 from dermis.extras import needed
+from dermis.frame.passes.painting.eye_pictures import eye_pictures
+from dermis.gpu.failures import on_device
+from dermis.mesh.eyes import Eyes
 
 _PACKAGE, _BINARY = ".usdz", ".usdc"
 _UNIT = Row("metersPerUnit", 1.0, "m", "lengths of the stage are metres, those of materials too")
@@ -35,7 +39,7 @@ class Usd(Target):
     wrong: ClassVar[str] = (
         "True for renderers that read the MaterialX nodes and walk as OpenPBR says; UsdPreviewSurface, which "
         "the others read, has no light below the surface at all. Hairs stay where they are when the head "
-        "moves, eyes have one colour, and programs that scale a stage to their own unit must scale radii too."
+        "moves, and programs that scale a stage to their own unit must scale radii too."
     )
 
     def parameters(self, subject: Subject, version: str) -> Rows:
@@ -70,10 +74,22 @@ def _write(subject: Subject, rows: Rows, file: Path, prefix: str) -> list[Path]:
     """Write the stage; the maps beside it."""
     pictures = write_pictures(subject, file.parent, prefix)
     looks = looks_of(subject, radii_mm(rows, OPEN_PBR), pictures)
+    eyes = subject.shape.eyes
+    if eyes is not None:
+        pictures["eye"] = file.parent / f"{prefix}eye.png"
+        pictures["eye"].write_bytes(_eye(eyes))
+        names = subject.shape.mesh.materials
+        looks |= {kind: eye_look(names[kind].name) for kind in eyes.material.tolist() if kind in looks}
     stage = stage_of(subject.shape, Path(subject.name).stem or subject.name, looks, prefix)
     if not stage.GetRootLayer().Export(str(file)):
         refuse(file.name, "a stage that USD can write", "it could not", "Choose another name")
     return [*pictures.values()]
+
+
+def _eye(eyes: Eyes) -> bytes:
+    """What they look like along their axis, as a PNG file."""
+    painted = on_device("auto", lambda device: eye_pictures(device, eyes.look))
+    return encoded_maps({"eye": painted.colour})["eye"]
 
 
 TARGET = Usd()

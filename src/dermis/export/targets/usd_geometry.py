@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.extras import needed
+from dermis.mesh.eye_layout import eye_uv
 from dermis.mesh.gltf.moved_points import MovedPoints
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
@@ -67,7 +68,7 @@ def add_mesh(stage: Any, path: Any, head: Head, moved: MovedPoints) -> dict[int,
     made.CreateNormalsAttr(vt.Vec3fArray.FromNumpy(np.ascontiguousarray(moved.normals[one])))
     made.SetNormalsInterpolation(geometry.Tokens.vertex)
     made.CreateSubdivisionSchemeAttr(geometry.Tokens.none)
-    _add_uv(made, mesh, faces)
+    _add_uv(made, texture_coordinates(head), faces)
     subsets = {}
     for kind in np.unique(faces.material).tolist():
         own = vt.IntArray.FromNumpy(np.flatnonzero(faces.material == kind).astype(np.int32))
@@ -78,11 +79,21 @@ def add_mesh(stage: Any, path: Any, head: Head, moved: MovedPoints) -> dict[int,
     return subsets
 
 
-def _add_uv(made: Any, mesh: Mesh, faces: Faces) -> None:
-    """Texture coordinates with v upwards, one for each vertex of ours."""
+def texture_coordinates(head: Head) -> Floats:
+    """(v, 2) of the vertices, v downwards: eyes of true shape by the layout of their picture."""
+    mesh, found = head.mesh, head.mesh.uv.copy()
+    if head.eyes is not None:
+        frames = head.eyes.frames(head.control, head.control.rest)
+        for material, frame in zip(head.eyes.material, frames, strict=True):
+            own = np.unique(mesh.triangles[mesh.material == material])
+            found[own] = eye_uv(mesh.positions[own] @ frame[:3, :3].T + frame[:3, 3])
+    return found
+
+
+def _add_uv(made: Any, uv: Floats, faces: Faces) -> None:
+    """Texture coordinates (v, 2) with v upwards, one for each vertex of ours."""
     geometry, sdf, vt = (needed(f"pxr.{name}", TASK) for name in ("UsdGeom", "Sdf", "Vt"))
-    upwards = mesh.uv.copy()
-    upwards[:, 1] = 1.0 - upwards[:, 1]
+    upwards = np.ascontiguousarray(np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]), np.float32)
     primvar = geometry.PrimvarsAPI(made).CreatePrimvar(
         "st", sdf.ValueTypeNames.TexCoord2fArray, geometry.Tokens.faceVarying
     )
