@@ -11,6 +11,7 @@ from dermis.export.deviation import Deviation
 from dermis.export.target import Rows, Value
 from dermis.optics.media import Floats
 
+_NOTABLE = 0.05  # of the light at the wrong radius
 _CHANNELS = "red", "green", "blue"
 _ERRORS = {
     "cdf": "most light at the wrong radius, of 1",
@@ -63,7 +64,7 @@ class Report:
             "error": self.error.as_json(),
             "naive_parameters": {row.name: row.value for row in self.naive_rows},
             "naive_error": self.naive_error.as_json(),
-            "wrong": self.wrong,
+            "wrong": " ".join(self.words()),
             "run": not self.not_run,
             "files": [str(file) for file in self.files],
         }
@@ -75,7 +76,7 @@ class Report:
         """
         what = " ".join(filter(None, (self.title, self.version, self.variant)))
         head = f"{self.subject}, profile by {self.model}, for {what}"
-        lines = [head, *(["not run: written by its manual"] if self.not_run else []), "", *_table(self.rows)]
+        lines = [head, *(["not run: by published meanings"] if self.not_run else []), "", *_table(self.rows)]
         if naive:
             lines += ["", "what one would type", *_table(self.naive_rows)]
         lines += ["", f"{'':12}" + "".join(f"{name:>9}" for name in _CHANNELS)]
@@ -83,7 +84,16 @@ class Report:
         for name, told in _ERRORS.items():
             lines.append(f"{name:12}{_numbers(getattr(self.error, name))}  {told}")
             lines.append(f"{'  naive':12}{_numbers(getattr(self.naive_error, name))}  as one would type it")
-        return [*lines, "", self.wrong]
+        return [*lines, "", *self.words()]
+
+    def words(self) -> list[str]:
+        """What stays wrong, of this skin and of the target."""
+        worst = int(self.error.cdf.argmax())
+        share = float(self.error.cdf[worst])
+        if share < _NOTABLE:
+            return [self.wrong]
+        what = f"the program cannot hold this profile: {share:.0%} of the {_CHANNELS[worst]} light leaves"
+        return [f"Whatever is typed, {what} at another radius.", self.wrong]
 
     def markdown(self) -> str:
         """The report as a page to lie beside what was written."""

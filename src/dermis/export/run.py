@@ -67,9 +67,8 @@ def export_skin(
         home = inside.parent if place.suffix else inside
         files = target.write(subject, report.rows, inside, known)
         ends = place.parent if place.suffix else place
-        report = replace(report, files=tuple(ends / file.relative_to(home) for file in files))
-        _tell(report, inside)
-    return report
+        files += _tell(replace(report, files=tuple(file.relative_to(home) for file in files)), inside)
+    return replace(report, files=tuple(ends / file.relative_to(home) for file in files))
 
 
 def judged(subject: Subject, target: Target, version: str) -> Report:
@@ -126,10 +125,11 @@ def _move(part: Path, end: Path) -> None:
         part.replace(trial)
 
 
-def _tell(report: Report, inside: Path) -> None:
+def _tell(report: Report, inside: Path) -> list[Path]:
     """The page and the numbers, in the folder or beside the file."""
     single = bool(inside.suffix)
     page = inside.with_name(f"{inside.name}.md") if single else inside / _PAGE
     told = inside.with_name(f"{inside.name}.json") if single else inside / TOLD
     page.write_text(report.markdown(), encoding="utf-8")
     told.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
+    return [page, told]

@@ -37,8 +37,8 @@ class Unity(Target):
     versions: ClassVar[tuple[str, ...]] = tuple(_FORMS)
     needs_maps: ClassVar[bool] = True
     wrong: ClassVar[str] = (
-        "One lobe a channel cannot hold what layers do: most of the red light of layered skin leaves nearer, "
-        "and the rest farther, than shown. The filter is cut at 99.7 % of the widest channel."
+        "The filter is cut at 99.7 % of the widest channel, and the scale of a scene that is not in metres has "
+        "to be told in worldScale."
     )
     not_run: ClassVar[bool] = True
 

@@ -13,7 +13,7 @@ from dermis.optics.media import Floats
 
 _HALF = 1.58  # s r within which half of the light leaves
 _UNITY_SHARE = 0.997
-_UNREAL_FACTOR = 0.6
+UNREAL_FACTOR = 0.6
 _UNREAL_SHORTEST_CM = 0.1
 
 
@@ -168,7 +168,7 @@ def unreal_parameters(profile: BurleyProfile) -> UnrealParameters:
     a tenth of the millimetres as scene units, so that scale 1 is life-size for centimetres.
     """
     _need_colour(profile)
-    mean_free_path = 0.1 * _UNREAL_FACTOR * shape_factor(profile.albedo) / profile.shape
+    mean_free_path = 0.1 * UNREAL_FACTOR * shape_factor(profile.albedo) / profile.shape
     distance = max(float(mean_free_path.max()), _UNREAL_SHORTEST_CM)
     return UnrealParameters(
         surface_albedo=tuple(profile.albedo.tolist()),
