@@ -27,8 +27,8 @@ from dermis.scene.settings import Settings
 
 SIDE = 512
 LIGHT, PAINT, DRAWN = 0.03, 0.01, 0.03
-"""Root mean square of the difference over that of the values: texels of 0.5 mm hold what lies between them,
-and light leaves towards the eye as along the normal only where the skin faces it. Measured .019, .005, .02."""
+"""Root mean square of the difference over that of the values: texels hold the mean of what lies in them, and
+light leaves towards the eye as along the normal only where the skin faces it. Measured .019, .005, .02."""
 SETTINGS = Settings(atlas=512, size=(192, 192), samples=1, strands=False)
 SEEN = "diffuse", "irradiance", "albedo", "melanin", "thickness", "uv"
 

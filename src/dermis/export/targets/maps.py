@@ -1,4 +1,4 @@
-"""Maps of a head in its own uv layout, with light before and after it spreads, for whatever reads pictures."""
+"""Maps of a head in its own uv layout, with light before and after it spreads, for what reads pictures."""
 
 from __future__ import annotations
 
@@ -57,7 +57,8 @@ class MapFolder(Target):
 
         def within(radius_mm: Floats) -> Floats:
             with np.errstate(under="ignore"):
-                return 1.0 - np.exp(-0.5 * radius_mm[:, None] ** 2 / profile.variance_mm2) @ share
+                left = np.exp(-0.5 * radius_mm[:, None] ** 2 / profile.variance_mm2) @ share
+            return np.asarray(1.0 - left)
 
         return Curve.of(within, energy)
 

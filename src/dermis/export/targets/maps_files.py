@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-
 from dermis.errors import refuse
 from dermis.export.targets.maps_encoding import NormalY, exr, levels, with_green
 from dermis.export.targets.maps_meaning import MEANINGS
@@ -37,7 +36,8 @@ def check_side(side: object) -> int:
     if side not in SIDES or isinstance(side, bool):
         came = f"{side!r} came"
         refuse("size of the maps", f"a power of two from {SIDES[0]} to {SIDES[-1]}", came, "Take 2048")
-    return int(side)  # type: ignore[call-overload,no-any-return]
+    assert isinstance(side, int)
+    return side
 
 
 def baked_maps(renderer: Renderer, scene: Scene, settings: Settings, side: int) -> Baked:

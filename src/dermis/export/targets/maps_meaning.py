@@ -29,7 +29,9 @@ class Meaning:
 
 MEANINGS: Mapping[str, Meaning] = MappingProxyType(
     {
-        "albedo": Meaning("", "colour", "share of the light that comes back from below the surface, Rec. 709"),
+        "albedo": Meaning(
+            "", "colour", "share of the light that comes back from below the surface, Rec. 709"
+        ),
         "normal": Meaning("", "normal", "normal with the relief in tangent space: x along +u, z outwards"),
         "height": Meaning("mm", "range", "relief outwards, from an arbitrary zero; the normal's own"),
         "roughness": Meaning("", "root", "Beckmann m, with the relief that is finer than a texel"),
@@ -42,7 +44,9 @@ MEANINGS: Mapping[str, Meaning] = MappingProxyType(
         "stretch": Meaning("mm", "none", "length on the skin of the maps' width and of their height; R, G"),
         "irradiance": Meaning("irradiance", "light", "light that enters the skin, before it spreads"),
         "scattered": Meaning(
-            "irradiance", "light", "light that leaves, after it spread: pi times the radiance along the normal"
+            "irradiance",
+            "light",
+            "light that leaves, after it spread: pi times the radiance along the normal",
         ),
     }
 )

@@ -1,7 +1,7 @@
 """Mitsuba 3: a scene whose skin is a homogeneous medium, as it has no diffusion profiles.
 
-A surface of index 1.4 around the medium is what tissue has, and light that is found by rays alone passes it: an
-environment, lamps of some size. Points and spots need the matched one, whose medium is another.
+A surface of index 1.4 around the medium is what tissue has, and light that is found by rays alone passes it:
+an environment, lamps of some size. Points and spots need the matched one, whose medium is another.
 """
 
 from __future__ import annotations
@@ -36,9 +36,10 @@ class Mitsuba(Target):
     variants: ClassVar[tuple[str, ...]] = ("matched", "rough", "smooth")
     needs_maps: ClassVar[bool] = True
     wrong: ClassVar[str] = (
-        "One medium a channel cannot hold layers: their red light leaves nearer and farther than shown. Under "
-        "rough and smooth surfaces points, spots and parallel light are black, for no ray finds them; the "
-        "matched surface mirrors alike from all sides and dims by lightness, without hues. Hairs are left out."
+        "One medium a channel cannot hold layers: their red light leaves nearer and farther than shown. "
+        "Under rough and smooth surfaces points, spots and parallel light are black, for no ray finds them; "
+        "the matched surface mirrors alike from all sides and dims by lightness, without hues. Hairs are "
+        "left out."
     )
 
     def parameters(self, subject: Subject, version: str) -> Rows:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from dermis.export.targets.maps_encoding import exr
 from dermis.export.targets.mitsuba_shapes import Surfaces, files_of, surfaces
 from dermis.export.targets.mitsuba_words import (
-
     Given,
     Ref,
     Words,
@@ -83,7 +82,7 @@ def scene_files(
     yield from files_of(made)
     for index, content in looks.opaque.items():
         yield _opaque_file(index), content
-    if looks.passing is not None:
+    if looks.passing is not None and looks.held_back is not None:
         yield "textures/passing.exr", exr("passing", looks.passing)
         yield "textures/held_back.exr", exr("held_back", looks.held_back)
     if not isinstance(looks.roughness, float):
@@ -138,7 +137,10 @@ def _frame(
 
     picture : width, height [pixel], samples of each
     """
-    defaults = {"boundary": boundary, **dict(zip(("width", "height", "samples"), map(str, picture), strict=True))}
+    defaults = {
+        "boundary": boundary,
+        **dict(zip(("width", "height", "samples"), map(str, picture), strict=True)),
+    }
     size = picture[:2]
     sensor = sensor_of(words, scene.camera, size)
     sensor["film"] |= {"width": Given("integer", "width"), "height": Given("integer", "height")}
@@ -169,7 +171,12 @@ def _skin(words: Words, boundary: Boundary, looks: Looks, made: Surfaces) -> lis
     if boundary == "matched":
         # Rays inwards meet the upper one and step over the lower one, rays outwards the other way round.
         parts.append(_below(passing is not None))
-        shapes = {"upper": "skin_surface", "upper_caps": "skin_surface", "skin": "skin_below", "caps": "skin_below"}
+        shapes = {
+            "upper": "skin_surface",
+            "upper_caps": "skin_surface",
+            "skin": "skin_below",
+            "caps": "skin_below",
+        }
     for name, surface in shapes.items():
         if getattr(made, name) is not None:
             shape = {"type": "ply", "filename": f"meshes/{name}.ply", "bsdf": Ref(surface)}

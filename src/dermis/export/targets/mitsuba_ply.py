@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 _FACE = np.dtype([("count", "u1"), ("corner", "<i4", (3,))])
 
 
-def ply(triangles: NDArray[Any], positions: Any, normals: Any = None, uv: Any = None, colour: Any = None) -> bytes:
+def ply(
+    triangles: NDArray[Any], positions: Any, normals: Any = None, uv: Any = None, colour: Any = None
+) -> bytes:
     """A file of triangles.
 
     positions, normals, uv, colour : (v, 3), (v, 3), (v, 2) with v = 0 at the pictures' top, (v, 3) linear

@@ -106,7 +106,8 @@ def document(parts: list[ET.Element]) -> bytes:
     root = ET.Element("scene", {"version": VERSION})
     root.extend(parts)
     ET.indent(root)
-    return ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+    text: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)
+    return text + b"\n"
 
 
 def default(name: str, value: str) -> ET.Element:

@@ -1,0 +1,148 @@
+"""The scene for Mitsuba: what its XML says, and that Mitsuba itself renders it as was predicted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+from dermis.export.curve import Curve
+from dermis.export.deviation import deviation
+from dermis.export.run import export_skin
+from dermis.export.subject import Subject, subject_of
+from dermis.export.target import numbers_of
+from dermis.export.targets.mitsuba import TARGET, medium_for
+from dermis.export.targets.mitsuba_colours import Colours
+from dermis.export.targets.mitsuba_painted import divided
+from dermis.export.targets.mitsuba_words import Bitmap, Transform, Words, element
+from dermis.optics.media import media
+from dermis.reference.mitsuba_scene import variant_of
+
+EDGE_NOISE = 0.05
+"""Of an edge response by 12,000 paths; its standard error is a third of this."""
+
+
+@pytest.fixture(scope="module")
+def mi() -> Any:
+    return pytest.importorskip("mitsuba")
+
+
+@pytest.fixture(scope="module")
+def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A ball of skin2, whose name would like to be more than a name."""
+    place = tmp_path_factory.mktemp("mitsuba") / "ball"
+    export_skin(subject_of("skin2"), "mitsuba", place)
+    return place
+
+
+def test_a_homogeneous_skin_gets_its_own_medium_back() -> None:
+    subject = subject_of("skin1")
+    rows = TARGET.with_variant("smooth").parameters(subject, "3")
+    layer = media()["skin1"].layers[0]
+    np.testing.assert_allclose(numbers_of(rows, "sigma_t"), layer.sigma_t_prime, rtol=0.02)
+    np.testing.assert_allclose(numbers_of(rows, "albedo"), layer.alpha_prime, rtol=0.005)
+
+
+@pytest.mark.parametrize("boundary", TARGET.variants)
+def test_fitted_media_are_near_and_typed_ones_far(boundary: str) -> None:
+    subject, target = subject_of("skin1"), TARGET.with_variant(boundary)
+    fit, typed = target.parameters(subject, "3"), target.naive(subject, "3")
+    near, far = (deviation(subject.curve, target.shown(rows, subject, "3")) for rows in (fit, typed))
+    assert near.edge.max() < 0.015
+    assert np.abs(near.energy).max() < 1e-3
+    assert far.edge.min() > 0.1
+
+
+def test_dimmed_skin_has_a_brighter_medium() -> None:
+    curve = subject_of("skin1").curve
+    mean = np.array([0.3, 0.2, 0.1])
+    plain, dimmed = Colours(mean, mean, 1.0), Colours(mean, 1.3 * mean, 1.3)
+    for boundary in TARGET.variants:
+        before, after = (medium_for(curve, one, boundary) for one in (plain, dimmed))  # type: ignore[arg-type]
+        assert np.all(np.array(after.albedo) > np.array(before.albedo))
+        np.testing.assert_allclose(dimmed.passing(boundary), 1 / 1.3, rtol=1e-12)  # type: ignore[arg-type]
+
+
+def test_words_are_escaped_and_pictures_numbered() -> None:
+    words = Words()
+    made = element({"type": "ply", "filename": '"/><x a="&'}, "", words)
+    assert ET.fromstring(ET.tostring(made))[0].attrib["value"] == '"/><x a="&'
+    slide = {"type": "bitmap", "bitmap": Bitmap(np.zeros((1, 1, 3), np.float32)), "raw": True}
+    assert element(slide, "", words)[0].attrib == {"name": "filename", "value": "textures/light_0.exr"}
+    assert len(words.bitmaps) == 1
+
+
+def test_transforms_are_those_of_mitsuba(mi: Any) -> None:
+    given = [1.0, 2.0, 3.0], [-4.0, 0.5, 1.0], [0.0, 1.0, 0.2]
+    own = Transform().look_at(*given).scale([2.0, 3.0, 1.0]).matrix
+    with variant_of(mi, "scalar_rgb"):
+        theirs = np.array(mi.ScalarTransform4f().look_at(*given).scale([2.0, 3.0, 1.0]).matrix)
+        assert Words.math.RayEpsilon == pytest.approx(mi.math.RayEpsilon, rel=1e-6)
+    np.testing.assert_allclose(own, theirs, atol=1e-5)
+
+
+def test_divided_triangles_cover_the_whole() -> None:
+    found = divided(np.array([4, 7]), 3)
+    assert len(found.corners) == 2 * 9
+    np.testing.assert_allclose(found.weights.sum(axis=1), 1.0)
+    corners = found.weights[found.corners][:, :, 1:]
+    across, down = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    np.testing.assert_allclose(np.linalg.det(np.stack([across, down], axis=1)), 1 / 9)
+    assert set(found.triangle.tolist()) == {4, 7}
+
+
+def test_the_scene_says_which_files_it_has(ball: Path) -> None:
+    for name in ("scene.xml", *(f"boundary_{each}.xml" for each in TARGET.variants)):
+        for node in ET.parse(ball / name).iter("string"):
+            if node.attrib["name"] == "filename":
+                assert (ball / node.attrib["value"]).is_file()
+    scene = ET.parse(ball / "scene.xml").getroot()
+    defaults = {node.attrib["name"]: node.attrib["value"] for node in scene.iter("default")}
+    assert defaults["boundary"] == "matched"
+    assert "/tmp" not in (ball / "scene.xml").read_text("utf-8")
+
+
+@pytest.mark.parametrize("boundary", TARGET.variants)
+def test_mitsuba_renders_the_scene(mi: Any, ball: Path, boundary: str) -> None:
+    with variant_of(mi, "scalar_rgb"):
+        given = {"boundary": boundary, "width": "24", "height": "24", "samples": "8"}
+        picture = np.array(mi.render(mi.load_file(str(ball / "scene.xml"), **given)))
+    assert picture.shape == (24, 24, 3)
+    assert np.isfinite(picture).all()
+    if boundary == "matched":  # points and spots light it
+        lit = picture[picture.max(axis=-1) > 0.1]
+        assert len(lit) > 4
+        assert lit[:, 0].mean() > lit[:, 2].mean()
+
+
+def test_an_edge_of_light_is_as_predicted(mi: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "benchmarks"))
+    import engines_mitsuba as bench
+
+    subject = subject_of("skin2")
+    with variant_of(mi, "scalar_rgb"):
+        found = _edge(mi, bench, subject, "smooth", 0)
+        wrong = _typed(mi, bench, subject)
+    assert found < EDGE_NOISE < wrong
+
+
+def _edge(mi: Any, bench: Any, subject: Subject, boundary: str, channel: int) -> float:
+    target = TARGET.with_variant(boundary)
+    return _apart(mi, bench, subject, target.parameters(subject, "3"), boundary, channel)
+
+
+def _typed(mi: Any, bench: Any, subject: Subject) -> float:
+    return _apart(mi, bench, subject, TARGET.with_variant("smooth").naive(subject, "3"), "smooth", 0)
+
+
+def _apart(mi: Any, bench: Any, subject: Subject, rows: Any, boundary: str, channel: int) -> float:
+    """Largest difference from the true curve."""
+    sigma, albedo = (numbers_of(rows, name)[channel] for name in ("sigma_t", "albedo"))
+    medium = bench.Walked((sigma,) * 3, (albedo,) * 3)
+    d = float(bench.fit_d(subject.curve)[channel])
+    seen, _, _ = bench.measured(mi, medium, boundary, d, 768)
+    curve: Curve = subject.curve
+    return float(np.abs(seen - bench.over_pixels(curve, channel, d)).max())
