@@ -122,7 +122,7 @@ class Frame(Recorder):
     ) -> None:
         """Rasterise `vertices` / 3 triangles into cleared targets.
 
-        indices : buffer of the number that the shader gets for each of the vertices; without it they are counted
+        indices : buffer of the numbers of the vertices for the shader; None counts them
         layer : the instance index that the shader sees
         far : the depth that the attachment starts at
         """
