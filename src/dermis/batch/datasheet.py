@@ -39,9 +39,10 @@ Places are in mm from the head's centre, and `head_pose` goes from the head at r
 
 _STATED = """## Drawn and stated
 
-What varies, against the distribution in `spec.toml`: mean and standard deviation, or shares; the greatest distance of both
-distributions (Kolmogorov and Smirnov's; of texts that of two shares), which is `usual` on average for so many draws; and the chance of one
-as great by the draws alone (for texts of a chi-square as great). Below 1e-6 it is no chance: the row says so. People count once.
+What varies, against its distribution in `spec.toml`: mean and standard deviation, or shares; the greatest
+distance of both (Kolmogorov and Smirnov's; for texts, of two shares), and what it usually is for so many
+draws; the chance of one as great by chance alone (for texts, of a chi-square as great). Rows below 1e-6 are
+marked. People count once.
 
 """
 
@@ -122,11 +123,10 @@ def _files(spec: Spec) -> str:
 def _stated(agreed: Iterable[Agreement]) -> str:
     """The distances of what was drawn from what is stated."""
     rows = [
-        (one.parameter, one.count, one.stated, one.found, f"{one.distance:.2g}", f"{one.usual:.2g}")
-        + (f"{one.chance:.1g}" + ("" if one.agrees else ": not as stated"),)
+        (*one[:4], *(f"{size:.2g}" for size in one[4:]), "" if one.agrees else "not as stated")
         for one in agreed
     ]
-    heads = "parameter", "draws", "stated", "found", "distance", "usual", "chance"
+    heads = "parameter", "draws", "stated", "found", "distance", "usual", "chance", ""
     return _STATED + _table(heads, rows)
 
 

@@ -43,7 +43,7 @@ def entries(
 def _record(
     number: int, observation: Observation, parameters: Mapping[str, Any], spec: Spec
 ) -> dict[str, Any]:
-    camera, gaze = observation.camera, observation.gaze
+    camera, gaze, found = observation.camera, observation.gaze, observation.landmarks
     named = {place: name for name, place in spec.landmark_tables.items()}  # no paths of this machine
     return {
         "number": number,
@@ -55,7 +55,7 @@ def _record(
         },
         "head_pose": _rounded(observation.head_pose, _UNIT_DIGITS),
         "gaze": None if gaze is None else _rounded(gaze, _UNIT_DIGITS),
-        "landmarks": {named.get(place, place): _landmarks(one) for place, one in observation.landmarks.items()},
+        "landmarks": {named.get(place, place): _landmarks(one) for place, one in found.items()},
     }
 
 
