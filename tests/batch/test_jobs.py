@@ -1,4 +1,4 @@
-"""Files of jobs in the documentation: they are what schedulers read, and their commands are what `dermis batch` takes."""
+"""Files of jobs in the documentation: schedulers can read them, and `dermis batch` takes their commands."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from string import Template
 from typing import Any
 
 import pytest
+from cyclopts import App
 
 from dermis.cli import batch as command
 
@@ -44,10 +45,10 @@ def commands() -> dict[str, str]:
 
 
 @pytest.mark.parametrize("kind", ["slurm", "kubernetes", "skypilot"])
-def test_commands_are_taken_with_what_schedulers_set(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_commands_are_taken_with_what_schedulers_set(kind: str) -> None:
     """Every placeholder has a value, and the parser binds every word."""
-    from dermis.cli import app
-
+    app = App(name="dermis", result_action="return_value")
+    app.command(command.batch, name="batch")
     words = shlex.split(Template(commands()[kind]).substitute(GIVEN))
     assert words[:2] == ["dermis", "batch"]
     function, bound, _ = app.parse_args([*words[1:], "--dry-run"], exit_on_error=False, print_error=False)
