@@ -55,6 +55,18 @@ def _machine(told: Told) -> str:
     return "\n".join(parts)
 
 
+def _memory(told: Told) -> str:
+    """How much a worker holds after so many images, where that was read."""
+    rows = [
+        (_KINDS[name], one["workers"], mark, f"{size / 1e6:.0f}")
+        for name in _KINDS
+        for one in told.get(name, [])
+        for mark, size in one.get("resident_bytes", {}).items()
+    ]
+    heads = "what", "workers", "images of each, about", "memory of the largest [MB]"
+    return f"\n{_table(heads, rows)}" if rows else ""
+
+
 def _rates(told: Told) -> str:
     rows = []
     for name, words in _KINDS.items():
@@ -64,7 +76,7 @@ def _rates(told: Told) -> str:
             ratio = one["images_per_s"] / runs[0]["images_per_s"]
             who = one["workers"], one["adapters"], one["encoders"]
             rows.append((words, *who, f"{one['images_per_s']:.3g}", f"{ratio:.2f}", memory))
-    text = _table(_HEADS, rows)
+    text = _table(_HEADS, rows) + _memory(told)
     if dask := told.get("dask"):
         ratio = dask["dask_over_plain"]
         text += (

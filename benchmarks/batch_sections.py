@@ -30,6 +30,8 @@ _FROM, _TO = 0.25, 0.9  # of the images: processes that start, and those that ha
 _STILL = {"light": {"kind": "studio"}, "environment": {"name": "none"}, "background": {"kind": "gradient"}}
 _DISK_BYTES = 1 << 28
 _MOST_STEPS = 40
+MARKS = 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000
+"""Images of a worker after which its memory is read."""
 
 
 @dataclass(frozen=True)
@@ -62,13 +64,21 @@ def spec_for(plan: Plan, images: int, shards: int, *, moving: bool = False) -> S
 
 @dataclass
 class Clock:
-    """When images were there, and how much memory the workers had."""
+    """When images were there, and how much memory the workers had.
+
+    resident : bytes of the largest worker after so many images of each, about
+    """
 
     seen: list[tuple[float, int]] = field(default_factory=list)
     memory: list[int] = field(default_factory=list)
+    workers: int = 1
+    resident: dict[int, int] = field(default_factory=dict)
 
     def told(self, progress: Progress) -> None:
         self.seen.append((time.monotonic(), progress.images))
+        for mark in MARKS:
+            if mark not in self.resident and progress.images >= mark * self.workers:
+                self.resident[mark] = max((_resident(one.pid) for one in active_children()), default=0)
         share = progress.images / progress.to_draw
         if (len(self.memory) == 0 and share >= _FROM) or (len(self.memory) == 1 and share >= _TO):
             self.memory.append(max((_resident(one.pid) for one in active_children()), default=0))
@@ -81,9 +91,9 @@ class Clock:
         return (last - first) / (ended - began) if ended > began else 0.0
 
 
-def measured_run(plan: Plan, crew: Crew, spec: Spec, encoders: int) -> dict[str, Any]:
+def measured_run(plan: Plan, crew: Crew, spec: Spec, encoders: int, count: int = 1) -> dict[str, Any]:
     """Images/s of a run, bytes of an image, and memory of a worker at its begin and end [byte]."""
-    clock, began = Clock(), time.monotonic()
+    clock, began = Clock(workers=count), time.monotonic()
     with _folder(plan) as out:
         report = run(Work(spec, out, encoders), crew, told=clock.told)
         size = sum(path.stat().st_size for path in out.rglob("shard-*") if path.is_file())
@@ -93,6 +103,7 @@ def measured_run(plan: Plan, crew: Crew, spec: Spec, encoders: int) -> dict[str,
         "seconds": time.monotonic() - began,
         "bytes_per_image": size / max(report.images, 1),
         "worker_bytes": clock.memory,
+        "resident_bytes": {str(mark): size for mark, size in clock.resident.items()},
     }
 
 
@@ -100,7 +111,7 @@ def workers(plan: Plan, count: int, *, moving: bool = False) -> dict[str, Any]:
     """Plain processes, so many of them."""
     seats, encoders = Seating(plan.adapter, workers=count, encoders=plan.encoders).seats()
     spec = spec_for(plan, plan.images * count, 8 * count, moving=moving)
-    found = measured_run(plan, Processes(seats), spec, encoders)
+    found = measured_run(plan, Processes(seats), spec, encoders, count)
     return {"workers": count, "encoders": encoders, "adapters": len({one.adapter for one in seats}), **found}
 
 

@@ -22,7 +22,7 @@ seed = 3
 size = [32, 32]
 shard_size = {SHARD_SIZE}
 outputs = ["depth", "normal"]
-landmarks = []
+landmarks = ["points.csv"]
 
 [render]
 atlas = 64
@@ -51,6 +51,7 @@ def write_spec(folder: Path, *bad: str) -> Path:
     (folder / "large.obj").write_text(larger)
     for name in bad:
         (folder / name).write_text("no head\n")
+    (folder / "points.csv").write_text("name,vertex\nfirst,0\nsecond,1\n")
     path = folder / "spec.toml"
     listed = "".join(f', "{name}"' for name in bad)
     path.write_text(_TEXT.replace('"large.obj"]', f'"large.obj"{listed}]'))

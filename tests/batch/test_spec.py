@@ -59,6 +59,7 @@ REFUSED = {
     "folder = '/'": "folder: expected no such key",
     "outputs = ['smell']": "output: expected one of depth",
     "landmarks = ['dlib']": "landmarks: expected some of ibug-68",
+    "landmarks = ['none.csv']": r"landmarks: .* tables of name,vertex .*'none\.csv' came",
     "format = 'zip'": "spec: format",
     "[[correlated]]\nof = ['camera.yaw_deg', 'x']\ncorrelation = 0.5": "correlated: of: .*'x' is none",
     "[[correlated]]\nof = ['camera.yaw_deg']\ncorrelation = 0.5": "correlated: .*2 to 50 names",
@@ -266,3 +267,19 @@ def test_files_are_sorted_known_by_their_contents_and_checked(tmp_path: Path) ->
     (tmp_path / "a.hdr").unlink()
     with pytest.raises(DermisError, match=r"files: a\.hdr: .* there is none"):
         spec_of(tomllib.loads(first.text()), tmp_path)
+
+
+def test_tables_of_landmarks_are_known_by_their_contents(tmp_path: Path) -> None:
+    table, tables = tmp_path / "points.csv", {"landmarks": ["ibug-68", "points.csv"]}
+    table.write_text("# a ball\nname,vertex\ntop,3\n")
+    first = spec_of(tables, tmp_path)
+    assert list(first.files) == ["points.csv"]
+    assert first.landmark_tables == {"ibug-68": "ibug-68", "points.csv": str(table)}
+    assert spec_of(tomllib.loads(first.text()), tmp_path) == first
+    table.write_text("name,vertex\ntop,4\n")
+    assert spec_of(tables, tmp_path).digest() != first.digest()
+    with pytest.raises(DermisError, match=r"files: points\.csv: expected the file of hash"):
+        spec_of(tomllib.loads(first.text()), tmp_path)
+    table.write_text("name,point\ntop,4\n")
+    with pytest.raises(DermisError, match=r"points\.csv: expected landmarks in CSV"):
+        spec_of(tables, tmp_path)

@@ -51,6 +51,21 @@ def test_the_page_has_each_run_with_its_ratio() -> None:
     assert "0.980 times" in text and "what is reached first" not in text
 
 
+def test_memory_is_told_by_images() -> None:
+    from batch_page import page
+    from batch_sections import Clock
+
+    from dermis.batch.run import Progress
+
+    clock = Clock(workers=2)
+    for images in range(1, 50):
+        clock.told(Progress(images, 50))
+    assert list(clock.resident) == [10, 20]
+    run = told()["new"][1] | {"resident_bytes": {"10": 5 * 10**8, "20": 6 * 10**8}}
+    text = page([told(new=[run])])
+    assert "| new people | 2 | 10 | 500 |" in text and "| new people | 2 | 20 | 600 |" in text
+
+
 def test_the_rate_is_that_of_the_middle() -> None:
     from batch_sections import Clock
 

@@ -10,8 +10,9 @@ from dermis.batch.dials import check_looks, check_skin, check_weights
 from dermis.batch.distributions import Distribution
 from dermis.batch.tables import MIXTURE, NONE
 from dermis.environment.panorama import UNIFORM
-from dermis.errors import about, refuse
+from dermis.errors import about, refuse, shortened
 from dermis.frame.outputs import asked_outputs
+from dermis.human.landmarks.points import table_points
 from dermis.human.landmarks.sets import SETS
 from dermis.mesh.samples import SAMPLES
 from dermis.reading import is_file
@@ -20,13 +21,14 @@ from dermis.scene.lights import NO_LIGHTS
 
 _ANCESTRY = "person.african", "person.asian", "person.caucasian"
 _HEAD = "person.head"
+_LONGEST = 100  # letters of a name
 
 
 def check_spec(spec: Any, drawn: Mapping[str, Distribution], expressions: Mapping[str, Any]) -> None:
     """Refuse a spec that cannot be drawn, by table and key."""
     with about("outputs"):
         asked_outputs(spec.outputs)
-    _check_landmarks(spec.landmarks)
+    _check_landmarks(spec.landmarks, spec.folder)
     check_looks(spec.person)
     check_skin(spec.skin)
     check_weights(spec.pose)
@@ -37,10 +39,15 @@ def check_spec(spec: Any, drawn: Mapping[str, Distribution], expressions: Mappin
     _check_named(drawn, spec.folder)
 
 
-def _check_landmarks(names: Sequence[str]) -> None:
+def _check_landmarks(names: Sequence[str], folder: Path) -> None:
+    """Refuse what is neither a set nor a table that can be read."""
     for name in names:
-        if name not in SETS:
-            refuse("landmarks", f"some of {', '.join(SETS)}", f"{name!r} came", "Correct it")
+        if name in SETS:
+            continue
+        if not name.endswith(".csv") or not is_file(folder / name):
+            expected = f"some of {', '.join(SETS)}, or tables of name,vertex (.csv) in the spec's folder"
+            refuse("landmarks", expected, f"{shortened(name, _LONGEST)!r} came", "Correct it")
+        table_points(str(folder / name))
 
 
 def _check_person(drawn: Mapping[str, Distribution]) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from dermis.batch.agreement import Agreement, agreements
 from dermis.batch.described import classes, landmark_names, outputs_of
 from dermis.batch.licences import licences
 from dermis.batch.settling import settle
@@ -36,6 +37,15 @@ Places are in mm from the head's centre, and `head_pose` goes from the head at r
 
 """
 
+_STATED = """## Drawn and stated
+
+What varies, against its distribution in `spec.toml`: mean and standard deviation, or shares; the greatest
+distance of both (Kolmogorov and Smirnov's; for texts, of two shares), and what it usually is for so many
+draws; the chance of one as great by chance alone (for texts, of a chi-square as great). Rows below 1e-6 are
+marked. People count once.
+
+"""
+
 Rows = Iterable[Sequence[object]]
 
 
@@ -47,7 +57,7 @@ def write_datasheet(out: Path, spec: Spec) -> None:
     """
     there = [shard for shard in shards_of(spec) if is_there(out, shard, spec)]
     stamps = [stamp_of(shard_path(out, shard, spec)) for shard in there]
-    text = _readme(spec, stamps, statistics(out)).encode()
+    text = _readme(spec, stamps, statistics(out), agreements(out, spec)).encode()
     description = (json.dumps(_description(spec), indent=1, ensure_ascii=False) + "\n").encode()
     settle(out / DESCRIPTION, lambda path: path.write_bytes(description))
     settle(out / README, lambda path: path.write_bytes(text))
@@ -65,7 +75,7 @@ def _description(spec: Spec) -> dict[str, Any]:
     }
 
 
-def _readme(spec: Spec, stamps: Sequence[Stamp], drawn: Rows) -> str:
+def _readme(spec: Spec, stamps: Sequence[Stamp], drawn: Rows, agreed: Iterable[Agreement]) -> str:
     width, height = spec.size
     left_out = [one for stamp in stamps for one in stamp.left_out]
     images = sum(stamp.stop - stamp.first for stamp in stamps) - len(left_out)
@@ -83,6 +93,7 @@ def _readme(spec: Spec, stamps: Sequence[Stamp], drawn: Rows) -> str:
         _labels(spec),
         _DRAWN,
         _table(("parameter", "images", "values"), drawn),
+        _stated(agreed),
         "## Licences\n",
         _table(("part", "by", "licence"), licences(spec)),
         "## Made with\n",
@@ -107,6 +118,16 @@ def _files(spec: Spec) -> str:
     ]
     rows.append(("json", "parameters, camera, head_pose, gaze, landmarks", "", "", ""))
     return _FILES + _table(("file", "content", "unit", "stored as", "where nothing is seen"), rows)
+
+
+def _stated(agreed: Iterable[Agreement]) -> str:
+    """The distances of what was drawn from what is stated."""
+    rows = [
+        (*one[:4], *(f"{size:.2g}" for size in one[4:]), "" if one.agrees else "not as stated")
+        for one in agreed
+    ]
+    heads = "parameter", "draws", "stated", "found", "distance", "usual", "chance", ""
+    return _STATED + _table(heads, rows)
 
 
 def _has_alpha(spec: Spec) -> bool:

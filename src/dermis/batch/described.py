@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 from typing import Any
 
 from dermis.batch.encodings import file_kind, stored_as
 from dermis.batch.spec import Spec
 from dermis.frame.outputs import OUTPUTS
 from dermis.human.labels.classes import label_classes
+from dermis.human.landmarks.points import table_points
 from dermis.human.landmarks.sets import SETS
-from dermis.reading import read_text, understood
-from dermis.tables import parse_rows, read_rows
+from dermis.tables import read_rows
 
 _LABELS = "label", "label_face_synthetics"
 
@@ -47,9 +46,7 @@ def landmark_names(name: str, spec: Spec) -> list[str]:
     """Of the points of a set, or of a table that the spec names, in their order."""
     if name in SETS:
         return [row["landmark"] for row in read_rows("dermis.human.landmarks", name)]
-    text = read_text(spec.folder / name, "a table of landmarks")
-    with understood(name, "a table of landmarks", KeyError, csv.Error):
-        return [row["name"] for row in parse_rows(text)]
+    return [landmark for landmark, _ in table_points(spec.landmark_tables[name])]
 
 
 def _levels(name: str, spec: Spec) -> tuple[float, int]:

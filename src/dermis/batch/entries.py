@@ -36,12 +36,15 @@ def entries(
     for name in spec.outputs:
         suffix = f"{name}.{file_kind(name, spec.encoding)}"
         found[suffix] = encode_output(name, observation.outputs[name], spec.encoding)
-    found[RECORD] = _json(_record(number, observation, parameters))
+    found[RECORD] = _json(_record(number, observation, parameters, spec))
     return found
 
 
-def _record(number: int, observation: Observation, parameters: Mapping[str, Any]) -> dict[str, Any]:
-    camera, gaze = observation.camera, observation.gaze
+def _record(
+    number: int, observation: Observation, parameters: Mapping[str, Any], spec: Spec
+) -> dict[str, Any]:
+    camera, gaze, found = observation.camera, observation.gaze, observation.landmarks
+    named = {place: name for name, place in spec.landmark_tables.items()}  # no paths of this machine
     return {
         "number": number,
         "parameters": dict(parameters),
@@ -52,7 +55,7 @@ def _record(number: int, observation: Observation, parameters: Mapping[str, Any]
         },
         "head_pose": _rounded(observation.head_pose, _UNIT_DIGITS),
         "gaze": None if gaze is None else _rounded(gaze, _UNIT_DIGITS),
-        "landmarks": {name: _landmarks(one) for name, one in observation.landmarks.items()},
+        "landmarks": {named.get(place, place): _landmarks(one) for place, one in found.items()},
     }
 
 

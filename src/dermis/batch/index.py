@@ -12,7 +12,9 @@ from dermis.batch.settling import settle
 from dermis.batch.shard_files import shard_files
 from dermis.batch.shards import is_there, shard_path, shards_of
 from dermis.batch.spec import Spec
+from dermis.errors import refuse
 from dermis.extras import needed
+from dermis.reading import is_file
 
 INDEX = "index.parquet"
 NUMBERS = {"camera.K": 9, "camera.R": 9, "camera.t": 3, "head_pose": 12, "gaze": 6}
@@ -42,6 +44,17 @@ def write_index(out: Path, spec: Spec) -> Path:
 
     settle(target, write)
     return target
+
+
+def index_file(out: Path, purpose: str) -> Any:
+    """The index of a data set, open to be read column by column.
+
+    Raises DermisError where there is none.
+    """
+    parquet = needed("pyarrow.parquet", purpose)
+    if not is_file(out / INDEX):
+        refuse(out, f"a data set with {INDEX}", "it is missing", "Run dermis batch again")
+    return parquet.ParquetFile(out / INDEX)
 
 
 def _rows_of_shards(out: Path, spec: Spec) -> Iterator[list[Row]]:

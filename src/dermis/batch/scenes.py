@@ -33,10 +33,10 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.smoothness import SmoothIn
 
-_KEPT = 16  # people
 _FAR_MM = 1e4  # where eyes look that look nowhere
 _PARTS = "skin", "eyes", "hair", "targets"
 _SEED, _HEAD = "person.seed", "person.head"
+_KEPT_DRAWN, _KEPT_NAMED = 1, 8  # people of seeds, of whom none comes again; heads by name, which do
 _UNKNOWING = {"person.number", _SEED, _HEAD}
 
 
@@ -56,7 +56,7 @@ class _Seen:
 
 
 class SceneMaker:
-    """Makes the scenes of a data set; people that were made before are kept, and change no result."""
+    """Makes the scenes of a data set; people that may come again are kept, and change no result."""
 
     def __init__(self, spec: Spec) -> None:
         self.spec = spec
@@ -93,7 +93,7 @@ class SceneMaker:
         if key not in self._people:
             self._people[key] = self._made(parameters)
         self._people.move_to_end(key)
-        while len(self._people) > _KEPT:
+        while len(self._people) > (_KEPT_NAMED if _HEAD in parameters else _KEPT_DRAWN):
             self._people.popitem(last=False)
         return self._people[key]
 

@@ -30,6 +30,7 @@ from dermis.batch.tables import (
     TurnTable,
 )
 from dermis.errors import about, refuse, shown_value
+from dermis.human.landmarks.sets import SETS
 from dermis.quantities import whole_number
 from dermis.reading import named_path, read_toml
 from dermis.scene.findings import Because, ImpossibleError
@@ -69,7 +70,7 @@ class Spec(Plain):
     outputs: tuple[str, ...] = ()
     """What is written of each image besides its colour, as of `dermis render --outputs`."""
     landmarks: tuple[str, ...] = ("ibug-68",)
-    """Sets of landmarks."""
+    """Sets of landmarks, or tables of name,vertex for meshes of your own (.csv, in the spec's folder)."""
     shard_size: Annotated[int, Field(ge=1, le=10**6), Because("a million in a file")] = 1000
     """Images in a shard."""
     format: Literal["webdataset", "folder"] = "webdataset"
@@ -126,6 +127,11 @@ class Spec(Plain):
     def distributions(self) -> Mapping[str, Distribution]:
         """By name of the parameter that is drawn from each."""
         return self._drawing.drawn
+
+    @property
+    def landmark_tables(self) -> Mapping[str, str]:
+        """By name as the spec has it: a set's own, or the path of its table."""
+        return {name: name if name in SETS else str(self.folder / name) for name in self.landmarks}
 
     @property
     def own_targets(self) -> frozenset[str]:
@@ -195,7 +201,8 @@ def spec_of(tables: Mapping[str, Any], folder: Path = Path()) -> Spec:
         given["correlated"] = tuple(_made(Correlated, "correlated", group) for group in groups)
     spec = _made(Spec, "", given | {"folder": folder})
     ends = [end for name in _FILES if name in spec.distributions for end in spec.distributions[name].ends]
-    found = hashes(map(str, ends), folder)
+    tables_named = (name for name in spec.landmarks if name not in SETS)
+    found = hashes([*map(str, ends), *tables_named], folder)
     if spec.files:
         check_hashes(spec.files, found)
     return spec.replace(files=found) if found else spec

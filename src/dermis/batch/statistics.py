@@ -6,10 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from dermis.batch.index import INDEX, NUMBERS
-from dermis.errors import refuse
+from dermis.batch.index import NUMBERS, index_file
 from dermis.extras import needed
-from dermis.reading import is_file
 
 _MOST_NAMED = 12
 _NO_PARAMETERS = frozenset(("number", "key", "shard", *NUMBERS))
@@ -20,10 +18,7 @@ def statistics(out: Path) -> Iterator[tuple[str, int, str]]:
 
     Raises DermisError where there is no index.
     """
-    parquet = needed("pyarrow.parquet", "the statistics of a data set")
-    if not is_file(out / INDEX):
-        refuse(out, f"a data set with {INDEX}", "it is missing", "Run dermis batch again")
-    with parquet.ParquetFile(out / INDEX) as file:
+    with index_file(out, "the statistics of a data set") as file:
         for name in file.schema_arrow.names:
             if name not in _NO_PARAMETERS:
                 column = file.read(columns=[name]).column(0)

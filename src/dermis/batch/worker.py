@@ -142,7 +142,8 @@ class Worker:
     def _observed(self, plans: Iterable[_Plan]) -> Iterator[Observation]:
         """What is seen of each, frames in flight; those without a background have alpha."""
         spec = self._work.spec
-        asked: dict[str, Any] = {"outputs": spec.outputs, "landmarks": spec.landmarks}
+        asked: dict[str, Any] = {"outputs": spec.outputs}
+        asked["landmarks"] = spec.landmark_tables.values()
         for alpha, alike in itertools.groupby(plans, lambda plan: plan.settings.background == "none"):
             each = itertools.tee(alike, 3)
             scenes, settings = (plan.scene for plan in each[0]), (plan.settings for plan in each[1])

@@ -67,6 +67,19 @@ def check_landmarks(name: object) -> str:
     return text
 
 
+def table_points(name: str) -> list[tuple[str, int]]:
+    """Name and vertex of each landmark in a table's file.
+
+    Raises DermisError for tables that cannot be read.
+    """
+    text = read_text(check_landmarks(name), _EXPECTED)
+    with understood(name, _EXPECTED, KeyError, TypeError, csv.Error):
+        found = [(str(row["name"]), int(row["vertex"])) for row in parse_rows(text)]
+    if not 0 < len(found) <= _MOST:
+        refuse(name, f"1 to {_MOST} landmarks", f"{len(found)} came", "Correct the table")
+    return found
+
+
 @cache
 def _rows(name: str) -> Rows:
     return read_rows(__package__, name)
@@ -88,11 +101,7 @@ def _of_human(head: Head, rows: Rows) -> LandmarkPoints:
 
 
 def _of_table(head: Head, name: str) -> LandmarkPoints:
-    text, count = read_text(check_landmarks(name), _EXPECTED), len(head.positions_mm)
-    with understood(name, _EXPECTED, KeyError, TypeError, csv.Error):
-        found = [(str(row["name"]), int(row["vertex"])) for row in parse_rows(text)]
-    if not 0 < len(found) <= _MOST:
-        refuse(name, f"1 to {_MOST} landmarks", f"{len(found)} came", "Correct the table")
+    found, count = table_points(name), len(head.positions_mm)
     for landmark, vertex in found:
         whole_number(f"{Path(name).name}: vertex of {landmark}", vertex, 0, count - 1)
     corner = np.repeat(np.array([[vertex] for _, vertex in found], np.int32), 4, axis=1)

@@ -1,6 +1,5 @@
 // Outputs of the mesh: where the centre of each pixel meets it.
-//#include "seen.wgsl"
-//#include "planes.wgsl"
+//#include "each_seen.wgsl"
 
 //#each geometry_outputs: override {NAME}_FIRST: u32 = UNASKED;
 
@@ -29,14 +28,6 @@ fn barycentric_output(seen: Seen) -> vec3f {
     return seen.weights;
 }
 
-@compute @workgroup_size(8, 8)
-fn main(@builtin(global_invocation_id) id: vec3u) {
-    let size = textureDimensions(centres);
-    if (any(id.xy >= size)) {
-        return;
-    }
-    let seen = seen_at(id.xy, size);
-    let there = sees_any(id.xy);
-    let cell = cell_of(id.xy, size);
+fn put_seen(seen: Seen, there: bool, cell: Cell) {
     //#each geometry_outputs: if ({NAME}_FIRST != UNASKED) {{ put_{type}({NAME}_FIRST, cell, select({nothing}, {name}_output(seen), there)); }}
 }

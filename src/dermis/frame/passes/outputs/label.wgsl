@@ -1,6 +1,5 @@
 // What the centre of each pixel shows, as a class: a part of the mesh, or the hairs over it.
-//#include "seen.wgsl"
-//#include "planes.wgsl"
+//#include "each_seen.wgsl"
 
 override FIELDS: u32 = 0u; // distances that each vertex has
 override HAIRS: bool = false; // whether hairs are drawn
@@ -41,15 +40,7 @@ fn label_face_synthetics_output(seen: Seen, there: bool, hairs: u32) -> u32 {
     return label_classes[shown(seen, there, hairs >> 8u)];
 }
 
-@compute @workgroup_size(8, 8)
-fn main(@builtin(global_invocation_id) id: vec3u) {
-    let size = textureDimensions(centres);
-    if (any(id.xy >= size)) {
-        return;
-    }
-    let seen = seen_at(id.xy, size);
-    let there = sees_any(id.xy);
-    let cell = cell_of(id.xy, size);
+fn put_seen(seen: Seen, there: bool, cell: Cell) {
     var hairs = 0u;
     if (HAIRS) {
         hairs = hair_labels[cell.index];

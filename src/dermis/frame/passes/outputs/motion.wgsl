@@ -1,6 +1,5 @@
 // How far the points that pixels see have moved in the picture since the scene before.
-//#include "seen.wgsl"
-//#include "planes.wgsl"
+//#include "each_seen.wgsl"
 
 //#each motion_outputs: override {NAME}_FIRST: u32 = UNASKED;
 
@@ -32,14 +31,6 @@ fn motion_output(seen: Seen) -> vec2f {
     return vec2f(0.5, -0.5) * moved * vec2f(textureDimensions(centres));
 }
 
-@compute @workgroup_size(8, 8)
-fn main(@builtin(global_invocation_id) id: vec3u) {
-    let size = textureDimensions(centres);
-    if (any(id.xy >= size)) {
-        return;
-    }
-    let seen = seen_at(id.xy, size);
-    let there = sees_any(id.xy);
-    let cell = cell_of(id.xy, size);
+fn put_seen(seen: Seen, there: bool, cell: Cell) {
     //#each motion_outputs: if ({NAME}_FIRST != UNASKED) {{ put_{type}({NAME}_FIRST, cell, select({nothing}, {name}_output(seen), there)); }}
 }

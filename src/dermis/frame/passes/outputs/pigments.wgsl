@@ -1,7 +1,7 @@
 // Pigments of the skin that the centre of each pixel sees, as shares of the volume.
 //#include "seen_footprint.wgsl"
 //#include "skin.wgsl"
-//#include "planes.wgsl"
+//#include "each_seen.wgsl"
 
 //#each pigments_outputs: override {NAME}_FIRST: u32 = UNASKED;
 
@@ -28,14 +28,6 @@ fn blood_output(seen: Seen) -> f32 {
     return pigments_of(seen).y;
 }
 
-@compute @workgroup_size(8, 8)
-fn main(@builtin(global_invocation_id) id: vec3u) {
-    let size = textureDimensions(centres);
-    if (any(id.xy >= size)) {
-        return;
-    }
-    let seen = seen_at(id.xy, size);
-    let there = sees_any(id.xy);
-    let cell = cell_of(id.xy, size);
+fn put_seen(seen: Seen, there: bool, cell: Cell) {
     //#each pigments_outputs: if ({NAME}_FIRST != UNASKED) {{ put_{type}({NAME}_FIRST, cell, select({nothing}, {name}_output(seen), there)); }}
 }

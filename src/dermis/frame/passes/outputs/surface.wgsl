@@ -1,7 +1,7 @@
 // Outputs of the surface with its relief, at the centre of each pixel.
 //#include "seen_footprint.wgsl"
 //#include "skin.wgsl"
-//#include "planes.wgsl"
+//#include "each_seen.wgsl"
 
 //#each surface_outputs: override {NAME}_FIRST: u32 = UNASKED;
 
@@ -18,14 +18,6 @@ fn normal_camera_output(seen: Seen) -> vec3f {
     return vec3f(dot(n, normalize(look.rays.right)), -dot(n, normalize(look.rays.up)), dot(n, look.rays.forward));
 }
 
-@compute @workgroup_size(8, 8)
-fn main(@builtin(global_invocation_id) id: vec3u) {
-    let size = textureDimensions(centres);
-    if (any(id.xy >= size)) {
-        return;
-    }
-    let seen = seen_at(id.xy, size);
-    let there = sees_any(id.xy);
-    let cell = cell_of(id.xy, size);
+fn put_seen(seen: Seen, there: bool, cell: Cell) {
     //#each surface_outputs: if ({NAME}_FIRST != UNASKED) {{ put_{type}({NAME}_FIRST, cell, select({nothing}, {name}_output(seen), there)); }}
 }

@@ -1,7 +1,6 @@
 // How thick the flesh is below what the centre of each pixel sees.
 //#include "bilinear.wgsl"
-//#include "seen.wgsl"
-//#include "planes.wgsl"
+//#include "each_seen.wgsl"
 
 //#each thickness_outputs: override {NAME}_FIRST: u32 = UNASKED;
 
@@ -12,14 +11,6 @@ fn thickness_output(seen: Seen) -> f32 {
     return select(0.0, found.x / max(found.a, 1e-6), (seen.point.flags & MAPPED) != 0u);
 }
 
-@compute @workgroup_size(8, 8)
-fn main(@builtin(global_invocation_id) id: vec3u) {
-    let size = textureDimensions(centres);
-    if (any(id.xy >= size)) {
-        return;
-    }
-    let seen = seen_at(id.xy, size);
-    let there = sees_any(id.xy);
-    let cell = cell_of(id.xy, size);
+fn put_seen(seen: Seen, there: bool, cell: Cell) {
     //#each thickness_outputs: if ({NAME}_FIRST != UNASKED) {{ put_{type}({NAME}_FIRST, cell, select({nothing}, {name}_output(seen), there)); }}
 }

@@ -1,0 +1,120 @@
+"""What was drawn is held against what a spec states: chance is let pass, and nothing else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from dermis.batch.agreement import agreements, compared
+from dermis.batch.distributions import Distribution
+from dermis.batch.index import INDEX
+from dermis.batch.spec import Spec, example_text, load_spec, spec_of
+from dermis.batch.stated import stated
+from dermis.errors import DermisError
+from dermis.extras import needed
+
+COUNT = 2000
+LAWS: dict[str, tuple[Any, Any]] = {
+    "uniform": ({"uniform": [-3, 5]}, stats.uniform(-3, 8)),
+    "logarithmic": ({"log_uniform": [0.1, 30]}, stats.loguniform(0.1, 30)),
+    "normal": ({"normal": [2, 0.5]}, stats.norm(2, 0.5)),
+    "truncated": ({"truncated": [0, 1, -0.5, 2]}, stats.truncnorm(-0.5, 2)),
+    "far": ({"truncated": [0, 1, 3, 4]}, stats.truncnorm(3, 4)),
+}
+
+
+def index(folder: Path, spec: Spec) -> Path:
+    """An index of what the spec draws, without any pictures."""
+    rows = [spec.parameters(k) for k in range(spec.count)]
+    names = sorted({name for row in rows for name in row})
+    arrow = needed("pyarrow", "a test")
+    columns = {name: [row.get(name) for row in rows] for name in names}
+    needed("pyarrow.parquet", "a test").write_table(arrow.table(columns), folder / INDEX)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of the example, with two images of each person."""
+    made = tmp_path_factory.mktemp("drawn")
+    text = example_text().replace("images_per_person = 1 ", "images_per_person = 2 ")
+    (made / "spec.toml").write_text(text)
+    return index(made, load_spec(made / "spec.toml", count=COUNT))
+
+
+def test_two_thousand_draws_agree_with_their_spec(folder: Path) -> None:
+    found = {one.parameter: one for one in agreements(folder, load_spec(folder / "spec.toml"))}
+    assert len(found) > 30 and all(one.agrees for one in found.values())
+    chances = np.array([one.chance for one in found.values()])
+    assert chances.min() > 1e-3 and 0.3 < np.median(chances) < 0.8, "chances of what is so are even"
+    assert found["person.age"].count == COUNT // 2, "people count once"
+    assert found["gaze.yaw_deg"].count < 0.4 * COUNT, "what only some images have"
+    assert found["head.yaw_deg"].distance < 3 * found["head.yaw_deg"].usual
+
+
+@pytest.mark.parametrize(
+    ("stated_so", "parameter"),
+    [
+        ("yaw_deg = {truncated = [0, 18, -40, 40]}", "head.yaw_deg"),
+        ("yaw_deg = {truncated = [3, 14, -40, 40]}", "head.yaw_deg"),
+        ("strength = {choice = [0, {uniform = [0.1, 1]}], weights = [1, 1]}", "light.rim.strength"),
+        ('at = {choice = ["camera", "angles"], weights = [6, 4]}', "gaze.at"),
+        ("age = {truncated = [50, 22, 25, 90]}", "person.age"),
+    ],
+)
+def test_another_statement_is_found_out(folder: Path, stated_so: str, parameter: str) -> None:
+    """The same index, held against a spec that says something else of one parameter."""
+    table, _, key = parameter.rpartition(".")
+    lines, inside = [], ""
+    for line in example_text().splitlines():
+        inside = line.partition("]")[0][1:] if line.startswith("[") else inside
+        lines.append(stated_so if inside == table and line.startswith(f"{key} =") else line)
+    assert stated_so in lines
+    (folder / "other.toml").write_text("\n".join(lines))
+    spec = load_spec(folder / "other.toml")
+    assert [one.parameter for one in agreements(folder, spec) if not one.agrees] == [parameter]
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_distances_are_those_of_kolmogorov_and_smirnov(name: str) -> None:
+    told, law = LAWS[name]
+    values = np.random.default_rng(1).permutation(law.ppf((np.arange(500) + 0.3) ** 1.02 / 600))
+    found, truth = compared(name, stated(told), list(values)), stats.kstest(values, law.cdf, method="asymp")
+    assert found.distance == pytest.approx(truth.statistic, abs=1e-4)
+    assert found.chance == pytest.approx(truth.pvalue, rel=0.02)
+    mean, sd = map(float, found.stated.split(", "))
+    assert mean == pytest.approx(law.mean(), abs=2e-3 * law.std()) and sd == pytest.approx(
+        law.std(), rel=2e-3
+    )
+
+
+def test_usual_is_the_mean_distance() -> None:
+    law: Distribution = stated({"uniform": [0, 1]})
+    rng = np.random.default_rng(2)
+    found = [compared("x", law, list(rng.uniform(size=400))) for _ in range(100)]
+    assert np.mean([one.distance for one in found]) == pytest.approx(found[0].usual, rel=0.1)
+
+
+def test_values_that_nothing_states_are_no_chance() -> None:
+    law = stated({"choice": ["a", "b"], "weights": [1, 0]})
+    assert compared("x", law, ["a"] * 9).chance == 1.0
+    assert not compared("x", law, ["a"] * 9 + ["b"]).agrees
+    steps = stated({"choice": [0, 1 / 3, {"uniform": [5, 6]}]})
+    assert compared("x", steps, [0.0, 0.333333, 5.5] * 50).chance > 0.5, "numbers are rounded"
+    assert not compared("x", steps, [0.0, 0.34, 5.5] * 50).agrees
+
+
+def test_backgrounds_without_an_environment_count_as_gradients(tmp_path: Path) -> None:
+    kinds = {"kind": {"choice": ["environment", "gradient", "none"]}}
+    around = {"name": {"choice": ["none", "uniform"]}}
+    spec = spec_of({"count": 500, "background": kinds, "environment": around})
+    assert all(one.agrees for one in agreements(index(tmp_path, spec), spec))
+
+
+def test_an_index_is_needed(tmp_path: Path) -> None:
+    with pytest.raises(DermisError, match=r"expected a data set with index\.parquet"):
+        list(agreements(tmp_path, spec_of({})))
