@@ -15,6 +15,7 @@ from scipy.ndimage import distance_transform_edt
 
 from dermis.export.run import export_skin
 from dermis.export.subject import Subject, subject_of
+from dermis.export.textures import painted
 from dermis.frame.renderer import Renderer
 from dermis.images.colour import encode_srgb
 from dermis.images.io import read_image
@@ -22,8 +23,9 @@ from dermis.reference.metrics import relative_rmse
 from dermis.scene.settings import Settings
 
 PICTURE = Path(__file__).parent.parent / "docs" / "images" / "engines_blender.webp"
-SIDE, SAMPLES, SEEDS = 256, 32, 2
-SHOWN, SHOWN_SAMPLES = 384, 128
+TEXELS = 1024
+SIDE, SAMPLES, SEEDS = 192, 32, 2
+SHOWN, SHOWN_SAMPLES = 384, 64
 METHODS = "random-walk-skin", "random-walk", "burley"
 LIT = 0.25  # of the mean: what is darker lies in shadow
 Floats = np.ndarray[Any, Any]
@@ -31,7 +33,7 @@ Floats = np.ndarray[Any, Any]
 
 def heads(pythons: dict[str, Path]) -> Iterator[dict[str, Any]]:
     """Without hair, which both draw by other means: outlines and colours of each method and version."""
-    subject = subject_of("human")
+    subject = painted(subject_of("human"), TEXELS, "auto")
     assert subject.head is not None
     bald = subject.with_head(replace(subject.head, hair=None, strands=None))
     ours = drawn(bald, SIDE)
@@ -46,7 +48,7 @@ def heads(pythons: dict[str, Path]) -> Iterator[dict[str, Any]]:
 def drawn(subject: Subject, side: int) -> Floats:
     """(h, w, 4) ours, linear."""
     assert subject.scene is not None
-    settings = Settings(size=(side, side), samples=16)
+    settings = Settings(size=(side, side), atlas=TEXELS, samples=16)
     return np.asarray(Renderer().draw(subject.scene, settings).linear_rgba(), np.float64)
 
 
@@ -92,7 +94,7 @@ def compared(ours: Floats, theirs: Floats) -> dict[str, Any]:
 
 def picture(pythons: dict[str, Path]) -> None:
     """Ours beside Cycles of each version, with hair."""
-    subject = subject_of("human")
+    subject = painted(subject_of("human"), TEXELS, "auto")
     seen = [drawn(subject, SHOWN)]
     for version, python in pythons.items():
         seen += rendered(subject, METHODS[0], version, python, SHOWN, SHOWN_SAMPLES, 1)
