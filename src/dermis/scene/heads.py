@@ -100,7 +100,7 @@ def load_head(
     told |= {"opaque": tuple(opaque), "eye_groups": tuple(eye_groups)}
     if is_person(name):
         return _with_look(_human(name, own, height_mm, normal_y, told | {"eyes": eyes}, levels), eye)
-    sample, files, look = SAMPLES.get(name), dict[str, Any](), dict[str, Any]()
+    sample, files, look = SAMPLES.get(name), dict[str, Any](), EyeLook()
     if sample is not None:
         _check_kind(sample)
         files = fetch(name)
@@ -127,8 +127,7 @@ def load_head(
     thanks = f"{sample.attribution}, {sample.licence}" if sample else ""
     made = _subdivided(Head(name, rigged.mesh, maps, thanks, rigged.rig), levels)
     made = with_usual_regions(made) if regions == AUTO else made
-    made = with_fitted_eyes(made, rigged.mesh) if eyes == "fitted" else made
-    return _with_look(_with_look(made, look if made.eyes else None), eye)
+    return _with_look(with_fitted_eyes(made, rigged.mesh, look) if eyes == "fitted" else made, eye)
 
 
 def is_person(name: str) -> bool:

@@ -25,6 +25,7 @@ _THROUGH = "KHR_materials_diffuse_transmission.diffuseTransmissionColorFactor"
 _BASE = "pbrMetallicRoughness.baseColorFactor"
 _THICK_M = 0.1  # a ball, and about a head: programs that trace no rays take it for the way through
 _EAR_MM = 4.0  # where light comes through a head
+_LEAST = 1e-9
 _TYPED = 0.5  # share of the light that a user lets through who sees the slider
 
 
@@ -48,7 +49,7 @@ class Gltf(Target):
         """The volume whose walk comes nearest, or what an ear lets through."""
         if self.variant == DIFFUSE:
             return _diffuse(subject, *_through(subject))
-        return _scatter(fitted(subject.curve))
+        return _scatter(fitted(subject.curve, subject.albedo))
 
     def naive(self, subject: Subject, version: str) -> Rows:
         """The skin's colour for every colour, and the mean radius of the light for the distance."""
@@ -63,7 +64,8 @@ class Gltf(Target):
         if self.variant == DIFFUSE:
             back = (1.0 - numbers_of(rows, _FACTOR)[0]) * subject.curve.energy
             return Curve.of(lambda r: np.repeat((r > 0.0)[:, None], 3, axis=1), back)
-        return walked(_volume(rows))
+        found = walked(_volume(rows))
+        return found.with_energy(found.energy / np.maximum(subject.albedo, _LEAST) * subject.curve.energy)
 
     def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
         """One .glb file; the skin's material has the extensions, none of which is required."""

@@ -66,7 +66,10 @@ def walked(volume: Volume) -> Curve:
     return half_space("skin", single_scattering(volume.multiscatter), volume.mean_free_path_mm)
 
 
-def fitted(curve: Curve) -> Volume:
-    """The volume whose walk gives back a curve's energy, and is nearest to it cumulatively."""
-    found = homogeneous(curve)
+def fitted(curve: Curve, energy: Floats | None = None) -> Volume:
+    """The volume whose walk gives back a curve's energy, and is nearest to it cumulatively.
+
+    energy : (3,) that it gives back instead, a colour map's [-]
+    """
+    found = homogeneous(curve, energy)
     return volume_of(found.mfp_mm, multiscatter_of(found.albedo))

@@ -48,7 +48,7 @@ class _Shape(NamedTuple):
 
 
 @preparing("fitting the eyes")
-def with_fitted_eyes(head: Head, coarse: Mesh | None = None) -> Head:
+def with_fitted_eyes(head: Head, coarse: Mesh | None = None, look: EyeLook | None = None) -> Head:
     """The head with the package's eyes where its file calls something eyes that is two balls.
 
     The new balls have the radius and the place of those, look along their corneas or straight ahead, and
@@ -56,6 +56,7 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None) -> Head:
     `note` says why.
 
     coarse : the mesh of a head that is subdivided, as it was before, when the lids lay on the balls
+    look : of the eyes
     """
     mesh, control = head.mesh, head.control
     found, why = find_balls(coarse or mesh)
@@ -76,7 +77,7 @@ def with_fitted_eyes(head: Head, coarse: Mesh | None = None) -> Head:
     material = np.arange(-2, 0, dtype=np.int32) + len(made.materials)
     balls_mm, middles_mm = np.array([(shape.ball_mm, shape.middle_mm) for shape in shapes]).T
     sight = np.stack([axes_along(shape.axis) @ ball.sight for ball, shape in zip(found, shapes, strict=True)])
-    eyes = Eyes(apex, back, side, material, EyeLook(), balls_mm, middles_mm, sight)
+    eyes = Eyes(apex, back, side, material, look or EyeLook(), balls_mm, middles_mm, sight)
     return replace(head, mesh=made, rig=rig, eyes=eyes)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
 
 from dermis.errors import about
 from dermis.mesh.eyes import EyeLook
@@ -12,8 +11,8 @@ from dermis.mesh.gltf.document import read_document
 from dermis.reading import BROKEN, understood
 
 
-def told_eyes(path: Path) -> dict[str, Any]:
-    """Fields of `EyeLook` that a .glb or .gltf file tells of its person; {} for others.
+def told_eyes(path: Path) -> EyeLook:
+    """What a .glb or .gltf file tells of the eyes of its person; the usual look for others.
 
     Raises DermisError for such that no eyes can have.
     """
@@ -21,8 +20,7 @@ def told_eyes(path: Path) -> dict[str, Any]:
     person = notes.get("person") if isinstance(notes, dict) else None
     eyes = person.get("eyes") if isinstance(person, dict) else None
     if not isinstance(eyes, dict):
-        return {}
+        return EyeLook()
     told = {one.name: eyes[one.name] for one in fields(EyeLook) if one.name in eyes}
     with about(path), understood(path, "sound numbers of eyes", *BROKEN):
-        EyeLook(**told)
-    return told
+        return EyeLook(**told)

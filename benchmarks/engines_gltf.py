@@ -1,0 +1,52 @@
+"""What glTF's draft of scattering can say of skins: predicted differences, and what other readings show.
+
+python benchmarks/engines_gltf.py
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from cyclopts import run
+from figures_file import write_figures
+
+from dermis.export.deviation import deviation
+from dermis.export.subject import subject_of
+from dermis.export.targets.gltf import DIFFUSE, DRAFT, SCATTER, TARGET
+from dermis.export.targets.gltf_medium import fitted, walked
+
+RESULTS = Path(__file__).parent / "results" / "engines_gltf.json"
+SKINS = "skin1", "skin2", "marble", "dj3", "gpu-gems-3"
+VERSION = TARGET.versions[-1]
+
+
+def figures_of(name: str) -> dict[str, Any]:
+    """Of a skin: what was fitted, and the differences of it, of what one would type, and of A as the colour."""
+    subject = subject_of(name)
+    volume = fitted(subject.curve, subject.albedo)
+    coloured = walked(volume._replace(multiscatter=subject.curve.energy))
+    found: dict[str, Any] = {
+        "albedo": [round(float(x), 4) for x in subject.curve.energy],
+        "multiscatter": [round(float(x), 4) for x in volume.multiscatter],
+        "mean_free_path_mm": [round(float(x), 4) for x in volume.mean_free_path_mm],
+        "albedo_as_colour": deviation(subject.curve, coloured).as_json(),
+    }
+    for variant in (SCATTER, DIFFUSE):
+        target = TARGET.with_variant(variant)
+        best, naive = (
+            deviation(subject.curve, target.shown(rows, subject, VERSION)).as_json()
+            for rows in (target.parameters(subject, VERSION), target.naive(subject, VERSION))
+        )
+        found[variant] = {"error": best, "naive_error": naive}
+    return found
+
+
+def main() -> None:
+    """Compute and write."""
+    figures = {"version": VERSION, "draft": DRAFT, "skins": {name: figures_of(name) for name in SKINS}}
+    write_figures(RESULTS, figures, 4)
+
+
+if __name__ == "__main__":
+    run(main)
