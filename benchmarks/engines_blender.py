@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from engines_blender_head import heads, picture
 
+from dermis.export.deviation import deviation
 from dermis.export.lobe import fit_d
 from dermis.export.subject import subject_of
 from dermis.export.targets.blender import TARGET
@@ -73,6 +74,7 @@ def edge(python: Path, version: str, method: str, name: str) -> dict[str, Any]:
     subject, target = subject_of(name), TARGET.with_variant(method)
     rows, d = target.parameters(subject, version), fit_d(subject.curve)
     shown = target.shown(rows, subject, version)
+    typed = target.shown(target.naive(subject, version), subject, version)
     samples = SAMPLES.get(method, USUAL_SAMPLES)
     passes = [
         {"channel": c, "width_m": 12e-3 * d[c], "size": [BINS * EACH, ROWS], "samples": samples, "seed": k}
@@ -103,6 +105,7 @@ def edge(python: Path, version: str, method: str, name: str) -> dict[str, Any]:
         "against_true": np.abs(measured - true).max(axis=1).round(4).tolist(),
         "noise": np.sqrt((noise**2).mean(axis=1)).round(4).tolist(),
         "energy": (np.pi * lit / subject.curve.energy).round(4).tolist(),
+        "typed_in": deviation(subject.curve, typed).edge.round(4).tolist(),
         "predicted_energy": (shown.energy / subject.curve.energy).round(4).tolist(),
     }
 

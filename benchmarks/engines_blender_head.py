@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 from PIL import Image
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import distance_transform_edt, maximum_filter
 
 from dermis.export.run import export_skin
 from dermis.export.subject import Subject, subject_of
+from dermis.export.textures import painted
 from dermis.frame.renderer import Renderer
 from dermis.images.colour import encode_srgb
 from dermis.images.io import read_image
@@ -22,21 +23,23 @@ from dermis.reference.metrics import relative_rmse
 from dermis.scene.settings import Settings
 
 PICTURE = Path(__file__).parent.parent / "docs" / "images" / "engines_blender.webp"
-SIDE, SAMPLES, SEEDS = 256, 32, 2
-SHOWN, SHOWN_SAMPLES = 384, 128
-METHODS = "random-walk-skin", "random-walk", "burley"
+TEXELS = 1024
+SIDE, SAMPLES, SEEDS = 192, 32, 2
+SHOWN, SHOWN_SAMPLES = 320, 48
+METHODS = {"4.5": ("random-walk-skin",), "5.2": ("random-walk-skin", "random-walk", "burley")}
 LIT = 0.25  # of the mean: what is darker lies in shadow
+BRIGHT, GROWN = 0.75, 9  # radiance of highlights, white skin being 1, and pixels across that they spoil
 Floats = np.ndarray[Any, Any]
 
 
 def heads(pythons: dict[str, Path]) -> Iterator[dict[str, Any]]:
     """Without hair, which both draw by other means: outlines and colours of each method and version."""
-    subject = subject_of("human")
+    subject = painted(subject_of("human"), TEXELS, "auto")
     assert subject.head is not None
     bald = subject.with_head(replace(subject.head, hair=None, strands=None))
     ours = drawn(bald, SIDE)
     for version, python in pythons.items():
-        for method in METHODS:
+        for method in METHODS[version]:
             pictures = rendered(bald, method, version, python, SIDE, SAMPLES, SEEDS)
             found = {"version": version, "method": method, **compared(ours, np.stack(pictures))}
             print(found, flush=True)  # noqa: T201
@@ -46,7 +49,7 @@ def heads(pythons: dict[str, Path]) -> Iterator[dict[str, Any]]:
 def drawn(subject: Subject, side: int) -> Floats:
     """(h, w, 4) ours, linear."""
     assert subject.scene is not None
-    settings = Settings(size=(side, side), samples=16)
+    settings = Settings(size=(side, side), atlas=TEXELS, samples=16)
     return np.asarray(Renderer().draw(subject.scene, settings).linear_rgba(), np.float64)
 
 
@@ -78,7 +81,9 @@ def compared(ours: Floats, theirs: Floats) -> dict[str, Any]:
     whole = (ours[..., 3] > 0.999) & (mean[..., 3] > 0.999)
     light = ours[..., :3].mean(axis=-1)
     lit = whole & (light > LIT * light[whole].mean())
-    error = relative_rmse(ours[..., :3], mean[..., :3], whole, variance[..., :3])
+    bright = (ours[..., :3].max(axis=-1) > BRIGHT) | (mean[..., :3].max(axis=-1) > BRIGHT)
+    matte = whole & ~maximum_filter(bright, GROWN)
+    errors = [relative_rmse(ours[..., :3], mean[..., :3], on, variance[..., :3]) for on in (whole, matte)]
     return {
         "side": ours.shape[0],
         "samples": SEEDS * SAMPLES,
@@ -86,16 +91,18 @@ def compared(ours: Floats, theirs: Floats) -> dict[str, Any]:
         "pixels_apart": int((a != b).sum()),
         "pixels": int(a.sum()),
         "lit_colour": (mean[lit][:, :3].mean(axis=0) / ours[lit][:, :3].mean(axis=0)).round(4).tolist(),
-        "relative_rmse": round(float(error.value), 4),
+        "relative_rmse": round(float(errors[0].value), 4),
+        "without_highlights": round(float(errors[1].value), 4),
+        "share_without_highlights": round(float(matte.sum() / whole.sum()), 4),
     }
 
 
 def picture(pythons: dict[str, Path]) -> None:
     """Ours beside Cycles of each version, with hair."""
-    subject = subject_of("human")
+    subject = painted(subject_of("human"), TEXELS, "auto")
     seen = [drawn(subject, SHOWN)]
     for version, python in pythons.items():
-        seen += rendered(subject, METHODS[0], version, python, SHOWN, SHOWN_SAMPLES, 1)
+        seen += rendered(subject, METHODS[version][0], version, python, SHOWN, SHOWN_SAMPLES, 1)
     shown = [one[..., :3] + 0.4 * (1.0 - one[..., 3:]) for one in seen]
     levels = encode_srgb(np.clip(np.concatenate(shown, axis=1), 0.0, 1.0))
     Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE, quality=88)

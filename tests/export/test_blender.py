@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from small_head import write_head
 
 from dermis.errors import DermisError
 from dermis.export.deviation import deviation
@@ -123,6 +124,16 @@ def test_ball_is_one_script_without_this_machine(tmp_path: Path) -> None:
     told = described_in(text)
     assert told["inputs"][RADIUS] == list(numbers_of(report.rows, RADIUS))
     assert (told["method"], told["versions"], told["head"]) == ("RANDOM_WALK", [[5, 2], None], None)
+
+
+def test_head_lies_beside_its_script(tmp_path: Path) -> None:
+    head = write_head(tmp_path / "a'\"; head.obj")
+    export_skin(head, "blender", tmp_path / "made.py", variant="burley", profile="skin1")
+    text = (tmp_path / "made.py").read_text("utf-8")
+    told = described_in(text)
+    assert (told["head"], told["skin_slots"], told["name"]) == ("made.glb", [0], "a'\"; head.obj")
+    assert (tmp_path / "made.glb").read_bytes()[:4] == b"glTF"
+    assert told["versions"] == [[4, 5], None] and str(tmp_path) not in text
 
 
 def test_names_are_words_and_never_code() -> None:

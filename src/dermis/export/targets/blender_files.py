@@ -56,7 +56,7 @@ def _described(subject: Subject, rows: Rows, method: str, versions: Any) -> dict
     inputs["Specular IOR Level"] = 0.5 * skin.strength
     rough = float(np.sqrt(skin.smoothing * _GGX))
     return {
-        "name": _printable(subject.name),
+        "name": _printable(Path(subject.name).name),
         "versions": versions,
         "method": method,
         "inputs": inputs,
