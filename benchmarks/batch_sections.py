@@ -53,7 +53,7 @@ def spec_for(plan: Plan, images: int, shards: int, *, moving: bool = False) -> S
     tables: dict[str, Any] = tomllib.loads(example_text())
     tables |= {"count": images, "size": list(plan.size), "shard_size": max(1, images // shards)}
     tables |= {"outputs": list(OUTPUTS), "landmarks": list(LANDMARKS)}
-    tables["render"] = {**tables["render"], "atlas": plan.atlas}
+    tables["render"] = {**tables["render"], "atlas": plan.atlas, "shadow_size": plan.atlas}
     if moving:
         tables |= {"images_per_person": images, **_STILL}
         tables.pop("correlated", None)
@@ -123,7 +123,7 @@ def dask(plan: Plan, count: int) -> dict[str, Any]:
 def steps(plan: Plan) -> dict[str, Any]:
     """Milliseconds of each step of an image by itself, in one process: medians."""
     spec = spec_for(plan, min(_MOST_STEPS, plan.images), 1)
-    maker, renderer = SceneMaker(spec), Renderer(plan.adapter)
+    maker, renderer = SceneMaker(spec), Renderer(plan.adapter, rounds=16)
     told: dict[str, list[float]] = {}
     for number in range(spec.count):
         parameters = _timed(told, "parameters", lambda: spec.parameters(number))  # noqa: B023

@@ -14,7 +14,7 @@ from png_bytes import png
 from small_head import write_head
 
 from dermis.errors import DermisError
-from dermis.extras import EXTRAS, needed
+from dermis.extras import EXTRAS, distribution, needed
 from dermis.images.codecs import decode_with_pillow, encode_png
 from dermis.images.io import read_image
 
@@ -68,7 +68,7 @@ def test_each_extra_is_one_of_the_packages() -> None:
     text = (SOURCE.parent / "pyproject.toml").read_text("utf-8")
     for module, extra in EXTRAS.items():
         (line,) = [line for line in text.splitlines() if line.startswith(f"{extra} = [")]
-        assert module.replace("_", "-").removesuffix("evaluator") in line
+        assert distribution(module) in line
 
 
 def test_what_is_missing_is_named() -> None:

@@ -1,27 +1,35 @@
 """Makes src/dermis/export/data/half_space.csv: profiles of homogeneous half-spaces by Monte Carlo.
 
-python tools/half_space_table.py [PHOTONS], minutes on two cores. Scattering is isotropic, and lengths are
-in mean free paths, so that a profile depends on the albedo alone, the surface and how light enters.
+python tools/half_space_table.py [PHOTONS], some minutes. Scattering is isotropic and lengths are in mean free
+paths, so that a profile depends on the albedo alone, the surface and how light enters. Photons are never
+absorbed: one that leaves after n scatterings counts albedo^n, for all albedos at once.
 """
 
 from __future__ import annotations
 
+import math
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from dermis.machine_code import compiled
 from dermis.outputs import replacing
-from dermis.reference.slab import ScatteringLayer
-from dermis.reference.slab_mc import trace_slab
+from dermis.reference.photon import deflect, refract, uniform
+
+Floats = NDArray[np.float64]
+Words = NDArray[np.uint64]
 
 OUT = Path(__file__).parent.parent / "src" / "dermis" / "export" / "data" / "half_space.csv"
 KINDS = {"skin": (1.4, False), "matched": (1.0, False), "walk": (1.0, True)}
 """Index of refraction of the surface, and whether light enters by the cosine of all directions."""
 ABSORBED = np.concatenate([np.geomspace(1e-5, 0.2, 25), np.linspace(0.25, 0.95, 15), [0.98]])
 EDGES = np.concatenate([[0.0], np.geomspace(1e-3, 3e3, 96)])
-COUNTED = 2_000_000  # photons that leave
-MOST = 64_000_000
+PHOTONS, BATCHES = 3_000_000, 40
+DARK, MORE = 0.2, 8  # what is absorbed at least where few photons count, and how many times more are traced
+EVENTS, FEW_EVENTS = 200_000, 200  # after which a photon counts next to nothing, or a seventh at 1e-5
 HEAD = """\
 # quantity: cumulative share of the light leaving a homogeneous half-space around a thin beam, of all that
 #   leaves; total is that of what enters; kind skin has a smooth surface of index 1.4 lit at right angles,
@@ -35,23 +43,68 @@ HEAD = """\
 
 def main() -> int:
     """Trace all and write the table."""
-    counted = int(sys.argv[1]) if len(sys.argv) > 1 else COUNTED
+    photons = int(sys.argv[1]) if len(sys.argv) > 1 else PHOTONS
     lines = [HEAD + ",".join(["kind", "albedo", "total", *(f"{edge:.5g}" for edge in EDGES[1:])])]
     for kind, (eta, diffuse) in KINDS.items():
-        lines += [_line(kind, eta, diffuse, float(absorbed), counted) for absorbed in ABSORBED]
+        dark = ABSORBED >= DARK
+        bright_left = traced(eta, diffuse, ABSORBED[~dark], photons, EVENTS)
+        left = np.hstack([bright_left, traced(eta, diffuse, ABSORBED[dark], MORE * photons, FEW_EVENTS)])
+        total, within = left.sum(axis=0), np.cumsum(left[:-1], axis=0)
+        for i, absorbed in enumerate(ABSORBED):
+            shares = ",".join(f"{share:.5f}" for share in within[:, i] / total[i])
+            lines.append(f"{kind},{1.0 - absorbed:.6g},{total[i]:.6g},{shares}")
     with replacing(OUT) as trial:
         trial.write_text("\n".join([*lines, ""]), encoding="utf-8")
     return 0
 
 
-def _line(kind: str, eta: float, diffuse: bool, absorbed: float, counted: int) -> str:
-    layer = [ScatteringLayer(absorbed, 1.0 - absorbed, np.inf, 0.0, eta)]
-    first = trace_slab(layer, counted // 20, 1, EDGES, diffuse=diffuse).per_entering.total_reflectance
-    photons = int(min(MOST, counted / max(first, 1e-4)))
-    found = trace_slab(layer, photons, 0, EDGES, diffuse=diffuse)
-    share = np.cumsum(found.reflectance * np.pi * np.diff(EDGES**2)) / found.total_reflectance
-    total = found.per_entering.total_reflectance
-    return ",".join([kind, f"{1.0 - absorbed:.6g}", f"{total:.6g}", *(f"{x:.5f}" for x in share)])
+def traced(eta: float, diffuse: bool, absorbed: Floats, photons: int, events: int) -> Floats:
+    """Light that leaves through each ring and beyond the last (k, m) for each albedo, of what enters [-]."""
+
+    def batch(seeds: np.random.SeedSequence) -> Floats:
+        left = np.zeros((len(EDGES), len(absorbed)))
+        rng = seeds.generate_state(4, np.uint64).astype(np.uint64)
+        _walk(photons // BATCHES, events, eta, diffuse, EDGES**2, np.log1p(-absorbed), rng, left)
+        return left
+
+    with ThreadPoolExecutor() as pool:
+        parts = list(pool.map(batch, np.random.SeedSequence(0).spawn(BATCHES)))
+    return np.asarray(np.sum(parts, axis=0) / (photons // BATCHES * BATCHES))
+
+
+@compiled
+def _walk(
+    photons: int,
+    events: int,
+    eta: float,
+    diffuse: bool,
+    edges2: Floats,
+    log_albedo: Floats,
+    rng: Words,
+    left: Floats,
+) -> None:
+    for _ in range(photons):
+        x = y = z = ux = uy = 0.0
+        uz = math.sqrt(uniform(rng)) if diffuse else 1.0
+        ux = math.sqrt(1.0 - uz * uz)  # rings are round: one azimuth stands for all
+        scatterings = 0
+        path = -math.log(uniform(rng))
+        for _event in range(events):
+            to_face = -z / uz if uz < 0.0 else path
+            if path <= to_face:
+                x, y, z = x + path * ux, y + path * uy, z + path * uz
+                ux, uy, uz = deflect(ux, uy, uz, 0.0, rng)
+                scatterings += 1
+                path = -math.log(uniform(rng))
+                continue
+            x, y, z = x + to_face * ux, y + to_face * uy, 0.0
+            path -= to_face
+            if eta == 1.0 or uniform(rng) >= refract(-uz, eta)[0]:
+                ring = int(np.searchsorted(edges2, x * x + y * y, side="right")) - 1
+                for k in range(len(log_albedo)):
+                    left[ring, k] += math.exp(scatterings * log_albedo[k])
+                break
+            uz = -uz
 
 
 if __name__ == "__main__":

@@ -16,8 +16,11 @@ EXTRAS = {
     "pyarrow": "batch",
     "webdataset": "batch",
     "distributed": "cluster",
+    "pxr": "engines",
+    "MaterialX": "engines",
 }
 """Extra by module, for those that `needed` is asked for."""
+_CALLED = {"pxr": "usd-core"}  # what is called otherwise where it is installed from
 
 
 def needed(module: str, task: str) -> Any:
@@ -32,5 +35,10 @@ def needed(module: str, task: str) -> Any:
         return import_module(module)
     except ImportError as fault:
         remedy = f'Install it: pip install "dermis[{EXTRAS[package]}]", or ".[{EXTRAS[package]}]" in a clone'
-        name = package.replace("_", "-")
+        name = distribution(package)
         refuse(task, f"the package {name}", f"it cannot be imported ({fault})", remedy)
+
+
+def distribution(module: str) -> str:
+    """What the package of a module is called where it is installed from."""
+    return _CALLED.get(module, module.replace("_", "-"))

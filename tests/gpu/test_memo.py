@@ -53,9 +53,9 @@ def test_room_is_made_before_a_thing_is() -> None:
     assert log.made == "abc"
 
 
-@pytest.mark.parametrize(("depth", "rounds"), [(1, 1), (2, 4)])
-def test_what_nobody_asks_for_goes_after_some_rounds(depth: int, rounds: int) -> None:
-    memo, log = Memo(depth), Log()
+@pytest.mark.parametrize(("depth", "asked", "rounds"), [(1, 1, 1), (2, 1, 4), (1, 3, 3), (2, 3, 4)])
+def test_what_nobody_asks_for_goes_after_some_rounds(depth: int, asked: int, rounds: int) -> None:
+    memo, log = Memo(depth, asked), Log()
     for more, expected in ((0, ""), (rounds, "a")):
         log.asked(memo, "a")
         for _ in range(more + 1):

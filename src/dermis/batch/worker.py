@@ -23,6 +23,10 @@ from dermis.gpu.failures import DeviceError
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
+_ROUNDS = (
+    16  # images that may come between two with an environment, whose occlusion takes a second to prepare
+)
+
 
 class Failure(NamedTuple):
     """An image that was left out, and why."""
@@ -64,7 +68,7 @@ class Worker:
 
     def __init__(self, adapter: str, work: Work) -> None:
         self._work = work
-        self._renderer = Renderer(adapter)
+        self._renderer = Renderer(adapter, rounds=_ROUNDS)
         self._maker = SceneMaker(work.spec)
         self._encoders = Encoders(work.encoders, partial(_encode, work.spec))
 

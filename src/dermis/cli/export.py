@@ -10,6 +10,7 @@ from cyclopts import Parameter
 from dermis.cli.console import print_json, print_lines, working_on
 from dermis.cli.head_options import HeadOptions, check_head
 from dermis.cli.options import NOTHING, Adapter, Json, given
+from dermis.errors import refuse
 from dermis.export.registry import TARGETS
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ def export(
     output: Annotated[Path, Parameter(name=("--output", "-o"))],
     version: str | None = None,
     variant: str | None = None,
+    diffuse_transmission: Annotated[bool, Parameter(negative="", show_default=False)] = False,
     model: Model | None = None,
     profile: str | None = None,
     library: Path | None = None,
@@ -50,6 +52,8 @@ def export(
 
         dermis export human:7 --to unity -o person
 
+        dermis export human:7 --to gltf --diffuse-transmission -o person.glb
+
         dermis export human --to babylon -o head.html
 
         dermis export head.glb --profile medium --to unity --version 14 -o head --json
@@ -66,6 +70,8 @@ def export(
         Of the program [the newest that is known].
     variant:
         Of what the program can do, such as a method of scattering [its first].
+    diffuse_transmission:
+        The same as --variant diffuse-transmission, which gltf has.
     model:
         What the true profile is by [montecarlo for one layer without end, layered for others].
     profile:
@@ -83,7 +89,11 @@ def export(
     from dermis.export.run import export_skin
 
     check_head(what, head)
-    told: dict[str, Any] = given(version=version, variant=variant, model=model, profile=profile, library=library)
+    if diffuse_transmission:
+        _check_alone(variant)
+        variant = "diffuse-transmission"
+    told: dict[str, Any] = given(version=version, variant=variant, model=model)
+    told |= given(profile=profile, library=library)
     with working_on(f"exporting {what}"):
         report = export_skin(what, to, output, side=map_side, adapter=adapter, **told, **head)
     if as_json:
@@ -91,3 +101,9 @@ def export(
     else:
         print_lines(*report.lines(naive), "", *map(str, report.files))
     return 0
+
+
+def _check_alone(variant: str | None) -> None:
+    if variant is not None:
+        came = f"--variant {variant} came with it"
+        refuse("--diffuse-transmission", "no other variant", came, "Leave one of them out")

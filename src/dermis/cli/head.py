@@ -107,8 +107,8 @@ def head(
         eumelanin, 0 (blue) to 1 (dark brown), pupil_mm, redness, seed; as eumelanin=0.2 [what goes with it].
     hair:
         style (none, cropped or short), length_mm, density, curl, fade, beard_mm, bushy, grey, eumelanin,
-        pheomelanin and seed; as style=cropped,length_mm=5 [what goes with the person]. Only .json has it:
-        hairs are not written as glTF.
+        pheomelanin and seed; as style=cropped,length_mm=5 [what goes with the person]. In .glb hairs are
+        thin tubes, which this package does not read back.
     colour:
         Picture of the skin's colour, sRGB [the head's own, as the next two].
     normal:

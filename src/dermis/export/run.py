@@ -55,7 +55,7 @@ def export_skin(
 
     DermisError : an unknown target, version, variant or model, and what cannot be read or written
     """
-    target = TARGETS[to].with_variant(variant)
+    target = replace(TARGETS[to].with_variant(variant), side=side, adapter=adapter)
     target = target if library is None else target.with_library(library)
     known, place = target.known_version(version), _checked(target, output)
     told = {"model": model, "profile": profile, **head}
@@ -63,9 +63,9 @@ def export_skin(
         subject = subject_of(subject, **told)
     elif given := [name for name, value in told.items() if value is not None]:
         refuse(given[0], "a subject that is still to be made", "it came with one", "Leave it out")
-    report = judged(subject, target, known)
     if target.needs_maps:
         subject = painted(subject, side, adapter)
+    report = judged(subject, target, known)
     with _made(place) as inside:
         home = inside.parent if place.suffix else inside
         files = target.write(subject, report.rows, inside, known)

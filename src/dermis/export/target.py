@@ -50,9 +50,13 @@ class Target(ABC):
     """A program that skin is exported to; what differs within one version is its variant.
 
     variant : one of `variants`, "" where there are none
+    side : of maps that are made [texel]
+    adapter : that makes them
     """
 
     variant: str = ""
+    side: int = 2048
+    adapter: str = "auto"
 
     name: ClassVar[str]
     title: ClassVar[str]

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from dermis.export.subject import Subject
-from dermis.images.colour import encode_srgb8
-from dermis.images.io import write_png
-from dermis.mesh.maps import Maps
+from dermis.human.head_file import relief_slopes
+from dermis.mesh.gltf.textures import skin_pictures
 
-Files = dict[str, Path]
+ROLES = "colour", "normal", "roughness", "specular", "height"
 
 
 def painted(subject: Subject, side: int, adapter: str) -> Subject:
@@ -31,35 +26,19 @@ def painted(subject: Subject, side: int, adapter: str) -> Subject:
     return subject.with_head(on_device(adapter, lambda device: with_painted_maps(device, head, side)))
 
 
-def write_maps(subject: Subject, folder: Path, stem: str = "") -> Files:
-    """The maps that a head has, as PNG, by role: colour (sRGB), normal (green up), grey ones.
+def write_maps(subject: Subject, folder: Path, stem: str = "") -> dict[str, Path]:
+    """The maps that a head has, as PNG, by role: colour (sRGB), normal (green up), and grey ones.
+
+    Roughness is Beckmann's m, specular the strength of the reflection, both plain; height is from its lowest
+    to its highest in 16 bits.
 
     stem : what their names begin with, such as "skin_"
     """
     head = subject.head
     if head is None:
         return {}
-    pictures = _pictures(head.maps)
-    written = {}
-    for role, levels in pictures.items():
-        written[role] = folder / f"{stem}{role}.png"
-        write_png(written[role], levels)
+    pictures, _ = skin_pictures(head.maps, relief_slopes(head))
+    written = {role: folder / f"{stem}{role}.png" for role in ROLES if role in pictures}
+    for role, path in written.items():
+        path.write_bytes(pictures[role])
     return written
-
-
-def _pictures(maps: Maps) -> dict[str, NDArray[Any]]:
-    found = {}
-    if maps.colour is not None:
-        found["colour"] = encode_srgb8(maps.colour)
-    if maps.normal is not None:
-        slopes = np.concatenate([-maps.normal, np.ones((*maps.normal.shape[:2], 1))], axis=-1)
-        unit = slopes / np.linalg.norm(slopes, axis=-1, keepdims=True)
-        found["normal"] = _levels(0.5 + 0.5 * unit)
-    for role in ("roughness", "specular"):
-        if (grey := getattr(maps, role)) is not None:
-            found[role] = _levels(grey)
-    return found
-
-
-def _levels(values: NDArray[Any]) -> NDArray[np.uint8]:
-    return np.asarray(np.rint(255.0 * np.clip(values, 0.0, 1.0)), np.uint8)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
-from dermis.frame.shape import Shape
+from dermis.frame.shape import VERTICES, Shape
 from dermis.gpu import Device
 from dermis.gpu.textures import texture_from
 from dermis.mesh.mesh import Mesh
@@ -22,26 +22,48 @@ class HeadResources:
     """What the shaders read of a head's surface.
 
     resources : textures and buffers by their names in geometry.wgsl
+    indices : buffer of the triangles' vertices, for the rasteriser
     triangles : count
     """
 
     resources: dict[str, Any]
+    indices: Any
     triangles: int
 
     def shaped(self, shape: Shape) -> HeadResources:
         """The same triangles with the vertices of another shape."""
         return replace(self, resources=self.resources | shape.vertices)
 
+    def placed(self, other: HeadResources) -> HeadResources:
+        """The same triangles with another's vertices."""
+        return replace(
+            self, resources={**self.resources, **{name: other.resources[name] for name in VERTICES}}
+        )
+
 
 def upload_geometry(device: Device, mesh: Mesh, atlas: Atlas, shape: Shape) -> HeadResources:
     """A head's triangles in an atlas, and the vertices of its shape."""
-    triangles = _triangle_table(mesh, atlas)
+    return _uploaded(device, _triangle_table(mesh, atlas), shape.vertices)
+
+
+def upload_bare(device: Device, triangles: NDArray[np.integer]) -> HeadResources:
+    """Triangles of no atlas and no material, without their vertices, for views that take depths alone.
+
+    triangles : (t, 3) vertices
+    """
+    table = np.zeros((3, len(triangles), 4), dtype=np.uint32)
+    table[0, :, :3] = triangles
+    return _uploaded(device, table, {})
+
+
+def _uploaded(device: Device, table: NDArray[np.uint32], vertices: dict[str, Any]) -> HeadResources:
+    rows = np.concatenate([_rows(part, _TRIANGLES_PER_ROW) for part in table])
     read = device.adapter.kind != "CPU"  # see geometry.wgsl; what is not read still needs to be there
     resources = {
-        "triangle_table": texture_from(device, triangles, "rgba32uint"),
-        "triangle_buffer": device.buffer(triangles if read else triangles[:1, :3], "STORAGE"),
+        "triangle_table": texture_from(device, rows, "rgba32uint"),
+        "triangle_buffer": device.buffer(rows if read else rows[:1, :3], "STORAGE"),
     }
-    return HeadResources(resources | shape.vertices, len(mesh.triangles))
+    return HeadResources(resources | vertices, device.buffer(table[0, :, :3], "INDEX"), table.shape[1])
 
 
 def _triangle_table(mesh: Mesh, atlas: Atlas) -> NDArray[np.uint32]:
@@ -52,7 +74,7 @@ def _triangle_table(mesh: Mesh, atlas: Atlas) -> NDArray[np.uint32]:
     table[1] = np.ascontiguousarray(atlas.place[:, :2]).reshape(-1, 4).view(np.uint32)
     table[2, :, :2] = np.ascontiguousarray(atlas.place[:, 2]).view(np.uint32)
     table[2, :, 2] = atlas.per_uv.view(np.uint32)
-    return np.concatenate([_rows(part, _TRIANGLES_PER_ROW) for part in table])
+    return table
 
 
 def _rows(table: NDArray[Any], per_row: int) -> NDArray[Any]:

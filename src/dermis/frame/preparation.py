@@ -33,6 +33,7 @@ from dermis.human.skin.movements import movements
 from dermis.mesh.head import Head
 from dermis.mesh.outline import Outline
 from dermis.mesh.rig import Motion
+from dermis.scene.environment import Environment
 from dermis.scene.lights import Light
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
@@ -54,11 +55,11 @@ class Moved(NamedTuple):
 class Preparation:
     """Makes the inputs of frames on a device.
 
-    depth : how many of each thing are kept, see `Memo`
+    depth, rounds : how many of each thing are kept, and for how long, see `Memo`
     """
 
-    def __init__(self, device: Device, depth: int = 1) -> None:
-        self.device, self.memo = device, Memo(depth)
+    def __init__(self, device: Device, depth: int = 1, rounds: int = 1) -> None:
+        self.device, self.memo = device, Memo(depth, rounds)
         self.profile_of = SkinProfiles().of
 
     def inputs(
@@ -95,7 +96,7 @@ class Preparation:
     ) -> Inputs:
         keep, device, head, around = self.memo.keep, self.device, scene.head.bare, scene.environment
         profile = self.profile_of(scene.skin)
-        surroundings = keep(load_surroundings, device, around.name if around else None)
+        surroundings = keep(load_surroundings, device, around.name if around else None, of=_kind_of(around))
         scene = with_suns(self.memo, scene, surroundings)
         moved = self._moved(head, scene.motion)
         lit_by = head, tuple(scene.lights), moved.outline, settings.shadow_size
@@ -153,6 +154,11 @@ class Preparation:
         """The head as it is posed, or at rest where no motion came."""
         at_rest = self.memo.keep(_resting, head)
         return self.memo.keep(_posed, head, motion or head.control.rest, at_rest)
+
+
+def _kind_of(around: Environment | None) -> str:
+    """Of surroundings: none do not take the place of some."""
+    return "" if around else "none"
 
 
 def _bytes_of(head: Head, motion: Motion, at_rest: MotionBytes) -> MotionBytes:

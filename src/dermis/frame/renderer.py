@@ -41,14 +41,18 @@ class Renderer(Submitter):
 
     adapter : "auto", "cpu" or part of an adapter's name
     depth : how many variants of each resource are kept, for callers that alternate between a few
+    rounds : frames for which resources are kept that none of them needs
     reopens : False raises DeviceLostError instead, for callers that keep resources of their own on the device
     """
 
-    def __init__(self, adapter: str = "auto", depth: int = 1, *, reopens: bool = True) -> None:
+    def __init__(
+        self, adapter: str = "auto", depth: int = 1, *, rounds: int = 1, reopens: bool = True
+    ) -> None:
         if not isinstance(adapter, str):
             refuse("adapter", "its name", f"{shown_value(adapter)} came", "Write auto, cpu or a part of it")
         super().__init__()
         self._depth = whole_number("depth", depth, 1, _DEEPEST)
+        self._rounds = whole_number("rounds", rounds, 1, _DEEPEST)
         self._adapter, self._opening_ms = adapter, 0.0
         self.kept_open = KeptOpen(self._open, self._adopt, reopens=reopens)
 
@@ -59,7 +63,7 @@ class Renderer(Submitter):
     def _adopt(self, device: Device) -> None:
         """Make what is kept from frame to frame on a device that was just opened."""
         warm_up(device)
-        self.on(device, self._depth)
+        self.on(device, self._depth, self._rounds)
         self._opening_ms = 1e3 * (time.perf_counter() - self._opening_began)
 
     def forget(self) -> None:

@@ -34,10 +34,10 @@ class Submitter:
         self._last: Shown | None = None
         self._in_flight: deque[int] = deque()
 
-    def on(self, device: Device, depth: int) -> None:
+    def on(self, device: Device, depth: int, rounds: int) -> None:
         """Make what is kept from frame to frame on a device."""
         self.device, self.graph = device, Graph(device)
-        preparation = Preparation(device, depth)
+        preparation = Preparation(device, depth, rounds)
         self.memo, self.prepare = preparation.memo, preparation.inputs
         self.profile_of = preparation.profile_of
         self._in_flight.clear()

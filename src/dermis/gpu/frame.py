@@ -114,6 +114,7 @@ class Frame(Recorder):
         resources: Resources,
         vertices: int,
         *,
+        indices: Any = None,
         layer: int = 0,
         depth: Any,
         far: float,
@@ -121,6 +122,7 @@ class Frame(Recorder):
     ) -> None:
         """Rasterise `vertices` / 3 triangles into cleared targets.
 
+        indices : buffer of the number that the shader gets for each of the vertices; without it they are counted
         layer : the instance index that the shader sees
         far : the depth that the attachment starts at
         """
@@ -132,7 +134,11 @@ class Frame(Recorder):
         }
         targets = [target] if target is not None else []
         one = self._render_pass(stage, program, resources, targets, attached)
-        one.draw(vertices, 1, 0, layer)
+        if indices is None:
+            one.draw(vertices, 1, 0, layer)
+        else:
+            one.set_index_buffer(indices, "uint32")
+            one.draw_indexed(vertices, 1, 0, 0, layer)
         one.end()
 
     def fill(

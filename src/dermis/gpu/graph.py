@@ -105,6 +105,7 @@ class Graph(Recorder):
         resources: Resources,
         vertices: int,
         *,
+        indices: Any = None,
         layer: int = 0,
         depth: Any,
         far: float,
@@ -114,10 +115,12 @@ class Graph(Recorder):
         writes = tuple(slot_of(self.device, one) for one in (depth, target) if one is not None)
 
         def run(frame: Frame) -> None:
-            frame.draw(stage, program, resources, vertices, layer=layer, depth=depth, far=far, target=target)
+            attached = {"depth": depth, "far": far, "target": target}
+            frame.draw(stage, program, resources, vertices, indices=indices, layer=layer, **attached)
 
         access = program.access(resources)
-        self._add(stage, program, resources, (vertices,), access, writes, run, (layer, far))
+        taken = None if indices is None else slot_of(self.device, indices)
+        self._add(stage, program, resources, (vertices,), access, writes, run, (layer, far, taken))
 
     def fill(
         self, stage: str, program: FragmentProgram, resources: Resources, targets: Sequence[Any]
@@ -192,7 +195,7 @@ class Graph(Recorder):
         access: Access,
         writes: tuple[Slot, ...],
         run: Callable[[Frame], None],
-        more: tuple[float, ...] = (),
+        more: tuple[Any, ...] = (),
     ) -> None:
         if self.listing is not None:
             self.listing.add(stage, program, resources, size, len(self._passes))

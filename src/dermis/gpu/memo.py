@@ -32,14 +32,14 @@ class Made:
 class Memo:
     """Results of functions by their arguments; a function is called again only when an argument changes.
 
-    depth : how many results of each function are kept, for callers that alternate between a few; a function
-        that is not asked for during depth squared rounds is forgotten
+    depth : how many results of each function are kept, for callers that alternate between a few
+    rounds : after which a function is forgotten that nobody asked for; depth squared where that is more
     """
 
-    def __init__(self, depth: int = 1) -> None:
+    def __init__(self, depth: int = 1, rounds: int = 1) -> None:
         self._depth = depth
         self._kept: dict[Role, list[Made]] = {}
-        self._asked: deque[set[Role]] = deque([set()], maxlen=depth * depth)
+        self._asked: deque[set[Role]] = deque([set()], maxlen=max(rounds, depth * depth))
         self._making: list[Made] = []
         self._found: list[tuple[Role, Made]] = []  # in this round, parts not among them
 

@@ -36,15 +36,19 @@ def write_person(
     eyes : what its eyes look like; of one colour where None
     """
     notes = {"person": numbers_of(person)}
-    told = {"weights": weights, "slopes": relief(head), "notes": notes, "eyes": eyes}
-    data = encode_head(head, roughness=roughness, **told)
+    data = encode_head(
+        head, roughness=roughness, weights=weights, slopes=relief_slopes(head), notes=notes, eyes=eyes
+    )
     with replacing(path) as trial:
         trial.write_bytes(data)
     return len(data)
 
 
-def relief(head: Head) -> NDArray[np.float32] | None:
-    """(n, n, 2) rise of a height map to the right and upwards, if other programs need it [-]."""
+def relief_slopes(head: Head) -> NDArray[np.float32] | None:
+    """(n, n, 2) rise of a head's height map to the right and upwards, if other programs need it [-].
+
+    None where it has a map of normals, or no square height map: they need none.
+    """
     height = head.maps.height
     if head.maps.normal is not None or height is None:
         return None

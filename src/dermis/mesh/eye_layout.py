@@ -33,4 +33,4 @@ def eye_uv(places: Doubles) -> NDArray[np.float32]:
     angle = np.arctan2(across, places[:, 2])
     radius = RIM * np.expm1(-angle / FALLING) / np.expm1(-np.pi / FALLING)
     way = places[:, :2] * [1.0, -1.0] / np.maximum(across, 1e-12)[:, None]
-    return (0.5 + radius[:, None] * way).astype(np.float32)
+    return np.asarray(0.5 + radius[:, None] * way, np.float32)

@@ -6,8 +6,6 @@ Blender's Python runs `cycles_script.py` as a process of its own on a folder wit
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,18 +17,16 @@ from numpy.typing import NDArray
 
 from dermis.errors import DermisError, refuse
 from dermis.images.io import read_image
+from dermis.reference.blender_process import PYTHON_VARIABLE as PYTHON_VARIABLE
+from dermis.reference.blender_process import Errand, blender_python, run_blender
 from dermis.reference.cycles_scene import FALLOFFS, Below, describe
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
-PYTHON_VARIABLE = "DERMIS_BLENDER_PYTHON"
 Floats = NDArray[np.float32]
 Method = Literal["random-walk", "burley"]
 _PASSES = 4
-_REMEDY = (
-    f"Set {PYTHON_VARIABLE} to a Python with bpy, kept apart since bpy wants numpy below 2: "
-    'python3.11 -m venv blender && blender/bin/pip install bpy "numpy<2"'
-)
+_ERRAND = Errand("Cycles", "to render the scene", "Try bpy 5.0, which this was made with")
 _START_S, _PATH_S = 300.0, 5e-4
 """Time limits for the start and for each path: a hundred times what two cores took."""
 
@@ -144,19 +140,6 @@ def _check_samples(samples: int) -> None:
         refuse("samples", "a whole number from 1", f"{samples} came", "Correct it")
 
 
-def blender_python(python: str | Path | None = None) -> Path:
-    """The Python that has bpy: the one given, or the one that DERMIS_BLENDER_PYTHON names.
-
-    Raises DermisError when there is no such file.
-    """
-    named = python or os.environ.get(PYTHON_VARIABLE) or ""
-    if not named:
-        _refuse_python("none is named")
-    if not Path(named).is_file():
-        _refuse_python(f"there is no file {named}")
-    return Path(named)
-
-
 def _write_scene(folder: Path, described: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
     (folder / "scene.json").write_text(json.dumps(described), encoding="utf-8")
     np.savez(folder / "arrays.npz", **arrays)  # type: ignore[arg-type]  # its last parameter is no array
@@ -168,18 +151,7 @@ def _run_cycles(python: Path, folder: Path, paths: int) -> None:
     paths : to be traced, which sets the time limit
     """
     script = Path(__file__).with_name("cycles_script.py")
-    # Isolated: our packages need another numpy, and the `cycles` beside the script is not Blender's.
-    command = [str(python), "-I", str(script), str(folder)]
-    longest = _START_S + _PATH_S * paths
-    try:
-        ran = subprocess.run(command, capture_output=True, check=False, timeout=longest)
-    except OSError as fault:
-        _refuse_python(f"{python} cannot be run ({fault.strerror})")
-    except subprocess.TimeoutExpired:
-        came = f"it was ended after {longest:.0f} s"
-        refuse("Cycles", "to render the scene", came, "Take fewer samples or a smaller image")
-    if ran.returncode != 0:
-        _refuse_end(python, ran)
+    run_blender(python, script, [str(folder)], _START_S + _PATH_S * paths, _ERRAND)
 
 
 def read_passes(folder: Path, samples: Sequence[int], size: tuple[int, int]) -> list[CyclesPass]:
@@ -207,18 +179,5 @@ def read_passes(folder: Path, samples: Sequence[int], size: tuple[int, int]) -> 
         _refuse_render(f"it left something else ({str(fault) or type(fault).__name__})")
 
 
-def _refuse_end(python: Path, ran: subprocess.CompletedProcess[bytes]) -> NoReturn:
-    said = (ran.stderr.strip() or ran.stdout.strip()).decode("utf-8", "replace").splitlines()
-    last = said[-1] if said else "it said nothing"
-    if "No module named" in last:
-        _refuse_python(f"{python} says: {last}")
-    ended = f"signal {-ran.returncode} ended it" if ran.returncode < 0 else "it failed"
-    _refuse_render(f"{ended} ({last})")
-
-
 def _refuse_render(came: str) -> NoReturn:
-    refuse("Cycles", "to render the scene", came, "Try bpy 5.0, which this was made with")
-
-
-def _refuse_python(came: str) -> NoReturn:
-    refuse("Cycles", "a Python that has Blender's module bpy", came, _REMEDY)
+    refuse(_ERRAND.who, _ERRAND.task, came, _ERRAND.remedy)

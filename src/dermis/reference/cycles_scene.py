@@ -61,7 +61,7 @@ def describe(
         "materials": _materials(scene.head, medium, method),
         "lights": [lamp(light, number) for number, light in enumerate(scene.lights, start=1)],
         "world": around,
-        "camera": _camera(scene),
+        "camera": camera_of(scene),
         "size": list(size),
         "direct": isinstance(medium, Lambertian | Facets),
     }
@@ -128,7 +128,11 @@ def _skin(medium: Below, method: str) -> dict[str, Any]:
     return {"method": FALLOFFS[method], "colour": colour, "radius": walk.tolist()}
 
 
-def _camera(scene: Scene) -> dict[str, Any]:
+def camera_of(scene: Scene) -> dict[str, Any]:
+    """The camera in Cycles' units.
+
+    Raises DermisError for lenses that Cycles has not.
+    """
     camera = scene.camera
     check_lens(camera, "Cycles")
     path = np.subtract(camera.target, camera.position)

@@ -134,13 +134,10 @@ def _leave(x: float, y: float, upward: bool, scatterings: int, edges2: Floats, t
 
 
 @compiled
-def _walk(stack: Stack, edges2: Floats, rng: Words, tally: Tally, diffuse: bool) -> None:
-    """One photon that has entered on the axis, followed until it leaves or is absorbed."""
+def _walk(stack: Stack, edges2: Floats, rng: Words, tally: Tally) -> None:
+    """One photon that has entered straight down on the axis, followed until it leaves or is absorbed."""
     x = y = z = ux = uy = 0.0
     uz = 1.0
-    if diffuse:
-        uz = math.sqrt(uniform(rng))
-        ux = math.sqrt(1.0 - uz * uz)  # rings are round: one azimuth stands for all
     layer, bottom = 1, len(stack.eta) - 2
     scatterings = 0
     depth = -math.log(uniform(rng))  # optical, to the next scattering
@@ -175,12 +172,8 @@ def _walk(stack: Stack, edges2: Floats, rng: Words, tally: Tally, diffuse: bool)
 
 
 @compiled
-def walk_batch(
-    photons: int, stack: Stack, edges2: Floats, rng: Words, tally: Tally, diffuse: bool = False
-) -> None:
+def walk_batch(photons: int, stack: Stack, edges2: Floats, rng: Words, tally: Tally) -> None:
     """Add the fates of this many photons to the tally.
-
-    diffuse : whether they enter by the cosine of all directions, not straight down
 
     Source: [Wang1995], except that absorption takes a photon whole or not at all.
     """
@@ -189,4 +182,4 @@ def walk_batch(
     # 0.97 times. That gain is small for skin, and whole photons are counts: they conserve energy exactly, add
     # up alike in any order, and have binomial errors.
     for _ in range(photons):
-        _walk(stack, edges2, rng, tally, diffuse)
+        _walk(stack, edges2, rng, tally)

@@ -45,7 +45,6 @@ def trace_slab(
     seed: int = 0,
     edges_mm: Floats | None = None,
     report: Report | None = None,
-    diffuse: bool = False,
 ) -> SlabResult:
     """What becomes of a thin beam that falls at right angles on a stack of layers in air.
 
@@ -54,13 +53,12 @@ def trace_slab(
     seed : the same seed gives the same result on any number of processors
     edges_mm : of the rings, from 0; `default_edges` when left out [mm]
     report : called with the number of batches done, and of all
-    diffuse : the beam comes from all directions by their cosine, under a surface that is matched
 
     Source: [Wang1995].
     """
     photons = _check(layers, photons, seed)
     edges = default_edges() if edges_mm is None else _checked_edges(edges_mm)
-    tally = _trace(_stack(layers), photons, seed, edges, report, diffuse)
+    tally = _trace(_stack(layers), photons, seed, edges, report)
     return _shares(tally, photons, edges, layers[0].eta)
 
 
@@ -176,9 +174,7 @@ def _stack(layers: Sequence[ScatteringLayer]) -> Stack:
     )
 
 
-def _trace(
-    stack: Stack, photons: int, seed: int, edges: Floats, report: Report | None, diffuse: bool
-) -> Tally:
+def _trace(stack: Stack, photons: int, seed: int, edges: Floats, report: Report | None) -> Tally:
     from numba import config
 
     from dermis.reference.photon import Tally, walk_batch
@@ -192,7 +188,7 @@ def _trace(
         for done in range(0, size, _AT_ONCE):
             if stop.is_set():
                 break
-            walk_batch(min(_AT_ONCE, size - done), stack, edges**2, rng, tally, diffuse)
+            walk_batch(min(_AT_ONCE, size - done), stack, edges**2, rng, tally)
         return tally
 
     sizes = [photons * (i + 1) // BATCHES - photons * i // BATCHES for i in range(BATCHES)]

@@ -20,6 +20,7 @@ from dermis.mesh.gltf.pictures import embedded_maps
 from dermis.mesh.head import Head
 from dermis.mesh.load import load_rigged
 from dermis.mesh.maps import Maps, load_maps
+from dermis.mesh.mesh import Mesh
 from dermis.mesh.obj_maps import obj_maps
 from dermis.mesh.samples import SAMPLES, Sample, fetch
 from dermis.mesh.subdivide import subdivide_head
@@ -127,8 +128,7 @@ def load_head(
     thanks = f"{sample.attribution}, {sample.licence}" if sample else ""
     made = _subdivided(Head(name, rigged.mesh, maps, thanks, rigged.rig), levels)
     made = with_usual_regions(made) if regions == AUTO else made
-    made = with_fitted_eyes(made, rigged.mesh) if eyes == "fitted" else made
-    return _with_look(_with_look(made, look if made.eyes else None), eye)
+    return _with_look(_fitted(made, rigged.mesh, look) if eyes == "fitted" else made, eye)
 
 
 def is_person(name: str) -> bool:
@@ -142,6 +142,12 @@ def _subdivided(head: Head, levels: Levels) -> Head:
     if made.levels and made.rig is not None:
         return replace(made, rig=replace(made.rig, corner=head.mesh.point))
     return made
+
+
+def _fitted(head: Head, coarse: Mesh, look: Mapping[str, float]) -> Head:
+    """The head with the package's eyes, if it has any, that look as its file tells."""
+    made = with_fitted_eyes(head, coarse)
+    return made if made.eyes is None else _with_look(made, look)
 
 
 def _with_look(head: Head, look: Mapping[str, float] | None) -> Head:

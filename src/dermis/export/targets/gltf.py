@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+
 from dermis.export.curve import Curve
 from dermis.export.lobe import fit_d
 from dermis.export.subject import Subject
 from dermis.export.target import Row, Rows, Target, numbers_of
-
 from dermis.export.targets.gltf_file import encoded
 from dermis.export.targets.gltf_medium import Volume, fitted, walked
 from dermis.optics.media import SKIN_ETA

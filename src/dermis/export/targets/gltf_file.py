@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from dermis.export.subject import Subject
 
+from dermis.export.subject import Subject
 from dermis.export.targets.gltf_medium import colour_for
 from dermis.frame.passes.painting.eye_pictures import eye_pictures
 from dermis.gpu.failures import on_device
-from dermis.human.head_file import relief
+from dermis.human.head_file import relief_slopes
 from dermis.human.person_file import numbers_of
 from dermis.mesh.eye_layout import EyePictures
 from dermis.mesh.gltf.textures import Added, colours_png
@@ -33,10 +34,12 @@ def encoded(subject: Subject, extensions: dict[str, dict[str, Any]], draft: str)
     notes: dict[str, Any] = {"draft": draft} if draft else {}
     if is_person(subject.name):
         notes["person"] = numbers_of(person_of(subject.name))
+    elif head.eyes is not None:
+        notes["person"] = {"eyes": asdict(head.eyes.look)}
     return encode_head(
         head,
         roughness=skin.roughness,
-        slopes=relief(head),
+        slopes=relief_slopes(head),
         notes=notes,
         eyes=_eyes(head),
         added=_added(subject, head, extensions, draft),

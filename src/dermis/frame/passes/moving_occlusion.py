@@ -9,15 +9,20 @@ from typing import Any
 import numpy as np
 
 from dermis.frame.atlas_layout import AtlasLayout, MovingOcclusion
-from dermis.frame.geometry import HeadResources
+from dermis.frame.geometry import HeadResources, upload_bare
 from dermis.frame.passes import TILE, each, program
 from dermis.frame.passes.visibility_buffer import Drawer, Layers, draw_layers, make_layers
 from dermis.frame.sky import SIDE, VIEWS, Look, look_around
 from dermis.gpu import Device, Frame, make_texture
 from dermis.mesh.head import Head
 from dermis.mesh.outline import Outline
+from dermis.mesh.unrefined import coarse_triangles
 
 _VERTICES = "moving_occlusion_vertices.wgsl"
+_OCCLUDERS = (
+    5_000,
+    0.4,
+)  # faces, at least; how far the others may be off the surface [mm], a quarter of a texel
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,11 +30,13 @@ class Sky:
     """The open share of the sky at a head's vertices.
 
     layers : depth maps from all around
+    occluders : triangles that are seen there, fewer than the head's: the maps are no finer
     shares : buffer of two for each vertex, as it rests and as it is now
     vertices : count
     """
 
     layers: Layers
+    occluders: HeadResources
     shares: Any
     vertices: int
 
@@ -41,7 +48,8 @@ def make_sky(device: Device, head: Head, resting: HeadResources) -> Sky:
     """
     count, rig, frame = len(head.mesh.positions), head.control, Frame(device, timed=False)
     layers = make_layers(device, (SIDE, SIDE), VIEWS, triangles=False)
-    sky = Sky(layers, device.buffer(np.zeros((count, 2), np.float32), "STORAGE"), count)
+    occluders = upload_bare(device, coarse_triangles(head, *_OCCLUDERS))
+    sky = Sky(layers, occluders, device.buffer(np.zeros((count, 2), np.float32), "STORAGE"), count)
     look = look_around(Outline(rig.outline_mm(rig.rest)), np.eye(3))
     _draw_vertices(frame, sky, look, sky_record(device, look, count), resting, True)
     frame.submit()
@@ -91,7 +99,7 @@ def _draw_vertices(
     graph: Drawer, sky: Sky, look: Look, record: Any, head: HeadResources, resting: bool = False
 ) -> None:
     """Find the shares of a head as it is drawn now."""
-    draw_layers(graph, "occlusion", sky.layers, look.views, head)
+    draw_layers(graph, "occlusion", sky.layers, look.views, sky.occluders.placed(head))
     bound = {**head.resources, "sky": record, "maps": sky.layers.texture, "shares": sky.shares}
     find = program(graph.device, _VERTICES, (("RESTING", resting),) if resting else ())
     graph.dispatch("occlusion", find, bound, each(sky.vertices))

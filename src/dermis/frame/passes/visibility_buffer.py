@@ -148,12 +148,14 @@ def _draw_raster(graph: Drawer, stage: str, layers: Layers, clips: Matrix, head:
     resources = {**head.resources, "views": _views(shader, layers, clips, head)}
     for layer, (depth, target) in enumerate(zip(layers.depth, layers.targets, strict=True)):
         vertices, attached = 3 * head.triangles, {"depth": depth, "far": 0.0, "target": target}
-        graph.draw(stage, shader, resources, vertices, layer=layer, **attached)
+        indices = None if layers.triangles else head.indices
+        graph.draw(stage, shader, resources, vertices, indices=indices, layer=layer, **attached)
 
 
 def _raster_program(device: Device, triangles: bool) -> RasterProgram:
     def make() -> RasterProgram:
-        path, folders = PASSES / "visibility_buffer_raster.wgsl", shader_folders()
+        name = "visibility_buffer_raster.wgsl" if triangles else "depth_raster.wgsl"
+        path, folders = PASSES / name, shader_folders()
         chosen, target = suited(device, path, folders), "r32uint" if triangles else None
         return RasterProgram(device, path, folders, chosen, target=target, depth_compare="greater")
 

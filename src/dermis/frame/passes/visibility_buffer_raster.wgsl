@@ -1,4 +1,4 @@
-// Rasterises the nearest surface: its depth, and its triangle where there is a colour target.
+// Rasterises the nearest surface: its depth and its triangle.
 //#include "mesh_textures.wgsl"
 //#include "views.wgsl"
 

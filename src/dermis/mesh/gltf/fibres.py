@@ -20,7 +20,7 @@ COLOURS = 64
 _SIDES = 3
 _WIDER = 2.0 * np.pi / (_SIDES * np.sqrt(3.0))  # a triangle is as wide as a circle, seen from all around
 _LEAST_MM = 0.01  # a smaller displacement is none
-_ALBEDO = 5.89  # of a fibre of roughness 0.3 among others, see [Chiang2016]
+_ALBEDO = 5.89  # of a fibre of roughness 0.3 among others: [Chiang2016] equation 9
 _TINY = 1e-9
 
 
@@ -53,7 +53,7 @@ class Fibres:
 
     @property
     def _knots(self) -> int:
-        return self.strands.knots_mm.shape[1]
+        return int(self.strands.knots_mm.shape[1])
 
     @property
     def each(self) -> int:
@@ -105,8 +105,12 @@ class Fibres:
         first, second = self.mesh.quads[self.strands.roots.quad].T
         around = self.mesh.point[np.column_stack([self.mesh.triangles[first], self.mesh.triangles[second]])]
         hair = np.flatnonzero((np.abs(delta_mm).max(axis=1) > 0)[around].any(axis=1))
-        some = replace(self, strands=_some(self.strands, hair))
-        delta = (some.placed(points_mm + delta_mm)[0] - some.placed(points_mm)[0]).reshape(-1, self.each, 3)
+        roots, places = self.strands.roots, self._rings[0][hair]
+        roots = Roots(roots.quad[hair], roots.place[hair])
+        (before, rest), (after, frame) = (
+            frames(self.mesh, roots, points) for points in (points_mm, points_mm + delta_mm)
+        )
+        delta = (after - before)[:, None] + np.einsum("nic,nki->nkc", frame - rest, places)
         far = np.flatnonzero(np.abs(delta).max(axis=(1, 2), initial=0.0) >= _LEAST_MM)
         vertex = hair[far][:, None] * self.each + np.arange(self.each)
         return vertex.ravel(), delta[far].reshape(-1, 3)
@@ -130,16 +134,10 @@ class Fibres:
         order = np.argsort(albedo.sum(axis=1), kind="stable")
         group = np.empty(len(order), np.int64)
         group[order] = np.arange(len(order)) * COLOURS // len(order)
-        row = np.stack([np.bincount(group, albedo[:, c], COLOURS) for c in range(3)], axis=-1)
-        row /= np.maximum(np.bincount(group, minlength=COLOURS), 1)[:, None]
+        sums = np.stack([np.bincount(group, albedo[:, c], COLOURS) for c in range(3)], axis=-1)
+        row = sums / np.maximum(np.bincount(group, minlength=COLOURS), 1)[:, None]
         u = np.repeat((group + 0.5) / COLOURS, self.each)
         return row[None].astype(np.float32), np.stack([u, np.full_like(u, 0.5)], axis=1).astype(np.float32)
-
-
-def _some(strands: Strands, those: NDArray[np.intp]) -> Strands:
-    roots = Roots(strands.roots.quad[those], strands.roots.place[those])
-    parts = {name: getattr(strands, name)[those] for name in ("knots_mm", "radius_mm", "absorption")}
-    return replace(strands, roots=roots, cover=None, **parts)
 
 
 def rest_points(mesh: Mesh, positions_mm: Floats) -> Doubles:

@@ -32,7 +32,7 @@ Tree = dict[str, Any]
 BROWS, HAIR = "brows and lashes", "hair"
 """Names of the materials of hairs, and of their pictures."""
 _KNOTS = {BROWS: 5, HAIR: 4}
-_MOST_HAIRS = 12_000  # fewer stand for all, wider
+_MOST_HAIRS = 16_000  # fewer stand for all, wider
 _M = 1e-3  # of a millimetre
 
 

@@ -1,0 +1,135 @@
+"""Edges of light on exported skin in Mitsuba itself: a half-lit plane against the curve and what was predicted.
+
+python benchmarks/engines_mitsuba.py --samples 60000
+
+A plane of the exported medium lies under a lamp that covers half of it and all but touches it. Seen along the
+normal, what leaves at a distance from the lamp's edge is the edge response of the profile, by reciprocity.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from cyclopts import run
+from figures_file import write_figures
+from numpy.typing import NDArray
+
+from dermis.export.curve import Curve
+from dermis.export.lobe import fit_d
+from dermis.export.subject import Subject, subject_of
+from dermis.export.target import numbers_of
+from dermis.export.targets.mitsuba import TARGET
+from dermis.export.targets.mitsuba_files import BOUNDARIES, Boundary, Walked, medium_words, surface_words
+from dermis.reference.described import rgb
+from dermis.reference.mitsuba_scene import load_mitsuba, variant_of
+
+Floats = NDArray[np.float64]
+RESULTS = Path(__file__).parent / "results" / "engines_mitsuba.json"
+SKINS = "skin1", "skin2", "dj3"
+_REACH, _PIXELS, _PASSES, _INSIDE = 4.0, 16, 8, 16
+_LAMP_D = 0.01  # height of the lamp, by d
+_PLANE_D = 500.0
+_BLACK = 1e-9
+
+
+def plane(mi: Any, medium: Walked, boundary: Boundary, d_mm: float, *, black: bool = False) -> Any:
+    """The plane z = 0, lit where x > 0, as a camera along the normal sees it within `_REACH` d of the edge.
+
+    The camera looks from under the surface where that sends light on along the normal anyway.
+    """
+    turn = mi.ScalarTransform4f
+    size, height = _PLANE_D * d_mm, _LAMP_D * d_mm
+    albedo = (_BLACK,) * 3 if black else medium.albedo
+    inside = mi.load_dict(medium_words(Walked(medium.sigma_t, albedo)))
+    below = boundary != "rough"
+    eye = -1e-3 * height if below else 0.5 * height
+    over = turn().translate([size, 0.0, height]).rotate([1, 0, 0], 180).scale([size, size, 1.0])
+    look = turn().look_at([0, 0, eye], [0, 0, -1], [0, 1, 0]).scale([_REACH * d_mm, _REACH * d_mm, 1.0])
+    film = {"type": "hdrfilm", "width": _PIXELS, "height": 1, "pixel_format": "rgb"}
+    sensor = {
+        "type": "orthographic",
+        "near_clip": 1e-9,
+        "far_clip": 1e6,
+        "to_world": look,
+        "film": {**film, "component_format": "float32", "rfilter": {"type": "box"}},
+        "sampler": {"type": "independent"},
+    }
+    skin = {"type": "rectangle", "to_world": turn().scale([size, size, 1.0]), "interior": inside}
+    dark = {"type": "diffuse", "reflectance": rgb((0, 0, 0))}
+    lamp = {"type": "rectangle", "to_world": over, "bsdf": dark}
+    return mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "volpath", "rr_depth": 400},
+            "sensor": {**sensor, **({"medium": inside} if below else {})},
+            "skin": {**skin, "bsdf": surface_words(boundary)},
+            "lamp": {**lamp, "emitter": {"type": "area", "radiance": rgb((1, 1, 1))}},
+        }
+    )
+
+
+def measured(
+    mi: Any, medium: Walked, boundary: Boundary, d_mm: float, samples: int
+) -> tuple[Floats, Floats, float]:
+    """Edge response at the pixels, its standard errors, and what leaves far inside the light."""
+    built = plane(mi, medium, boundary, d_mm)
+    each = samples // _PASSES
+    seen = np.array([np.array(mi.render(built, spp=each, seed=k))[0].mean(axis=1) for k in range(_PASSES)])
+    if boundary == "rough":  # what the surface itself reflects
+        bare = plane(mi, medium, boundary, d_mm, black=True)
+        lit = np.array(mi.render(bare, spp=samples, seed=99))[0].mean(axis=1)
+        seen -= np.where(np.arange(_PIXELS) >= _PIXELS // 2, lit[_PIXELS // 2 :].mean(), 0.0)
+    # The two sides of the edge add up to the whole, everywhere.
+    both = seen + seen[:, ::-1]
+    whole = float(both.mean())
+    response = 0.5 + 0.5 * (seen - seen[:, ::-1]) / whole
+    return response.mean(axis=0), response.std(axis=0, ddof=1) / np.sqrt(_PASSES), whole
+
+
+def over_pixels(curve: Curve, channel: int, d_mm: float) -> Floats:
+    """What a curve has there, on the mean of each pixel."""
+    edges = np.linspace(-_REACH, _REACH, _PIXELS + 1) * d_mm
+    at = edges[:-1, None] + np.diff(edges)[:, None] * (np.arange(_INSIDE) + 0.5) / _INSIDE
+    return np.asarray(curve.edge(at)[..., channel].mean(axis=1))
+
+
+def one(mi: Any, subject: Subject, boundary: Boundary, samples: int) -> dict[str, Any]:
+    """A skin under a surface: differences in red, green and blue."""
+    target = TARGET.with_variant(boundary)
+    version = target.known_version(None)
+    rows = target.parameters(subject, version)
+    shown, d = target.shown(rows, subject, version), fit_d(subject.curve)
+    told: dict[str, list[Any]] = {key: [] for key in ("predicted", "exported", "noise", "rms", "energy", "edge")}
+    for c in range(3):
+        sigma, albedo = (numbers_of(rows, name)[c] for name in ("sigma_t", "albedo"))
+        medium = Walked((sigma,) * 3, (albedo,) * 3)
+        found, error, whole = measured(mi, medium, boundary, float(d[c]), samples)
+        fault = found - over_pixels(shown, c, float(d[c]))
+        told["predicted"].append(float(np.abs(fault).max()))
+        told["exported"].append(float(np.abs(found - over_pixels(subject.curve, c, float(d[c]))).max()))
+        told["noise"].append(float(error.mean()))
+        told["rms"].append(float(np.sqrt((fault**2).mean())))
+        # Radiance seen from inside is larger by the index squared.
+        told["energy"].append(whole / (BOUNDARIES[boundary] ** 2 if boundary != "rough" else 1.0))
+        told["edge"].append([float(value) for value in found[_PIXELS // 2 :]])
+    return {"skin": subject.name, "boundary": boundary, "d_mm": [float(x) for x in d], **told}
+
+
+def main(*, samples: int = 60000, output: Path = RESULTS, variant: str = "scalar_rgb") -> None:
+    """Measure all skins under all surfaces and write the figures."""
+    mi = load_mitsuba()
+    found = []
+    with variant_of(mi, variant):
+        for name in SKINS:
+            subject = subject_of(name)
+            found += [one(mi, subject, boundary, samples) for boundary in TARGET.variants]
+    half = _PIXELS // 2
+    at = [(k + 0.5) * _REACH / half for k in range(half)]
+    how = {"mitsuba": mi.__version__, "samples": samples, "pixels": _PIXELS, "at_d": at}
+    write_figures(output, {**how, "edges": found}, 4)
+
+
+if __name__ == "__main__":
+    run(main)

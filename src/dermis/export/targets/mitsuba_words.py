@@ -1,0 +1,167 @@
+"""Mitsuba's scene descriptions as XML, without Mitsuba: it need not be there for a scene to be written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any, ClassVar
+from xml.etree import ElementTree as ET
+
+import numpy as np
+from numpy.typing import NDArray
+
+VERSION = "3.0.0"
+_POINTS, _VECTORS = ("position", "center"), ("direction",)
+_KINDS = {
+    "emitter": ("point", "projector", "directional", "area", "constant", "envmap", "spot"),
+    "shape": ("rectangle", "sphere", "disk", "ply"),
+    "bsdf": ("null", "diffuse", "principled", "dielectric", "roughdielectric", "mask", "roughconductor"),
+    "texture": ("bitmap", "mesh_attribute"),
+    "medium": ("homogeneous",),
+    "phase": ("isotropic", "hg"),
+    "integrator": ("volpath", "volpathmis"),
+    "sensor": ("perspective", "orthographic"),
+    "sampler": ("independent", "multijitter"),
+    "film": ("hdrfilm",),
+    "rfilter": ("box", "gaussian"),
+}
+_KIND = {plugin: kind for kind, plugins in _KINDS.items() for plugin in plugins}
+
+
+class Transform:
+    """A matrix as Mitsuba builds it: each call acts before those that came earlier."""
+
+    def __init__(self, matrix: Any = None) -> None:
+        self.matrix = np.eye(4) if matrix is None else np.asarray(matrix, np.float64).reshape(4, 4)
+
+    def look_at(self, origin: Any, target: Any, up: Any) -> Transform:
+        """From +Z towards the target, Y upwards."""
+        ahead = _unit(np.subtract(target, origin))
+        left = _unit(np.cross(up, ahead))
+        matrix = np.eye(4)
+        matrix[:3] = np.column_stack([left, np.cross(ahead, left), ahead, origin])
+        return Transform(self.matrix @ matrix)
+
+    def scale(self, factors: Any) -> Transform:
+        """Along the axes, or alike."""
+        return Transform(self.matrix @ np.diag([*np.broadcast_to(factors, 3), 1.0]))
+
+
+@dataclass(eq=False)
+class Bitmap:
+    """A picture that goes into a file of its own."""
+
+    values: NDArray[np.float32]
+
+
+@dataclass
+class Words:
+    """What stands in for the module `mitsuba` where scenes are described.
+
+    bitmaps : pictures, in the order in which they are written
+    """
+
+    bitmaps: list[NDArray[np.float32]] = field(default_factory=list)
+    ScalarTransform4f: ClassVar[type] = Transform
+    Bitmap: ClassVar[type] = Bitmap
+    math: ClassVar[SimpleNamespace] = SimpleNamespace(RayEpsilon=1500 * 2.0**-24)
+
+
+@dataclass(frozen=True)
+class Ref:
+    """Something that is described elsewhere in the scene, by its name."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Given:
+    """A value that `mitsuba -D NAME=...` replaces, and its kind."""
+
+    kind: str
+    name: str
+
+
+def element(described: Mapping[str, Any], name: str, words: Words) -> ET.Element:
+    """What a description says, under a name.
+
+    words : takes the pictures
+    """
+    plugin = described["type"]
+    made = ET.Element(_KIND[plugin], {"type": plugin, **_named(name, described)})
+    for key, value in described.items():
+        if key not in ("type", "id"):
+            made.append(_property(key, value, words))
+    return made
+
+
+def picture_file(index: int) -> str:
+    """Where a picture is beside the scene."""
+    return f"textures/light_{index}.exr"
+
+
+def document(parts: list[ET.Element]) -> bytes:
+    """A scene of these parts."""
+    root = ET.Element("scene", {"version": VERSION})
+    root.extend(parts)
+    ET.indent(root)
+    return ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+
+
+def default(name: str, value: str) -> ET.Element:
+    """A value that the command line may replace."""
+    return ET.Element("default", {"name": name, "value": value})
+
+
+def include(filename: str) -> ET.Element:
+    """What another file describes."""
+    return ET.Element("include", {"filename": filename})
+
+
+def _named(name: str, described: Mapping[str, Any]) -> dict[str, str]:
+    return {"id": described["id"]} if "id" in described else ({"name": name} if name else {})
+
+
+def _property(key: str, value: Any, words: Words) -> ET.Element:
+    if isinstance(value, Ref):
+        return ET.Element("ref", {"name": key, "id": value.name})
+    if isinstance(value, Given):
+        return ET.Element(value.kind, {"name": key, "value": f"${value.name}"})
+    if isinstance(value, Transform):
+        made = ET.Element("transform", {"name": key})
+        ET.SubElement(made, "matrix", {"value": _numbers(value.matrix.ravel())})
+        return made
+    if isinstance(value, Bitmap):
+        words.bitmaps.append(value.values)
+        return _plain("filename", picture_file(len(words.bitmaps) - 1))
+    if isinstance(value, Mapping):
+        if value["type"] == "rgb":
+            return ET.Element("rgb", {"name": key, "value": _numbers(np.ravel(value["value"]))})
+        return element(value, key, words)
+    return _plain(key, value)
+
+
+def _plain(key: str, value: Any) -> ET.Element:
+    if key in _POINTS or key in _VECTORS:
+        kind = "point" if key in _POINTS else "vector"
+        return ET.Element(kind, {"name": key, **dict(zip("xyz", map(_number, value), strict=True))})
+    if isinstance(value, bool):
+        return ET.Element("boolean", {"name": key, "value": str(value).lower()})
+    if isinstance(value, int | np.integer):
+        return ET.Element("integer", {"name": key, "value": str(int(value))})
+    if isinstance(value, float | np.floating):
+        return ET.Element("float", {"name": key, "value": _number(value)})
+    return ET.Element("string", {"name": key, "value": str(value)})
+
+
+def _numbers(values: Any) -> str:
+    return " ".join(map(_number, values))
+
+
+def _number(value: Any) -> str:
+    return f"{float(value):.9g}"
+
+
+def _unit(vector: Any) -> NDArray[np.float64]:
+    return np.asarray(vector / np.linalg.norm(vector))

@@ -1,0 +1,99 @@
+"""A reader of pbrt's scene files (version 4) that knows the directives and parameters which we write."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+_TOKEN = re.compile(r'#[^\n]*|"((?:[^"\\\n])*)"|([\[\]])|([^\s"\[\]#]+)')
+_NUMBERS = {"Scale": 3, "Translate": 3, "LookAt": 9}
+_BARE = {"WorldBegin", "AttributeBegin", "AttributeEnd"}
+_NAMES = {"Texture": 3}  # words in quotes before parameters; one of all others
+_KNOWN: dict[str, dict[str, str]] = {
+    "Camera perspective": {"fov": "float", "screenwindow": "float*"},
+    "Sampler zsobol": {"pixelsamples": "integer"},
+    "Integrator volpath": {"maxdepth": "integer"},
+    "Film rgb": {"filename": "string", "xresolution": "integer", "yresolution": "integer"},
+    "LightSource point": {"from": "point3", "I": "rgb"},
+    "LightSource spot": {
+        "from": "point3",
+        "to": "point3",
+        "I": "rgb",
+        "coneangle": "float",
+        "conedeltaangle": "float",
+    },
+    "LightSource distant": {"from": "point3", "to": "point3", "L": "rgb"},
+    "LightSource infinite": {"L": "rgb"},
+    "AreaLightSource diffuse": {"L": "rgb"},
+    "Shape bilinearmesh": {"P": "point3*"},
+    "Shape sphere": {"radius": "float"},
+    "Shape plymesh": {"filename": "string"},
+    "Texture imagemap": {"filename": "string", "encoding": "string", "wrap": "string"},
+    "Material coateddiffuse": {"reflectance": "rgb", "roughness": "float", "remaproughness": "bool"},
+    "Material subsurface": {
+        "reflectance": "rgb|texture",
+        "mfp": "rgb",
+        "scale": "float",
+        "g": "float",
+        "eta": "float",
+        "roughness": "float|texture",
+        "remaproughness": "bool",
+        "normalmap": "string",
+    },
+}
+_COUNT = {"float": 1, "integer": 1, "rgb": 3, "point3": 3, "string": 1, "texture": 1, "bool": 1}
+
+
+class Directive(NamedTuple):
+    """One of a file: its word, words in quotes, plain numbers, and parameters by name."""
+
+    word: str
+    names: list[str]
+    numbers: list[float]
+    parameters: dict[str, list[str]]
+
+
+def read(text: str) -> list[Directive]:
+    """The directives of a file; AssertionError where pbrt would stop."""
+    tokens = [found.groups() for found in _TOKEN.finditer(text) if not found[0].startswith("#")]
+    assert not _TOKEN.sub("", text).strip(), "something that is no token"
+    found, at, depth = [], 0, 0
+    while at < len(tokens):
+        word = tokens[at][2]
+        assert word is not None, f"a directive is expected, {tokens[at]} came"
+        one, at = _directive(word, tokens, at + 1)
+        depth += (word == "AttributeBegin") - (word == "AttributeEnd")
+        assert depth >= 0
+        found.append(one)
+    assert depth == 0
+    assert [one.word for one in found].count("WorldBegin") == 1
+    return found
+
+
+def _directive(word: str, tokens: list[tuple[str, ...]], at: int) -> tuple[Directive, int]:
+    if word in _BARE:
+        return Directive(word, [], [], {}), at
+    if word in _NUMBERS:
+        end = at + _NUMBERS[word]
+        return Directive(word, [], [float(one[2]) for one in tokens[at:end]], {}), end
+    count = _NAMES.get(word, 1)
+    names = [one[0] for one in tokens[at : at + count]]
+    known, at, parameters = _KNOWN[f"{word} {names[-1]}"], at + count, {}
+    while at < len(tokens) and tokens[at][0] is not None:
+        kind, name = tokens[at][0].split(" ")
+        assert name in known and kind in known[name].rstrip("*").split("|"), tokens[at]
+        assert tokens[at + 1][1] == "["
+        end = next(k for k in range(at + 2, len(tokens)) if tokens[k][1] == "]")
+        values = [one[0] if kind in ("string", "texture") else one[2] for one in tokens[at + 2 : end]]
+        assert None not in values
+        _check(kind, values, several=known[name].endswith("*"))
+        parameters[name], at = values, end + 1
+    return Directive(word, names, [], parameters), at
+
+
+def _check(kind: str, values: list[str], several: bool) -> None:
+    assert several or len(values) == _COUNT[kind]
+    if kind == "bool":
+        assert values[0] in ("true", "false")
+    elif kind not in ("string", "texture"):
+        [float(value) for value in values]

@@ -1,0 +1,168 @@
+"""Blender: formulas against the published and the counted, and the script that is written."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dermis.errors import DermisError
+from dermis.export.deviation import deviation
+from dermis.export.lobe import fit_d
+from dermis.export.run import export_skin
+from dermis.export.subject import Subject, subject_of
+from dermis.export.target import numbers_of
+from dermis.export.targets.blender import TARGET
+from dermis.export.targets.blender_scene import surroundings
+from dermis.export.targets.blender_text import script_text
+from dermis.export.targets.blender_walks import (
+    albedo,
+    burley_stretch,
+    burley_within,
+    legacy_albedo,
+    skin_stretch,
+    walk_within,
+)
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.primitives import uv_sphere
+from dermis.optics.media import media
+from dermis.reference.half_space import diffuse_albedo, directional_albedo
+from dermis.scene import Camera, PointLight, Scene
+
+RADIUS = "Subsurface Radius"
+HOSTILE = "x'; import os; os.system('true') #\n\"\"\"'''"
+
+
+@pytest.fixture(scope="module")
+def skin1() -> Subject:
+    return subject_of("skin1")
+
+
+def test_walks_return_what_half_spaces_do() -> None:
+    for alpha in (0.2, 0.41, 0.7, 0.9, 0.98):
+        total = float(walk_within(np.array([1e6]), alpha, "straight")[0])
+        assert total == pytest.approx(float(directional_albedo(1.0, alpha)), abs=2e-3)
+    below = float(walk_within(np.array([1e6]), 0.1, "straight")[0])
+    assert below == pytest.approx(0.5 * float(walk_within(np.array([1e6]), 0.2, "straight")[0]))
+
+
+@pytest.mark.parametrize(("formula", "apart"), [(albedo, 0.003), (legacy_albedo, 0.03)])
+def test_albedos_of_walks_return_the_colour(formula: Any, apart: float) -> None:
+    for colour in (0.1, 0.3, 0.5, 0.8):
+        assert diffuse_albedo(float(formula(colour))) == pytest.approx(colour, abs=apart)
+
+
+def test_published_diffuse_paths_are_the_radius_of_the_skin_walk() -> None:
+    """The table of [Jensen2001] gives skin1's total and diffuse path; its coefficients give the mean path."""
+    (layer,) = media()["skin1"].layers
+    path = np.array([3.67, 1.37, 0.68]) * skin_stretch(np.array([0.44, 0.22, 0.13]), 1.3)
+    assert path == pytest.approx(layer.mean_free_path_mm, rel=0.06)
+
+
+def test_burley_is_cut_at_16_lengths_and_stretched_in_eevee() -> None:
+    assert burley_within([0.0, 16.0, 40.0]) == pytest.approx([0.0, 1.0, 1.0])
+    assert burley_within([1.0])[0] == pytest.approx(
+        (1 - 0.25 / np.e - 0.75 * np.exp(-1 / 3)) / 0.99638, rel=1e-4
+    )
+    assert burley_stretch([0.8, 0.8, 0.24]) == pytest.approx([1.04, 1.04, 2.475])
+
+
+def test_radii_are_those_of_the_method(skin1: Subject) -> None:
+    d = fit_d(skin1.curve)
+
+    def radius(variant: str, version: str) -> np.ndarray[Any, Any]:
+        return np.array(numbers_of(TARGET.with_variant(variant).parameters(skin1, version), RADIUS))
+
+    assert radius("burley", "5.2") == pytest.approx(4 * np.pi * d, rel=0.03)
+    assert radius("eevee", "5.2") / radius("burley", "5.2") == pytest.approx(
+        burley_stretch(skin1.albedo), rel=1e-3
+    )
+    assert radius("random-walk", "5.1") / radius("random-walk", "5.2") == pytest.approx(4 * np.pi, rel=0.02)
+    assert (radius("random-walk", "4.5") == radius("random-walk", "5.1")).all()
+    assert (radius("random-walk-skin", "4.5") == radius("random-walk-skin", "5.2")).all()
+
+
+@pytest.mark.parametrize("variant", TARGET.variants)
+def test_parameters_are_better_than_what_is_typed_in(skin1: Subject, variant: str) -> None:
+    target = TARGET.with_variant(variant)
+    errors = [
+        deviation(skin1.curve, target.shown(rows(skin1, "5.2"), skin1, "5.2"))
+        for rows in (target.parameters, target.naive)
+    ]
+    assert errors[0].edge.max() < 0.016 < errors[1].edge.max()
+    assert errors[0].cdf.max() < 0.04 < errors[1].cdf.max()
+
+
+def test_unknown_versions_and_methods_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(DermisError, match=r"a version of Blender that is known: 4\.5, 5\.0, 5\.1, 5\.2"):
+        export_skin("skin1", "blender", tmp_path / "a", version="2.79")
+    with pytest.raises(DermisError, match="random-walk-skin, random-walk, burley, eevee"):
+        export_skin("skin1", "blender", tmp_path / "a", variant="gaussian")
+    assert not list(tmp_path.iterdir())
+
+
+def described_in(text: str) -> dict[str, Any]:
+    (told,) = (node for node in ast.parse(text).body if isinstance(node, ast.AnnAssign))
+    assert told.value is not None
+    found: dict[str, Any] = ast.literal_eval(told.value)
+    return found
+
+
+def test_ball_is_one_script_without_this_machine(tmp_path: Path) -> None:
+    report = export_skin("skin1", "blender", tmp_path / "skin", version="5.2", variant="random-walk")
+    assert {file.name for file in (tmp_path / "skin").iterdir()} == {"skin.py", "README.md", "export.json"}
+    text = (tmp_path / "skin" / "skin.py").read_text("utf-8")
+    compile(text, "skin.py", "exec")
+    assert str(Path.home()) not in text and str(tmp_path) not in text and "import dermis" not in text
+    told = described_in(text)
+    assert told["inputs"][RADIUS] == list(numbers_of(report.rows, RADIUS))
+    assert (told["method"], told["versions"], told["head"]) == ("RANDOM_WALK", [[5, 2], None], None)
+
+
+def test_names_are_words_and_never_code() -> None:
+    usual, hostile = (script_text({"name": name, "lights": [1.5, None]}) for name in ("head", HOSTILE))
+    assert described_in(hostile) == {"name": HOSTILE, "lights": [1.5, None]}
+    trees = [ast.parse(text) for text in (usual, hostile)]
+    for tree in trees:
+        tree.body = [node for node in tree.body if not isinstance(node, ast.AnnAssign)]
+    assert ast.dump(trees[0]) == ast.dump(trees[1])
+
+
+def test_script_refuses_a_blender_in_which_radii_mean_something_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, parts in {
+        "bpy": {"app": SimpleNamespace(version=(5, 2, 3))},
+        "mathutils": {"Matrix": None},
+    }.items():
+        stub = ModuleType(name)
+        vars(stub).update(parts)
+        monkeypatch.setitem(sys.modules, name, stub)
+    for versions, refused in (([[4, 5], [5, 2]], True), ([[5, 2], None], False), ([[6, 0], None], True)):
+        found: dict[str, Any] = {"__name__": "script"}
+        exec(compile(script_text({"versions": versions}), "script", "exec"), found)
+        if refused:
+            with pytest.raises(SystemExit, match=r"but 5\.2 runs it\. Export it again with --version 5\.2"):
+                found["check_version"]()
+        else:
+            found["check_version"]()
+
+
+def test_scene_stands_upright_in_metres() -> None:
+    head = Head("ball", uv_sphere(100.0, 16, 8), Maps())
+    lamp = PointLight(position=(0, 300, 400), target=(0, 0, 0), irradiance=(2, 1, 1))
+    scene = Scene(head, lights=[lamp], camera=Camera(position=(100, 0, 1000), target=(100, 0, 0)))
+    told, panorama = surroundings(scene, (0.0, 10.0, 0.0))
+    light, camera = np.array(told["lights"][0]["to_world"]), np.array(told["camera"]["to_world"])
+    assert light[:3, 3] == pytest.approx([0.0, -0.4, 0.31])
+    assert camera[:3, 3] == pytest.approx([0.1, -1.0, 0.01])
+    assert -camera[:3, 2] == pytest.approx([0.0, 1.0, 0.0]) and camera[:3, 1] == pytest.approx(
+        [0.0, 0.0, 1.0]
+    )
+    # Blender's irradiance is P / 4 pi^2 d^2 times pi: a lamp's power is spread over a sphere
+    assert told["lights"][0]["set"]["energy"] / (4 * np.pi * 0.5**2) == pytest.approx(2.0)
+    assert panorama is None

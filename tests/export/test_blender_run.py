@@ -1,0 +1,95 @@
+"""What is written for Blender, run by the Blender that DERMIS_BLENDER_PYTHON names."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from small_head import write_head
+
+from dermis.errors import DermisError
+from dermis.export.run import export_skin
+from dermis.export.subject import subject_of
+from dermis.export.targets.blender import TARGET
+from dermis.reference.blender_process import PYTHON_VARIABLE
+
+PYTHON = os.environ.get(PYTHON_VARIABLE, "")
+MEASURING = Path(__file__).parents[2] / "benchmarks" / "engines_blender_script.py"
+ASKED = """
+import json, sys
+import bpy
+bpy.ops.wm.open_mainfile(filepath=sys.argv[-2])
+scene = bpy.context.scene
+nodes = [node for one in bpy.data.materials for node in one.node_tree.nodes]
+shaders = [node for node in nodes if node.type == "BSDF_PRINCIPLED"]
+skin = [node for node in shaders if node.inputs["Subsurface Weight"].default_value == 1.0]
+meshes = [one for one in scene.objects if one.type == "MESH"]
+told = {
+    "name": scene.name,
+    "methods": [node.subsurface_method for node in skin],
+    "radius_m": [x * skin[0].inputs["Subsurface Scale"].default_value
+                 for x in skin[0].inputs["Subsurface Radius"].default_value],
+    "size_m": list(max(meshes, key=lambda one: len(one.data.vertices)).dimensions),
+    "lights": len([one for one in scene.objects if one.type == "LIGHT"]),
+    "camera": list(scene.camera.matrix_world.translation),
+}
+open(sys.argv[-1], "w").write(json.dumps(told))
+"""
+
+pytestmark = pytest.mark.skipif(not PYTHON, reason=f"{PYTHON_VARIABLE} is not set")
+
+
+@pytest.fixture(scope="module")
+def version() -> str:
+    """Of Blender, as the target knows it."""
+    words = [PYTHON, "-I", "-c", "import bpy; print('version', *bpy.app.version[:2])"]
+    said = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120).stdout
+    (line,) = (line for line in said.splitlines() if line.startswith("version"))
+    return ".".join(line.split()[1:])
+
+
+def test_head_is_saved_upright_with_its_skin(tmp_path: Path, version: str) -> None:
+    head = write_head(tmp_path / "a'\"; head.obj")
+    file = tmp_path / "head.blend"
+    report = export_skin(head, "blender", file, version=version, variant="burley", profile="skin1")
+    (tmp_path / "ask.py").write_text(ASKED)
+    told_file = tmp_path / "told.json"
+    words = [PYTHON, "-I", str(tmp_path / "ask.py"), str(file), str(told_file)]
+    subprocess.run(words, check=True, capture_output=True, timeout=120)
+    told: dict[str, Any] = json.loads(told_file.read_text())
+    assert told["methods"] == ["BURLEY"]
+    assert np.array(told["radius_m"]) == pytest.approx(4e-3 * np.pi * report.d_mm, rel=0.03)
+    assert told["size_m"] == pytest.approx([0.16, 0.19, 0.24], rel=0.03)  # 240 mm high, its face to -Y
+    assert told["lights"] >= 1 and told["camera"][1] < -1.0
+    assert "head.obj" in told["name"]
+
+
+def test_numbers_of_another_version_are_not_made(tmp_path: Path, version: str) -> None:
+    other = "4.5" if version == "5.2" else "5.2"
+    with pytest.raises(
+        DermisError, match=r"to make the scene, but it failed \(this file: expected Blender from"
+    ):
+        export_skin("skin1", "blender", tmp_path / "a.blend", version=other, variant="random-walk")
+    assert not (tmp_path / "a.blend").exists()
+
+
+@pytest.mark.parametrize("variant", ["random-walk-skin", "random-walk", "burley"])
+def test_cycles_shows_the_edge_that_was_predicted(tmp_path: Path, version: str, variant: str) -> None:
+    """Red of a half-lit plane within 4 mm; the benchmark has all colours with less noise."""
+    subject, target = subject_of("skin1"), TARGET.with_variant(variant)
+    rows = target.parameters(subject, version)
+    target.write(subject, rows, tmp_path, version)
+    one = {"channel": 0, "width_m": 8e-3, "size": [8, 32], "samples": 128, "seed": 1}
+    (tmp_path / "passes.json").write_text(json.dumps([one]))
+    words = [PYTHON, "-I", str(MEASURING), str(tmp_path)]
+    subprocess.run(words, check=True, capture_output=True, timeout=300)
+    (columns,) = json.loads((tmp_path / "done.json").read_text())["columns"]
+    shown = target.shown(rows, subject, version)
+    fine = shown.edge(np.linspace(-4.0, 4.0, 8 * 32, endpoint=False) + 1 / 64)[:, 0]
+    expected = fine.reshape(8, 32).mean(axis=1)
+    assert np.pi * np.array(columns)[:, 0] == pytest.approx(expected * shown.energy[0], abs=0.025)

@@ -1,0 +1,156 @@
+"""Baked maps against what the frame itself shows of the same skin."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dermis.errors import DermisError
+from dermis.export.run import export_skin
+from dermis.export.subject import subject_of
+from dermis.export.targets.maps_encoding import with_green
+from dermis.export.targets.maps_files import check_side, resampled
+from dermis.frame.baking import Baked, bake
+from dermis.frame.renderer import Renderer
+from dermis.images.colour import decode_srgb_levels
+from dermis.images.io import read_image
+from dermis.mesh.maps import Maps
+from dermis.scene.model import Scene
+from dermis.scene.settings import Settings
+
+SIDE = 512
+LIGHT, PAINT, DRAWN = 0.03, 0.01, 0.03
+"""Root mean square of the difference over that of the values: texels of 0.5 mm hold what lies between them,
+and light leaves towards the eye as along the normal only where the skin faces it. Measured .019, .005, .02."""
+SETTINGS = Settings(atlas=512, size=(192, 192), samples=1, strands=False)
+SEEN = "diffuse", "irradiance", "albedo", "melanin", "thickness", "uv"
+
+
+@pytest.fixture(scope="module")
+def renderer() -> Renderer:
+    return Renderer(os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return Scene("human:7")
+
+
+@pytest.fixture(scope="module")
+def baked(renderer: Renderer, scene: Scene) -> Baked:
+    return bake(renderer, scene, SETTINGS, SIDE)
+
+
+def looked_up(values: NDArray[Any], uv: NDArray[Any]) -> NDArray[Any]:
+    """Bilinear."""
+    at = uv * len(values) - 0.5
+    low = np.clip(np.floor(at).astype(int), 0, len(values) - 2)
+    x, y = low.T
+    fx, fy = (part if values.ndim == 2 else part[:, None] for part in (at - low).T)
+    rows = [values[y + k, x] * (1 - fx) + values[y + k, x + 1] * fx for k in (0, 1)]
+    return np.asarray(rows[0] * (1 - fy) + rows[1] * fy)
+
+
+def apart(found: NDArray[Any], wanted: NDArray[Any]) -> float:
+    return float(np.sqrt(((found - wanted) ** 2).mean() / (wanted**2).mean()))
+
+
+def test_the_maps_hold_what_the_frame_shows(renderer: Renderer, scene: Scene, baked: Baked) -> None:
+    drawn = renderer.draw(scene, SETTINGS, outputs=SEEN)
+    seen = {name: drawn.output(name) for name in SEEN}
+    skin = seen["thickness"] > 0
+    uv = seen["uv"][skin]
+    for name, of, factor, most in (
+        ("scattered", "diffuse", np.pi, LIGHT),
+        ("irradiance", "irradiance", 1.0, LIGHT),
+        ("albedo", "albedo", 1.0, PAINT),
+        ("melanin", "melanin", 1.0, 2 * PAINT),
+        ("thickness", "thickness", 1.0, PAINT),
+    ):
+        found = looked_up(baked.maps[name], uv)
+        assert apart(found / factor, seen[of][skin]) < most, name
+
+
+def test_a_head_drawn_with_the_maps_looks_the_same(renderer: Renderer, scene: Scene, baked: Baked) -> None:
+    before = renderer.draw(scene, SETTINGS).linear()
+    normal, area = baked.maps["normal"], baked.maps["stretch"][..., :2].prod(axis=-1)
+    slopes = np.ascontiguousarray(-normal[..., :2] / normal[..., 2:], np.float32)
+    rho_s = baked.maps["rho_s"]
+    maps = Maps(colour=baked.maps["albedo"], normal=slopes, specular=rho_s, roughness=baked.maps["roughness"])
+    mean = float(np.average(rho_s[baked.covered], weights=area[baked.covered]))
+    skin = scene.skin.model_copy(update={"rho_s": mean})
+    after = renderer.draw(scene.replace(head=replace(scene.head, maps=maps), skin=skin), SETTINGS).linear()
+    assert apart(after, before) < DRAWN
+
+
+def test_nothing_beside_the_skin_is_black(baked: Baked) -> None:
+    assert 0.4 < baked.covered.mean() < 0.95
+    albedo = baked.maps["albedo"]
+    assert albedo.min() > 0.0
+    assert albedo[~baked.covered].min() >= albedo[baked.covered].min()
+    np.testing.assert_allclose(np.linalg.norm(baked.maps["normal"], axis=-1), 1.0, atol=1e-5)
+
+
+def test_skin_without_pigments_or_thin_parts_says_so(renderer: Renderer, scene: Scene) -> None:
+    plain = replace(scene.head, maps=Maps())
+    small = SETTINGS.model_copy(update={"transmission": "none"})
+    found = bake(renderer, scene.replace(head=plain, skin={"profile": "gpu-gems-3"}), small, 256)
+    assert set(found.absent) == {"melanin", "blood", "thickness"}
+    assert not set(found.absent) & set(found.maps)
+
+
+def test_files_read_back_as_the_json_says(tmp_path: Path) -> None:
+    place = tmp_path / "maps"
+    report = export_skin("human:7", "maps", place, side=256, adapter="cpu", variant="directx")
+    told = json.loads((place / "maps.json").read_text("utf-8"))
+    assert told["size"] == 256
+    assert told["normal_green"].startswith("down")
+    assert {file.name for file in report.files} >= {"albedo.exr", "albedo.png", "scattered.exr", "height.png"}
+    for name, about in told["maps"].items():
+        linear = read_image(place / f"{name}.exr")
+        assert linear.shape[:2] == (256, 256)
+        if "png" not in about:
+            continue
+        levels = read_image(place / f"{name}.png")
+        shown = _numbers(levels, about)
+        kept = np.clip(linear, 0.0, about.get("white", np.inf)) if about["png"] == "sRGB" else linear
+        step = 0.006 * max(float(np.abs(kept).max()), 1e-9)
+        assert np.abs(shown - kept).max() < step, name
+
+
+def _numbers(levels: NDArray[Any], about: dict[str, Any]) -> NDArray[Any]:
+    if about["png"] == "sRGB":
+        return decode_srgb_levels(levels) * about.get("white", 1.0)
+    share = levels / 65535
+    rules = {"value = 2 level / 65535 - 1": 2 * share - 1, "value = (level / 65535)^2": share**2}
+    if "black" in about:
+        return np.asarray(about["black"] + share * (about["white"] - about["black"]))
+    return np.asarray(rules.get(about["png"], share))
+
+
+def test_green_turns_for_directx() -> None:
+    normal = np.array([[[0.1, 0.2, 0.97]]], np.float32)
+    np.testing.assert_array_equal(with_green(normal, "up"), normal)
+    np.testing.assert_allclose(with_green(normal, "down"), [[[0.1, -0.2, 0.97]]])
+
+
+def test_resampling_keeps_ramps() -> None:
+    ramp = np.tile((np.arange(64, dtype=np.float32) + 0.5) / 64, (64, 1))
+    np.testing.assert_allclose(resampled(ramp, 16)[0], (np.arange(16) + 0.5) / 16, atol=1e-6)
+    np.testing.assert_allclose(resampled(ramp, 128)[0, 8:-8], ((np.arange(128) + 0.5) / 128)[8:-8], atol=1e-6)
+
+
+def test_odd_sizes_and_skins_without_a_head_are_refused(tmp_path: Path) -> None:
+    for side in (0, 300, 2**20, True):
+        with pytest.raises(DermisError, match="power of two"):
+            check_side(side)
+    with pytest.raises(DermisError, match="a head"):
+        export_skin(subject_of("skin1"), "maps", tmp_path / "maps")
+    assert not (tmp_path / "maps").exists()

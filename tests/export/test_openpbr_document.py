@@ -1,0 +1,89 @@
+"""Materials as MaterialX documents: what the library makes of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+pytest.importorskip("MaterialX")
+import MaterialX
+from MaterialX import PyMaterialXGenGlsl, PyMaterialXGenMdl, PyMaterialXGenOsl, PyMaterialXGenShader
+
+from dermis.export.targets.openpbr_document import OPEN_PBR, STANDARD, document_of, library
+from dermis.export.targets.openpbr_look import Look, plain_look, skin_look
+from dermis.mesh.mesh import Material
+from dermis.scene.skin import Skin
+
+RADIUS_M = (1.234e-3, 4e-4, 2e-4)
+GENERATORS = {
+    "glsl": PyMaterialXGenGlsl.GlslShaderGenerator,
+    "osl": PyMaterialXGenOsl.OslShaderGenerator,
+    "mdl": PyMaterialXGenMdl.MdlShaderGenerator,
+}
+HOSTILE = '"/><input name="x" /><!-- \n ; import os'
+
+
+def looks(name: str = "skin") -> list[Look]:
+    skin = skin_look(name, Skin(), RADIUS_M, (0.4, 0.2, 0.1), ["colour", "roughness", "specular", "normal"])
+    return [skin, plain_look(Material("left eye", "opaque"))]
+
+
+def read_back(made: Any) -> Any:
+    again = MaterialX.createDocument()
+    MaterialX.readFromXmlString(again, MaterialX.writeToXmlString(made))
+    again.setDataLibrary(library())
+    assert again.validate() == (True, "")
+    return again
+
+
+@pytest.mark.parametrize("shader", [OPEN_PBR, STANDARD])
+def test_what_is_written_is_valid_when_read_back(shader: str) -> None:
+    again = read_back(document_of(looks(), shader, "a_"))
+    nodes = {node.getName(): node for node in again.getNodes(shader)}
+    assert set(nodes) == {"skin_surface", "left_eye_surface"}
+    for node in nodes.values():
+        for one in node.getInputs():
+            assert node.getNodeDef().getActiveInput(one.getName()).getType() == one.getType()
+    radius = nodes["skin_surface"].getInput("subsurface_radius" if shader == OPEN_PBR else "subsurface_scale")
+    assert radius.getUnit() == "meter" and radius.getValue() == pytest.approx(max(RADIUS_M))
+
+
+def test_pictures_have_their_colour_spaces() -> None:
+    graph = read_back(document_of(looks(), OPEN_PBR, "a_")).getNodeGraph("skin_maps")
+    files = {one.getName(): one.getInput("file") for one in graph.getNodes("image")}
+    assert files["colour_image"].getColorSpace() == "srgb_texture"
+    assert not any(one.getColorSpace() for name, one in files.items() if name != "colour_image")
+    assert files["normal_image"].getValueString() == "a_normal.png"
+
+
+@pytest.mark.parametrize("language", GENERATORS)
+@pytest.mark.parametrize("shader", [OPEN_PBR, STANDARD])
+def test_code_is_generated_that_reads_lengths_in_other_units(shader: str, language: str) -> None:
+    code = generated(document_of(looks(), shader, "a_"), GENERATORS[language].create())
+    assert "0.00123" in code and "100.0" in code  # metres, and centimetres in one
+    assert "srgb_texture_to_lin_rec709" in code
+
+
+def test_a_hostile_name_is_text() -> None:
+    again = read_back(document_of(looks(HOSTILE), OPEN_PBR, "a_"))
+    named = [one for one in again.getMaterialNodes() if one.getAttribute("uiname")]
+    assert HOSTILE in [one.getAttribute("uiname") for one in named]
+    assert [node.getCategory() for node in again.getNodes()] == [OPEN_PBR, "surfacematerial"] * 2
+
+
+def generated(made: Any, generator: Any) -> str:
+    """A pixel shader of the first material, in a scene in centimetres."""
+    context = PyMaterialXGenShader.GenContext(generator)
+    context.registerSourceCodeSearchPath(MaterialX.getDefaultDataSearchPath())
+    colours = PyMaterialXGenShader.DefaultColorManagementSystem.create(generator.getTarget())
+    colours.loadLibrary(library())
+    generator.setColorManagementSystem(colours)
+    units = PyMaterialXGenShader.UnitSystem.create(generator.getTarget())
+    units.loadLibrary(library())
+    registry, distance = MaterialX.UnitConverterRegistry.create(), library().getUnitTypeDef("distance")
+    registry.addUnitConverter(distance, MaterialX.LinearUnitConverter.create(distance))
+    units.setUnitConverterRegistry(registry)
+    generator.setUnitSystem(units)
+    context.getOptions().targetDistanceUnit = "centimeter"
+    return generator.generate("skin", made.getMaterialNodes()[0], context).getSourceCode("pixel")

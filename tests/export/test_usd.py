@@ -1,0 +1,56 @@
+"""The target USD: files of each kind, with pictures, read back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+from zipfile import ZipFile
+
+import pytest
+
+pytest.importorskip("pxr")
+pytest.importorskip("MaterialX")
+from pxr import Sdf, Usd, UsdGeom, UsdShade
+
+from dermis.export.run import export_skin
+from dermis.export.target import numbers_of
+
+
+def surface(stage: Any, name: str = "skin") -> Any:
+    path = stage.GetDefaultPrim().GetPath().AppendPath(f"materials/{name}")
+    return UsdShade.Material(stage.GetPrimAtPath(path)).ComputeSurfaceSource("mtlx")[0]
+
+
+@pytest.mark.parametrize("suffix", [".usda", ".usdc", ".usd", ".usdz"])
+def test_a_skin_comes_on_a_ball(suffix: str, tmp_path: Path) -> None:
+    file = tmp_path / f"ball{suffix}"
+    report = export_skin("skin1", "usd", file)
+    stage = Usd.Stage.Open(str(file))
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/skin1/mesh"))
+    low, high = mesh.GetExtentAttr().Get()
+    assert high[1] - low[1] == pytest.approx(0.1, rel=1e-3)
+    shader = surface(stage)
+    for name in ("subsurface_radius", "subsurface_radius_scale"):
+        value = shader.GetInput(name).Get()
+        told = numbers_of(report.rows, name)
+        assert ((value,) if len(told) == 1 else tuple(value)) == pytest.approx(told)
+
+
+def test_a_person_comes_in_one_package(tmp_path: Path) -> None:
+    file = tmp_path / "person.usdz"
+    export_skin("human", "usd", file, side=256, adapter="cpu")
+    with ZipFile(file) as package:
+        names = package.namelist()
+    assert names[0].endswith(".usdc") and {".png"} == {Path(name).suffix for name in names[1:]}
+    stage = Usd.Stage.Open(str(file))
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/human/mesh"))
+    assert len(mesh.GetPrim().GetRelationship("skel:blendShapeTargets").GetTargets()) == 52
+    children = {prim.GetName() for prim in stage.GetDefaultPrim().GetChildren()}
+    assert children == {"mesh", "skeleton", "materials", "hair", "lashes_and_brows"}
+    used = [
+        attribute.Get().resolvedPath
+        for prim in stage.Traverse()
+        for attribute in prim.GetAttributes()
+        if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset
+    ]
+    assert used and all(used)

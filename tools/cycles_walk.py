@@ -1,0 +1,96 @@
+"""Walks as Cycles takes them through a half-space: writes `export/data/cycles_walk.csv`.
+
+    python tools/cycles_walk.py [PHOTONS]   # a minute for 4 million
+
+No photon is absorbed: one that leaves after n scatterings stands for albedo^n at each albedo, so that all
+columns come from the same walks, smooth in the albedo.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.machine_code import compiled
+from dermis.reference.photon import Words, deflect, uniform
+
+Floats = NDArray[np.float64]
+ROOTS = (0.01, 0.02, 0.04, 0.07, 0.1, 0.14, 0.19, 0.25, 0.32, 0.4, 0.48, 0.56, 0.64, 0.72, 0.8, 0.8945)
+"""sqrt(1 - albedo); Cycles takes no albedo below 0.2."""
+RADII = np.concatenate([[0.0], np.geomspace(0.03, 200.0, 32)])
+"""Within which light is counted [mean free paths]."""
+MOST = 256
+"""Steps after which Cycles gives a walk up."""
+ETA = 1.4
+ENTRIES = ("straight", "skin")
+PLACE = Path(__file__).resolve().parents[1] / "src" / "dermis" / "export" / "data" / "cycles_walk.csv"
+HEADER = """\
+# quantity: share of the light seen along the normal of a half-space that fell on it within a radius of the
+#   place seen: walks of Cycles, isotropic, of at most {most} steps, that leave an index-matched surface.
+#   entry: where walks begin, "straight" down, or as RANDOM_WALK_SKIN has it: half of them diffuse, half
+#   refracted at index {eta} by facets of GGX's roughness 1. root: sqrt(1 - albedo of single scattering)
+# unit: radius in mean free paths; within: dimensionless
+# source: {photons} photons an entry, counted by tools/cycles_walk.py (seed 7)
+# licence: Apache-2.0
+entry,root,radius,within
+"""
+
+
+@compiled
+def _entering(skin: bool, rng: Words) -> tuple[float, float, float]:
+    """Where a walk begins, z downwards."""
+    if not skin:
+        return 0.0, 0.0, 1.0
+    facing = math.sqrt(uniform(rng))  # cosine of facets of roughness 1, and of diffuse light alike
+    turn = 2.0 * math.pi * uniform(rng)
+    angle = math.acos(facing)
+    if uniform(rng) >= 0.5:
+        angle -= math.asin(math.sin(angle) / ETA)
+    return math.sin(angle) * math.cos(turn), math.sin(angle) * math.sin(turn), math.cos(angle)
+
+
+@compiled
+def _walks(photons: int, skin: bool, powers: Floats, radii: Floats, rng: Words, found: Floats) -> None:
+    """Add to `found` (albedos, radii + 1) the weights of photons that leave, by their ring.
+
+    powers : (albedos, MOST) albedo^n
+    """
+    for _ in range(photons):
+        x = y = z = 0.0
+        ux, uy, uz = _entering(skin, rng)
+        for step in range(MOST):
+            path = -math.log(uniform(rng))
+            if z + path * uz < 0.0:
+                path = -z / uz
+                ring = np.searchsorted(radii, math.hypot(x + path * ux, y + path * uy))
+                found[:, ring] += powers[:, step]
+                break
+            x, y, z = x + path * ux, y + path * uy, z + path * uz
+            ux, uy, uz = deflect(ux, uy, uz, 0.0, rng)
+
+
+def main() -> None:
+    """Walk for each way to enter and write the table."""
+    photons = int(sys.argv[1]) if len(sys.argv) > 1 else 4_000_000
+    albedo = 1.0 - np.array(ROOTS) ** 2
+    powers = albedo[:, None] ** np.arange(MOST)
+    lines = []
+    for number, entry in enumerate(ENTRIES):
+        found = np.zeros((len(ROOTS), len(RADII) + 1))
+        words = np.random.default_rng([7, number]).integers(0, 2**64, 4, np.uint64)
+        _walks(photons, entry == "skin", powers, RADII, words, found)
+        within = np.cumsum(found, axis=1)[:, 1:-1] / photons
+        for root, row in zip(ROOTS, within, strict=True):
+            lines += [
+                f"{entry},{root:g},{r:.5g},{share:.5f}" for r, share in zip(RADII[1:], row, strict=True)
+            ]
+    header = HEADER.format(photons=f"{photons:,}", most=MOST, eta=ETA)
+    PLACE.write_text(header + "\n".join(lines) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
