@@ -1,0 +1,156 @@
+"""Measure in Babylon.js itself, in headless Chromium, how light spreads beside the edge of a half-lit plane.
+
+    DERMIS_BABYLON=node_modules python benchmarks/engines_babylon.py
+
+writes `benchmarks/results/engines_babylon.json`. DERMIS_BABYLON is a folder that npm has installed the package
+babylonjs into; Chromium draws with its software WebGL.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.export.lobe import fit_d, lobe
+from dermis.export.registry import TARGETS
+from dermis.export.subject import subject_of
+from dermis.export.target import numbers_of
+from dermis.export.targets.babylon_spiral import TOO_WIDE, spiral
+
+HERE = Path(__file__).parent
+RESULT = HERE / "results" / "engines_babylon.json"
+SIDE, PIXELS, LEVEL = 640, 14.0, 0.9  # of the canvas; in the widest d; radiance of what is lit
+TURNS = 5
+FLAGS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+Floats = NDArray[np.float64]
+
+
+@contextmanager
+def opened(library: Path) -> Iterator[Any]:
+    """The page, with the library loaded."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=shutil.which("chromium"), args=list(FLAGS))
+        one = browser.new_page(viewport={"width": SIDE, "height": SIDE})
+        one.goto((HERE / "engines_babylon.html").as_uri())
+        one.add_script_tag(path=str(library / "babylonjs" / "babylon.js"))
+        yield one
+        browser.close()
+
+
+def radiance(page: Any, colour: Floats, metres: float, pixel: float, turn: float) -> Floats:
+    """(SIDE, SIDE, 3) of the canvas by that of what is lit, rows from below."""
+    told = {"colour": list(map(float, colour)), "metersPerUnit": metres, "pixel": pixel, "turn": turn}
+    data = base64.b64decode(page.evaluate("(told) => drawEdge(told)", told))
+    levels = np.frombuffer(data, np.uint8).reshape(SIDE, SIDE, 4)[..., :3]
+    return levels / (255.0 * LEVEL)
+
+
+def predicted(colour: Floats, metres: float, pixel: float, turn: float) -> Floats:
+    """The same by the samples, which are rounded to pixels, where metersPerUnit is of scenes in mm."""
+    r, angle, weight = spiral(colour)
+    across = TOO_WIDE * 1e-3 * r / metres / pixel
+    right, upwards = np.round(across * np.cos(angle)), np.round(across * np.sin(angle))
+    middle = np.arange(SIDE) + 0.5 - 0.5 * SIDE
+    told = np.zeros((SIDE, SIDE, 3))
+    for one in range(len(r)):
+        x, y = middle[None, :] + right[one], middle[:, None] + upwards[one]
+        told += (x * np.cos(turn) + y * np.sin(turn) > 0.0)[..., None] * weight[one]
+    return told
+
+
+def along(picture: Floats, pixel: float, turn: float, at_mm: Floats, half_mm: float) -> Floats:
+    """Means (n, 3) at distances from the edge, of a strip across it."""
+    middle = (np.arange(SIDE) + 0.5 - 0.5 * SIDE) * pixel
+    x, y = middle[None, :], middle[:, None]
+    away, beside = x * np.cos(turn) + y * np.sin(turn), y * np.cos(turn) - x * np.sin(turn)
+    strip = np.abs(beside) < half_mm
+    bins = np.round((away[strip] - at_mm[0]) / (at_mm[1] - at_mm[0])).astype(int)
+    kept = (bins >= 0) & (bins < len(at_mm))
+    count = np.bincount(bins[kept], minlength=len(at_mm))
+    sums = [np.bincount(bins[kept], picture[strip][kept, c], len(at_mm)) for c in range(3)]
+    return np.stack(sums, axis=-1) / np.maximum(count, 1)[:, None]
+
+
+def measured(page: Any, colour: Floats, metres: float, shown_d: Floats) -> dict[str, Any]:
+    """Edge responses over all turns: measured, by the samples, and of true lobes of widths d.
+
+    metres : metersPerUnit of a scene in mm
+    """
+    widest = float(shown_d.max())
+    pixel = widest / PIXELS
+    at = np.arange(-84, 85) * pixel  # 6 d
+    found, told, worst = [], [], 0.0
+    for turn in np.arange(TURNS) * 2.0 * np.pi / TURNS + 0.1:
+        pictures = radiance(page, colour, metres, pixel, turn), predicted(colour, metres, pixel, turn)
+        two = [along(picture, pixel, turn, at, 3.0 * widest) for picture in pictures]
+        worst = max(worst, float(np.abs(two[0] - two[1]).max()))
+        found.append(two[0])
+        told.append(two[1])
+    mean, by_samples, true = np.mean(found, 0), np.mean(told, 0), lobe(shown_d, np.ones(3)).edge(at)
+    near = np.abs(at)[:, None] <= 6.0 * shown_d
+    keep = slice(0, None, 7)
+    return {
+        "colour": np.round(colour, 5).tolist(),
+        "metersPerUnit_mm": round(1e3 * metres, 5),
+        "expected_d_mm": np.round(shown_d, 5).tolist(),
+        "fitted_d_mm": fitted_widths(at, mean),
+        "x_mm": np.round(at[keep], 4).tolist(),
+        "edge": np.round(mean[keep], 4).tolist(),
+        "predicted": np.round(by_samples[keep], 4).tolist(),
+        "measured_less_predicted": _largest(mean - by_samples, near),
+        "measured_less_predicted_in_one_direction": round(worst, 4),
+        "measured_less_lobes": _largest(mean - true, near),
+    }
+
+
+def _largest(difference: Floats, near: NDArray[np.bool_]) -> list[float]:
+    return np.round(np.abs(difference * near).max(axis=0), 4).tolist()
+
+
+def fitted_widths(at: Floats, edge: Floats) -> list[float]:
+    """Widths of the lobes whose edge responses come nearest [mm]."""
+    tried = np.geomspace(at[-1] / 600.0, at[-1], 241)
+    curves = np.stack([lobe(np.full(3, d), np.ones(3)).edge(at)[:, 0] for d in tried])
+    off = ((curves[:, :, None] - edge) ** 2).sum(axis=1)
+    return np.round(tried[off.argmin(axis=0)], 4).tolist()
+
+
+def exported(page: Any, name: str) -> dict[str, Any]:
+    """A skin with its exported parameters, against the profile that is exported too."""
+    subject, target = subject_of(name), TARGETS["babylon"].with_variant(None)
+    rows = target.parameters(subject, target.known_version(None))
+    colour = np.array(numbers_of(rows, "subSurface.scatteringDiffusionProfile"))
+    metres = 1e-3 * numbers_of(rows, "subSurfaceConfiguration.metersPerUnit")[0]
+    told = measured(page, colour, metres, fit_d(subject.curve))
+    x, edge = np.array(told["x_mm"]), np.array(told["edge"])
+    near = np.abs(x)[:, None] <= 6.0 * fit_d(subject.curve)
+    return told | {"measured_less_profile": _largest(edge - subject.curve.edge(x), near)}
+
+
+def main() -> None:
+    """Measure, and write the result."""
+    library = Path(os.environ["DERMIS_BABYLON"])
+    with opened(library) as page:
+        plain = {
+            name: measured(page, np.array(colour), 1e-3, TOO_WIDE / np.array(colour))
+            for name, colour in {"white": (1, 1, 1), "grey": (0.5, 0.5, 0.5), "coloured": (1, 0.5, 0.25)}.items()
+        }
+        skins = {name: exported(page, name) for name in ("skin1", "skin2", "dj3")}
+        told = {"engine": "babylonjs " + page.evaluate("BABYLON.Engine.Version"), "turns": TURNS, "samples": 40}
+    told |= {"noise": 0.002, "plain": plain, "skins": skins}
+    RESULT.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

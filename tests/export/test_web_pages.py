@@ -1,0 +1,159 @@
+"""Pages with a head: what they may load, words of users, the numbers, and that browsers draw them."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import os
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+from dermis.errors import DermisError
+from dermis.export.lobe import fit_d, lobe
+from dermis.export.registry import TARGETS
+from dermis.export.run import export_skin, judged
+from dermis.export.subject import Subject, subject_of
+from dermis.export.target import numbers_of
+from dermis.export.targets.babylon_spiral import spiral_curve
+from dermis.export.targets.web_library import inline
+from dermis.export.targets.web_page import hash_of
+
+FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+WICKED = '"; import os</script><script>alert(1)</script>$head'
+NODE = {"babylon": "DERMIS_BABYLON", "three": "DERMIS_THREE"}
+
+
+@pytest.fixture(scope="module")
+def skin() -> Subject:
+    return subject_of("skin1")
+
+
+@pytest.fixture(params=["babylon", "three"])
+def target(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+def text_of(subject: Subject, target: str, folder: Path) -> str:
+    export_skin(subject, target, folder / "page.html")
+    return (folder / "page.html").read_text("utf-8")
+
+
+def test_scripts_are_those_that_the_policy_names(skin: Subject, target: str, tmp_path: Path) -> None:
+    text = text_of(skin, target, tmp_path)
+    policy = re.search(r'Security-Policy" content="([^"]*)"', text)
+    assert policy is not None
+    allowed = policy[1].replace("&#x27;", "'")
+    inside = re.findall(r'<script type="(?:module|importmap)">(.*?)</script>', text, re.DOTALL)
+    assert inside and all(hash_of(one) in allowed for one in inside)
+    assert "unsafe" not in allowed and allowed.startswith("default-src 'none'")
+    known = TARGETS[target].with_variant(None)
+    urls = [one.url for one in known.scripts[known.versions[-1]]]  # type: ignore[attr-defined]
+    assert all(url in allowed for url in urls)
+    assert text.count("sha384-") == len(urls) == len(set(re.findall(r"sha384-[\w+/]{64}", text)))
+    assert set(re.findall(r"https?://[^/\"' ]+", text)) == {"https://cdn.jsdelivr.net"}
+
+
+def test_words_of_users_stay_words(target: str, tmp_path: Path) -> None:
+    plain = subject_of("skin1")
+    named = Subject(WICKED, plain.curve, plain.albedo, plain.model, plain.tissue)
+    text = text_of(named, target, tmp_path)
+    assert "<script>alert" not in text and "alert(1)" in text
+    assert text.count("</script>") == text.count("<script") == text_of(plain, target, tmp_path).count("<script")
+
+
+def test_the_page_holds_the_head_in_metres_and_the_parameters(skin: Subject, target: str, tmp_path: Path) -> None:
+    text = text_of(skin, target, tmp_path)
+    head = re.search(r'id="head">([^<]*)<', text)
+    told = re.search(r'id="settings">([^<]*)<', text)
+    assert head is not None and told is not None
+    assert base64.b64decode(head[1]).startswith(b"glTF")
+    settings = json.loads(told[1])
+    report = judged(skin, TARGETS[target].with_variant(None), TARGETS[target].versions[-1])
+    assert settings["skin"] == json.loads(json.dumps({r.name.rpartition(".")[2]: r.value for r in report.rows}))
+    assert 0.3 < np.linalg.norm(settings["camera"]["position"]) < 3.0
+    assert all(abs(np.linalg.norm(light["direction"]) - 1.0) < 1e-9 for light in settings["lights"])
+
+
+@pytest.mark.parametrize("name", ["skin1", "skin2", "dj3"])
+def test_babylons_two_parameters_undo_both_of_its_slips(name: str) -> None:
+    subject, babylon = subject_of(name), TARGETS["babylon"].with_variant(None)
+    rows = babylon.parameters(subject, babylon.versions[-1])
+    colour, (metres,) = (numbers_of(rows, row.name) for row in rows[:2])
+    d = fit_d(subject.curve)
+    np.testing.assert_allclose(2.0 / (metres * np.array(colour)), d)  # each channel's own width
+    np.testing.assert_allclose(2.0 * max(colour) / metres, d.max())  # and the widest is drawn from
+    report = judged(subject, babylon, babylon.versions[-1])
+    # the lobes' own error, and half a step of the fortieth that samples make
+    own = np.abs(lobe(d, subject.curve.energy).share - subject.curve.share).max(axis=0)
+    assert (report.error.edge <= 0.5 * own + 0.025).all()
+    assert (report.naive_error.edge > 2.0 * report.error.edge).all()
+
+
+def test_a_white_profile_is_a_lobe_and_a_grey_one_is_wider_not_narrower() -> None:
+    x = np.linspace(-6.0, 6.0, 49)
+    white = spiral_curve([1.0, 1.0, 1.0], 2.0, np.ones(3))
+    assert np.abs(white.edge(x) - lobe(np.ones(3), np.ones(3)).edge(x)).max() < 0.01
+    grey = spiral_curve([0.5, 0.5, 0.5], 2.0, np.ones(3))
+    assert (grey.radius_of(0.5) > white.radius_of(0.5)).all()
+
+
+def test_three_spreads_nothing_and_says_so(skin: Subject) -> None:
+    report = judged(skin, TARGETS["three"].with_variant(None), "0.187.0")
+    assert (report.error.edge > 0.45).all() and "Nothing spreads" in report.wrong
+
+
+def test_a_library_of_another_version_is_refused_and_nothing_is_written(target: str, tmp_path: Path) -> None:
+    known = TARGETS[target].with_variant(None)
+    first = known.scripts[known.versions[-1]][0]  # type: ignore[attr-defined]
+    file = tmp_path / first.package / first.path
+    file.parent.mkdir(parents=True)
+    file.write_text("alert(1)")
+    with pytest.raises(DermisError, match="npm install"):
+        export_skin("skin1", target, tmp_path / "page.html", library=tmp_path)
+    assert not (tmp_path / "page.html").exists()
+
+
+def test_other_targets_have_no_library(tmp_path: Path) -> None:
+    with pytest.raises(DermisError, match="library"):
+        export_skin("skin1", "unity", tmp_path / "x.asset", library=tmp_path)
+
+
+def test_an_embedded_script_does_not_end_early() -> None:
+    assert "</script" not in inline('x = "</script><!--"').lower()
+
+
+def drawn(page: Path) -> NDArray[np.float64]:
+    """The page in Chromium, without network."""
+    from playwright.sync_api import sync_playwright
+
+    faults: list[str] = []
+    with sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
+        one = browser.new_page(viewport={"width": 240, "height": 240}, offline=True)
+        one.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
+        one.goto(page.as_uri())
+        one.wait_for_selector("html[data-state]", state="attached", timeout=120_000)
+        picture = np.asarray(Image.open(io.BytesIO(one.screenshot())).convert("RGB"), np.float64) / 255.0
+        assert one.evaluate("document.documentElement.dataset.state") == "drawn"
+        browser.close()
+    assert faults == []
+    return picture
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="there is no Chromium here")
+def test_a_browser_draws_the_ball_without_network(skin: Subject, target: str, tmp_path: Path) -> None:
+    library = os.environ.get(NODE[target])
+    if library is None:
+        pytest.skip(f"{NODE[target]} does not name the folder node_modules with the library")
+    export_skin(skin, target, tmp_path / "page.html", library=library)
+    picture = drawn(tmp_path / "page.html")
+    ball = picture[80:160, 100:140]
+    assert (ball.mean(axis=(0, 1)) > 0.1).all() and ball[..., 0].mean() > 1.2 * ball[..., 2].mean()
+    assert picture[200:, 200:].max() < 0.02
