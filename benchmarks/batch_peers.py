@@ -29,7 +29,7 @@ from peers import cpu_model
 
 from dermis.cli.console import print_lines
 from dermis.errors import DermisError, refuse
-from dermis.reference.cycles import blender_python
+from dermis.reference.blender_process import blender_python
 
 ROOT = Path(__file__).resolve().parent
 RESULTS = ROOT / "results" / "batch_peers.json"

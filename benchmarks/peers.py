@@ -28,7 +28,7 @@ from dermis.cli.console import note, print_lines, progress
 from dermis.comparison.scenes import LIGHTS as SCENES
 from dermis.errors import DermisError, refuse
 from dermis.outputs import check_output, replacing
-from dermis.reference.cycles import blender_python
+from dermis.reference.blender_process import blender_python
 from dermis.reference.mitsuba_scene import load_mitsuba
 
 ROOT = Path(__file__).resolve().parent
