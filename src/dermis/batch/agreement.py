@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 class Agreement(NamedTuple):
     """A parameter as it is stated and as it was found.
 
-    count : draws: images that have it, or people
+    draws : images that have it, or people
     stated, found : mean and standard deviation, or how often the values come
     distance : of Kolmogorov and Smirnov, or the greatest difference of two shares [-]
     usual : the mean of such distances for so many draws from what is stated [-]; 0 where there is none
@@ -41,7 +41,7 @@ class Agreement(NamedTuple):
     """
 
     parameter: str
-    count: int
+    draws: int
     stated: str
     found: str
     distance: float
@@ -143,11 +143,12 @@ def _texts(name: str, stated: dict[str, float], values: Sequence[str]) -> Agreem
     distance = max(abs(found[text] / count - stated.get(text, 0.0)) for text in {*stated, *found})
     usual = max(sqrt(2 / np.pi * share * (1 - share) / count) for share in stated.values())
     chance = 0.0 if found.keys() - stated.keys() else _chi_square(stated, found, count)
-    told = [
-        ", ".join(f"{text} {of(text):.3g}" for text in sorted(stated)[:_MOST_NAMED])
-        for of in (lambda text: stated[text], lambda text: found[text] / count)
-    ]
-    return Agreement(name, count, *told, distance, usual, chance)
+    came = {text: found[text] / count for text in stated}
+    return Agreement(name, count, _told(stated), _told(came), distance, usual, chance)
+
+
+def _told(of: dict[str, float]) -> str:
+    return ", ".join(f"{text} {of[text]:.3g}" for text in sorted(of)[:_MOST_NAMED])
 
 
 def _chi_square(stated: dict[str, float], found: Counter[str], count: int) -> float:
