@@ -32,7 +32,7 @@ def yaml_of(word: str) -> Any:
 
 
 def slurm() -> str:
-    return next(text for kind, text in BLOCKS if kind == "bash" and "#SBATCH" in text)
+    return str(next(text for kind, text in BLOCKS if kind == "bash" and "#SBATCH" in text))
 
 
 def commands() -> dict[str, str]:

@@ -144,12 +144,11 @@ def _texts(name: str, stated: dict[str, float], values: Sequence[str]) -> Agreem
     usual = max(sqrt(2 / np.pi * share * (1 - share) / count) for share in stated.values())
     chance = 0.0 if found.keys() - stated.keys() else _chi_square(stated, found, count)
     came = {text: found[text] / count for text in stated}
-    return Agreement(name, count, _shares(stated), _shares(came), distance, usual, chance)
+    return Agreement(name, count, _told(stated), _told(came), distance, usual, chance)
 
 
-def _shares(shares: dict[str, float]) -> str:
-    """How often some of the texts come, in words."""
-    return ", ".join(f"{text} {shares[text]:.3g}" for text in sorted(shares)[:_MOST_NAMED])
+def _told(of: dict[str, float]) -> str:
+    return ", ".join(f"{text} {of[text]:.3g}" for text in sorted(of)[:_MOST_NAMED])
 
 
 def _chi_square(stated: dict[str, float], found: Counter[str], count: int) -> float:
