@@ -37,8 +37,8 @@ class Unity(Target):
     versions: ClassVar[tuple[str, ...]] = tuple(_FORMS)
     needs_maps: ClassVar[bool] = True
     wrong: ClassVar[str] = (
-        "The filter is cut at 99.7 % of the widest channel, and the scale of a scene that is not in metres has "
-        "to be told in worldScale."
+        "The filter is cut at 99.7 % of the widest channel, and worldScale has to tell the scale of a scene "
+        "that is not in metres."
     )
     not_run: ClassVar[bool] = True
 

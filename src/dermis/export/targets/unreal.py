@@ -39,8 +39,8 @@ class Unreal(Target):
     needs_maps: ClassVar[bool] = True
     wrong: ClassVar[str] = (
         "The base colour of the material colours the light, not the profile. Before 5.8 depths of thin parts "
-        "are off by about 100 for light that comes through, and no field mends it; in 5.8 they are right while "
-        "r.SSProfiles.Transmission.UseLegacy is 0."
+        "are off by about 100 for light that comes through, and no field mends it; in 5.8 they are right "
+        "while r.SSProfiles.Transmission.UseLegacy is 0."
     )
     not_run: ClassVar[bool] = True
 

@@ -1,0 +1,49 @@
+"""Writes the table of docs/engines.md from the targets themselves: python benchmarks/engines_page.py"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from dermis.export.registry import TARGETS
+from dermis.export.run import judged
+from dermis.export.subject import subject_of
+from dermis.outputs import replacing
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "engines.md"
+BEGIN, END = "<!-- predicted -->", "<!-- /predicted -->"
+SKINS = "skin1", "skin2", "dj3", "medium"
+_HEADS = "target", "version", "variant", "skin", "cdf", "edge", "energy", "edge as one would type it"
+
+
+def main() -> int:
+    """Write the page."""
+    text = page(PAGE.read_text("utf-8"))
+    with replacing(PAGE) as trial:
+        trial.write_text(text, encoding="utf-8")
+    return 0
+
+
+def page(text: str) -> str:
+    """The page with its table made anew."""
+    before, rest = text.split(BEGIN)
+    return f"{before}{BEGIN}\n{predicted()}{END}{rest.split(END)[1]}"
+
+
+def predicted() -> str:
+    """Errors in red, green and blue of all targets, newest versions and variants, by their formulas."""
+    lines = [_HEADS, ["---"] * len(_HEADS)]
+    subjects = [subject_of(name) for name in SKINS]
+    for name in TARGETS:
+        for variant in TARGETS[name].variants or (None,):
+            target = TARGETS[name].with_variant(variant)
+            for subject in subjects:
+                told = judged(subject, target, target.versions[-1])
+                errors = told.error.cdf, told.error.edge, told.error.energy, told.naive_error.edge
+                cells = [" / ".join(f"{x + 0.0:.3f}" for x in one.round(3)) for one in errors]
+                lines.append([target.title, told.version, told.variant or "-", subject.name, *cells])
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

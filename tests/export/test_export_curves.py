@@ -1,0 +1,116 @@
+"""Curves, fits and deviations, against closed forms and numbers of published works."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from dermis.errors import DermisError
+from dermis.export.curve import Curve
+from dermis.export.deviation import deviation
+from dermis.export.equivalent import homogeneous
+from dermis.export.half_space import albedo_of, half_space
+from dermis.export.lobe import fit_d, lobe
+from dermis.export.subject import Subject, subject_of
+
+WHITE = np.ones(3)
+
+
+def test_edge_of_a_gaussian_is_its_error_function() -> None:
+    from scipy.special import erf
+
+    sigma = np.array([0.2, 0.5, 1.3])
+    curve = Curve.of(lambda r: -np.expm1(-(r[:, None] ** 2) / (2.0 * sigma**2)), WHITE)
+    x = np.linspace(-3.0, 3.0, 61)
+    expected = 0.5 + 0.5 * erf(x[:, None] / (sigma * np.sqrt(2.0)))
+    np.testing.assert_allclose(curve.edge(x), expected, atol=2e-4)
+
+
+def test_fit_of_a_lobe_finds_its_width() -> None:
+    d = np.array([1.173, 0.461, 0.05])
+    np.testing.assert_allclose(fit_d(lobe(d, WHITE)), d, rtol=1e-5)
+
+
+def test_a_fit_is_the_best_there_is(dj3: Subject) -> None:
+    d = fit_d(dj3.curve)
+    best = deviation(dj3.curve, lobe(d, WHITE)).cdf
+    for factor in (0.97, 1.03):
+        assert (deviation(dj3.curve, lobe(factor * d, WHITE)).cdf > best).all()
+
+
+def test_fits_take_less_than_a_tenth_of_a_second(dj3: Subject) -> None:
+    homogeneous(dj3.curve)  # tables are read once
+    before = time.process_time()
+    fit_d(dj3.curve)
+    homogeneous(dj3.curve)
+    assert time.process_time() - before < 0.2  # both together
+
+
+def test_deviation_from_itself_is_none_and_grows_with_the_width() -> None:
+    one = lobe([1.0, 0.5, 0.2], [0.5, 0.4, 0.3])
+    none = deviation(one, one)
+    assert not none.cdf.any() and not none.edge.any() and not none.energy.any()
+    wider = deviation(one, lobe([1.2, 0.6, 0.24], [0.55, 0.4, 0.3]))
+    much = deviation(one, lobe([2.0, 1.0, 0.4], [0.5, 0.4, 0.3]))
+    assert (wider.cdf > 0.03).all() and (much.cdf > wider.cdf).all() and (much.edge > wider.edge).all()
+    np.testing.assert_allclose(wider.energy, [0.1, 0.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("albedo", "total"),
+    [(0.5, 0.05381), (0.9, 0.25739), (0.98, 0.51859), (0.995, 0.70942)],
+)
+def test_half_spaces_have_the_totals_of_independent_monte_carlo(albedo: float, total: float) -> None:
+    curve = half_space("skin", np.full(3, albedo), WHITE)
+    np.testing.assert_allclose(curve.energy, total, rtol=0.006)
+    np.testing.assert_allclose(albedo_of("skin", curve.energy), albedo, atol=1e-3)
+
+
+def test_matched_half_space_has_the_total_of_chandrasekhar() -> None:
+    """1 - H(1) sqrt(1 - a) of isotropic scattering, a = 0.9, H(1) = 1.8501."""
+    total = half_space("matched", np.full(3, 0.9), WHITE).energy
+    np.testing.assert_allclose(total, 0.4149, atol=0.003)
+
+
+def test_tissue_of_one_layer_is_by_monte_carlo_and_of_several_by_its_model(
+    skin1: Subject, dj3: Subject
+) -> None:
+    assert (skin1.model, dj3.model, subject_of("gpu-gems-3").model) == ("montecarlo", "layered", "table")
+    layered = subject_of("skin1", model="layered")
+    assert layered.model == "layered"
+    assert np.abs(layered.curve.share - skin1.curve.share).max() > 0.05
+    np.testing.assert_allclose(layered.curve.energy, skin1.curve.energy, rtol=0.3)
+
+
+def test_homogeneous_medium_of_a_homogeneous_skin_is_itself(skin1: Subject) -> None:
+    found = homogeneous(skin1.curve)
+    assert skin1.tissue is not None
+    layer = skin1.tissue.medium.layers[0]
+    np.testing.assert_allclose(found.albedo, layer.alpha_prime, atol=1e-4)
+    np.testing.assert_allclose(found.mfp_mm, layer.mean_free_path_mm, rtol=1e-3)
+
+
+def test_homogeneous_medium_of_layers_has_their_energy_and_tells_its_error(dj3: Subject) -> None:
+    error = deviation(dj3.curve, homogeneous(dj3.curve).curve)
+    assert np.abs(error.energy).max() < 1e-3
+    assert 0.05 < error.cdf[0] < 0.2
+
+
+def test_spectral_skin_is_per_light_that_enters() -> None:
+    skin = subject_of("medium")
+    assert skin.tissue is not None
+    given = skin.tissue.profile().total
+    np.testing.assert_allclose(skin.curve.energy * (1.0 - (0.4 / 2.4) ** 2), given, rtol=1e-9)
+
+
+def test_words_that_stand_for_nothing_are_refused() -> None:
+    with pytest.raises(DermisError, match="profile nosuch"):
+        subject_of("nosuch")
+    with pytest.raises(DermisError, match="model: expected one of montecarlo"):
+        subject_of("skin1", model="guess")  # type: ignore[arg-type]
+    with pytest.raises(DermisError, match="table of Gaussians"):
+        subject_of("gpu-gems-3", model="layered")
+    with pytest.raises(DermisError, match="profile: expected a head"):
+        subject_of("skin1", profile="dj3")

@@ -1,0 +1,162 @@
+"""Targets: their formulas go back to what was fitted, and their files are read as they are meant."""
+
+from __future__ import annotations
+
+import json
+import runpy
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from dermis.errors import DermisError
+from dermis.export.lobe import fit_d
+from dermis.export.registry import TARGETS
+from dermis.export.run import export_skin, judged
+from dermis.export.subject import Subject
+from dermis.export.target import numbers_of
+from dermis.export.targets.unity import asset_text
+
+LOBES = ["unity", "unreal", "renderman"]
+EVIL = '"; import os; os._exit(3) # \n'
+
+
+@pytest.mark.parametrize("name", LOBES)
+def test_parameters_show_the_fitted_lobe_in_all_versions(name: str, skin1: Subject) -> None:
+    target = TARGETS[name].with_variant(None)
+    for version in target.versions:
+        shown = target.shown(target.parameters(skin1, version), skin1, version)
+        np.testing.assert_allclose(fit_d(shown), fit_d(skin1.curve), rtol=1e-4)
+
+
+@pytest.mark.parametrize("name", [*LOBES, "arnold"])
+def test_what_is_written_is_better_than_what_is_typed(name: str, dj3: Subject) -> None:
+    target = TARGETS[name].with_variant(None)
+    report = judged(dj3, target, target.versions[-1])
+    assert (report.error.cdf < report.naive_error.cdf).all()
+    assert (report.error.edge < report.naive_error.edge).all()
+    assert "red light" in report.words()[0]
+
+
+def test_unity_reads_its_asset_back(skin1: Subject, tmp_path: Path) -> None:
+    report = export_skin(skin1, "unity", tmp_path / "skin.asset")
+    text = (tmp_path / "skin.asset").read_text("utf-8").replace("!u!114 ", "").replace("%TAG", "#")
+    told = yaml.safe_load(text)["MonoBehaviour"]
+    own = told["profile"]
+    distance = np.array([own["scatteringDistance"][c] for c in "rgb"]) * own["scatteringDistanceMultiplier"]
+    np.testing.assert_allclose(distance, report.d_mm, rtol=1e-4)
+    assert (told["m_Version"], told["m_Name"], own["worldScale"], own["hash"]) == (2, "skin", 1, 0)
+
+
+def test_unity_before_14_has_the_width_in_the_colour_alone(skin1: Subject) -> None:
+    rows = TARGETS["unity"].parameters(skin1, "12")
+    text = asset_text("skin", rows, "12")
+    assert "scatteringDistanceMultiplier" not in text and "m_Version: 1\n" in text
+    np.testing.assert_allclose(numbers_of(rows, "scatteringDistance"), fit_d(skin1.curve))
+
+
+class _Settings:
+    """Fields that the editor's structure has, by its page; others are refused."""
+
+    known = frozenset(
+        """boundary_color_bleed enable_burley enable_mean_free_path extinction_scale implementation ior lobe_mix
+        mean_free_path_color mean_free_path_distance normal_scale roughness0 roughness1 scattering_distribution
+        surface_albedo tint transmission_tint_color world_unit_scale""".split()
+    )
+
+    def __init__(self, *more: str) -> None:
+        self.allowed, self.values = self.known | {*more}, dict[str, Any]()
+
+    def set_editor_property(self, name: str, value: Any) -> None:
+        if name not in self.allowed:
+            raise AttributeError(name)
+        self.values[name] = value
+
+
+def _editor(settings: _Settings, saved: list[Any]) -> ModuleType:
+    """As much of the editor's module as the script may use; anything else raises AttributeError."""
+    stored = {}
+    profile = SimpleNamespace(
+        get_editor_property={"settings": settings}.__getitem__,
+        set_editor_property=stored.__setitem__,
+        get_path_name=lambda: "/Game/Dermis/x",
+    )
+    tools = SimpleNamespace(create_asset=lambda *words: saved.append(words) or profile)
+    unreal: Any = ModuleType("unreal")
+    unreal.AssetToolsHelpers = SimpleNamespace(get_asset_tools=lambda: tools)
+    unreal.EditorAssetLibrary = SimpleNamespace(
+        does_asset_exist=lambda path: False, save_loaded_asset=saved.append
+    )
+    unreal.SubsurfaceProfile, unreal.SubsurfaceProfileFactory = object, object
+    unreal.LinearColor = lambda *channels: channels
+    unreal.log = lambda text: None
+    return unreal  # type: ignore[no-any-return]
+
+
+@pytest.mark.parametrize(("version", "more"), [("5.7", ()), ("5.8", ("distance_scale",))])
+def test_unreal_runs_its_script(
+    version: str, more: tuple[str, ...], skin1: Subject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    report = export_skin(skin1, "unreal", tmp_path / "skin.py", version=version)
+    settings, saved = _Settings(*more), list[Any]()
+    monkeypatch.setitem(sys.modules, "unreal", _editor(settings, saved))
+    runpy.run_path(str(tmp_path / "skin.py"))
+    found = settings.values
+    assert found["enable_burley"] is True and found["enable_mean_free_path"] is True
+    assert found["world_unit_scale"] * found.get("distance_scale", 0.1) == pytest.approx(0.1)
+    A = np.array(found["surface_albedo"][:3])
+    path_mm = 10.0 * np.array(found["mean_free_path_color"][:3]) * found["mean_free_path_distance"]
+    d = path_mm / (0.6 * (1.85 - A + 7.0 * np.abs(A - 0.8) ** 3))
+    np.testing.assert_allclose(d, report.d_mm, rtol=1e-4)
+    assert saved[0][:2] == ("skin1", "/Game/Dermis") and len(saved) == 2
+
+
+@pytest.mark.parametrize("name", [*LOBES, "arnold"])
+def test_names_do_no_harm(name: str, skin1: Subject, tmp_path: Path) -> None:
+    evil = Subject(EVIL, skin1.curve, skin1.albedo, skin1.model, skin1.tissue)
+    assert evil.identifier.isidentifier()
+    report = export_skin(evil, name, tmp_path / "made" if name != "renderman" else tmp_path / "made.json")
+    for file in report.files:
+        text = file.read_text("utf-8")
+        if file.suffix == ".json":
+            json.loads(text)
+        elif file.suffix == ".py":
+            compile(text, str(file), "exec")
+            assert "os._exit" not in text
+        assert str(tmp_path) not in text
+
+
+@pytest.mark.parametrize("name", ["renderman", "arnold"])
+def test_values_are_marked_as_not_run(name: str, skin1: Subject, tmp_path: Path) -> None:
+    export_skin(skin1, name, tmp_path / "values.json")
+    told = json.loads((tmp_path / "values.json").read_text("utf-8"))
+    assert told["status"].startswith("not run") and told["parameters"]
+    assert all(row["unit"] and row["meaning"] for row in told["parameters"].values())
+
+
+def test_a_folder_is_replaced_only_where_it_is_an_export(skin1: Subject, tmp_path: Path) -> None:
+    place = tmp_path / "made"
+    for _ in range(2):
+        export_skin(skin1, "unity", place)
+    assert sorted(file.name for file in place.iterdir()) == ["README.md", "export.json", "skin1.asset"]
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / "work.txt").write_text("mine")
+    with pytest.raises(DermisError, match=r"of before that holds export\.json"):
+        export_skin(skin1, "unity", tmp_path / "own")
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["made", "own"]
+
+
+def test_what_is_unknown_is_told_with_what_is_known(skin1: Subject, tmp_path: Path) -> None:
+    with pytest.raises(DermisError, match="target: expected one of arnold, "):
+        export_skin(skin1, "quake", tmp_path / "x")
+    with pytest.raises(DermisError, match=r"Unity HDRP that is known: 12, 14, 17, but '3'"):
+        export_skin(skin1, "unity", tmp_path / "x", version="3")
+    with pytest.raises(DermisError, match="variant: expected none for unity"):
+        export_skin(skin1, "unity", tmp_path / "x", variant="thick")
+    with pytest.raises(DermisError, match=r"ends in \.asset or no suffix"):
+        export_skin(skin1, "unity", tmp_path / "x.png")
+    assert not list(tmp_path.iterdir())
