@@ -68,7 +68,7 @@ class Babylon(WebPage):
         return "\n".join(f"<script>{text}</script>" for text in texts), [hash_of(text) for text in texts]
 
 
-def _rows(subject: Subject, profile: np.ndarray, metres: float) -> Rows:  # type: ignore[type-arg]
+def _rows(subject: Subject, profile: np.ndarray, metres: float) -> Rows:
     colour = tuple(float(x) for x in profile)
     return (
         Row(_PROFILE, colour, "-", "1/width: a smaller number spreads farther"),

@@ -85,7 +85,9 @@ class Three(WebPage):
             checks = {script.url: script.integrity for script in scripts}
             return _import_map({"imports": places, "integrity": checks}, [script.url for script in scripts])
         texts = {script.name: script.read(self.library) for script in scripts}
-        return _import_map({"imports": {name: module_url(text, _IMPORTS) for name, text in texts.items()}}, ["data:"])
+        return _import_map(
+            {"imports": {name: module_url(text, _IMPORTS) for name, text in texts.items()}}, ["data:"]
+        )
 
 
 def _import_map(told: dict[str, dict[str, str]], sources: list[str]) -> tuple[str, list[str]]:
