@@ -2,8 +2,8 @@
 
     DERMIS_BABYLON=node_modules python benchmarks/engines_babylon.py
 
-writes `benchmarks/results/engines_babylon.json`. DERMIS_BABYLON is a folder that npm has installed the package
-babylonjs into; Chromium draws with its software WebGL.
+writes `benchmarks/results/engines_babylon.json`. DERMIS_BABYLON is a folder that npm has installed the
+package babylonjs into; Chromium draws with its software WebGL.
 """
 
 from __future__ import annotations

@@ -30,8 +30,8 @@ class Babylon(WebPage):
     licence: ClassVar[str] = "Apache-2.0"
     draw: ClassVar[str] = "babylon.js"
     wrong: ClassVar[str] = (
-        "Forty samples of one lobe a channel, the same in every pixel: shadows' edges show steps of a fortieth, "
-        "and the narrower channels have fewer of them. Light spreads on the screen only, not through thin "
+        "Forty samples of one lobe a channel, the same in every pixel: shadows' edges show steps of a "
+        "fortieth, and the narrower channels have fewer of them. Light spreads on the screen only, not through thin "
         "parts; slopes count twice in depth; diffuse light above 1 is cut off. Lights are parallel here."
     )
     scripts: ClassVar[dict[str, tuple[Script, ...]]] = {
