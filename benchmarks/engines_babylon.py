@@ -2,8 +2,8 @@
 
     DERMIS_BABYLON=node_modules python benchmarks/engines_babylon.py
 
-writes `benchmarks/results/engines_babylon.json`. DERMIS_BABYLON is a folder that npm has installed the package
-babylonjs into; Chromium draws with its software WebGL.
+writes `benchmarks/results/engines_babylon.json`. DERMIS_BABYLON is a folder that npm has installed the
+package babylonjs into; Chromium draws with its software WebGL.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ RESULT = HERE / "results" / "engines_babylon.json"
 SIDE, PIXELS, LEVEL = 640, 14.0, 0.9  # of the canvas; in the widest d; radiance of what is lit
 TURNS = 5
 FLAGS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-Floats = NDArray[np.float64]
+Floats = NDArray[Any]
 
 
 @contextmanager
@@ -115,7 +115,7 @@ def measured(page: Any, colour: Floats, metres: float, shown_d: Floats) -> dict[
 
 
 def _largest(difference: Floats, near: NDArray[np.bool_]) -> list[float]:
-    return np.round(np.abs(difference * near).max(axis=0), 4).tolist()
+    return [round(float(x), 4) for x in np.abs(difference * near).max(axis=0)]
 
 
 def fitted_widths(at: Floats, edge: Floats) -> list[float]:
@@ -123,7 +123,7 @@ def fitted_widths(at: Floats, edge: Floats) -> list[float]:
     tried = np.geomspace(at[-1] / 600.0, at[-1], 241)
     curves = np.stack([lobe(np.full(3, d), np.ones(3)).edge(at)[:, 0] for d in tried])
     off = ((curves[:, :, None] - edge) ** 2).sum(axis=1)
-    return np.round(tried[off.argmin(axis=0)], 4).tolist()
+    return [round(float(x), 4) for x in tried[off.argmin(axis=0)]]
 
 
 def exported(page: Any, name: str) -> dict[str, Any]:
@@ -144,10 +144,18 @@ def main() -> None:
     with opened(library) as page:
         plain = {
             name: measured(page, np.array(colour), 1e-3, TOO_WIDE / np.array(colour))
-            for name, colour in {"white": (1, 1, 1), "grey": (0.5, 0.5, 0.5), "coloured": (1, 0.5, 0.25)}.items()
+            for name, colour in {
+                "white": (1, 1, 1),
+                "grey": (0.5, 0.5, 0.5),
+                "coloured": (1, 0.5, 0.25),
+            }.items()
         }
         skins = {name: exported(page, name) for name in ("skin1", "skin2", "dj3")}
-        told = {"engine": "babylonjs " + page.evaluate("BABYLON.Engine.Version"), "turns": TURNS, "samples": 40}
+        told = {
+            "engine": "babylonjs " + page.evaluate("BABYLON.Engine.Version"),
+            "turns": TURNS,
+            "samples": 40,
+        }
     told |= {"noise": 0.002, "plain": plain, "skins": skins}
     RESULT.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
 

@@ -65,10 +65,14 @@ def test_words_of_users_stay_words(target: str, tmp_path: Path) -> None:
     named = Subject(WICKED, plain.curve, plain.albedo, plain.model, plain.tissue)
     text = text_of(named, target, tmp_path)
     assert "<script>alert" not in text and "alert(1)" in text
-    assert text.count("</script>") == text.count("<script") == text_of(plain, target, tmp_path).count("<script")
+    assert (
+        text.count("</script>") == text.count("<script") == text_of(plain, target, tmp_path).count("<script")
+    )
 
 
-def test_the_page_holds_the_head_in_metres_and_the_parameters(skin: Subject, target: str, tmp_path: Path) -> None:
+def test_the_page_holds_the_head_in_metres_and_the_parameters(
+    skin: Subject, target: str, tmp_path: Path
+) -> None:
     text = text_of(skin, target, tmp_path)
     head = re.search(r'id="head">([^<]*)<', text)
     told = re.search(r'id="settings">([^<]*)<', text)
@@ -76,7 +80,9 @@ def test_the_page_holds_the_head_in_metres_and_the_parameters(skin: Subject, tar
     assert base64.b64decode(head[1]).startswith(b"glTF")
     settings = json.loads(told[1])
     report = judged(skin, TARGETS[target].with_variant(None), TARGETS[target].versions[-1])
-    assert settings["skin"] == json.loads(json.dumps({r.name.rpartition(".")[2]: r.value for r in report.rows}))
+    assert settings["skin"] == json.loads(
+        json.dumps({r.name.rpartition(".")[2]: r.value for r in report.rows})
+    )
     assert 0.3 < np.linalg.norm(settings["camera"]["position"]) < 3.0
     assert all(abs(np.linalg.norm(light["direction"]) - 1.0) < 1e-9 for light in settings["lights"])
 

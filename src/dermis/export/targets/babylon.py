@@ -30,9 +30,9 @@ class Babylon(WebPage):
     licence: ClassVar[str] = "Apache-2.0"
     draw: ClassVar[str] = "babylon.js"
     wrong: ClassVar[str] = (
-        "Forty samples of one lobe a channel, the same in every pixel: shadows' edges show steps of a fortieth, "
-        "and the narrower channels have fewer of them. Light spreads on the screen only, not through thin "
-        "parts; slopes count twice in depth; diffuse light above 1 is cut off. Lights are parallel here."
+        "Forty samples of one lobe a channel, the same in every pixel: shadows' edges show steps of a "
+        "fortieth, and the narrower channels have fewer of them. Light spreads on the "
+        "screen only, not through thin parts; slopes count twice in depth; diffuse light above 1 is cut off. Lights are parallel here."
     )
     scripts: ClassVar[dict[str, tuple[Script, ...]]] = {
         "9.28.0": (
@@ -68,7 +68,7 @@ class Babylon(WebPage):
         return "\n".join(f"<script>{text}</script>" for text in texts), [hash_of(text) for text in texts]
 
 
-def _rows(subject: Subject, profile: np.ndarray, metres: float) -> Rows:  # type: ignore[type-arg]
+def _rows(subject: Subject, profile: np.ndarray, metres: float) -> Rows:
     colour = tuple(float(x) for x in profile)
     return (
         Row(_PROFILE, colour, "-", "1/width: a smaller number spreads farther"),

@@ -52,8 +52,8 @@ class Three(WebPage):
     draw: ClassVar[str] = "three.js"
     wrong: ClassVar[str] = (
         "Nothing spreads: its materials send all light back from where it falls, so shadows' edges are sharp "
-        "and have no red fringe, and nothing shines through an ear. Transmission would make glass of the skin "
-        "and is left at 0. Lights are parallel here."
+        "and have no red fringe, and nothing shines through an ear. Transmission would make glass of the "
+        "skin and is left at 0. Lights are parallel here."
     )
     scripts: ClassVar[dict[str, tuple[Script, ...]]] = {
         "0.187.0": tuple(Script("three", "0.187.0", *told, name) for name, told in _HASHES.items())
@@ -85,7 +85,9 @@ class Three(WebPage):
             checks = {script.url: script.integrity for script in scripts}
             return _import_map({"imports": places, "integrity": checks}, [script.url for script in scripts])
         texts = {script.name: script.read(self.library) for script in scripts}
-        return _import_map({"imports": {name: module_url(text, _IMPORTS) for name, text in texts.items()}}, ["data:"])
+        return _import_map(
+            {"imports": {name: module_url(text, _IMPORTS) for name, text in texts.items()}}, ["data:"]
+        )
 
 
 def _import_map(told: dict[str, dict[str, str]], sources: list[str]) -> tuple[str, list[str]]:
