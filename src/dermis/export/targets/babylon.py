@@ -32,7 +32,8 @@ class Babylon(WebPage):
     wrong: ClassVar[str] = (
         "Forty samples of one lobe a channel, the same in every pixel: shadows' edges show steps of a "
         "fortieth, and the narrower channels have fewer of them. Light spreads on the "
-        "screen only, not through thin parts; slopes count twice in depth; diffuse light above 1 is cut off. Lights are parallel here."
+        "screen only, not through thin parts; slopes count twice in depth; diffuse light above 1 is "
+        "cut off. Lights are parallel here."
     )
     scripts: ClassVar[dict[str, tuple[Script, ...]]] = {
         "9.28.0": (

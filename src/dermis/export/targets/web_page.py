@@ -27,7 +27,7 @@ def page(
     libraries : elements that load or hold the library
     sources : what else scripts may come from, as in a Content-Security-Policy
     """
-    script, style = inline(_text("common.js") + _text(draw)), _text("page.css")
+    script, style = inline(_text("panel.js") + _text(draw)), _text("page.css")
     allowed = " ".join([hash_of(script), *sources])
     return Template(_text("page.html")).substitute(
         policy=html.escape(f"{_NONE}; {_MADE}; style-src {hash_of(style)}; script-src {allowed}"),
