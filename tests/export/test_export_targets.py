@@ -22,6 +22,10 @@ from dermis.export.target import numbers_of
 from dermis.export.targets.unity import asset_text
 
 LOBES = ["unity", "unreal", "renderman"]
+KNOWN = """
+boundary_color_bleed enable_burley enable_mean_free_path extinction_scale implementation ior lobe_mix
+mean_free_path_color mean_free_path_distance normal_scale roughness0 roughness1 scattering_distribution
+surface_albedo tint transmission_tint_color world_unit_scale"""
 EVIL = '"; import os; os._exit(3) # \n'
 
 
@@ -62,11 +66,7 @@ def test_unity_before_14_has_the_width_in_the_colour_alone(skin1: Subject) -> No
 class _Settings:
     """Fields that the editor's structure has, by its page; others are refused."""
 
-    known = frozenset(
-        """boundary_color_bleed enable_burley enable_mean_free_path extinction_scale implementation ior lobe_mix
-        mean_free_path_color mean_free_path_distance normal_scale roughness0 roughness1 scattering_distribution
-        surface_albedo tint transmission_tint_color world_unit_scale""".split()
-    )
+    known = frozenset(KNOWN.split())
 
     def __init__(self, *more: str) -> None:
         self.allowed, self.values = self.known | {*more}, dict[str, Any]()

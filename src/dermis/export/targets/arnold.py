@@ -32,8 +32,8 @@ class Arnold(Target):
     suffixes: ClassVar[tuple[str, ...]] = (".json", "")
     versions: ClassVar[tuple[str, ...]] = ("7",)
     wrong: ClassVar[str] = (
-        "How colour becomes the albedo of a scattering inside the renderer is not published: this is by a walk "
-        "counted here. One medium cannot hold layers."
+        "How colour becomes the albedo of a scattering inside the renderer is not published: this is by a "
+        "walk counted here. One medium cannot hold layers."
     )
     not_run: ClassVar[bool] = True
 

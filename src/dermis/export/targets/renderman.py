@@ -36,8 +36,8 @@ class RenderMan(Target):
     suffixes: ClassVar[tuple[str, ...]] = (".json", "")
     versions: ClassVar[tuple[str, ...]] = ("26",)
     wrong: ClassVar[str] = (
-        "The curve of the model is not published in closed form: this is that of its authors' paper. Its path "
-        "traced and multiple models have others."
+        "The curve of the model is not published in closed form: this is that of its authors' paper. Its "
+        "path traced and multiple models have others."
     )
     not_run: ClassVar[bool] = True
 
