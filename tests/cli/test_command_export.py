@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from conftest import Run
+Run = Callable[..., Any]
 
 
 def test_it_says_in_json_what_was_written_and_how_wrong_it_is(run: Run, tmp_path: Path) -> None:
-    ended = run("export", "dj3", "--to", "unity", "-o", "made", "--json", folder=tmp_path)
-    assert (ended.returncode, ended.stderr) == (0, "")
+    ended = run("export", "dj3", "--to", "unity", "-o", tmp_path / "made", "--json")
+    assert (ended.code, ended.stderr) == (0, "")
     told = json.loads(ended.stdout)
     assert (told["target"], told["version"], told["model"]) == ("unity", "17", "layered")
     for name in ("cdf", "edge", "energy"):
         assert len(told["error"][name]) == len(told["naive_error"][name]) == 3
     assert 0.1 < told["error"]["cdf"][0] < 0.2 and len(told["d_mm"]) == 3
     assert [Path(file).name for file in told["files"]] == ["dj3.asset", "README.md", "export.json"]
-    assert all((tmp_path / file).is_file() for file in told["files"])
+    assert all(Path(file).is_file() for file in told["files"])
 
 
 def test_unknown_versions_are_refused_with_those_known(run: Run, tmp_path: Path) -> None:
-    ended = run("export", "skin1", "--to", "unreal", "--version", "4.27", "-o", "made", folder=tmp_path)
-    assert ended.returncode == 2 and "5.7, 5.8, but '4.27' came" in ended.stderr
+    ended = run("export", "skin1", "--to", "unreal", "--version", "4.27", "-o", tmp_path / "made")
+    assert ended.code == 2 and "5.7, 5.8, but '4.27' came" in ended.stderr
     assert not list(tmp_path.iterdir())
