@@ -9,12 +9,15 @@ from __future__ import annotations
 import importlib.util
 import json
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import bpy  # type: ignore[import-not-found,unused-ignore]
 import numpy as np
-from mathutils import Matrix  # type: ignore[import-not-found,unused-ignore]
+
+with suppress(ImportError):  # which only Blender's Python has
+    import bpy  # type: ignore[import-not-found,unused-ignore]
+    from mathutils import Matrix  # type: ignore[import-not-found,unused-ignore]
 
 SIDE_M, CARD_M = 1.0, 0.002  # of the plane, and above it the card that shades half of it
 
