@@ -1,7 +1,7 @@
 // The grid of first guesses, over the logarithms of red and of blue over green: red and green alone would not tell
 // much melanin from much blood.
 
-const SIDE: u32 = 96u;
+override SIDE: u32;
 const REDS: vec2f = vec2f(-4.6, 0.0);
 const BLUES: vec2f = vec2f(-1.6, 0.6);
 

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.errors import refuse, shown_value
+from dermis.human.skin.colours import EPIDERMIS_MM
 from dermis.optics.media import Floats
 from dermis.optics.pigments.skin import SkinParameters
 from dermis.optics.skin_colours import colour_table
 
 Third = Literal["none", "oxygen", "shade"]
-EPIDERMIS_MM = 0.05
-"""Of the skin of faces, within what is measured, 0.05 to 0.1 [mm]."""
 FACE = SkinParameters(melanin=0.0, blood=0.0, epidermis_mm=EPIDERMIS_MM)
 """The skin whose melanin and blood are looked for, unless another is given."""
 DARKEST = 1e-4

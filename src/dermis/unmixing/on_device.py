@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.gpu import ComputeProgram, Device, Frame, compiled, download, make_texture
+from dermis.gpu.program import declared
 from dermis.gpu.textures import texture_from, upload
 from dermis.unmixing.model import BLOOD_SPREAD, DARKEST, USUAL_BLOOD, SkinModel
 from dermis.unmixing.solve import FLOOR
@@ -17,7 +18,7 @@ from dermis.unmixing.solve import FLOOR
 Pixels = NDArray[np.float32]
 Told = Callable[[int, int], None]
 _FOLDER = Path(__file__).parent
-_SIDE = 96  # of the grid of first guesses, as in first_guess.wgsl
+_SIDE = 96  # of the grid of first guesses
 _STEPS = 8
 _STRIP = 1 << 22  # texels, of 16 bytes each in seven textures
 _TEXEL = "rgba32float"
@@ -118,8 +119,9 @@ def _table_of(device: Device, model: SkinModel) -> Any:
 
 def _program(device: Device, name: str, model: SkinModel) -> ComputeProgram:
     thirds, nodes = model.logs.shape[:2]
-    constants = {"NODES": nodes, "THIRDS": thirds, "SHADE": int(model.third == "shade")}
+    numbers = {"NODES": nodes, "THIRDS": thirds, "SHADE": int(model.third == "shade"), "SIDE": _SIDE}
     path = _FOLDER / f"{name}.wgsl"
+    constants = declared(path, (), tuple(numbers.items()))
 
     def make() -> ComputeProgram:
         return ComputeProgram(device, path, (), constants)

@@ -1,8 +1,8 @@
 // Colours of skins, and their melanin and blood by Gauss and Newton's steps; solve.py is the same in float64.
 
-override NODES: u32 = 129u; // along the roots of melanin and of blood
-override THIRDS: u32 = 1u; // of the third number, when the table has it
-override SHADE: bool = false; // whether the third number is the logarithm of a factor
+override NODES: u32; // along the roots of melanin and of blood
+override THIRDS: u32; // of the third number, when the table has it
+override SHADE: bool; // whether the third number is the logarithm of a factor
 
 struct Model {
     span: vec2f, // of the third number

@@ -63,9 +63,9 @@ class Babylon(WebPage):
     def loaded(self, version: str) -> tuple[str, list[str]]:
         """Two scripts."""
         scripts = self.scripts[version]
-        if self.library is None:
+        if self.installed is None:
             return "\n".join(map(linked, scripts)), [script.url for script in scripts]
-        texts = [inline(script.read(self.library)) for script in scripts]
+        texts = [inline(script.read(self.installed)) for script in scripts]
         return "\n".join(f"<script>{text}</script>" for text in texts), [hash_of(text) for text in texts]
 
 

@@ -80,11 +80,11 @@ class Three(WebPage):
     def loaded(self, version: str) -> tuple[str, list[str]]:
         """Six modules and the map of their names."""
         scripts = self.scripts[version]
-        if self.library is None:
+        if self.installed is None:
             places = {script.name: script.url for script in scripts}
             checks = {script.url: script.integrity for script in scripts}
             return _import_map({"imports": places, "integrity": checks}, [script.url for script in scripts])
-        texts = {script.name: script.read(self.library) for script in scripts}
+        texts = {script.name: script.read(self.installed) for script in scripts}
         return _import_map(
             {"imports": {name: module_url(text, _IMPORTS) for name, text in texts.items()}}, ["data:"]
         )

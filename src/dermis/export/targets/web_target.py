@@ -30,11 +30,11 @@ _NO_LIBRARY = "{} could not be loaded from {}. Is there no network? Export again
 class WebPage(Target):
     """A page that draws a head.
 
-    library : folder that npm has installed the library's packages into, whose files then stand in the page;
+    installed : folder that npm has installed the library's packages into, whose files then stand in the page;
         None loads them from a public server
     """
 
-    library: Path | None = None
+    installed: Path | None = None
 
     suffixes: ClassVar[tuple[str, ...]] = (".html",)
     needs_maps: ClassVar[bool] = True
@@ -47,7 +47,7 @@ class WebPage(Target):
 
     def with_library(self, folder: str | Path) -> WebPage:
         """The same with the library inside the page."""
-        return replace(self, library=Path(folder))
+        return replace(self, installed=Path(folder))
 
     def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
         """The page."""
