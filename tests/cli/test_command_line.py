@@ -51,7 +51,11 @@ def test_a_process_renders(folder: Path) -> None:
 
 @pytest.mark.parametrize(
     "words",
-    [["--help"], *([name, "--help"] for name in ("render", "batch", "export", "cite")), ["--version"]],
+    [
+        ["--help"],
+        *([name, "--help"] for name in ("render", "batch", "export", "unmix", "cite")),
+        ["--version"],
+    ],
 )
 def test_help_loads_nothing_heavy(words: list[str]) -> None:
     """The help of a command that takes a model's fields needs the model, and with it pydantic."""
