@@ -18,9 +18,10 @@ from dermis.atlas.unwrap.untangle import untangle
 from dermis.atlas.unwrap.unwrap import PADDING, Layout, unwrap
 from dermis.atlas.unwrap.validity import crossed, faults
 from dermis.errors import DermisError
-from dermis.mesh.geometry import build_mesh, triangle_areas
+from dermis.mesh.geometry import build_mesh
 from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.primitives import plane, uv_sphere
+from dermis.mesh.tangents import triangle_areas
 
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]

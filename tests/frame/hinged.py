@@ -23,7 +23,7 @@ def upright(mesh: Mesh, face: float) -> Mesh:
         name: np.ascontiguousarray(getattr(mesh, name)[:, [2, 1, 0]] * [face, 1, -face], dtype=np.float32)
         for name in ("positions", "normals")
     }
-    return Mesh(**(vars(mesh) | turned))
+    return replace(mesh, **turned)
 
 
 def corner() -> Head:

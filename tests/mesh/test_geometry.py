@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from dermis.mesh.geometry import build_mesh, edges, triangle_areas, vertex_normals, weld
+from dermis.mesh.geometry import build_mesh, edges, vertex_normals, weld
 from dermis.mesh.mesh import Material
 from dermis.mesh.primitives import plane, uv_sphere
+from dermis.mesh.tangents import triangle_areas
 
 SKIN = (Material("skin"),)
 

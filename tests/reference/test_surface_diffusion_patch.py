@@ -7,8 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from dermis.errors import DermisError
-from dermis.mesh.geometry import edges, triangle_areas
+from dermis.mesh.geometry import edges
 from dermis.mesh.primitives import plane, uv_sphere
+from dermis.mesh.tangents import triangle_areas
 from dermis.reference.refine import Patch, refine_patch
 from dermis.reference.surface_diffusion import (
     diffuse_on_surface,

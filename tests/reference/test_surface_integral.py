@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from dermis.errors import DermisError
-from dermis.mesh.geometry import triangle_areas
 from dermis.mesh.primitives import plane, uv_sphere
+from dermis.mesh.tangents import triangle_areas
 from dermis.reference.surface_integral import (
     GaussianSum,
     IrradianceSamples,

@@ -9,9 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from dermis.errors import DermisError
-from dermis.mesh.geometry import edges, triangle_areas
+from dermis.mesh.geometry import edges
 from dermis.mesh.mesh import Material
 from dermis.mesh.primitives import plane, uv_sphere
+from dermis.mesh.tangents import triangle_areas
 from dermis.reference.irradiance_samples import IrradianceSamples, Places, sample_irradiance
 from dermis.reference.octree import Tree, build_tree
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.atlas.atlas import GUTTER, MOST_SHEAR, Atlas
-from dermis.mesh.geometry import uv_cross
 from dermis.mesh.mesh import Mesh
+from dermis.mesh.tangents import uv_cross
 from dermis.mesh.uv import charts, usable
 
 Floats = NDArray[np.float64]

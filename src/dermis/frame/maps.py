@@ -19,9 +19,9 @@ from dermis.human.skin.painted import PaintedMaps
 from dermis.human.skin.surface import painting
 from dermis.images.colour import encode_srgb
 from dermis.images.filters import mip_chain
-from dermis.mesh.geometry import triangle_areas
 from dermis.mesh.head import Head
 from dermis.mesh.mesh import Mesh
+from dermis.mesh.tangents import triangle_areas
 from dermis.mesh.uv import triangle_uv_area
 from dermis.specular.beckmann import beckmann_table
 

@@ -16,7 +16,7 @@ from dermis.mesh.mesh import Material, Mesh
 from dermis.mesh.outline import Outline
 from dermis.mesh.rig import MorphTargets, Rig, Skeleton
 
-_FORM = 4  # raise when `load_rigged` gives other results for the same file
+_FORM = 5  # raise when `load_rigged` gives other results for the same file
 _MESH = [field.name for field in fields(Mesh) if field.name != "materials"]
 _TARGETS = [field.name for field in fields(MorphTargets) if field.name != "names"]
 _SKELETON = [field.name for field in fields(Skeleton) if field.name != "names"]

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from dermis.errors import refuse
 from dermis.mesh.formats import Part, default_unit_mm
-from dermis.mesh.geometry import edges, triangle_areas
+from dermis.mesh.geometry import edges
 from dermis.mesh.limits import MOST_TRIANGLES, MOST_VERTICES
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.rig import Rig
+from dermis.mesh.tangents import triangle_areas
 
 UV_TOLERANCE = 1e-4
 FARTHEST_MM = 1e6

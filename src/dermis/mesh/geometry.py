@@ -1,4 +1,4 @@
-"""Welding, normals and tangents of triangles, and the assembly of a `Mesh` from plain arrays."""
+"""Welding and normals of triangles, and the assembly of a `Mesh` from plain arrays."""
 
 from __future__ import annotations
 
@@ -6,11 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.mesh.mesh import Floats, Ints, Material, Mesh
-
-Doubles = NDArray[np.float64]
-
-MIN_UV_CROSS = 1e-12
-"""Twice the signed uv area below which u and v have no direction on a triangle (1/70 texel at 8192)."""
+from dermis.mesh.tangents import unit
 
 
 def weld(rows: ArrayLike) -> Ints:
@@ -56,33 +52,6 @@ def unite_sides(sides: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[
     return np.column_stack((keys // stride, keys % stride)), of_side.reshape(-1), counts
 
 
-def sum_at(index: NDArray[np.integer], values: Doubles, count: int) -> Doubles:
-    """Sum of the rows of `values` (n, k) that carry each `index` (n,), as (count, k)."""
-    columns = [np.bincount(index, weights=column, minlength=count) for column in values.T]
-    return np.column_stack(columns)
-
-
-def triangle_areas(corners: NDArray[np.floating]) -> Doubles:
-    """Area of each triangle [mm2]; corners : (f, 3, 3) [mm]."""
-    places = np.asarray(corners, dtype=np.float64)
-    cross = np.cross(places[:, 1] - places[:, 0], places[:, 2] - places[:, 0])
-    return np.asarray(np.linalg.norm(cross, axis=1) / 2)
-
-
-def uv_cross(corners: NDArray[np.floating]) -> Doubles:
-    """Twice the signed uv area of each triangle; corners : (f, 3, 2)."""
-    places = np.asarray(corners, dtype=np.float64)
-    a, b = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-
-
-def _unit(vectors: Doubles, instead: Doubles) -> Doubles:
-    """`vectors` normalised, or `instead` where they have no length; both (n, 3)."""
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    usable = length > 0
-    return np.where(usable, vectors / np.where(usable, length, 1), instead)
-
-
 def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
     """Unit normals (v, 3): face normals weighted by the angle of the corner, summed over welded points.
 
@@ -94,50 +63,18 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
 
     Angles, unlike areas, do not depend on how the surface is cut into triangles.
     """
-    corners = positions[triangles].astype(np.float64)
-    ahead = np.roll(corners, -1, axis=1) - corners
-    behind = np.roll(corners, 1, axis=1) - corners
-    cross = np.cross(ahead, behind)
-    angle = np.arctan2(np.linalg.norm(cross, axis=2), (ahead * behind).sum(axis=2))
-    face = _unit(cross[:, 0], np.zeros((len(cross), 3)))
-    count = int(point.max()) + 1
-    summed = sum_at(point[triangles].ravel(), (face[:, None] * angle[..., None]).reshape(-1, 3), count)
-    return np.asarray(_unit(summed, np.broadcast_to([0.0, 0.0, 1.0], summed.shape))[point].astype(np.float32))
-
-
-def tangents(positions: Floats, uv: Floats, normals: Floats, triangles: Ints) -> tuple[Floats, Floats]:
-    """Change of position with u and with v, dpdu and dpdv, each (v, 3) [mm per unit of uv].
-
-    Averaged over the triangles of each corner vertex by area, without those that have no uv area; a vertex
-    with no others gets two orthogonal directions of 1 mm, so that nothing divides by 0.
-
-    positions, normals : (v, 3) [mm], unit
-    uv : (v, 2)
-    triangles : (f, 3)
-    """
-    p, q = positions[triangles].astype(np.float64), uv[triangles].astype(np.float64)
-    cross, weight = uv_cross(q), triangle_areas(p)
-    valid = (np.abs(cross) > MIN_UV_CROSS) & (weight > 0)
-    p, q, cross, weight = p[valid], q[valid], cross[valid, None], weight[valid, None]
-    e1, e2, d1, d2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]
-    dpdu = (e1 * d2[:, 1:] - e2 * d1[:, 1:]) / cross
-    dpdv = (e2 * d1[:, :1] - e1 * d2[:, :1]) / cross
-    corner = triangles[valid].ravel()
-    rows = np.repeat(np.hstack((dpdu * weight, dpdv * weight, weight)), 3, axis=0)
-    summed = sum_at(corner, rows, len(positions))
-    mean = summed[:, :6] / np.where(summed[:, 6:] > 0, summed[:, 6:], 1)
-    return _with_length(mean[:, :3], mean[:, 3:], normals.astype(np.float64))
-
-
-def _with_length(dpdu: Doubles, dpdv: Doubles, normals: Doubles) -> tuple[Floats, Floats]:
-    """The pair; where either has no length, two directions of 1 mm across the normal."""
-    # the axis least along the normal cannot be parallel to it
-    axis = np.eye(3)[np.abs(normals).argmin(axis=1)]
-    across = _unit(np.cross(axis, normals), axis)
-    short = np.minimum(np.linalg.norm(dpdu, axis=1), np.linalg.norm(dpdv, axis=1)) < 1e-6
-    u = np.where(short[:, None], across, dpdu)
-    v = np.where(short[:, None], np.cross(across, normals), dpdv)
-    return u.astype(np.float32), v.astype(np.float32)
+    corners = [np.ascontiguousarray(column, np.float64)[triangles] for column in positions.T]  # (f, 3) each
+    ax, ay, az = (one[:, [1, 2, 0]] - one for one in corners)
+    bx, by, bz = (one[:, [2, 0, 1]] - one for one in corners)
+    cross = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    sine = np.sqrt(cross[0] ** 2 + cross[1] ** 2 + cross[2] ** 2)
+    angle = np.arctan2(sine, ax * bx + ay * by + az * bz)
+    length = np.where(sine[:, :1] > 0, sine[:, :1], 1.0)
+    at, count = point[triangles].ravel(), int(point.max()) + 1
+    weighed = [(one[:, :1] / length * angle).ravel() for one in cross]
+    summed = np.stack([np.bincount(at, one, count) for one in weighed], axis=1, dtype=np.float64)
+    upwards = np.broadcast_to([0.0, 0.0, 1.0], summed.shape)
+    return np.asarray(unit(summed, upwards).astype(np.float32)[point])
 
 
 def _trusted(given: Floats, computed: Floats) -> Floats:
@@ -157,7 +94,7 @@ def build_mesh(
     point: ArrayLike | None = None,
     quads: ArrayLike = (),
 ) -> Mesh:
-    """A `Mesh` with its points welded and its normals and tangents computed.
+    """A `Mesh` with its points welded and its normals computed.
 
     positions : (v, 3) finite [mm]
     uv : (v, 2) v down
@@ -174,7 +111,6 @@ def build_mesh(
     normal = vertex_normals(place, points, corner)
     if normals is not None:
         normal = _trusted(np.asarray(normals, dtype=np.float32), normal)
-    dpdu, dpdv = tangents(place, flat, normal, corner)
     groups = np.ascontiguousarray(material, dtype=np.int32)
     pairs = np.asarray(quads, dtype=np.int32).reshape(-1, 2)
-    return Mesh(place, normal, flat, dpdu, dpdv, points, corner, groups, tuple(materials), pairs)
+    return Mesh(place, normal, flat, points, corner, groups, tuple(materials), pairs)

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.mesh.outline import Outline, hull
+from dermis.mesh.tangents import tangents
 from dermis.summary import Summarised
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]
-
 
 Part = Literal["upper teeth", "lower teeth", "tongue"]
 PARTS: tuple[Part, ...] = ("upper teeth", "lower teeth", "tongue")
@@ -47,7 +47,6 @@ class Mesh(Summarised):
     positions : (v, 3) [mm]
     normals : (v, 3) unit vectors
     uv : (v, 2) u to the right, v DOWN: (0, 0) is the top-left corner of every map, in [0, 1]
-    dpdu, dpdv : (v, 3) change of position with uv, averaged over the faces around [mm per unit of uv]
     point : (v,) index of the unique position
     triangles : (f, 3) corner vertices
     material : (f,) index into `materials`
@@ -57,8 +56,6 @@ class Mesh(Summarised):
     positions: Floats
     normals: Floats
     uv: Floats
-    dpdu: Floats
-    dpdv: Floats
     point: Ints
     triangles: Ints
     material: Ints
@@ -74,3 +71,18 @@ class Mesh(Summarised):
     def outline(self) -> Outline:
         """Corners of the convex hull."""
         return hull(self.positions)
+
+    @property
+    def dpdu(self) -> Floats:
+        """(v, 3) change of position with u, averaged over the faces around [mm per unit of uv]."""
+        return self._tangents[0]
+
+    @property
+    def dpdv(self) -> Floats:
+        """(v, 3) the same with v."""
+        return self._tangents[1]
+
+    @cached_property
+    def _tangents(self) -> tuple[Floats, Floats]:
+        # Only when asked: of a person, whose atlas is its template's, nobody does.
+        return tangents(self.positions, self.uv, self.normals, self.triangles)

@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.mesh.geometry import edges, sum_at
+from dermis.mesh.geometry import edges
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.subdivide import MAX_LEVELS
+from dermis.mesh.tangents import sum_at
 
 Doubles = NDArray[np.float64]
 

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.mesh.components import components
-from dermis.mesh.geometry import MIN_UV_CROSS, Doubles, edges, uv_cross, weld
+from dermis.mesh.geometry import edges, weld
 from dermis.mesh.mesh import Ints, Mesh
+from dermis.mesh.tangents import MIN_UV_CROSS, Doubles, uv_cross
 
 
 def charts(mesh: Mesh) -> Ints:

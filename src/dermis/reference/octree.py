@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.mesh.geometry import triangle_areas
+from dermis.mesh.tangents import triangle_areas
 from dermis.reference.irradiance_samples import IrradianceSamples
 
 Floats = NDArray[np.float64]

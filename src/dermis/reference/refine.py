@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.errors import refuse
-from dermis.mesh.geometry import triangle_areas
 from dermis.mesh.mesh import Mesh
+from dermis.mesh.tangents import triangle_areas
 from dermis.reference.surface_diffusion import edge_for, margin_for, welded
 from dermis.reference.triangles import Floats, Index, divide, sides
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.errors import refuse
-from dermis.mesh.geometry import sum_at
 from dermis.mesh.mesh import Mesh
+from dermis.mesh.tangents import sum_at
 from dermis.reference.surface_diffusion_operators import delaunay, intrinsic, mass_and_stiffness
 from dermis.reference.triangles import Floats, Index, sides
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.mesh.geometry import sum_at
+from dermis.mesh.tangents import sum_at
 from dermis.reference.triangles import Floats, Index, sides
 
 if TYPE_CHECKING:

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.mesh.components import components
-from dermis.mesh.geometry import edges, sum_at, triangle_areas
+from dermis.mesh.geometry import edges
+from dermis.mesh.tangents import sum_at, triangle_areas
 
 Index = NDArray[np.int64]
 Doubles = NDArray[np.float64]

@@ -11,8 +11,8 @@ from dermis.frame.passes import each, program
 from dermis.frame.shape import LEAST_ACROSS, Shape, ShapeTables, displacements, make_shape
 from dermis.gpu import Device, Frame, Graph, Recorder
 from dermis.gpu.program import Resources
-from dermis.mesh.geometry import MIN_UV_CROSS
 from dermis.mesh.rig import Rig
+from dermis.mesh.tangents import MIN_UV_CROSS
 
 
 class MotionBytes(NamedTuple):

@@ -11,9 +11,10 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.mesh.geometry import triangle_areas, vertex_normals
+from dermis.mesh.geometry import vertex_normals
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.rig import Stencils
+from dermis.mesh.tangents import triangle_areas
 from dermis.tables import numbers, read_rows
 
 Floats = NDArray[np.float32]

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from dermis.mesh.components import components
 from dermis.mesh.fitted_eyes.spheres import Sphere, corneal_axis, fit_sphere
-from dermis.mesh.geometry import triangle_areas
 from dermis.mesh.mesh import Mesh
+from dermis.mesh.tangents import triangle_areas
 
 Doubles = NDArray[np.float64]
 Index = NDArray[np.int64]

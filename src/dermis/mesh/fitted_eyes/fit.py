@@ -154,7 +154,7 @@ def _with_meshes(mesh: Mesh, balls: tuple[Index, Index], places: list[Doubles], 
     faces = np.count_nonzero(stays)
     both = {
         name: np.concatenate([getattr(mesh, name)[vertex], getattr(new, name)])
-        for name in ("positions", "normals", "uv", "dpdu", "dpdv")
+        for name in ("positions", "normals", "uv")
     }
     return Mesh(
         **both,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.mesh.geometry import triangle_areas
+from dermis.mesh.tangents import triangle_areas
 from dermis.optics.media import SKIN_ETA
 from dermis.reference.described import rgb
 from dermis.reference.half_space import diffuse_albedo
