@@ -81,6 +81,16 @@ def test_fewer_hairs_stand_for_all_there_are(density: float) -> None:
     )
 
 
+def test_a_share_of_hairs_covers_as_much_as_all() -> None:
+    all_of_them, few = (hair(Human(hair=HairLook(style="short")).head(hairs=share)) for share in (1.0, 0.25))
+    assert len(few) == pytest.approx(0.25 * len(all_of_them), rel=0.03)
+    assert few.radius_mm.mean() == pytest.approx(4 * all_of_them.radius_mm.mean(), rel=0.03)
+    assert few.cover is not None and all_of_them.cover is not None
+    assert few.cover.mean() == pytest.approx(all_of_them.cover.mean(), rel=0.05)
+    with pytest.raises(DermisError, match="hairs"):
+        Human().head(hairs=0.0)
+
+
 @pytest.mark.parametrize("style", LOOKS)
 def test_no_hair_grows_on_ears_lips_and_face(style: str) -> None:
     head = grown(style)

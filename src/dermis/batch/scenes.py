@@ -33,6 +33,8 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.smoothness import SmoothIn
 
+_ALL_HAIRS_PIXELS = 700  # a side of the pictures from which on all hairs can be told apart, at 230 mm
+_LEAST_HAIRS = 0.2
 _FAR_MM = 1e4  # where eyes look that look nowhere
 _PARTS = "skin", "eyes", "hair", "targets"
 _SEED, _HEAD = "person.seed", "person.head"
@@ -102,7 +104,9 @@ class SceneMaker:
             head, skin = self._loaded(self._named(parameters[_HEAD]))
         else:
             person = drawn_person(parameters)
-            head, skin = person.head(subdivide=_levels(self.spec.size)), skin_of(person)
+            size = self.spec.size
+            head = person.head(subdivide=_levels(size), hairs=_hairs(size))
+            skin = skin_of(person)
         return _Seen(head, face_points(head), turning_bones(head.control.skeleton).head, skin)
 
     def _loaded(self, name: str) -> tuple[Head, Skin]:
@@ -150,6 +154,11 @@ def drawn_person(parameters: Mapping[str, Any]) -> Human:
 def _levels(size: tuple[int, int]) -> int:
     """Levels of subdivision, alike for all drawn people, who share their topology then."""
     return max(LEAST_OF_PEOPLE, SmoothIn(size=size)(Human().head(subdivide=0)))
+
+
+def _hairs(size: tuple[int, int]) -> float:
+    """Share of the hairs that grows: no more than a picture of this size can tell apart."""
+    return min(1.0, max(_LEAST_HAIRS, max(size) / _ALL_HAIRS_PIXELS))
 
 
 def _makes(name: str) -> bool:

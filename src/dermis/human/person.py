@@ -38,6 +38,7 @@ _RANGES = {
     "hair_eumelanin": (0.0, 10.0),
     "hair_pheomelanin": (0.0, 10.0),
 }
+_LEAST_HAIRS = 0.05
 _MOST_WEIGHT = 2.0  # of a published target
 _NONE: Mapping[str, float] = MappingProxyType({})
 Levels = int | Callable[[Head], int]
@@ -102,23 +103,27 @@ class Human:
             number(name, given[name], *_RANGES[name])
         return cls(**drawn(seed, given))
 
-    def head(self, maps: Maps | None = None, layout: Layout = "own", subdivide: Levels = 1) -> Head:
+    def head(
+        self, maps: Maps | None = None, layout: Layout = "own", subdivide: Levels = 1, hairs: float = 1.0
+    ) -> Head:
         """The person at rest, with expressions and bones to move by.
 
         maps : those of the skin; painted as `look` says when left out
         layout : "own" has most room for the face; "hm08" is the published one, which MakeHuman's skins fit
         subdivide : levels of Catmull and Clark's subdivision, 0 to 3, or what finds them for the head
+        hairs : share of the usual number on head and chin that grows, each as much wider; 0.05 to 1
 
-        Raises DermisError for targets that nobody knows.
+        Raises DermisError for targets that nobody knows, and for other shares.
         """
         if layout not in get_args(Layout):
             came = f"{shown_value(layout)} came"
             refuse("layout", f"one of {', '.join(get_args(Layout))}", came, "Choose one")
+        number("hairs", hairs, _LEAST_HAIRS, 1.0)
         painted = maps or PaintedMaps(look=self.look)
         plain = human_head(self.weights(), painted, layout, self.iris)
         shared = template(layout, levels_of(plain, subdivide))
         head = shared.shaped(plain)
-        return groomed(head, plain, shared.rooting, head.levels, self.hairdo, self.look.recession)
+        return groomed(head, plain, shared.rooting, self.hairdo, self.look.recession, hairs)
 
     def on(self, head: Head) -> Head:
         """The head of another person with this one's skin and eyes.

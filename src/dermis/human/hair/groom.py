@@ -22,14 +22,21 @@ _LEAST_EUMELANIN = 0.07  # white hair is not quite white
 
 
 def groomed(
-    head: Head, plain: Head, rooting: Rooting, levels: int, look: HairLook, recession: float = 0.0
+    head: Head,
+    plain: Head,
+    rooting: Rooting,
+    look: HairLook,
+    recession: float = 0.0,
+    hairs: float = 1.0,
 ) -> Head:
     """The head with hair, beard, brows and lashes.
 
-    plain : the head before it was subdivided `levels` times
+    plain : the head before it was subdivided
     rooting : on the person whose brows are where the artist has them
     recession : see `SkinLook`
+    hairs : share of those of head and beard that grows, each as much wider
     """
+    levels = head.levels
     skin, parts = Skin(head.mesh), list[Grown]()
     for side, eye in zip((1.0, -1.0), eye_middles(plain.mesh), strict=True):
         rng = np.random.default_rng((look.seed, int(side > 0)))
@@ -37,7 +44,7 @@ def groomed(
         for lid in (lashes.UPPER, lashes.LOWER):
             parts.append(_lashes(head, rooting, levels, lid, side, eye, rng))
     head = replace(head, strands=_joined(head, parts, _absorption(parts, look)))
-    ground = Ground(head, plain, levels, skin)
+    ground = Ground(head, plain, levels, skin, hairs)
     hair = [*scalp_hair(ground, look, recession), *beard_hair(ground, look)]
     if not hair:
         return head

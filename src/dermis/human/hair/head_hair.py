@@ -36,12 +36,16 @@ class Set(NamedTuple):
 
 
 class Ground(NamedTuple):
-    """What hair grows on: the head as it is drawn, and before it was subdivided so many times."""
+    """What hair grows on: the head as it is drawn, and before it was subdivided so many times.
+
+    share : of the usual number of hairs that grows, each as much wider
+    """
 
     head: Head
     plain: Head
     levels: int
     skin: Skin
+    share: float = 1.0
 
     def rooted(self, where: Rooted) -> Set:
         """Roots on the head as it is drawn."""
@@ -62,7 +66,7 @@ def scalp_hair(ground: Ground, look: HairLook, recession: float) -> list[Grown]:
     if look.style == "none" or look.density == 0.0:
         return []
     rng, where = np.random.default_rng((look.seed, 3)), hairy_skin.scalp(recession)
-    drawn = 22.0 + 53.0 * look.density
+    drawn = ground.share * (22.0 + 53.0 * look.density)
     few, many = (hairy_skin.rooted(ground.plain.mesh, where, n, rng) for n in (_GUIDES_PER_CM2, drawn))
     guide, hair = ground.rooted(few), ground.rooted(many)
     lie = combed(few.places, guide.normals, look, recession)
@@ -76,7 +80,8 @@ def beard_hair(ground: Ground, look: HairLook) -> list[Grown]:
     if look.beard_mm == 0.0:
         return []
     rng, mesh = np.random.default_rng((look.seed, 4)), ground.plain.mesh
-    both = _GUIDES_PER_CM2, BEARD_PER_CM2
+    drawn = ground.share * BEARD_PER_CM2
+    both = _GUIDES_PER_CM2, drawn
     few, many = (hairy_skin.rooted(mesh, hairy_skin.beard(), density, rng) for density in both)
     guide, hair = ground.rooted(few), ground.rooted(many)
     lie = combed_beard(few.places, guide.normals, look)
@@ -84,7 +89,7 @@ def beard_hair(ground: Ground, look: HairLook) -> list[Grown]:
     tight = max(look.curl - _TIGHT, 0.0) * 2
     rough = Roughness(0.3, 0.22, 0.2, 0.05 + 0.1 * look.curl, 0.5 * tight, 1.5)
     found = grown(hair.places, hair.normals, guide.places, ways, rough, rng)
-    return [_stranded(hair, found, BEARD_PER_CM2, BEARD_PER_CM2, _BEARD_MM, rng)]
+    return [_stranded(hair, found, drawn, BEARD_PER_CM2, _BEARD_MM, rng)]
 
 
 def _stranded(
