@@ -33,7 +33,7 @@ from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
 from dermis.scene.smoothness import SmoothIn
 
-_ALL_HAIRS_PIXELS = 700  # a side of the pictures from which on all hairs can be told apart, at 230 mm
+_ALL_HAIRS_PIXELS = 1000  # a side of the pictures from which on all hairs can be told apart, at 230 mm
 _LEAST_HAIRS = 0.2
 _FAR_MM = 1e4  # where eyes look that look nowhere
 _PARTS = "skin", "eyes", "hair", "targets"

@@ -53,7 +53,7 @@ class Strands(Summarised):
 
     def middle_mm(self, mesh: Mesh) -> Doubles:
         """(3,) the mean of the roots on a mesh at rest [mm]."""
-        return np.asarray(frames(mesh, self.roots, points_of(mesh))[0].mean(axis=0))
+        return np.asarray(_places(mesh, self.roots, points_of(mesh))[0].mean(axis=0))
 
     def refined(self, mesh: Mesh, finer: Mesh, levels: int) -> Strands:
         """The same hairs on the mesh refined by Catmull's and Clark's rules."""
@@ -98,13 +98,18 @@ def frames(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tuple[D
 
     points_mm : (p, 3) of the mesh
     """
-    a, b, c, d = points_mm[corners(mesh, roots.quad)].astype(np.float64).transpose(1, 0, 2)
-    root = np.einsum("nk,knc->nc", weights(roots.place), np.stack([a, b, c, d]))
+    root, (a, b, c, d) = _places(mesh, roots, points_mm)
     along, normal = (b - a) + (c - d), np.cross(c - a, d - b)
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), _LEAST)
     normal -= (normal * along).sum(axis=1, keepdims=True) * along
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), _LEAST)
     return root, np.stack([along, np.cross(normal, along), normal], axis=1)
+
+
+def _places(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
+    """Where roots are (n, 3), and the corners of their quads (4, n, 3) [mm]."""
+    around = points_mm[corners(mesh, roots.quad)].astype(np.float64).transpose(1, 0, 2)
+    return np.einsum("nk,knc->nc", weights(roots.place), around), around
 
 
 def finer_roots(mesh: Mesh, roots: Roots, levels: int) -> Roots:

@@ -39,8 +39,8 @@ def to_radius(transform: Floats) -> Floats:
     from scipy.fft import fht
 
     weighted = transform * frequencies()[:, None] / (2.0 * np.pi)
-    rings = np.stack([fht(a, _STEP, mu=0.0, offset=_offset()) for a in weighted.T], axis=1)
-    return np.asarray(rings / radii()[:, None])
+    rings = fht(np.ascontiguousarray(weighted.T), _STEP, mu=0.0, offset=_offset())
+    return np.asarray(rings.T / radii()[:, None])
 
 
 @cache
