@@ -36,11 +36,18 @@ fn depth_at(triangle: u32, place: vec2f) -> f32 {
     return dot(n, a - strand_view.eye) / dot(n, ray);
 }
 
+// Samples of a pixel. There are no more than layers: that keeps Mesa's software driver from putting the record's number into
+// the shader, which it would then compile anew, and keep, at each dispatch.
+fn sample_count() -> u32 {
+    return min(strand_view.samples, textureNumLayers(visibility_buffer));
+}
+
 fn depths_at(pixel: vec2u) -> Depths {
-    let count = min(strand_view.samples, MOST_DEPTHS);
+    let samples = sample_count();
+    let count = min(samples, MOST_DEPTHS);
     var depths = Depths(vec4f(-1.0), vec4f(-1.0), 1.0 / f32(count));
     for (var k = 0u; k < count; k += 1u) {
-        let s = k * strand_view.samples / count;
+        let s = k * samples / count;
         let found = textureLoad(visibility_buffer, pixel, s, 0).x;
         var depth = 1e30;
         if (found > 0u) {
