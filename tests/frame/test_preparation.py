@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from setups import front_camera, frontal, head_of, scene_of, settings_of
 
-from dermis.frame import preparation, resources
+from dermis.frame import blurred_levels, preparation, resources
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.environment import Environment
@@ -82,10 +82,10 @@ def test_what_was_drawn_before_is_let_go_of(renderer: Renderer) -> None:
     two = Renderer(renderer.device.adapter.name, depth=2)
     settings = settings_of()
     two.prepare(scene(), settings, "left")
-    assert (resources._make_levels, "left") in two.memo._kept
+    assert (blurred_levels._make_levels, "left") in two.memo._kept
     for _ in range(8):
         two.prepare(scene(), settings)
-    assert {of for make, of in two.memo._kept if make is resources._make_levels} == {""}
+    assert {of for make, of in two.memo._kept if make is blurred_levels._make_levels} == {""}
 
 
 def test_frames_that_move_look_as_if_they_were_the_first(renderer: Renderer) -> None:

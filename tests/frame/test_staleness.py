@@ -6,6 +6,7 @@ The fields that are changed are found by introspection: a new one is tested the 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import chdir
 from dataclasses import fields, replace
 from typing import Any
 
@@ -17,6 +18,7 @@ from setups import front_camera, head_of, settings_of
 from dermis.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.gpu.listing import Listing
+from dermis.images.io import write_png
 from dermis.mesh.primitives import uv_sphere
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
@@ -34,6 +36,8 @@ BASE = Scene(HEAD, lights=(LAMP,), camera=front_camera(HEAD, frame_mm=70.0))
 SETTINGS = settings_of(seams="stitch", shadow_size=128)
 WORDS: dict[tuple[type[Plain], str], Any] = {  # for what is neither a number nor one of some words
     (Skin, "profile"): "dj3",
+    (Skin, "profile_map"): "white.png",
+    (Skin, "other_profiles"): ("skin1",),
     (Skin, "pigments"): Pigments(melanin=0.2).model_dump(),
     (Skin, "layers"): (LAYER.model_dump(),),
     (Environment, "name"): "uniform",
@@ -45,10 +49,21 @@ GIVEN: dict[str, dict[str, Any]] = {  # what kinds of light have no default for
     "stripe": {"direction": (0.0, 0.0, -1.0)},
 }
 BESIDE: dict[tuple[type[Plain], str], dict[str, Any]] = {  # what lets a field matter, or be changed at all
+    (Skin, "profile_map"): {"profile_map": "half.png", "other_profiles": ("dj3",)},
+    (Skin, "other_profiles"): {"profile_map": "half.png", "other_profiles": ("dj3",)},
     (Skin, "pigments"): {"profile": "light"},
     (Skin, "layers"): {"profile": "skin1"},
     (Settings, "seam_colour"): {"seams": "clear-colour"},
 }
+
+
+@pytest.fixture(autouse=True, scope="module")
+def masks(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Files that a skin's fields name."""
+    with chdir(tmp_path_factory.mktemp("masks")):
+        for name, levels in {"half.png": [[255, 0]], "white.png": [[255]]}.items():
+            write_png(name, np.array(levels, np.uint8)[..., None])
+        yield
 
 
 def others(model: type[Plain], name: str, value: Any) -> Iterator[Any]:

@@ -73,6 +73,8 @@ LAYERS = (
 )
 SKIN = Skin(
     profile="medium",
+    profile_map="mask.png",
+    other_profiles=("dark", "light"),
     albedo="profile",
     mix=0.1,
     roughness=0.2,

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from dermis.errors import DermisError
+from dermis.gpu import failures
 from dermis.gpu.device import Device
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.models import diffusion_profile
@@ -117,6 +118,12 @@ def test_the_same_skin_comes_back_and_twice_the_melanin_is_found_as_that(
     assert np.median(darker.blood / found.blood) == pytest.approx(1.0, rel=0.02)
     cold = found.recoloured(Change(oxygen=0.2), "cpu")
     assert (cold[..., 0] < colours[..., 0]).mean() > 0.99  # blood without oxygen takes more of the red
+
+
+def test_recolouring_opens_no_further_device(colours: Pixels, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = unmix(colours[:4, :4], adapter="cpu")
+    monkeypatch.setattr(failures, "open_device", None)
+    assert found.recoloured(Change(), "cpu").shape == (4, 4, 3)
 
 
 def test_a_larger_median_adds_and_a_smaller_one_multiplies() -> None:

@@ -15,6 +15,7 @@ from dermis.mesh.eyes import EyeLook
 from dermis.scene.pose import MOST_WEIGHT
 from dermis.scene.skin import Skin
 
+_NO_DIALS = "pigments", "layers", "profile_map", "other_profiles"
 _SEED = "seed"  # a whole number, which follows from the person
 _LOOKS: Mapping[str, type] = {"skin": SkinLook, "eyes": EyeLook, "hair": HairLook}
 
@@ -30,7 +31,7 @@ def check_looks(person: Any) -> None:
 
 def check_skin(dials: Mapping[str, Distribution]) -> None:
     """Refuse names and values that `Skin` does not have."""
-    known = [name for name in Skin.model_fields if name not in ("pigments", "layers")]
+    known = [name for name in Skin.model_fields if name not in _NO_DIALS]
     _check("skin", dials, known, lambda values: Skin(**values))
 
 

@@ -28,6 +28,7 @@ from dermis.scene.environment import Environment
 from dermis.scene.head_table import AUTO, NO_REGIONS, EyeTable, HeadTable, names_regions
 from dermis.scene.settings import PHOTOGRAPHED, Settings
 from dermis.scene.skin import PRESETS, Skin
+from dermis.scene.techniques import TECHNIQUES
 
 if TYPE_CHECKING:
     from dermis.mesh.head import Head
@@ -110,7 +111,9 @@ def assemble(name: str, given: SceneOptions) -> tuple[Scene, Settings]:
     )
     if given.look_at is not None:
         made = replace(made, pose=gaze_given(given.look_at, made))
-    return made, Settings(**{**PHOTOGRAPHED, **settings.model_dump(exclude_unset=True), **given.settings})
+    shown = Settings(**{**PHOTOGRAPHED, **settings.model_dump(exclude_unset=True), **given.settings})
+    _note_mixing(made.skin, shown)
+    return made, shown
 
 
 def note_levels(name: str, given: SceneOptions, head: Head) -> None:
@@ -141,8 +144,16 @@ def _check(name: str, given: SceneOptions) -> None:
     check(Environment, {"name": "uniform"} | given.around, AROUND)
     if "profile" in given.skin:
         load_profile(given.skin["profile"])
+    for other in given.skin.get("other_profiles", ()):
+        load_profile(other)
     if "name" in given.around:
         panorama_file(given.around["name"])
+
+
+def _note_mixing(skin: Skin, settings: Settings) -> None:
+    """A line on stderr where a map of profiles changes nothing."""
+    if skin.profile_map and not TECHNIQUES[settings.technique].mixes:
+        note(f"note: {settings.technique} takes the first profile alone; texture-space mixes them by the map")
 
 
 def _begin(name: str, given: SceneOptions) -> tuple[Scene, Settings]:

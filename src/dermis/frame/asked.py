@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 from dermis.frame import surroundings
-from dermis.frame.inputs import Split
+from dermis.frame.levels import Split
 from dermis.frame.outputs import OUTPUTS
 from dermis.frame.passes.painting import paint
 from dermis.frame.seams import LaidOut, Remedy, laid_out, remedy_of
@@ -30,6 +30,8 @@ class Asked:
     shadow_layers : how many parts of lights cast shadows
     posed : whether the scene has a pose
     view : name of a scene among several that are drawn in turn
+    others : profiles that a map mixes into the first one, of the same Gaussians
+    share_map : (h, w, 2) their shares, None without any
     outputs, landmarks : names of what is asked of the frame besides its picture
     """
 
@@ -45,6 +47,8 @@ class Asked:
     shadow_layers: int
     posed: bool
     view: str
+    others: tuple[GaussianSum, ...] = ()
+    share_map: Any = None
     outputs: tuple[str, ...] = ()
     landmarks: tuple[str, ...] = ()
 
@@ -78,8 +82,14 @@ class Asked:
 
     @cached_property
     def split(self) -> Split:
-        """The profile as the technique uses it."""
-        return self.technique.split(self.profile, self.white)
+        """The profiles as the technique uses them."""
+        first, *others = (self.technique.split(one, self.white) for one in (self.profile, *self.others))
+        return replace(first, others=tuple(others))
+
+    @property
+    def mixed(self) -> bool:
+        """Whether a map mixes profiles."""
+        return bool(self.others)
 
     @cached_property
     def occluded(self) -> bool:

@@ -12,7 +12,7 @@ from dermis.errors import refuse
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.curvature import Curvature
 from dermis.frame.geometry import HeadResources
-from dermis.frame.levels import Blur, Levels
+from dermis.frame.levels import Blur, Levels, Split
 from dermis.frame.passes.background import Backdrop
 from dermis.frame.passes.bloom import Glow
 from dermis.frame.passes.meter import Meter
@@ -24,6 +24,7 @@ from dermis.frame.passes.post import Picture
 from dermis.frame.passes.shadows import ShadowMaps
 from dermis.frame.passes.shape import MotionBytes
 from dermis.frame.passes.visibility_buffer import Layers
+from dermis.frame.profile_mixture import Mixture
 from dermis.frame.projection import (
     Axes,
     Triple,
@@ -46,6 +47,7 @@ from dermis.mesh.mesh import PARTS
 from dermis.mesh.outline import Outline
 from dermis.scene.camera import Camera, Window
 from dermis.scene.settings import Settings
+from dermis.scene.skin import MOST_OTHERS
 
 Floats = NDArray[np.float64]
 _MOST_MATERIALS = 64
@@ -62,6 +64,7 @@ class Resources:
     layouts : atlases that light is spread on; the first is the one that is looked at
     scatters : whether light spreads over them
     blurs : how, on each, where light is as bright as it was given
+    mixture : of profiles by a map, None for one profile
     scattered : texture of the light that leaves below the surface
     curvature : the surface's, None where nothing reads it
     own : what the technique made for itself
@@ -86,6 +89,7 @@ class Resources:
     scatters: bool
     levels: Levels
     blurs: tuple[Blur, ...]
+    mixture: Mixture | None
     scattered: Any
     curvature: Curvature | None
     own: Any
@@ -167,20 +171,6 @@ class EyesSeen(NamedTuple):
     edges_mm: NDArray[np.float64] | None
 
 
-@dataclass(frozen=True)
-class Split:
-    """A profile divided into the level that is lit again in the image and those that are blurred.
-
-    relit, total : (3,) weight of the level that is not blurred, and of all
-    blurred_mm2, weight : (k,) and (k, 3) of the blurred levels
-    """
-
-    relit: Floats
-    total: Floats
-    blurred_mm2: Floats
-    weight: Floats
-
-
 def pinhole(camera: Camera, head: Head, settings: Settings) -> Pinhole:
     """The camera as the renderer takes it."""
     eye, path = place_of(camera.position, head.centre_mm), between(camera.position, camera.target)
@@ -211,6 +201,7 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Sp
         "Shade",
         samples=settings.samples,
         relit=split.relit,
+        relit_changes=np.pad(split.relit_changes, ((0, MOST_OTHERS - len(split.others)), (0, 1))),
         total=split.total,
         shown=_PARTS[settings.parts],
         material_colour=colours,

@@ -17,6 +17,7 @@ HALVES = "rgba16float"
 MOST_HALVINGS = 3
 _BRIGHT = 16.0  # scaled irradiance of all lights, a 4000th of the largest half
 _MOST_SCALED = 2.0**100  # its inverse is a float too; light that would need more counts as none
+Floats = NDArray[np.float64]
 Halvings = tuple[tuple[int, ...], ...]
 """Of each layout, how often the resolution of each level is halved, see `Blur`."""
 SHARP = 0.45  # least standard deviation [mm] of a halved level, over its squared texel side [mm^2]
@@ -62,14 +63,42 @@ class Blur:
     scale : factor of the light in the layers
     edge : what lies beyond a chart's edge and its gutter: "repeated", "cleared" or "skipped"
     clear : the light that empty texels show when the edge is "cleared"
+    changes : (k, 3) by which the weights of each profile that a map mixes in differ
     """
 
-    variance_mm2: NDArray[np.float64]
-    weight: NDArray[np.float64]
+    variance_mm2: Floats
+    weight: Floats
     halvings: tuple[int, ...]
     scale: float = 1.0
     edge: str = "repeated"
     clear: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    changes: tuple[Floats, ...] = ()
+
+
+@dataclass(frozen=True)
+class Split:
+    """A profile divided into the level that is lit again in the image and those that are blurred.
+
+    relit, total : (3,) weight of the level that is not blurred, and of all
+    blurred_mm2, weight : (k,) and (k, 3) of the blurred levels
+    others : the same of profiles that a map mixes into this one, of the same Gaussians
+    """
+
+    relit: Floats
+    total: Floats
+    blurred_mm2: Floats
+    weight: Floats
+    others: tuple[Split, ...] = ()
+
+    @property
+    def relit_changes(self) -> Floats:
+        """(o, 3) by which the others' weights of the level that is not blurred differ."""
+        return np.array([one.relit - self.relit for one in self.others]).reshape(-1, 3)
+
+    @property
+    def changes(self) -> tuple[Floats, ...]:
+        """(k, 3) by which each other's weights of the blurred levels differ."""
+        return tuple(one.weight - self.weight for one in self.others)
 
 
 def usual_texel(device: Device) -> str:

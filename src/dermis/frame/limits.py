@@ -13,6 +13,7 @@ from dermis.errors import refuse
 from dermis.frame.asked import Asked
 from dermis.frame.passes.shadows import SHADOW_BYTES
 from dermis.frame.passes.surface_texels import SURFACE_BYTES
+from dermis.frame.profile_mixture import sums_of
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Device
 from dermis.gpu.memory import check_memory, found_room, held_bytes
@@ -81,6 +82,7 @@ def frame_bytes(asked: Asked) -> dict[str, float]:
     pixel += _NUMBER * sum(asked.output_channels.values())
     pixel += technique.apart_bytes * ("diffuse" in asked.outputs)
     texel = atlas_texel_bytes(technique, asked.count, len(atlases.layouts))
+    texel += _mixing_bytes(asked) if asked.count else 0.0
     if "translucent" in asked.outputs:
         texel += _FLOATS * (2 * len(atlases.layouts) - 1)
     return {
@@ -88,6 +90,13 @@ def frame_bytes(asked: Asked) -> dict[str, float]:
         "size": float(pixel * width * height),
         "shadow_size": float(SHADOW_BYTES * asked.shadow_layers * settings.shadow_size**2),
     }
+
+
+def _mixing_bytes(asked: Asked) -> float:
+    """Of a texel of the atlas, where a map mixes profiles: levels of each other, shares and sums."""
+    others = len(asked.others)
+    shares = len(asked.atlases.layouts) + sums_of(others)
+    return others * asked.technique.texel_bytes(asked.count) + _FLOATS * shares if others else 0.0
 
 
 def _halved(settings: Settings, option: str) -> Settings | None:

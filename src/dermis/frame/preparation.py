@@ -21,7 +21,7 @@ from dermis.frame.passes.shade import shade_program
 from dermis.frame.passes.shape import MotionBytes, resting
 from dermis.frame.projection import Views, shadow_layers
 from dermis.frame.resources import make_resources
-from dermis.frame.skin_profiles import SkinProfiles
+from dermis.frame.skin_profiles import Mixed, SkinProfiles
 from dermis.frame.sky import Anchors, Look, anchors_of, look_around, turn_of
 from dermis.frame.strands import strand_constants
 from dermis.frame.surroundings import brightest, load_surroundings, with_suns
@@ -37,6 +37,7 @@ from dermis.scene.environment import Environment
 from dermis.scene.lights import Light
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
+from dermis.scene.skin import Skin
 from dermis.scene.techniques import TECHNIQUES
 
 _SLACK_MM = 10.0  # that a rig's outermost points may miss of a pose
@@ -60,7 +61,7 @@ class Preparation:
 
     def __init__(self, device: Device, depth: int = 1, rounds: int = 1) -> None:
         self.device, self.memo = device, Memo(depth, rounds)
-        self.profile_of = SkinProfiles().of
+        self.profiles = SkinProfiles()
 
     def inputs(
         self,
@@ -95,7 +96,7 @@ class Preparation:
         more: tuple[Names, Names],
     ) -> Inputs:
         keep, device, head, around = self.memo.keep, self.device, scene.head.bare, scene.environment
-        profile = self.profile_of(scene.skin)
+        (profile, *others), shares = self._profiles(scene.skin, technique)
         surroundings = keep(load_surroundings, device, around.name if around else None, of=_kind_of(around))
         scene = with_suns(self.memo, scene, surroundings)
         moved = self._moved(head, scene.motion)
@@ -103,7 +104,8 @@ class Preparation:
         record, layers, parts = keep(_lights, *lit_by, using=(device, scene))
         who = scene.head, scene.skin, profile, _person(scene)
         counts = parts, len(layers.clips), scene.motion is not None
-        asked = Asked(*who, settings, around, surroundings, technique, *counts, view, *more)
+        mixed = tuple(others), shares
+        asked = Asked(*who, settings, around, surroundings, technique, *counts, view, *mixed, *more)
         try:
             resources = keep(make_resources, self.memo, device, asked)
         except NoRoomError as error:
@@ -128,6 +130,10 @@ class Preparation:
             constants=resources.constants + shone_on,
             centre_mm=head.centre_mm,
         )
+
+    def _profiles(self, skin: Skin, technique: Technique) -> Mixed:
+        """The skin's profiles, its first one alone for techniques that mix none."""
+        return self.profiles.mixed(skin) if technique.mixes else ((self.profiles.of(skin),), None)
 
     def _around(self, head: Head, motion: Motion | None, outline: Outline) -> tuple[Look, Any]:
         """How the sky sees the head as it is posed, and the shader's record of it."""

@@ -5,19 +5,17 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.cached import cached_atlas
 from dermis.frame import surface, surroundings
 from dermis.frame.asked import Asked
 from dermis.frame.atlas_layout import AtlasLayout, Walked
 from dermis.frame.atlas_textures import AtlasTextures, upload_atlas
+from dermis.frame.blurred_levels import blurred_levels
 from dermis.frame.curvature import Curvature, make_curvature, no_curvature
 from dermis.frame.geometry import HeadResources, upload_geometry
 from dermis.frame.gutters import Walks, make_walks, with_lists
 from dermis.frame.inputs import Resources, view_record
-from dermis.frame.levels import Blur, Halvings, Levels
 from dermis.frame.limits import check_limits
 from dermis.frame.maps import fine_detail, upload_maps
 from dermis.frame.passes import shade, shadows, surface_texels, visibility_buffer
@@ -34,7 +32,7 @@ from dermis.frame.strand_space import (
     room_of,
 )
 from dermis.frame.strands import StrandResources, has_strands, make_tables, skin_under
-from dermis.frame.techniques.technique import AtlasTechnique, Technique
+from dermis.frame.techniques.technique import Technique
 from dermis.frame.translucency import translucency_of
 from dermis.gpu import Constants, Device, Memo
 from dermis.gpu.textures import texture_from
@@ -63,7 +61,6 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
     atlases = [_atlas(memo, device, asked, name, k) for k, name in enumerate(asked.atlases.layouts)]
     shared |= memo.wait(maps) | keep(fine_detail, device, asked.finely_painted)
     layouts = [_layout(memo, device, asked, one, shape, person, shared, k) for k, one in enumerate(atlases)]
-    blurs = tuple(_blur(asked, textures) for _, textures in atlases) if asked.count else ()
     own, view = _shading(memo, device, asked)
     return Resources(
         shape=shape,
@@ -73,8 +70,6 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         layouts=tuple(layouts),
         shadow_maps=shadow_maps,
         scatters=asked.count > 0,
-        levels=_levels(memo, device, asked, blurs),
-        blurs=blurs,
         scattered=_sum(memo, device, asked, settings.atlas, "both") if layouts[1:] else layouts[0].scattered,
         curvature=curvature,
         own=own,
@@ -86,13 +81,14 @@ def make_resources(memo: Memo, device: Device, asked: Asked) -> Resources:
         gaussians=len(asked.profile.variance_mm2),
         strands=strands,
         unscattered=keep(atlases[0][0].unscattered, asked.topology.mesh),
+        **blurred_levels(memo, device, asked, [textures for _, textures in atlases]),
         **picture_resources(memo, device, asked, tuple(layouts), tables),
     )
 
 
 def _details(asked: Asked) -> Constants:
-    """Whether there is relief finer than maps, and eyes of true shape."""
-    found = {"DETAIL": asked.finely_painted, "EYES": asked.head.eyes is not None}
+    """Whether there is relief finer than maps, eyes of true shape, and a map that mixes profiles."""
+    found = {"DETAIL": asked.finely_painted, "EYES": asked.head.eyes is not None, "MIXED": asked.mixed}
     return tuple((name, 1) for name, there in found.items() if there)
 
 
@@ -208,19 +204,6 @@ def _sum(memo: Memo, device: Device, asked: Asked, side: int, role: str) -> Any:
     return memo.keep(_make_sum, device, asked.technique, side, asked.light_of, of=of)
 
 
-def _levels(memo: Memo, device: Device, asked: Asked, blurs: tuple[Blur, ...]) -> Levels:
-    side, halvings = asked.settings.atlas if blurs else 1, tuple(blur.halvings for blur in blurs) or ((0,),)
-    return memo.keep(_make_levels, device, asked.technique, side, halvings, asked.light_of, of=asked.view)
-
-
-def _blur(asked: Asked, atlas: AtlasTextures) -> Blur:
-    assert isinstance(asked.technique, AtlasTechnique)
-    red, green, blue = (np.pi * c * asked.remedy.coloured for c in asked.settings.seam_colour)
-    halvings = asked.technique.halvings(asked.split, atlas, asked.remedy.edge)
-    spread = asked.split.blurred_mm2, asked.split.weight
-    return Blur(*spread, halvings, edge=asked.remedy.edge, clear=(red, green, blue))
-
-
 def _cached_atlas(head: Head, side: int, name: str) -> Atlas:
     return cached_atlas(head.mesh, side, name)
 
@@ -239,10 +222,6 @@ def _curvature(device: Device, head: Head) -> Curvature:
 
 def _albedo(device: Device, model: str, fresnel: str) -> Any:
     return texture_from(device, albedo_table(model, fresnel), "rg32float")
-
-
-def _make_levels(device: Device, technique: Technique, side: int, halvings: Halvings, _: str) -> Levels:
-    return technique.make_levels(device, side, halvings)
 
 
 def _make_sum(device: Device, technique: Technique, side: int, _: str) -> Any:

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.errors import refuse
+from dermis.frame.profile_mixture import load_shares
+from dermis.optics.fits.shared import shared_gaussians
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.profiles import fit_profile, load_profile, preset_names
 from dermis.scene.skin import Pigments, Skin
 from dermis.scene.tissue import tissue_of
 
+Mixed = tuple[tuple[GaussianSum, ...], NDArray[np.float32] | None]
 _KEPT = 4  # the live skin, one to compare with, and those just before
 
 
@@ -32,6 +39,21 @@ class SkinProfiles:
         if self._newest is None or self._newest[0] is not skin:
             self._newest = skin, self._found(skin)
         return self._newest[1]
+
+    def mixed(self, skin: Skin) -> Mixed:
+        """The skin's profiles as sums of the same Gaussians, and the shares of all but the first by place.
+
+        Raises DermisError for a map without other profiles, and for others without one.
+        """
+        first = self.of(skin)
+        if not skin.other_profiles and skin.profile_map is None:
+            return (first,), None
+        if not skin.other_profiles or skin.profile_map is None:
+            came = "there is only a map" if skin.profile_map else "there is no map"
+            remedy = "Give profile_map and other_profiles both"
+            refuse("profile_map", "a map of shares, and the profiles whose shares these are", came, remedy)
+        others = (load_profile(name) for name in skin.other_profiles)
+        return shared_gaussians((first, *others)), load_shares(skin.profile_map)
 
     def _found(self, skin: Skin) -> GaussianSum:
         known = self._last(_tissue, skin)

@@ -39,7 +39,7 @@ class Submitter:
         self.device, self.graph = device, Graph(device)
         preparation = Preparation(device, depth, rounds)
         self.memo, self.prepare = preparation.memo, preparation.inputs
-        self.profile_of = preparation.profile_of
+        self.profile_of = preparation.profiles.of
         self._in_flight.clear()
 
     def _submit(

@@ -99,10 +99,33 @@ class KeptOpen:
             raise
 
 
+class OneDevice:
+    """A device for several jobs, opened for the first of them, and once more where it is lost.
+
+    adapter : as `open_device` takes it
+    """
+
+    def __init__(self, adapter: str) -> None:
+        self._adapter = adapter
+        self._opened: list[Device] = []
+        self._kept: KeptOpen | None = None
+
+    def run(self, job: Callable[[Device], T]) -> T:
+        """What a job returns on the device.
+
+        Raises DermisError as `open_device` and `KeptOpen.run`.
+        """
+        if self._kept is None:
+            self._kept = KeptOpen(partial(open_device, self._adapter), self._adopt)
+        return self._kept.run(lambda: job(self._opened[0]))
+
+    def _adopt(self, device: Device) -> None:
+        self._opened[:] = [device]
+
+
 def on_device(adapter: str, job: Callable[[Device], T]) -> T:
     """What a job returns on a device that is opened for it, and once more where it is lost.
 
     Raises DermisError as `open_device` and `KeptOpen.run`.
     """
-    opened: list[Device] = []
-    return KeptOpen(partial(open_device, adapter), opened.append).run(lambda: job(opened[-1]))
+    return OneDevice(adapter).run(job)

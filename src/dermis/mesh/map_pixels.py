@@ -20,6 +20,7 @@ PathLike = str | Path | Picture
 
 MOST_SIDE = 8192
 """Texels of a map's side: as many as any device takes."""
+_ALIKE = 2.5 / 255  # JPEG may separate the channels of a grey picture by a level or two
 _MIN_NORMAL_Z = 0.05  # slopes steeper than 87 degrees are capped; nothing real leans further
 
 
@@ -61,6 +62,17 @@ def height_map(path: PathLike, relief_mm: np.float32) -> Floats:
     with np.errstate(over="ignore"):
         height *= relief_mm
     return height
+
+
+def share_map(path: PathLike) -> Floats:
+    """(H, W, 2) shares of two others in a mixture, 0..1, together at most 1: red and green, or grey and 0."""
+    role = "a map of profiles"
+    image = _as_unit(_read(path, role))
+    shares = np.zeros((*image.shape[:2], 2), np.float32)
+    given = 2 if image.shape[2] >= 3 and _apart(image) > _ALIKE else 1
+    shares[..., :given] = image[..., :given]
+    shares = _within_unit(path, role, shares)
+    return np.asarray(shares / np.maximum(shares.sum(axis=-1, keepdims=True), 1.0))
 
 
 def plain_map(path: PathLike, role: str) -> Floats:
@@ -123,9 +135,8 @@ def _read(path: PathLike, role: str) -> NDArray[Any]:
 def _grey(path: PathLike, role: str, image: NDArray[Any]) -> Floats:
     """(H, W) in units of the full scale, of a grey picture or of RGB whose channels agree."""
     if image.shape[2] > 1:
-        # JPEG may separate the channels of a grey picture by a level or two.
         apart = max(_apart(image[rows]) for rows in strips(image))
-        if apart > 2.5 / 255:
+        if apart > _ALIKE:
             came = f"its red, green and blue differ by up to {apart:.2f} of the full scale"
             refuse(path, f"{role} in grey", came, "Check which map this is, or save it as grey")
     return _converted(image[..., 0], (), _as_unit)

@@ -90,7 +90,7 @@ def load_scene(
         else _lights(path, lights),
         environment=environment,
         camera=_camera(path, told, head),
-        skin=skin.model_copy(update={"profile": _beside(path.parent, skin.profile)}),
+        skin=_found(path.parent, skin),
         pose=pose,
     ), settings
 
@@ -137,6 +137,14 @@ def _skin(path: Path, told: Any) -> Skin:
     if told not in SKINS:
         refuse(f"{path}: skin", f"a table or one of {', '.join(SKINS)}", f"{told!r} came", "Correct it")
     return Skin.preset(told)
+
+
+def _found(folder: Path, skin: Skin) -> Skin:
+    """The skin with names of files that hold from anywhere."""
+    others = tuple(_beside(folder, name) for name in skin.other_profiles)
+    shares = skin.profile_map and _beside(folder, skin.profile_map)
+    names = {"profile": _beside(folder, skin.profile), "other_profiles": others, "profile_map": shares}
+    return skin.model_copy(update={name: one for name, one in names.items() if one != getattr(skin, name)})
 
 
 def _check_said_once(path: Path, table: HeadTable, skin: Skin) -> None:

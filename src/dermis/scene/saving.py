@@ -20,7 +20,7 @@ from dermis.scene.toml_text import table_text
 
 _HEADER = "# A scene of dermis: lengths in mm from the head's centre, colours linear Rec. 709."
 _SAID_BY_REGIONS = {"rho_s"}
-_FILES = {"profile", "name"}  # of skins and environments, where they are no presets
+_FILES = {"profile", "profile_map", "other_profiles", "name"}  # of skins and environments, unless presets
 
 
 def save_scene(path: Path, scene: Scene, settings: Settings, head: Mapping[str, Any]) -> None:
@@ -70,6 +70,12 @@ def _pose(pose: Pose | None) -> list[str]:
 def _plain(title: str, values: Plain, left_out: set[str] | None = None) -> str:
     table = values.model_dump(exclude=left_out, exclude_none=True)
     for key in _FILES & table.keys():
-        if is_file(table[key]):
-            table[key] = str(Path(table[key]).resolve())
+        table[key] = _whole(table[key])
     return table_text(title, table)
+
+
+def _whole(name: Any) -> Any:
+    """A file's name that holds from anywhere, or several; presets as they are."""
+    if isinstance(name, tuple):
+        return tuple(map(_whole, name))
+    return str(Path(name).resolve()) if is_file(name) else name

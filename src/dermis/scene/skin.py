@@ -13,6 +13,8 @@ from dermis.specular.models import EnergyName, FresnelName, SpecularName
 
 StructureName = Literal["dj2006", "donner2008", "biospec"]
 MOST_LAYERS = 8
+MOST_OTHERS = 2
+"""Profiles that a map can mix into another."""
 _OILY_STRENGTH, _OILY_SMOOTHING = 2.0, 0.6
 USUAL_ROUGHNESS, USUAL_RHO_S = 0.3, 0.45
 PRESETS: dict[str, dict[str, Any]] = {"default": {}, "deck-2007": {"specular": "kelemen", "rho_s": 0.18}}
@@ -79,6 +81,11 @@ class Skin(Plain):
     profile: str = "gpu-gems-3"
     """Diffusion profile: "gpu-gems-3", a medium or skin (dj3, skin1, light ...), a .toml file such as
     `dermis profile -o` writes, or a CSV file with variance_mm2,red,green,blue."""
+    profile_map: str | None = None
+    """Picture of where the skin has other profiles, in the head's uv, plain numbers: grey, or red, for the
+    first other's share of the skin; green for the second's."""
+    other_profiles: Annotated[tuple[str, ...], Field(max_length=MOST_OTHERS)] = ()
+    """One or two profiles that `profile_map` mixes in; texture space alone does so."""
     albedo: Literal["map", "profile"] = "map"
     """Where skin gets its colour: "map" makes the profile white and takes the colour map; "profile" keeps the
     profile's own colour and uses no map."""

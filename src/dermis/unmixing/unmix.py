@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dermis.errors import refuse
 from dermis.gpu import Device
-from dermis.gpu.failures import on_device
+from dermis.gpu.failures import OneDevice
 from dermis.images.difference import delta_e_2000
 from dermis.images.io import Picture
 from dermis.mesh.map_pixels import colour_map
@@ -44,6 +44,7 @@ class Unmixed:
     third : oxygen, the share of haemoglobin that carries it, where that was asked for [-]
     shading : (h, w) light that was taken out of the colours, where that was asked for [-]
     residual : (h, w, 3) the colour over that of the model's skin: paint, hair, and all else that is none [-]
+    devices : those that the skin was computed on, by what was asked for; they stay open for more
     """
 
     melanin: Pixels
@@ -55,6 +56,7 @@ class Unmixed:
     shading: Pixels | None
     skin: SkinParameters
     model: SkinModel
+    devices: dict[str, OneDevice] = field(default_factory=dict)
 
     def maps(self) -> dict[str, Pixels]:
         """Those that are there, by the names of their files."""
@@ -96,7 +98,8 @@ class Unmixed:
 
         Raises DermisError as `dermis.gpu.open_device`.
         """
-        return on_device(adapter, lambda device: self._recoloured(device, change))
+        kept = self.devices.setdefault(adapter, OneDevice(adapter))
+        return kept.run(lambda device: self._recoloured(device, change))
 
     def _recoloured(self, device: Device, change: Change) -> Pixels:
         fixed = self.third is None or change.oxygen is not None
@@ -153,9 +156,10 @@ def unmix(
         made, sd, residual = Unmixer(device, model, noise).unmix(even, told)
         found = made[..., 2] if third == "oxygen" else None
         maps = (made[..., 0], made[..., 1], sd[..., 0], sd[..., 1])
-        return Unmixed(*maps, residual, found, light, skin, model)
+        return Unmixed(*maps, residual, found, light, skin, model, {adapter: kept})
 
-    return on_device(adapter, job)
+    kept = OneDevice(adapter)
+    return kept.run(job)
 
 
 def _array(colours: ArrayLike) -> Pixels:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from dermis.frame.atlas_textures import AtlasTextures
-from dermis.frame.inputs import Split
-from dermis.frame.levels import Blur, Levels
+from dermis.frame.levels import Blur, Levels, Split
 from dermis.frame.passes import TILE, program
 from dermis.frame.techniques.technique import AtlasTechnique
 from dermis.gpu import Recorder

@@ -26,5 +26,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let w = unpack2x16unorm(texel.y);
     let other = load_bilinear(second, place_of_point(texel.x - 1u, vec3f(1.0 - w.x - w.y, w)));
     let kept = smoothstep(0.0, FADE_MM, edge_mm(textureLoad(edge_map, id.xy, 0).x, textureLoad(stretch_map, id.xy, 0).xy));
-    textureStore(blended, id.xy, mix(other, own, kept));
+    textureStore(blended, id.xy, vec4f(mix(other.rgb, own.rgb, kept), own.a)); // where profiles are mixed, a packs shares
 }

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from dermis.frame.atlas_textures import AtlasTextures
-from dermis.frame.inputs import Split
-from dermis.frame.levels import HALVES, Blur, Halvings, Levels, make_levels
+from dermis.frame.levels import HALVES, Blur, Halvings, Levels, Split, make_levels
 from dermis.frame.passes import TECHNIQUES, program
 from dermis.frame.techniques.technique import AtlasTechnique
 from dermis.gpu import Device, make_texture

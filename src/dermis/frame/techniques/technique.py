@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.atlas_textures import AtlasTextures
-from dermis.frame.inputs import Inputs, Split
+from dermis.frame.inputs import Inputs
 from dermis.frame.levels import (
     FLOATS,
     MOST_HALVINGS,
     Blur,
     Halvings,
     Levels,
+    Split,
     halvings_of,
     make_levels,
     usual_texel,
@@ -25,11 +26,13 @@ from dermis.frame.passes import (
     combine,
     gutters,
     irradiance,
+    profile_mixture,
     stretch,
     surface_texels,
     translucency,
     translucency_weights,
 )
+from dermis.frame.profile_mixture import Mixture
 from dermis.gpu import Constants, Device, Graph, Memo
 from dermis.gpu.textures import FORMAT_BYTES
 from dermis.optics.gaussians import GaussianSum
@@ -46,6 +49,7 @@ class Technique:
 
     sources : keys of the bibliography
     on_atlas : whether light spreads over the atlas
+    mixes : whether it can mix profiles by a map
     stitches : whether it can carry light across the map's seams
     transmits : whether light comes through thin parts
     curved : whether the shading reads the surface's curvature
@@ -56,6 +60,7 @@ class Technique:
 
     sources: ClassVar[tuple[str, ...]] = ()
     on_atlas: ClassVar[bool] = False
+    mixes: ClassVar[bool] = False
     stitches: ClassVar[bool] = True
     transmits: ClassVar[bool] = False
     curved: ClassVar[bool] = False
@@ -159,8 +164,8 @@ class AtlasTechnique(Technique):
         resources = inputs.resources
         if not resources.scatters:
             return resources.scattered
-        levels, layouts = resources.levels, inputs.layouts
-        for layout, blur in zip(layouts, inputs.blurs, strict=True):
+        levels, layouts, mixture = resources.levels, inputs.layouts, resources.mixture
+        for number, (layout, blur) in enumerate(zip(layouts, inputs.blurs, strict=True)):
             into = levels.layer(0), levels.size, levels.texel, blur.scale
             graph.repeat(stretch.draw, layout.head, layout.atlas)
             if layout.walked:
@@ -170,7 +175,11 @@ class AtlasTechnique(Technique):
             if layout.translucency:
                 graph.repeat(translucency_weights.draw, layout.translucency)
             graph.repeat(self.fill, levels, layout.atlas, blur)
-            graph.repeat(self.leave, levels, blur, layout.translucency, layout.scattered)
+            leaves = mixture.sum(0) if mixture else layout.scattered
+            graph.repeat(self.leave, levels, blur, layout.translucency, leaves)
+            if mixture:
+                profile_mixture.share(graph, layout, mixture, number)
+                graph.repeat(self.mix, levels, blur, layout.atlas, mixture, number, layout.scattered)
         if len(layouts) > 1:
             blend.draw(graph, layouts[0], layouts[1], resources.scattered)
         return resources.scattered
@@ -183,6 +192,28 @@ class AtlasTechnique(Technique):
         """Let the blurred light through thin parts, and add up what leaves."""
         through = translucency.draw(graph, levels, blur, thin) if thin else None
         combine.draw(graph, levels, blur, into, through)
+
+    def mix(
+        self,
+        graph: Any,
+        levels: Levels,
+        blur: Blur,
+        atlas: AtlasTextures,
+        mixture: Mixture,
+        layout: int,
+        into: Any,
+    ) -> None:
+        """Add to what leaves by the first profile what others make of it: half as receivers, half as givers.
+
+        Light from y leaves at x as much as light from x at y: (w(x) + w(y)) / 2 of each Gaussian.
+        """
+        for other, (given, weight) in enumerate(zip(mixture.given, blur.changes, strict=True)):
+            change = replace(blur, weight=weight)
+            combine.draw(graph, levels, change, mixture.sum(1 + 2 * other))
+            profile_mixture.give(graph, levels, mixture, layout, other)
+            self.fill(graph, given, atlas, blur)
+            combine.draw(graph, given, change, mixture.sum(2 + 2 * other))
+        profile_mixture.draw(graph, mixture, layout, into)
 
     def leave_through(self, graph: Any, levels: Levels, blur: Blur, thin: Any, into: Any) -> None:
         """Add up only what `leave` let through thin parts, by the same steps."""

@@ -15,6 +15,7 @@ class TextureSpace(AtlasTechnique):
 
     sources = ("dEonLuebke2007", "Geusebroek2003")
     transmits = True
+    mixes = True
 
     def fill(self, graph: Any, levels: Levels, atlas: AtlasTextures, blur: Blur) -> None:
         """Fill layer k with the light of layer 0 spread by the k-th Gaussian."""

@@ -6,8 +6,10 @@
 //#include "lids.wgsl"
 //#include "footprint.wgsl"
 //#include "pre_integrated.wgsl"
+//#include "packed_shares.wgsl"
 
 override SPLIT: bool = false; // whether light below the skin is kept apart, to spread over the picture
+override MIXED: bool = false; // whether a map mixes profiles: `scattered` then has their shares beside the light
 override EYES: bool = false; // whether there are eyes of true shape, and teeth
 
 const WET_ROUGHNESS: f32 = 0.1; // of plain materials: teeth, tongues, eyeballs of files
@@ -20,6 +22,7 @@ struct Shade {
     up: vec3f,
     shift: vec2f, // of the picture's middle from the axis
     relit: vec3f, // weight of the level that is not blurred
+    relit_changes: array<vec4f, 2>, // by which that of other profiles differs
     total: vec3f, // weight of all levels
     shown: vec2f, // factors of the light from below and of the reflected light
     pre: PreIntegrated,
@@ -55,6 +58,24 @@ fn is_opaque(point: Point) -> bool {
     return (point.flags & OPAQUE) != 0u;
 }
 
+// Weight of the level that is not blurred, at a place of the atlas.
+fn relit_at(uv: vec2f) -> vec3f {
+    if (!MIXED) {
+        return shade.relit;
+    }
+    let most = vec2i(textureDimensions(scattered)) - 1;
+    let place = uv * vec2f(most + 1) - 0.5;
+    let a = clamp(vec2i(floor(place)), vec2i(0), most);
+    let b = clamp(vec2i(floor(place)) + 1, vec2i(0), most);
+    let w = bilinear_weights(place);
+    let shares = w.x * shares_of(a) + w.y * shares_of(vec2i(b.x, a.y)) + w.z * shares_of(vec2i(a.x, b.y)) + w.w * shares_of(b);
+    return shade.relit + shares.x * shade.relit_changes[0].rgb + shares.y * shade.relit_changes[1].rgb;
+}
+
+fn shares_of(at: vec2i) -> vec2f {
+    return unpacked_shares(textureLoad(scattered, at, 0).a);
+}
+
 fn shaded_skin(met: Met, lit: Lit, out: f32) -> Shaded {
     let point = met.point;
     let surface = met.surface;
@@ -63,7 +84,7 @@ fn shaded_skin(met: Met, lit: Lit, out: f32) -> Shaded {
     if (PRE_INTEGRATED) {
         below = shade.total * pre_integrated(point, surface, met.footprint, met.open) * share;
     } else if ((point.flags & MAPPED) != 0u) {
-        below = shade.relit * below + load_bilinear(scattered, point.place).rgb;
+        below = relit_at(point.place) * below + load_bilinear(scattered, point.place).rgb;
     } else {
         below *= shade.total;
     }

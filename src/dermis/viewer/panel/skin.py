@@ -21,7 +21,7 @@ from dermis.viewer.session import Session, apply_regions
 from dermis.viewer.state import ViewerState, changed
 
 Layers = tuple[TissueLayer, ...]
-_PROFILE_FIELDS = ("profile", "albedo", "pigments", "layers")
+_PROFILE_FIELDS = ("profile", "profile_map", "other_profiles", "albedo", "pigments", "layers")
 _FIRST_STRUCTURE = "dj2006"
 _BLOODY_STRUCTURE = "donner2008"  # the one with blood in its epidermis
 _DERMIS = ("blood", "oxygen")
