@@ -62,6 +62,7 @@ class Blur:
     scale : factor of the light in the layers
     edge : what lies beyond a chart's edge and its gutter: "repeated", "cleared" or "skipped"
     clear : the light that empty texels show when the edge is "cleared"
+    steps : levels without weight that only lead to others, counted from the unblurred one
     """
 
     variance_mm2: NDArray[np.float64]
@@ -70,6 +71,12 @@ class Blur:
     scale: float = 1.0
     edge: str = "repeated"
     clear: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    steps: tuple[int, ...] = ()
+
+    @property
+    def own(self) -> tuple[int, ...]:
+        """The layers of the unblurred light and of the profile's levels, without those that lead to them."""
+        return tuple(k for k in range(len(self.halvings)) if k not in self.steps)
 
 
 def usual_texel(device: Device) -> str:

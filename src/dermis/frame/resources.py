@@ -216,9 +216,10 @@ def _levels(memo: Memo, device: Device, asked: Asked, blurs: tuple[Blur, ...]) -
 def _blur(asked: Asked, atlas: AtlasTextures) -> Blur:
     assert isinstance(asked.technique, AtlasTechnique)
     red, green, blue = (np.pi * c * asked.remedy.coloured for c in asked.settings.seam_colour)
-    halvings = asked.technique.halvings(asked.split, atlas, asked.remedy.edge)
-    spread = asked.split.blurred_mm2, asked.split.weight
-    return Blur(*spread, halvings, edge=asked.remedy.edge, clear=(red, green, blue))
+    split, steps = asked.technique.chain(asked.split, atlas, asked.remedy.edge)
+    halvings = asked.technique.halvings(split, atlas, asked.remedy.edge)
+    spread = split.blurred_mm2, split.weight, halvings
+    return Blur(*spread, edge=asked.remedy.edge, clear=(red, green, blue), steps=steps)
 
 
 def _cached_atlas(head: Head, side: int, name: str) -> Atlas:

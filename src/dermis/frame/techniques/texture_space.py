@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from dermis.frame.atlas_textures import AtlasTextures
+from dermis.frame.blur_chain import lead_up
+from dermis.frame.inputs import Split
 from dermis.frame.levels import Blur, Levels
 from dermis.frame.passes import diffuse
 from dermis.frame.techniques.technique import AtlasTechnique
@@ -15,6 +20,14 @@ class TextureSpace(AtlasTechnique):
 
     sources = ("dEonLuebke2007", "Geusebroek2003")
     transmits = True
+
+    def chain(self, split: Split, atlas: AtlasTextures, edge: str) -> tuple[Split, tuple[int, ...]]:
+        """The split with the levels between that make the blurs cheaper."""
+        most = len(atlas.sheets(edge)) - 1
+        variances, steps = lead_up(split.blurred_mm2, atlas.usual_per_mm, most)
+        weight = np.zeros((len(variances), 3))
+        weight[[k for k in range(len(variances)) if k + 1 not in steps]] = split.weight
+        return replace(split, blurred_mm2=variances, weight=weight), steps
 
     def fill(self, graph: Any, levels: Levels, atlas: AtlasTextures, blur: Blur) -> None:
         """Fill layer k with the light of layer 0 spread by the k-th Gaussian."""
