@@ -114,7 +114,7 @@ def _surface_of_blurs(inputs: Inputs, texels: int) -> float:
 
 def _through(thin: Translucency, levels: Levels, blur: Blur) -> float:
     """Bytes of translucency: pairs and their texels, the light of the sources, and the light that leaves."""
-    pairs, halved = thin.pairs, blur.halvings[1 + thin.layer]
+    pairs, halved = thin.pairs, blur.halvings[blur.own[1 + thin.layer]]
     receivers, sources = pairs.receivers[1], pairs.sources[1]
     lists = thin.weights.size + pairs.sums.size + _TEXEL * sources
     level = (levels.size >> halved) ** 2

@@ -34,10 +34,10 @@ def blurred_levels(
 def _blur(asked: Asked, atlas: AtlasTextures) -> Blur:
     assert isinstance(asked.technique, AtlasTechnique)
     red, green, blue = (np.pi * c * asked.remedy.coloured for c in asked.settings.seam_colour)
-    halvings = asked.technique.halvings(asked.split, atlas, asked.remedy.edge)
-    spread = asked.split.blurred_mm2, asked.split.weight
     edge, clear = asked.remedy.edge, (red, green, blue)
-    return Blur(*spread, halvings, edge=edge, clear=clear, changes=asked.split.changes)
+    split, steps = asked.technique.chain(asked.split, atlas, edge)
+    spread = split.blurred_mm2, split.weight, asked.technique.halvings(split, atlas, edge)
+    return Blur(*spread, edge=edge, clear=clear, steps=steps, changes=split.changes)
 
 
 def _make_levels(device: Device, technique: Technique, side: int, halvings: Halvings, _: str) -> Levels:

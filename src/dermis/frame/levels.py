@@ -63,6 +63,7 @@ class Blur:
     scale : factor of the light in the layers
     edge : what lies beyond a chart's edge and its gutter: "repeated", "cleared" or "skipped"
     clear : the light that empty texels show when the edge is "cleared"
+    steps : levels without weight that only lead to others, counted from the unblurred one
     changes : (k, 3) by which the weights of each profile that a map mixes in differ
     """
 
@@ -72,7 +73,13 @@ class Blur:
     scale: float = 1.0
     edge: str = "repeated"
     clear: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    steps: tuple[int, ...] = ()
     changes: tuple[Floats, ...] = ()
+
+    @property
+    def own(self) -> tuple[int, ...]:
+        """The layers of the unblurred light and of the profile's levels, without those that lead to them."""
+        return tuple(k for k in range(len(self.halvings)) if k not in self.steps)
 
 
 @dataclass(frozen=True)

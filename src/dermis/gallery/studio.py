@@ -87,8 +87,9 @@ class Studio:
             self._draw(scene, 1.0, settings)
             inputs = self.renderer.prepare(scene, self.settings(**settings))
             levels, blur = inputs.resources.levels, inputs.blurs[0]
-            halved = blur.halvings[level]
-            found = download(self.renderer.device, levels.stacks[halved], layer=level - levels.first[halved])
+            layer = blur.own[level]
+            halved = blur.halvings[layer]
+            found = download(self.renderer.device, levels.stacks[halved], layer=layer - levels.first[halved])
             return np.asarray(found, np.float32)[..., :3] / np.float32(blur.scale)
 
         return self.renderer.kept_open.run(light)

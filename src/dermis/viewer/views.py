@@ -92,11 +92,12 @@ class Views:
         """The map of the atlas that a view reads, and how its numbers are scaled."""
         if view in LEVELS:
             layer, blurs = LEVELS[view], inputs.blurs[:1] if inputs.resources.scatters else ()
-            count = len(blurs[0].halvings) if blurs else 0
+            own = blurs[0].own if blurs else ()
+            count = len(own)
             if layer >= count:
                 refuse(f"view {view}", "a level of light on the atlas", f"there are {count}", _ATLAS_NEEDED)
-            halvings, scale = blurs[0].halvings[layer], blurs[0].scale
-            return inputs.resources.levels.layer(layer, halvings), self._exposure(inputs) / scale
+            halvings, scale = blurs[0].halvings[own[layer]], blurs[0].scale
+            return inputs.resources.levels.layer(own[layer], halvings), self._exposure(inputs) / scale
         if view == "stretch":
             stretch = inputs.layouts[0].atlas.resources["stretch_map"]
             return stretch, self._mean_density(stretch)

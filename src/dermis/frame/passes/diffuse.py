@@ -39,7 +39,8 @@ def draw(graph: Recorder, levels: Levels, atlas: AtlasTextures, blur: Blur) -> N
         stitch.draw(graph, "diffuse", sheets[finer], source, levels.texel)
         if here > finer:
             source = _halved(graph, levels, source, k - 1, here)
-        cut = TRUNCATION if alone and k == 1 else SUMMED_TRUNCATION
+        far = k > 1 and k - 1 in blur.steps and k not in blur.steps  # most of its width comes at once
+        cut = TRUNCATION if far or (alone and k == 1) else SUMMED_TRUNCATION
         clear = blur.scale * np.asarray(blur.clear)
         for axis, blurred in enumerate((levels.spare(here), levels.layer(k, here))):
             along = _along(graph.device, levels.texel, axis, atlas.sheared, blur.edge)

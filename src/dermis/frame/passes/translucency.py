@@ -21,7 +21,7 @@ def draw(graph: Recorder, levels: Levels, blur: Blur, thin: Translucency, consta
 
     Source: [JensenBuhler2002; dEonLuebke2007].
     """
-    device, pairs, level = graph.device, thin.pairs, 1 + thin.layer
+    device, pairs, level = graph.device, thin.pairs, blur.own[1 + thin.layer]
     halved = blur.halvings[level]
     gather = program(device, "translucency_gather.wgsl")
     record = gather.record(

@@ -154,6 +154,10 @@ class AtlasTechnique(Technique):
         mips = sum(0.25**halving for halving in range(MOST_HALVINGS + 1))
         return FORMAT_BYTES[FLOATS] * (levels + 2 * mips)  # where none is halved that could be
 
+    def chain(self, split: Split, atlas: AtlasTextures, edge: str) -> tuple[Split, tuple[int, ...]]:
+        """The split with weightless levels that lead to others, and which those are; here there are none."""
+        return split, ()
+
     def halvings(self, split: Split, atlas: AtlasTextures, edge: str) -> tuple[int, ...]:
         """How often the resolution of each level is halved, that of the unblurred one first."""
         most = len(atlas.sheets(edge)) - 1

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from dermis.frame.atlas_textures import AtlasTextures
-from dermis.frame.levels import Blur, Levels
+from dermis.frame.blur_chain import lead_up
+from dermis.frame.levels import Blur, Levels, Split
 from dermis.frame.passes import diffuse
 from dermis.frame.techniques.technique import AtlasTechnique
 
@@ -16,6 +20,19 @@ class TextureSpace(AtlasTechnique):
     sources = ("dEonLuebke2007", "Geusebroek2003")
     transmits = True
     mixes = True
+
+    def chain(self, split: Split, atlas: AtlasTextures, edge: str) -> tuple[Split, tuple[int, ...]]:
+        """The split with the levels between that make the blurs cheaper."""
+        most = len(atlas.sheets(edge)) - 1
+        variances, steps = lead_up(split.blurred_mm2, atlas.usual_per_mm, most)
+        own = [k for k in range(len(variances)) if k + 1 not in steps]
+
+        def led_up(one: Split) -> Split:
+            weight = np.zeros((len(variances), 3))
+            weight[own] = one.weight
+            return replace(one, blurred_mm2=variances, weight=weight)
+
+        return replace(led_up(split), others=tuple(map(led_up, split.others))), steps
 
     def fill(self, graph: Any, levels: Levels, atlas: AtlasTextures, blur: Blur) -> None:
         """Fill layer k with the light of layer 0 spread by the k-th Gaussian."""

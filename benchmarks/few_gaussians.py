@@ -1,0 +1,92 @@
+"""Times skins of few Gaussians, in steps and at once: python benchmarks/few_gaussians.py -o result.json"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from dataclasses import replace
+from itertools import cycle
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from cyclopts import Parameter, run
+
+from dermis.benchmark.cases import Case, scenes_of, settings_of
+from dermis.benchmark.measure import ON_CPU, Effort, stage_ms
+from dermis.cli.console import print_json
+from dermis.frame.renderer import Renderer
+from dermis.frame.techniques.technique import AtlasTechnique
+from dermis.frame.techniques.texture_space import TextureSpace
+from dermis.mesh.head import Head
+from dermis.outputs import check_output, replacing
+from dermis.scene.heads import load_head
+from dermis.scene.techniques import TECHNIQUES
+
+_AT_ONCE = "at-once"
+_ON_GPU, _ON_CPU = Case(), Case((512, 512), atlas=1024)
+_COUNTS = (1, 2, 3, 4, 6)
+
+
+class AtOnce(TextureSpace):
+    """Each Gaussian from the one before, with none between."""
+
+    chain = AtlasTechnique.chain
+
+
+def main(
+    *,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    head: str = "lee_perry_smith",
+    adapter: str = "auto",
+    atlas: int = 0,
+) -> int:
+    """Measure and print, and write the figures where a file is named.
+
+    Parameters
+    ----------
+    output:
+        JSON to write.
+    head:
+        A sample or a file.
+    adapter:
+        auto (the best), cpu (software), or a part of an adapter's name.
+    atlas:
+        Side in texels; 2048 on GPUs and 1024 in software unless given.
+    """
+    if output is not None:
+        check_output(output, (".json",))
+    renderer, loaded = Renderer(adapter), load_head(head)
+    software = renderer.device.adapter.kind == "CPU"
+    usual = _ON_CPU if software else _ON_GPU
+    usual = replace(usual, atlas=atlas or usual.atlas)
+    effort = ON_CPU if software else Effort(warming=60, row=1, timed=15)
+    rows = [measured(renderer, loaded, replace(usual, gaussians=count), effort) for count in _COUNTS]
+    found = {"adapter": renderer.device.adapter.name, "atlas": usual.atlas, "rows": rows}
+    if output is not None:
+        with replacing(output) as partial:
+            partial.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    print_json(found)
+    return 0
+
+
+def measured(renderer: Renderer, head: Head, case: Case, effort: Effort) -> dict[str, Any]:
+    """Device time in steps and at once [ms], and how far the pictures are apart (relative RMSE)."""
+    row: dict[str, Any] = {"gaussians": case.gaussians}
+    pictures = []
+    with tempfile.TemporaryDirectory() as folder, TECHNIQUES.including(_AT_ONCE, AtOnce()):
+        scenes = scenes_of(case, head, Path(folder), 8)
+        for name, technique in (("in steps", case.technique), ("at once", _AT_ONCE)):
+            settings = settings_of(replace(case, technique=technique))
+            pictures.append(renderer.draw(scenes[0], settings).linear())
+            blur = renderer.prepare(scenes[0], settings).blurs[0]
+            drawn = stage_ms(renderer, cycle([*scenes[1:], scenes[0]]), settings, effort)
+            row[name] = {stage: round(drawn[stage], 4) for stage in ("diffuse", "combine", "total")}
+            row[name] |= {"sigma_mm": np.sqrt(blur.variance_mm2).round(2).tolist(), "halvings": blur.halvings}
+    one, other = pictures
+    row["apart"] = float(np.sqrt(((one - other) ** 2).mean() / (other**2).mean()))
+    return row
+
+
+if __name__ == "__main__":
+    run(main)
