@@ -29,7 +29,8 @@ class Taken:
     groups : workgroups, or vertices of a raster pass
     completes : number of the resource that it completes from its own content, -1 for none
     raster : of a raster pass its layer, index buffer, depth view and its start, and target; -1 for none
-    written : resource and blob that the host writes
+    written : resource and bytes that the host writes
+    unit : number of the recording that it is part of, which runs as a whole; a pass alone has one of its own
     """
 
     stage: str
@@ -39,6 +40,7 @@ class Taken:
     completes: int = -1
     raster: dict[str, float] | None = None
     written: tuple[int, bytes] | None = None
+    unit: int = 0
 
 
 @dataclass
@@ -51,6 +53,12 @@ class Take:
     passes: list[Taken] = field(default_factory=list)
     records: list[tuple[str, Record]] = field(default_factory=list)
     _known: dict[int, int] = field(default_factory=dict)
+
+    def add(self, one: Taken, unit: int | None) -> None:
+        """Add a pass, of a recording if it is part of one."""
+        before = self.passes[-1].unit if self.passes else -1
+        one.unit = before + 1 if unit is None else unit
+        self.passes.append(one)
 
     def record(self, struct: str, record: Record) -> int:
         """The number of a record."""
@@ -78,12 +86,14 @@ class Tape(Graph):
         self._objects: list[Any] = []
         self._numbers: dict[int, int] = {}
         self._take = Take()
+        self._unit: int | None = None
         self._taken: dict[int, int] = {}
         self._kept: list[Program] = []
 
     def take(self, declare: Callable[[Tape], Any]) -> Take:
         """The frame that `declare` declares."""
         self._take = take = Take()
+        self._unit = None
         declare(self)
         return take
 
@@ -118,7 +128,7 @@ class Tape(Graph):
     def write(self, stage: str, buffer: Any, data: bytes) -> None:
         """Take down what the host writes."""
         written = self.resource(buffer), data
-        self._take.passes.append(Taken(stage, None, [], (len(data),), written=written))
+        self._take.add(Taken(stage, None, [], (len(data),), written=written), self._unit)
 
     def draw(
         self,
@@ -146,15 +156,22 @@ class Tape(Graph):
         raise NotImplementedError(f"{stage}: passes that fill targets are not taken down")
 
     def repeat(self, record: Callable[..., Any], *args: Any) -> Any:
-        """Take down the passes of `record(tape, *args)`."""
-        return record(self, *args)
+        """Take down the passes of `record(tape, *args)`, which run as a whole."""
+        if self._unit is not None:
+            return record(self, *args)
+        passes = self._take.passes
+        self._unit = passes[-1].unit + 1 if passes else 0
+        try:
+            return record(self, *args)
+        finally:
+            self._unit = None
 
     def _pass(
         self, stage: str, program: Program, resources: Resources, groups: tuple[int, ...]
     ) -> Taken:
         bound = [self._bound(program, one, resources[one.name]) for one in program.bindings]
         taken = Taken(stage, self._program(program), bound, groups)
-        self._take.passes.append(taken)
+        self._take.add(taken, self._unit)
         return taken
 
     def _bound(self, program: Program, binding: Binding, value: Any) -> int:

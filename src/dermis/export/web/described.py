@@ -76,6 +76,7 @@ def _pass(one: Taken, packer: Packer) -> Json:
         "completes": one.completes,
         "raster": one.raster,
         "written": written,
+        "unit": one.unit,
     }
 
 

@@ -18,7 +18,7 @@ import { unpacked } from "./packed.js";
 /**
  * @typedef {{stage: string, program: number, bound: number[], groups: number[], completes: number,
  *     raster: {layer: number, far: number, indices: number, depth: number, target: number} | null,
- *     written: [number, number] | null}} Pass
+ *     written: [number, number] | null, unit: number}} Pass
  */
 /** @typedef {{name: string, passes: Pass[], records: [string, number][], picture: number, size: number[]}} Frame */
 /**

@@ -54,7 +54,11 @@ export class Player {
         this.records = new Records(made, frame);
         /** @type {Uint8Array[]} what the host writes, by pass */
         this.written = frame.passes.map((one) => (one.written ? made.bytes(one.written[1]) : new Uint8Array(0)));
-        this.dependencies = new Dependencies(frame.passes.map((one) => this.#access(one)));
+        /** @type {number[]} a number that follows from each */
+        this.writing = this.written.map(numberOf);
+        /** @type {number[][]} passes that run as a whole */
+        this.units = unitsOf(frame.passes);
+        this.dependencies = new Dependencies(this.units.map((unit) => joined(unit.map((k) => this.#access(frame.passes[k])))));
         this.keys = frame.passes.map(keyOf);
         /** @type {any[]} */
         this.pipelines = [];
@@ -74,19 +78,22 @@ export class Player {
     /** Run what is stale. @param {GPUCommandEncoder} encoder */
     draw(encoder) {
         const versions = this.#versions();
-        const due = this.dependencies.due(versions);
+        const now = this.dependencies.due(versions);
+        /** @type {boolean[]} */
+        const due = [];
+        this.units.forEach((unit, index) => unit.forEach((k) => (due[k] = now[index])));
         this.made.device.queue.writeBuffer(this.records.buffer, 0, this.records.bytes);
         /** @type {GPUComputePassEncoder | null} */
         let open = null;
-        due.forEach((now, index) => {
+        due.forEach((run, index) => {
             const one = this.frame.passes[index];
-            if (!now) return;
+            if (!run) return;
             if (one.written) {
                 this.made.device.queue.writeBuffer(this.made.resource(one.written[0]), 0, /** @type {any} */ (this.written[index]));
             } else if (one.raster) {
                 open?.end();
                 open = null;
-                this.#rasterise(encoder, one, index);
+                this.rasterise(encoder, one, index);
             } else {
                 open ??= encoder.beginComputePass();
                 open.setPipeline(this.pipelines[index]);
@@ -95,24 +102,27 @@ export class Player {
             }
         });
         /** @type {GPUComputePassEncoder | null} */ (open)?.end();
-        this.dependencies.ran(due, versions);
+        this.dependencies.ran(now, versions);
         this.ran = [...new Set(this.frame.passes.filter((_, k) => due[k]).map((one) => one.stage))];
     }
 
     #versions() {
         const records = this.frame.records.map((_, k) => this.records.version(k));
-        const keys = this.frame.passes.map((one, index) => {
+        const keys = this.units.map((unit) => {
             const hash = new Hash();
-            hash.addLarge(this.keys[index]);
-            for (const k of one.bound) if (k < 0) hash.addLarge(records[-1 - k]);
-            if (one.written) for (const byte of this.written[index]) hash.add(byte);
+            for (const index of unit) {
+                const one = this.frame.passes[index];
+                hash.addLarge(this.keys[index]);
+                for (const k of one.bound) if (k < 0) hash.addLarge(records[-1 - k]);
+                if (one.written) hash.addLarge(this.writing[index]);
+            }
             return hash.value();
         });
         return this.dependencies.versions(keys);
     }
 
     /** @param {GPUCommandEncoder} encoder @param {Pass} one @param {number} index */
-    #rasterise(encoder, one, index) {
+    rasterise(encoder, one, index) {
         const { layer, far, indices, depth, target } = /** @type {NonNullable<Pass["raster"]>} */ (one.raster);
         const pass = encoder.beginRenderPass({
             colorAttachments: target < 0 ? [] : [{ view: this.made.resource(target), loadOp: "clear", storeOp: "store", clearValue: [0, 0, 0, 0] }],
@@ -166,4 +176,34 @@ function keyOf(one) {
     for (const k of [one.program, ...one.bound, ...one.groups]) hash.add(k);
     if (one.raster) for (const k of Object.values(one.raster)) hash.add(k);
     return hash.value();
+}
+
+/** @param {Uint8Array} bytes */
+export function numberOf(bytes) {
+    const hash = new Hash();
+    for (const word of new Int32Array(bytes.slice().buffer, 0, bytes.length >> 2)) hash.add(word);
+    return hash.value();
+}
+
+/** The numbers of the passes of each unit. @param {Pass[]} passes */
+function unitsOf(passes) {
+    /** @type {number[][]} */
+    const found = [];
+    passes.forEach((one, k) => (k && one.unit === passes[k - 1].unit ? found[found.length - 1].push(k) : found.push([k])));
+    return found;
+}
+
+/**
+ * What passes that run as a whole find written, and what they leave, scratch aside.
+ * @param {import("./graph.js").Access[]} each
+ */
+function joined(each) {
+    if (each.length === 1) return each[0];
+    const reads = new Set();
+    const writes = new Set();
+    for (const one of each) {
+        for (const slot of one.reads) if (!writes.has(slot) && !one.writes.includes(slot)) reads.add(slot);
+        for (const slot of one.writes) writes.add(slot);
+    }
+    return { reads: [...reads], writes: [...writes].filter((slot) => !slot.scratch) };
 }
