@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.gpu import Device, make_texture, scratch
+from dermis.gpu.textures import view_of
 
 FLOATS = "rgba32float"
 """Format of light in full precision."""
@@ -44,13 +45,13 @@ class Levels:
         """A view of level k at one resolution."""
         if (k, halvings) not in self._views:
             layer = k - self.first[halvings]
-            self._views[k, halvings] = _view(self.stacks[halvings], layer=layer)
+            self._views[k, halvings] = view_of(self.stacks[halvings], layer=layer)
         return self._views[k, halvings]
 
     def spare(self, halvings: int = 0) -> Any:
         """A view of the texture between two passes."""
         if (-1, halvings) not in self._views:
-            self._views[-1, halvings] = _view(self.scratch, mip=halvings)
+            self._views[-1, halvings] = view_of(self.scratch, mip=halvings)
         return self._views[-1, halvings]
 
 
@@ -136,11 +137,6 @@ def layers_of(halvings: Halvings) -> tuple[range, ...]:
         )
         for times in range(coarsest + 1)
     )
-
-
-def _view(texture: Any, layer: int = 0, mip: int = 0) -> Any:
-    options = {"dimension": "2d", "array_layer_count": 1, "mip_level_count": 1}
-    return texture.create_view(base_array_layer=layer, base_mip_level=mip, **options)
 
 
 def scale_of(texel: str, brightest: float) -> float:

@@ -204,6 +204,10 @@ class Device:
             self._samplers[key] = self.handle.create_sampler(**options)
         return self._samplers[key]
 
+    def sampler_options(self, sampler: Any) -> dict[str, str]:
+        """The options that a sampler was made with."""
+        return next(dict(key) for key, made in self._samplers.items() if made is sampler)
+
     def timestamp_pool(self) -> tuple[Any, Any]:
         """The query set for a frame's timestamps and the buffer that they are resolved into."""
         import wgpu

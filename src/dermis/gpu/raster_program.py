@@ -15,6 +15,7 @@ class RasterProgram(Program):
 
     target : format of the colour target, or None for depth only
     depth_compare : wgpu's name ("less", "greater")
+    drawn : both
     """
 
     def __init__(
@@ -28,6 +29,7 @@ class RasterProgram(Program):
         depth_compare: str,
     ) -> None:
         super().__init__(device, path, folders, constants)
+        self.drawn = {"target": target, "depth_compare": depth_compare}
         fragment = {"module": self._module, "entry_point": "fragment", "targets": [{"format": target}]}
         self.pipeline = device.handle.create_render_pipeline(
             layout=self._layout,

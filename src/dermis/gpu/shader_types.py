@@ -82,6 +82,12 @@ def record_of(text: str, struct: str, **values: Any) -> np.ndarray[Any, Any]:
     return record
 
 
+def record_type(text: str, name: str) -> str:
+    """The type of the record bound by a name."""
+    (struct,) = re.findall(rf"var<uniform>\s*{name}\s*:\s*(\w+)", _COMMENT.sub("", text))
+    return str(struct)
+
+
 def members_read(text: str, name: str) -> Callable[[bytes], Hashable]:
     """Takes out of the bytes of a record bound by that name the members that the shader's text names.
 

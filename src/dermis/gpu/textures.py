@@ -76,6 +76,14 @@ def make_texture(
         )
 
 
+def view_of(texture: Any, *, layer: int = 0, mip: int = 0) -> Any:
+    """A 2-D view of one mip level of one layer, which tells them as its `part`."""
+    one = {"dimension": "2d", "array_layer_count": 1, "mip_level_count": 1}
+    view = texture.create_view(base_array_layer=layer, base_mip_level=mip, **one)
+    view.part = layer, mip
+    return view
+
+
 def upload(device: Device, texture: Any, array: NDArray[Any], *, mip: int = 0, layer: int = 0) -> None:
     """Fill one mip level of one layer with an (h, w) or (h, w, c) array of the texture's own type."""
     kind, channels = _FORMATS[texture.format]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.frame.levels import HALVES
 from dermis.frame.passes import program
 from dermis.gpu import Device, Frame, Recorder, make_texture, upload
-from dermis.gpu.textures import texture_from
+from dermis.gpu.textures import texture_from, view_of
 from dermis.images.filters import mip_chain
 
 Floats = NDArray[np.float32]
@@ -116,10 +116,12 @@ def empty(device: Device, shape: tuple[int, ...]) -> Mipped:
     """Space for an (h, w) map with all its mips."""
     mips = max(shape[:2]).bit_length()
     texture = make_texture(device, (shape[1], shape[0]), HALVES, mips=mips, name="painted map")
-    views = (
-        texture.create_view(dimension="2d", base_mip_level=mip, mip_level_count=1) for mip in range(mips)
-    )
-    return Mipped(texture, tuple(views))
+    return mipped(texture)
+
+
+def mipped(texture: Any) -> Mipped:
+    """A texture with views of its mips."""
+    return Mipped(texture, tuple(view_of(texture, mip=mip) for mip in range(texture.mip_level_count)))
 
 
 def halve(recorder: Recorder, mipped: Mipped, first: int = 1) -> None:

@@ -18,6 +18,7 @@ from dermis.frame.passes import PASSES, program, shader_folders, suited
 from dermis.frame.projection import Matrix, Views
 from dermis.gpu import Constants, Device, Frame, Graph, RasterProgram, Recorder, compiled, make_texture
 from dermis.gpu.program import Program
+from dermis.gpu.textures import view_of
 
 Drawer = Frame | Graph
 _GROUPS = 2048  # workgroups that keep a GPU busy; where there are more triangles, each takes more of them
@@ -97,8 +98,7 @@ def _raster_layers(device: Device, size: tuple[int, int], count: int, triangles:
 
     def layered(texel: str, number: int) -> tuple[Any, list[Any]]:
         texture = make_texture(device, size, texel, layers=max(2, number), use="raster", name=name)
-        options = {"dimension": "2d", "array_layer_count": 1}
-        return texture, [texture.create_view(base_array_layer=k, **options) for k in range(number)]
+        return texture, [view_of(texture, layer=k) for k in range(number)]
 
     if not triangles:
         texture, depth = layered("depth32float", count)

@@ -12,7 +12,7 @@ from dermis.frame.inputs import Inputs
 from dermis.frame.passes import TECHNIQUES, program
 from dermis.frame.techniques.technique import Technique
 from dermis.gpu import Device, Graph, Memo, Recorder, make_texture
-from dermis.gpu.textures import texture_from
+from dermis.gpu.textures import texture_from, view_of
 from dermis.optics.fits.separable import SeparableKernel, preintegrate
 from dermis.optics.gaussians import GaussianSum
 from dermis.scene.camera import Window
@@ -95,9 +95,7 @@ def make_apart(device: Device, size: tuple[int, int], whole: bool = True) -> Apa
     whole : whether the whole picture is asked for
     """
     layers = make_texture(device, size, "rgba32float", layers=2)
-    below, leaving = (
-        layers.create_view(dimension="2d", base_array_layer=k, array_layer_count=1) for k in range(2)
-    )
+    below, leaving = (view_of(layers, layer=k) for k in range(2))
     between = make_texture(device, size, "rgba32float")
     result = make_texture(device, size, "rgba32float") if whole else None
     return Apart(layers, below, leaving, between, result)

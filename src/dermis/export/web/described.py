@@ -1,0 +1,109 @@
+"""A tape and its takes as the player reads them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dermis.export.web.packing import Packer
+from dermis.export.web.reads import needed
+from dermis.gpu.tape import Take, Taken, Tape
+
+Json = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Named:
+    """A take with its name and picture.
+
+    picture : the texture of bytes that it fills
+    """
+
+    name: str
+    take: Take
+    picture: Any
+    size: tuple[int, int]
+
+
+def described(tape: Tape, frames: list[Named], packer: Packer) -> Json:
+    """The file's description; what it names by number lies in the packer.
+
+    Of resources that hold nothing but zeros, as new ones do, no content is kept.
+    """
+    pictures = [tape.resource(one.picture) for one in frames]
+    contents = {}
+    for number in needed(tape, [one.take for one in frames]):
+        mips = _mips(tape, number)
+        if any(one.any() for one in mips):
+            contents[number] = [packer.add(one) for one in mips]
+    return {
+        "shaders": tape.shaders,
+        "programs": [_program(one) for one in tape.programs],
+        "resources": [_camel(one) for one in tape.resources],
+        "structs": {name: _struct(dtype) for name, dtype in tape.structs.items()},
+        "contents": contents,
+        "frames": [_frame(one, k, packer) for one, k in zip(frames, pictures, strict=True)],
+    }
+
+
+def _mips(tape: Tape, number: int) -> list[Any]:
+    """A buffer's bytes, or a texture's mip by mip, each with all its layers."""
+    parts, layers = tape.content(number), tape.resources[number].get("size")
+    count = layers[2] if isinstance(layers, list) else 1
+    return [np.concatenate(parts[k : k + count]) for k in range(0, len(parts), count)]
+
+
+def _frame(one: Named, picture: int, packer: Packer) -> Json:
+    records = [(struct, packer.add(np.frombuffer(record.tobytes(), np.uint8))) for struct, record in one.take.records]
+    return {
+        "name": one.name,
+        "size": one.size,
+        "picture": picture,
+        "passes": [_pass(each, packer) for each in one.take.passes],
+        "records": records,
+    }
+
+
+def _pass(one: Taken, packer: Packer) -> Json:
+    written = None if one.written is None else (one.written[0], packer.add(one.written[1]))
+    return {
+        "stage": one.stage,
+        "program": one.program,
+        "bound": one.bound,
+        "groups": one.groups,
+        "completes": one.completes,
+        "raster": one.raster,
+        "written": written,
+        "unit": one.unit,
+    }
+
+
+def _program(one: Json) -> Json:
+    return {**one, "bindings": [(index, name, _camel(entry)) for index, name, entry in one["bindings"]]}
+
+
+def _struct(dtype: np.dtype[Any]) -> Json:
+    """Its size, and of each member the offset and the number of floats [4 bytes]."""
+    members = {name: _member(kind, offset) for name, (kind, offset, *_) in (dtype.fields or {}).items()}
+    return {"size": dtype.itemsize, "members": members}
+
+
+def _member(kind: np.dtype[Any], offset: int) -> Any:
+    base = kind.base
+    if base.fields is None:
+        return [offset // 4, kind.itemsize // 4]
+    return {"offset": offset // 4, "each": base.itemsize // 4, "members": _struct(base)["members"]}
+
+
+def _camel(value: Any) -> Any:
+    """The same with names of members as WebGPU spells them."""
+    if isinstance(value, dict):
+        return {_spelt(name): _camel(one) for name, one in value.items()}
+    return value
+
+
+def _spelt(name: str) -> str:
+    first, *others = name.split("_")
+    return first + "".join(word.title() for word in others)

@@ -1,0 +1,152 @@
+// Resources, pipelines and bind groups as the file describes them, in WebGPU's own words.
+
+import { makeSlot } from "./graph.js";
+import { unpacked } from "./packed.js";
+
+/** @typedef {import("./graph.js").Slot} Slot */
+/** @typedef {import("./packed.js").Run} Run */
+/**
+ * @typedef {{kind: "buffer", size: number, usage: number, scratch?: boolean}
+ *     | {kind: "texture", format: GPUTextureFormat, size: number[], mips: number, usage: number, scratch?: boolean}
+ *     | {kind: "view", of: number, part: [number, number]}
+ *     | {kind: "sampler", options: GPUSamplerDescriptor}} Described
+ */
+/**
+ * @typedef {{name: string, shader: number, constants: Record<string, number>,
+ *     bindings: [number, string, any, number][], raster: {target: string | null, depth_compare: string} | null}} Program
+ */
+/**
+ * @typedef {{stage: string, program: number, bound: number[], groups: number[], completes: number,
+ *     raster: {layer: number, far: number, indices: number, depth: number, target: number} | null,
+ *     written: [number, number] | null, unit: number}} Pass
+ */
+/** @typedef {{name: string, passes: Pass[], records: [string, number][], picture: number, size: number[]}} Frame */
+/**
+ * @typedef {{shaders: string[], programs: Program[], resources: Described[], blobs: Run[],
+ *     contents: Record<string, number[]>, frames: Frame[],
+ *     structs: Record<string, {size: number, members: Record<string, number[]>}>}} Scene
+ */
+/** @typedef {GPUBuffer | GPUTexture | GPUTextureView | GPUSampler} Made */
+
+/** @type {Record<string, number>} */
+const TEXEL_BYTES = { r: 1, rg: 2, rgba: 4 };
+
+/** @param {string} format as "rgba16float" */
+export function texelBytes(format) {
+    if (format === "depth32float") return 4;
+    const [, channels, bits] = /** @type {RegExpMatchArray} */ (format.match(/^(r|rg|rgba)(8|16|32)/));
+    return (TEXEL_BYTES[channels] * Number(bits)) / 8;
+}
+
+/** Everything of a file on one device. */
+export class Made {
+    /** @param {GPUDevice} device @param {Scene} scene @param {Uint8Array} data */
+    constructor(device, scene, data) {
+        this.device = device;
+        this.scene = scene;
+        this.data = data;
+        /** @type {(Made | undefined)[]} */
+        this.resources = [];
+        /** @type {Slot[]} */
+        this.slots = [];
+        /** @type {Map<number, Promise<any>>} */
+        this.pipelines = new Map();
+        /** @type {GPUBindGroupLayout[]} */
+        this.layouts = [];
+        /** @type {GPUShaderModule[]} */
+        this.modules = [];
+    }
+
+    /** @param {number} blob */
+    bytes(blob) {
+        return unpacked(this.data, this.scene.blobs[blob]);
+    }
+
+    /** A resource, made and filled when it is first asked for. @param {number} number @returns {any} */
+    resource(number) {
+        return (this.resources[number] ??= /** @type {any} */ (this.#make(number)));
+    }
+
+    /** What a resource holds. @param {number} number @returns {Slot} */
+    slot(number) {
+        const described = this.scene.resources[number];
+        const parent = described.kind === "view" ? this.slot(described.of) : null;
+        const scratch = parent ? parent.scratch : "scratch" in described && Boolean(described.scratch);
+        return (this.slots[number] ??= makeSlot(parent, scratch));
+    }
+
+    /** @param {number} number */
+    #make(number) {
+        const one = this.scene.resources[number];
+        if (one.kind === "sampler") return this.device.createSampler(one.options);
+        if (one.kind === "buffer") return this.#buffer(number, one);
+        if (one.kind === "texture") return this.#texture(number, one);
+        const [layer, mip] = one.part;
+        const part = { baseArrayLayer: layer, baseMipLevel: mip, arrayLayerCount: 1, mipLevelCount: 1 };
+        return this.resource(one.of).createView({ dimension: "2d", ...part });
+    }
+
+    /** @param {number} number @param {{size: number, usage: number}} one */
+    #buffer(number, { size, usage }) {
+        const made = this.device.createBuffer({ size, usage });
+        const [blob] = this.scene.contents[number] ?? [];
+        if (blob !== undefined) this.device.queue.writeBuffer(made, 0, this.bytes(blob));
+        return made;
+    }
+
+    /** @param {number} number @param {{format: GPUTextureFormat, size: number[], mips: number, usage: number}} one */
+    #texture(number, { format, size, mips, usage }) {
+        const made = this.device.createTexture({ format, size, mipLevelCount: mips, usage });
+        const blobs = this.scene.contents[number] ?? [];
+        blobs.forEach((blob, mip) => {
+            const [width, height] = size.slice(0, 2).map((side) => Math.max(1, side >> mip));
+            const layout = { bytesPerRow: width * texelBytes(format), rowsPerImage: height };
+            const to = { texture: made, mipLevel: mip };
+            this.device.queue.writeTexture(to, this.bytes(blob), layout, [width, height, size[2]]);
+        });
+        return made;
+    }
+
+    /** @param {number} number of a program */
+    layout(number) {
+        const { bindings, raster } = this.scene.programs[number];
+        const visibility = raster ? GPUShaderStage.VERTEX | GPUShaderStage.FRAGMENT : GPUShaderStage.COMPUTE;
+        const entries = bindings.map(([binding, , entry]) => ({ binding, visibility, ...entry }));
+        return (this.layouts[number] ??= this.device.createBindGroupLayout({ entries }));
+    }
+
+    /** @param {number} number of a program @returns {Promise<any>} */
+    pipeline(number) {
+        if (!this.pipelines.has(number)) this.pipelines.set(number, this.#compile(number));
+        return /** @type {Promise<any>} */ (this.pipelines.get(number));
+    }
+
+    /** @param {number} number */
+    #compile(number) {
+        const { name, shader, constants, raster } = this.scene.programs[number];
+        const module = (this.modules[shader] ??= this.device.createShaderModule({ label: name, code: this.scene.shaders[shader] }));
+        const layout = this.device.createPipelineLayout({ bindGroupLayouts: [this.layout(number)] });
+        if (!raster) return this.device.createComputePipelineAsync({ label: name, layout, compute: { module, entryPoint: "main", constants } });
+        const target = /** @type {GPUTextureFormat | null} */ (raster.target);
+        return this.device.createRenderPipelineAsync({
+            label: name,
+            layout,
+            vertex: { module, entryPoint: "vertex", constants },
+            fragment: target ? { module, entryPoint: "fragment", targets: [{ format: target }] } : undefined,
+            primitive: { topology: "triangle-list", cullMode: "none" },
+            depthStencil: {
+                format: "depth32float",
+                depthWriteEnabled: true,
+                depthCompare: /** @type {GPUCompareFunction} */ (raster.depth_compare),
+            },
+        });
+    }
+
+    /** What a binding gets. @param {any} entry @param {number} number @returns {GPUBindingResource} */
+    bound(entry, number) {
+        const one = this.resource(number);
+        const dimension = (entry.texture ?? entry.storageTexture)?.viewDimension;
+        if (this.scene.resources[number].kind === "texture") return one.createView({ dimension });
+        return entry.buffer ? { buffer: one } : one;
+    }
+}

@@ -1,0 +1,73 @@
+"""Numbers packed for one gzip: differences from row to row, then byte plane by byte plane, as packed.js reads."""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import zlib
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Bytes = NDArray[np.uint8]
+Run = tuple[int, int, int, int, int]
+"""Where a run of bytes begins, how many it has, bytes of a word, words of a row, how often rows are subtracted."""
+_ROWS = (1, 2, 3, 4, 8)
+_ORDERS = (0, 1, 2)
+_TRIED = 1 << 15  # bytes in the middle by which a way is chosen
+_WORDS = {1: np.uint8, 2: np.uint16, 4: np.uint32}
+
+
+class Packer:
+    """Gathers runs of bytes; the same bytes come once."""
+
+    def __init__(self) -> None:
+        self.runs: list[Run] = []
+        self._known: dict[bytes, int] = {}
+        self._data: list[bytes] = []
+        self._end = 0
+
+    def add(self, data: Bytes | bytes, ways: Iterable[tuple[int, int, int]] | None = None) -> int:
+        """The number of a run of bytes.
+
+        ways : bytes of a word, words of a row and how often rows are subtracted; the one that packs best is taken
+        """
+        raw = np.frombuffer(data, np.uint8)
+        key = hashlib.sha256(raw).digest()
+        if key not in self._known:
+            self._known[key] = len(self.runs)
+            way = _best(raw, list(ways or _all_ways(len(raw))))
+            packed = planes(raw, *way)
+            self.runs.append((self._end, len(packed), *way))
+            self._data.append(packed)
+            self._end += len(packed)
+        return self._known[key]
+
+    def packed(self) -> bytes:
+        """All of it."""
+        return gzip.compress(b"".join(self._data), 9, mtime=0)
+
+
+def planes(raw: Bytes, word: int, row: int, order: int) -> bytes:
+    """The bytes of words, all of their first before all of their second, of what differences leave."""
+    words = raw.view(_WORDS[word]).copy()
+    for _ in range(order):
+        words[row:] -= words[:-row].copy()
+    return words.view(np.uint8).reshape(-1, word).T.tobytes()
+
+
+def _all_ways(size: int) -> Iterable[tuple[int, int, int]]:
+    yield 1, 1, 0
+    for word in (2, 4):
+        if size % word == 0:
+            yield word, 1, 0
+            rows = [row for row in _ROWS if size % (word * row) == 0]
+            yield from ((word, row, order) for row in rows for order in _ORDERS[1:])
+
+
+def _best(raw: Bytes, ways: list[tuple[int, int, int]]) -> tuple[int, int, int]:
+    """The way that packs the middle of the bytes best."""
+    middle = len(raw) // 2 // 96 * 96  # a multiple of all rows of words
+    tried = raw[max(0, middle - _TRIED // 96 * 96) :][: 2 * (_TRIED // 96 * 96)] if len(raw) > 2 * _TRIED else raw
+    return min(ways, key=lambda way: len(zlib.compress(planes(tried, *way), 6)))
