@@ -27,7 +27,7 @@ _FREQUENCIES = np.geomspace(0.02, 5.0, 24)  # at which shapes are compared [1/me
 class ThinParts:
     """Tables by thickness, evenly spaced in its root, of weights of a profile's k Gaussians in 3 channels.
 
-    Light is measured as `direction.wgsl` has it: by what a half-space returns of it.
+    Both are shares of what a half-space returns of the same light.
 
     reach_mm : thickness of the last row; that of the first is 0
     through : (ROWS, k, 3) that leave on the far side [-]
@@ -56,12 +56,10 @@ def medium_of(profile: GaussianSum, total: Floats, eta: float) -> Medium:
     return Medium("flesh", (layer,), eta)
 
 
-def thin_parts(profile: GaussianSum, total: Floats, eta: float, reach_mm: float) -> ThinParts:
-    """The tables of a profile whose half-space returns a share of light.
+def thin_parts(body: Medium, variance_mm2: Floats, reach_mm: float) -> ThinParts:
+    """The tables of slabs that are cut from a half-space of one layer.
 
-    profile : whose Gaussians spread light
-    total : (c,) that the half-space returns of what enters perpendicularly [-]
-    eta : index of refraction against the air, 1 for light that no surface bends [-]
+    variance_mm2 : (k,) of the Gaussians that spread light
     reach_mm : largest thickness of use
 
     How much goes through is exact, for uniform light from all directions; how wide it spreads is layered
@@ -69,12 +67,12 @@ def thin_parts(profile: GaussianSum, total: Floats, eta: float, reach_mm: float)
 
     Sources: [Chandrasekhar1960] for the amounts, [Kienle1998] for the widths.
     """
-    body, depth = medium_of(profile, total, eta), reach_mm * np.linspace(0.0, 1.0, ROWS) ** 2
-    through, lost = np.zeros((2, ROWS, len(profile.weight), len(total)))
-    for c in range(len(total)):
+    depth = reach_mm * np.linspace(0.0, 1.0, ROWS) ** 2
+    through, lost = np.zeros((2, ROWS, len(variance_mm2), body.channels))
+    for c in range(body.channels):
         one = body.channel(c)
-        passed, gone = _shares(one.layers[0], depth[1:], eta)
-        shape = _shapes(one, depth[1:], profile.variance_mm2)
+        passed, gone = _shares(one.layers[0], depth[1:], body.eta)
+        shape = _shapes(one, depth[1:], variance_mm2)
         through[1:, :, c], lost[1:, :, c] = passed[:, None] * shape, gone[:, None] * shape
         lost[0, :, c] = shape[0]
     return ThinParts(reach_mm, through, lost)
