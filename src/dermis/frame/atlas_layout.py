@@ -23,6 +23,7 @@ class PairBuffers:
     count : of pairs
     sums : buffer of cells and their pairs, as translucency.wgsl reads them
     light : texture of the coarse atlas for what comes through, none yet, and 1 where there is surface
+    lost : the same for the share that is not returned where light comes through
     """
 
     cells: Cells
@@ -32,6 +33,7 @@ class PairBuffers:
     count: int
     sums: Any
     light: Any
+    lost: Any
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +45,10 @@ class Translucency:
     receiver_points, source_points : buffers of where the pairs' places are
     weights : buffer of the share of light that each pair lets pass
     gathered : buffer for the light of the sources
-    weighing, gaussians : record of translucency_weights.wgsl for a profile, and how many it has
+    evenly : buffer for the same of sources that all give 1
+    weighing, losing : records of translucency_weights.wgsl for what a profile lets pass and for what it
+        therefore does not return
+    gaussians, slabs : how many these have, and whether they have tables by thickness
     layer : blurred level, counted from 0, whose light passes
     """
 
@@ -53,14 +58,22 @@ class Translucency:
     source_points: Any
     weights: Any
     gathered: Any
+    evenly: Any
     weighing: Any = None
+    losing: Any = None
     gaussians: int = 0
+    slabs: bool = False
     layer: int = 0
 
     @property
     def light(self) -> Any:
         """Texture of the coarse atlas for what comes through."""
         return self.pairs.light
+
+    @property
+    def lost(self) -> Any:
+        """Texture of the coarse atlas for the share that is not returned."""
+        return self.pairs.lost
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,6 +33,7 @@ from dermis.frame.strand_space import (
 )
 from dermis.frame.strands import StrandResources, has_strands, make_tables, skin_under
 from dermis.frame.techniques.technique import Technique
+from dermis.frame.thin_tables import thin_tables
 from dermis.frame.translucency import translucency_of
 from dermis.gpu import Constants, Device, Memo
 from dermis.gpu.textures import texture_from
@@ -187,8 +188,9 @@ def _layout(
     translucency = None
     if asked.count and asked.settings.transmission == "thin" and asked.technique.transmits:
         now, then = (one.resources | textures.resources for one in (held, at_rest()))
-        blurred = asked.split.blurred_mm2, asked.split.weight, asked.skin.has_own_tissue
-        translucency = translucency_of(memo, device, now, then, atlas, *blurred, of=number)
+        blurred = asked.split.blurred_mm2, asked.split.weight, thin_tables(memo, asked)
+        own = asked.skin.has_own_tissue
+        translucency = translucency_of(memo, device, now, then, atlas, *blurred, own, of=number)
     side = asked.settings.atlas if asked.count else 1
     surfaces = keep(surface_texels.make_surfaces, device, side, of=number)
     scattered = _sum(memo, device, asked, side, number)

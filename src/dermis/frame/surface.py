@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.gpu import ComputeProgram
 from dermis.gpu.shader_types import struct_dtype
@@ -21,6 +22,7 @@ from dermis.specular.energy import ENERGY
 from dermis.specular.fresnel import SKIN_ETA, SKIN_F0
 from dermis.specular.models import MODELS
 
+Floats = NDArray[np.float64]
 DEFAULT_COLOUR = 0.8
 """Albedo of heads without a colour map."""
 _EYE_SEEDS = 1000  # that look different
@@ -99,11 +101,16 @@ def _derived(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any]:
     }
 
 
+def half_space_of(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Floats, float]:
+    """(3,) what the half-space of the skin's mean colour returns of light from above, and its index."""
+    colour = profile.albedo if skin.albedo == "profile" else maps.mean_colour
+    colour = np.full(3, DEFAULT_COLOUR) if colour is None else np.asarray(colour, np.float64)
+    return colour, 1.0 if skin.specular == "none" else SKIN_ETA
+
+
 def _by_direction(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any]:
     """Members that direction.wgsl reads, for half-spaces of the skin's mean colour."""
-    colour = profile.albedo if skin.albedo == "profile" else maps.mean_colour
-    colour = np.full(3, DEFAULT_COLOUR) if colour is None else colour
-    law = directions(colour, 1.0 if skin.specular == "none" else SKIN_ETA)
+    law = directions(*half_space_of(skin, maps, profile))
     return {
         "inner_eta": law.eta,
         "mean_once": law.mean_once,

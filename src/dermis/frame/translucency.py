@@ -19,11 +19,13 @@ from dermis.frame.passes.translucency_points import RECEIVER_BYTES, SOURCE_BYTES
 from dermis.frame.passes.translucency_weights import source_level, weighing
 from dermis.gpu import Device, Memo, make_texture, scratch, upload
 from dermis.gpu.program import Resources
+from dermis.optics.thin_parts import ThinParts
 from dermis.preparing import preparing
 
 Floats = NDArray[np.float64]
 _WIDTHS_TO_DOUBLE, _LEAST_SHARED_MM = 2, 0.5
 _WIDTHS = 4  # whose pairs are kept
+_ONE = np.array([0xfe000, 0x3f8fe000], np.uint32)  # white light of 1, as light_words.wgsl has it
 _COARSER = 1.5  # times the side of cells whose pairs memory does not hold
 
 
@@ -35,6 +37,7 @@ def translucency_of(
     atlas: Atlas,
     variance_mm2: Floats,
     weight: Floats,
+    thin: ThinParts | None,
     changing: bool,
     of: str,
 ) -> Translucency:
@@ -42,6 +45,7 @@ def translucency_of(
 
     surface, at_rest : resources of geometry.wgsl and of the atlas, as the head is now and for the search
     variance_mm2, weight : (k,) and (k, 3) of the blurred levels
+    thin : tables of what passes by thickness; None for Gaussians of the straight distance
     changing : whether profiles come and go, so that similar ones should share their pairs
     of : name of the atlas among several
     """
@@ -49,7 +53,7 @@ def translucency_of(
     widest = shared_width(widest) if changing else widest
     pairs = memo.keep(PairsByWidth, device, at_rest, atlas, of=of).of(widest)
     made = memo.keep(_unweighed, device, surface, pairs, of=of)
-    return memo.keep(_weighed, device, made, variance_mm2, weight, of=of)
+    return memo.keep(_weighed, device, made, variance_mm2, weight, thin, of=of)
 
 
 class PairsByWidth:
@@ -102,7 +106,8 @@ def pairs_from(device: Device, cells: Cells, found: Found) -> PairBuffers:
         pairs=found.pairs,
         count=int(found.first[-1]),
         sums=device.buffer(_sums(cells, found), "STORAGE"),
-        light=_unlit(device, cells.surface),
+        light=scratch(device, _unlit(device, cells.surface)),
+        lost=_unlit(device, cells.surface),
     )
 
 
@@ -123,21 +128,33 @@ def _unlit(device: Device, surface: NDArray[np.bool_]) -> Any:
     light[..., 3] = surface
     texture = make_texture(device, surface.shape, "rgba32float")
     upload(device, texture, light)
-    return scratch(device, texture)
+    return texture
 
 
 def translucency_from(
-    device: Device, surface: Resources, pairs: PairBuffers, variance_mm2: Floats, weight: Floats
+    device: Device,
+    surface: Resources,
+    pairs: PairBuffers,
+    variance_mm2: Floats,
+    weight: Floats,
+    thin: ThinParts | None = None,
 ) -> Translucency:
     """What a profile lets pass between pairs, and space for it."""
-    return _weighed(device, _unweighed(device, surface, pairs), variance_mm2, weight)
+    return _weighed(device, _unweighed(device, surface, pairs), variance_mm2, weight, thin)
 
 
-def _weighed(device: Device, made: Translucency, variance_mm2: Floats, weight: Floats) -> Translucency:
+def _weighed(
+    device: Device, made: Translucency, variance_mm2: Floats, weight: Floats, thin: ThinParts | None
+) -> Translucency:
+    total = weight.sum(axis=0)
+    passing = weight if thin is None else thin.through
+    losing = weight / total if thin is None else thin.lost
     return replace(
         made,
-        weighing=weighing(device, made.pairs, variance_mm2, weight),
+        weighing=weighing(device, made.pairs, variance_mm2, weight, thin, passing),
+        losing=weighing(device, made.pairs, variance_mm2, weight / total, thin, losing),
         gaussians=len(weight),
+        slabs=thin is not None,
         layer=source_level(made.pairs.cells.spacing_mm, variance_mm2),
     )
 
@@ -151,4 +168,5 @@ def _unweighed(device: Device, surface: Resources, pairs: PairBuffers) -> Transl
         source_points=space(device, sources, SOURCE_BYTES),
         weights=space(device, pairs.count, 8),
         gathered=scratch(device, space(device, sources, 8)),
+        evenly=device.buffer(np.tile(_ONE, (max(sources, 1), 1)), "STORAGE"),
     )

@@ -57,7 +57,7 @@ def h_function(cosine: ArrayLike, albedo: float) -> Floats:
 
     Source: [Chandrasekhar1960] section 39, the integral over the imaginary axis.
     """
-    root, weight = _nodes(0.0, 1.0)
+    root, weight = gaussian_nodes(0.0, 1.0)
     angle = 0.5 * np.pi * root**2  # the integrand's logarithm is smooth in its root
     slope = np.pi * root * weight * np.log1p(-albedo * angle / np.tan(angle))
     mu = np.asarray(cosine, np.float64)[..., None]
@@ -72,7 +72,7 @@ def directional_albedo(cosine: ArrayLike, albedo: float, eta: float) -> Floats:
 
 def mean_of_once(cosine: ArrayLike, eta: float) -> Floats:
     """Mean of 1/(a + b) over exit directions, by the cosine of entry [-]."""
-    a, critical = np.maximum(refracted(cosine, eta), 1e-4), _critical(eta)
+    a, critical = np.maximum(refracted(cosine, eta), 1e-4), critical_cosine(eta)
     return np.asarray(2.0 * eta**2 * (1.0 - critical - a * np.log((a + 1.0) / (a + critical))))
 
 
@@ -88,11 +88,11 @@ class _Matched:
     """
 
     def __init__(self, albedo: float, eta: float) -> None:
-        critical = _critical(eta)
-        escaping, caught = _nodes(critical, 1.0), _nodes(0.0, critical)
+        critical = critical_cosine(eta)
+        escaping, caught = gaussian_nodes(critical, 1.0), gaussian_nodes(0.0, critical)
         self._mu, weight = (np.concatenate(both) for both in zip(escaping, caught, strict=True))
         self._albedo, self._H = albedo, h_function(self._mu, albedo)
-        back = _internal_reflectance(self._mu, eta)
+        back = internal_reflectance(self._mu, eta)
         flux = 2.0 * weight * self._mu
         self.leaving = flux * (1.0 - back)
         self._within = np.eye(len(self._mu)) - self._reflected(self._mu, self._H) * flux * back
@@ -128,7 +128,7 @@ def _channel(total: float, eta: float) -> tuple[Floats, float, float]:
 @lru_cache(maxsize=_KEPT)
 def _mean_once(eta: float) -> float:
     """Mean of 1/(a + b) over both directions."""
-    mu, weight = _nodes(0.0, 1.0)
+    mu, weight = gaussian_nodes(0.0, 1.0)
     return float((2.0 * weight * mu * mean_of_once(mu, eta)).sum())
 
 
@@ -145,7 +145,7 @@ def _albedo_of(total: float, eta: float) -> float:
     return float(brentq(beyond, least, _MOST_ALBEDO)) if beyond(_MOST_ALBEDO) > 0.0 else _MOST_ALBEDO
 
 
-def _internal_reflectance(cosine: Floats, eta: float) -> Floats:
+def internal_reflectance(cosine: Floats, eta: float) -> Floats:
     """Share of unpolarised light from inside that the surface reflects back."""
     outside = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - cosine**2), 0.0))
     across = (eta * cosine - outside) / np.maximum(eta * cosine + outside, 1e-12)
@@ -153,17 +153,17 @@ def _internal_reflectance(cosine: Floats, eta: float) -> Floats:
     return np.asarray(0.5 * (across**2 + along**2))
 
 
-def _critical(eta: float) -> float:
+def critical_cosine(eta: float) -> float:
     """Least cosine below the surface at which light leaves."""
     return float(np.sqrt(1.0 - 1.0 / eta**2))
 
 
-def _nodes(low: float, high: float) -> tuple[Floats, Floats]:
+def gaussian_nodes(low: float, high: float, count: int = _NODES) -> tuple[Floats, Floats]:
     """Gaussian nodes and weights of an interval."""
-    nodes, weights = _gaussian()
+    nodes, weights = _gaussian(count)
     return low + 0.5 * (high - low) * (nodes + 1.0), 0.5 * (high - low) * weights
 
 
-@lru_cache(maxsize=1)
-def _gaussian() -> tuple[Floats, Floats]:
-    return np.polynomial.legendre.leggauss(_NODES)
+@lru_cache(maxsize=4)
+def _gaussian(count: int) -> tuple[Floats, Floats]:
+    return np.polynomial.legendre.leggauss(count)

@@ -17,16 +17,19 @@ def make_sum(device: Device, side: int) -> Any:
     return make_texture(device, (side, side), FLOATS, name="sum of blurred light")
 
 
-def draw(graph: Recorder, levels: Levels, blur: Blur, into: Any, transmitted: Any = None) -> None:
+def draw(
+    graph: Recorder, levels: Levels, blur: Blur, into: Any, transmitted: Any = None, lost: Any = None
+) -> None:
     """Sum the blurred layers, all but the first, from coarse resolution to fine.
 
     transmitted : texture of the light through thin parts, None without any
+    lost : texture of the share of the blurred light that thin parts do not return, None for none
     """
     device, blurred = graph.device, blur.halvings[1 : len(blur.weight) + 1]
     coarsest = max(blurred)
     for mip in range(coarsest, -1, -1):
         through = transmitted if mip == _finest_for(transmitted, levels.size, coarsest) else None
-        shader = _program(device, levels.texel, mip > 0, mip < coarsest, through is not None)
+        shader = _program(device, levels.texel, mip > 0, mip < coarsest, through is not None, lost is not None)
         first, count = blurred.index(mip), blurred.count(mip)
         padded = np.zeros((MOST_GAUSSIANS, 4), np.float32)
         padded[:count, :3] = blur.weight[first : first + count]
@@ -38,6 +41,7 @@ def draw(graph: Recorder, levels: Levels, blur: Blur, into: Any, transmitted: An
             "levels": levels.stacks[mip],
             "source": levels.spare(mip + 1) if mip < coarsest else levels.layer(0),
             "transmitted": nothing(device) if through is None else through,
+            "lost": nothing(device) if lost is None else lost,
             "linear": device.sampler(mag_filter="linear", min_filter="linear"),
             "stored": levels.spare(mip) if mip else into,
         }
@@ -49,9 +53,11 @@ def nothing(device: Device) -> Any:
     return device.shared("nothing", lambda: make_texture(device, (1, 1), "rgba32float", use="map"))
 
 
-def _program(device: Device, texel: str, between: bool, coarser: bool, transmitted: bool) -> ComputeProgram:
+def _program(
+    device: Device, texel: str, between: bool, coarser: bool, transmitted: bool, thin: bool
+) -> ComputeProgram:
     """The pass into the texture between passes, or into the sum of 32-bit floats."""
-    constants = (("COARSER", coarser), ("TRANSMITTED", transmitted))
+    constants = (("COARSER", coarser), ("TRANSMITTED", transmitted), ("THIN", thin))
     return program(device, "combine.wgsl", constants, texel, texel if between else FLOATS)
 
 

@@ -1,10 +1,11 @@
-// The weighted sum of the blurred levels of one resolution, the sum of the coarser ones, and the light through thin parts.
+// The weighted sum of the blurred levels of one resolution, less what thin parts let pass, the sum of the coarser ones, and that light.
 //#include "source.wgsl"
 //#include "store.wgsl"
 //#include "bilinear.wgsl"
 
 override COARSER: bool = false; // whether there are levels of less resolution
 override TRANSMITTED: bool = false; // whether light comes through thin parts
+override THIN: bool = false; // whether thin parts return less
 
 struct Weights {
     first: u32, // first layer
@@ -17,6 +18,7 @@ struct Weights {
 @group(0) @binding(0) var<uniform> weights: Weights;
 @group(0) @binding(1) var levels: texture_2d_array<f32>;
 @group(0) @binding(2) var transmitted: texture_2d<f32>; // light, and 1 where there is surface; maybe at less resolution
+@group(0) @binding(6) var lost: texture_2d<f32>; // share that thin parts do not return, and 1 where there is surface
 // source: the sum of the coarser levels, and 1 where there is surface
 
 @compute @workgroup_size(16, 16)
@@ -35,6 +37,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         }
     }
     let place = (vec2f(id.xy) + 0.5) / vec2f(size);
+    if (THIN) {
+        let share = load_bilinear(lost, place);
+        sum = vec4f(sum.rgb * (1.0 - min(share.rgb / max(share.a, 1e-6), vec3f(1.0))), sum.a);
+    }
     if (COARSER) {
         let light = source_at(place);
         sum += vec4f(light.rgb / max(light.a, 1e-6), 0.0);

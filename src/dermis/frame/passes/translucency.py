@@ -37,15 +37,27 @@ def draw(graph: Recorder, levels: Levels, blur: Blur, thin: Translucency, consta
         "source_points": thin.source_points,
         "gathered": thin.gathered,
     }
-    leaving = {
-        "receivers": pairs.sums,
-        "weights": thin.weights,
-        "gathered": thin.gathered,
-        "transmitted": pairs.light,
-    }
-    chosen = dict((_ALONE if device.adapter.kind == "CPU" else _TEAMS) + constants)
-    add_up = program(device, "translucency.wgsl", tuple(chosen.items()))
     graph.dispatch("translucency", gather, entering, each(pairs.sources[1], _GATHERING))
-    receivers = int(chosen["SIZE"]) // int(chosen["TEAM"])  # of a workgroup
-    graph.dispatch("translucency", add_up, leaving, each(pairs.receivers[1], receivers))
+    add_up(graph, thin, thin.gathered, pairs.light, constants)
     return pairs.light
+
+
+def add_up(
+    graph: Recorder,
+    thin: Translucency,
+    gathered: Any,
+    into: Any,
+    constants: Constants = (),
+    stage: str = "translucency",
+) -> None:
+    """Sum what sources give by the pairs' weights.
+
+    gathered : buffer of their light
+    into : texture of the coarse atlas
+    """
+    device, pairs = graph.device, thin.pairs
+    bound = {"receivers": pairs.sums, "weights": thin.weights, "gathered": gathered, "transmitted": into}
+    chosen = dict((_ALONE if device.adapter.kind == "CPU" else _TEAMS) + constants)
+    shader = program(device, "translucency.wgsl", tuple(chosen.items()))
+    receivers = int(chosen["SIZE"]) // int(chosen["TEAM"])  # of a workgroup
+    graph.dispatch(stage, shader, bound, each(pairs.receivers[1], receivers))

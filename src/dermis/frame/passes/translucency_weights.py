@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from dermis.frame.atlas_layout import PairBuffers, Translucency
 from dermis.frame.passes import program
+from dermis.frame.passes.translucency import add_up
 from dermis.frame.passes.translucency_points import draw_receivers, draw_sources
 from dermis.gpu import ComputeProgram, Device, Recorder
 from dermis.optics.gaussians import MOST_GAUSSIANS
+from dermis.optics.thin_parts import ROWS, ThinParts
 
 Floats = NDArray[np.float64]
 GRAIN = (
@@ -22,19 +24,21 @@ _SMOOTH = 0.45  # of the spacing; light of this standard deviation has no detail
 
 
 def draw(graph: Recorder, thin: Translucency) -> None:
-    """Weigh the pairs of the surface as it is now."""
+    """Weigh the pairs of the surface as it is now, and sum what it does not return because of them."""
     pairs, cells = thin.pairs, thin.pairs.cells
     draw_receivers(graph, thin.surface, cells, pairs.receivers, thin.receiver_points)
     draw_sources(graph, thin.surface, cells, pairs.sources, thin.source_points)
     bound = {
-        "weighing": thin.weighing,
         "pairs": pairs.pairs,
         "receiver_points": thin.receiver_points,
         "source_points": thin.source_points,
         "weights": thin.weights,
     }
-    shader = _shader(graph.device, thin.gaussians)
-    graph.dispatch("pairs", shader, bound, (_ROW // _SIZE, max(1, -(-pairs.count // _ROW)), 1))
+    shader, groups = _shader(graph.device, thin.gaussians, thin.slabs), max(1, -(-pairs.count // _ROW))
+    for weighed in (thin.losing, thin.weighing):
+        graph.dispatch("pairs", shader, bound | {"weighing": weighed}, (_ROW // _SIZE, groups, 1))
+        if weighed is thin.losing:
+            add_up(graph, thin, thin.evenly, pairs.lost, stage="pairs")
 
 
 def source_level(spacing_mm: float, variance_mm2: Floats) -> int:
@@ -43,15 +47,28 @@ def source_level(spacing_mm: float, variance_mm2: Floats) -> int:
     return int(smooth[0]) if len(smooth) else len(variance_mm2) - 1
 
 
-def weighing(device: Device, pairs: PairBuffers, variance_mm2: Floats, weight: Floats) -> Any:
+def weighing(
+    device: Device,
+    pairs: PairBuffers,
+    variance_mm2: Floats,
+    weight: Floats,
+    thin: ThinParts | None = None,
+    passing: Floats | None = None,
+) -> Any:
     """The record of a profile's pass.
 
     variance_mm2, weight : (k,) and (k, 3) of the blurred levels
+    passing : (ROWS, k, 3) of the tables of thin parts
     """
+    through = np.zeros((ROWS * MOST_GAUSSIANS, 4), np.float32)
+    if thin is not None and passing is not None:
+        through[: ROWS * len(weight), :3] = passing.reshape(-1, 3)
     gaussian = np.zeros((MOST_GAUSSIANS, 4), np.float32)
     gaussian[: len(weight), :3], gaussian[: len(weight), 3] = weight, variance_mm2
-    return _shader(device, len(weight)).record(
+    return _shader(device, len(weight), thin is not None).record(
         "Weighing",
+        reach_mm=1.0 if thin is None else thin.reach_mm,
+        through=through,
         radius_mm=pairs.cells.radius_mm,
         before_mm2=variance_mm2[source_level(pairs.cells.spacing_mm, variance_mm2)],
         cell_mm2=pairs.cells.spacing_mm**2,
@@ -60,5 +77,5 @@ def weighing(device: Device, pairs: PairBuffers, variance_mm2: Floats, weight: F
     )
 
 
-def _shader(device: Device, gaussians: int) -> ComputeProgram:
-    return program(device, "translucency_weights.wgsl", (("COUNT", gaussians),))
+def _shader(device: Device, gaussians: int, slabs: bool) -> ComputeProgram:
+    return program(device, "translucency_weights.wgsl", (("COUNT", gaussians), ("SLABS", slabs)))

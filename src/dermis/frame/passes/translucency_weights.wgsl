@@ -2,13 +2,18 @@
 //#include "translucent_pair.wgsl"
 
 override COUNT: u32 = 8u; // Gaussians; as a constant, so that software adapters unroll the loop
+override SLABS: bool = false; // whether a table says what passes each thickness; else a Gaussian of the straight distance does
+
+const ROWS: u32 = 32u; // of the table, as in optics/thin_parts.py
 
 struct Weighing {
     radius_mm: f32, // pairs are nearer
     before_mm2: f32, // variance that the sources' light has already
     cell_mm2: f32, // that a source usually stands for
     grain: f32, // least variance that is added, over that or the source's own area: it hides their pattern
-    gaussian: array<vec4f, 24>, // weight per channel, variance [mm^2]
+    reach_mm: f32, // thickness of the table's last row
+    gaussian: array<vec4f, 24>, // weight per channel of what the blurs bring, variance [mm^2]
+    through: array<vec4f, 768>, // weights of what passes: COUNT of each row, evenly spaced by the root of the thickness
 }
 
 @group(0) @binding(0) var<uniform> weighing: Weighing;
@@ -41,19 +46,32 @@ fn along2_of(offset: u32, metric: vec3f, area: f32) -> f32 {
     return select(square + area / 6.0, FAR_MM2, offset == NOWHERE || square >= weighing.radius_mm * weighing.radius_mm);
 }
 
+// Weight of a Gaussian in what passes a thickness.
+fn through(k: u32, row: f32) -> vec3f {
+    let low = min(u32(row), ROWS - 2u);
+    let near = weighing.through[low * COUNT + k].rgb;
+    return mix(near, weighing.through[(low + 1u) * COUNT + k].rgb, row - f32(low));
+}
+
 // A Gaussian of the distance sqrt(t^2 + r^2) is exp(-t^2 / 2v) G(v, r) [dEonLuebke2007]; what is already in the sources'
 // light need not be added. The blur along the surface has brought its own share: that is taken off.
 fn passed(depth2: f32, aside2: f32, along2: f32, area: f32) -> vec3f {
     let edge2 = max(weighing.radius_mm * weighing.radius_mm - depth2, 0.0);
+    let row = f32(ROWS - 1u) * sqrt(min(sqrt(depth2) / weighing.reach_mm, 1.0));
     var sum = vec3f(0.0);
     for (var k = 0u; k < COUNT; k++) {
         let gaussian = weighing.gaussian[k];
         let w = max(gaussian.w - weighing.before_mm2, weighing.grain * max(area, weighing.cell_mm2));
         let disc = max(1.0 - exp(-0.5 * edge2 / w), LEAST_DISC);
-        let straight = exp(-0.5 * (depth2 / gaussian.w + aside2 / w)) / disc;
-        sum += gaussian.rgb * max(0.0, straight - exp(-0.5 * along2 / w)) / w;
+        let along = exp(-0.5 * along2 / w);
+        if (SLABS) {
+            sum += (through(k, row) * (exp(-0.5 * aside2 / w) / disc) - gaussian.rgb * along) / w;
+        } else {
+            let straight = exp(-0.5 * (depth2 / gaussian.w + aside2 / w)) / disc;
+            sum += gaussian.rgb * max(0.0, straight - along) / w;
+        }
     }
-    return area / (2.0 * PI) * sum;
+    return area / (2.0 * PI) * max(sum, vec3f(0.0));
 }
 
 @compute @workgroup_size(64)

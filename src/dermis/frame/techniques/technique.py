@@ -195,7 +195,7 @@ class AtlasTechnique(Technique):
     def leave(self, graph: Any, levels: Levels, blur: Blur, thin: Any, into: Any) -> None:
         """Let the blurred light through thin parts, and add up what leaves."""
         through = translucency.draw(graph, levels, blur, thin) if thin else None
-        combine.draw(graph, levels, blur, into, through)
+        combine.draw(graph, levels, blur, into, through, thin.lost if thin else None)
 
     def mix(
         self,

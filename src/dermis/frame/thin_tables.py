@@ -1,0 +1,32 @@
+"""Tables of what thin parts of the skin let pass and return less, as a frame needs them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.frame import surface
+from dermis.frame.asked import Asked
+from dermis.gpu import Memo
+from dermis.optics.gaussians import GaussianSum
+from dermis.optics.thin_parts import ThinParts, medium_of, thin_parts
+
+Floats = NDArray[np.float64]
+_REACH, _FARTHEST_MM = 4.0, 40.0  # standard deviations of the widest Gaussian, beyond all pairs
+
+
+def thin_tables(memo: Memo, asked: Asked) -> ThinParts | None:
+    """What passes thin parts of half-spaces, for the blurred levels; None for lambertian skin."""
+    if asked.skin.direction != "half-space":
+        return None
+    split, law = asked.split, surface.half_space_of(asked.skin, asked.head.maps, asked.profile)
+    return memo.keep(_made, asked.profile, *law, split.total, split.blurred_mm2, split.weight)
+
+
+def _made(
+    profile: GaussianSum, colour: Floats, eta: float, total: Floats, variance_mm2: Floats, weight: Floats
+) -> ThinParts:
+    """Tables as weights of the blurred levels, which alone lose what passes."""
+    reach = min(_REACH * float(np.sqrt(variance_mm2[-1])), _FARTHEST_MM)
+    made = thin_parts(medium_of(profile, colour, eta), variance_mm2, reach)
+    return ThinParts(reach, made.through * total, made.lost * (total / weight.sum(axis=0)))

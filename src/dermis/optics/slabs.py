@@ -1,0 +1,97 @@
+"""Light that slabs of a medium return and let through, between two faces that may refract."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dermis.optics.directions import critical_cosine, gaussian_nodes, internal_reflectance
+
+Floats = NDArray[np.float64]
+_NODES = 16  # of an interval of cosines
+_THINNEST = 1e-6  # optical thickness in which light scatters once at most
+
+
+@dataclass(frozen=True, eq=False)
+class Slabs:
+    """What becomes of the power that enters slabs of several thicknesses, from each of m directions.
+
+    cosine : (m,) of entry, below the surface, that light from the air has [-]
+    flux : (m,) share of uniform light from the air that enters there; they sum to 1
+    back, through : (n, m) share that leaves after it scattered, on the side of entry and on the far one [-]
+    """
+
+    cosine: Floats
+    flux: Floats
+    back: Floats
+    through: Floats
+
+
+def slabs(albedo: float, optical_depth: ArrayLike, eta: float) -> Slabs:
+    """Slabs that scatter isotropically, by adding and doubling; exact but for the number of directions.
+
+    albedo : of single scattering [-]
+    optical_depth : (n,) thickness in mean free paths, above 0 [-]
+    eta : index of refraction against the air on both sides, at least 1 [-]
+
+    Source: [Chandrasekhar1960] section 50 for what layers do together.
+    """
+    tau = np.atleast_1d(np.asarray(optical_depth, np.float64))
+    mu, weight = _cosines(eta)
+    flux, escapes = 2.0 * weight * mu, mu > critical_cosine(eta)
+    R, T, straight = _doubled(albedo, tau, mu, flux)
+    back, through = _between_faces(R * flux, T * flux, straight, internal_reflectance(mu, eta), R, T)
+    leaving = flux * (1.0 - internal_reflectance(mu, eta))
+    entering = leaving[escapes] / leaving[escapes].sum()
+    up, down = (np.einsum("k,nkm->nm", leaving, part[..., escapes]) for part in (back, through))
+    return Slabs(mu[escapes], entering, up, down)
+
+
+def _cosines(eta: float) -> tuple[Floats, Floats]:
+    """Gaussian nodes and weights below the surface: those that escape, and those that it holds back."""
+    critical = critical_cosine(eta)
+    spans = [(critical, 1.0), (0.0, critical)] if critical > 0.0 else [(0.0, 1.0)]
+    parts = [gaussian_nodes(low, high, _NODES) for low, high in spans]
+    mu, weight = (np.concatenate(both) for both in zip(*parts, strict=True))
+    return mu, weight
+
+
+def _doubled(albedo: float, tau: Floats, mu: Floats, flux: Floats) -> tuple[Floats, Floats, Floats]:
+    """Reflected and transmitted radiance (n, m, m) over pi per power from each direction, and (n, m) unscattered."""
+    times = int(np.ceil(np.log2(max(float(tau.max()) / _THINNEST, 1.0))))
+    t = (tau / 2.0**times)[:, None, None]
+    a, b = mu[:, None], mu[None, :]
+    R = -0.25 * albedo / (a + b) * np.expm1(-t * (1.0 / a + 1.0 / b))
+    T = 0.25 * albedo * t / (a * b) * np.exp(-0.5 * t * (1.0 / a + 1.0 / b))
+    straight = np.exp(-t[..., 0] / mu)
+    for _ in range(times):
+        up, down = R * flux, T * flux + straight[:, :, None] * np.eye(len(mu))
+        entering = R * straight[:, None, :]
+        between = np.linalg.solve(np.eye(len(mu)) - up @ up, T + up @ entering)
+        R, T = R + down @ (up @ between + entering), down @ between + T * straight[:, None, :]
+        straight = straight**2
+    return R, T, straight
+
+
+def _between_faces(
+    up: Floats, down: Floats, straight: Floats, held: Floats, R: Floats, T: Floats
+) -> tuple[Floats, Floats]:
+    """Scattered radiance over pi below the upper and above the lower face, per power that enters.
+
+    up, down : (n, m, m) what the slab makes of radiance: it reflects and scatters it through
+    held : (m,) share that a face reflects back into the slab
+    """
+    if not held.any():
+        return R, T
+    unit, count = np.eye(len(held)), len(held)
+    passing = (down + straight[:, :, None] * unit) * held
+    around = np.block([[unit - up * held, -passing], [-passing, unit - up * held]])
+    # What has not scattered goes to and fro between the faces by itself.
+    once = 1.0 / (1.0 - (straight * held) ** 2)
+    below = held * straight * once
+    top = R * (once[:, None, :]) + T * below[:, None, :]
+    bottom = T * once[:, None, :] + R * below[:, None, :]
+    solved = np.linalg.solve(around, np.concatenate([top, bottom], axis=1))
+    return solved[:, :count], solved[:, count:]

@@ -1,0 +1,137 @@
+"""What thin parts of a profile's medium let through, and what they therefore return less, by Gaussians."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.optics.diffusion import hankel, layered_diffusion
+from dermis.optics.diffusion.boundary import mismatch
+from dermis.optics.gaussians import GaussianSum
+from dermis.optics.media import Layer, Medium
+from dermis.optics.slabs import Slabs, slabs
+
+Floats = NDArray[np.float64]
+ROWS = 32
+"""Thicknesses of the tables."""
+_MOST_ALBEDO, _LEAST_ALBEDO = 1.0 - 1e-6, 1e-3
+_LOGS = (-14.0, 14.0)  # of frequencies that are searched [1/mm]
+_DEEP = 60.0  # mean free paths that are as good as a half-space
+_FREQUENCIES = np.geomspace(0.02, 5.0, 24)  # at which shapes are compared [1/mean free path]
+
+
+@dataclass(frozen=True, eq=False)
+class ThinParts:
+    """Tables by thickness, evenly spaced in its root, of weights of a profile's k Gaussians in 3 channels.
+
+    Both are shares of what a half-space returns of the same light.
+
+    reach_mm : thickness of the last row; that of the first is 0
+    through : (ROWS, k, 3) that leave on the far side [-]
+    lost : (ROWS, k, 3) share that no longer leaves on the near side, spread as what leaves on the far one [-]
+    """
+
+    reach_mm: float
+    through: Floats
+    lost: Floats
+
+
+def medium_of(profile: GaussianSum, total: Floats, eta: float) -> Medium:
+    """The half-space that returns a share of light, and half of it within the profile's own distance.
+
+    total : (c,) that it returns of what enters perpendicularly [-]
+    eta : index of refraction against the air [-]
+    """
+    albedo, extinction = np.empty(len(total)), np.empty(len(total))
+    for c, share in enumerate(total):
+        albedo[c] = _albedo_of(float(share), eta)
+        one = GaussianSum("", profile.variance_mm2, profile.weight[:, [c]])
+        wide = _half(lambda s, one=one: float(one.hankel(s)[0]))
+        unit = _unit(float(albedo[c]), eta)
+        extinction[c] = wide / _half(lambda s, unit=unit: _returned(s, unit))
+    layer = Layer((1.0 - albedo) * extinction, albedo * extinction)
+    return Medium("flesh", (layer,), eta)
+
+
+def thin_parts(body: Medium, variance_mm2: Floats, reach_mm: float) -> ThinParts:
+    """The tables of slabs that are cut from a half-space of one layer.
+
+    variance_mm2 : (k,) of the Gaussians that spread light
+    reach_mm : largest thickness of use
+
+    How much goes through is exact, for uniform light from all directions; how wide it spreads is layered
+    diffusion's, for light from above.
+
+    Sources: [Chandrasekhar1960] for the amounts, [Kienle1998] for the widths.
+    """
+    depth = reach_mm * np.linspace(0.0, 1.0, ROWS) ** 2
+    through, lost = np.zeros((2, ROWS, len(variance_mm2), body.channels))
+    for c in range(body.channels):
+        one = body.channel(c)
+        passed, gone = _shares(one.layers[0], depth[1:], body.eta)
+        shape = _shapes(one, depth[1:], variance_mm2)
+        through[1:, :, c], lost[1:, :, c] = passed[:, None] * shape, gone[:, None] * shape
+        lost[0, :, c] = shape[0]
+    return ThinParts(reach_mm, through, lost)
+
+
+def _shares(layer: Layer, depth_mm: Floats, eta: float) -> tuple[Floats, Floats]:
+    """What comes through, over what a half-space returns; and the share of that which is no longer returned."""
+    albedo, extinction = float(layer.alpha_prime[0]), float(layer.sigma_t_prime[0])
+    cut, whole = slabs(albedo, extinction * depth_mm, eta), slabs(albedo, _DEEP, eta)
+    returned = _uniform(whole, whole.back)
+    return _uniform(cut, cut.through) / returned, 1.0 - _uniform(cut, cut.back) / returned
+
+
+def _uniform(of: Slabs, share: Floats) -> Floats:
+    return np.asarray(share @ of.flux)
+
+
+def _shapes(body: Medium, depth_mm: Floats, variance_mm2: Floats) -> Floats:
+    """(n, k) weights of Gaussians, which sum to 1, that spread as what comes through each thickness."""
+    from scipy.optimize import nnls
+
+    s = _FREQUENCIES * float(body.layers[0].sigma_t_prime[0])
+    bells = np.exp(-0.5 * variance_mm2 * s[:, None] ** 2)
+    A, sure = mismatch(body.eta, "exact"), 100.0
+    made = np.empty((len(depth_mm), len(variance_mm2)))
+    for row, thickness in enumerate(depth_mm):
+        sheet = replace(body, layers=(replace(body.layers[0], thickness_mm=float(thickness)),))
+        spread = layered_diffusion.respond(np.concatenate([hankel.STILL, s]), sheet, A)[1][:, 0]
+        ones = np.full((1, len(variance_mm2)), sure)
+        made[row] = nnls(np.vstack([bells, ones]), np.append(spread[1:] / spread[0], sure))[0]
+    return np.asarray(made / made.sum(axis=1, keepdims=True))
+
+
+def _albedo_of(total: float, eta: float) -> float:
+    """Albedo of single scattering of the half-space that returns this share, by layered diffusion."""
+    from scipy.optimize import brentq
+
+    def beyond(albedo: float) -> float:
+        return _returned(float(hankel.STILL[0]), _unit(albedo, eta)) - total
+
+    if beyond(_LEAST_ALBEDO) >= 0.0:
+        return _LEAST_ALBEDO
+    return float(brentq(beyond, _LEAST_ALBEDO, _MOST_ALBEDO)) if beyond(_MOST_ALBEDO) > 0.0 else _MOST_ALBEDO
+
+
+def _unit(albedo: float, eta: float) -> Medium:
+    """A half-space whose mean free path is 1 mm."""
+    return Medium("flesh", (Layer(np.array([1.0 - albedo]), np.array([albedo])),), eta)
+
+
+def _returned(frequency: float, body: Medium) -> float:
+    """Hankel transform of what it returns."""
+    A = mismatch(body.eta, "exact")
+    return float(layered_diffusion.respond(np.array([frequency]), body, A)[0][0, 0])
+
+
+def _half(transform: Callable[[float], float]) -> float:
+    """The frequency at which a transform has fallen to half of its total [1/mm]."""
+    from scipy.optimize import brentq
+
+    total = transform(float(hankel.STILL[0]))
+    return float(np.exp(brentq(lambda log: transform(float(np.exp(log))) - 0.5 * total, *_LOGS)))
