@@ -1,0 +1,135 @@
+"""Random faces in random light, path-traced: python benchmarks/fitting_scenes.py [--side 256] [--samples 16]
+
+What `fitting.py` fits. Paths are kept on disk, so a run that was cut off goes on where it stopped, and one
+that asks for more adds to them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import gettempdir
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.comparison.person import traced
+from dermis.comparison.person_paint import paint_of
+from dermis.environment.panorama import directions
+from dermis.frame.renderer import Renderer
+from dermis.human.person import Human
+from dermis.images.exr import encode_exr
+from dermis.reference.path_traced import PathTraced
+from dermis.scene.camera import Camera
+from dermis.scene.environment import Environment
+from dermis.scene.lights import DirectionalLight
+from dermis.scene.model import Scene
+from dermis.scene.people import skin_of
+from dermis.scene.skin import USUAL_ROUGHNESS
+
+FOLDER = Path(gettempdir()) / "dermis-fitting"
+"""Of panoramas, which scenes name as files."""
+SCENES = 30
+_SEED = 24
+_MELANIN, _BLOOD, _ROUGHNESS = (-2.2, -0.8), (-2.5, -1.5), (0.2, 0.4)  # the first two as decimal exponents
+_PAINT = 1024
+_ROWS = 32
+_FACE_MM = 250.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """A face whose light and skin are known.
+
+    towards : (3,) unit vector to the sun
+    sun : share of the light on a surface that faces the sun which the sun gives [-]
+    """
+
+    number: int
+    person: Human
+    scene: Scene
+    melanin: float
+    blood: float
+    roughness: float
+    towards: NDArray[np.float64]
+    sun: float
+
+
+def case(number: int) -> Case:
+    """The one of a number: the same each time."""
+    random = np.random.default_rng((_SEED, number))
+    melanin, blood = (float(10.0 ** random.uniform(*span)) for span in (_MELANIN, _BLOOD))
+    roughness = float(random.uniform(*_ROUGHNESS))
+    pigments = {"melanin": melanin, "blood": blood}
+    person = Human.drawn(100 + number, skin=pigments, hair={"style": "none", "beard_mm": 0.0})
+    head = person.head()
+    turn, tilt = np.radians(random.uniform(-65.0, 65.0)), np.radians(random.uniform(-10.0, 60.0))
+    towards = np.array([np.sin(turn) * np.cos(tilt), np.sin(tilt), np.cos(turn) * np.cos(tilt)])
+    radiance = _sky(random)
+    strength = float(random.uniform(1.0, 3.0))
+    arriving = _facing(radiance, towards)
+    lights = [DirectionalLight(direction=tuple(-towards), irradiance=strength, angle_degrees=0.53)]  # type: ignore[arg-type]
+    yaw = np.radians(random.uniform(-25.0, 25.0))
+    eye = 1100.0 * np.array([np.sin(yaw), 0.0, np.cos(yaw)])
+    camera = Camera(position=tuple(eye), target=(0.0, -10.0, 30.0), frame_mm=_FACE_MM)
+    environment = Environment(name=str(_panorama(number, radiance)))
+    skin = skin_of(person).model_copy(update={"roughness": roughness, "rho_s": 1.0})
+    scene = Scene(head, lights=lights, camera=camera, skin=skin, environment=environment)
+    return Case(number, person, scene, melanin, blood, roughness, towards, strength / (strength + arriving))
+
+
+def _sky(random: np.random.Generator) -> NDArray[np.float64]:
+    """(h, w) radiance: some everywhere, and three wide lobes."""
+    towards = directions(_ROWS, 2 * _ROWS)
+    radiance = np.full(towards.shape[:2], random.uniform(0.05, 0.2))
+    for _ in range(3):
+        middle = random.standard_normal(3) + (0.0, 0.6, 0.6)
+        cosine = towards @ (middle / np.linalg.norm(middle))
+        radiance += random.uniform(0.1, 0.5) * (0.5 + 0.5 * cosine) ** random.uniform(1.0, 8.0)
+    return radiance
+
+
+def _facing(radiance: NDArray[np.float64], towards: NDArray[np.float64]) -> float:
+    """Irradiance of a surface that faces a direction."""
+    from dermis.environment.panorama import solid_angles
+
+    cosine = np.maximum(directions(_ROWS, 2 * _ROWS) @ towards, 0.0)
+    return float((radiance * cosine * solid_angles(_ROWS, 2 * _ROWS)).sum())
+
+
+def _panorama(number: int, radiance: NDArray[np.float64]) -> Path:
+    FOLDER.mkdir(exist_ok=True)
+    path = FOLDER / f"sky_{number}.exr"
+    path.write_bytes(encode_exr(np.repeat(radiance[..., None], 3, axis=2).astype(np.float32)))
+    return path
+
+
+def photograph(renderer: Renderer, one: Case, side: int, samples: int) -> PathTraced:
+    """The case by path tracing; the surface reflects as a dielectric of index 1.4."""
+    paint = paint_of(renderer, one.scene, _PAINT)
+    rough = np.clip(paint.roughness * (one.roughness / USUAL_ROUGHNESS), 0.05, 1.0).astype(np.float32)
+    return traced(renderer, one.scene, replace(paint, roughness=rough), (side, side), samples)
+
+
+def main(words: list[str]) -> int:
+    """Trace all of them."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("--side", type=int, default=256)
+    parser.add_argument("--samples", type=int, default=16)
+    parser.add_argument("--scenes", type=int, default=SCENES)
+    parser.add_argument("--adapter", default="auto")
+    asked = parser.parse_args(words)
+    renderer = Renderer(asked.adapter)
+    for number in range(asked.scenes):
+        began = time.perf_counter()
+        photograph(renderer, case(number), asked.side, asked.samples)
+        sys.stdout.write(f"{number} {time.perf_counter() - began:.0f} s\n")
+        sys.stdout.flush()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,1 @@
+"""From a photograph of a face to its light and skin."""

@@ -1,0 +1,64 @@
+"""Light from all around that spherical harmonics of the second order hold: lobes that add up to all of it."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.environment.panorama import directions
+
+Floats = NDArray[np.float64]
+ROWS = 32
+"""Of the panoramas."""
+BASIS = 9
+"""Spherical harmonics up to the second order: what skin's soft shading can tell of light from all around."""
+_LOBES = 48
+_CANDIDATES = 400
+
+
+def lobe(towards: Floats, places: Floats) -> Floats:
+    """Radiance that falls off from 1 to 0 behind: the sharpest that second-order harmonics hold exactly.
+
+    towards : (k, 3) unit vectors of the middles
+    places : (..., 3) unit vectors
+    """
+    return np.asarray((0.5 + 0.5 * (places @ towards.T)) ** 2)
+
+
+@cache
+def middles() -> Floats:
+    """(9, 3) middles of lobes that all others are sums of, spread as far as a greedy choice has it."""
+    every = spread_directions(_CANDIDATES)
+    chosen = [int(np.argmax(every[:, 2]))]
+    for _ in range(BASIS - 1):  # the candidate that the lobes chosen so far describe worst
+        before = lobe(every[chosen], every)
+        left = lobe(every, every)
+        left = left - before @ np.linalg.lstsq(before, left, rcond=None)[0]
+        chosen.append(int(np.argmax((left**2).sum(axis=0))))
+    return every[chosen]
+
+
+@cache
+def mixtures() -> tuple[Floats, Floats]:
+    """(9, n) shares of the nine lobes that make up n others all around, and their middles (n, 3)."""
+    towards = spread_directions(_LOBES)
+    places = spread_directions(_CANDIDATES)
+    return np.linalg.lstsq(lobe(middles(), places), lobe(towards, places), rcond=None)[0], towards
+
+
+def spread_directions(count: int) -> Floats:
+    """(count, 3) unit vectors, each for an equal share of the sphere [Keinert2015]."""
+    index = np.arange(count) + 0.5
+    y = 1.0 - 2.0 * index / count
+    turn, radius = np.pi * (1.0 + np.sqrt(5.0)) * index, np.sqrt(1.0 - y**2)
+    return np.stack([radius * np.cos(turn), y, radius * np.sin(turn)], axis=-1)
+
+
+def panorama(strengths: Floats) -> Floats:
+    """(h, w) radiance of the nine lobes, which rounding leaves a little below 0 nowhere.
+
+    strengths : (9,)
+    """
+    return np.maximum(lobe(middles(), directions(ROWS, 2 * ROWS)) @ strengths, 0.0)

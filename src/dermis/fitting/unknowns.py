@@ -1,0 +1,137 @@
+"""What is looked for in a photograph, as numbers that steps can be taken in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.human.skin.painted import PaintedMaps
+from dermis.mesh.head import Head
+from dermis.scene.lights import DirectionalLight
+from dermis.scene.model import Scene
+from dermis.scene.skin import Pigments, Skin
+
+Floats = NDArray[np.float64]
+SUN_DEGREES = 0.53
+"""Angle that the sun spans, for shadows."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A number of the skin, looked for as its logarithm.
+
+    usual, spread : what it is believed to be before the photograph is seen: median and standard deviation of
+        the logarithm
+    low, high : limits
+    step : of finite differences, in the logarithm
+    """
+
+    name: str
+    usual: float
+    spread: float
+    low: float
+    high: float
+    step: float
+
+
+SKIN = (
+    Unknown("melanin", 0.03, 2.0, 0.0005, 0.6, 0.1),
+    Unknown("blood", 0.01, 0.7, 0.0005, 0.2, 0.15),
+    Unknown("roughness", 0.3, 0.35, 0.05, 1.0, 0.06),
+    Unknown("rho_s", 0.7, 0.5, 0.02, 1.0, 0.1),
+)
+"""Artist's beliefs, wide ones: the spread of melanin is that of all peoples, roughness that of the face's
+regions; strength is between a dry skin's and a smooth boundary's. `rho_s` is what oil changes."""
+TURN_STEP = 0.02
+"""Of finite differences of a sun's direction [rad]."""
+TURN_SPREAD = 1.0
+WHITE_SPREAD = 0.2
+"""Of the logarithm of red and of blue over green, where the light's colour is looked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """One value of everything but the strengths of lights.
+
+    logs : (4,) logarithms of `SKIN`
+    suns : (k, 3) unit vectors towards them
+    white : (2,) logarithms of red and blue over green of the light
+    """
+
+    logs: Floats
+    suns: Floats
+    white: Floats
+
+    def values(self) -> dict[str, float]:
+        """Of the skin, by name."""
+        return {one.name: float(np.exp(log)) for one, log in zip(SKIN, self.logs, strict=True)}
+
+    def moved(self, step: Floats) -> Point:
+        """Another, kept within the limits.
+
+        step : (4 + 2 k + 2,) of the logarithms, of the suns' directions along their tangents, of the white
+        """
+        skin, count = len(SKIN), len(self.suns)
+        low, high = np.log([one.low for one in SKIN]), np.log([one.high for one in SKIN])
+        turns = step[skin : skin + 2 * count].reshape(count, 2)
+        moved = self.suns + np.einsum("kt,ktc->kc", turns, tangents(self.suns))
+        return Point(
+            np.clip(self.logs + step[:skin], low, high),
+            moved / np.linalg.norm(moved, axis=1, keepdims=True),
+            self.white + step[skin + 2 * count :],
+        )
+
+
+def usual_point(suns: Floats) -> Point:
+    """Before the photograph is seen."""
+    return Point(np.log([one.usual for one in SKIN]), suns, np.zeros(2))
+
+
+def tangents(towards: Floats) -> Floats:
+    """(k, 2, 3) unit vectors at right angles to each direction (k, 3) and to each other."""
+    helper = np.where(np.abs(towards[:, 1:2]) < 0.9, (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
+    first = np.cross(helper, towards)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(towards, first)], axis=1)
+
+
+def skinned(scene: Scene, point: Point) -> Scene:
+    """The scene with this skin.
+
+    Painted people are painted with these pigments; other heads take the colour of the pigments' profile all
+    over, for what pigments a colour map was made of is not known.
+    """
+    found = point.values()
+    melanin, blood = found["melanin"], found["blood"]
+    changed = {"roughness": found["roughness"], "rho_s": found["rho_s"], "oiliness": 0.0}
+    if not isinstance(scene.head.maps, PaintedMaps):
+        own = (scene.skin.pigments or Pigments()).model_copy(update={"melanin": melanin, "blood": blood})
+        changed |= {"profile": "spectral", "pigments": own, "albedo": "profile"}
+        return replace(scene, skin=Skin(**(scene.skin.model_dump() | changed)))
+    own = (scene.skin.pigments or Pigments()).model_copy(update={"melanin": melanin, "blood": blood})
+    changed |= {"profile": "spectral", "pigments": own}
+    return replace(
+        scene, head=painted(scene.head, melanin, blood), skin=Skin(**(scene.skin.model_dump() | changed))
+    )
+
+
+def painted(head: Head, melanin: float, blood: float) -> Head:
+    """A painted person with these pigments."""
+    assert isinstance(head.maps, PaintedMaps)
+    look = replace(head.maps.look, melanin=melanin, blood=blood)
+    return replace(head, maps=replace(head.maps, look=look))
+
+
+def suns_of(towards: Floats, strengths: Sequence[float] | Floats, white: Floats) -> list[DirectionalLight]:
+    """Suns of a colour (3,) and strengths (k,), irradiance of what faces them."""
+    return [
+        DirectionalLight(
+            direction=tuple(-way),
+            irradiance=tuple(float(strength) * white),
+            angle_degrees=SUN_DEGREES,
+        )
+        for way, strength in zip(towards, strengths, strict=True)
+    ]
