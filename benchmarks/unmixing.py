@@ -56,7 +56,7 @@ def main(words: list[str]) -> int:
     device = open_device(asked.adapter)
     speed = {"adapter": device.adapter.name} | {str(side): speed_ms(device, side) for side in SIDES}
     if asked.speed:
-        print(json.dumps(speed))
+        sys.stdout.write(json.dumps(speed) + "\n")
         return 0
     told: dict[str, Any] = {"skins": SKINS, "noise": NOISE, "photons": _PHOTONS}
     told["known"] = {str(mm): known(replace(FACE, epidermis_mm=mm)) for mm in THICK_MM}
