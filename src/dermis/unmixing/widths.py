@@ -28,7 +28,7 @@ CORNERS = {"profile": (0, 0), "profile_blood": (0, -1), "profile_dark": (-1, -1)
 blood, dark with blood."""
 MAP = "profile_map"
 _NODES = 4  # along the logarithms of melanin and of blood
-_ENDS = 5.0, 95.0  # percentiles of the skin between which profiles are mixed
+_ENDS = 0.5, 99.5  # percentiles of the skin between which profiles are mixed
 _LEAST, _APART = 1e-3, 1.02  # of a share; of the ends
 _STIFF = 1e4  # of the equation that shares sum to 1
 
