@@ -7,6 +7,7 @@ by Monte Carlo; `unmixing_page.py` writes docs/fit.md from what comes out.
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import time
 from dataclasses import replace
@@ -36,6 +37,7 @@ from dermis.unmixing.unmix import unmix
 RESULTS = Path(__file__).parent / "results" / "unmixing.json"
 Floats = NDArray[np.float64]
 SKINS, TRIALS, NOISE, SEED = 200, 64, 0.01, 7
+SIDES = 1024, 2048, 4096
 BANDS = (0.0, 0.01, 0.05, 0.2, 0.5)
 THICK_MM = 0.05, 0.25
 _MELANIN, _BLOOD = (-2.5, -0.35), (-3.0, -1.0)  # decimal exponents
@@ -49,16 +51,19 @@ def main(words: list[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("-o", "--output", type=Path, default=RESULTS)
     parser.add_argument("--adapter", default="auto")
+    parser.add_argument("--speed", action="store_true", help="print the times alone, and write nothing")
     asked = parser.parse_args(words)
     device = open_device(asked.adapter)
+    speed = {"adapter": device.adapter.name} | {str(side): speed_ms(device, side) for side in SIDES}
+    if asked.speed:
+        sys.stdout.write(json.dumps(speed) + "\n")
+        return 0
     told: dict[str, Any] = {"skins": SKINS, "noise": NOISE, "photons": _PHOTONS}
     told["known"] = {str(mm): known(replace(FACE, epidermis_mm=mm)) for mm in THICK_MM}
     told["mistaken"] = mistaken()
     told["counted"] = counted()
     told["shading"] = shading(asked.adapter)
-    told["speed"] = {"adapter": device.adapter.name} | {
-        str(side): speed_ms(device, side) for side in (1024, 2048, 4096)
-    }
+    told["speed"] = speed
     write_figures(asked.output, told, 4)
     return 0
 

@@ -11,7 +11,6 @@ Sources: DonnerJensen2006, Jacques1998
 from dataclasses import replace
 
 import dermis
-from dermis.frame.painted import with_painted_maps
 from dermis.gallery.picture import main
 from dermis.unmixing.change import Change, Share
 
@@ -25,9 +24,7 @@ SKINS = {
 
 
 def draw(studio):
-    head = studio.head()
-    if head.maps.painted:  # the human's skin lies in no picture
-        head = with_painted_maps(studio.renderer.device, head, 1024)
+    head = studio.coloured_head()
     found, panels = dermis.unmix(head.maps.colour, adapter=studio.adapter), {}
     for name, change in SKINS.items():
         colour = found.recoloured(change, studio.adapter).clip(0.0, 1.0)

@@ -33,6 +33,7 @@ def unmix(
     epidermis_mm: float | None = None,
     noise: float = 0.01,
     shading: Annotated[bool, Parameter(negative="")] = False,
+    widths: Annotated[bool, Parameter(negative="")] = False,
     adapter: Adapter = "auto",
     as_json: Json = False,
 ) -> int:
@@ -49,6 +50,8 @@ def unmix(
         dermis unmix colour.jpg --melanin 0.15 -o tanned
 
         dermis unmix colour.jpg --blood x2 --oxygen 0.3 -o cold
+
+        dermis unmix colour.jpg --widths -o maps
 
         dermis unmix photographed.png --shading --find oxygen -o maps --json
 
@@ -78,6 +81,8 @@ def unmix(
         Standard deviation of a channel, relative; what is known of melanin and blood follows from it.
     shading:
         Take slow changes of brightness for light, and divide by them; shading.exr has them.
+    widths:
+        Write three diffusion profiles and the map that mixes them, for dermis render --profile-map.
     adapter:
         Which adapter computes: auto, cpu or part of a name.
     """
@@ -104,8 +109,16 @@ def unmix(
         )
     recoloured = None if change is None else found.recoloured(change, adapter)
     written = save(output, found, recoloured, linear=colour_map.suffix.lower() in (".exr", ".hdr"))
+    if widths:
+        written += _save_widths(output, found)
     _report(found, written, time.perf_counter() - started, as_json)
     return 0
+
+
+def _save_widths(folder: Path, found: Unmixed) -> list[Path]:
+    from dermis.unmixing.widths import save_widths, widths_of
+
+    return save_widths(folder, widths_of(found))
 
 
 def _change(

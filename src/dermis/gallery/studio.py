@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.frame.painted import with_painted_maps
 from dermis.frame.rendered import Rendered
 from dermis.frame.renderer import Renderer
 from dermis.mesh.head import Head
@@ -47,6 +48,11 @@ class Studio:
         options : of `load_head`
         """
         return self._load(name or self.name, subdivide=1, **options)
+
+    def coloured_head(self) -> Head:
+        """The head to show with its colours in a picture, also where the device paints them."""
+        head = self.head()
+        return with_painted_maps(self.renderer.device, head, 1024) if head.maps.painted else head
 
     def render(self, scene: Scene, scale: float = 1.0, **settings: Any) -> NDArray[np.uint8]:
         """(h, w, 3) sRGB bytes.

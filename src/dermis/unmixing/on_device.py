@@ -20,7 +20,7 @@ Told = Callable[[int, int], None]
 _FOLDER = Path(__file__).parent
 _SIDE = 96  # of the grid of first guesses
 _STEPS = 8
-_STRIP = 1 << 22  # texels, of 16 bytes each in seven textures
+_STRIP = 1 << 22  # texels, of 16 bytes each in five textures
 _TEXEL = "rgba32float"
 
 
@@ -33,6 +33,7 @@ class Unmixer:
     def __init__(self, device: Device, model: SkinModel, noise: float) -> None:
         self.device, self.model, self.noise = device, model, noise
         self._table = _table_of(device, model)
+        self._found: tuple[Any, Any] | None = None
         self._starts = device.space(8 * _SIDE**2, "first guesses")
         shader = _program(device, "unmix_start", model)
         frame = Frame(device, timed=False)
@@ -47,26 +48,31 @@ class Unmixer:
         made, unsure, residual = (np.empty((height, width, n), np.float32) for n in (3, 2, 3))
         for rows in strips(height, width):
             textures = self.strip(texture_from(self.device, _four(colours[rows]), _TEXEL, "colours"))
-            for whole, texture in zip((made, unsure, residual), textures, strict=True):
-                whole[rows] = download(self.device, texture)[..., : whole.shape[2]]
+            shares, left = (download(self.device, texture) for texture in textures)
+            made[rows, :, :2], unsure[rows] = shares[..., :2], shares[..., 2:]
+            made[rows, :, 2], residual[rows] = left[..., 3], left[..., :3]
             told(rows.stop, height)
         return made, unsure, residual
 
-    def strip(self, colours: Any) -> tuple[Any, Any, Any]:
-        """The three textures of what a texture's colours are made of."""
+    def strip(self, colours: Any) -> tuple[Any, Any]:
+        """Two textures of what a texture's colours are made of: see `record`."""
         frame = Frame(self.device, timed=False)
         made = self.record(frame, colours)
         frame.submit()
         return made
 
-    def record(self, frame: Frame, colours: Any) -> tuple[Any, Any, Any]:
-        """Record the pass that makes them, new ones, of a texture's colours."""
+    def record(self, frame: Frame, colours: Any) -> tuple[Any, Any]:
+        """Record the pass that finds, of a texture's colours, melanin, blood and their standard deviations,
+        and the residual with the third number; in textures that the next of the same size takes again.
+        """
         size = colours.size[:2]
         shader = _program(self.device, "unmix", self.model)
-        made, unsure, residual = (make_texture(self.device, size, _TEXEL) for _ in range(3))
-        bound = {"colours": colours, "made": made, "unsure": unsure, "residual": residual}
+        if self._found is None or self._found[0].size[:2] != size:
+            self._found = make_texture(self.device, size, _TEXEL), make_texture(self.device, size, _TEXEL)
+        shares, residual = self._found
+        bound = {"colours": colours, "shares": shares, "residual": residual}
         frame.compute("unmix", shader, bound | self._bound(shader, _STEPS), size)
-        return made, unsure, residual
+        return shares, residual
 
     def _bound(self, shader: ComputeProgram, steps: int) -> dict[str, Any]:
         record = _record(shader, self.model, self.noise, steps)

@@ -41,6 +41,7 @@ struct Found {
     system: System,
 }
 
+const DONE: f32 = 1e-4; // a step that ends the search: the next one would be a hundredth of it
 const CURVED: f32 = 1e-6; // added to curvatures, for nodes where a number does not show
 
 @group(0) @binding(0) var<uniform> model: Model;
@@ -88,21 +89,29 @@ fn weights_of(colour: vec3f) -> vec3f {
 fn system_at(x: vec3f, logs: vec3f, weights: vec3f) -> System {
     let there = slopes_at(x);
     let off = logs - there.logs;
-    let belief = 1.0 / (model.spread * model.spread);
-    let away = x.z - model.usual;
     let bled = (x.y - model.blood.x) / model.blood.y;
     let w = weights;
-    return System(
+    var found = System(
         dot(w, there.p * there.p) + CURVED,
         dot(w, there.p * there.q),
         dot(w, there.q * there.q) + 1.0 / (model.blood.y * model.blood.y),
-        dot(w, there.p * there.t),
-        dot(w, there.q * there.t),
-        dot(w, there.t * there.t) + belief,
-        vec3f(dot(w, there.p * off), dot(w, there.q * off) - bled / model.blood.y, dot(w, there.t * off) - belief * away),
-        dot(w, off * off) + belief * away * away + bled * bled,
+        0.0,
+        0.0,
+        1.0,
+        vec3f(dot(w, there.p * off), dot(w, there.q * off) - bled / model.blood.y, 0.0),
+        dot(w, off * off) + bled * bled,
         off,
     );
+    if (SHADE || THIRDS > 1u) {
+        let belief = 1.0 / (model.spread * model.spread);
+        let away = x.z - model.usual;
+        found.pt = dot(w, there.p * there.t);
+        found.qt = dot(w, there.q * there.t);
+        found.tt = dot(w, there.t * there.t) + belief;
+        found.down.z = dot(w, there.t * off) - belief * away;
+        found.cost += belief * away * away;
+    }
+    return found;
 }
 
 // The third number follows from the others at each step, which leaves a system of two.
@@ -136,10 +145,14 @@ fn solved(start: vec3f, logs: vec3f, weights: vec3f) -> Found {
         let x = clamp(best + step_of(there, best, damping), low, high);
         let s = system_at(x, logs, weights);
         let better = s.cost <= there.cost;
+        let done = all(abs(x - best) < vec3f(DONE));
         damping *= select(16.0, 0.1, better);
         if (better) {
             best = x;
             there = s;
+        }
+        if (done) {
+            break;
         }
     }
     return Found(best, there);

@@ -110,9 +110,13 @@ class Unmixed:
         factors, added = change.over(self._median(self.melanin), self._median(self.blood))
         return recoloured(device, target, made, self.residual, factors, added)
 
+    def skin_texels(self) -> NDArray[np.bool_]:
+        """(h, w) whether a texel's colour is near one of the model's."""
+        return np.asarray(np.abs(np.log(np.maximum(self.residual, _BLACK))).max(axis=-1) < _LIKE_SKIN)
+
     def _median(self, share: Pixels) -> float:
         """Over the skin of the model."""
-        skin = np.abs(np.log(np.maximum(self.residual, _BLACK))).max(axis=-1) < _LIKE_SKIN
+        skin = self.skin_texels()
         return float(np.median(share[skin] if skin.any() else share))
 
 

@@ -1,0 +1,34 @@
+"""Widths of scattering that follow maps of melanin and blood."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dermis.errors import DermisError
+from dermis.frame.profile_mixture import load_shares
+from dermis.optics.profiles import load_profile
+from dermis.unmixing.model import skin_model
+from dermis.unmixing.unmix import unmix
+from dermis.unmixing.widths import CORNERS, save_widths, widths_of
+
+
+def test_profiles_follow_melanin_and_blood(tmp_path: Path) -> None:
+    m, b = (one.ravel() for one in np.meshgrid(np.geomspace(0.01, 0.1, 24), np.geomspace(0.003, 0.04, 24)))
+    found = unmix(skin_model().colours(m, b).reshape(24, 24, 3), adapter="cpu")
+    made = widths_of(found)
+    assert (made.error < 0.5 * made.alone).all() and made.error.max() < 0.12
+    for corner, share in (((0, 0), (0, 0)), ((-1, 0), (1, 0)), ((-1, -1), (0, 1))):
+        np.testing.assert_allclose(made.shares[corner], share, atol=0.02)
+    written = save_widths(tmp_path, made)
+    np.testing.assert_allclose(load_shares(str(written[-1])), made.shares, atol=1e-6)
+    read = [load_profile(tmp_path / f"{name}.toml") for name in CORNERS]
+    spread = [(one.variance_mm2 @ (one.weight / one.albedo))[0] for one in read]
+    assert spread[0] > spread[1] > spread[2]  # blood shortens the way of red light, and so does melanin
+
+
+def test_what_is_no_skin_has_no_widths() -> None:
+    with pytest.raises(DermisError, match="no texel is like skin"):
+        widths_of(unmix(np.zeros((4, 4, 3)), adapter="cpu"))
