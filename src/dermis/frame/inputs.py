@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -173,12 +173,14 @@ class Split:
 
     relit, total : (3,) weight of the level that is not blurred, and of all
     blurred_mm2, weight : (k,) and (k, 3) of the blurred levels
+    fine : members of the shader's struct Fine, none where the picture shows what texels hold
     """
 
     relit: Floats
     total: Floats
     blurred_mm2: Floats
     weight: Floats
+    fine: dict[str, Any] = field(default_factory=dict)
 
 
 def pinhole(camera: Camera, head: Head, settings: Settings) -> Pinhole:
@@ -216,6 +218,8 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Sp
         material_colour=colours,
         jitter=jitter,
     )
+    for name, value in split.fine.items():
+        record["fine"][name] = value
     if head.eyes is not None:
         fill_eye(record["eyes"], head.eyes.look)
         record["eyes"]["material"] = head.eyes.material
