@@ -207,6 +207,8 @@ def view_record(shade: ComputeProgram, head: Head, settings: Settings, split: Sp
         material_colour=colours,
         jitter=jitter,
     )
+    for name, value in split.fine.items():
+        record["fine"][name] = value
     if head.eyes is not None:
         fill_eye(record["eyes"], head.eyes.look)
         record["eyes"]["material"] = head.eyes.material

@@ -90,6 +90,7 @@ class Split:
     relit, total : (3,) weight of the level that is not blurred, and of all
     blurred_mm2, weight : (k,) and (k, 3) of the blurred levels
     others : the same of profiles that a map mixes into this one, of the same Gaussians
+    fine : members of the shader's struct Fine, none where the picture shows what texels hold
     """
 
     relit: Floats
@@ -97,6 +98,7 @@ class Split:
     blurred_mm2: Floats
     weight: Floats
     others: tuple[Split, ...] = ()
+    fine: dict[str, Any] = field(default_factory=dict)
 
     @property
     def relit_changes(self) -> Floats:

@@ -28,11 +28,13 @@ class Kind(Generic[L]):
     always : whether all shaders have it; others are compiled only for scenes that use them
     narrow : whether all of it comes from its position or along its direction; else it is an area light
     round : whether it is a disc as seen from the head, not a rectangle
+    sheet : whether it is a Gaussian across `half_u`, so that details finer than texels are known
     """
 
     always = False
     narrow = True
     round = True
+    sheet = False
 
     @property
     def shader(self) -> Path:

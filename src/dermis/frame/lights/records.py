@@ -157,6 +157,7 @@ def _members(light: Light, centre: Triple, view: ShadowView | None, siblings: in
         "parallel": parallel,
         "round": kind.round,
         "narrow": kind.narrow,
+        "sheet": kind.sheet,
         "irradiance": light.irradiance,
         "direction": unit(along),
         "position": place,

@@ -12,6 +12,8 @@ from dermis.scene.lights import StripeLight
 
 
 class _Stripe(Kind[StripeLight]):
+    sheet = True
+
     def members(self, light: StripeLight, centre: Triple, distance: float) -> dict[str, Any]:
         right, up, _ = frame_of(np.array(light.direction), np.array(light.up))
         across, along = 2.0 * right / light.width_mm, 2.0 * up / light.length_mm

@@ -1,8 +1,18 @@
 // A sheet of parallel light: a Gaussian across it, 1/e^2 at its edges; even along it.
 
+const STRIPE_VARIANCE: f32 = 0.25; // over the square of the half width
+
+// Share of the middle's light at a distance from it, over the half width; averaged by a Gaussian of the added variance.
+fn stripe_across(distance: f32, added: f32) -> f32 {
+    let variance = STRIPE_VARIANCE + added;
+    return sqrt(STRIPE_VARIANCE / variance) * exp(-0.5 * distance * distance / variance);
+}
+
+fn stripe_along(light: Light, p: vec3f) -> f32 {
+    return 1.0 - smoothstep(0.95, 1.0, abs(dot(p - light.position, light.half_v)));
+}
+
 fn stripe_incident(light: Light, p: vec3f, part: u32) -> Incident {
-    let d = p - light.position;
-    let across = dot(d, light.half_u);
-    let share = exp(-2.0 * across * across) * (1.0 - smoothstep(0.95, 1.0, abs(dot(d, light.half_v))));
-    return Incident(-light.direction, light.irradiance * share);
+    let across = stripe_across(dot(p - light.position, light.half_u), area_variance(light.half_u));
+    return Incident(-light.direction, light.irradiance * (across * stripe_along(light, p)));
 }

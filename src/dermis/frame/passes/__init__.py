@@ -8,6 +8,7 @@ from pathlib import Path
 from dermis import specular
 from dermis.frame.atlas_textures import atlas_numbers
 from dermis.frame.baked_numbers import baking_numbers
+from dermis.frame.fine_light import fine_numbers
 from dermis.frame.levels import FLOATS, HALVES, usual_texel
 from dermis.frame.lights import light_numbers
 from dermis.frame.lights.kind import light_shaders
@@ -38,6 +39,7 @@ SHARED_SHADERS = ShaderFolder(
         **strand_numbers(),
         **meter_numbers(),
         **baking_numbers(),
+        **fine_numbers(),
     },
 )
 TILE = 16

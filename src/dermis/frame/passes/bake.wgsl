@@ -29,7 +29,9 @@ fn met_from_above(triangle: u32, weights: vec3f) -> Met {
     }
     let open = open_sky(point, t, weights);
     let film = Film(surface.normal, vec3f(0.0));
-    var met = Met(point, surface, film, vec3f(1.0), surface.normal, baking.footprint, open);
+    let side = f32(textureDimensions(scattered).x);
+    let texel = texel_axes(triangle, corner_at(t.x), corner_at(t.y), corner_at(t.z), side);
+    var met = Met(point, surface, film, vec3f(1.0), surface.normal, baking.footprint, open, texel);
     if (EYES) {
         made_true(&met);
     }

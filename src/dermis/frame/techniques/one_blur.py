@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dermis.frame.levels import Split
+from dermis.frame.techniques.technique import AtlasTechnique
 from dermis.frame.techniques.texture_space import TextureSpace
 from dermis.optics.fits.gaussian import single_gaussian
 from dermis.optics.gaussians import GaussianSum
@@ -18,6 +20,10 @@ class OneBlur(TextureSpace):
     def gaussians(self, profile: GaussianSum) -> GaussianSum:
         """The one Gaussian."""
         return single_gaussian(profile)
+
+    def split(self, profile: GaussianSum, white: bool) -> Split:
+        """The blur alone: texels are shown as they are."""
+        return AtlasTechnique.split(self, profile, white)
 
     def relights(self, profile: GaussianSum) -> bool:
         """No: it blurs all light."""

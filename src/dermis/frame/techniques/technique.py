@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.atlas_textures import AtlasTextures
+from dermis.frame.fine_light import TEXEL_AREA
 from dermis.frame.inputs import Inputs
 from dermis.frame.levels import (
     FLOATS,
@@ -170,7 +171,7 @@ class AtlasTechnique(Technique):
             return resources.scattered
         levels, layouts, mixture = resources.levels, inputs.layouts, resources.mixture
         for number, (layout, blur) in enumerate(zip(layouts, inputs.blurs, strict=True)):
-            into = levels.layer(0), levels.size, levels.texel, blur.scale
+            into = levels.layer(0), levels.size, levels.texel, blur.scale, TEXEL_AREA
             graph.repeat(stretch.draw, layout.head, layout.atlas)
             if layout.walked:
                 graph.repeat(gutters.draw, layout.atlas, layout.walked.walks, layout.walked.head)

@@ -9,9 +9,11 @@ import numpy as np
 
 from dermis.frame.atlas_textures import AtlasTextures
 from dermis.frame.blur_chain import lead_up
+from dermis.frame.fine_light import fine_levels
 from dermis.frame.levels import Blur, Levels, Split
 from dermis.frame.passes import diffuse
 from dermis.frame.techniques.technique import AtlasTechnique
+from dermis.optics.gaussians import GaussianSum
 
 
 class TextureSpace(AtlasTechnique):
@@ -20,6 +22,12 @@ class TextureSpace(AtlasTechnique):
     sources = ("dEonLuebke2007", "Geusebroek2003")
     transmits = True
     mixes = True
+
+    def split(self, profile: GaussianSum, white: bool) -> Split:
+        """What is lit again, the Gaussians that blur, and what the picture adds to light on texels."""
+        split = super().split(profile, white)
+        relit_mm2 = float(profile.variance_mm2[0]) if self.relights(profile) else 0.0
+        return replace(split, fine=fine_levels(split.blurred_mm2, split.weight, relit_mm2))
 
     def chain(self, split: Split, atlas: AtlasTextures, edge: str) -> tuple[Split, tuple[int, ...]]:
         """The split with the levels between that make the blurs cheaper."""

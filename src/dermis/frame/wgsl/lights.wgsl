@@ -34,6 +34,7 @@ struct Light {
     parallel: u32, // 1 where its map has no perspective
     round: u32, // 1 where it is a disc on its map, 0 for a square
     narrow: u32, // 1 where all of it comes from its position or, in parallel light, along its direction
+    sheet: u32, // 1 where it is a Gaussian across half_u, whose blurs are known
 }
 
 struct Lights {
@@ -44,6 +45,17 @@ struct Lights {
 @group(0) @binding(11) var<uniform> lights: Lights;
 @group(0) @binding(12) var shadow_maps: texture_2d_array<f32>; // depth: 1 near, 0 nothing
 @group(0) @binding(25) var shadow_bounds: texture_2d_array<f32>; // nearest depths in squares, see shadow_bounds.wgsl
+
+// Light finer than what looks at it is averaged: standard deviations of that area along two ways [mm]; 0 for a point.
+var<private> area_u: vec3f;
+var<private> area_v: vec3f;
+
+// Variance of the area along an axis [mm^2 times the square of the axis' length].
+fn area_variance(axis: vec3f) -> f32 {
+    let u = dot(area_u, axis);
+    let v = dot(area_v, axis);
+    return u * u + v * v;
+}
 
 struct Incident {
     direction: vec3f, // to the light

@@ -7,6 +7,7 @@
 //#include "footprint.wgsl"
 //#include "pre_integrated.wgsl"
 //#include "packed_shares.wgsl"
+//#include "fine_light.wgsl"
 
 override SPLIT: bool = false; // whether light below the skin is kept apart, to spread over the picture
 override MIXED: bool = false; // whether a map mixes profiles: `scattered` then has their shares beside the light
@@ -26,6 +27,7 @@ struct Shade {
     total: vec3f, // weight of all levels
     shown: vec2f, // factors of the light from below and of the reflected light
     pre: PreIntegrated,
+    fine: Fine,
     eyes: array<Eye, 2>,
     lids: array<vec4f, 112>, // edges of the lids around each eye, in its own space, half of them each; see human/lid_rings.csv
     material_colour: array<vec4f, 64>,
@@ -44,6 +46,7 @@ struct Met {
     v: vec3f, // towards the viewer
     footprint: f32, // share of the maps' side
     open: f32, // share of the sky that it sees
+    texel: TexelAxes, // where there is light finer than texels
 }
 
 struct Shaded {
@@ -84,7 +87,13 @@ fn shaded_skin(met: Met, lit: Lit, out: f32) -> Shaded {
     if (PRE_INTEGRATED) {
         below = shade.total * pre_integrated(point, surface, met.footprint, met.open) * share;
     } else if ((point.flags & MAPPED) != 0u) {
-        below = relit_at(point.place) * below + load_bilinear(scattered, point.place).rgb;
+        let relit = relit_at(point.place);
+        below = relit * below + load_bilinear(scattered, point.place).rgb;
+        if (STRIPE_LIGHT) {
+            let side = vec2f(textureDimensions(scattered));
+            below += share * finer_light(point, surface, met.texel, shade.fine, relit, side);
+            below = max(below, vec3f(0.0));
+        }
     } else {
         below *= shade.total;
     }
@@ -135,7 +144,17 @@ fn met_at(triangle: u32, place: vec2f, share: f32, size: vec2f) -> Met {
     } else {
         surface = surface_at(point, footprint);
     }
-    var met = Met(point, surface, Film(surface.normal, vec3f(0.0)), vec3f(1.0), v, footprint, open);
+    var texel: TexelAxes;
+    if (STRIPE_LIGHT) {
+        texel = texel_axes(triangle, a, b, c, f32(textureDimensions(scattered).x));
+        // The variance of as many samples as are shaded together.
+        let samples = max(1.0, round(share * f32(shade.samples)));
+        let deviation = sqrt((1.0 - 1.0 / samples) / 12.0);
+        area_u = deviation * (wx.x * a.position + wx.y * b.position + wx.z * c.position);
+        area_v = deviation * (wy.x * a.position + wy.y * b.position + wy.z * c.position);
+    }
+    let film = Film(surface.normal, vec3f(0.0));
+    var met = Met(point, surface, film, vec3f(1.0), v, footprint, open, texel);
     if (EYES) {
         made_true(&met);
     }
