@@ -65,7 +65,7 @@ fn passed(depth2: f32, aside2: f32, along2: f32, area: f32) -> vec3f {
         let disc = max(1.0 - exp(-0.5 * edge2 / w), LEAST_DISC);
         let along = exp(-0.5 * along2 / w);
         if (SLABS) {
-            sum += (through(k, row) * (exp(-0.5 * aside2 / w) / disc) - gaussian.rgb * along) / w;
+            sum += (through(k, row) * (exp(-0.5 * aside2 / w) / disc)) / w;
         } else {
             let straight = exp(-0.5 * (depth2 / gaussian.w + aside2 / w)) / disc;
             sum += gaussian.rgb * max(0.0, straight - along) / w;
