@@ -45,7 +45,8 @@ class Translucency:
     receiver_points, source_points : buffers of where the pairs' places are
     weights : buffer of the share of light that each pair lets pass
     gathered : buffer for the light of the sources
-    evenly : buffer for the same of sources that all give 1
+    evenly : buffer of the same for sources that all give 1
+    slants : buffer of how much of the sources' light passes deep slabs, by its directions
     weighing, losing : records of translucency_weights.wgsl for what a profile lets pass and for what it
         therefore does not return
     gaussians, slabs : how many these have, and whether they have tables by thickness
@@ -59,6 +60,7 @@ class Translucency:
     weights: Any
     gathered: Any
     evenly: Any
+    slants: Any
     weighing: Any = None
     losing: Any = None
     gaussians: int = 0

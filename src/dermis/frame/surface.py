@@ -16,6 +16,7 @@ from dermis.mesh.eyes import EyeLook
 from dermis.mesh.maps import Maps
 from dermis.optics.directions import directions
 from dermis.optics.gaussians import GaussianSum
+from dermis.optics.thin_parts import across
 from dermis.scene.skin import USUAL_ROUGHNESS, Skin
 from dermis.specular.albedo import ROOT_OF_FIRST_ROW
 from dermis.specular.energy import ENERGY
@@ -110,13 +111,15 @@ def half_space_of(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Floats,
 
 def _by_direction(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any]:
     """Members that direction.wgsl reads, for half-spaces of the skin's mean colour."""
-    law = directions(*half_space_of(skin, maps, profile))
+    half_space = half_space_of(skin, maps, profile)
+    law = directions(*half_space)
     return {
         "inner_eta": law.eta,
         "mean_once": law.mean_once,
         "once": law.once,
         "back_from_everywhere": law.from_everywhere,
         "back": np.pad(law.returned, ((0, 0), (0, 1))),
+        "across": np.pad(across(*half_space), ((0, 0), (0, 1))),
     }
 
 

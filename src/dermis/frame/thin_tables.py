@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,4 +31,5 @@ def _made(
     """Tables as weights of the blurred levels, which alone lose what passes."""
     reach = min(_REACH * float(np.sqrt(variance_mm2[-1])), _FARTHEST_MM)
     made = thin_parts(medium_of(profile, colour, eta), variance_mm2, reach)
-    return ThinParts(reach, made.through * total, made.lost * (total / weight.sum(axis=0)))
+    lost = made.lost * (total / weight.sum(axis=0))
+    return replace(made, through=made.through * total, lost=lost)

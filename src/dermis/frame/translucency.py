@@ -167,6 +167,7 @@ def _unweighed(device: Device, surface: Resources, pairs: PairBuffers) -> Transl
         receiver_points=scratch(device, space(device, receivers, RECEIVER_BYTES)),
         source_points=space(device, sources, SOURCE_BYTES),
         weights=space(device, pairs.count, 8),
-        gathered=scratch(device, space(device, sources, 8)),
-        evenly=device.buffer(np.tile(_ONE, (max(sources, 1), 1)), "STORAGE"),
+        gathered=scratch(device, space(device, sources, 16)),
+        slants=scratch(device, space(device, sources, 8)),
+        evenly=device.buffer(np.tile(_ONE, (max(sources, 1), 2)), "STORAGE"),
     )

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dermis.optics.diffusion import hankel, layered_diffusion
 from dermis.optics.diffusion.boundary import mismatch
+from dermis.optics.directions import ROWS as DIRECTIONS
+from dermis.optics.directions import refracted
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Layer, Medium
 from dermis.optics.slabs import Slabs, slabs
@@ -19,6 +22,7 @@ ROWS = 32
 """Thicknesses of the tables."""
 _MOST_ALBEDO, _LEAST_ALBEDO = 1.0 - 1e-6, 1e-3
 _LOGS = (-14.0, 14.0)  # of frequencies that are searched [1/mm]
+_LAW_DEPTH = 10.0  # mean free paths from which on directions of entry count alike
 _DEEP = 60.0  # mean free paths that are as good as a half-space
 _FREQUENCIES = np.geomspace(0.02, 5.0, 24)  # at which shapes are compared [1/mean free path]
 
@@ -32,11 +36,13 @@ class ThinParts:
     reach_mm : thickness of the last row; that of the first is 0
     through : (ROWS, k, 3) that leave on the far side [-]
     lost : (ROWS, k, 3) share that no longer leaves on the near side, spread as what leaves on the far one [-]
+    deep : (ROWS,) how far directions of entry count as in deep slabs, see `across` [-1, 1]
     """
 
     reach_mm: float
     through: Floats
     lost: Floats
+    deep: Floats
 
 
 def medium_of(profile: GaussianSum, total: Floats, eta: float) -> Medium:
@@ -62,28 +68,60 @@ def thin_parts(body: Medium, variance_mm2: Floats, reach_mm: float) -> ThinParts
     variance_mm2 : (k,) of the Gaussians that spread light
     reach_mm : largest thickness of use
 
-    How much goes through is exact, for uniform light from all directions; how wide it spreads is layered
-    diffusion's, for light from above.
+    How much goes through is exact, for uniform light from all directions, as its change with direction nearly
+    is; how wide it spreads is layered diffusion's, for light from above.
 
     Sources: [Chandrasekhar1960] for the amounts, [Kienle1998] for the widths.
     """
     depth = reach_mm * np.linspace(0.0, 1.0, ROWS) ** 2
     through, lost = np.zeros((2, ROWS, len(variance_mm2), body.channels))
+    deep, weight = np.zeros((2, ROWS, body.channels))
     for c in range(body.channels):
         one = body.channel(c)
-        passed, gone = _shares(one.layers[0], depth[1:], body.eta)
+        passed, gone, deep[1:, c] = _shares(one.layers[0], depth[1:], body.eta)
+        weight[1:, c] = passed
         shape = _shapes(one, depth[1:], variance_mm2)
         through[1:, :, c], lost[1:, :, c] = passed[:, None] * shape, gone[:, None] * shape
         lost[0, :, c] = shape[0]
-    return ThinParts(reach_mm, through, lost)
+    deep[0], weight[0] = deep[1], weight[1]
+    mean = (weight * deep).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-12)
+    return ThinParts(reach_mm, through, lost, np.clip(mean, -1.0, 1.0))
 
 
-def _shares(layer: Layer, depth_mm: Floats, eta: float) -> tuple[Floats, Floats]:
-    """What comes through, over what a half-space returns; and the share of that which is no longer returned."""
+def across(total: Floats, eta: float) -> Floats:
+    """(directions.ROWS, c) what passes deep slabs from a direction, over what does of uniform light.
+
+    Both for light of which as much comes back; by evenly spaced roots of the cosine, as `directions` has it.
+
+    total : (c,) that the half-space returns of what enters perpendicularly [-]
+    """
+    cosine = refracted(np.linspace(0.0, 1.0, DIRECTIONS) ** 2, eta)
+    laws = [_law(_albedo_of(float(share), eta), eta) for share in total]
+    return np.stack([np.interp(cosine, *law) for law in laws], axis=-1)
+
+
+@lru_cache(maxsize=64)
+def _law(albedo: float, eta: float) -> tuple[Floats, Floats]:
+    """Cosines of entry below the surface, and what passes deep slabs as `across` has it."""
+    whole = slabs(albedo, _DEEP, eta)
+    slanted = _slanted(slabs(albedo, _LAW_DEPTH, eta), whole)[0]
+    return whole.cosine, slanted
+
+
+def _slanted(cut: Slabs, whole: Slabs) -> Floats:
+    """(n, m) what passes from each direction over what comes back from there, both over those of uniform light."""
+    returned = whole.back[0] / _uniform(whole, whole.back)
+    return np.asarray(cut.through / _uniform(cut, cut.through)[:, None] / returned)
+
+
+def _shares(layer: Layer, depth_mm: Floats, eta: float) -> tuple[Floats, Floats, Floats]:
+    """What comes through, over what a half-space returns; the share of that which is no longer returned; deepness."""
     albedo, extinction = float(layer.alpha_prime[0]), float(layer.sigma_t_prime[0])
     cut, whole = slabs(albedo, extinction * depth_mm, eta), slabs(albedo, _DEEP, eta)
-    returned = _uniform(whole, whole.back)
-    return _uniform(cut, cut.through) / returned, 1.0 - _uniform(cut, cut.back) / returned
+    returned, law = _uniform(whole, whole.back), _law(albedo, eta)[1] - 1.0
+    weight = whole.flux * whole.back[0]
+    deep = (_slanted(cut, whole) - 1.0) @ (weight * law) / (weight * law**2).sum()
+    return _uniform(cut, cut.through) / returned, 1.0 - _uniform(cut, cut.back) / returned, deep
 
 
 def _uniform(of: Slabs, share: Floats) -> Floats:

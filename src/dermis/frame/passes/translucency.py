@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from dermis.frame.atlas_layout import Translucency
+from dermis.frame.atlas_layout import AtlasLayout, Translucency
 from dermis.frame.levels import Blur, Levels
 from dermis.frame.passes import each, program
 from dermis.gpu import Constants, Recorder
@@ -35,11 +35,30 @@ def draw(graph: Recorder, levels: Levels, blur: Blur, thin: Translucency, consta
         "entering": record,
         "levels": levels.stacks[halved],
         "source_points": thin.source_points,
+        "slants": thin.slants if thin.slabs else thin.evenly,
         "gathered": thin.gathered,
     }
     graph.dispatch("translucency", gather, entering, each(pairs.sources[1], _GATHERING))
     add_up(graph, thin, thin.gathered, pairs.light, constants)
     return pairs.light
+
+
+def draw_slants(graph: Recorder, layout: AtlasLayout, constants: Constants) -> None:
+    """How much of the light where sources lie passes deep slabs.
+
+    constants : pipeline constants of the lights
+    """
+    thin = layout.translucency
+    assert thin is not None
+    shader, count = program(graph.device, "translucency_slants.wgsl", constants), thin.pairs.sources[1]
+    bound = {
+        **layout.lit,
+        "surfaces": layout.surfaces,
+        "slanted": shader.record("Slanted", sources=count),
+        "source_points": thin.source_points,
+        "slants": thin.slants,
+    }
+    graph.dispatch("translucency", shader, bound, each(count, _GATHERING))
 
 
 def add_up(

@@ -1,5 +1,6 @@
 // Light that comes through thin parts, summed where it leaves: a team of invocations for each receiver.
 //#include "light_words.wgsl"
+//#include "pair_words.wgsl"
 
 override SIZE: u32 = 128u; // invocations of a workgroup
 override TEAM: u32 = 32u; // invocations of a receiver: a power of two up to SIZE
@@ -12,8 +13,8 @@ struct Receiver {
 }
 
 @group(0) @binding(0) var<storage, read> receivers: array<Receiver>; // those with most pairs first
-@group(0) @binding(1) var<storage, read> weights: array<vec2u>; // source, and the share of its light, as in translucency_weights.wgsl
-@group(0) @binding(2) var<storage, read> gathered: array<vec2u>; // as in light_words.wgsl
+@group(0) @binding(1) var<storage, read> weights: array<vec2u>; // source and depth, and the share of its light, as in translucency_weights.wgsl
+@group(0) @binding(2) var<storage, read> gathered: array<vec4u>; // light, and what passes deep slabs of it, as in light_words.wgsl
 @group(0) @binding(3) var transmitted: texture_storage_2d<rgba32float, write>;
 
 var<workgroup> part: array<vec3f, SIZE>;
@@ -26,7 +27,10 @@ fn decoded(word: u32) -> vec3f {
 
 fn passed(k: u32, end: u32) -> vec3f {
     let pair = weights[min(k, end - 1u)];
-    return select(0.0, 1.0, k < end) * decoded(pair.y) * light_of(gathered[pair.x]);
+    let source = gathered[pair.x & SOURCE];
+    let light = light_of(source.xy);
+    let deep = f32(bitcast<i32>(pair.x) >> SOURCE_BITS) / DEEPEST;
+    return select(0.0, 1.0, k < end) * decoded(pair.y) * max(light + deep * (light_of(source.zw) - light), vec3f(0.0));
 }
 
 // Several pairs at once, to hide the latency of memory.

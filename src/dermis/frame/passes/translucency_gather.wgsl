@@ -13,7 +13,8 @@ struct Entering {
 @group(0) @binding(0) var<uniform> entering: Entering;
 @group(0) @binding(1) var levels: texture_2d_array<f32>;
 @group(0) @binding(2) var<storage, read> source_points: array<Source>;
-@group(0) @binding(3) var<storage, read_write> gathered: array<vec2u>; // as in light_words.wgsl
+@group(0) @binding(3) var<storage, read> slants: array<vec2u>; // as translucency_slants.wgsl has them
+@group(0) @binding(4) var<storage, read_write> gathered: array<vec4u>; // light, and what passes deep slabs of it, as in light_words.wgsl
 
 const SIZE: u32 = 64u; // of a workgroup
 
@@ -38,5 +39,5 @@ fn main(
     let w = entering.scale * bilinear_weights(place);
     let light = w.x * level_at(a) + w.y * level_at(a + vec2i(1, 0)) + w.z * level_at(a + vec2i(0, 1))
         + w.w * level_at(a + vec2i(1, 1));
-    gathered[index] = light_words(light.rgb);
+    gathered[index] = vec4u(light_words(light.rgb), light_words(light.rgb * light_of(slants[index])));
 }

@@ -63,6 +63,7 @@ def weighing(
     through = np.zeros((ROWS * MOST_GAUSSIANS, 4), np.float32)
     if thin is not None and passing is not None:
         through[: ROWS * len(weight), :3] = passing.reshape(-1, 3)
+        through[: ROWS * len(weight) : len(weight), 3] = thin.deep
     gaussian = np.zeros((MOST_GAUSSIANS, 4), np.float32)
     gaussian[: len(weight), :3], gaussian[: len(weight), 3] = weight, variance_mm2
     return _shader(device, len(weight), thin is not None).record(

@@ -1,5 +1,6 @@
 // How much light passes through the flesh between translucent pairs, beyond what the blurs carry round.
 //#include "translucent_pair.wgsl"
+//#include "pair_words.wgsl"
 
 override COUNT: u32 = 8u; // Gaussians; as a constant, so that software adapters unroll the loop
 override SLABS: bool = false; // whether a table says what passes each thickness; else a Gaussian of the straight distance does
@@ -13,14 +14,14 @@ struct Weighing {
     grain: f32, // least variance that is added, over that or the source's own area: it hides their pattern
     reach_mm: f32, // thickness of the table's last row
     gaussian: array<vec4f, 24>, // weight per channel of what the blurs bring, variance [mm^2]
-    through: array<vec4f, 768>, // weights of what passes: COUNT of each row, evenly spaced by the root of the thickness
+    through: array<vec4f, 768>, // weights of what passes: COUNT of each row, evenly spaced by the root of the thickness; the first's w: how deep it is, as pair_word takes it
 }
 
 @group(0) @binding(0) var<uniform> weighing: Weighing;
 @group(0) @binding(1) var<storage, read> pairs: array<u32>; // three words: source, receiver, offset in the map [1/8 texel]
 @group(0) @binding(2) var<storage, read> receiver_points: array<Receiver>;
 @group(0) @binding(3) var<storage, read> source_points: array<Source>;
-@group(0) @binding(4) var<storage, read_write> weights: array<vec2u>; // source; share of its light, as encoded says
+@group(0) @binding(4) var<storage, read_write> weights: array<vec2u>; // source and depth as in pair_words.wgsl; share of its light, as encoded says
 
 const ROW: u32 = 1024u; // of the pairs, as they are spread over invocations
 const PI: f32 = 3.14159265358979;
@@ -53,11 +54,21 @@ fn through(k: u32, row: f32) -> vec3f {
     return mix(near, weighing.through[(low + 1u) * COUNT + k].rgb, row - f32(low));
 }
 
+fn row_of(depth2: f32) -> f32 {
+    return f32(ROWS - 1u) * sqrt(min(sqrt(depth2) / weighing.reach_mm, 1.0));
+}
+
+fn deep_at(depth2: f32) -> f32 {
+    let row = row_of(depth2);
+    let low = min(u32(row), ROWS - 2u);
+    return mix(weighing.through[low * COUNT].w, weighing.through[(low + 1u) * COUNT].w, row - f32(low));
+}
+
 // A Gaussian of the distance sqrt(t^2 + r^2) is exp(-t^2 / 2v) G(v, r) [dEonLuebke2007]; what is already in the sources'
 // light need not be added. The blur along the surface has brought its own share: that is taken off.
 fn passed(depth2: f32, aside2: f32, along2: f32, area: f32) -> vec3f {
     let edge2 = max(weighing.radius_mm * weighing.radius_mm - depth2, 0.0);
-    let row = f32(ROWS - 1u) * sqrt(min(sqrt(depth2) / weighing.reach_mm, 1.0));
+    let row = row_of(depth2);
     var sum = vec3f(0.0);
     for (var k = 0u; k < COUNT; k++) {
         let gaussian = weighing.gaussian[k];
@@ -65,7 +76,7 @@ fn passed(depth2: f32, aside2: f32, along2: f32, area: f32) -> vec3f {
         let disc = max(1.0 - exp(-0.5 * edge2 / w), LEAST_DISC);
         let along = exp(-0.5 * along2 / w);
         if (SLABS) {
-            sum += (through(k, row) * (exp(-0.5 * aside2 / w) / disc) - gaussian.rgb * along) / w;
+            sum += (through(k, row) * (exp(-0.5 * aside2 / w) / disc)) / w;
         } else {
             let straight = exp(-0.5 * (depth2 / gaussian.w + aside2 / w)) / disc;
             sum += gaussian.rgb * max(0.0, straight - along) / w;
@@ -89,5 +100,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let depth2 = lie.depth * lie.depth;
     let along2 = along2_of(pairs[3u * index + 2u], receiver.metric, source.area);
     let light = passed(depth2, max(lie.square - depth2, 0.0), along2, source.area);
-    weights[index] = vec2u(number, encoded(share * light));
+    var deep = 0.0;
+    if (SLABS) {
+        deep = deep_at(depth2);
+    }
+    weights[index] = vec2u(pair_word(number, deep), encoded(share * light));
 }

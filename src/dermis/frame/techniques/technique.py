@@ -179,6 +179,8 @@ class AtlasTechnique(Technique):
             irradiance.draw(graph, layout, inputs.light_constants, *into)
             if layout.translucency:
                 graph.repeat(translucency_weights.draw, layout.translucency)
+                if layout.translucency.slabs:
+                    translucency.draw_slants(graph, layout, inputs.light_constants)
             graph.repeat(self.fill, levels, layout.atlas, blur)
             leaves = mixture.sum(0) if mixture else layout.scattered
             graph.repeat(self.leave, levels, blur, layout.translucency, leaves)

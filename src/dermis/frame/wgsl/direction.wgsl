@@ -13,6 +13,13 @@ fn coming_back(cosine: f32) -> vec3f {
     return mix(skin.back[low].rgb, skin.back[low + 1u].rgb, row - f32(low));
 }
 
+// Light that passes deep slabs from a direction, over that from everywhere of which as much comes back.
+fn going_across(cosine: f32) -> vec3f {
+    let row = sqrt(clamp(cosine, 0.0, 1.0)) * f32(DIRECTIONS - 1u);
+    let low = min(u32(row), DIRECTIONS - 2u);
+    return mix(skin.across[low].rgb, skin.across[low + 1u].rgb, row - f32(low));
+}
+
 // Cosine below the surface; never 0, so that the sum of two is not either.
 fn refracted(cosine: f32) -> f32 {
     return sqrt(max(1.0 - (1.0 - cosine * cosine) / (skin.inner_eta * skin.inner_eta), 1e-8));

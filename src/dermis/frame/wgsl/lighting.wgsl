@@ -16,6 +16,7 @@ struct Lit {
     entered: vec3f, // irradiance that enters the skin, times the share that comes back over that from straight above
     reflected: vec3f, // radiance off the surface
     directional: vec3f, // part of `entered` that leaves towards the eye beyond the mean over all directions
+    across: vec3f, // `entered`, by what passes deep slabs of it
 }
 
 // What lies over a surface and reflects.
@@ -75,7 +76,7 @@ fn light_up(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
 }
 
 fn light_through(point: Point, surface: Surface, film: Film, v: vec3f, open: f32) -> Lit {
-    var lit = Lit(vec3f(0.0), vec3f(0.0), vec3f(0.0));
+    var lit = Lit(vec3f(0.0), vec3f(0.0), vec3f(0.0), vec3f(0.0));
     let mirror = seen_normal(film.normal, v);
     let by_direction = HALF_SPACE && (point.flags & OPAQUE) == 0u;
     let facing = clamp(dot(surface.normal, v), 0.0, 1.0);
@@ -104,6 +105,7 @@ fn light_through(point: Point, surface: Surface, film: Film, v: vec3f, open: f32
                     if (by_direction) {
                         lit.directional += entering * beyond_mean(cosine, facing);
                         entering *= coming_back(cosine);
+                        lit.across += entering * going_across(cosine);
                     }
                     lit.entered += entering;
                     let share = surface.rho_s * max(dot(mirror, arriving.direction), 0.0);
@@ -127,6 +129,7 @@ fn light_through(point: Point, surface: Surface, film: Film, v: vec3f, open: f32
         if (by_direction) {
             lit.directional += entering * beyond_mean_from_everywhere(facing);
             entering *= skin.back_from_everywhere;
+            lit.across += entering;
         }
         lit.entered += entering;
         lit.reflected += albedo * mirrored(point, mirror, v, surface.roughness, open);

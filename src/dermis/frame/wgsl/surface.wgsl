@@ -20,6 +20,7 @@ struct Skin {
     once: vec3f, // strength of single scattering
     back_from_everywhere: vec3f, // share of uniform light that comes back, over that of light from straight above
     back: array<vec4f, 32>, // the same for light from one direction, by evenly spaced roots of its cosine
+    across: array<vec4f, 32>, // of light from one direction, what passes deep slabs, over that of uniform light that comes back alike
 }
 
 @group(0) @binding(2) var<uniform> skin: Skin;

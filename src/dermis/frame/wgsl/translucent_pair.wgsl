@@ -1,17 +1,11 @@
 // Places that give light and places that take it through the flesh, and how they lie to each other.
+//#include "translucent_source.wgsl"
 
 struct Receiver {
     position: vec3f,
     texel: u32, // of the atlas, x and y packed
     normal: vec3f,
     metric: vec3f, // squares of a texel along u and v, and the product of both [mm^2]
-}
-
-struct Source {
-    centre: vec3f,
-    area: f32, // [mm^2]
-    normal: vec3f,
-    texel: u32, // of the atlas, x and y packed
 }
 
 const NOWHERE: u32 = 0x80008000u; // offset in the map to what no blur reaches
