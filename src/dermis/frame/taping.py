@@ -16,13 +16,14 @@ from dermis.gpu import Frame, upload
 from dermis.gpu.tape import Take, Tape
 from dermis.scene.techniques import TECHNIQUES
 
+_KEPT = 32  # of each resource: for all nodes of dials
 FORMS = {"gpu": "DiscreteGPU", "software": "CPU"}
 """Kinds of adapters that frames are laid out for."""
 
 
 def renderer_for(form: str, adapter: str) -> Renderer:
     """A renderer whose frames are laid out for GPUs or for software, whatever its adapter is."""
-    made = Renderer(adapter, depth=2, rounds=1000)
+    made = Renderer(adapter, depth=_KEPT, rounds=1000)
     if made.device.adapter.kind != FORMS[form]:
         device = made.device
         device.programs.clear()

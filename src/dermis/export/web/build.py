@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dermis.export.web.described import Named, described
 from dermis.export.web.dials import Dial, changes, node_inputs
 from dermis.export.web.hands import hands_of
-from dermis.export.web.maps import Maps, texels_of
+from dermis.export.web.maps import Maps, shorten, texels_of
 from dermis.export.web.packing import Packer
 from dermis.export.web.pictures import picture_of
 from dermis.frame.inputs import Inputs
@@ -90,7 +90,8 @@ def _form(made: Built, renderer: Renderer, asked: Asked, sizes: tuple[int, ...])
             frames.append(Named(technique, taken(tape, inputs), picture, (side, side)))
             turned.append(_turned(made.packer, renderer, asked, settings, inputs, frames[-1].take))
     mapped = made.maps.put(renderer, tape, [one.take for one in frames])
-    found = described(tape, frames, mapped, made.packer)
+    steps = shorten(renderer, tape, [one.take for one in frames])
+    found = described(tape, frames, mapped, steps, made.packer)
     for one, dials in zip(found["frames"], turned, strict=True):
         one["dials"] = dials
     found["maps"] = _pictured(made, mapped)

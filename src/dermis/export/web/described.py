@@ -32,7 +32,11 @@ Mapped = dict[int, tuple[str, int, Take | None]]
 """Maps that come as pictures: role, how many mips, and passes that fill the others, see `Maps.put`."""
 
 
-def described(tape: Tape, frames: list[Named], mapped: Mapped, packer: Packer) -> Json:
+Stepped = dict[int, tuple[float, ...]]
+"""Buffers of floats that are multiples of steps."""
+
+
+def described(tape: Tape, frames: list[Named], mapped: Mapped, steps: Stepped, packer: Packer) -> Json:
     """The file's description; what it names by number lies in the packer.
 
     Of resources that hold nothing but zeros, as new ones do, no content is kept.
@@ -40,6 +44,10 @@ def described(tape: Tape, frames: list[Named], mapped: Mapped, packer: Packer) -
     pictures = [[tape.resource(one.picture.bytes), tape.resource(one.picture.exposed)] for one in frames]
     contents = {}
     for number in needed(tape, [one.take for one in frames]):
+        if number in steps:
+            floats = tape.content(number)[0].view(np.float32).reshape(-1, len(steps[number]))
+            contents[number] = [packer.add_floats(floats, steps[number])]
+            continue
         _, pictured, halving = mapped.get(number, ("", 0, None))
         mips = [] if halving else _mips(tape, number)[pictured:]
         if any(one.any() for one in mips):

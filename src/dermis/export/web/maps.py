@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.export.web.packing import stepped
 from dermis.export.web.pictures import LEAST, Picture, picture_of
 from dermis.frame.renderer import Renderer
 from dermis.frame.taping import halving, refill
 from dermis.gpu.tape import Take, Tape
 
 _STORABLE = 8  # WebGPU's number of STORAGE_BINDING
+_KNOT_MM = 2.0**-8, 2.0**-8, 2.0**-8, 2.0**-14  # steps of hairs' places and of their radius
 _COLOUR = "colour_map"
 _ROLES = (_COLOUR, "relief_map", "slope_map", "specular_map", "roughness_map", "detail_map")
 
@@ -57,6 +59,16 @@ class Maps:
         return np.stack([self.pictures[role, mip, layer].texels for layer in range(len(layers))])
 
 
+def shorten(renderer: Renderer, tape: Tape, takes: list[Take]) -> dict[int, tuple[float, ...]]:
+    """Round the places of hairs on a device; of each buffer of them the steps of its columns."""
+    found = {}
+    for number in _bound(tape, takes, ("knots",)):
+        data = stepped(tape.content(number)[0].view(np.float32).reshape(-1, len(_KNOT_MM)), _KNOT_MM)
+        renderer.device.write(tape.object(number), data.tobytes(), data.nbytes)
+        found[number] = _KNOT_MM
+    return found
+
+
 def texels_of(tape: Tape, number: int, mip: int) -> NDArray[np.float16]:
     """(l, h, w, c) what a texture of halves holds."""
     width, height, layers = tape.resources[number]["size"]
@@ -77,14 +89,19 @@ def _large(described: dict[str, Any]) -> int:
 
 def _mapped(tape: Tape, takes: list[Take]) -> dict[int, str]:
     """Textures of halves bound as maps, large enough for pictures, with their roles."""
-    found: dict[int, str] = {}
-    for take in takes:
-        for one in (each for each in take.passes if each.program is not None):
-            names = [name for _, name, _ in tape.programs[one.program or 0]["bindings"]]
-            found |= {k: name for k, name in zip(one.bound, names, strict=True) if name in _ROLES and k >= 0}
     return {
         number: role
-        for number, role in found.items()
+        for number, role in _bound(tape, takes, _ROLES).items()
         if tape.resources[number].get("format", "").endswith("16float")
         and min(tape.resources[number]["size"][:2]) >= LEAST
     }
+
+
+def _bound(tape: Tape, takes: list[Take], names: tuple[str, ...]) -> dict[int, str]:
+    """What is bound by some names."""
+    found: dict[int, str] = {}
+    for take in takes:
+        for one in (each for each in take.passes if each.program is not None):
+            bound = [name for _, name, _ in tape.programs[one.program or 0]["bindings"]]
+            found |= {k: name for k, name in zip(one.bound, bound, strict=True) if name in names and k >= 0}
+    return found

@@ -25,7 +25,7 @@ function tell(words, state) {
 
 /** What the file holds, unpacked once. @returns {Promise<[File, import("./device.js").Store]>} */
 async function readFile() {
-    const part = (/** @type {string} */ id) => bytesOf(element(id).textContent.trim());
+    const part = (/** @type {string} */ id) => bytesOf(element(id).textContent);
     const [told, data] = await Promise.all(["scene", "data"].map((id) => inflated(part(id))));
     const file = JSON.parse(new TextDecoder().decode(told));
     const all = part("pictures");

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from dermis.export.inlining import hash_of, inline
 from dermis.export.web.build import Built
 from dermis.export.web.dials import Dial
+from dermis.export.web.packing import seven_bits
 
 MODULES = ("graph", "packed", "device", "player", "maps", "camera", "turned", "screen", "page")
 """Of the player, each after those that it imports."""
@@ -45,9 +46,9 @@ def web_page(built: Built, dials: tuple[Dial, ...], title: str, note: str) -> st
         note=html.escape(note),
         style=style,
         poster=f"data:image/webp;base64,{_base64(_poster(built.poster))}",
-        scene=_base64(gzip.compress(json.dumps(told).encode(), 9, mtime=0)),
-        data=_base64(built.packer.packed()),
-        pictures=_base64(b"".join(built.pictures)),
+        scene=seven_bits(gzip.compress(json.dumps(told).encode(), 9, mtime=0)),
+        data=seven_bits(built.packer.packed()),
+        pictures=seven_bits(b"".join(built.pictures)),
         script=script,
     )
 
