@@ -2,20 +2,55 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
 from dermis.frame.frame import draw_frame
 from dermis.frame.inputs import Inputs
+from dermis.frame.passes import map_mips
 from dermis.frame.renderer import Renderer
+from dermis.gpu import Frame, upload
 from dermis.gpu.tape import Take, Tape
-from dermis.scene.model import Scene
-from dermis.scene.settings import Settings
 from dermis.scene.techniques import TECHNIQUES
 
+_KEPT = 32  # of each resource: for all nodes of dials
+FORMS = {"gpu": "DiscreteGPU", "software": "CPU"}
+"""Kinds of adapters that frames are laid out for."""
 
-def taken(renderer: Renderer, tape: Tape, scene: Scene, settings: Settings) -> tuple[Inputs, Take]:
-    """What a frame reads, and its passes; nothing of it runs.
 
-    renderer : that has the tape's device
+def renderer_for(form: str, adapter: str) -> Renderer:
+    """A renderer whose frames are laid out for GPUs or for software, whatever its adapter is."""
+    made = Renderer(adapter, depth=_KEPT, rounds=1000)
+    if made.device.adapter.kind != FORMS[form]:
+        device = made.device
+        device.programs.clear()
+        device.adapter = replace(device.adapter, kind=FORMS[form])
+    return made
+
+
+def taken(tape: Tape, inputs: Inputs) -> Take:
+    """The passes of a frame; none of them runs."""
+    technique = TECHNIQUES[inputs.settings.technique]
+    return tape.take(lambda graph: draw_frame(graph, inputs, technique))
+
+
+def halving(tape: Tape, texture: Any) -> Take:
+    """The passes that fill a map's mips from its first."""
+    return tape.take(lambda graph: map_mips.halve(graph, map_mips.mipped(texture)))
+
+
+def refill(renderer: Renderer, texture: Any, levels: list[NDArray[np.float16]]) -> None:
+    """Put other texels into a map; its mips follow where only the first is given.
+
+    levels : (l, h, w, c) of each mip
     """
-    inputs = renderer.prepare(scene, settings)
-    technique = TECHNIQUES[settings.technique]
-    return inputs, tape.take(lambda graph: draw_frame(graph, inputs, technique))
+    for mip, layers in enumerate(levels):
+        for layer, texels in enumerate(layers):
+            upload(renderer.device, texture, texels, mip=mip, layer=layer)
+    if len(levels) < texture.mip_level_count:
+        frame = Frame(renderer.device, timed=False)
+        map_mips.halve(frame, map_mips.mipped(texture))
+        frame.submit()

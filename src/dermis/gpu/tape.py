@@ -101,6 +101,10 @@ class Tape(Graph):
         """The bytes that a resource holds now: of a texture those of each layer, mip by mip."""
         return content_of(self.device, self._objects[number])
 
+    def object(self, number: int) -> Any:
+        """A resource by its number."""
+        return self._objects[number]
+
     def resource(self, value: Any) -> int:
         """The number of a texture, view, buffer or sampler."""
         if id(value) not in self._numbers:

@@ -13,7 +13,6 @@ from dermis.reading import read_file
 
 _CDN = "https://cdn.jsdelivr.net/npm"
 _MOST = 32 << 20
-_END = re.compile("</(?=script)", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -52,11 +51,6 @@ class Script:
             remedy = f"Install it: npm install {self.package}@{self.version}"
             refuse(file, expected, "other bytes came", remedy)
         return data.decode("utf-8")
-
-
-def inline(text: str) -> str:
-    """A script as it may stand between <script> and </script>: strings keep their meaning."""
-    return _END.sub(r"<\\/", text).replace("<!--", r"<\!--")
 
 
 def module_url(text: str, names: dict[str, str]) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 import html
 import json
 from collections.abc import Mapping, Sequence
@@ -11,7 +10,8 @@ from importlib import resources
 from string import Template
 from typing import Any
 
-from dermis.export.targets.web_library import Script, inline
+from dermis.export.inlining import hash_of, inline
+from dermis.export.targets.web_library import Script
 
 Json = Mapping[str, Any]
 _NONE = "default-src 'none'; base-uri 'none'; form-action 'none'"
@@ -45,11 +45,6 @@ def json_text(value: Json) -> str:
     """JSON that no element of HTML begins or ends in."""
     told = json.dumps(value, ensure_ascii=True)
     return told.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-
-
-def hash_of(text: str) -> str:
-    """What a Content-Security-Policy knows an inline script or style by."""
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
 def linked(script: Script) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from dermis.export.web.packing import Packer
 from dermis.export.web.reads import needed
+from dermis.frame.passes.post import Picture
 from dermis.gpu.tape import Take, Taken, Tape
 
 Json = dict[str, Any]
@@ -18,26 +19,40 @@ Json = dict[str, Any]
 class Named:
     """A take with its name and picture.
 
-    picture : the texture of bytes that it fills
+    picture : what it fills
     """
 
     name: str
     take: Take
-    picture: Any
+    picture: Picture
     size: tuple[int, int]
 
 
-def described(tape: Tape, frames: list[Named], packer: Packer) -> Json:
+Mapped = dict[int, tuple[str, int, Take | None]]
+"""Maps that come as pictures: role, how many mips, and passes that fill the others, see `Maps.put`."""
+
+
+Stepped = dict[int, tuple[float, ...]]
+"""Buffers of floats that are multiples of steps."""
+
+
+def described(tape: Tape, frames: list[Named], mapped: Mapped, steps: Stepped, packer: Packer) -> Json:
     """The file's description; what it names by number lies in the packer.
 
     Of resources that hold nothing but zeros, as new ones do, no content is kept.
     """
-    pictures = [tape.resource(one.picture) for one in frames]
+    pictures = [[tape.resource(one.picture.bytes), tape.resource(one.picture.exposed)] for one in frames]
     contents = {}
     for number in needed(tape, [one.take for one in frames]):
-        mips = _mips(tape, number)
+        if number in steps:
+            floats = tape.content(number)[0].view(np.float32).reshape(-1, len(steps[number]))
+            contents[number] = [packer.add_floats(floats, steps[number])]
+            continue
+        _, pictured, halving = mapped.get(number, ("", 0, None))
+        mips = [] if halving else _mips(tape, number)[pictured:]
         if any(one.any() for one in mips):
-            contents[number] = [packer.add(one) for one in mips]
+            contents[number] = [-1] * pictured + [packer.add(one) for one in mips]
+    fills = [(number, take) for number, (*_, take) in mapped.items() if take]
     return {
         "shaders": tape.shaders,
         "programs": [_program(one) for one in tape.programs],
@@ -45,6 +60,7 @@ def described(tape: Tape, frames: list[Named], packer: Packer) -> Json:
         "structs": {name: _struct(dtype) for name, dtype in tape.structs.items()},
         "contents": contents,
         "frames": [_frame(one, k, packer) for one, k in zip(frames, pictures, strict=True)],
+        "halved": {number: [_pass(one, packer) for one in take.passes] for number, take in fills},
     }
 
 
@@ -55,15 +71,24 @@ def _mips(tape: Tape, number: int) -> list[Any]:
     return [np.concatenate(parts[k : k + count]) for k in range(0, len(parts), count)]
 
 
-def _frame(one: Named, picture: int, packer: Packer) -> Json:
+def _frame(one: Named, picture: list[int], packer: Packer) -> Json:
     records = [(struct, packer.add(np.frombuffer(record.tobytes(), np.uint8))) for struct, record in one.take.records]
     return {
         "name": one.name,
         "size": one.size,
-        "picture": picture,
+        "picture": picture[0],
+        "linear": picture[1],
+        "views": {stage: _views(one.take, stage) for stage in ("visibility", "shadows")},
         "passes": [_pass(each, packer) for each in one.take.passes],
         "records": records,
     }
+
+
+def _views(take: Take, stage: str) -> int:
+    """The record by which a stage's passes see the head, -1 for none."""
+    views = [k for k, (struct, _) in enumerate(take.records) if struct == "Views"]
+    bound = (-1 - k for one in take.passes if one.stage == stage for k in one.bound if k < 0)
+    return next((k for k in bound if k in views), -1)
 
 
 def _pass(one: Taken, packer: Packer) -> Json:

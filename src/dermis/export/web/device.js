@@ -20,13 +20,23 @@ import { unpacked } from "./packed.js";
  *     raster: {layer: number, far: number, indices: number, depth: number, target: number} | null,
  *     written: [number, number] | null, unit: number}} Pass
  */
-/** @typedef {{name: string, passes: Pass[], records: [string, number][], picture: number, size: number[]}} Frame */
 /**
- * @typedef {{shaders: string[], programs: Program[], resources: Described[], blobs: Run[],
- *     contents: Record<string, number[]>, frames: Frame[],
- *     structs: Record<string, {size: number, members: Record<string, number[]>}>}} Scene
+ * What a node of a dial changes: record or pass, first word, and blob of differences.
+ * @typedef {{records: number[][], written: number[][]}} Change
  */
-/** @typedef {GPUBuffer | GPUTexture | GPUTextureView | GPUSampler} Made */
+/**
+ * @typedef {{name: string, passes: Pass[], records: [string, number][], picture: number, linear: number,
+ *     size: number[], views: Record<string, number>, dials: Record<string, (Change | null)[]>}} Frame
+ */
+/** A layer of a map: its picture, the blob of its curves, and how many channels are a colour. @typedef {number[]} Layer */
+/**
+ * @typedef {{shaders: string[], programs: Program[], resources: Described[],
+ *     contents: Record<string, number[]>, frames: Frame[], halved: Record<string, Pass[]>,
+ *     maps: Record<string, Layer[][]>, hands: import("./camera.js").Hands,
+ *     colours: {map: number, dials: Record<string, (Layer | null)[]>},
+ *     structs: Record<string, {size: number, members: Record<string, any>}>}} Scene
+ */
+/** @typedef {{blobs: Run[], data: Uint8Array, pictures: Uint8Array[]}} Store */
 
 /** @type {Record<string, number>} */
 const TEXEL_BYTES = { r: 1, rg: 2, rgba: 4 };
@@ -40,13 +50,15 @@ export function texelBytes(format) {
 
 /** Everything of a file on one device. */
 export class Made {
-    /** @param {GPUDevice} device @param {Scene} scene @param {Uint8Array} data */
-    constructor(device, scene, data) {
+    /** @param {GPUDevice} device @param {Scene} scene @param {Store} store */
+    constructor(device, scene, store) {
         this.device = device;
         this.scene = scene;
-        this.data = data;
-        /** @type {(Made | undefined)[]} */
+        this.store = store;
+        /** @type {any[]} */
         this.resources = [];
+        /** @type {Map<number, Float32Array>} */
+        this.changes = new Map();
         /** @type {Slot[]} */
         this.slots = [];
         /** @type {Map<number, Promise<any>>} */
@@ -59,12 +71,18 @@ export class Made {
 
     /** @param {number} blob */
     bytes(blob) {
-        return unpacked(this.data, this.scene.blobs[blob]);
+        return unpacked(this.store.data, this.store.blobs[blob]);
+    }
+
+    /** @param {number} blob */
+    floats(blob) {
+        if (!this.changes.has(blob)) this.changes.set(blob, new Float32Array(this.bytes(blob).slice().buffer));
+        return /** @type {Float32Array} */ (this.changes.get(blob));
     }
 
     /** A resource, made and filled when it is first asked for. @param {number} number @returns {any} */
     resource(number) {
-        return (this.resources[number] ??= /** @type {any} */ (this.#make(number)));
+        return (this.resources[number] ??= this.#make(number));
     }
 
     /** What a resource holds. @param {number} number @returns {Slot} */
@@ -99,6 +117,7 @@ export class Made {
         const made = this.device.createTexture({ format, size, mipLevelCount: mips, usage });
         const blobs = this.scene.contents[number] ?? [];
         blobs.forEach((blob, mip) => {
+            if (blob < 0) return; // a picture
             const [width, height] = size.slice(0, 2).map((side) => Math.max(1, side >> mip));
             const layout = { bytesPerRow: width * texelBytes(format), rowsPerImage: height };
             const to = { texture: made, mipLevel: mip };
@@ -148,5 +167,19 @@ export class Made {
         const dimension = (entry.texture ?? entry.storageTexture)?.viewDimension;
         if (this.scene.resources[number].kind === "texture") return one.createView({ dimension });
         return entry.buffer ? { buffer: one } : one;
+    }
+
+    /**
+     * The bind group of a pass.
+     * @param {Pass} one
+     * @param {(k: number) => GPUBufferBinding} record binds the frame's record k
+     */
+    group(one, record) {
+        const { bindings } = this.scene.programs[one.program];
+        const entries = bindings.map(([binding, , entry], k) => ({
+            binding,
+            resource: one.bound[k] < 0 ? record(-1 - one.bound[k]) : this.bound(entry, one.bound[k]),
+        }));
+        return this.device.createBindGroup({ layout: this.layout(one.program), entries });
     }
 }

@@ -1,18 +1,24 @@
-// What the file holds: one gzip of numbers as differences, byte plane by byte plane.
+// What the file holds: one gzip of numbers as differences, byte plane by byte plane, seven bits to a letter.
 
 /**
- * A run of bytes: where it begins, how many there are, the bytes of a word, words of a row, and how often
- * differences from row to row were taken.
- * @typedef {[number, number, number, number, number]} Run
+ * A run of bytes: where it begins, how many there are, the bytes of a word, words of a row, how often
+ * differences from row to row were taken, and of floats the step of each word of a row.
+ * @typedef {[number, number, number, number, number, number[]]} Run
  */
 
-/** @param {string} text base64 */
+/** Bytes of a text with seven bits in each letter, 256 more where it could not stand in a page. @param {string} text */
 export function bytesOf(text) {
-    const native = /** @type {any} */ (Uint8Array).fromBase64;
-    if (native) return /** @type {Uint8Array} */ (native.call(Uint8Array, text));
-    const raw = atob(text);
-    const found = new Uint8Array(raw.length);
-    for (let k = 0; k < raw.length; k++) found[k] = raw.charCodeAt(k);
+    const found = new Uint8Array((text.length * 7) >> 3);
+    let [bits, count, end] = [0, 0, 0];
+    for (let k = 0; k < text.length; k++) {
+        bits = (bits << 7) | (text.charCodeAt(k) & 127);
+        count += 7;
+        if (count >= 8) {
+            count -= 8;
+            found[end++] = bits >> count;
+            bits &= (1 << count) - 1;
+        }
+    }
     return found;
 }
 
@@ -23,7 +29,7 @@ export async function inflated(bytes) {
 }
 
 /** @param {Uint8Array} data @param {Run} run */
-export function unpacked(data, [start, size, word, row, order]) {
+export function unpacked(data, [start, size, word, row, order, steps]) {
     const planes = data.subarray(start, start + size);
     if (word === 1 && order === 0) return planes;
     const count = size / word;
@@ -36,5 +42,8 @@ export function unpacked(data, [start, size, word, row, order]) {
     for (let time = 0; time < order; time++) {
         for (let k = row; k < count; k++) words[k] += words[k - row];
     }
-    return new Uint8Array(words.buffer);
+    if (!steps.length) return new Uint8Array(words.buffer);
+    const floats = new Float32Array(count);
+    for (let k = 0; k < count; k++) floats[k] = (words[k] | 0) * steps[k % row];
+    return new Uint8Array(floats.buffer);
 }

@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Bytes = NDArray[np.uint8]
-Run = tuple[int, int, int, int, int]
-"""Where a run of bytes begins, how many it has, bytes of a word, words of a row, how often rows are subtracted."""
+Run = tuple[int, int, int, int, int, tuple[float, ...]]
+"""Where a run of bytes begins, how many it has, bytes of a word, words of a row, how often rows are subtracted, and
+of floats the step of each word of a row."""
+_FORBIDDEN = frozenset({0, 13, ord("<")})  # letters that a script element would change, or end at
 _ROWS = (1, 2, 3, 4, 8)
 _ORDERS = (0, 1, 2)
 _TRIED = 1 << 15  # bytes in the middle by which a way is chosen
@@ -34,12 +36,21 @@ class Packer:
         ways : bytes of a word, words of a row and how often rows are subtracted; the one that packs best is taken
         """
         raw = np.frombuffer(data, np.uint8)
-        key = hashlib.sha256(raw).digest()
+        return self._add(raw, list(ways or _all_ways(len(raw))), ())
+
+    def add_floats(self, values: NDArray[np.float32], steps: tuple[float, ...]) -> int:
+        """The number of (n, c) floats that are multiples of steps, c powers of two; see `stepped`."""
+        words = np.rint(values / np.array(steps)).astype(np.int32)
+        ways = [(4, len(steps), order) for order in _ORDERS]
+        return self._add(words.view(np.uint8).reshape(-1), ways, steps)
+
+    def _add(self, raw: Bytes, ways: list[tuple[int, int, int]], steps: tuple[float, ...]) -> int:
+        key = hashlib.sha256(raw).digest() + repr(steps).encode()
         if key not in self._known:
             self._known[key] = len(self.runs)
-            way = _best(raw, list(ways or _all_ways(len(raw))))
+            way = _best(raw, ways)
             packed = planes(raw, *way)
-            self.runs.append((self._end, len(packed), *way))
+            self.runs.append((self._end, len(packed), *way, steps))
             self._data.append(packed)
             self._end += len(packed)
         return self._known[key]
@@ -47,6 +58,19 @@ class Packer:
     def packed(self) -> bytes:
         """All of it."""
         return gzip.compress(b"".join(self._data), 9, mtime=0)
+
+
+def stepped(values: NDArray[np.float32], steps: tuple[float, ...]) -> NDArray[np.float32]:
+    """(n, c) floats as multiples of steps."""
+    return np.asarray(np.rint(values / np.array(steps)) * np.array(steps), np.float32)
+
+
+def seven_bits(data: bytes) -> str:
+    """Bytes as letters of seven bits, those that cannot stand in a page 256 higher: as packed.js reads them."""
+    bits = np.unpackbits(np.frombuffer(data, np.uint8))
+    bits = np.concatenate([bits, np.zeros(-len(bits) % 7, np.uint8)])
+    sevens = np.packbits(bits.reshape(-1, 7), axis=1)[:, 0] >> 1
+    return sevens.tobytes().decode("ascii").translate({one: one + 256 for one in _FORBIDDEN})
 
 
 def planes(raw: Bytes, word: int, row: int, order: int) -> bytes:

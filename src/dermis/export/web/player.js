@@ -25,6 +25,26 @@ export class Records {
         this.bytes = new ArrayBuffer(Math.max(end, STEP));
         this.buffer = made.device.createBuffer({ size: this.bytes.byteLength, usage: GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST });
         frame.records.forEach(([, blob], k) => new Uint8Array(this.bytes, this.starts[k]).set(made.bytes(blob)));
+        this.taken = this.bytes.slice(0);
+    }
+
+    /** Take all as they were taken down. */
+    reset() {
+        new Uint8Array(this.bytes).set(new Uint8Array(this.taken));
+    }
+
+    /** The number of the record of a structure, -1 for none. @param {string} struct */
+    find(struct) {
+        return this.frame.records.findIndex(([name]) => name === struct);
+    }
+
+    /**
+     * Put numbers into a member of record k.
+     * @param {number} k @param {string} name @param {number[]} values @param {number} start of them in the member
+     */
+    put(k, name, values, start = 0) {
+        const [offset] = this.made.scene.structs[this.frame.records[k][0]].members[name];
+        this.floats(k).set(values, offset + start);
     }
 
     /** The floats of record k. @param {number} k */
@@ -53,7 +73,9 @@ export class Player {
         this.frame = frame;
         this.records = new Records(made, frame);
         /** @type {Uint8Array[]} what the host writes, by pass */
-        this.written = frame.passes.map((one) => (one.written ? made.bytes(one.written[1]) : new Uint8Array(0)));
+        this.written = frame.passes.map((one) => (one.written ? made.bytes(one.written[1]).slice() : new Uint8Array(0)));
+        this.rest = this.written.map((bytes) => bytes.slice());
+        this.rasterises = frame.passes.some((one) => one.raster);
         /** @type {number[]} a number that follows from each */
         this.writing = this.written.map(numberOf);
         /** @type {number[][]} passes that run as a whole */
@@ -71,7 +93,7 @@ export class Player {
     /** Compile and fill everything. */
     async prepare() {
         const programs = this.frame.passes.map((one) => (one.written ? null : this.made.pipeline(one.program)));
-        this.groups = this.frame.passes.map((one) => (one.written ? null : this.#group(one)));
+        this.groups = this.frame.passes.map((one) => (one.written ? null : this.made.group(one, (k) => this.#record(k))));
         this.pipelines = await Promise.all(programs);
     }
 
@@ -137,16 +159,6 @@ export class Player {
             pass.draw(one.groups[0], 1, 0, layer);
         }
         pass.end();
-    }
-
-    /** @param {Pass} one */
-    #group(one) {
-        const { bindings } = this.made.scene.programs[one.program];
-        const entries = bindings.map(([binding, , entry], k) => ({
-            binding,
-            resource: one.bound[k] < 0 ? this.#record(-1 - one.bound[k]) : this.made.bound(entry, one.bound[k]),
-        }));
-        return this.made.device.createBindGroup({ layout: this.made.layout(one.program), entries });
     }
 
     /** @param {number} k */

@@ -1,0 +1,299 @@
+// The page: opens a device, plays the frame that fits, and listens to hands.
+
+import { Made } from "./device.js";
+import { fillMaps, halve, putTexels, stepsOf, texelsOf } from "./maps.js";
+import { bytesOf, inflated } from "./packed.js";
+import { Player } from "./player.js";
+import { Screen } from "./screen.js";
+import { apply, atRest, between } from "./turned.js";
+
+/** @typedef {import("./turned.js").Dial} Dial */
+/** @typedef {import("./device.js").Scene} Scene */
+/** @typedef {{forms: Record<string, Scene>, blobs: import("./packed.js").Run[], images: number[], dials: Dial[]}} File */
+
+const [BEFORE, AFTER] = ["none", "texture-space"];
+const NO_WEBGPU = "This head needs WebGPU: Chrome or Edge 113, Safari 26, Firefox 141 or later, on a device whose graphics driver they accept. Above is a still picture of it.";
+
+/** @param {string} id @returns {any} */
+const element = (id) => document.getElementById(id);
+
+/** @param {string} words @param {string} state */
+function tell(words, state) {
+    element("told").textContent = words;
+    document.documentElement.dataset.state = state;
+}
+
+/** What the file holds, unpacked once. @returns {Promise<[File, import("./device.js").Store]>} */
+async function readFile() {
+    const part = (/** @type {string} */ id) => bytesOf(element(id).textContent);
+    const [told, data] = await Promise.all(["scene", "data"].map((id) => inflated(part(id))));
+    const file = JSON.parse(new TextDecoder().decode(told));
+    const all = part("pictures");
+    let end = 0;
+    const pictures = file.images.map((/** @type {number} */ size) => all.subarray(end, (end += size)));
+    return [file, { blobs: file.blobs, data, pictures }];
+}
+
+/** The page at work on one device. */
+class Page {
+    /** @param {File} file @param {import("./device.js").Store} store */
+    constructor(file, store) {
+        this.file = file;
+        this.store = store;
+        this.state = atRest(file.dials);
+        this.technique = AFTER;
+        /** @type {Map<string, Player>} */
+        this.players = new Map();
+        this.dirty = true;
+        this.busy = false;
+        this.painted = "";
+        this.frames = 0;
+        /** @type {Player | null} */
+        this.player = null;
+        /** @type {Screen | null} */
+        this.screen = null;
+        this.soft = false;
+    }
+
+    /** Open a device, again after a loss. */
+    async open() {
+        const adapter = await navigator.gpu?.requestAdapter({ powerPreference: "high-performance" });
+        if (!adapter) return tell(NO_WEBGPU, "without");
+        const wanted = new URLSearchParams(location.hash.slice(1));
+        const soft = adapter.info.isFallbackAdapter || /swiftshader|llvmpipe/i.test(adapter.info.architecture + adapter.info.description);
+        const form = wanted.get("form") ?? (soft ? "software" : "gpu");
+        const scene = this.file.forms[form] ?? Object.values(this.file.forms)[0];
+        const device = await adapter.requestDevice({ requiredLimits: limitsFor(scene, adapter.limits) });
+        device.lost.then((info) => info.reason !== "destroyed" && this.reopen());
+        device.addEventListener("uncapturederror", (event) => tell(`The device refused: ${/** @type {GPUUncapturedErrorEvent} */ (event).error.message}`, "failed"));
+        this.made = new Made(device, scene, this.store);
+        this.players.clear();
+        this.painted = "";
+        this.soft = soft;
+        this.screen = null;
+        const maps = fillMaps(this.made);
+        await Promise.all([maps, this.choose()]);
+        this.dirty = true;
+        await this.draw();
+        tell("", "drawn");
+    }
+
+    async reopen() {
+        tell("The graphics device was lost; it is opened again …", "loading");
+        await this.open().catch(failed);
+    }
+
+    /** The player for the technique and the size of the window. */
+    async choose() {
+        const made = /** @type {Made} */ (this.made);
+        const side = Math.min(innerWidth, innerHeight) * devicePixelRatio;
+        const fitting = made.scene.frames.filter((one) => one.name === this.technique);
+        const frame = fitting.find((one) => one.size[0] >= 0.9 * side) ?? fitting[fitting.length - 1];
+        const key = `${frame.name} ${frame.size[0]}`;
+        if (!this.players.has(key)) {
+            const player = new Player(made, frame);
+            await player.prepare();
+            this.players.set(key, player);
+        }
+        this.player = /** @type {Player} */ (this.players.get(key));
+        if (this.screen?.frame !== frame) {
+            this.screen?.close();
+            this.screen = new Screen(element("picture"), made, frame, this.soft);
+        }
+        this.dirty = true;
+    }
+
+    /** Draw what is stale, and wait until it is there: one frame at a time. */
+    async draw() {
+        if (!this.dirty || this.busy || !this.player || !this.made || !this.screen) return;
+        [this.dirty, this.busy] = [false, true];
+        try {
+            await this.#frame(this.player, this.made, this.screen);
+        } finally {
+            this.busy = false;
+        }
+    }
+
+    /** @param {Player} player @param {Made} made @param {Screen} screen */
+    async #frame(player, made, screen) {
+        const began = performance.now();
+        apply(player, this.file.dials, this.state);
+        await this.#paint(made);
+        const encoder = made.device.createCommandEncoder();
+        player.draw(encoder);
+        screen.copy(encoder);
+        made.device.queue.submit([encoder.finish()]);
+        await screen.show();
+        this.frames++;
+        element("time").textContent = `${(performance.now() - began).toFixed(0)} ms`;
+        element("poster").hidden = true;
+    }
+
+    /** Mix the colour map where dials change it. @param {Made} made */
+    async #paint(made) {
+        const { map, dials } = made.scene.colours;
+        const turned = this.file.dials.filter((one) => dials?.[one.name] && this.state.dials[one.name] !== one.rest);
+        const key = turned.map((one) => `${one.name} ${this.state.dials[one.name]}`).join();
+        if (key === this.painted) return;
+        this.painted = key;
+        putTexels(made, map, await mixed(made, turned, this.state.dials));
+        await halve(made, map);
+        made.slot(map).held++;
+    }
+
+    /** @param {string} technique */
+    async turnTo(technique) {
+        this.technique = technique;
+        await this.choose();
+        await this.draw();
+    }
+
+    touch() {
+        this.dirty = true;
+    }
+}
+
+/** The limits that a scene's resources need, if they are above those that every device has. @param {Scene} scene @param {GPUSupportedLimits} offered */
+function limitsFor(scene, offered) {
+    const buffers = scene.resources.flatMap((one) => (one.kind === "buffer" ? [one.size] : []));
+    const largest = Math.max(...buffers);
+    /** @type {Record<string, number>} */
+    const limits = {};
+    if (largest > 128 << 20) limits.maxStorageBufferBindingSize = Math.min(largest, offered.maxStorageBufferBindingSize);
+    if (largest > 256 << 20) limits.maxBufferSize = Math.min(largest, offered.maxBufferSize);
+    return limits;
+}
+
+/** The colour map's texels between dials' nodes. @param {Made} made @param {Dial[]} turned @param {Record<string, number>} values */
+async function mixed(made, turned, values) {
+    const { map, dials } = made.scene.colours;
+    const { width, height } = made.resource(map);
+    const layer = made.scene.maps[map][0][0];
+    const at = async (/** @type {import("./device.js").Layer} */ one) => fromHalves(texelsOf(await stepsOf(made, one, width, height)));
+    const base = await at(layer);
+    const sum = base.slice();
+    for (const dial of turned) {
+        for (const [node, share] of between(dial, values[dial.name])) {
+            const one = dials[dial.name][node];
+            if (!one || !share) continue;
+            const other = await at(one);
+            for (let k = 0; k < sum.length; k++) sum[k] += share * (other[k] - base[k]);
+        }
+    }
+    return toHalves(sum);
+}
+
+/** @param {Uint16Array} halves */
+function fromHalves(halves) {
+    const found = new Float32Array(halves.length);
+    for (let k = 0; k < halves.length; k++) {
+        const [sign, rank, part] = [halves[k] >> 15, (halves[k] >> 10) & 31, halves[k] & 1023];
+        found[k] = (sign ? -1 : 1) * (rank ? 2 ** (rank - 15) * (1 + part / 1024) : part * 2 ** -24);
+    }
+    return found;
+}
+
+/** @param {Float32Array} values from 0 to some thousand, as colours are */
+function toHalves(values) {
+    const words = new Uint32Array(values.buffer);
+    const found = new Uint16Array(values.length);
+    for (let k = 0; k < values.length; k++) found[k] = values[k] < 6.2e-5 ? 0 : ((words[k] + 0x1000 - 0x38000000) >>> 13) & 0x7fff;
+    return found;
+}
+
+/** @param {unknown} error */
+function failed(error) {
+    tell(`It could not be drawn: ${error instanceof Error ? error.message : error}`, "failed");
+}
+
+/** @param {Page} page */
+function listen(page) {
+    const canvas = element("picture");
+    /** @type {Map<number, {x: number, y: number}>} */
+    const fingers = new Map();
+    canvas.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
+        canvas.setPointerCapture(event.pointerId);
+        fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+    });
+    for (const name of ["pointerup", "pointercancel"]) {
+        canvas.addEventListener(name, (/** @type {PointerEvent} */ event) => fingers.delete(event.pointerId));
+    }
+    canvas.addEventListener("pointermove", (/** @type {PointerEvent} */ event) => {
+        const last = fingers.get(event.pointerId);
+        if (!last) return;
+        const now = { x: event.clientX, y: event.clientY };
+        const other = [...fingers].find(([id]) => id !== event.pointerId)?.[1];
+        if (other) pinch(page, other, last, now);
+        else drag(page, event.shiftKey || event.buttons === 2, now.x - last.x, now.y - last.y);
+        fingers.set(event.pointerId, now);
+    });
+    canvas.addEventListener("contextmenu", (/** @type {Event} */ event) => event.preventDefault());
+    canvas.addEventListener("wheel", (/** @type {WheelEvent} */ event) => {
+        event.preventDefault();
+        zoom(page, Math.exp(0.001 * event.deltaY));
+    }, { passive: false });
+    canvas.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+        const step = /** @type {Record<string, number[]>} */ ({ ArrowLeft: [20, 0], ArrowRight: [-20, 0], ArrowUp: [0, 20], ArrowDown: [0, -20] })[event.key];
+        if (step) drag(page, event.shiftKey, step[0], step[1]);
+        if (event.key === "+") zoom(page, 0.9);
+        if (event.key === "-") zoom(page, 1.1);
+    });
+    addEventListener("resize", () => page.choose().then(() => page.draw()).catch(failed));
+}
+
+/** @param {Page} page @param {boolean} light @param {number} x @param {number} y [pixel] */
+function drag(page, light, x, y) {
+    const { state } = page;
+    const moved = light || element("light").checked;
+    const turn = 0.006;
+    if (moved) {
+        state.lightYaw += turn * x;
+        state.lightPitch = Math.max(-1.4, Math.min(1.4, state.lightPitch - turn * y));
+    } else {
+        state.yaw -= turn * x;
+        state.pitch = Math.max(-1.4, Math.min(1.4, state.pitch + turn * y));
+    }
+    page.touch();
+}
+
+/** @param {Page} page @param {number} factor */
+function zoom(page, factor) {
+    page.state.zoom = Math.max(0.35, Math.min(2.5, page.state.zoom * factor));
+    page.touch();
+}
+
+/** @param {Page} page @param {{x: number, y: number}} other @param {{x: number, y: number}} last @param {{x: number, y: number}} now */
+function pinch(page, other, last, now) {
+    const apart = (/** @type {{x: number, y: number}} */ one) => Math.max(1, Math.hypot(one.x - other.x, one.y - other.y));
+    zoom(page, apart(last) / apart(now));
+}
+
+/** A slider for each dial. @param {Page} page */
+function addDials(page) {
+    for (const dial of page.file.dials) {
+        const label = document.createElement("label");
+        const slider = document.createElement("input");
+        const [least, most] = [dial.values[0], dial.values[dial.values.length - 1]];
+        Object.assign(slider, { type: "range", min: least, max: most, step: (most - least) / 200, value: dial.rest });
+        slider.addEventListener("input", () => {
+            page.state.dials[dial.name] = Number(slider.value);
+            page.touch();
+        });
+        label.append(dial.name, slider);
+        element("dials").append(label);
+    }
+    element("after").addEventListener("change", () => page.turnTo(element("after").checked ? AFTER : BEFORE).catch(failed));
+}
+
+async function start() {
+    if (!navigator.gpu) return tell(NO_WEBGPU, "without");
+    const page = new Page(...(await readFile()));
+    addDials(page);
+    listen(page);
+    await page.open();
+    const next = () => requestAnimationFrame(() => page.draw().catch(failed).finally(next));
+    next();
+    Object.assign(window, { dermis: page });
+}
+
+start().catch(failed);
