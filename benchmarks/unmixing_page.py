@@ -1,4 +1,4 @@
-"""Writes docs/fit.md from what `unmixing.py` has measured: python benchmarks/unmixing_page.py"""
+"""Writes docs/fit.md from what `unmixing.py` and `widths.py` measured: python benchmarks/unmixing_page.py"""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "fit.md"
 TEXT = ROOT / "docs" / "fit.in.md"
 RESULTS = ROOT / "benchmarks" / "results" / "unmixing.json"
+WIDTHS = RESULTS.with_name("widths.json")
 
 Told = dict[str, Any]
 
@@ -21,15 +22,22 @@ Told = dict[str, Any]
 def main() -> int:
     """Write the page."""
     with replacing(PAGE) as trial:
-        trial.write_text(page(json.loads(RESULTS.read_text("utf-8"))), encoding="utf-8")
+        trial.write_text(page(*figures()), encoding="utf-8")
     return 0
 
 
-def page(told: Told) -> str:
+def figures() -> tuple[Told, Told]:
+    """What was measured of unmixing, and of widths."""
+    told, widths = (json.loads(path.read_text("utf-8")) for path in (RESULTS, WIDTHS))
+    return told, widths
+
+
+def page(told: Told, widths: Told) -> str:
     """The page's text."""
     text = TEXT.read_text("utf-8")
     tables = {"known": _known(told), "mistaken": _mistaken(told), "counted": _counted(told)}
     tables |= {"shading": _shading(told["shading"]), "speed": _speed(told["speed"])}
+    tables |= {"supplied": _supplied(told["supplied"]), "borders": _borders(widths), "grid": _grid(widths)}
     for name, table in tables.items():
         text = text.replace(f"<!-- {name} -->", table)
     return text
@@ -94,6 +102,38 @@ def _shading(told: Told) -> str:
         f"The light varies by {_percent(told['light'])}; {_percent(told['left'])} of it is left afterwards.\n"
     )
     return _table(("light", "melanin off by (median)", "blood"), rows) + "\n" + light
+
+
+def _supplied(told: Sequence[Told]) -> str:
+    heads = "melanin", "skins", "CIEDE2000 of the colour", "left when found", "melanin off by", "blood"
+    rows = [
+        (
+            "{:g} to {:g}".format(*one["melanin"]),
+            one["skins"],
+            f"{one['delta_e_forward']:.2f}",
+            f"{one['delta_e']:.2f}",
+            _percent(one["melanin_error"]),
+            _percent(one["blood_error"]),
+        )
+        for one in told
+    ]
+    return _table(heads, rows)
+
+
+def _borders(told: Told) -> str:
+    heads = "media", "weights of", "mean error", "worst", "light in all", "white skin's light"
+    rows = [
+        (name, rule, *(_percent(one[key]) for key in ("rms", "worst", "energy", "white")))
+        for name, pair in told["pairs"].items()
+        for rule, one in pair["rules"].items()
+    ]
+    return _table(heads, rows)
+
+
+def _grid(told: Told) -> str:
+    words = {"one_profile": "one profile, at the middle", "mixed": "three, mixed by the map"}
+    rows = [(words[key], *map(_percent, told["grid"][key])) for key in words]
+    return _table(("", "red", "green", "blue"), rows)
 
 
 def _speed(told: Told) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 
@@ -13,9 +12,9 @@ FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 
 def test_the_page_is_that_of_the_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "path", [*sys.path, str(FOLDER)])
-    from unmixing_page import PAGE, RESULTS, page
+    from unmixing_page import PAGE, figures, page
 
-    told = json.loads(RESULTS.read_text("utf-8"))
-    text = page(told)
+    told, widths = figures()
+    text = page(told, widths)
     assert text == PAGE.read_text("utf-8") and "<!--" not in text
     assert f"| {told['known']['0.05'][0]['skins']} |" in text

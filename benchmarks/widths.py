@@ -1,0 +1,154 @@
+"""How well mixed profiles stand for light at the border of two media: python benchmarks/widths.py
+
+Monte Carlo through two half-spaces side by side is the truth; `unmixing_page.py` puts the figures into
+docs/fit.md. With --cost it prints the milliseconds of frames with one, two and three profiles.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from figures_file import write_figures
+from numpy.typing import NDArray
+
+import dermis
+from dermis.frame.renderer import Renderer
+from dermis.images.io import write_png
+from dermis.reference.two_media import exchange
+from dermis.unmixing.model import skin_model
+from dermis.unmixing.unmix import unmix
+from dermis.unmixing.widths import widths_of
+
+RESULTS = Path(__file__).parent / "results" / "widths.json"
+Floats = NDArray[np.float64]
+PAIRS: dict[str, tuple[tuple[float, float], tuple[float, float]]] = {
+    "skin1 beside skin2, red": ((0.032, 0.013), (0.74, 1.09)),
+    "skin1 beside skin2, green": ((0.17, 0.07), (0.88, 1.59)),
+    "four times the absorption": ((0.03, 0.12), (1.0, 1.0)),
+    "twice the scattering": ((0.05, 0.05), (1.0, 2.0)),
+    "half the width, same colour": ((0.05, 0.1), (1.0, 2.0)),
+}
+"""Absorption and reduced scattering left and right [1/mm]."""
+HALF_MM, STRIPS, PHOTONS, SEED = 14.0, 140, 40_000, 3
+_JUDGED, _CENTRAL = slice(40, 100), slice(20, 120)  # strips around the border; those whose light counts
+_FRAMES = 12
+
+
+def main(words: list[str]) -> int:
+    """Measure, and write the figures."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("-o", "--output", type=Path, default=RESULTS)
+    parser.add_argument("--adapter", default="auto")
+    parser.add_argument("--cost", action="store_true", help="print milliseconds of frames, and write nothing")
+    parser.add_argument("--atlas", type=int, default=2048)
+    asked = parser.parse_args(words)
+    if asked.cost:
+        sys.stdout.write(json.dumps(cost(asked.adapter, asked.atlas)) + "\n")
+        return 0
+    told = {"pairs": {name: border(*pair) for name, pair in PAIRS.items()}, "grid": grid(asked.adapter)}
+    write_figures(asked.output, told | {"photons": PHOTONS}, 3)
+    return 0
+
+
+def border(sigma_a: tuple[float, float], sigma_s: tuple[float, float]) -> dict[str, Any]:
+    """Errors of each rule at the border of two media: root mean square over the true maximum, and energy."""
+    edges = np.linspace(-HALF_MM, HALF_MM, STRIPS + 1)
+    a, s = np.array(sigma_a), np.array(sigma_s)
+    true = exchange(a, s, edges, PHOTONS, SEED)
+    alone = [along(exchange(np.full(2, a[k]), np.full(2, s[k]), edges, PHOTONS, SEED)) for k in (0, 1)]
+    colour = [one[0] + 2.0 * one[1:].sum() for one in alone]
+    right = edges[:-1] >= 0.0
+    apart = np.abs(np.subtract.outer(np.arange(STRIPS), np.arange(STRIPS)))
+    white = [one[apart] / total for one, total in zip(alone, colour, strict=True)]
+    tint = np.sqrt(np.where(right, colour[1], colour[0]))
+    told = {}
+    for name, kernel in rules(white, right).items():
+        off = [errors(light, kernel, tint, true) for light in patterns(edges)]
+        rms, energy, kept = np.abs(np.array(off)).T
+        told[name] = {"rms": rms.mean(), "worst": rms.max(), "energy": energy.max(), "white": kept.max()}
+    return {"albedo": colour, "rules": told}
+
+
+def along(matrix: Floats) -> Floats:
+    """(n,) light by the distance in strips, of one medium."""
+    found = np.zeros(STRIPS)
+    for k in range(STRIPS):
+        pairs = [matrix[i, j] for i in range(STRIPS)[_JUDGED] for j in (i - k, i + k) if 0 <= j < STRIPS]
+        found[k] = np.mean(pairs) if pairs else 0.0
+    return found
+
+
+def rules(white: list[Floats], right: NDArray[np.bool_]) -> dict[str, Floats]:
+    """White kernels from row to column."""
+    leaves = np.where(right[None], white[1], white[0])
+    enters = np.where(right[:, None], white[1], white[0])
+    return {
+        "one profile": white[0],
+        "where it leaves": leaves,
+        "where it enters": enters,
+        "half of each": 0.5 * (leaves + enters),
+        "geometric mean": np.sqrt(leaves * enters),
+    }
+
+
+def patterns(edges: Floats) -> Iterator[Floats]:
+    """Light over the strips: even, with an edge near the border, and lines of 0.5 mm."""
+    x = 0.5 * (edges[:-1] + edges[1:])
+    yield np.ones(STRIPS)
+    for edge in (-1.0, 0.0, 1.0):
+        yield np.where(x < edge, 1.0, 0.0)
+        yield np.where(x > edge, 1.0, 0.0)
+    for middle in (-1.5, -0.5, 0.5, 1.5):
+        yield np.where(np.abs(x - middle) < 0.25, 1.0, 0.0)
+
+
+def errors(light: Floats, kernel: Floats, tint: Floats, true: Floats) -> tuple[float, float, float]:
+    """Root mean square over the maximum, light in all, and what the kernel alone makes of white's."""
+    made, wanted = tint * ((light * tint) @ kernel), light @ true
+    off = np.sqrt(((made - wanted)[_JUDGED] ** 2).mean()) / wanted[_JUDGED].max()
+    energy = made[_CENTRAL].sum() / wanted[_CENTRAL].sum() - 1.0
+    near = light[_JUDGED]  # far from where strips end
+    return float(off), float(energy), float((near @ kernel[_JUDGED]).sum() / near.sum() - 1.0)
+
+
+def grid(adapter: str) -> dict[str, Any]:
+    """What three profiles leave of the widths of skins with 1 to 15 % of melanin and 0.2 to 6 % of blood."""
+    m, b = np.meshgrid(np.geomspace(0.01, 0.15, 64), np.geomspace(0.002, 0.06, 64))
+    colours = skin_model().colours(m.ravel(), b.ravel()).reshape(64, 64, 3)
+    return widths_of(unmix(colours, adapter=adapter)).summary()
+
+
+def cost(adapter: str, atlas: int) -> dict[str, Any]:
+    """Median milliseconds of a human's frames by how many profiles its skin has, lit anew each time."""
+    renderer, head = Renderer(adapter), dermis.load_head("human")
+    settings = dermis.Settings(size=(1920, 1080), atlas=atlas)
+    told: dict[str, Any] = {"adapter": renderer.device.adapter.name, "atlas": atlas}
+    with TemporaryDirectory() as folder:
+        mask = Path(folder) / "mask.png"
+        write_png(mask, np.random.default_rng(SEED).integers(0, 127, (64, 64, 3)).astype(np.uint8))
+        one = dermis.Skin(profile="skin1")
+        for others in ((), ("skin2",), ("skin2", "dj3")):
+            skin = one.replace(profile_map=str(mask), other_profiles=others) if others else one
+            took = [_frame_ms(renderer, dermis.Scene(head, skin=skin), settings, k) for k in range(_FRAMES)]
+            told[f"profiles {1 + len(others)}"] = float(np.median(took[2:]))
+    return told
+
+
+def _frame_ms(renderer: Renderer, scene: dermis.Scene, settings: dermis.Settings, number: int) -> float:
+    """By the device's clock where it has one; of light that no frame before had."""
+    bright = 3.0 + 0.01 * number
+    lamp = dermis.PointLight(position=(-300, 300, 700), irradiance=(bright, bright, bright))
+    drawn = renderer.draw(replace(scene, lights=(lamp,)), settings, timed="whole")
+    return drawn.gpu_ms["total"] if drawn.gpu_ms else drawn.frame_ms
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,25 @@
+"""Profiles on one set of Gaussians keep their totals and stay near what they were."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dermis.optics.fits.shared import SHARED_TERMS, shared_errors, shared_gaussians
+from dermis.optics.profiles import load_profile
+
+
+@pytest.mark.parametrize("names", [("skin1", "skin2"), ("gpu-gems-3", "dj3", "skin1")])
+def test_each_keeps_its_total_and_its_shape(names: tuple[str, ...]) -> None:
+    profiles = [load_profile(name) for name in names]
+    shared = shared_gaussians(profiles)
+    for before, after in zip(profiles, shared, strict=True):
+        assert len(after.variance_mm2) <= SHARED_TERMS
+        np.testing.assert_array_equal(after.variance_mm2, shared[0].variance_mm2)
+        np.testing.assert_allclose(after.albedo, before.albedo, rtol=1e-9)
+    assert shared_errors(profiles, shared).max() < 0.1
+
+
+def test_profiles_that_share_theirs_are_taken_as_they_are() -> None:
+    one = load_profile("skin1")
+    assert all(after is one for after in shared_gaussians([one, one]))
