@@ -144,7 +144,7 @@ def _serve(pipe: Any, seat: Seat, work: Work) -> None:
                     failed = worker.draw(shard, lambda: pipe.send(Told(images=1)))
                     pipe.send(Told(shard=shard, failed=failed))
         except (DeviceError, LostProcessError) as fault:
-            pipe.send(Told(again=str(fault)))
+            pipe.send(Told(again=str(fault).removesuffix(".")))  # what is told goes on
         except DermisError as fault:
             pipe.send(Told(refusal=str(fault)))
 

@@ -49,6 +49,7 @@ _SOURCES = {FLOATS: _LEVELS / "loaded", HALVES: _LEVELS / "filtered"}
 _STORES = {FLOATS: _LEVELS / "floats", HALVES: _LEVELS / "halves"}
 _EACH, _ROW = 64, 32768  # invocations of a workgroup as in each.wgsl; workgroups in a row, at most 65535
 _STRIP = 16  # pixels of an invocation on software adapters, see shade.wgsl
+_SPLAT_STEP = 2.0  # of hairs' shadows on software adapters [texel], see docs/performance.md
 _SAMPLES = 64  # that an invocation may meet: drivers end what goes round loops 65,535 times
 
 
@@ -102,10 +103,11 @@ def device_constants(device: Device) -> Constants:
     """Pipeline constants that suit the device, for shaders that declare them.
 
     GPUs read buffers faster. Software adapters read textures faster, skip lights behind each point's surface,
-    and shade columns of pixels; see geometry.wgsl, lighting.wgsl and shade.wgsl.
+    shade columns of pixels and take longer steps along hairs that cast shadows; see geometry.wgsl,
+    lighting.wgsl, shade.wgsl and strands_shadow.wgsl.
     """
     if device.adapter.kind == "CPU":
-        return (("PASSES_DARK", 1), ("STRIP", _STRIP))
+        return (("PASSES_DARK", 1), ("STRIP", _STRIP), ("SPLAT_STEP", _SPLAT_STEP))
     return (("MESH_IN_BUFFERS", 1),)
 
 

@@ -11,7 +11,7 @@
 
 override COVERS: bool = false; // whether the nearest are known
 
-const STEP: f32 = 1.0; // between places along a hair, at most [texel]
+override SPLAT_STEP: f32 = 1.0; // between places along a hair, at most [texel]; software adapters take longer ones
 
 fn window_at(layer: i32) -> Window {
     let word = window_begin(layer);
@@ -44,7 +44,7 @@ fn splat(light: Light, a: vec4f, b: vec4f, wider: f32) {
     let up = in_window(window, on_map(light, a.xyz + light.map_up)).y - begin.y;
     let way = b.xyz - a.xyz;
     let across = length(vec2f(dot(way, light.map_right), dot(way, light.map_up)));
-    let count = max(1u, u32(ceil(distance(begin.xy, end.xy) / STEP)));
+    let count = max(1u, u32(ceil(distance(begin.xy, end.xy) / SPLAT_STEP)));
     let cover = wider * (a.w + b.w) * across * abs(right * up) / f32(count);
     for (var k = 0u; k < count; k += 1u) {
         let at = mix(begin, end, (f32(k) + 0.5) / f32(count));

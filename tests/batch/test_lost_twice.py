@@ -1,0 +1,72 @@
+"""A worker that loses its device twice is replaced, which is told; workers that all do end the run with 2."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import losing_worker
+import pytest
+from small_set import HERE, SHARDS, contents, drawn
+
+from dermis.batch.spec import Spec
+from dermis.cli import main
+
+OPENED_AGAIN, REPLACED = "it is opened again", "it was lost twice"
+ATTEMPTS = 2
+SHARD = "shard-00003"  # the only one that is drawn, as the others are there
+
+
+@pytest.fixture
+def begun(
+    undisturbed: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> tuple[Path, Path]:
+    """A data set without one shard, and the folder of the workers that lose their devices."""
+    out, lost = tmp_path / "out", tmp_path / "lost"
+    lost.mkdir()
+    for name, data in undisturbed.items():
+        if not name.startswith((SHARD, "index", "README")):
+            (out / name).parent.mkdir(parents=True, exist_ok=True)
+            (out / name).write_bytes(data)
+    monkeypatch.setattr("dermis.batch.processes._serve", losing_worker.serve)
+    monkeypatch.setenv(losing_worker.FOLDER, str(lost))
+    return out, lost
+
+
+def test_another_worker_draws_the_shard(
+    small_spec: Spec,
+    undisturbed: dict[str, bytes],
+    begun: tuple[Path, Path],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    out, lost = begun
+    monkeypatch.setenv(losing_worker.WORKERS, "1")
+    with pytest.warns(UserWarning) as told:
+        report = drawn(small_spec, out)
+    notes = [str(one.message) for one in told]
+    assert [OPENED_AGAIN in note for note in notes] == [True, False], notes
+    assert REPLACED in notes[1] and notes[1].endswith("its shard is drawn again")
+    assert (report.shards, report.skipped, report.is_whole) == (1, SHARDS - 1, True)
+    assert len(list(lost.iterdir())) == 1 and contents(out) == undisturbed
+
+
+def test_the_command_ends_with_2_where_all_do(
+    small_folder: Path,
+    begun: tuple[Path, Path],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    out, lost = begun
+    before = contents(out)
+    monkeypatch.setattr("dermis.batch.processes.MOST_ATTEMPTS", ATTEMPTS)
+    monkeypatch.setenv(losing_worker.WORKERS, "9")
+    words = ["batch", str(small_folder / "spec.toml"), "-o", str(out), "--adapter", HERE.adapter]
+    monkeypatch.setattr(sys, "argv", ["dermis", *words, "--workers", "1", "--encoders", "0"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    said = capsys.readouterr().err
+    assert ended.value.code == 2 and OPENED_AGAIN in said and "its shard is drawn again" in said
+    assert re.search(rf"shard 3: .* but {ATTEMPTS} failed, .*{REPLACED}.*\. What is whole is kept", said)
+    assert ".." not in said and ".;" not in said
+    assert len(list(lost.iterdir())) == ATTEMPTS and contents(out) == before
