@@ -12,14 +12,13 @@ import numpy as np
 
 import dermis
 from dermis.atlas.cached import cached_atlas
+from dermis.environment.mirrors import ROUGH, VIEWS, equivalent_mirrors
 from dermis.environment.panorama import directions, load_panorama, resampled, solid_angles, split_suns
 from dermis.environment.prefilter import (
     ROUGHEST,
     ROUGHNESSES,
-    SIDE,
     SMOOTHEST,
     Prefiltered,
-    equivalent_mirrors,
     prefilter,
 )
 from dermis.frame.lights.rectangle import facing_irradiance
@@ -81,18 +80,18 @@ def reflection_error(name: str, m: float, cosine: float, count: int = 60) -> flo
     for normal, view in zip(normals, views, strict=True):
         weight = kelemen(cosines(normal, towards, view), np.array(m)) * np.maximum(towards @ normal, 0)
         exact.append(weight @ light)
-    across, up, mirror_m = mirror(cosine, m)
-    seen = reflected(made.layers, up * normals + across * along, mirror_m)
+    lobes = mirror(cosine, m)
+    seen = np.mean([reflected(made.layers, z * normals + x * along, wide) for x, z, wide in lobes], axis=0)
     error = directional_albedo(cosine, m) * seen - np.array(exact)
     return float(np.sqrt((error**2).mean()) / np.mean(exact))
 
 
 def mirror(cosine: float, m: float) -> Array:
-    """Where the lobe points, and its roughness, between the table's nodes."""
-    x, y = cosine * (SIDE - 1), np.log(m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST) * (SIDE - 1)
-    j, i = min(int(x), SIDE - 2), min(int(y), SIDE - 2)
+    """Where the round lobes point, and their roughness, between the table's nodes."""
+    x, y = np.sqrt(cosine) * (VIEWS - 1), np.log(m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST) * (ROUGH - 1)
+    j, i = min(int(x), VIEWS - 2), min(int(y), ROUGH - 2)
     rows = equivalent_mirrors()[i : i + 2, j : j + 2]
-    return np.asarray(np.einsum("i,j,ijk->k", [1 - (y - i), y - i], [1 - (x - j), x - j], rows))
+    return np.asarray(np.einsum("i,j,ijlk->lk", [1 - (y - i), y - i], [1 - (x - j), x - j], rows))
 
 
 def reflected(layers: Array, towards: Array, m: float) -> Array:

@@ -22,7 +22,6 @@ from dermis.environment.panorama import (
 from dermis.environment.prefilter import (
     HEIGHT,
     ROUGHNESSES,
-    equivalent_mirrors,
     mirror_kernel,
     prefilter,
     round_lobe,
@@ -30,8 +29,6 @@ from dermis.environment.prefilter import (
 from dermis.errors import DermisError
 from dermis.images.colour import luminance
 from dermis.images.io import write_exr, write_png
-from dermis.specular.cosines import cosines
-from dermis.specular.models import MODELS
 
 Floats = NDArray[np.float64]
 
@@ -194,28 +191,6 @@ def test_kernels_are_too_smooth_to_ring() -> None:
         assert (
             factors[0] == pytest.approx(1.0) and abs(factors[-1]) < 1e-3 and np.abs(factors).max() < 1 + 1e-9
         )
-
-
-def test_mirrors_seen_along_the_normal_keep_their_roughness() -> None:
-    table, roughness = equivalent_mirrors(), np.geomspace(0.05, 1, 8)
-    assert np.allclose(table[:, -1, 0], 0, atol=1e-6)
-    assert np.allclose(table[:, -1, 2], roughness, rtol=0.02)
-    assert np.allclose(table[..., 0] ** 2 + table[..., 1] ** 2, 1)
-
-
-@pytest.mark.parametrize("model", ["kelemen", "torrance-sparrow", "blinn-phong", "phong", "two-lobe"])
-def test_mirrors_have_the_lobes_mean_direction(model: str) -> None:
-    """At a node of the table, by light sampled over the hemisphere; and the mean cosine of a round lobe."""
-    table, roughness = equivalent_mirrors(model), np.geomspace(0.05, 1, 8)
-    light, area = directions(256, 512)[:128], solid_angles(256, 512)[:128]
-    cosine = 3 / 7
-    view = np.array([-np.sqrt(1 - cosine**2), cosine, 0])
-    up = np.array([0.0, 1.0, 0.0])
-    weight = MODELS[model].lobe(cosines(up, light, view), roughness[5]) * light[..., 1] * area
-    mean = (light * weight[..., None]).sum(axis=(0, 1)) / weight.sum()
-    assert np.allclose(mean[:2] / np.linalg.norm(mean), table[5, 3, :2], atol=2e-3)
-    own = round_lobe(np.arccos(light[..., 1]), table[5, 3, 2]) * area
-    assert (own * light[..., 1]).sum() / own.sum() == pytest.approx(np.linalg.norm(mean), abs=2e-3)
 
 
 def test_samples_are_found(sample_folder: Path) -> None:

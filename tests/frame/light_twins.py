@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-SIDE = 8  # of the table of mirrors
+ROUGH, VIEWS, LOBES = 8, 16, 4  # of the table of mirrors
 LEVELS = 10  # of reflections
 RANGE = np.log(20.0)  # from the smoothest roughness, 0.05, to the roughest
 
@@ -62,19 +62,22 @@ def mirrored(
 ) -> Floats:
     """(..., 3) radiance that the surface's lobe sees."""
     cosine = np.clip(dot(normal, view), 0, 1)
-    x, y = cosine * (SIDE - 1), np.clip(np.log(m / 0.05) / RANGE, 0, 1) * (SIDE - 1)
-    j, i = np.minimum(x.astype(int), SIDE - 2), np.minimum(y.astype(int), SIDE - 2)
-    table = environment["mirrors"].astype(float).reshape(SIDE, SIDE, 4)[..., :3]
-    fx, fy = (x - j)[..., None], (y - i)[..., None]
+    x, y = np.sqrt(cosine) * (VIEWS - 1), np.clip(np.log(m / 0.05) / RANGE, 0, 1) * (ROUGH - 1)
+    j, i = np.minimum(x.astype(int), VIEWS - 2), np.minimum(y.astype(int), ROUGH - 2)
+    table = environment["mirrors"].astype(float).reshape(ROUGH, VIEWS, LOBES, 4)[..., :3]
+    fx, fy = (x - j)[..., None, None], (y - i)[..., None, None]
     low = (1 - fx) * table[i, j] + fx * table[i, j + 1]
     high = (1 - fx) * table[i + 1, j] + fx * table[i + 1, j + 1]
-    mirror = (1 - fy) * low + fy * high
+    lobes = np.moveaxis((1 - fy) * low + fy * high, -2, 0)
     along = cosine[..., None] * normal - view
     along = along / np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-6)
-    direction = unit(mirror[..., 1:2] * normal + mirror[..., :1] * along)
     seen = np.clip((cosine + open_) ** np.exp2(-16 * m - 1) - 1 + open_, 0, 1)
-    risen = np.clip(1 + dot(direction, smooth) / m, 0, 1)
-    return reflection(layers, environment, direction, mirror[..., 2]) * (seen * risen)[..., None]
+    total = np.zeros_like(normal)
+    for mirror in lobes:
+        direction = unit(mirror[..., 1:2] * normal + mirror[..., :1] * along)
+        risen = np.clip(1 + dot(direction, smooth) / m, 0, 1)[..., None]
+        total += risen * reflection(layers, environment, direction, mirror[..., 2])
+    return np.asarray(total * seen[..., None] / LOBES)
 
 
 def part_of(light: Any, points: Floats, part: int) -> tuple[Floats, Floats]:

@@ -15,8 +15,9 @@ from tolerances import FURNACE, PANORAMA, PREFILTERED
 from twins import DEFAULT_COLOUR, surface, surface_albedo
 
 from dermis.atlas.cached import cached_atlas
+from dermis.environment.mirrors import equivalent_mirrors
 from dermis.environment.panorama import directions, solid_angles
-from dermis.environment.prefilter import equivalent_mirrors, prefilter
+from dermis.environment.prefilter import prefilter
 from dermis.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download

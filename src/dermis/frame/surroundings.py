@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.cached import cached_occlusion
+from dermis.environment.mirrors import equivalent_mirrors
 from dermis.environment.panorama import Sun, load_panorama
-from dermis.environment.prefilter import equivalent_mirrors, prefilter
+from dermis.environment.prefilter import prefilter
 from dermis.frame.lights import sun_lights
 from dermis.frame.passes.occlusion import FORM, bake_occlusion, whole_map
 from dermis.frame.surface import model_of

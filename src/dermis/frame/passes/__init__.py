@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from dermis import specular
+from dermis.environment.mirrors import mirror_numbers
 from dermis.frame.atlas_textures import atlas_numbers
 from dermis.frame.baked_numbers import baking_numbers
 from dermis.frame.fine_light import fine_numbers
@@ -40,6 +41,7 @@ SHARED_SHADERS = ShaderFolder(
         **meter_numbers(),
         **baking_numbers(),
         **fine_numbers(),
+        **mirror_numbers(),
     },
 )
 TILE = 16

@@ -5,14 +5,15 @@ override ENVIRONMENT: bool = false; // whether there is one
 const LAYERS: f32 = 10.0; // of reflections, even in the logarithm of the roughness
 const SMOOTHEST: f32 = 0.05; // roughness of the first and of the last of them
 const ROUGHEST: f32 = 1.0;
-const MIRRORS: u32 = 8u; // rows and columns of the table of mirror lobes
+//#fill const MIRRORS: vec2u = vec2u({mirror_views}u, {mirror_rough}u); // columns and rows of the table of mirror lobes
+//#fill const LOBES: u32 = {mirror_lobes}u; // round lobes whose mean stands for the surface's
 
 struct Environment {
     turn: vec2f, // cosine and sine of the rotation about +Y
     exposure: f32,
     albedo: vec3f, // of skin whose colour map is white
     occluded: u32, // whether the occlusion map holds anything
-    mirrors: array<vec4f, 64>, // by roughness and cosine: sine and cosine of where the lobe points, its roughness
+    mirrors: array<vec4f, 512>, // by roughness, cosine and lobe: sine and cosine of where it points, its roughness
 }
 
 @group(0) @binding(20) var<uniform> environment: Environment;
@@ -53,15 +54,20 @@ fn ambient(normal: vec3f, open: f32, albedo: vec3f) -> vec3f {
     return panorama_at(normal, 0u) * max(vec3f(open), ((open * a + b) * open + c) * open);
 }
 
-// Direction and roughness of the round lobe that approximates the surface's, in the plane of view and normal.
-fn mirror_at(cosine: f32, m: f32) -> vec3f {
-    let last = f32(MIRRORS - 1u);
-    let place = clamp(vec2f(cosine, log(m / SMOOTHEST) / log(ROUGHEST / SMOOTHEST)), vec2f(0.0), vec2f(1.0)) * last;
-    let at = min(vec2u(place), vec2u(MIRRORS - 2u));
+// Place in the table of mirrors: by the root of the cosine, and by the logarithm of the roughness.
+fn mirror_place(cosine: f32, m: f32) -> vec2f {
+    let place = vec2f(sqrt(cosine), log(m / SMOOTHEST) / log(ROUGHEST / SMOOTHEST));
+    return clamp(place, vec2f(0.0), vec2f(1.0)) * vec2f(MIRRORS - 1u);
+}
+
+// Direction and roughness of a round lobe, in the plane of view and normal.
+fn mirror_at(place: vec2f, lobe: u32) -> vec3f {
+    let at = min(vec2u(place), MIRRORS - 2u);
     let f = place - vec2f(at);
-    let row = at.y * MIRRORS + at.x;
-    let low = mix(environment.mirrors[row], environment.mirrors[row + 1u], f.x);
-    let high = mix(environment.mirrors[row + MIRRORS], environment.mirrors[row + MIRRORS + 1u], f.x);
+    let row = LOBES * (at.y * MIRRORS.x + at.x) + lobe;
+    let below = row + LOBES * MIRRORS.x;
+    let low = mix(environment.mirrors[row], environment.mirrors[row + LOBES], f.x);
+    let high = mix(environment.mirrors[below], environment.mirrors[below + LOBES], f.x);
     return mix(low, high, f.y).xyz;
 }
 
@@ -69,12 +75,23 @@ fn mirror_at(cosine: f32, m: f32) -> vec3f {
 // the surface that carries the relief.
 fn mirrored(point: Point, normal: vec3f, v: vec3f, m: f32, open: f32) -> vec3f {
     let cosine = clamp(dot(normal, v), 0.0, 1.0);
-    let mirror = mirror_at(cosine, m);
-    let along = cosine * normal - v; // away from the eye, as long as the angle's sine
-    let direction = normalize(mirror.y * normal + mirror.x * along / max(length(along), 1e-6));
+    let place = mirror_place(cosine, m);
+    var along = cosine * normal - v; // away from the eye, as long as the angle's sine
+    along /= max(length(along), 1e-6);
+    var sum = vec3f(0.0);
+    var k = 0u;
+    loop {
+        let mirror = mirror_at(place, k);
+        let direction = normalize(mirror.y * normal + mirror.x * along);
+        let risen = clamp(1.0 + dot(direction, point.normal) / m, 0.0, 1.0);
+        sum += risen * reflection(direction, mirror.z);
+        k++;
+        if (k >= LOBES) {
+            break;
+        }
+    }
     let seen = clamp(pow(cosine + open, exp2(-16.0 * m - 1.0)) - 1.0 + open, 0.0, 1.0);
-    let risen = clamp(1.0 + dot(direction, point.normal) / m, 0.0, 1.0);
-    return reflection(direction, mirror.z) * seen * risen;
+    return sum * (seen / f32(LOBES));
 }
 
 // Open share of the sky on the atlas.

@@ -1,0 +1,95 @@
+"""Lobes as a few round ones, against sums over the whole lobe."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dermis.environment.mirrors import equivalent_mirrors
+from dermis.environment.panorama import directions, solid_angles
+from dermis.environment.prefilter import HEIGHT, prefilter, round_lobe
+from dermis.images.io import write_exr
+from dermis.specular.cosines import cosines
+from dermis.specular.models import MODELS
+
+Floats = NDArray[np.float64]
+
+
+def test_mirrors_seen_along_the_normal_keep_their_roughness() -> None:
+    """Within what the quarters of a wide lobe differ by; their mean is the normal."""
+    table, roughness = equivalent_mirrors(), np.geomspace(0.05, 1, 8)
+    assert np.allclose(table[:, -1, :, 0].mean(axis=1), 0, atol=1e-3)
+    assert np.allclose(table[:, -1, :, 2], roughness[:, None], rtol=0.15)
+    assert np.allclose(table[..., 0] ** 2 + table[..., 1] ** 2, 1)
+
+
+@pytest.mark.parametrize("model", ["kelemen", "torrance-sparrow", "blinn-phong", "phong", "two-lobe"])
+def test_mirrors_have_the_lobes_mean_direction(model: str) -> None:
+    """At a node of the table, by light sampled over the hemisphere; and no more than its width across."""
+    light, area = directions(256, 512)[:128], solid_angles(256, 512)[:128]
+    cosine, m = (7 / 15) ** 2, np.geomspace(0.05, 1, 8)[4]
+    view, up = np.array([-np.sqrt(1 - cosine**2), cosine, 0]), np.array([0.0, 1.0, 0.0])
+    weight = MODELS[model].lobe(cosines(up, light, view), m) * light[..., 1] * area
+    weight /= weight.sum()
+    x, _, z = np.moveaxis(light, -1, 0)
+    mean = np.array([(weight * x).sum(), (weight * light[..., 1]).sum()])
+    lobes = equivalent_mirrors(model)[4, 7]
+    made, across = np.zeros(2), 0.0
+    for sine, cos, wide in lobes:
+        own = round_lobe(np.arccos(light[..., 1]), wide) * area
+        made += np.array([sine, cos]) * (own * light[..., 1]).sum() / own.sum() / len(lobes)
+        across += (own * z**2).sum() / own.sum() / len(lobes)
+    assert np.allclose(made, mean, atol=3e-3)
+    assert across < 1.2 * (weight * z**2).sum()
+    assert model in ("two-lobe", "phong") or across > 0.97 * (weight * z**2).sum()
+
+
+@pytest.fixture(scope="module")
+def lit_room(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Floats]:
+    """A file of a dim room with a bright window and a coloured floor, and its radiance."""
+    towards = directions(256, 512)
+    radiance = 0.3 + 0.2 * towards * [1, 0.5, -0.5]
+    radiance[towards[..., 0] > 0.9] += [4.0, 5.0, 6.0]
+    radiance[towards[..., 1] < -0.5] *= [1.5, 0.8, 0.4]
+    path = tmp_path_factory.mktemp("environment") / "room.exr"
+    write_exr(path, radiance.astype(np.float32))
+    return str(path), radiance
+
+
+@pytest.mark.parametrize(("cosine", "most"), [(0.7, 0.05), (0.4, 0.09), (0.2, 0.07)])
+def test_grazing_reflections_are_the_lobes(lit_room: tuple[str, Floats], cosine: float, most: float) -> None:
+    """Roughness 0.3, against a plain sum of the whole lobe; one round lobe errs by 7, 20 and 25 %."""
+    name, radiance = lit_room
+    layers, towards, area = prefilter(name).layers, directions(256, 512), solid_angles(256, 512)
+    made, exact = [], []
+    for turn in np.linspace(0, 2 * np.pi, 7)[:-1]:
+        tangent = np.array([np.cos(turn), 0.3, np.sin(turn)])
+        normal = np.cross(tangent, [0.2, 1.0, -0.4])
+        normal /= np.linalg.norm(normal)
+        along = np.cross(normal, np.cross(tangent, normal))
+        along /= np.linalg.norm(along)
+        view = cosine * normal - np.sqrt(1 - cosine**2) * along
+        weight = MODELS["kelemen"].lobe(cosines(normal, towards, view), 0.3) * np.maximum(towards @ normal, 0)
+        weight *= area
+        exact.append(np.einsum("yxc,yx->c", radiance, weight) / weight.sum())
+        made.append(np.mean([seen_in(layers, normal, along, one) for one in lobes_between(cosine)], axis=0))
+    assert np.sqrt(np.mean(np.subtract(made, exact) ** 2)) < most * np.mean(exact)
+
+
+def lobes_between(cosine: float) -> Floats:
+    """(4, 3) round lobes for roughness 0.3 between the nodes of the table."""
+    x, y = np.sqrt(cosine) * 15, np.log(0.3 / 0.05) / np.log(20) * 7
+    j, i = int(x), int(y)
+    four = equivalent_mirrors()[i : i + 2, j : j + 2]
+    return np.asarray(np.einsum("i,j,ijlk->lk", [1 - (y - i), y - i], [1 - (x - j), x - j], four))
+
+
+def seen_in(layers: NDArray[np.float32], normal: Floats, along: Floats, lobe: Floats) -> Floats:
+    """(3,) mean radiance under a round lobe, at the nearest texel."""
+    direction = lobe[1] * normal + lobe[0] * along
+    nearest = (directions(HEIGHT, 2 * HEIGHT) @ direction).argmax()
+    at = np.log(lobe[2] / 0.05) / np.log(20) * 9
+    low = min(int(at), 8)
+    of = layers.reshape(len(layers), -1, 3)[:, nearest].astype(float)
+    return np.asarray(of[1 + low] + (at - low) * (of[2 + low] - of[1 + low]))
