@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,10 +77,9 @@ def thin_parts(body: Medium, variance_mm2: Floats, reach_mm: float) -> ThinParts
     deep, weight = np.zeros((2, ROWS, body.channels))
     for c in range(body.channels):
         one = body.channel(c)
-        passed, gone, deep[1:, c] = _shares(one.layers[0], depth[1:], body.eta)
-        weight[1:, c] = passed
-        shape = _shapes(one, depth[1:], variance_mm2)
-        through[1:, :, c], lost[1:, :, c] = passed[:, None] * shape, gone[:, None] * shape
+        share, shape = _shares(one.layers[0], depth[1:], body.eta), _shapes(one, depth[1:], variance_mm2)
+        through[1:, :, c], lost[1:, :, c] = share.passed[:, None] * shape, share.lost[:, None] * shape
+        deep[1:, c], weight[1:, c] = share.deep, share.amount
         lost[0, :, c] = shape[0]
     deep[0], weight[0] = deep[1], weight[1]
     mean = (weight * deep).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-12)
@@ -112,18 +112,24 @@ def _slanted(cut: Slabs, whole: Slabs) -> Floats:
     return np.asarray(cut.through / _uniform(cut, cut.through)[:, None] / returned)
 
 
-def _shares(layer: Layer, depth_mm: Floats, eta: float) -> tuple[Floats, Floats, Floats]:
-    """What comes through and what returns no longer, over what a half-space returns; `ThinParts.deep`."""
+class _Shares(NamedTuple):
+    """Of uniform light by thickness, (n,) each: what comes through; this and what returns no longer over what
+    a half-space returns; and `ThinParts.deep`."""
+
+    amount: Floats
+    passed: Floats
+    lost: Floats
+    deep: Floats
+
+
+def _shares(layer: Layer, depth_mm: Floats, eta: float) -> _Shares:
     albedo, extinction = float(layer.alpha_prime[0]), float(layer.sigma_t_prime[0])
     cut, whole = slabs(albedo, extinction * depth_mm, eta), slabs(albedo, _DEEP, eta)
     returned, law = _uniform(whole, whole.back), _law(albedo, eta)[1] - 1.0
     weight = whole.flux * whole.back[0]
     deep = (_slanted(cut, whole) - 1.0) @ (weight * law) / (weight * law**2).sum()
-    return (
-        _uniform(cut, cut.through) / returned,
-        np.maximum(1.0 - _uniform(cut, cut.back) / returned, 0.0),
-        deep,
-    )
+    amount, lost = _uniform(cut, cut.through), np.maximum(1.0 - _uniform(cut, cut.back) / returned, 0.0)
+    return _Shares(amount, amount / returned, lost, deep)
 
 
 def _uniform(of: Slabs, share: Floats) -> Floats:
