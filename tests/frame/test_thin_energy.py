@@ -1,4 +1,4 @@
-"""Thin parts give no more light than they get, and half-space skin lets through what slabs of its medium do."""
+"""Thin parts give no more light than they get; half-space skin lets through what slabs of its medium do."""
 
 from __future__ import annotations
 
