@@ -89,6 +89,9 @@ AREA_LIGHT = 0.01
 SLAB_THROUGH = 0.003
 """Light through a slab against the profile, of all its light: places are a millimetre apart."""
 
+WHITE_THIN = 0.01
+"""Share of the light that a white sheet in even light may give too much or too little."""
+
 OCCLUSION = 0.04
 """Open share of the sky by 128 directions against closed forms: one direction stands for up to 0.03 of it."""
 

@@ -9,6 +9,7 @@ import accuracy_highlight as highlight
 import accuracy_light as light
 import accuracy_look as look
 import accuracy_optics as optics
+import accuracy_slabs as slabs
 import accuracy_specular as specular
 import accuracy_surface as surface
 import accuracy_thin as thin
@@ -99,6 +100,7 @@ def main() -> None:
             **specular.tables(),
             **light.tables(*sys.argv[1:2]),
             **optics.tables(),
+            **slabs.tables(*sys.argv[1:2]),
             **thin.tables(*sys.argv[1:2]),
         ),
         encoding="utf-8",

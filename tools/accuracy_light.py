@@ -110,7 +110,8 @@ def furnace(renderer: dermis.Renderer, head: Head, energy: str, **chosen: str) -
     scene = Scene(white, environment=Environment(name="uniform"), skin=skin)
     settings = Settings.model_validate({"size": (384, 384), "atlas": 1024, "samples": 1, **chosen})
     shown = renderer.draw(scene, settings)
-    inside = shown.linear()[shown._read(shown.picture.exposed)[..., 3] == 1][:, 1]
+    made = shown.linear_rgba()
+    inside = made[made[..., 3] == 1][:, 1]
     return np.array([inside.min(), inside.mean(), inside.max()])
 
 

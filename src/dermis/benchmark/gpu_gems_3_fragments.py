@@ -53,8 +53,10 @@ class Fragments(GpuGems3):
             thin = layout.translucency
             if thin:
                 translucency_weights.draw(graph, thin)
+                if thin.slabs:
+                    translucency.draw_slants(graph, layout, inputs.light_constants)
             through = translucency.draw(graph, made.levels, blur, thin) if thin else None
-            self._add_up(graph, made.levels, blur, layout.scattered, through)
+            self._add_up(graph, made.levels, blur, layout.scattered, through, thin.lost if thin else None)
         return made.scattered
 
     def shader(self, device: Device, constants: Constants) -> FragmentProgram:
@@ -76,7 +78,7 @@ class Fragments(GpuGems3):
         }
         graph.fill("irradiance", shader, bound, [into])
 
-    def _add_up(self, graph: Graph, levels: Levels, blur: Blur, into: Any, through: Any) -> None:
+    def _add_up(self, graph: Graph, levels: Levels, blur: Blur, into: Any, through: Any, lost: Any) -> None:
         shader = _program(graph.device, "gpu_gems_3_sum.wgsl", (), [FLOATS])
         padded = np.zeros((MOST_GAUSSIANS, 4), np.float32)
         padded[: len(blur.weight), :3] = blur.weight / blur.scale
@@ -86,6 +88,7 @@ class Fragments(GpuGems3):
             "weights": shader.record("Weights", weight=padded, **counts),
             "levels": levels.stacks[0],
             "transmitted": nothing(graph.device) if through is None else through,
+            "lost": nothing(graph.device) if lost is None else lost,
         }
         graph.fill("combine", shader, bound, [into])
 

@@ -182,15 +182,14 @@ def _layout(
         lit["occlusion_map"] = keep(surroundings.occlusion_map, device, head, atlas, using=bound, of=number)
     else:
         lit["occlusion_map"] = surroundings.no_occlusion(device)
-    follows = None
+    follows = translucency = None
     if asked.occlusion_moves:
         lit["occlusion_map"], follows = keep(make_map, device, lit["occlusion_map"], of=number)
-    translucency = None
     if asked.count and asked.settings.transmission == "thin" and asked.technique.transmits:
         now, then = (one.resources | textures.resources for one in (held, at_rest()))
-        blurred = asked.split.blurred_mm2, asked.split.weight, thin_tables(memo, asked)
-        own = asked.skin.has_own_tissue
-        translucency = translucency_of(memo, device, now, then, atlas, *blurred, own, of=number)
+        blurred = asked.split.blurred_mm2, asked.split.weight
+        how = thin_tables(memo, asked), asked.skin.has_own_tissue
+        translucency = translucency_of(memo, device, now, then, atlas, *blurred, *how, of=number)
     side = asked.settings.atlas if asked.count else 1
     surfaces = keep(surface_texels.make_surfaces, device, side, of=number)
     scattered = _sum(memo, device, asked, side, number)

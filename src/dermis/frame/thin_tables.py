@@ -28,8 +28,9 @@ def thin_tables(memo: Memo, asked: Asked) -> ThinParts | None:
 def _made(
     profile: GaussianSum, colour: Floats, eta: float, total: Floats, variance_mm2: Floats, weight: Floats
 ) -> ThinParts:
-    """Tables as weights of the blurred levels, which alone lose what passes."""
+    """Tables as weights of the blurred levels, which alone lose what passes: no more than they have."""
     reach = min(_REACH * float(np.sqrt(variance_mm2[-1])), _FARTHEST_MM)
     made = thin_parts(medium_of(profile, colour, eta), variance_mm2, reach)
-    lost = made.lost * (total / weight.sum(axis=0))
-    return replace(made, through=made.through * total, lost=lost)
+    blurred = weight.sum(axis=0) / total
+    share = np.minimum(1.0, blurred / np.maximum(made.lost.sum(axis=1), 1e-12))[:, None]
+    return replace(made, through=made.through * share * total, lost=made.lost * share / blurred)

@@ -25,7 +25,7 @@ from dermis.preparing import preparing
 Floats = NDArray[np.float64]
 _WIDTHS_TO_DOUBLE, _LEAST_SHARED_MM = 2, 0.5
 _WIDTHS = 4  # whose pairs are kept
-_ONE = np.array([0xfe000, 0x3f8fe000], np.uint32)  # white light of 1, as light_words.wgsl has it
+_ONE = np.array([0xFE000, 0x3F8FE000], np.uint32)  # white light of 1, as light_words.wgsl has it
 _COARSER = 1.5  # times the side of cells whose pairs memory does not hold
 
 

@@ -59,7 +59,7 @@ def _cosines(eta: float) -> tuple[Floats, Floats]:
 
 
 def _doubled(albedo: float, tau: Floats, mu: Floats, flux: Floats) -> tuple[Floats, Floats, Floats]:
-    """Reflected and transmitted radiance (n, m, m) over pi per power from each direction, and (n, m) unscattered."""
+    """(n, m, m) radiance over pi, back and through, per power from each direction; (n, m) unscattered."""
     times = int(np.ceil(np.log2(max(float(tau.max()) / _THINNEST, 1.0))))
     t = (tau / 2.0**times)[:, None, None]
     a, b = mu[:, None], mu[None, :]

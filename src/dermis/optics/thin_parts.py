@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ ROWS = 32
 _MOST_ALBEDO, _LEAST_ALBEDO = 1.0 - 1e-6, 1e-3
 _LOGS = (-14.0, 14.0)  # of frequencies that are searched [1/mm]
 _LAW_DEPTH = 10.0  # mean free paths from which on directions of entry count alike
-_DEEP = 60.0  # mean free paths that are as good as a half-space
+_DEEP = 1e4  # mean free paths that are as good as a half-space
 _FREQUENCIES = np.geomspace(0.02, 5.0, 24)  # at which shapes are compared [1/mean free path]
 
 
@@ -55,9 +56,7 @@ def medium_of(profile: GaussianSum, total: Floats, eta: float) -> Medium:
     for c, share in enumerate(total):
         albedo[c] = _albedo_of(float(share), eta)
         one = GaussianSum("", profile.variance_mm2, profile.weight[:, [c]])
-        wide = _half(lambda s, one=one: float(one.hankel(s)[0]))
-        unit = _unit(float(albedo[c]), eta)
-        extinction[c] = wide / _half(lambda s, unit=unit: _returned(s, unit))
+        extinction[c] = _half(partial(_spread, one)) / _half(partial(_returned, _unit(albedo[c], eta)))
     layer = Layer((1.0 - albedo) * extinction, albedo * extinction)
     return Medium("flesh", (layer,), eta)
 
@@ -78,10 +77,9 @@ def thin_parts(body: Medium, variance_mm2: Floats, reach_mm: float) -> ThinParts
     deep, weight = np.zeros((2, ROWS, body.channels))
     for c in range(body.channels):
         one = body.channel(c)
-        passed, gone, deep[1:, c] = _shares(one.layers[0], depth[1:], body.eta)
-        weight[1:, c] = passed
-        shape = _shapes(one, depth[1:], variance_mm2)
-        through[1:, :, c], lost[1:, :, c] = passed[:, None] * shape, gone[:, None] * shape
+        share, shape = _shares(one.layers[0], depth[1:], body.eta), _shapes(one, depth[1:], variance_mm2)
+        through[1:, :, c], lost[1:, :, c] = share.passed[:, None] * shape, share.lost[:, None] * shape
+        deep[1:, c], weight[1:, c] = share.deep, share.amount
         lost[0, :, c] = shape[0]
     deep[0], weight[0] = deep[1], weight[1]
     mean = (weight * deep).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-12)
@@ -109,19 +107,29 @@ def _law(albedo: float, eta: float) -> tuple[Floats, Floats]:
 
 
 def _slanted(cut: Slabs, whole: Slabs) -> Floats:
-    """(n, m) what passes from each direction over what comes back from there, both over those of uniform light."""
+    """(n, m) what passes of light from each direction, as `across` has it."""
     returned = whole.back[0] / _uniform(whole, whole.back)
     return np.asarray(cut.through / _uniform(cut, cut.through)[:, None] / returned)
 
 
-def _shares(layer: Layer, depth_mm: Floats, eta: float) -> tuple[Floats, Floats, Floats]:
-    """What comes through, over what a half-space returns; the share of that which is no longer returned; deepness."""
+class _Shares(NamedTuple):
+    """Of uniform light by thickness, (n,) each: what comes through; this and what returns no longer over what
+    a half-space returns; and `ThinParts.deep`."""
+
+    amount: Floats
+    passed: Floats
+    lost: Floats
+    deep: Floats
+
+
+def _shares(layer: Layer, depth_mm: Floats, eta: float) -> _Shares:
     albedo, extinction = float(layer.alpha_prime[0]), float(layer.sigma_t_prime[0])
     cut, whole = slabs(albedo, extinction * depth_mm, eta), slabs(albedo, _DEEP, eta)
     returned, law = _uniform(whole, whole.back), _law(albedo, eta)[1] - 1.0
     weight = whole.flux * whole.back[0]
     deep = (_slanted(cut, whole) - 1.0) @ (weight * law) / (weight * law**2).sum()
-    return _uniform(cut, cut.through) / returned, 1.0 - _uniform(cut, cut.back) / returned, deep
+    amount, lost = _uniform(cut, cut.through), np.maximum(1.0 - _uniform(cut, cut.back) / returned, 0.0)
+    return _Shares(amount, amount / returned, lost, deep)
 
 
 def _uniform(of: Slabs, share: Floats) -> Floats:
@@ -149,7 +157,7 @@ def _albedo_of(total: float, eta: float) -> float:
     from scipy.optimize import brentq
 
     def beyond(albedo: float) -> float:
-        return _returned(float(hankel.STILL[0]), _unit(albedo, eta)) - total
+        return _returned(_unit(albedo, eta), float(hankel.STILL[0])) - total
 
     if beyond(_LEAST_ALBEDO) >= 0.0:
         return _LEAST_ALBEDO
@@ -161,7 +169,12 @@ def _unit(albedo: float, eta: float) -> Medium:
     return Medium("flesh", (Layer(np.array([1.0 - albedo]), np.array([albedo])),), eta)
 
 
-def _returned(frequency: float, body: Medium) -> float:
+def _spread(profile: GaussianSum, frequency: float) -> float:
+    """Hankel transform of a profile of one channel."""
+    return float(profile.hankel(frequency)[0])
+
+
+def _returned(body: Medium, frequency: float) -> float:
     """Hankel transform of what it returns."""
     A = mismatch(body.eta, "exact")
     return float(layered_diffusion.respond(np.array([frequency]), body, A)[0][0, 0])

@@ -29,7 +29,8 @@ def draw(
     coarsest = max(blurred)
     for mip in range(coarsest, -1, -1):
         through = transmitted if mip == _finest_for(transmitted, levels.size, coarsest) else None
-        shader = _program(device, levels.texel, mip > 0, mip < coarsest, through is not None, lost is not None)
+        there = through is not None, lost is not None
+        shader = _program(device, levels.texel, mip > 0, mip < coarsest, *there)
         first, count = blurred.index(mip), blurred.count(mip)
         padded = np.zeros((MOST_GAUSSIANS, 4), np.float32)
         padded[:count, :3] = blur.weight[first : first + count]

@@ -37,9 +37,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         }
     }
     let place = (vec2f(id.xy) + 0.5) / vec2f(size);
+    var gone = vec3f(0.0);
     if (THIN) {
         let share = load_bilinear(lost, place);
-        sum = vec4f(sum.rgb * (1.0 - min(share.rgb / max(share.a, 1e-6), vec3f(1.0))), sum.a);
+        gone = share.rgb / max(share.a, 1e-6);
+        sum = vec4f(sum.rgb * (1.0 - min(gone, vec3f(1.0))), sum.a);
     }
     if (COARSER) {
         let light = source_at(place);
@@ -48,7 +50,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     sum = vec4f(weights.scale * sum.rgb, sum.a);
     if (TRANSMITTED) {
         let light = load_bilinear(transmitted, place);
-        sum += vec4f(weights.through * light.rgb / max(light.a, 1e-6), 0.0);
+        // Between several sheets more may seem to pass than there is.
+        sum += vec4f(weights.through * light.rgb / (max(light.a, 1e-6) * max(gone, vec3f(1.0))), 0.0);
     }
     store(id.xy, sum);
 }

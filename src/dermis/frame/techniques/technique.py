@@ -225,7 +225,7 @@ class AtlasTechnique(Technique):
     def leave_through(self, graph: Any, levels: Levels, blur: Blur, thin: Any, into: Any) -> None:
         """Add up only what `leave` let through thin parts, by the same steps."""
         alone = replace(blur, weight=np.zeros_like(blur.weight))
-        combine.draw(graph, levels, alone, into, thin.light)
+        combine.draw(graph, levels, alone, into, thin.light, thin.lost)
 
 
 def _weights(profile: GaussianSum, white: bool) -> NDArray[np.float64]:

@@ -1,0 +1,83 @@
+"""Thin parts give no more light than they get; half-space skin lets through what slabs of its medium do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from setups import head_of, run_frame, scene_of
+from tolerances import WHITE_THIN
+
+from dermis.frame.renderer import Renderer
+from dermis.gpu import download
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.primitives import wedge
+from dermis.optics.diffusion.models import diffusion_profile
+from dermis.optics.fits.gaussian import fit_gaussians
+from dermis.optics.media import media
+from dermis.optics.profiles import write_profile
+from dermis.optics.slabs import slabs
+from dermis.scene.environment import Environment
+from dermis.scene.lights import DirectionalLight
+
+Floats = NDArray[np.float64]
+WHITE = np.ones((4, 4, 3))
+BODY = media()["skin1"].with_eta(1.0)
+
+
+@pytest.fixture(scope="module")
+def skin1(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A file of its profile."""
+    file: Path = tmp_path_factory.mktemp("profile") / "skin1.toml"
+    write_profile(file, fit_gaussians(diffusion_profile(BODY).rings(), 6, name="skin1").profile, {})
+    return str(file)
+
+
+def left(renderer: Renderer, mesh: Mesh, *lights: DirectionalLight, around: Any = None, **skin: Any) -> Any:
+    """(n, 3) light that leaves a slab far from its rim below the surface, on the upper and the lower face."""
+    scene = replace(scene_of(head_of(mesh, colour=WHITE), *lights, rho_s=0.0, **skin), environment=around)
+    inputs = run_frame(renderer, scene, atlas=192, occlusion="none")
+    texels = download(renderer.device, inputs.layouts[0].atlas.resources["atlas"])
+    light = download(renderer.device, inputs.resources.scattered)[..., :3].astype(float)
+    own = texels[..., 0] > 0
+    w = np.stack([texels[own][:, 1] & 0xFFFF, texels[own][:, 1] >> 16], axis=-1) / 65535.0
+    w = np.column_stack([1 - w.sum(axis=1), w])
+    corners = mesh.triangles[texels[own][:, 0].astype(int) - 1]
+    points, normals = (np.einsum("nk,nkc->nc", w, a[corners]) for a in (mesh.positions, mesh.normals))
+    inner = np.abs(points[:, :2]).max(axis=1) < 8.0
+    return [light[own][inner & (sign * normals[:, 2] > 0.9)] for sign in (1.0, -1.0)]
+
+
+@pytest.mark.parametrize("direction", ["lambertian", "half-space"])
+def test_a_white_sheet_in_a_furnace(renderer: Renderer, direction: str) -> None:
+    """Alike lit from everywhere it gives what it gets, less what half-spaces let pass unscattered."""
+    uniform = Environment(name="uniform")
+    thick, thin = (
+        np.concatenate(left(renderer, wedge(40.0, d, d), around=uniform, direction=direction))
+        for d in (30.0, 1.0)
+    )
+    share, half_space = thin / thick.mean(axis=0), direction == "half-space"
+    assert share.max() < 1.0 + (3.0 if half_space else 1.0) * WHITE_THIN
+    assert share.min() > 1.0 - (0.1 if half_space else WHITE_THIN)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 60.0])
+def test_half_space_skin_is_thin_as_its_medium(renderer: Renderer, skin1: str, degrees: float) -> None:
+    """Red and green light on both faces beside the exact slab."""
+    angle = np.radians(degrees)
+    way = (float(np.sin(angle)), 0.0, float(np.cos(angle)))
+    lamp = DirectionalLight(direction=way, irradiance=(1.0, 1.0, 1.0), shadows=False)
+    layer, cosine = BODY.layers[0], float(np.cos(angle))
+    for thickness in (1.0, 3.0):
+        mesh = wedge(40.0, thickness, thickness)
+        skin = {"albedo": "profile", "profile": skin1, "direction": "half-space", "specular": "none"}
+        through, back = (face.mean(axis=0) / cosine for face in left(renderer, mesh, lamp, **skin))
+        for c in range(2):
+            made = slabs(float(layer.alpha_prime[c]), float(layer.sigma_t_prime[c]) * thickness, 1.0)
+            exact = [np.interp(cosine, made.cosine, part[0]) for part in (made.through, made.back)]
+            assert through[c] == pytest.approx(exact[0], rel=0.15)
+            assert back[c] == pytest.approx(exact[1], rel=0.25)

@@ -1,0 +1,50 @@
+"""Slabs by adding and doubling: energy, photons one by one, the exact half-space."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dermis.optics.directions import directional_albedo, refracted
+from dermis.optics.slabs import slabs
+from dermis.reference.slab import ScatteringLayer
+from dermis.reference.slab_mc import trace_slab
+
+PHOTONS = 40_000
+
+
+def straight_down(cosine: np.ndarray, share: np.ndarray) -> float:
+    """The nodes stop short of it."""
+    return float(np.polyval(np.polyfit(cosine[-4:], share[-4:], 3), 1.0))
+
+
+@pytest.mark.parametrize("eta", [1.0, 1.4])
+def test_photons_leave_slabs_as_often(eta: float) -> None:
+    """From straight above, what leaves scattered on either side."""
+    for depth in (0.5, 2.0, 6.0):
+        made = slabs(0.9, depth, eta)
+        ends = made.cosine[-4:]  # the nodes stop short of straight down
+        back, through = (
+            np.polyval(np.polyfit(ends, part[0, -4:], 3), 1.0) for part in (made.back, made.through)
+        )
+        run = trace_slab([ScatteringLayer(0.1, 0.9, depth, 0.0, eta)], PHOTONS).per_entering
+        assert back == pytest.approx(run.total_reflectance, abs=4.0 * run.total_reflectance_se)
+        assert through == pytest.approx(run.total_transmittance, abs=4.0 * run.total_transmittance_se)
+
+
+@pytest.mark.parametrize("eta", [1.0, 1.4])
+def test_no_light_is_made_or_lost(eta: float) -> None:
+    made = slabs(1.0, [20.0, 50.0], eta)  # where all has scattered
+    assert made.flux.sum() == pytest.approx(1.0)
+    assert np.abs(made.back + made.through - 1.0).max() < 1e-3
+    clear = slabs(1.0, 0.01, 1.0)
+    straight = np.exp(-0.01 / clear.cosine)
+    assert np.abs(clear.back + clear.through + straight - 1.0).max() < 1e-5
+
+
+@pytest.mark.parametrize("eta", [1.0, 1.4])
+def test_a_deep_slab_is_a_half_space(eta: float) -> None:
+    air = np.array([0.2, 0.6, 0.95])
+    made = slabs(0.95, 64.0, eta)
+    found = np.interp(refracted(air, eta), made.cosine, made.back[0])
+    assert found == pytest.approx(directional_albedo(air, 0.95, eta), abs=2e-3)

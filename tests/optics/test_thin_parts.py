@@ -1,0 +1,75 @@
+"""Tables of thin parts: the medium behind a profile, amounts, widths and directions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dermis.optics.diffusion.boundary import fresnel
+from dermis.optics.diffusion.models import diffusion_profile
+from dermis.optics.directions import directions
+from dermis.optics.fits.gaussian import fit_gaussians
+from dermis.optics.gaussians import GaussianSum
+from dermis.optics.media import Layer, Medium, media
+from dermis.optics.slabs import slabs
+from dermis.optics.thin_parts import ROWS, across, medium_of, thin_parts
+
+BODY = media()["skin1"].with_eta(1.0)
+REACH = 12.0
+DEPTH = REACH * np.linspace(0.0, 1.0, ROWS) ** 2
+
+
+@pytest.fixture(scope="module")
+def profile() -> GaussianSum:
+    return fit_gaussians(diffusion_profile(BODY).rings(), 6, name="skin1").profile
+
+
+def test_a_profile_tells_its_medium(profile: GaussianSum) -> None:
+    found, body = medium_of(profile, profile.albedo, 1.0).layers[0], BODY.layers[0]
+    assert found.alpha_prime == pytest.approx(body.alpha_prime, rel=0.01)
+    assert found.sigma_t_prime == pytest.approx(body.sigma_t_prime, rel=0.02)
+
+
+def test_what_passes_from_any_direction(profile: GaussianSum) -> None:
+    """Beside the exact slab: red to a sixth of what passes from above, from 1 to 8 mm, to 70 degrees."""
+    made = thin_parts(BODY, profile.variance_mm2, REACH)
+    layer, law = BODY.layers[0], across(profile.albedo, 1.0)[:, 0]
+    cosine = np.cos(np.radians([0.0, 30.0, 50.0, 70.0]))
+    whole = slabs(float(layer.alpha_prime[0]), 1e4, 1.0)
+    back = np.interp(cosine, whole.cosine, whole.back[0])
+    slant = np.interp(np.sqrt(cosine), np.linspace(0.0, 1.0, len(law)), law)
+    for thickness in (1.0, 2.0, 4.0, 8.0):
+        share = np.interp(thickness, DEPTH, made.through[..., 0].sum(axis=1))
+        deep = np.interp(thickness, DEPTH, made.deep)
+        cut = slabs(float(layer.alpha_prime[0]), float(layer.sigma_t_prime[0]) * thickness, 1.0)
+        exact = np.interp(cosine, cut.cosine, cut.through[0])
+        found = share * back * (1.0 + deep * (slant - 1.0))
+        assert np.abs(found - exact).max() < exact[0] / 6.0, thickness
+
+
+def test_light_that_a_white_medium_lets_pass_is_lost_to_its_near_side() -> None:
+    white = Medium("white", (Layer(np.array([1e-6]), np.array([2.0])),), 1.0)
+    made = thin_parts(white, np.array([0.01, 0.1, 1.0, 10.0]), 8.0)
+    through, lost = made.through[1:, :, 0].sum(axis=1), made.lost[1:, :, 0].sum(axis=1)
+    clear = DEPTH[1:] / REACH * 8.0 > 4.0  # beyond, nothing passes unscattered
+    assert (lost >= through - 5e-3).all()
+    assert lost[clear] == pytest.approx(through[clear], abs=5e-3)
+
+
+def test_thicker_parts_spread_light_wider() -> None:
+    variance = np.array([0.05, 0.5, 5.0, 20.0])
+    made = thin_parts(BODY.channel(0), variance, REACH).through[1:, :, 0]
+    width = made @ variance / made.sum(axis=1)
+    assert (np.diff(width)[4:] > -0.02 * width[5:]).all() and width[-1] > 10.0 * width[4]
+
+
+def test_directions_cancel_in_uniform_light() -> None:
+    """`across` is over what uniform light brings of which as much comes back."""
+    for eta in (1.0, 1.4):
+        law = across(np.array([0.5]), eta)[:, 0]
+        cosine = np.linspace(0.0, 1.0, len(law)) ** 2
+        fine = np.linspace(1e-3, 1.0, 2001)
+        returned = np.interp(np.sqrt(fine), np.sqrt(cosine), directions([0.5], eta).returned[:, 0])
+        weight = returned * fine * (1.0 - fresnel(fine, eta))
+        mean = (weight * np.interp(np.sqrt(fine), np.sqrt(cosine), law)).sum() / weight.sum()
+        assert mean == pytest.approx(1.0, abs=0.01)

@@ -1,0 +1,124 @@
+"""Tables of the errors of light through slabs, by directions of entry, for docs/accuracy.md.
+
+python tools/accuracy_slabs.py [ADAPTER] prints them alone. Slabs far from their rim; the truth is adding and
+doubling (`optics/slabs.py`), which the tests hold against photons.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+import dermis
+from dermis.gpu import download
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.primitives import wedge
+from dermis.optics.diffusion.models import diffusion_profile
+from dermis.optics.directions import refracted
+from dermis.optics.fits.gaussian import fit_gaussians
+from dermis.optics.media import Medium, media
+from dermis.optics.profiles import TERMS, write_profile
+from dermis.optics.slabs import slabs
+from dermis.reference.slab import ScatteringLayer
+from dermis.reference.slab_mc import trace_slab
+from dermis.scene import DirectionalLight, Scene, Settings, Skin
+
+Array = np.ndarray
+THICK_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
+DEGREES = (0.0, 40.0, 60.0, 80.0)
+PHOTONS = 100_000
+BODIES = (("skin1", 1.0), ("skin2", 1.0), ("skin1", 1.4), ("skin2", 1.4))
+
+
+def exact(body: Medium, thickness: float) -> Array:
+    """(2, angles, 3) share of what enters that leaves scattered, on the near side and the far one."""
+    layer, made = body.layers[0], np.empty((2, len(DEGREES), 3))
+    below = refracted(np.cos(np.radians(DEGREES)), body.eta)
+    for c in range(3):
+        cut = slabs(float(layer.alpha_prime[c]), float(layer.sigma_t_prime[c]) * thickness, body.eta)
+        made[..., c] = [np.interp(below, cut.cosine, part[0]) for part in (cut.back, cut.through)]
+    return made
+
+
+def drawn(renderer: dermis.Renderer, skin: Skin, thickness: float) -> Array:
+    """The same of the frame."""
+    mesh, made = wedge(60.0, thickness, thickness), np.empty((2, len(DEGREES), 3))
+    for k, angle in enumerate(np.radians(DEGREES)):
+        way = (float(np.sin(angle)), 0.0, float(np.cos(angle)))
+        light = DirectionalLight(direction=way, irradiance=(1.0, 1.0, 1.0), shadows=False)
+        scene = Scene(Head("slab", mesh, Maps()), lights=[light], skin=skin)
+        settings = Settings(size=(16, 16), atlas=256, samples=1)
+        renderer.draw(scene, settings)
+        inputs = renderer.prepare(scene, settings)
+        texels = download(renderer.device, inputs.layouts[0].atlas.resources["atlas"])
+        own = texels[..., 0] > 0
+        w = np.stack([texels[own][:, 1] & 0xFFFF, texels[own][:, 1] >> 16], axis=-1) / 65535.0
+        w = np.column_stack([1 - w.sum(axis=1), w])
+        corners = mesh.triangles[texels[own][:, 0].astype(int) - 1]
+        places, normals = (np.einsum("nk,nkc->nc", w, a[corners]) for a in (mesh.positions, mesh.normals))
+        leaving = download(renderer.device, inputs.resources.scattered)[own][:, :3].astype(float)
+        inner = np.abs(places[:, :2]).max(axis=1) < 8.0
+        for side in (0, 1):
+            facing = inner & ((2 * side - 1) * normals[:, 2] > 0.9)
+            made[side, k] = leaving[facing].mean(axis=0) / np.cos(angle)
+    return made
+
+
+def skins(body: Medium, folder: str) -> dict[str, Skin]:
+    """Lambertian skin and half-spaces of a medium, in its own colour."""
+    file = Path(folder) / f"{body.name}_{body.eta:g}.toml"
+    write_profile(file, fit_gaussians(diffusion_profile(body).rings(), TERMS, name=body.name).profile, {})
+    usual = {"profile": str(file), "albedo": "profile", "energy": "none", "rho_s": 0.0}
+    usual |= {"specular": "none"} if body.eta == 1.0 else {}
+    return {way: Skin(direction=way, **usual) for way in ("lambertian", "half-space")}  # type: ignore[arg-type]
+
+
+def table(renderer: dermis.Renderer) -> str:
+    """Errors, root mean square over directions and channels, over the root mean square of the truth."""
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name, eta in BODIES:
+            body = media()[name].with_eta(eta)
+            for way, skin in skins(body, folder).items():
+                for thickness in THICK_MM:
+                    truth, made = exact(body, thickness), drawn(renderer, skin, thickness)
+                    flux = np.sqrt(np.cos(np.radians(DEGREES)))[:, None]
+                    cells = []
+                    for side in (1, 0):
+                        error = np.linalg.norm(flux * (made[side] - truth[side]))
+                        error /= np.linalg.norm(flux * truth[side])
+                        red = made[side][:, 0] / truth[side][:, 0]
+                        cells.append(f"{error:.3f} | {' '.join(f'{one:.2f}' for one in red)}")
+                    rows.append(f"| {name}, index {eta:g} | {way} | {thickness:g} mm | {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+def forward() -> str:
+    """Photons that scatter forward, and slabs that scatter alike in all directions: light from above, red."""
+    rows = []
+    for eta in (1.0, 1.4):
+        layer = media()["skin1"].layers[0]
+        absorbed, scattered = float(layer.sigma_a[0]), float(layer.sigma_s_prime[0])
+        for thickness in THICK_MM:
+            cells = []
+            for g in (0.0, 0.8):
+                flesh = ScatteringLayer(absorbed, scattered / (1.0 - g), thickness, g, eta)
+                run = trace_slab([flesh], PHOTONS).per_entering
+                cells += [f"{run.total_transmittance:.3f}", f"{run.unscattered_transmittance:.3f}"]
+                cells.append(f"{run.total_reflectance:.3f}")
+            rows.append(f"| {eta:g} | {thickness:g} mm | {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+def tables(adapter: str = "auto") -> dict[str, str]:
+    """The tables of slabs, by their names in the page's template."""
+    return {"slab_errors": table(dermis.Renderer(adapter)), "slab_forward": forward()}
+
+
+if __name__ == "__main__":
+    for title, text in tables(*sys.argv[1:]).items():
+        sys.stdout.write(f"{title}\n{text}\n\n")
