@@ -12,6 +12,7 @@ import { apply, atRest, between } from "./turned.js";
 /** @typedef {{forms: Record<string, Scene>, blobs: import("./packed.js").Run[], images: number[], dials: Dial[]}} File */
 
 const [BEFORE, AFTER] = ["none", "texture-space"];
+const REST_MS = 400;
 const NO_WEBGPU = "This head needs WebGPU: Chrome or Edge 113, Safari 26, Firefox 141 or later, on a device whose graphics driver they accept. Above is a still picture of it.";
 
 /** @param {string} id @returns {any} */
@@ -53,6 +54,8 @@ class Page {
         /** @type {Screen | null} */
         this.screen = null;
         this.soft = false;
+        this.moving = false;
+        this.resting = 0;
     }
 
     /** Open a device, again after a loss. */
@@ -86,7 +89,7 @@ class Page {
     /** The player for the technique and the size of the window. */
     async choose() {
         const made = /** @type {Made} */ (this.made);
-        const side = Math.min(innerWidth, innerHeight) * devicePixelRatio;
+        const side = this.moving ? 0 : Math.min(innerWidth, innerHeight) * devicePixelRatio;
         const fitting = made.scene.frames.filter((one) => one.name === this.technique);
         const frame = fitting.find((one) => one.size[0] >= 0.9 * side) ?? fitting[fitting.length - 1];
         const key = `${frame.name} ${frame.size[0]}`;
@@ -108,7 +111,9 @@ class Page {
         if (!this.dirty || this.busy || !this.player || !this.made || !this.screen) return;
         [this.dirty, this.busy] = [false, true];
         try {
-            await this.#frame(this.player, this.made, this.screen);
+            if (this.soft) await this.choose();
+            this.dirty = false;
+            await this.#frame(this.player, this.made, /** @type {Screen} */ (this.screen));
         } finally {
             this.busy = false;
         }
@@ -148,7 +153,17 @@ class Page {
         await this.draw();
     }
 
+    /** What hands do: software draws smaller pictures until they rest. */
     touch() {
+        this.dirty = true;
+        if (!this.soft) return;
+        this.moving = true;
+        clearTimeout(this.resting);
+        this.resting = setTimeout(() => this.rest(), REST_MS);
+    }
+
+    rest() {
+        this.moving = false;
         this.dirty = true;
     }
 }

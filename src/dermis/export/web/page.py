@@ -10,7 +10,6 @@ import json
 import re
 from importlib import resources
 from string import Template
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
