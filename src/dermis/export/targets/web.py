@@ -63,6 +63,7 @@ class Web(Target):
         from dermis.export.web.dials import dials_of
         from dermis.export.web.maps import smaller
         from dermis.export.web.page import web_page
+        from dermis.scene.settings import Settings
 
         scene = subject.scene
         if scene is None:
@@ -71,7 +72,7 @@ class Web(Target):
             )
         scene = replace(scene, head=smaller(scene.head, min(self.side, _MAP)))
         dials = dials_of(scene)
-        made = built(Asked(scene, dials, _ATLAS, SIZES, self.adapter))
+        made = built(Asked(scene, dials, Settings(atlas=_ATLAS), SIZES, self.adapter))
         place.write_text(web_page(made, dials, subject.name, self.wrong), encoding="utf-8")
         return [place]
 

@@ -52,14 +52,19 @@ class Built:
 class Asked:
     """What is to be built.
 
+    settings : of all frames, but for size and technique
     sizes : sides of the pictures of each form, see `SIZES`; forms that are left out are not built
     """
 
     scene: Scene
     dials: tuple[Dial, ...]
-    atlas: int
+    settings: Settings
     sizes: dict[str, tuple[int, ...]]
     adapter: str = "auto"
+
+    def sized(self, side: int, technique: str = TECHNIQUES[0]) -> Settings:
+        """The settings of a frame."""
+        return self.settings.model_copy(update={"size": (side, side), "technique": technique})
 
 
 def built(asked: Asked, look: Callable[[Renderer, Scene, Settings], None] | None = None) -> Built:
@@ -71,7 +76,7 @@ def built(asked: Asked, look: Callable[[Renderer, Scene, Settings], None] | None
     for form in (one for one in FORMS if asked.sizes.get(one)):
         renderer = renderer_for(form, asked.adapter)
         made.forms[form] = _form(made, renderer, asked, asked.sizes[form])
-        settings = Settings(size=(asked.sizes[form][0],) * 2, atlas=asked.atlas)
+        settings = asked.sized(asked.sizes[form][0])
         if look is not None:
             look(renderer, asked.scene, settings)
         if made.poster is None:
@@ -84,7 +89,7 @@ def _form(made: Built, renderer: Renderer, asked: Asked, sizes: tuple[int, ...])
     base: Inputs | None = None
     for technique in TECHNIQUES:
         for side in sizes:
-            settings = Settings(size=(side, side), atlas=asked.atlas, technique=technique)
+            settings = asked.sized(side, technique)
             inputs = renderer.prepare(asked.scene, settings)
             base, picture = base or inputs, inputs.resources.picture
             frames.append(Named(technique, taken(tape, inputs), picture, (side, side)))
@@ -138,7 +143,7 @@ def _colours(made: Built, renderer: Renderer, asked: Asked, mapped: dict[int, An
     found: Json = {}
     if number is None:
         return found
-    settings = Settings(size=(256, 256), atlas=asked.atlas)
+    settings = asked.sized(min(map(min, asked.sizes.values())))
     for dial in (one for one in asked.dials if not one.moves):
         nodes = [
             _colour(made, renderer, scene, settings, dial.name, k) for k, scene in enumerate(dial.scenes)

@@ -67,7 +67,9 @@ class Page {
         const form = wanted.get("form") ?? (soft ? "software" : "gpu");
         const scene = this.file.forms[form] ?? Object.values(this.file.forms)[0];
         const device = await adapter.requestDevice({ requiredLimits: limitsFor(scene, adapter.limits) });
-        device.lost.then((info) => info.reason !== "destroyed" && this.reopen());
+        device.lost.then(async (info) => {
+            if (info.reason !== "destroyed") await this.reopen();
+        });
         device.addEventListener("uncapturederror", (event) => tell(`The device refused: ${/** @type {GPUUncapturedErrorEvent} */ (event).error.message}`, "failed"));
         this.made = new Made(device, scene, this.store);
         this.players.clear();
@@ -84,6 +86,11 @@ class Page {
     async reopen() {
         tell("The graphics device was lost; it is opened again …", "loading");
         await this.open().catch(failed);
+    }
+
+    /** When all is drawn. */
+    async idle() {
+        while (this.dirty || this.busy) await new Promise((done) => setTimeout(done, 1));
     }
 
     /** The player for the technique and the size of the window. */

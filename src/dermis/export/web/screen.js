@@ -16,7 +16,7 @@ export class Screen {
         const usage = GPUBufferUsage.COPY_DST | (soft ? GPUBufferUsage.MAP_READ : GPUBufferUsage.COPY_SRC);
         this.buffer = made.device.createBuffer({ size: this.layout.bytesPerRow * height, usage });
         this.plain = soft ? canvas.getContext("2d") : null;
-        this.context = soft ? null : canvas.getContext("webgpu");
+        this.context = soft ? null : /** @type {GPUCanvasContext | null} */ (/** @type {unknown} */ (canvas.getContext("webgpu")));
         this.context?.configure({
             device: made.device,
             format: "rgba8unorm",
