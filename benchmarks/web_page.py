@@ -17,7 +17,7 @@ FLAGS = ["--no-sandbox", "--enable-unsafe-webgpu"]
 HARDWARE = ["--enable-features=Vulkan", "--ignore-gpu-blocklist", "--use-angle=vulkan"]
 FRAMES = 10
 STATE = "document.documentElement.dataset.state"
-MOVE = "async () => { dermis.state.yaw += 0.02; dermis.touch(); await dermis.draw(); }"
+MOVE = "async () => { dermis.state.yaw += 0.02; dermis.touch(); await dermis.idle(); }"
 STILL = "async () => { dermis.state.yaw += 0.02; dermis.dirty = true; dermis.moving = false; await dermis.idle(); }"
 
 
@@ -62,7 +62,9 @@ def main() -> None:
         size = page.evaluate("dermis.player.frame.size")
         for name, (wall, processor) in rows.items():
             sys.stdout.write(f"{name}: {wall:.2f} s by the clock, {processor:.2f} s of the processor\n")
-        sys.stdout.write(f"{file.stat().st_size / 1e6:.1f} MB, picture {size}, load {os.getloadavg()[0]:.1f}\n")
+        sys.stdout.write(
+            f"{file.stat().st_size / 1e6:.1f} MB, picture {size}, load {os.getloadavg()[0]:.1f}\n"
+        )
         browser.close()
 
 

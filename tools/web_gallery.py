@@ -1,4 +1,4 @@
-"""Writes four heads as pages, and a page that leads to them, for a static host: python tools/web_gallery.py FOLDER."""
+"""Writes four heads as pages and a page that leads to them: python tools/web_gallery.py FOLDER."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ from dermis.mesh.samples import cached
 
 HEADS = {"human": "the human", "human-7": "human:7", "human-12": "human:12", "scan": "lee_perry_smith"}
 STYLE = (
-    "body{background:#000;color:#ddd;font:16px system-ui,sans-serif;margin:0;display:grid;gap:8px;padding:8px;"
-    "grid-template-columns:repeat(auto-fit,minmax(min(320px,100%),1fr))}img{width:100%;display:block}a{color:inherit}"
+    "body{background:#000;color:#ddd;font:16px system-ui,sans-serif;margin:0;display:grid;gap:8px;"
+    "padding:8px;"
+    "grid-template-columns:repeat(auto-fit,minmax(min(320px,100%),1fr))}"
+    "img{width:100%;display:block}a{color:inherit}"
 )
 
 

@@ -24,9 +24,7 @@ from dermis.export.inlining import hash_of
 from dermis.export.run import export_skin
 from dermis.export.web.build import Asked, Built, built
 from dermis.export.web.dials import Dial, dials_of
-from dermis.export.web.packing import Packer, planes, seven_bits, stepped
 from dermis.export.web.page import MODULES, player, web_page
-from dermis.export.web.pictures import picture_of
 from dermis.frame.renderer import Renderer
 
 FLAGS = ["--no-sandbox", "--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"]
@@ -209,41 +207,6 @@ def test_a_skin_by_itself_is_refused(tmp_path: Path) -> None:
     with pytest.raises(dermis.DermisError, match="a head"):
         export_skin("skin1", "web", tmp_path / "page.html")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_differences_and_planes_can_be_undone() -> None:
-    words = (np.arange(600, dtype=np.uint32) ** 2).reshape(-1, 3)
-    packed = np.frombuffer(planes(words.view(np.uint8).reshape(-1), 4, 3, 2), np.uint8)
-    found = packed.reshape(4, -1).T.copy().view(np.uint32).reshape(-1, 3)
-    np.testing.assert_array_equal(
-        found.cumsum(0, np.uint32).cumsum(0, np.uint32)[4:] * 0 + words[4:], words[4:]
-    )
-    assert len(set(found[4:].ravel().tolist())) == 1  # squares have the same second differences
-    packer = Packer()
-    assert packer.add(words.tobytes()) == packer.add(words.tobytes()) == 0
-
-
-def test_letters_of_seven_bits_stand_in_a_page() -> None:
-    data = np.random.default_rng(0).integers(0, 256, 4096, np.uint8).tobytes()
-    letters = seven_bits(data)
-    assert not {"\0", "\r", "<"} & set(letters)
-    bits = "".join(f"{ord(one) & 127:07b}" for one in letters)
-    assert bytes(int(bits[k : k + 8], 2) for k in range(0, 8 * len(data), 8)) == data
-
-
-def test_steps_are_no_more_than_half_a_step_away() -> None:
-    values = np.random.default_rng(1).normal(size=(50, 2)).astype(np.float32)
-    assert (np.abs(stepped(values, (2.0**-8, 2.0**-14)) - values) <= [2.0**-9, 2.0**-15]).all()
-
-
-def test_maps_as_pictures_stay_near() -> None:
-    x = np.linspace(0.0, 1.0, 64)
-    texels = np.stack([np.outer(x, x), np.outer(x, 1 - x), -np.outer(x, x)], axis=-1).astype(np.float16)
-    for colours in (False, True):
-        found = picture_of(np.abs(texels) if colours else texels, colours).texels.astype(np.float64)
-        assert np.sqrt(((np.abs(found) - np.abs(texels.astype(np.float64))) ** 2).mean()) < (
-            0.1 if colours else 0.02
-        )
 
 
 def test_modules_are_joined_in_order() -> None:
