@@ -1,4 +1,4 @@
-"""Frames written down so that another program can run them: shaders, pipelines, resources, passes, numbers."""
+"""Frames written down so that another program can run them."""
 
 from __future__ import annotations
 
@@ -170,9 +170,7 @@ class Tape(Graph):
         finally:
             self._unit = None
 
-    def _pass(
-        self, stage: str, program: Program, resources: Resources, groups: tuple[int, ...]
-    ) -> Taken:
+    def _pass(self, stage: str, program: Program, resources: Resources, groups: tuple[int, ...]) -> Taken:
         bound = [self._bound(program, one, resources[one.name]) for one in program.bindings]
         taken = Taken(stage, self._program(program), bound, groups)
         self._take.add(taken, self._unit)

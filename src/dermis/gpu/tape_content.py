@@ -12,7 +12,7 @@ from dermis.gpu.textures import download
 
 
 def described(device: Device, value: Any) -> dict[str, Any]:
-    """What it takes to make a resource: its kind, sizes and uses by WebGPU's numbers, or a sampler's options."""
+    """What it takes to make a resource: its kind, sizes and uses by WebGPU's numbers, or options."""
     if hasattr(value, "mip_level_count"):
         return {
             "kind": "texture",

@@ -7,13 +7,13 @@ from typing import ClassVar
 import numpy as np
 
 from dermis.export.curve import Curve
+from dermis.export.inlining import hash_of, inline
 from dermis.export.lobe import fit_d
 from dermis.export.subject import Subject
 from dermis.export.target import Row, Rows, numbers_of
 from dermis.export.targets.babylon_spiral import TOO_WIDE, spiral_curve
-from dermis.export.inlining import inline
 from dermis.export.targets.web_library import Script
-from dermis.export.targets.web_page import hash_of, linked
+from dermis.export.targets.web_page import linked
 from dermis.export.targets.web_target import WebPage, surface_rows
 
 _PROFILE = "subSurface.scatteringDiffusionProfile"

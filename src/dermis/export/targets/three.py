@@ -8,10 +8,10 @@ from typing import ClassVar
 import numpy as np
 
 from dermis.export.curve import Curve
+from dermis.export.inlining import hash_of
 from dermis.export.subject import Subject
 from dermis.export.target import Row, Rows
 from dermis.export.targets.web_library import Script, module_url
-from dermis.export.targets.web_page import hash_of
 from dermis.export.targets.web_target import WebPage, surface_rows
 
 _HASHES = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
 
@@ -15,6 +15,7 @@ from dermis.export.target import Row, Rows, Target, numbers_of
 from dermis.optics.media import Floats
 
 _ATLAS = 512
+_MAP = 1024  # texels a side, most
 _TITLE = "WebGPU"
 
 
@@ -27,9 +28,10 @@ class Web(Target):
     versions: ClassVar[tuple[str, ...]] = ("1",)
     suffixes: ClassVar[tuple[str, ...]] = (".html",)
     wrong: ClassVar[str] = (
-        "The page draws square pictures with an atlas of 512 texels; maps are of 8 bits a channel and lose what "
-        "WebP loses. Expressions move the skin, but their folds and flushes are not painted; between the nodes "
-        "of a dial, numbers are interpolated. Hairs keep the thickness of the first view."
+        "The page draws square pictures with an atlas of 512 texels; maps have at most 1024 texels a side, "
+        "8 bits a channel, and lose what WebP loses. Expressions move the skin, but their folds and flushes "
+        "are not painted; between the nodes of a dial, numbers are interpolated. Hairs keep the thickness of "
+        "the first view."
     )
 
     def parameters(self, subject: Subject, version: str) -> Rows:
@@ -39,7 +41,9 @@ class Web(Target):
             Row("atlas", _ATLAS, "texel", "side of the atlas that light spreads on"),
             Row("variance", tuple(float(x) for x in profile.variance_mm2), "mm2", "of each Gaussian"),
             *(
-                Row(f"weight.{colour}", tuple(float(x) for x in profile.weight[:, k]), "-", "of each Gaussian")
+                Row(
+                    f"weight.{colour}", tuple(float(x) for x in profile.weight[:, k]), "-", "of each Gaussian"
+                )
                 for k, colour in enumerate(("red", "green", "blue"))
             ),
         )
@@ -57,13 +61,18 @@ class Web(Target):
         """The page."""
         from dermis.export.web.build import SIZES, Asked, built
         from dermis.export.web.dials import dials_of
+        from dermis.export.web.maps import smaller
         from dermis.export.web.page import web_page
+        from dermis.scene.settings import Settings
 
         scene = subject.scene
         if scene is None:
-            refuse("subject", "a head, which the page renders", f"the skin {subject.name} came", "Name a head")
+            refuse(
+                "subject", "a head, which the page renders", f"the skin {subject.name} came", "Name a head"
+            )
+        scene = replace(scene, head=smaller(scene.head, min(self.side, _MAP)))
         dials = dials_of(scene)
-        made = built(Asked(scene, dials, _ATLAS, SIZES, self.adapter))
+        made = built(Asked(scene, dials, Settings(atlas=_ATLAS), SIZES, self.adapter))
         place.write_text(web_page(made, dials, subject.name, self.wrong), encoding="utf-8")
         return [place]
 

@@ -1,4 +1,4 @@
-"""A scene taken down for the page: frames in two forms, at several sizes, before and after, with their dials."""
+"""A scene taken down for the page: frames in two forms, at several sizes, before and after."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dermis.export.web.described import Named, described
 from dermis.export.web.dials import Dial, changes, node_inputs
 from dermis.export.web.hands import hands_of
-from dermis.export.web.maps import Maps, shorten, texels_of
+from dermis.export.web.maps import Pictured, shorten, texels_of
 from dermis.export.web.packing import Packer
 from dermis.export.web.pictures import picture_of
 from dermis.frame.inputs import Inputs
@@ -24,7 +24,7 @@ from dermis.scene.settings import Settings
 
 Json = dict[str, Any]
 TECHNIQUES = ("texture-space", "none")
-SIZES = {"gpu": (512, 1024, 1600), "software": (512,)}
+SIZES = {"gpu": (512, 1024, 1600), "software": (256, 512)}
 """Sides of the square pictures of each form [pixel]."""
 
 
@@ -38,7 +38,7 @@ class Built:
 
     forms: dict[str, Json] = field(default_factory=dict)
     packer: Packer = field(default_factory=Packer)
-    maps: Maps = field(default_factory=Maps)
+    maps: Pictured = field(default_factory=Pictured)
     pictures: list[bytes] = field(default_factory=list)
     poster: NDArray[np.uint8] | None = None
 
@@ -52,14 +52,19 @@ class Built:
 class Asked:
     """What is to be built.
 
+    settings : of all frames, but for size and technique
     sizes : sides of the pictures of each form, see `SIZES`; forms that are left out are not built
     """
 
     scene: Scene
     dials: tuple[Dial, ...]
-    atlas: int
+    settings: Settings
     sizes: dict[str, tuple[int, ...]]
     adapter: str = "auto"
+
+    def sized(self, side: int, technique: str = TECHNIQUES[0]) -> Settings:
+        """The settings of a frame."""
+        return self.settings.model_copy(update={"size": (side, side), "technique": technique})
 
 
 def built(asked: Asked, look: Callable[[Renderer, Scene, Settings], None] | None = None) -> Built:
@@ -71,7 +76,7 @@ def built(asked: Asked, look: Callable[[Renderer, Scene, Settings], None] | None
     for form in (one for one in FORMS if asked.sizes.get(one)):
         renderer = renderer_for(form, asked.adapter)
         made.forms[form] = _form(made, renderer, asked, asked.sizes[form])
-        settings = Settings(size=asked.sizes[form][0], atlas=asked.atlas)
+        settings = asked.sized(asked.sizes[form][0])
         if look is not None:
             look(renderer, asked.scene, settings)
         if made.poster is None:
@@ -84,7 +89,7 @@ def _form(made: Built, renderer: Renderer, asked: Asked, sizes: tuple[int, ...])
     base: Inputs | None = None
     for technique in TECHNIQUES:
         for side in sizes:
-            settings = Settings(size=(side, side), atlas=asked.atlas, technique=technique)
+            settings = asked.sized(side, technique)
             inputs = renderer.prepare(asked.scene, settings)
             base, picture = base or inputs, inputs.resources.picture
             frames.append(Named(technique, taken(tape, inputs), picture, (side, side)))
@@ -116,10 +121,10 @@ def _turned(
 
 def _pictured(made: Built, mapped: dict[int, Any]) -> Json:
     """Of each map the pictures and curves of its mips' layers."""
-    found = {}
+    found: Json = {}
     for number, (role, mips, _) in mapped.items():
         layers = 1 + max(layer for name, _, layer in made.maps.pictures if name == role)
-        found[number] = [[_placed(made, (role, mip, k)) for k in range(layers)] for mip in range(mips)]
+        found[str(number)] = [[_placed(made, (role, mip, k)) for k in range(layers)] for mip in range(mips)]
     return found
 
 
@@ -138,9 +143,11 @@ def _colours(made: Built, renderer: Renderer, asked: Asked, mapped: dict[int, An
     found: Json = {}
     if number is None:
         return found
-    settings = Settings(size=(256, 256), atlas=asked.atlas)
+    settings = asked.sized(min(map(min, asked.sizes.values())))
     for dial in (one for one in asked.dials if not one.moves):
-        nodes = [_colour(made, renderer, scene, settings, dial.name, k) for k, scene in enumerate(dial.scenes)]
+        nodes = [
+            _colour(made, renderer, scene, settings, dial.name, k) for k, scene in enumerate(dial.scenes)
+        ]
         if any(nodes):
             found[dial.name] = nodes
     return {"map": number, "dials": found} if found else {}

@@ -29,7 +29,7 @@ class Named:
 
 
 Mapped = dict[int, tuple[str, int, Take | None]]
-"""Maps that come as pictures: role, how many mips, and passes that fill the others, see `Maps.put`."""
+"""Maps that come as pictures: role, how many mips, and passes that fill the others, see `Pictured.put`."""
 
 
 Stepped = dict[int, tuple[float, ...]]
@@ -72,7 +72,9 @@ def _mips(tape: Tape, number: int) -> list[Any]:
 
 
 def _frame(one: Named, picture: list[int], packer: Packer) -> Json:
-    records = [(struct, packer.add(np.frombuffer(record.tobytes(), np.uint8))) for struct, record in one.take.records]
+    records = [
+        (struct, packer.add(np.frombuffer(record.tobytes(), np.uint8))) for struct, record in one.take.records
+    ]
     return {
         "name": one.name,
         "size": one.size,

@@ -113,7 +113,7 @@ def _parts(pairs: list[tuple[int, tuple[Floats, Floats]]], packer: Packer) -> li
 
 
 def dials_of(scene: Scene) -> tuple[Dial, ...]:
-    """The dials of a scene: roughness, expressions where the head has them, and pigments where skin is painted."""
+    """The dials of a scene: expressions where the head has them, pigments where skin is painted."""
     return (*_pigments(scene), _roughness(scene), *_expressions(scene))
 
 
@@ -150,6 +150,7 @@ def _pigments(scene: Scene) -> list[Dial]:
 def _pigmented(scene: Scene, maps: PaintedMaps, name: str, value: float) -> Scene:
     assert scene.skin.pigments is not None
     pigments = scene.skin.pigments.model_copy(update={name: value})
-    painted = replace(maps, look=replace(maps.look, **{name: value}))
+    changed: Any = {name: value}
+    painted = replace(maps, look=replace(maps.look, **changed))
     skin = scene.skin.model_copy(update={"pigments": pigments})
     return replace(scene, head=replace(scene.head, maps=painted), skin=skin)

@@ -1,4 +1,4 @@
-"""What hands move on the page: the camera and the lights, and where their numbers stand in a frame's records."""
+"""What hands move on the page: the camera and the lights."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Json = dict[str, Any]
 
 
 def hands_of(scene: Scene, inputs: Inputs) -> Json:
-    """The camera, the lights that can be dragged, and the outline that depths and shadow maps are fitted to."""
+    """The camera, the lights that can be dragged, and the outline that shadow maps are fitted to."""
     settings: Settings = inputs.settings
     camera, seen = scene.camera, pinhole(scene.camera, scene.head, settings)
     outline: Outline = scene.head.mesh.outline

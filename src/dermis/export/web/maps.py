@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,9 @@ from dermis.export.web.pictures import LEAST, Picture, picture_of
 from dermis.frame.renderer import Renderer
 from dermis.frame.taping import halving, refill
 from dermis.gpu.tape import Take, Tape
+from dermis.images.filters import mip_chain
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
 
 _STORABLE = 8  # WebGPU's number of STORAGE_BINDING
 _KNOT_MM = 2.0**-8, 2.0**-8, 2.0**-8, 2.0**-14  # steps of hairs' places and of their radius
@@ -21,7 +24,7 @@ _ROLES = (_COLOUR, "relief_map", "slope_map", "specular_map", "roughness_map", "
 
 
 @dataclass
-class Maps:
+class Pictured:
     """Pictures by role, mip and layer; and of each tape, which resource has them.
 
     A texture whose mips the device can halve comes with the first alone.
@@ -35,7 +38,9 @@ class Maps:
         """Whether a map is that which its picture was made of."""
         return bool(np.array_equal(self._given[role], texels))
 
-    def put(self, renderer: Renderer, tape: Tape, takes: list[Take]) -> dict[int, tuple[str, int, Take | None]]:
+    def put(
+        self, renderer: Renderer, tape: Tape, takes: list[Take]
+    ) -> dict[int, tuple[str, int, Take | None]]:
         """Encode what is not yet encoded, and decode it into a tape's textures.
 
         Of each of these its role, how many mips come as pictures, and the passes that fill the others.
@@ -59,9 +64,24 @@ class Maps:
         return np.stack([self.pictures[role, mip, layer].texels for layer in range(len(layers))])
 
 
+def smaller(head: Head, most: int) -> Head:
+    """The head with its maps of files halved until none has a longer side [texels]."""
+    maps = head.maps
+    if not isinstance(maps, Maps):
+        return head
+    given = {name: getattr(maps, name) for name in ("colour", "normal", "height", "specular", "roughness")}
+    halved: Any = {name: _halved(one, most) for name, one in given.items() if one is not None}
+    return replace(head, maps=replace(maps, **halved))
+
+
+def _halved(values: NDArray[np.float32], most: int) -> NDArray[np.float32]:
+    times = max(0, (max(values.shape[:2]) - 1).bit_length() - (most - 1).bit_length())
+    return np.asarray(mip_chain(values)[times], np.float32)
+
+
 def shorten(renderer: Renderer, tape: Tape, takes: list[Take]) -> dict[int, tuple[float, ...]]:
     """Round the places of hairs on a device; of each buffer of them the steps of its columns."""
-    found = {}
+    found: dict[int, tuple[float, ...]] = {}
     for number in _bound(tape, takes, ("knots",)):
         data = stepped(tape.content(number)[0].view(np.float32).reshape(-1, len(_KNOT_MM)), _KNOT_MM)
         renderer.device.write(tape.object(number), data.tobytes(), data.nbytes)

@@ -1,4 +1,4 @@
-"""Numbers packed for one gzip: differences from row to row, then byte plane by byte plane, as packed.js reads."""
+"""Numbers packed for one gzip: differences from row to row, byte plane by byte plane, see packed.js."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 Bytes = NDArray[np.uint8]
 Run = tuple[int, int, int, int, int, tuple[float, ...]]
-"""Where a run of bytes begins, how many it has, bytes of a word, words of a row, how often rows are subtracted, and
-of floats the step of each word of a row."""
+"""Where a run of bytes begins, how many it has, bytes of a word, words of a row, how often rows are
+subtracted, and of floats the step of each word of a row."""
 _FORBIDDEN = frozenset({0, 13, ord("<")})  # letters that a script element would change, or end at
 _ROWS = (1, 2, 3, 4, 8)
 _ORDERS = (0, 1, 2)
@@ -33,7 +33,7 @@ class Packer:
     def add(self, data: Bytes | bytes, ways: Iterable[tuple[int, int, int]] | None = None) -> int:
         """The number of a run of bytes.
 
-        ways : bytes of a word, words of a row and how often rows are subtracted; the one that packs best is taken
+        ways : bytes of a word, words of a row, how often rows are subtracted; the best is taken
         """
         raw = np.frombuffer(data, np.uint8)
         return self._add(raw, list(ways or _all_ways(len(raw))), ())
@@ -45,7 +45,7 @@ class Packer:
         return self._add(words.view(np.uint8).reshape(-1), ways, steps)
 
     def _add(self, raw: Bytes, ways: list[tuple[int, int, int]], steps: tuple[float, ...]) -> int:
-        key = hashlib.sha256(raw).digest() + repr(steps).encode()
+        key = hashlib.sha256(raw.tobytes()).digest() + repr(steps).encode()
         if key not in self._known:
             self._known[key] = len(self.runs)
             way = _best(raw, ways)
@@ -66,7 +66,7 @@ def stepped(values: NDArray[np.float32], steps: tuple[float, ...]) -> NDArray[np
 
 
 def seven_bits(data: bytes) -> str:
-    """Bytes as letters of seven bits, those that cannot stand in a page 256 higher: as packed.js reads them."""
+    """Bytes as letters of seven bits, those that cannot stand in a page 256 higher, see packed.js."""
     bits = np.unpackbits(np.frombuffer(data, np.uint8))
     bits = np.concatenate([bits, np.zeros(-len(bits) % 7, np.uint8)])
     sevens = np.packbits(bits.reshape(-1, 7), axis=1)[:, 0] >> 1
@@ -93,5 +93,7 @@ def _all_ways(size: int) -> Iterable[tuple[int, int, int]]:
 def _best(raw: Bytes, ways: list[tuple[int, int, int]]) -> tuple[int, int, int]:
     """The way that packs the middle of the bytes best."""
     middle = len(raw) // 2 // 96 * 96  # a multiple of all rows of words
-    tried = raw[max(0, middle - _TRIED // 96 * 96) :][: 2 * (_TRIED // 96 * 96)] if len(raw) > 2 * _TRIED else raw
+    tried = (
+        raw[max(0, middle - _TRIED // 96 * 96) :][: 2 * (_TRIED // 96 * 96)] if len(raw) > 2 * _TRIED else raw
+    )
     return min(ways, key=lambda way: len(zlib.compress(planes(tried, *way), 6)))

@@ -1,21 +1,21 @@
 // The page: opens a device, plays the frame that fits, and listens to hands.
 
 import { Made } from "./device.js";
-import { fillMaps, halve, putTexels, stepsOf, texelsOf } from "./maps.js";
+import { element, listen } from "./hands.js";
+import { fillMaps, halve, putTexels } from "./maps.js";
+import { mixed } from "./mixing.js";
 import { bytesOf, inflated } from "./packed.js";
 import { Player } from "./player.js";
 import { Screen } from "./screen.js";
-import { apply, atRest, between } from "./turned.js";
+import { apply, atRest } from "./turned.js";
 
 /** @typedef {import("./turned.js").Dial} Dial */
 /** @typedef {import("./device.js").Scene} Scene */
 /** @typedef {{forms: Record<string, Scene>, blobs: import("./packed.js").Run[], images: number[], dials: Dial[]}} File */
 
 const [BEFORE, AFTER] = ["none", "texture-space"];
+const REST_MS = 400;
 const NO_WEBGPU = "This head needs WebGPU: Chrome or Edge 113, Safari 26, Firefox 141 or later, on a device whose graphics driver they accept. Above is a still picture of it.";
-
-/** @param {string} id @returns {any} */
-const element = (id) => document.getElementById(id);
 
 /** @param {string} words @param {string} state */
 function tell(words, state) {
@@ -53,6 +53,8 @@ class Page {
         /** @type {Screen | null} */
         this.screen = null;
         this.soft = false;
+        this.moving = false;
+        this.resting = 0;
     }
 
     /** Open a device, again after a loss. */
@@ -64,7 +66,9 @@ class Page {
         const form = wanted.get("form") ?? (soft ? "software" : "gpu");
         const scene = this.file.forms[form] ?? Object.values(this.file.forms)[0];
         const device = await adapter.requestDevice({ requiredLimits: limitsFor(scene, adapter.limits) });
-        device.lost.then((info) => info.reason !== "destroyed" && this.reopen());
+        device.lost.then(async (info) => {
+            if (info.reason !== "destroyed") await this.reopen();
+        });
         device.addEventListener("uncapturederror", (event) => tell(`The device refused: ${/** @type {GPUUncapturedErrorEvent} */ (event).error.message}`, "failed"));
         this.made = new Made(device, scene, this.store);
         this.players.clear();
@@ -83,10 +87,15 @@ class Page {
         await this.open().catch(failed);
     }
 
+    /** When all is drawn. */
+    async idle() {
+        while (this.dirty || this.busy) await new Promise((done) => setTimeout(done, 1));
+    }
+
     /** The player for the technique and the size of the window. */
     async choose() {
         const made = /** @type {Made} */ (this.made);
-        const side = Math.min(innerWidth, innerHeight) * devicePixelRatio;
+        const side = this.moving ? 0 : Math.min(innerWidth, innerHeight) * devicePixelRatio;
         const fitting = made.scene.frames.filter((one) => one.name === this.technique);
         const frame = fitting.find((one) => one.size[0] >= 0.9 * side) ?? fitting[fitting.length - 1];
         const key = `${frame.name} ${frame.size[0]}`;
@@ -108,7 +117,9 @@ class Page {
         if (!this.dirty || this.busy || !this.player || !this.made || !this.screen) return;
         [this.dirty, this.busy] = [false, true];
         try {
-            await this.#frame(this.player, this.made, this.screen);
+            if (this.soft) await this.choose();
+            this.dirty = false;
+            await this.#frame(this.player, this.made, /** @type {Screen} */ (this.screen));
         } finally {
             this.busy = false;
         }
@@ -148,7 +159,17 @@ class Page {
         await this.draw();
     }
 
+    /** What hands do: software draws smaller pictures until they rest. */
     touch() {
+        this.dirty = true;
+        if (!this.soft) return;
+        this.moving = true;
+        clearTimeout(this.resting);
+        this.resting = setTimeout(() => this.rest(), REST_MS);
+    }
+
+    rest() {
+        this.moving = false;
         this.dirty = true;
     }
 }
@@ -164,108 +185,9 @@ function limitsFor(scene, offered) {
     return limits;
 }
 
-/** The colour map's texels between dials' nodes. @param {Made} made @param {Dial[]} turned @param {Record<string, number>} values */
-async function mixed(made, turned, values) {
-    const { map, dials } = made.scene.colours;
-    const { width, height } = made.resource(map);
-    const layer = made.scene.maps[map][0][0];
-    const at = async (/** @type {import("./device.js").Layer} */ one) => fromHalves(texelsOf(await stepsOf(made, one, width, height)));
-    const base = await at(layer);
-    const sum = base.slice();
-    for (const dial of turned) {
-        for (const [node, share] of between(dial, values[dial.name])) {
-            const one = dials[dial.name][node];
-            if (!one || !share) continue;
-            const other = await at(one);
-            for (let k = 0; k < sum.length; k++) sum[k] += share * (other[k] - base[k]);
-        }
-    }
-    return toHalves(sum);
-}
-
-/** @param {Uint16Array} halves */
-function fromHalves(halves) {
-    const found = new Float32Array(halves.length);
-    for (let k = 0; k < halves.length; k++) {
-        const [sign, rank, part] = [halves[k] >> 15, (halves[k] >> 10) & 31, halves[k] & 1023];
-        found[k] = (sign ? -1 : 1) * (rank ? 2 ** (rank - 15) * (1 + part / 1024) : part * 2 ** -24);
-    }
-    return found;
-}
-
-/** @param {Float32Array} values from 0 to some thousand, as colours are */
-function toHalves(values) {
-    const words = new Uint32Array(values.buffer);
-    const found = new Uint16Array(values.length);
-    for (let k = 0; k < values.length; k++) found[k] = values[k] < 6.2e-5 ? 0 : ((words[k] + 0x1000 - 0x38000000) >>> 13) & 0x7fff;
-    return found;
-}
-
 /** @param {unknown} error */
 function failed(error) {
     tell(`It could not be drawn: ${error instanceof Error ? error.message : error}`, "failed");
-}
-
-/** @param {Page} page */
-function listen(page) {
-    const canvas = element("picture");
-    /** @type {Map<number, {x: number, y: number}>} */
-    const fingers = new Map();
-    canvas.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
-        canvas.setPointerCapture(event.pointerId);
-        fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
-    });
-    for (const name of ["pointerup", "pointercancel"]) {
-        canvas.addEventListener(name, (/** @type {PointerEvent} */ event) => fingers.delete(event.pointerId));
-    }
-    canvas.addEventListener("pointermove", (/** @type {PointerEvent} */ event) => {
-        const last = fingers.get(event.pointerId);
-        if (!last) return;
-        const now = { x: event.clientX, y: event.clientY };
-        const other = [...fingers].find(([id]) => id !== event.pointerId)?.[1];
-        if (other) pinch(page, other, last, now);
-        else drag(page, event.shiftKey || event.buttons === 2, now.x - last.x, now.y - last.y);
-        fingers.set(event.pointerId, now);
-    });
-    canvas.addEventListener("contextmenu", (/** @type {Event} */ event) => event.preventDefault());
-    canvas.addEventListener("wheel", (/** @type {WheelEvent} */ event) => {
-        event.preventDefault();
-        zoom(page, Math.exp(0.001 * event.deltaY));
-    }, { passive: false });
-    canvas.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
-        const step = /** @type {Record<string, number[]>} */ ({ ArrowLeft: [20, 0], ArrowRight: [-20, 0], ArrowUp: [0, 20], ArrowDown: [0, -20] })[event.key];
-        if (step) drag(page, event.shiftKey, step[0], step[1]);
-        if (event.key === "+") zoom(page, 0.9);
-        if (event.key === "-") zoom(page, 1.1);
-    });
-    addEventListener("resize", () => page.choose().then(() => page.draw()).catch(failed));
-}
-
-/** @param {Page} page @param {boolean} light @param {number} x @param {number} y [pixel] */
-function drag(page, light, x, y) {
-    const { state } = page;
-    const moved = light || element("light").checked;
-    const turn = 0.006;
-    if (moved) {
-        state.lightYaw += turn * x;
-        state.lightPitch = Math.max(-1.4, Math.min(1.4, state.lightPitch - turn * y));
-    } else {
-        state.yaw -= turn * x;
-        state.pitch = Math.max(-1.4, Math.min(1.4, state.pitch + turn * y));
-    }
-    page.touch();
-}
-
-/** @param {Page} page @param {number} factor */
-function zoom(page, factor) {
-    page.state.zoom = Math.max(0.35, Math.min(2.5, page.state.zoom * factor));
-    page.touch();
-}
-
-/** @param {Page} page @param {{x: number, y: number}} other @param {{x: number, y: number}} last @param {{x: number, y: number}} now */
-function pinch(page, other, last, now) {
-    const apart = (/** @type {{x: number, y: number}} */ one) => Math.max(1, Math.hypot(one.x - other.x, one.y - other.y));
-    zoom(page, apart(last) / apart(now));
 }
 
 /** A slider for each dial. @param {Page} page */
@@ -289,7 +211,7 @@ async function start() {
     if (!navigator.gpu) return tell(NO_WEBGPU, "without");
     const page = new Page(...(await readFile()));
     addDials(page);
-    listen(page);
+    listen(page, failed);
     await page.open();
     const next = () => requestAnimationFrame(() => page.draw().catch(failed).finally(next));
     next();

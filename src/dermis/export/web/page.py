@@ -10,7 +10,6 @@ import json
 import re
 from importlib import resources
 from string import Template
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,19 @@ from dermis.export.web.build import Built
 from dermis.export.web.dials import Dial
 from dermis.export.web.packing import seven_bits
 
-MODULES = ("graph", "packed", "device", "player", "maps", "camera", "turned", "screen", "page")
+MODULES = (
+    "graph",
+    "packed",
+    "device",
+    "player",
+    "maps",
+    "camera",
+    "turned",
+    "screen",
+    "mixing",
+    "hands",
+    "page",
+)
 """Of the player, each after those that it imports."""
 _NONE = "default-src 'none'; base-uri 'none'; form-action 'none'; img-src data:"
 _IMPORT = re.compile(r"^import [^;]*;\n", re.MULTILINE)

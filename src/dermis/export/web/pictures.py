@@ -1,4 +1,4 @@
-"""Maps as pictures: eight bits a channel along a curve of each channel's own, and what they are decoded to."""
+"""Maps as pictures: eight bits a channel, along a curve of each channel's own."""
 
 from __future__ import annotations
 
@@ -38,10 +38,7 @@ def picture_of(texels: Halves, colours: bool) -> Picture:
     """
     curves = np.stack([_curve(texels[..., k].astype(np.float64)) for k in range(texels.shape[2])])
     steps = np.stack([_steps(texels[..., k], curves[k]) for k in range(len(curves))], axis=-1)
-    if colours:
-        image = steps[..., :_COLOURS]
-    else:
-        image = steps.transpose(2, 0, 1).reshape(-1, steps.shape[1])
+    image = steps[..., :_COLOURS] if colours else steps.transpose(2, 0, 1).reshape(-1, steps.shape[1])
     data = _encoded(image)
     found = _decoded(data)
     if colours:

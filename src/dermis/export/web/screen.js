@@ -8,14 +8,15 @@ export class Screen {
     /** @param {HTMLCanvasElement} canvas @param {Made} made @param {Frame} frame @param {boolean} soft */
     constructor(canvas, made, frame, soft) {
         const [width, height] = (this.size = frame.size);
-        [canvas.width, canvas.height] = frame.size;
+        this.canvas = canvas;
+        if (!soft) [canvas.width, canvas.height] = frame.size;
         this.made = made;
         this.frame = frame;
         this.layout = { bytesPerRow: Math.ceil((4 * width) / 256) * 256, rowsPerImage: height };
         const usage = GPUBufferUsage.COPY_DST | (soft ? GPUBufferUsage.MAP_READ : GPUBufferUsage.COPY_SRC);
         this.buffer = made.device.createBuffer({ size: this.layout.bytesPerRow * height, usage });
         this.plain = soft ? canvas.getContext("2d") : null;
-        this.context = soft ? null : canvas.getContext("webgpu");
+        this.context = soft ? null : /** @type {GPUCanvasContext | null} */ (/** @type {unknown} */ (canvas.getContext("webgpu")));
         this.context?.configure({
             device: made.device,
             format: "rgba8unorm",
@@ -37,6 +38,7 @@ export class Screen {
         if (!this.plain) return;
         await this.buffer.mapAsync(GPUMapMode.READ);
         const [width, height] = this.size;
+        if (this.canvas.width !== width) [this.canvas.width, this.canvas.height] = this.size;
         const bytes = new Uint8Array(this.buffer.getMappedRange());
         const image = new ImageData(width, height);
         for (let y = 0; y < height; y++) {

@@ -1,0 +1,72 @@
+"""Time an exported page in headless Chromium: python benchmarks/web_page.py PAGE.html [SIDE [FORM]].
+
+FORM is gpu or software; without it the page chooses. On a machine with a GPU that Chromium can use, add --gpu.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+SOFTWARE = ["--use-webgpu-adapter=swiftshader"]
+FLAGS = ["--no-sandbox", "--enable-unsafe-webgpu"]
+HARDWARE = ["--enable-features=Vulkan", "--ignore-gpu-blocklist", "--use-angle=vulkan"]
+FRAMES = 10
+STATE = "document.documentElement.dataset.state"
+MOVE = "async () => { dermis.state.yaw += 0.02; dermis.touch(); await dermis.idle(); }"
+STILL = "async () => { dermis.state.yaw += 0.02; dermis.dirty = true; dermis.moving = false; await dermis.idle(); }"
+
+
+def processor_s() -> float:
+    """Processor time of all of the browser's processes [s]."""
+    ticks = 0
+    for folder in Path("/proc").iterdir():
+        try:
+            words = (folder / "stat").read_text().rpartition(")")[2].split()
+            command = (folder / "cmdline").read_bytes()
+        except OSError:
+            continue
+        if b"chrom" in command and folder.name.isdigit():
+            ticks += int(words[11]) + int(words[12])
+    return ticks / os.sysconf("SC_CLK_TCK")
+
+
+def timed(page: Any, script: str, count: int) -> tuple[float, float]:
+    """Seconds by the clock and of the processor for each of some calls."""
+    began, used = time.perf_counter(), processor_s()
+    for _ in range(count):
+        page.evaluate(script)
+    return (time.perf_counter() - began) / count, (processor_s() - used) / count
+
+
+def main() -> None:
+    """Open the page and turn the head."""
+    from playwright.sync_api import sync_playwright
+
+    words = [word for word in sys.argv[1:] if word != "--gpu"]
+    file, side, form = Path(words[0]), int([*words, "512"][1]), (words[2:] or [""])[0]
+    flags = FLAGS + (HARDWARE if "--gpu" in sys.argv else SOFTWARE)
+    with sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=shutil.which("chromium"), args=flags)
+        page = browser.new_page(viewport={"width": side, "height": side}, offline=True)
+        began, used = time.perf_counter(), processor_s()
+        page.goto(file.resolve().as_uri() + (f"#form={form}" if form else ""))
+        page.wait_for_function(f"() => {STATE} && {STATE} !== 'loading'", timeout=300_000)
+        first = time.perf_counter() - began, processor_s() - used
+        rows = {"first picture": first, "frame at rest, camera turned": timed(page, STILL, FRAMES)}
+        rows["frame in motion"] = timed(page, MOVE, FRAMES)
+        size = page.evaluate("dermis.player.frame.size")
+        for name, (wall, processor) in rows.items():
+            sys.stdout.write(f"{name}: {wall:.2f} s by the clock, {processor:.2f} s of the processor\n")
+        sys.stdout.write(
+            f"{file.stat().st_size / 1e6:.1f} MB, picture {size}, load {os.getloadavg()[0]:.1f}\n"
+        )
+        browser.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,72 @@
+// Hands: orbit, zoom, the light, by mouse, fingers and keys.
+
+/**
+ * What hands turn.
+ * @typedef {{state: import("./turned.js").Turned, touch: () => void, choose: () => Promise<void>,
+ *     draw: () => Promise<void>}} Page
+ */
+
+/** @param {string} id @returns {any} */
+export const element = (id) => document.getElementById(id);
+
+/** Let pointers, wheel and keys turn things. @param {Page} page @param {(error: unknown) => void} failed */
+export function listen(page, failed) {
+    const canvas = element("picture");
+    /** @type {Map<number, {x: number, y: number}>} */
+    const fingers = new Map();
+    canvas.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
+        canvas.setPointerCapture(event.pointerId);
+        fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+    });
+    for (const name of ["pointerup", "pointercancel"]) {
+        canvas.addEventListener(name, (/** @type {PointerEvent} */ event) => fingers.delete(event.pointerId));
+    }
+    canvas.addEventListener("pointermove", (/** @type {PointerEvent} */ event) => {
+        const last = fingers.get(event.pointerId);
+        if (!last) return;
+        const now = { x: event.clientX, y: event.clientY };
+        const other = [...fingers].find(([id]) => id !== event.pointerId)?.[1];
+        if (other) pinch(page, other, last, now);
+        else drag(page, event.shiftKey || event.buttons === 2, now.x - last.x, now.y - last.y);
+        fingers.set(event.pointerId, now);
+    });
+    canvas.addEventListener("contextmenu", (/** @type {Event} */ event) => event.preventDefault());
+    canvas.addEventListener("wheel", (/** @type {WheelEvent} */ event) => {
+        event.preventDefault();
+        zoom(page, Math.exp(0.001 * event.deltaY));
+    }, { passive: false });
+    canvas.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+        const step = /** @type {Record<string, number[]>} */ ({ ArrowLeft: [20, 0], ArrowRight: [-20, 0], ArrowUp: [0, 20], ArrowDown: [0, -20] })[event.key];
+        if (step) drag(page, event.shiftKey, step[0], step[1]);
+        if (event.key === "+") zoom(page, 0.9);
+        if (event.key === "-") zoom(page, 1.1);
+    });
+    addEventListener("resize", () => page.choose().then(() => page.draw()).catch(failed));
+}
+
+/** @param {Page} page @param {boolean} light @param {number} x @param {number} y [pixel] */
+function drag(page, light, x, y) {
+    const { state } = page;
+    const moved = light || element("light").checked;
+    const turn = 0.006;
+    if (moved) {
+        state.lightYaw += turn * x;
+        state.lightPitch = Math.max(-1.4, Math.min(1.4, state.lightPitch - turn * y));
+    } else {
+        state.yaw -= turn * x;
+        state.pitch = Math.max(-1.4, Math.min(1.4, state.pitch + turn * y));
+    }
+    page.touch();
+}
+
+/** @param {Page} page @param {number} factor */
+function zoom(page, factor) {
+    page.state.zoom = Math.max(0.35, Math.min(2.5, page.state.zoom * factor));
+    page.touch();
+}
+
+/** @param {Page} page @param {{x: number, y: number}} other @param {{x: number, y: number}} last @param {{x: number, y: number}} now */
+function pinch(page, other, last, now) {
+    const apart = (/** @type {{x: number, y: number}} */ one) => Math.max(1, Math.hypot(one.x - other.x, one.y - other.y));
+    zoom(page, apart(last) / apart(now));
+}

@@ -1,0 +1,42 @@
+"""Numbers and maps as a page holds them: what is undone is what was there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dermis.export.web.packing import Packer, planes, seven_bits, stepped
+from dermis.export.web.pictures import picture_of
+
+
+def test_differences_and_planes_can_be_undone() -> None:
+    words = (np.arange(600, dtype=np.uint32) ** 2).reshape(-1, 3)
+    packed = np.frombuffer(planes(words.view(np.uint8).reshape(-1), 4, 3, 2), np.uint8)
+    found = packed.reshape(4, -1).T.copy().view(np.uint32).reshape(-1, 3)
+    np.testing.assert_array_equal(
+        found.cumsum(0, np.uint32).cumsum(0, np.uint32)[4:] * 0 + words[4:], words[4:]
+    )
+    packer = Packer()
+    assert packer.add(words.tobytes()) == packer.add(words.tobytes()) == 0
+
+
+def test_letters_of_seven_bits_stand_in_a_page() -> None:
+    data = np.random.default_rng(0).integers(0, 256, 4096, np.uint8).tobytes()
+    letters = seven_bits(data)
+    assert not {"\0", "\r", "<"} & set(letters)
+    bits = "".join(f"{ord(one) & 127:07b}" for one in letters)
+    assert bytes(int(bits[k : k + 8], 2) for k in range(0, 8 * len(data), 8)) == data
+
+
+def test_steps_are_no_more_than_half_a_step_away() -> None:
+    values = np.random.default_rng(1).normal(size=(50, 2)).astype(np.float32)
+    assert (np.abs(stepped(values, (2.0**-8, 2.0**-14)) - values) <= [2.0**-9, 2.0**-15]).all()
+
+
+def test_maps_as_pictures_stay_near() -> None:
+    x = np.linspace(0.0, 1.0, 64)
+    texels = np.stack([np.outer(x, x), np.outer(x, 1 - x), -np.outer(x, x)], axis=-1).astype(np.float16)
+    for colours in (False, True):
+        found = picture_of(np.abs(texels) if colours else texels, colours).texels.astype(np.float64)
+        assert np.sqrt(((np.abs(found) - np.abs(texels.astype(np.float64))) ** 2).mean()) < (
+            0.1 if colours else 0.02
+        )

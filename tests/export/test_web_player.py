@@ -1,0 +1,231 @@
+"""The page that plays frames: the same picture in Chromium, what runs again, hands, and what it may load."""
+
+from __future__ import annotations
+
+import base64
+import html
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from rigged_head import write_rigged_head
+from small_head import write_head
+
+import dermis
+from dermis.export.inlining import hash_of
+from dermis.export.run import export_skin
+from dermis.export.web.build import Asked, Built, built
+from dermis.export.web.dials import Dial, dials_of
+from dermis.export.web.page import MODULES, player, web_page
+from dermis.frame.renderer import Renderer
+
+FLAGS = ["--no-sandbox", "--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"]
+MODULES_FOLDER = Path(str(dermis.__file__)).parent / "export" / "web"
+SETTINGS = dermis.Settings(atlas=128, shadow_size=128, strands=False)
+SIDE = 96
+LIMIT = 0.005  # relative RMSE
+WICKED = "</script><script>alert(1)</script>"
+STATE = "document.documentElement.dataset.state"
+LINEAR = """async () => {
+  const page = dermis, frame = page.player.frame, device = page.made.device, [width, height] = frame.size;
+  const bytesPerRow = 16 * width;
+  const buffer = device.createBuffer({ size: bytesPerRow * height, usage: 9 });
+  const encoder = device.createCommandEncoder();
+  const texture = page.made.resource(frame.linear);
+  encoder.copyTextureToBuffer({ texture }, { buffer, bytesPerRow }, [width, height]);
+  device.queue.submit([encoder.finish()]);
+  await buffer.mapAsync(1);
+  return btoa(Array.from(new Uint8Array(buffer.getMappedRange()), (c) => String.fromCharCode(c)).join(""));
+}"""
+
+
+class Shown(NamedTuple):
+    """A page in a browser, with what it holds, and a renderer whose maps are those that it decodes."""
+
+    page: Any
+    scene: dermis.Scene
+    renderer: Renderer
+    dials: tuple[Dial, ...]
+
+    def linear(self) -> NDArray[np.float32]:
+        """(h, w, 3) what the page has drawn."""
+        raw = base64.b64decode(self.page.evaluate(LINEAR))
+        return np.frombuffer(raw, np.float32).reshape(SIDE, SIDE, 4)[..., :3]
+
+    def turn(self, script: str) -> list[str]:
+        """The stages that ran for a change."""
+        self.page.evaluate(f"async () => {{ {script}; await dermis.idle(); }}")
+        return list(self.page.evaluate("dermis.player.ran"))
+
+    def error(self, scene: dermis.Scene) -> float:
+        """Relative RMSE against a scene."""
+        settings = SETTINGS.model_copy(update={"size": (SIDE, SIDE)})
+        wanted = self.renderer.draw(scene, settings).linear()
+        return float(np.sqrt(((self.linear() - wanted) ** 2).mean() / (wanted**2).mean()))
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    sync = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        pytest.skip("there is no Chromium here")
+    with sync.sync_playwright() as play:
+        one = play.chromium.launch(executable_path=chromium, args=FLAGS)
+        yield one
+        one.close()
+
+
+class Taken(NamedTuple):
+    """What a page holds, and the renderer that it was taken down with."""
+
+    made: Built
+    scene: dermis.Scene
+    renderer: Renderer
+    dials: tuple[Dial, ...]
+
+
+def taken(scene: dermis.Scene, form: str, dials: tuple[Dial, ...]) -> Taken:
+    renderers: list[Renderer] = []
+    asked = Asked(scene, dials, SETTINGS, {form: (SIDE,)}, os.environ.get("DERMIS_TEST_ADAPTER", "cpu"))
+    made = built(asked, lambda renderer, *_: renderers.append(renderer))
+    return Taken(made, scene, renderers[0], dials)
+
+
+def shown(browser: Any, one: Taken, folder: Path) -> Shown:
+    """A page, drawn once."""
+    file = folder / "head.html"
+    file.write_text(web_page(one.made, one.dials, "head", ""), encoding="utf-8")
+    page = browser.new_page(viewport={"width": SIDE, "height": SIDE}, offline=True)
+    page.goto(file.as_uri())
+    page.wait_for_function(f"() => {STATE} && {STATE} !== 'loading'", timeout=120_000)
+    assert page.evaluate(f"{STATE} + document.getElementById('told').textContent") == "drawn"
+    return Shown(page, one.scene, one.renderer, one.dials)
+
+
+@pytest.fixture(scope="module")
+def rigged_taken(tmp_path_factory: pytest.TempPathFactory) -> Taken:
+    file = write_rigged_head(tmp_path_factory.mktemp("rigged") / "rigged.glb")
+    scene = dermis.Scene(dermis.load_head(file, subdivide=0))
+    return taken(scene, "gpu", dials_of(scene))
+
+
+@pytest.fixture(scope="module")
+def rigged(browser: Any, rigged_taken: Taken, tmp_path_factory: pytest.TempPathFactory) -> Shown:
+    return shown(browser, rigged_taken, tmp_path_factory.mktemp("shown"))
+
+
+def test_a_browser_draws_the_same_picture(rigged: Shown) -> None:
+    picture = rigged.linear()
+    assert picture.mean() > 0.02
+    assert rigged.error(rigged.scene) < LIMIT
+
+
+@pytest.mark.parametrize("name", ["human:7", "head.obj"])
+def test_software_is_given_frames_of_its_own(browser: Any, name: str, tmp_path: Path) -> None:
+    file = write_head(tmp_path / "head.obj")
+    head = dermis.load_head(file if name == file.name else name, subdivide=0)
+    one = shown(browser, taken(dermis.Scene(head), "software", ()), tmp_path)
+    # The browser's rasteriser moves corners to sixteenths of a pixel: a sample more or less at outlines.
+    assert one.error(one.scene) < 3.0 * LIMIT
+    one.page.close()
+
+
+def test_a_camera_that_turns_leaves_the_light_alone(rigged: Shown) -> None:
+    ran = rigged.turn("dermis.state.yaw = 0.4; dermis.state.zoom = 0.8; dermis.touch()")
+    assert set(ran) == {"visibility", "shade", "post"}
+    x, y, z = np.subtract(rigged.scene.camera.position, rigged.scene.camera.target)
+    around, level = np.arctan2(x, z) + 0.4, np.hypot(x, z)
+    offset = np.array([level * np.sin(around), y, level * np.cos(around)])
+    position = tuple(0.8 * offset + rigged.scene.camera.target)
+    camera = rigged.scene.camera.model_copy(
+        update={"position": position, "frame_mm": 0.8 * rigged.scene.camera.frame_mm}
+    )
+    assert rigged.error(replace(rigged.scene, camera=camera)) < LIMIT
+    rigged.turn("dermis.state.yaw = 0; dermis.state.zoom = 1; dermis.touch()")
+    assert rigged.error(rigged.scene) < LIMIT
+
+
+def test_a_light_is_dragged_with_its_shadows(rigged: Shown) -> None:
+    ran = rigged.turn("dermis.state.lightYaw = 0.9; dermis.touch()")
+    assert "shadows" in ran and "visibility" not in ran
+    key, *others = rigged.scene.lights
+    x, y, z = np.subtract(key.position, key.target)  # type: ignore[union-attr]
+    around, level = np.arctan2(x, z) + 0.9, np.hypot(x, z)
+    position = tuple(np.array([level * np.sin(around), y, level * np.cos(around)]) + key.target)  # type: ignore[union-attr]
+    lights = (key.model_copy(update={"position": position}), *others)
+    assert rigged.error(replace(rigged.scene, lights=lights)) < LIMIT
+    rigged.turn("dermis.state.lightYaw = 0; dermis.touch()")
+
+
+def test_a_dial_is_exact_at_its_nodes(rigged: Shown) -> None:
+    rough = next(one for one in rigged.dials if one.name == "roughness")
+    ran = rigged.turn(f"dermis.state.dials.roughness = {rough.values[-1]}; dermis.touch()")
+    assert "shade" in ran and "stretch" not in ran
+    scene = rough.scenes[-1]
+    assert scene is not None and rigged.error(scene) < LIMIT < rigged.error(rigged.scene)
+    assert rigged.turn(f"dermis.state.dials.roughness = {rough.rest}; dermis.touch()")
+    assert rigged.turn("dermis.touch()") == []
+
+
+def test_memory_stays_flat_in_motion(rigged: Shown) -> None:
+    made = "dermis.made.resources.filter(Boolean).length"
+    before = rigged.page.evaluate(made)
+    rigged.turn(
+        "for (let k = 0; k < 8; k++) { dermis.state.yaw += 0.01; dermis.touch(); await dermis.idle(); }"
+    )
+    assert rigged.page.evaluate(made) == before
+    rigged.turn("dermis.state.yaw = 0; dermis.touch()")
+
+
+def test_a_lost_device_is_opened_again(rigged: Shown) -> None:
+    rigged.page.evaluate("dermis.reopen()")
+    assert rigged.error(rigged.scene) < LIMIT
+
+
+def test_the_page_loads_nothing_and_words_of_users_stay_words(rigged_taken: Taken) -> None:
+    text = web_page(rigged_taken.made, rigged_taken.dials, WICKED, WICKED)
+    policy = html.unescape(re.search(r'Security-Policy" content="([^"]*)"', text)[1])  # type: ignore[index]
+    script, style = (
+        re.search(rf"<{tag}>(.*?)</", text, re.DOTALL)[1] for tag in ('script type="module"', "style")
+    )  # type: ignore[index]
+    assert policy.startswith("default-src 'none'") and "unsafe" not in policy and "connect" not in policy
+    assert hash_of(script) in policy and hash_of(style) in policy
+    assert re.findall(r"https?://", text) == [] and "<script>alert" not in text
+    assert text.count("<script") == text.count("</script>") == 4
+
+
+def test_a_skin_by_itself_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(dermis.DermisError, match="a head"):
+        export_skin("skin1", "web", tmp_path / "page.html")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_modules_are_joined_in_order() -> None:
+    assert {f"{name}.js" for name in MODULES} == {file.name for file in MODULES_FOLDER.glob("*.js")}
+    assert not re.search(r"^(import|export) ", player(), re.MULTILINE)
+
+
+def test_the_player_is_well_typed() -> None:
+    folder = os.environ.get("DERMIS_TYPESCRIPT")
+    if folder is None or shutil.which("node") is None:
+        pytest.skip("DERMIS_TYPESCRIPT does not name the folder node_modules with TypeScript")
+    command = [
+        "node",
+        str(Path(folder) / "typescript/bin/tsc"),
+        "--noEmit",
+        "--checkJs",
+        "--allowJs",
+        "--strict",
+    ]
+    command += ["--target", "esnext", "--module", "esnext", "--moduleResolution", "bundler", "--types", ""]
+    done = subprocess.run([*command, *map(str, MODULES_FOLDER.glob("*.*s"))], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout

@@ -1,0 +1,40 @@
+"""Writes four heads as pages and a page that leads to them: python tools/web_gallery.py FOLDER."""
+
+from __future__ import annotations
+
+import html
+import re
+import sys
+from pathlib import Path
+
+from dermis.export.run import export_skin
+from dermis.mesh.samples import cached
+
+HEADS = {"human": "the human", "human-7": "human:7", "human-12": "human:12", "scan": "lee_perry_smith"}
+STYLE = (
+    "body{background:#000;color:#ddd;font:16px system-ui,sans-serif;margin:0;display:grid;gap:8px;"
+    "padding:8px;"
+    "grid-template-columns:repeat(auto-fit,minmax(min(320px,100%),1fr))}"
+    "img{width:100%;display:block}a{color:inherit}"
+)
+
+
+def main(folder: Path) -> None:
+    """Write them."""
+    folder.mkdir(parents=True, exist_ok=True)
+    shown = []
+    for name, title in HEADS.items():
+        word = "human" if title.startswith("the") else title
+        if word == "lee_perry_smith" and not cached(word):
+            word = title = "human:19"
+        export_skin(word, "web", folder / f"{name}.html")
+        text = (folder / f"{name}.html").read_text(encoding="utf-8")
+        poster = re.search(r'src="(data:image/webp;base64,[^"]*)"', text)
+        assert poster is not None
+        shown.append(f'<a href="{name}.html"><img alt="" src="{poster[1]}">{html.escape(title)}</a>')
+    head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>dermis</title><style>{STYLE}</style>'
+    (folder / "index.html").write_text("\n".join([head, *shown, "</html>\n"]), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
