@@ -17,7 +17,7 @@ from dermis.fitting.unknowns import SKIN, TURN_SPREAD, TURN_STEP, WHITE_SPREAD, 
 Floats = NDArray[np.float64]
 _FLOOR = 0.03
 """Of the median of the photograph: what darker pixels are known to, as noise does not fall with them."""
-_ROBUST = 3.0
+ROBUST = 3.0
 """Standard deviations from which a residual counts less [Huber1964]."""
 _MAD = 1.4826
 _MOST_STEPS = 8
@@ -56,6 +56,7 @@ class Problem:
     target: Floats
     noise: float
     free_white: bool
+    robust: float = ROBUST
 
     def weights(self, shown: Floats) -> Floats:
         """(p, 3) one over the standard deviation of pixels that are this bright."""
@@ -74,7 +75,7 @@ class Problem:
         """The same with weights of what the model shows, and less for what it cannot explain."""
         plain = self.weights(np.maximum(self.target - state.residual, 0.0))
         scaled = np.abs(state.residual * plain)
-        limit = _ROBUST * max(_MAD * float(np.median(scaled)), 1.0)
+        limit = self.robust * max(_MAD * float(np.median(scaled)), 1.0)
         weight = plain * np.sqrt(limit / np.maximum(scaled, limit))
         A = (state.basis * weight).reshape(len(state.basis), -1).T
         x = strengths_of(A, (self.target * weight).ravel())
