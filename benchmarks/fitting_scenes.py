@@ -90,7 +90,7 @@ def _sky(random: np.random.Generator) -> NDArray[np.float64]:
     towards = directions(_ROWS, 2 * _ROWS)
     radiance = np.full(towards.shape[:2], random.uniform(0.05, 0.2))
     for _ in range(3):
-        middle = random.standard_normal(3) + (0.0, 0.6, 0.6)
+        middle = random.standard_normal(3) + np.array([0.0, 0.6, 0.6])
         cosine = towards @ (middle / np.linalg.norm(middle))
         radiance += random.uniform(0.1, 0.5) * (0.5 + 0.5 * cosine) ** random.uniform(1.0, 8.0)
     return radiance
@@ -114,8 +114,9 @@ def _panorama(number: int, radiance: NDArray[np.float64]) -> Path:
 def photograph(renderer: Renderer, one: Case, side: int, samples: int) -> PathTraced:
     """The case by path tracing; the surface reflects as a dielectric of index 1.4.
 
-    A medium that does not refract has one colour under light from everywhere and a darker one where light and
-    eye face it. The painted colours are those that colorimeters find: light at 45 degrees, seen from the front.
+    A medium that does not refract has one colour under light from everywhere and a darker one where light
+    and eye face it. The painted colours are those that colorimeters find: light at 45 degrees, seen from
+    the front.
     """
     paint = paint_of(renderer, one.scene, _PAINT)
     paint = replace(paint, colour=_measured(paint.colour))

@@ -33,8 +33,9 @@ def fit(
 ) -> int:
     """Find the light and the skin of a photograph: melanin, blood, roughness, gloss, sky and suns.
 
-    The head must be of the right shape, before the camera that took the photograph. Written are scene.toml, which
-    dermis render takes, with its light and person, the table fit.json, and photo, fit and difference as PNG.
+    The head must be of the right shape, before the camera that took the photograph. Written are scene.toml,
+    which dermis render takes, with its light and person, the table fit.json, and photo, fit and difference
+    as PNG.
 
     Examples:
 
@@ -49,13 +50,13 @@ def fit(
     photo:
         Photograph: PNG, JPEG or TIFF in sRGB, or EXR (linear).
     head:
-        human, human:7, a person's numbers (.json), a sample or a mesh; or a scene (.toml) with head, camera and
-        pose.
+        human, human:7, a person's numbers (.json), a sample or a mesh; or a scene (.toml) with head, camera
+        and pose.
     camera:
         portrait, three-quarter, profile or a TOML file with [camera]; the scene's own when left out.
     landmarks:
-        Landmarks in the photograph, to find camera and, for the human, its shape by: a CSV file of name,x,y in
-        pixels, what dermis render --landmarks writes, or MediaPipe's as JSON.
+        Landmarks in the photograph, to find the camera by and the shape of the human: a CSV file of name,x,y
+        in pixels, what dermis render --landmarks writes, or MediaPipe's as JSON.
     output:
         Folder for what is found, which is made.
     suns:
@@ -63,8 +64,8 @@ def fit(
     exposure:
         Factor from radiance to the photograph; the light's strength is one number with it.
     white:
-        Colour of the light in the photograph as red,green,blue (linear), or specular: find it by what the skin's
-        surface mirrors.
+        Colour of the light in the photograph as red,green,blue (linear), or specular: find it by what the
+        skin's surface mirrors.
     noise:
         Standard deviation of a pixel, relative.
     side:
@@ -97,7 +98,9 @@ def _report(found: Fitted, written: list[Path], as_json: bool) -> None:
         lines.append(f"  {name:10} {one['value']:8.4f}  known to {100 * one['relative_sd']:.0f} %")
     for k, sun in enumerate(told["suns"], start=1):
         way, off = ", ".join(f"{x:.2f}" for x in sun["towards"]), max(sun["sd_degrees"])
-        lines.append(f"  sun {k}      towards {way} (known to {off:.1f} degrees), irradiance {sun['irradiance']:.3g}")
+        lines.append(
+            f"  sun {k}      towards {way} (known to {off:.1f} degrees), irradiance {sun['irradiance']:.3g}"
+        )
     lines.append(f"  around     mean radiance {told['around']['mean_radiance']:.3g}")
     lines.append(f"  light      {', '.join(f'{x:.3f}' for x in told['white'])}")
     lines.append(f"  photograph and fit differ by {100 * told['residual']:.1f} % (median)")

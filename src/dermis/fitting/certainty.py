@@ -62,7 +62,7 @@ def certainty_of(problem: Problem, state: State, slopes: Floats) -> Certainty:
         (names[a], names[b], float(correlation[a, b]))
         for a in range(count)
         for b in range(a)
-        if abs(correlation[a, b]) > _ALIKE
+        if abs(correlation[a, b]) > _ALIKE and names[a][:5] != names[b][:5]
     )
     singular = np.linalg.svd(J * spread, compute_uv=False)
     told = dict(zip(names, map(float, sd), strict=False))

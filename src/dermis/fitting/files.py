@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,8 +79,8 @@ def scene_of(found: Fitted, folder: Path) -> Scene:
     return skinned(replace(found.subject.scene, lights=lights, environment=around), found.point)
 
 
-def pictures(found: Fitted) -> dict[str, NDArray[np.floating[Any]]]:
-    """Linear pictures: the photograph, the fit over black, and their difference on grey where skin counted."""
+def pictures(found: Fitted) -> dict[str, NDArray[np.float64]]:
+    """Linear pictures: photograph, fit, and their difference on grey where skin counted."""
     peak = max(float(np.percentile(found.photo[found.mask], 99.5)), 1e-9)
     off = np.where(found.mask[..., None], (found.photo - found.picture) / peak, 0.0)
     shown = {"photo": found.photo / max(peak, 1.0), "fit": found.picture / max(peak, 1.0)}

@@ -53,7 +53,7 @@ def fit(
     photo : a file (PNG, JPEG or TIFF in sRGB, EXR linear), or pixels (h, w, 3): bytes in sRGB, floats linear
     head : a scene or its file (.toml), a head or what `load_head` takes, a `Human`
     camera : a camera, a preset's name or a file; the scene's own when left out
-    landmarks : file of landmarks in the photograph: camera, and for the human its shape too, are found by them
+    landmarks : file of landmarks in the photograph, by which camera and the human's shape are found
     suns : lights from one direction beside the light from all around, 0 to 2
     exposure : factor from radiance to the photograph
     white : colour of the light in the photograph, or "specular" to find it from what the surface mirrors
@@ -84,7 +84,9 @@ def fit(
     )
     with TemporaryDirectory() as folder:
         frames = Frames(Renderer(adapter, depth=2), subject.scene, settings, Path(folder))
-        state, slopes, problem = _solved(frames, small, (given * exposure, noise, robust, white == "specular"), suns, told)
+        state, slopes, problem = _solved(
+            frames, small, (given * exposure, noise, robust, white == "specular"), suns, told
+        )
         picture = _picture(frames, state, given * exposure)
     known = certainty_of(problem, state, slopes)
     off = np.abs(state.residual) / np.maximum(problem.target, 1e-6)
@@ -145,5 +147,3 @@ def _white(white: Any) -> Floats:
         return np.ones(3)
     found = numbers("white", white, (3,), 0.01, 100.0)
     return np.asarray(found / found[1], np.float64)
-
-

@@ -53,10 +53,7 @@ class Fitted:
     @property
     def suns(self) -> list[tuple[Floats, float]]:
         """Unit vectors towards the suns, and the irradiance of what faces them."""
-        return [
-            (way, float(s))
-            for way, s in zip(self.point.suns, self.strengths[sky.BASIS :], strict=True)
-        ]
+        return [(way, float(s)) for way, s in zip(self.point.suns, self.strengths[sky.BASIS :], strict=True)]
 
     def summary(self) -> dict[str, Any]:
         """Numbers with their standard deviations, what is not determined, and what was believed.
@@ -103,11 +100,11 @@ def _summary(found: Fitted) -> dict[str, Any]:
 
 def _priors(found: Fitted) -> list[str]:
     """What was believed or given, in words."""
-    told = [
-        f"{one.name}: around {one.usual:g} within a factor of {np.exp(one.spread):.2g}" for one in SKIN
-    ]
+    told = [f"{one.name}: around {one.usual:g} within a factor of {np.exp(one.spread):.2g}" for one in SKIN]
     if found.suns:
-        told.append(f"directions of suns: within {np.degrees(TURN_SPREAD):.0f} degrees of where the search began")
+        told.append(
+            f"directions of suns: within {np.degrees(TURN_SPREAD):.0f} degrees of where the search began"
+        )
     white = "white red" in found.certainty.sd
     told.append(
         f"colour of the light: neutral within {100 * WHITE_SPREAD:.0f} %"
@@ -117,7 +114,7 @@ def _priors(found: Fitted) -> list[str]:
     told.append(f"exposure: given, {found.exposure:g}; the strength of the light is free")
     skin = found.subject.scene.skin.pigments
     assert skin is not None
-    told.append(f"held: eumelanin {skin.eumelanin:g}, oxygen {skin.oxygen:g}, epidermis {skin.epidermis_mm:g} mm")
+    told.append(
+        f"held: eumelanin {skin.eumelanin:g}, oxygen {skin.oxygen:g}, epidermis {skin.epidermis_mm:g} mm"
+    )
     return told
-
-

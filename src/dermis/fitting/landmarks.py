@@ -52,9 +52,13 @@ def _of_json(path: str | Path, told: Any, size: tuple[int, int]) -> tuple[str, d
             name, rows = next(iter(told["landmarks"].items()))
             return name, {str(row["name"]): np.asarray(row["pixel"], np.float64) for row in rows}
         while not _is_points(told):  # of the first face
-            told = next(told[key] for key in _MEDIAPIPE if key in told) if isinstance(told, Mapping) else told[0]
+            told = (
+                next(told[key] for key in _MEDIAPIPE if key in told) if isinstance(told, Mapping) else told[0]
+            )
         points = np.array([[one["x"], one["y"]] for one in told], np.float64)
-    return _BY_COUNT.get(len(points), ""), dict(zip(map(str, range(len(points))), points * size - 0.5, strict=True))
+    return _BY_COUNT.get(len(points), ""), dict(
+        zip(map(str, range(len(points))), points * size - 0.5, strict=True)
+    )
 
 
 def _is_points(told: Any) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,8 +36,8 @@ _FRAME_MM = 300.0
 def placed(subject: Subject, landmarks: str | Path, size: tuple[int, int]) -> Subject:
     """The subject before the camera that sees its landmarks where the photograph has them.
 
-    The human gets the identity that they tell: ancestry, sex, age, weight, muscle and details of the face, each
-    believed to be near the person given. Other heads, as they are, need a table of their own landmarks.
+    The human gets the identity that they tell: ancestry, sex, age, weight, muscle and details of the face,
+    each believed to be near the person given. Other heads, as they are, need a table of their own landmarks.
 
     Raises DermisError for files without landmarks, and for heads without those.
     """
@@ -87,7 +88,7 @@ class _Shape:
         own = cls(names, np.zeros((0, 3)), np.zeros((0, 0, 3)), person, details)
 
         def places_of(other: Human) -> Floats:
-            return _at(points, chosen, other.positions_mm.astype(np.float64)) - centre
+            return np.asarray(_at(points, chosen, other.positions_mm.astype(np.float64)) - centre)
 
         base, count = places_of(person), len(_MACRO) + len(details)
         slopes = np.stack([_slope(own, places_of, base, k, count) for k in range(count)])
@@ -101,7 +102,7 @@ class _Shape:
     def person(self, identity: Floats) -> Human:
         """The person given, changed by so many times what is believed of each number."""
         assert self.given is not None
-        macro = {
+        macro: dict[str, Any] = {
             name: float(np.clip(getattr(self.given, name) + _spread(name) * step, *_limits(name)))
             for name, step in zip(_MACRO, identity, strict=False)
         }
@@ -119,7 +120,7 @@ def _slope(shape: _Shape, places_of: Callable[[Human], Floats], base: Floats, k:
     if not change.any():
         step[k] = -0.2
         change = places_of(shape.person(step)) - base
-    return change / step[k]
+    return np.asarray(change / step[k])
 
 
 def _spread(name: str) -> float:

@@ -4,7 +4,7 @@ Gauss-Newton's steps with Levenberg's damping."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,9 @@ _FLOOR = 0.03
 ROBUST = 3.0
 """Standard deviations from which a residual counts less [Huber1964]."""
 _MAD = 1.4826
-_MOST_STEPS = 8
-_DONE = 2e-3
-_LEAST_GAIN = 1e-4
+_MOST_STEPS = 6
+_DONE = 0.01
+_LEAST_GAIN = 2e-3
 _DAMPING, _MOST_DAMPING = 1e-3, 1e3
 _LONGEST = 0.7  # step of a logarithm or a direction
 
@@ -124,13 +124,13 @@ def tint(point: Point) -> Floats:
 def solve(
     problem: Problem, start: Point, told: Callable[[int, int], None] = lambda done, of: None
 ) -> tuple[State, Floats]:
-    """The best state, and the derivatives (p, 3, u) there.
+    """The best state, and derivatives (p, 3, u) from one step before it at most.
 
-    By variable projection [GolubPereyra1973], with Kaufman's derivative [Kaufman1975]: light follows the skin.
+    By variable projection [GolubPereyra1973] with Kaufman's derivative [Kaufman1975]: light follows skin.
     """
     first = problem.weights(problem.target.mean(axis=1, keepdims=True) * np.ones(3))
     state = problem.reweighed(problem.state(start, first))
-    damping, slopes = _DAMPING, None
+    damping = _DAMPING
     for turn in range(_MOST_STEPS):
         told(turn, _MOST_STEPS)
         slopes = problem.slopes(state, f"light_{turn}")
@@ -141,7 +141,7 @@ def solve(
         state = problem.reweighed(better)
         if np.abs(step).max() < _DONE or gain < _LEAST_GAIN:
             break
-    return state, problem.slopes(state, "light_last")
+    return state, slopes
 
 
 def _improved(
@@ -150,7 +150,7 @@ def _improved(
     """A better state, the step to it and the damping for the next."""
     H, g = _system(problem, state, slopes)
     while damping < _MOST_DAMPING:
-        step = np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
+        step = np.asarray(np.linalg.solve(H + damping * np.diag(np.diag(H)), g), np.float64)
         step *= min(1.0, _LONGEST / max(float(np.abs(step).max()), 1e-12))
         if np.abs(step).max() < 0.1 * _DONE:
             break
@@ -177,8 +177,3 @@ def _active(state: State) -> Floats:
     """(m, a) weighed frames of the lights that are free to follow: suns at 0 are not."""
     free = [k for k in range(len(state.basis)) if k < sky.BASIS or state.strengths[k] > 0.0]
     return (state.basis[free] * state.weight).reshape(len(free), -1).T
-
-
-def scaled(state: State, by: float) -> State:
-    """The same in lights so many times as strong."""
-    return replace(state, strengths=by * state.strengths)
