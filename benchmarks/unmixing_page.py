@@ -124,10 +124,14 @@ def _errors(cases: Sequence[Told], words: str) -> list[tuple[str, ...]]:
     for name in ("melanin", "blood", "roughness"):
         pairs = [(one[name]["found"], one[name]["true"]) for one in cases]
         off = [a - b if name == "roughness" else a / b - 1.0 for a, b in pairs]
-        told = (lambda x: f"{x:.3f}") if name == "roughness" else (lambda x: f"{100.0 * x:.0f} %")
+        told = _thousandths if name == "roughness" else _percent
         rows.append((words, name, *_spread([abs(x) for x in off], told), told(statistics.median(off))))
     turns = [one["sun_degrees"] for one in cases]
     return [*rows, (words, "direction of the sun", *_spread(turns, lambda x: f"{x:.1f} degrees"), "")]
+
+
+def _thousandths(value: float) -> str:
+    return f"{value:.3f}"
 
 
 def _spread(values: Sequence[float], told: Callable[[float], str]) -> tuple[str, str, str]:

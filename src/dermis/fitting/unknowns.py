@@ -47,7 +47,7 @@ SKIN = (
 """Artist's beliefs, wide ones: the spread of melanin is that of all peoples, roughness that of the face's
 regions; strength is between a dry skin's and a smooth boundary's. `rho_s` is what oil changes."""
 _COARSE = 0.25
-"""Steps of the logarithms of pigments between which widths of scattering do not change: profiles take long."""
+"""Steps of the logarithms of pigments between which widths do not change: profiles take long."""
 TURN_STEP = 0.02
 """Of finite differences of a sun's direction [rad]."""
 TURN_SPREAD = 1.0
