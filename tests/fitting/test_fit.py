@@ -88,6 +88,13 @@ def test_files_are_a_scene_that_loads(found: Fitted, tmp_path: Path) -> None:
     assert {one.name for one in tmp_path.iterdir()} == names
 
 
+def test_a_head_without_a_name_is_no_file(person: Human) -> None:
+    assert subject_of(person).person is person
+    plain = subject_of(person.head(subdivide=0))
+    assert plain.person is None and not plain.table
+    assert subject_of(Human().head(subdivide=0)).person is not None
+
+
 def test_light_is_nowhere_negative_and_what_it_was() -> None:
     random = np.random.default_rng(3)
     A, light = random.uniform(size=(60, 10)), np.append(sky.mixtures()[0][:, 5], 0.7)

@@ -47,11 +47,14 @@ def save(folder: Path, found: Fitted) -> list[Path]:
 
     Raises DermisError when the disk is full, or the folder cannot be written to.
     """
+    table = found.subject.table
+    if found.subject.person is None and not table:
+        came = "it came as a head that only its maker knows"
+        refuse("head", "a person by name, or a Human, for a file to name", came, "Fit the Human itself")
     written = []
     if _has_sky(found):
         written.append(folder / "light.exr")
         _write_light(written[-1], found)
-    table = found.subject.table
     if found.subject.person is not None:
         written.append(folder / "person.json")
         look = found.subject.person.look

@@ -23,7 +23,8 @@ _MAD = 1.4826
 _MOST_STEPS = 6
 _DONE = 0.01
 _LEAST_GAIN = 2e-3
-_DAMPING, _MOST_DAMPING = 1e-3, 1e3
+_DAMPING = 1e-3
+_TRIALS = 3
 _LONGEST = 0.7  # step of a logarithm or a direction
 
 
@@ -149,7 +150,7 @@ def _improved(
 ) -> tuple[State | None, Floats, float]:
     """A better state, the step to it and the damping for the next."""
     H, g = _system(problem, state, slopes)
-    while damping < _MOST_DAMPING:
+    for _ in range(_TRIALS):
         step = np.asarray(np.linalg.solve(H + damping * np.diag(np.diag(H)), g), np.float64)
         step *= min(1.0, _LONGEST / max(float(np.abs(step).max()), 1e-12))
         if np.abs(step).max() < 0.1 * _DONE:
@@ -157,7 +158,7 @@ def _improved(
         trial = problem.state(state.point.moved(step), state.weight)
         if trial.cost < state.cost:
             return trial, step, max(0.2 * damping, 1e-6)
-        damping = max(10.0 * damping, 1e-2)
+        damping = max(30.0 * damping, 0.03)
     return None, np.zeros(len(g)), damping
 
 

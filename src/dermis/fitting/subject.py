@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from dermis.errors import refuse, shown_value
 from dermis.human.person import Human
 from dermis.human.skin.colours import EPIDERMIS_MM
@@ -19,7 +21,7 @@ from dermis.scene.heads import is_person, person_of
 from dermis.scene.model import Scene
 from dermis.scene.skin import Pigments, Skin
 
-FolderName = str | os.PathLike[str]
+_SAME_MM = 0.01
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,7 @@ class Subject:
     """A scene without light.
 
     person : whose skin is painted, None for other heads
-    table : [head] of a scene's file for those
+    table : [head] of a scene's file for those; empty for people who were given as heads without a name
     """
 
     scene: Scene
@@ -52,8 +54,8 @@ def subject_of(given: object, camera: object = None) -> Subject:
     if camera is not None:
         scene = replace(scene, camera=_camera(camera, scene.head))
     person = given if isinstance(given, Human) else _person(scene.head)
-    if not table:
-        name = scene.head.name
+    name = scene.head.name
+    if not table and (person is not None or not is_person(name)):
         table = {"name": str(Path(name).resolve()) if Path(name).is_file() else name}
     return Subject(_plain(scene), person, table)
 
@@ -71,7 +73,10 @@ def _person(head: Head) -> Human | None:
     """The person that a painted head is, with the skin that is painted on it."""
     if not isinstance(head.maps, PaintedMaps) or head.maps.colour is not None or not is_person(head.name):
         return None
-    return replace(person_of(head.name), skin=head.maps.look)
+    person = replace(person_of(head.name), skin=head.maps.look)
+    own, there = person.positions_mm, head.control.positions_mm
+    same = own.shape == there.shape and np.allclose(own, there, atol=_SAME_MM)
+    return person if same else None
 
 
 def _plain(scene: Scene) -> Scene:
