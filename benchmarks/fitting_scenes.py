@@ -1,4 +1,4 @@
-"""Random faces in random light, path-traced: python benchmarks/fitting_scenes.py [--side 256] [--samples 16]
+"""Random faces in random light, path-traced: python benchmarks/fitting_scenes.py [--side 256] [--samples 8]
 
 What `fitting.py` fits. Paths are kept on disk, so a run that was cut off goes on where it stopped, and one
 that asks for more adds to them.
@@ -22,6 +22,7 @@ from dermis.environment.panorama import directions
 from dermis.frame.renderer import Renderer
 from dermis.human.person import Human
 from dermis.images.exr import encode_exr
+from dermis.reference.half_space import diffuse_albedo, reflected_radiance
 from dermis.reference.path_traced import PathTraced
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
@@ -35,6 +36,8 @@ FOLDER = Path(gettempdir()) / "dermis-fitting"
 SCENES = 30
 _SEED = 24
 _MELANIN, _BLOOD, _ROUGHNESS = (-2.2, -0.8), (-2.5, -1.5), (0.2, 0.4)  # the first two as decimal exponents
+LOBE = "torrance-sparrow-smith"
+"""The lobe of the truth, of one kind of slopes."""
 _PAINT = 1024
 _ROWS = 32
 _FACE_MM = 250.0
@@ -76,7 +79,8 @@ def case(number: int) -> Case:
     eye = 1100.0 * np.array([np.sin(yaw), 0.0, np.cos(yaw)])
     camera = Camera(position=tuple(eye), target=(0.0, -10.0, 30.0), frame_mm=_FACE_MM)
     environment = Environment(name=str(_panorama(number, radiance)))
-    skin = skin_of(person).model_copy(update={"roughness": roughness, "rho_s": 1.0})
+    surface = {"roughness": roughness, "rho_s": 1.0, "specular": LOBE, "fresnel": "exact"}
+    skin = skin_of(person).model_copy(update=surface)
     scene = Scene(head, lights=lights, camera=camera, skin=skin, environment=environment)
     return Case(number, person, scene, melanin, blood, roughness, towards, strength / (strength + arriving))
 
@@ -86,7 +90,7 @@ def _sky(random: np.random.Generator) -> NDArray[np.float64]:
     towards = directions(_ROWS, 2 * _ROWS)
     radiance = np.full(towards.shape[:2], random.uniform(0.05, 0.2))
     for _ in range(3):
-        middle = random.standard_normal(3) + (0.0, 0.6, 0.6)
+        middle = random.standard_normal(3) + np.array([0.0, 0.6, 0.6])
         cosine = towards @ (middle / np.linalg.norm(middle))
         radiance += random.uniform(0.1, 0.5) * (0.5 + 0.5 * cosine) ** random.uniform(1.0, 8.0)
     return radiance
@@ -108,17 +112,30 @@ def _panorama(number: int, radiance: NDArray[np.float64]) -> Path:
 
 
 def photograph(renderer: Renderer, one: Case, side: int, samples: int) -> PathTraced:
-    """The case by path tracing; the surface reflects as a dielectric of index 1.4."""
+    """The case by path tracing; the surface reflects as a dielectric of index 1.4.
+
+    A medium that does not refract has one colour under light from everywhere and a darker one where light
+    and eye face it. The painted colours are those that colorimeters find: light at 45 degrees, seen from
+    the front.
+    """
     paint = paint_of(renderer, one.scene, _PAINT)
+    paint = replace(paint, colour=_measured(paint.colour))
     rough = np.clip(paint.roughness * (one.roughness / USUAL_ROUGHNESS), 0.05, 1.0).astype(np.float32)
     return traced(renderer, one.scene, replace(paint, roughness=rough), (side, side), samples)
+
+
+def _measured(colour: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Colours under light from everywhere of media that have these at 45 degrees to 0."""
+    albedo = 1.0 - np.linspace(1.0, 0.01, 48) ** 2
+    seen = [np.pi * float(reflected_radiance(np.sqrt(0.5), 1.0, float(one))) for one in albedo]
+    return np.interp(colour, seen, [diffuse_albedo(float(one)) for one in albedo]).astype(np.float32)
 
 
 def main(words: list[str]) -> int:
     """Trace all of them."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--side", type=int, default=256)
-    parser.add_argument("--samples", type=int, default=16)
+    parser.add_argument("--samples", type=int, default=8)
     parser.add_argument("--scenes", type=int, default=SCENES)
     parser.add_argument("--adapter", default="auto")
     asked = parser.parse_args(words)

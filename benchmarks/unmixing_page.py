@@ -1,10 +1,11 @@
-"""Writes docs/fit.md from what `unmixing.py` and `widths.py` measured: python benchmarks/unmixing_page.py"""
+"""Writes docs/fit.md from the results of `unmixing.py`, `widths.py` and `fitting.py`: python benchmarks/unmixing_page.py"""
 
 from __future__ import annotations
 
 import json
+import statistics
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ PAGE = ROOT / "docs" / "fit.md"
 TEXT = ROOT / "docs" / "fit.in.md"
 RESULTS = ROOT / "benchmarks" / "results" / "unmixing.json"
 WIDTHS = RESULTS.with_name("widths.json")
+FITTED = ROOT / "benchmarks" / "results" / "fitting.json"
 
 Told = dict[str, Any]
 
@@ -36,6 +38,7 @@ def page(told: Told, widths: Told) -> str:
     """The page's text."""
     text = TEXT.read_text("utf-8")
     tables = {"known": _known(told), "mistaken": _mistaken(told), "counted": _counted(told)}
+    tables["fitting"] = _fitting(json.loads(FITTED.read_text("utf-8")))
     tables |= {"shading": _shading(told["shading"]), "speed": _speed(told["speed"])}
     tables |= {"supplied": _supplied(told["supplied"]), "borders": _borders(widths), "grid": _grid(widths)}
     for name, table in tables.items():
@@ -139,6 +142,41 @@ def _grid(told: Told) -> str:
 def _speed(told: Told) -> str:
     rows = [(f"{side} x {side}", f"{ms:.3g}") for side, ms in told.items() if side != "adapter"]
     return _table(("texels", f"{told['adapter']} [ms]"), rows)
+
+
+def _fitting(told: Told) -> str:
+    heads = "pictures", "number", "median error", "90 %", "worst", "bias (median)"
+    rows = [
+        row
+        for key, words in (("own", "our own frames"), ("traced", "path-traced"))
+        for row in _errors(told[key], f"{len(told[key])} {words}")
+    ]
+    seconds = statistics.median(one["seconds"] for one in told["traced"])
+    busy = statistics.median(one["processor_seconds"] for one in told["traced"])
+    size = f"{told['side']} x {told['side']} pixels, {told['samples']} paths a pixel"
+    took = f"{told['adapter']}: {seconds:.3g} s for a fit in the median, {busy:.3g} s of processor time"
+    return _table(heads, rows) + f"\n{size}. {took}.\n"
+
+
+def _errors(cases: Sequence[Told], words: str) -> list[tuple[str, ...]]:
+    """Rows of the errors of each number."""
+    rows = []
+    for name in ("melanin", "blood", "roughness"):
+        pairs = [(one[name]["found"], one[name]["true"]) for one in cases]
+        off = [a - b if name == "roughness" else a / b - 1.0 for a, b in pairs]
+        told = _thousandths if name == "roughness" else _percent
+        rows.append((words, name, *_spread([abs(x) for x in off], told), told(statistics.median(off))))
+    turns = [one["sun_degrees"] for one in cases]
+    return [*rows, (words, "direction of the sun", *_spread(turns, lambda x: f"{x:.1f} degrees"), "")]
+
+
+def _thousandths(value: float) -> str:
+    return f"{value:.3f}"
+
+
+def _spread(values: Sequence[float], told: Callable[[float], str]) -> tuple[str, str, str]:
+    ordered = sorted(values)
+    return told(statistics.median(ordered)), told(ordered[int(0.9 * (len(ordered) - 1))]), told(ordered[-1])
 
 
 def _percent(share: float) -> str:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from dermis.batch.dataset import read_dataset
     from dermis.errors import DermisError
     from dermis.export.run import export_skin
+    from dermis.fitting.fit import fit
     from dermis.frame.observation import Observation
     from dermis.frame.renderer import Renderer, render
     from dermis.human.person import Human
@@ -82,6 +83,7 @@ _HOME = {
     "Settings": "scene.settings",
     "Skin": "scene.skin",
     "export_skin": "export.run",
+    "fit": "fitting.fit",
     "read_dataset": "batch.dataset",
     "unmix": "unmixing.unmix",
     "view": "viewer.windows",
@@ -109,6 +111,7 @@ __all__ = [
     "StripeLight",
     "Tissue",
     "export_skin",
+    "fit",
     "human_targets",
     "load_head",
     "load_lights",

@@ -16,6 +16,7 @@ COMMANDS = {
     "head": "Make a person of the parametric human and write it as glTF.",
     "export": "Write a skin or a head for another program, and say how wrong it will be there.",
     "unmix": "Find the melanin and blood of a picture of skin, and recolour it.",
+    "fit": "Find the light and the skin of a photograph of a head.",
     "lights": "Print a rig of lights as a file to start from.",
     "compare": "Compare techniques with the truth, or the models of the surface.",
     "gallery": "Draw every comparison of the talk, and a page that explains them.",

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dermis.fitting import sky
 from dermis.fitting.unknowns import Point, skinned, suns_of
+from dermis.frame.rendered import Rendered
 from dermis.frame.renderer import Renderer
 from dermis.images.exr import encode_exr
 from dermis.outputs import replacing
@@ -115,7 +116,7 @@ class Frames:
     def _image(self, scene: Scene, view: str) -> Floats:
         return np.asarray(self._draw(scene, view).linear()[self.mask], np.float64)
 
-    def _draw(self, scene: Scene, view: str, outputs: tuple[str, ...] = ()) -> object:
+    def _draw(self, scene: Scene, view: str, outputs: tuple[str, ...] = ()) -> Rendered:
         self.drawn += 1
         return self.renderer.draw(scene, self.settings, timed=False, view=view, outputs=outputs)
 

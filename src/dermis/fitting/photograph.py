@@ -55,16 +55,17 @@ def read_photograph(given: str | Path | Picture | ArrayLike) -> Photograph:
     if image.ndim != 3 or image.shape[2] not in (3, 4) or min(image.shape[:2]) < _LEAST_SIDE:
         expected = f"a picture (h, w, 3) in colour of {_LEAST_SIDE} pixels a side at least"
         refuse(name, expected, f"shape {image.shape} came", "Save it as RGB")
-    if image.dtype.kind not in "fu" or image.dtype.itemsize > 2 and image.dtype.kind == "u":
+    if image.dtype.kind != "f" and image.dtype not in (np.uint8, np.uint16):
         refuse(name, "sRGB bytes or linear floats", f"{image.dtype} came", "Convert it")
     image = image[..., :3]
     if image.dtype.kind == "f":
         if not np.isfinite(image).all() or image.min() < 0.0 or image.max() <= 0.0:
             refuse(name, "light, from 0", "some is negative, infinite or no number", "Export it again")
         return Photograph(image.astype(np.float64), np.ones(image.shape[:2]))
-    most = np.iinfo(image.dtype).max
-    trusted = (image.max(axis=2) < _CLIPPED * most).astype(np.float64)
-    return Photograph(decode_srgb_levels(image).astype(np.float64), trusted)
+    levels: NDArray[np.uint8] | NDArray[np.uint16] = np.asarray(image)
+    most = np.iinfo(levels.dtype).max
+    trusted = (levels.max(axis=2) < _CLIPPED * most).astype(np.float64)
+    return Photograph(decode_srgb_levels(levels).astype(np.float64), trusted)
 
 
 def _averaged(image: Floats, size: tuple[int, int]) -> Floats:

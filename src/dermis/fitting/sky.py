@@ -13,7 +13,8 @@ Floats = NDArray[np.float64]
 ROWS = 32
 """Of the panoramas."""
 BASIS = 9
-"""Spherical harmonics up to the second order: what skin's soft shading can tell of light from all around."""
+"""Spherical harmonics up to the second order: what matte shading tells of light from all around
+[RamamoorthiHanrahan2001]."""
 _LOBES = 48
 _CANDIDATES = 400
 
@@ -45,7 +46,8 @@ def mixtures() -> tuple[Floats, Floats]:
     """(9, n) shares of the nine lobes that make up n others all around, and their middles (n, 3)."""
     towards = spread_directions(_LOBES)
     places = spread_directions(_CANDIDATES)
-    return np.linalg.lstsq(lobe(middles(), places), lobe(towards, places), rcond=None)[0], towards
+    shares = np.linalg.lstsq(lobe(middles(), places), lobe(towards, places), rcond=None)[0]
+    return np.asarray(shares, np.float64), towards
 
 
 def spread_directions(count: int) -> Floats:

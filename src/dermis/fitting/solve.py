@@ -4,7 +4,7 @@ Gauss-Newton's steps with Levenberg's damping."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +17,14 @@ from dermis.fitting.unknowns import SKIN, TURN_SPREAD, TURN_STEP, WHITE_SPREAD, 
 Floats = NDArray[np.float64]
 _FLOOR = 0.03
 """Of the median of the photograph: what darker pixels are known to, as noise does not fall with them."""
-_ROBUST = 3.0
+ROBUST = 3.0
 """Standard deviations from which a residual counts less [Huber1964]."""
 _MAD = 1.4826
-_MOST_STEPS = 8
-_DONE = 2e-3
-_LEAST_GAIN = 1e-4
-_DAMPING, _MOST_DAMPING = 1e-3, 1e3
+_MOST_STEPS = 6
+_DONE = 0.01
+_LEAST_GAIN = 2e-3
+_DAMPING = 1e-3
+_TRIALS = 3
 _LONGEST = 0.7  # step of a logarithm or a direction
 
 
@@ -56,6 +57,7 @@ class Problem:
     target: Floats
     noise: float
     free_white: bool
+    robust: float = ROBUST
 
     def weights(self, shown: Floats) -> Floats:
         """(p, 3) one over the standard deviation of pixels that are this bright."""
@@ -74,7 +76,7 @@ class Problem:
         """The same with weights of what the model shows, and less for what it cannot explain."""
         plain = self.weights(np.maximum(self.target - state.residual, 0.0))
         scaled = np.abs(state.residual * plain)
-        limit = _ROBUST * max(_MAD * float(np.median(scaled)), 1.0)
+        limit = self.robust * max(_MAD * float(np.median(scaled)), 1.0)
         weight = plain * np.sqrt(limit / np.maximum(scaled, limit))
         A = (state.basis * weight).reshape(len(state.basis), -1).T
         x = strengths_of(A, (self.target * weight).ravel())
@@ -123,13 +125,13 @@ def tint(point: Point) -> Floats:
 def solve(
     problem: Problem, start: Point, told: Callable[[int, int], None] = lambda done, of: None
 ) -> tuple[State, Floats]:
-    """The best state, and the derivatives (p, 3, u) there.
+    """The best state, and derivatives (p, 3, u) from one step before it at most.
 
-    By variable projection [GolubPereyra1973], with Kaufman's derivative [Kaufman1975]: light follows the skin.
+    By variable projection [GolubPereyra1973] with Kaufman's derivative [Kaufman1975]: light follows skin.
     """
     first = problem.weights(problem.target.mean(axis=1, keepdims=True) * np.ones(3))
     state = problem.reweighed(problem.state(start, first))
-    damping, slopes = _DAMPING, None
+    damping = _DAMPING
     for turn in range(_MOST_STEPS):
         told(turn, _MOST_STEPS)
         slopes = problem.slopes(state, f"light_{turn}")
@@ -140,7 +142,7 @@ def solve(
         state = problem.reweighed(better)
         if np.abs(step).max() < _DONE or gain < _LEAST_GAIN:
             break
-    return state, problem.slopes(state, "light_last")
+    return state, slopes
 
 
 def _improved(
@@ -148,15 +150,15 @@ def _improved(
 ) -> tuple[State | None, Floats, float]:
     """A better state, the step to it and the damping for the next."""
     H, g = _system(problem, state, slopes)
-    while damping < _MOST_DAMPING:
-        step = np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
+    for _ in range(_TRIALS):
+        step = np.asarray(np.linalg.solve(H + damping * np.diag(np.diag(H)), g), np.float64)
         step *= min(1.0, _LONGEST / max(float(np.abs(step).max()), 1e-12))
         if np.abs(step).max() < 0.1 * _DONE:
             break
         trial = problem.state(state.point.moved(step), state.weight)
         if trial.cost < state.cost:
             return trial, step, max(0.2 * damping, 1e-6)
-        damping = max(10.0 * damping, 1e-2)
+        damping = max(30.0 * damping, 0.03)
     return None, np.zeros(len(g)), damping
 
 
@@ -176,8 +178,3 @@ def _active(state: State) -> Floats:
     """(m, a) weighed frames of the lights that are free to follow: suns at 0 are not."""
     free = [k for k in range(len(state.basis)) if k < sky.BASIS or state.strengths[k] > 0.0]
     return (state.basis[free] * state.weight).reshape(len(free), -1).T
-
-
-def scaled(state: State, by: float) -> State:
-    """The same in lights so many times as strong."""
-    return replace(state, strengths=by * state.strengths)

@@ -15,7 +15,7 @@ from dermis.fitting.unknowns import SKIN, Point
 from dermis.human.skin.colours import EPIDERMIS_MM, colours
 
 Floats = NDArray[np.float64]
-_AROUND = 40
+_AROUND = 28
 _BEHIND = -0.35  # along z: suns farther behind leave the face dark
 _MELANIN, _BLOOD = np.geomspace(0.002, 0.4, 14), np.geomspace(0.002, 0.06, 8)
 _STRENGTH = 0.5, 0.75, 1.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,8 @@ SKIN = (
 )
 """Artist's beliefs, wide ones: the spread of melanin is that of all peoples, roughness that of the face's
 regions; strength is between a dry skin's and a smooth boundary's. `rho_s` is what oil changes."""
+_COARSE = 0.25
+"""Steps of the logarithms of pigments between which widths do not change: profiles take long."""
 TURN_STEP = 0.02
 """Of finite differences of a sun's direction [rad]."""
 TURN_SPREAD = 1.0
@@ -101,21 +104,22 @@ def tangents(towards: Floats) -> Floats:
 def skinned(scene: Scene, point: Point) -> Scene:
     """The scene with this skin.
 
-    Painted people are painted with these pigments; other heads take the colour of the pigments' profile all
-    over, for what pigments a colour map was made of is not known.
+    Painted people are painted with these pigments, and light spreads below as far as pigments near them let
+    it; other heads take the colour of the pigments' profile all over, for what pigments a colour map was made
+    of is not known.
     """
     found = point.values()
-    melanin, blood = found["melanin"], found["blood"]
-    changed = {"roughness": found["roughness"], "rho_s": found["rho_s"], "oiliness": 0.0}
-    if not isinstance(scene.head.maps, PaintedMaps):
-        own = (scene.skin.pigments or Pigments()).model_copy(update={"melanin": melanin, "blood": blood})
-        changed |= {"profile": "spectral", "pigments": own, "albedo": "profile"}
-        return replace(scene, skin=Skin(**(scene.skin.model_dump() | changed)))
-    own = (scene.skin.pigments or Pigments()).model_copy(update={"melanin": melanin, "blood": blood})
-    changed |= {"profile": "spectral", "pigments": own}
-    return replace(
-        scene, head=painted(scene.head, melanin, blood), skin=Skin(**(scene.skin.model_dump() | changed))
-    )
+    changed: dict[str, Any] = {name: found[name] for name in ("roughness", "rho_s")}
+    changed |= {"oiliness": 0.0, "profile": "spectral"}
+    if isinstance(scene.head.maps, PaintedMaps):
+        head = painted(scene.head, found["melanin"], found["blood"])
+        melanin, blood = np.exp(_COARSE * np.rint(point.logs[:2] / _COARSE))
+    else:
+        head, melanin, blood = scene.head, found["melanin"], found["blood"]
+        changed["albedo"] = "profile"
+    held = (scene.skin.pigments or Pigments()).model_dump()
+    own = Pigments(**(held | {"melanin": float(melanin), "blood": float(blood)}))
+    return replace(scene, head=head, skin=Skin(**(scene.skin.model_dump() | changed | {"pigments": own})))
 
 
 def painted(head: Head, melanin: float, blood: float) -> Head:

@@ -1,0 +1,163 @@
+"""Known light and skin are found again in pictures that the renderer made of them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dermis import DermisError, DirectionalLight, Environment, Human, Renderer, Scene, Settings
+from dermis.fitting import sky
+from dermis.fitting.files import save
+from dermis.fitting.fit import fit
+from dermis.fitting.fitted import Fitted
+from dermis.fitting.landmarks import read_landmarks
+from dermis.fitting.linear import strengths_of
+from dermis.fitting.photograph import read_photograph
+from dermis.fitting.place import placed
+from dermis.fitting.subject import subject_of
+from dermis.human.landmarks.points import landmark_points
+from dermis.images.colour import encode_srgb8
+from dermis.scene.camera import Camera
+from dermis.scene.files import load_scene
+from dermis.scene.people import skin_of
+
+SIZE = (48, 56)
+CAMERA = Camera(position=(150.0, 20.0, 1100.0), target=(0.0, -10.0, 30.0), frame_mm=240.0)
+SMALL = {"side": 56, "atlas": 128}
+
+
+@pytest.fixture(scope="module")
+def person() -> Human:
+    return Human.drawn(7, skin={"melanin": 0.05, "blood": 0.012}, hair={"style": "none"})
+
+
+@pytest.fixture(scope="module")
+def scene(person: Human) -> Scene:
+    """A warm sky of one radiance, and a sun from the upper left."""
+    skin = skin_of(person).model_copy(update={"roughness": 0.25, "rho_s": 0.6})
+    sun = DirectionalLight(direction=(-0.5, -0.4, -0.77), irradiance=2.0)
+    return Scene(
+        person.head(subdivide=1),
+        skin=skin,
+        camera=CAMERA,
+        lights=[sun],
+        environment=Environment(name="uniform", exposure=0.3),
+    )
+
+
+@pytest.fixture(scope="module")
+def photo(scene: Scene) -> NDArray[np.float32]:
+    settings = Settings(size=SIZE, atlas=128, shadow_size=512, strands=False)
+    return Renderer("cpu").draw(scene, settings).linear()
+
+
+@pytest.fixture(scope="module")
+def found(person: Human, scene: Scene, photo: NDArray[np.float32]) -> Fitted:
+    """From bytes, at half the exposure, under light a fifth redder than white."""
+    seen = encode_srgb8(np.clip(0.5 * photo * (1.2, 1.0, 0.9), 0.0, 1.0))
+    return fit(seen, person, camera=CAMERA, exposure=0.5, white=(1.2, 1.0, 0.9), adapter="cpu", **SMALL)
+
+
+def test_finds_skin_and_light(found: Fitted) -> None:
+    assert found.values["melanin"] == pytest.approx(0.05, rel=0.05)
+    assert found.values["blood"] == pytest.approx(0.012, rel=0.1)
+    assert found.values["roughness"] == pytest.approx(0.25, abs=0.05)
+    ((way, strength),) = found.suns
+    true = np.array([0.5, 0.4, 0.77])
+    assert way @ true / np.linalg.norm(true) > np.cos(np.radians(3.0))
+    assert strength == pytest.approx(2.0, rel=0.1)
+    assert sky.panorama(found.strengths[: sky.BASIS]).mean() == pytest.approx(0.3, rel=0.2)
+    assert found.residual < 0.02
+
+
+def test_files_are_a_scene_that_loads(found: Fitted, tmp_path: Path) -> None:
+    save(tmp_path, found)
+    scene, settings = load_scene(tmp_path / "scene.toml")
+    assert settings.size == SIZE and settings.exposure == 0.5
+    assert scene.head.maps.look.melanin == pytest.approx(found.values["melanin"])  # type: ignore[attr-defined]
+    red, green, _ = scene.lights[0].irradiance
+    assert red / green == pytest.approx(1.2, rel=1e-6)
+    told = json.loads((tmp_path / "fit.json").read_text())
+    assert any(one.startswith("exposure: given, 0.5") for one in told["priors"])
+    names = {"light.exr", "person.json", "scene.toml", "photo.png", "fit.png", "difference.png", "fit.json"}
+    assert {one.name for one in tmp_path.iterdir()} == names
+
+
+def test_a_head_without_a_name_is_no_file(person: Human) -> None:
+    assert subject_of(person).person is person
+    plain = subject_of(person.head(subdivide=0))
+    assert plain.person is None and not plain.table
+    assert subject_of(Human().head(subdivide=0)).person is not None
+
+
+def test_light_is_nowhere_negative_and_what_it_was() -> None:
+    random = np.random.default_rng(3)
+    A, light = random.uniform(size=(60, 10)), np.append(sky.mixtures()[0][:, 5], 0.7)
+    assert strengths_of(A, A @ light) == pytest.approx(light, abs=1e-4)
+    dark = strengths_of(A, -(A @ light))
+    assert np.abs(dark).max() < 1e-9
+
+
+def test_lobes_make_up_all_of_the_second_order() -> None:
+    places = sky.spread_directions(200)
+    x, y, z = places.T
+    wanted = np.stack([np.ones(200), x, y, z, x * y, y * z, z * x, x * x - y * y, 3 * z * z - 1], axis=-1)
+    lobes = sky.lobe(sky.middles(), places)
+    made = lobes @ np.linalg.lstsq(lobes, wanted, rcond=None)[0]
+    assert np.abs(made - wanted).max() < 1e-9
+
+
+def test_clipped_pixels_are_not_trusted() -> None:
+    image = np.full((32, 32, 3), 100, np.uint8)
+    image[:16, :16, 0] = 255
+    small = read_photograph(image).within(16)
+    assert small.size == (16, 16) and small.trusted[:8, :8].max() == 0.0 and small.trusted[8:].min() == 1.0
+
+
+def test_camera_and_shape_by_landmarks(person: Human, tmp_path: Path) -> None:
+    head, size = person.head(subdivide=0), (300, 400)
+    points = landmark_points(head, "ibug-68")
+    places = np.einsum("nk,nkc->nc", points.share, head.positions_mm[points.corner]) - head.centre_mm
+    camera = CAMERA.to_opencv(size)
+    seen = (places @ camera.R.T + camera.t) @ camera.K.T
+    pixels = seen[:, :2] / seen[:, 2:]
+    rows = [f"{name},{x},{y}" for name, (x, y) in zip(points.names, pixels.tolist(), strict=True)]
+    (tmp_path / "face.csv").write_text("\n".join(["name,x,y", *rows]))
+    made = placed(subject_of(Human()), tmp_path / "face.csv", size)
+    assert made.person is not None
+    other = made.scene.camera
+    way, true = (np.subtract(one.position, one.target) for one in (other, CAMERA))
+    cosine = way @ true / np.linalg.norm(way) / np.linalg.norm(true)
+    assert cosine > np.cos(np.radians(3.0))
+    again = made.person.head(subdivide=0)
+    there = np.einsum("nk,nkc->nc", points.share, again.positions_mm[points.corner]) - again.centre_mm
+    found = other.to_opencv(size)
+    back = (there @ found.R.T + found.t) @ found.K.T
+    off = np.linalg.norm(back[:, :2] / back[:, 2:] - pixels, axis=1)
+    assert np.median(off) < 1.5
+
+
+def test_landmarks_of_mediapipe(tmp_path: Path) -> None:
+    face = [{"x": 0.5, "y": k / 478, "z": 0.0} for k in range(478)]
+    (tmp_path / "face.json").write_text(json.dumps({"face_landmarks": [face]}))
+    name, found = read_landmarks(tmp_path / "face.json", (200, 100))
+    assert name == "mediapipe" and found["239"] == pytest.approx([99.5, 49.5])
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"suns": 3}, "suns: expected"),
+        ({"exposure": 0.0}, "exposure: expected"),
+        ({"white": "grey"}, "white: expected"),
+        ({"camera": 3}, "camera: expected"),
+    ],
+)
+def test_refusals(person: Human, photo: NDArray[np.float32], given: dict[str, Any], told: str) -> None:
+    with pytest.raises(DermisError, match=told):
+        fit(photo, person, **given)
