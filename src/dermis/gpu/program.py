@@ -23,7 +23,7 @@ Resources = Mapping[str, Any]
 P = TypeVar("P")
 _TOOLKIT_SHADERS = Path(__file__).parent / "wgsl"
 _UNIFORM = {"type": "uniform"}
-_LARGE_RECORD = 1024  # bytes
+_LARGE_RECORD = 2048  # bytes; a skin is smaller, of which few shaders read all
 _MOST_VARIANTS = 12  # of a shader: on a software adapter each takes some 7 MB
 Constants = tuple[tuple[str, float], ...]
 """Names and values of pipeline constants, a shader's `override`s; those left out keep their default."""
