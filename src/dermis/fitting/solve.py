@@ -20,9 +20,9 @@ _FLOOR = 0.03
 ROBUST = 3.0
 """Standard deviations from which a residual counts less [Huber1964]."""
 _MAD = 1.4826
-_MOST_STEPS = 6
+_MOST_STEPS = 8
 _DONE = 0.01
-_LEAST_GAIN = 2e-3
+_LEAST_GAIN = 1e-4
 _DAMPING = 1e-3
 _TRIALS = 3
 _LONGEST = 0.7  # step of a logarithm or a direction

@@ -91,9 +91,9 @@ def surface_rows(subject: Subject) -> Rows:
 
 
 def camera_of(scene: Scene) -> dict[str, Any]:
-    """Where the scene is seen from [m], and the vertical angle of view [rad]."""
-    camera = scene.camera
-    position, target = (_M * np.asarray(each) for each in (camera.position, camera.target))
+    """Where the scene is seen from in the head's file [m], and the vertical angle of view [rad]."""
+    camera, centre = scene.camera, np.array(scene.head.centre_mm)
+    position, target = (_M * (centre + each) for each in (camera.position, camera.target))
     up = [float(x) for x in camera.up]
     fov = 2.0 * math.atan(camera.half_tangent)
     return {"position": position.tolist(), "target": target.tolist(), "up": up, "fov": fov}
