@@ -1,6 +1,6 @@
 """Time an exported page in headless Chromium: python benchmarks/web_page.py PAGE.html [SIDE [FORM]].
 
-FORM is gpu or software; without it the page chooses. On a machine with a GPU that Chromium can use, add --gpu.
+FORM is gpu or software; without it the page chooses. Where Chromium can use a GPU, add --gpu.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from typing import Any
 SOFTWARE = ["--use-webgpu-adapter=swiftshader"]
 FLAGS = ["--no-sandbox", "--enable-unsafe-webgpu"]
 HARDWARE = ["--enable-features=Vulkan", "--ignore-gpu-blocklist", "--use-angle=vulkan"]
-FRAMES = 10
+FRAMES = 4
 STATE = "document.documentElement.dataset.state"
 MOVE = "async () => { dermis.state.yaw += 0.02; dermis.touch(); await dermis.idle(); }"
-STILL = "async () => { dermis.state.yaw += 0.02; dermis.dirty = true; dermis.moving = false; await dermis.idle(); }"
+STILL = "async () => { dermis.state.yaw += 0.02; dermis.rest(); await dermis.idle(); }"
 
 
 def processor_s() -> float:

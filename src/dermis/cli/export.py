@@ -56,6 +56,8 @@ def export(
 
         dermis export human --to babylon -o head.html
 
+        dermis export human --to web -o head.html
+
         dermis export head.glb --profile medium --to unity --version 14 -o head --json
 
     Parameters

@@ -123,6 +123,8 @@ class Page {
         } finally {
             this.busy = false;
         }
+        clearTimeout(this.resting);
+        if (this.moving) this.resting = setTimeout(() => this.rest(), REST_MS);
     }
 
     /** @param {Player} player @param {Made} made @param {Screen} screen */
@@ -165,7 +167,6 @@ class Page {
         if (!this.soft) return;
         this.moving = true;
         clearTimeout(this.resting);
-        this.resting = setTimeout(() => this.rest(), REST_MS);
     }
 
     rest() {
