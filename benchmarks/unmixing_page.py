@@ -1,4 +1,7 @@
-"""Writes docs/fit.md from the results of `unmixing.py`, `widths.py` and `fitting.py`: python benchmarks/unmixing_page.py"""
+"""Writes docs/fit.md: python benchmarks/unmixing_page.py
+
+From what `unmixing.py`, `widths.py` and `fitting.py` measured.
+"""
 
 from __future__ import annotations
 

@@ -84,7 +84,8 @@ class Asked:
     def split(self) -> Split:
         """The profiles as the technique uses them."""
         first, *others = (self.technique.split(one, self.white) for one in (self.profile, *self.others))
-        return replace(first, others=tuple(others))
+        fine = {} if others else first.fine  # where widths vary, a stripe is as fine as texels
+        return replace(first, others=tuple(others), fine=fine)
 
     @property
     def mixed(self) -> bool:
