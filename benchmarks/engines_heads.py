@@ -3,8 +3,8 @@
     DERMIS_BABYLON=node_modules DERMIS_BLENDER_PYTHONS=bpy45/bin/python,bpy52/bin/python \\
         python benchmarks/engines_heads.py
 
-writes `benchmarks/results/engines_heads.json` and `docs/images/engines_heads.webp`. Hair is left out, which all
-of them draw by other means. Lights are parallel, as Babylon's page has them.
+writes `benchmarks/results/engines_heads.json` and `docs/images/engines_heads.webp`. Hair is left out, which
+all of them draw by other means. Lights are parallel, as Babylon's page has them.
 """
 
 from __future__ import annotations
