@@ -34,10 +34,10 @@ HERE = Path(__file__).parent
 RESULT = HERE / "results" / "engines_heads.json"
 PICTURE = HERE.parent / "docs" / "images" / "engines_heads.webp"
 TEXELS, SIDE = 1024, 256
-CYCLES_SAMPLES, MITSUBA_SAMPLES, PASSES = 64, 128, 2
+CYCLES_SAMPLES, MITSUBA_SAMPLES, PASSES = 64, 256, 2
 LIGHTS = (
-    DirectionalLight(direction=(0.8, -0.5, -0.7), irradiance=(2.6, 2.5, 2.3)),
-    DirectionalLight(direction=(-0.9, -0.2, -0.3), irradiance=(0.5, 0.55, 0.65)),
+    DirectionalLight(direction=(0.8, -0.5, -0.7), irradiance=(3.4, 3.3, 3.1)),
+    DirectionalLight(direction=(-0.9, -0.2, -0.3), irradiance=(0.8, 0.85, 0.95)),
 )
 FLAGS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 Floats = np.ndarray[Any, Any]
@@ -58,7 +58,7 @@ def main() -> int:
         shown.append(pictures.mean(axis=0))
         told.append(found)
         write_figures(RESULT, {"heads": told}, 4)
-    levels = encode_srgb(np.clip(np.concatenate([on_grey(one, ours) for one in shown], axis=1), 0.0, 1.0))
+    levels = encode_srgb(np.clip(np.concatenate([on_grey(one) for one in shown], axis=1), 0.0, 1.0))
     Image.fromarray(np.rint(255.0 * levels).astype(np.uint8)).save(PICTURE, quality=90)
     return 0
 
@@ -91,7 +91,8 @@ def in_babylon(subject: Subject, library: Path, ours: Floats) -> Floats:
         page.evaluate("document.querySelectorAll('body > :not(canvas)').forEach((one) => one.remove())")
         seen = Image.open(io.BytesIO(page.locator("canvas").screenshot())).convert("RGB")
         browser.close()
-    return np.dstack([decode_srgb(np.asarray(seen) / 255.0), ours[..., 3]])
+    light = decode_srgb(np.asarray(seen) / 255.0)
+    return np.dstack([light, np.where(light.any(axis=-1), ours[..., 3], 0.0)])
 
 
 def in_mitsuba(subject: Subject, ours: Floats) -> list[Floats]:
@@ -107,9 +108,9 @@ def in_mitsuba(subject: Subject, ours: Floats) -> list[Floats]:
     return [np.dstack([one, ours[..., 3]]).astype(np.float64) for one in seen]
 
 
-def on_grey(picture: Floats, ours: Floats) -> Floats:
-    """Before a grey wall, where our picture has one."""
-    return np.asarray(picture[..., :3] * (ours[..., 3:] > 0) + 0.05 * (1.0 - ours[..., 3:]))
+def on_grey(picture: Floats) -> Floats:
+    """Before a grey wall; picture : (h, w, 4) over black."""
+    return np.asarray(picture[..., :3] * (picture[..., 3:] > 0) + 0.05 * (1.0 - picture[..., 3:]))
 
 
 if __name__ == "__main__":

@@ -1,9 +1,11 @@
-"""Writes the table of docs/engines.md from the targets themselves: python benchmarks/engines_page.py"""
+"""Writes the tables of docs/engines.md, from the targets and what was measured: python benchmarks/engines_page.py"""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
+
+import engines_tables
 
 from dermis.export.registry import TARGETS
 from dermis.export.run import judged
@@ -11,7 +13,6 @@ from dermis.export.subject import subject_of
 from dermis.outputs import replacing
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "engines.md"
-BEGIN, END = "<!-- predicted -->", "<!-- /predicted -->"
 SKINS = "skin1", "skin2", "dj3", "medium"
 _NO_SKIN = ("maps",)  # a baked light map is what it is
 _HEADS = "target", "version", "variant", "skin", "cdf", "edge", "energy", "edge as one would type it"
@@ -26,14 +27,17 @@ def main() -> int:
 
 
 def page(text: str) -> str:
-    """The page with its table made anew."""
-    before, rest = text.split(BEGIN)
-    return f"{before}{BEGIN}\n{predicted()}{END}{rest.split(END)[1]}"
+    """The page with its tables made anew."""
+    tables = {name: getattr(engines_tables, name) for name in ("mitsuba", "babylon", "heads")}
+    for name, table in {"predicted": predicted, **tables}.items():
+        before, rest = text.split(f"<!-- {name} -->")
+        text = f"{before}<!-- {name} -->\n{table()}<!-- /{name} -->{rest.split(f'<!-- /{name} -->')[1]}"
+    return text
 
 
 def predicted() -> str:
     """Errors in red, green and blue of all targets, newest versions and variants, by their formulas."""
-    lines = [_HEADS, ["---"] * len(_HEADS)]
+    lines = []
     subjects = [subject_of(name) for name in SKINS]
     for name in sorted(set(TARGETS) - set(_NO_SKIN), key=str.lower):
         for variant in TARGETS[name].variants or (None,):
@@ -41,9 +45,9 @@ def predicted() -> str:
             for subject in subjects:
                 told = judged(subject, target, target.versions[-1])
                 errors = told.error.cdf, told.error.edge, told.error.energy, told.naive_error.edge
-                cells = [" / ".join(f"{x + 0.0:.3f}" for x in one.round(3)) for one in errors]
+                cells = [engines_tables.three(one.round(3)) for one in errors]
                 lines.append([target.title, told.version, told.variant or "-", subject.name, *cells])
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    return engines_tables.rows_of(_HEADS, lines)
 
 
 if __name__ == "__main__":

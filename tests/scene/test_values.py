@@ -18,7 +18,7 @@ BAD = [
     (Skin, {"roughness": 0.0}, "0.05"),
     (Skin, {"rho_s": -0.1}, "-0.1 came"),
     (Skin, {"albedo": "both"}, "'map' or 'profile'"),
-    (Skin, {"colour": 1}, "one of profile, albedo, mix"),
+    (Skin, {"colour": 1}, "one of profile, profile_map"),
     (Settings, {"size": (0, 64)}, "size.0: expected a whole number from 1 to 16384 (pixels"),
     (Settings, {"size": (64,)}, "size.1"),
     (Settings, {"size": (64, 64, 64)}, "2 items"),
