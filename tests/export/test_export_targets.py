@@ -17,7 +17,7 @@ from dermis.errors import DermisError
 from dermis.export.lobe import fit_d
 from dermis.export.registry import TARGETS
 from dermis.export.run import export_skin, judged
-from dermis.export.subject import Subject
+from dermis.export.subject import Subject, subject_of
 from dermis.export.target import numbers_of
 from dermis.export.targets.unity import asset_text
 
@@ -160,3 +160,11 @@ def test_what_is_unknown_is_told_with_what_is_known(skin1: Subject, tmp_path: Pa
     with pytest.raises(DermisError, match=r"ends in \.asset or no suffix"):
         export_skin(skin1, "unity", tmp_path / "x.png")
     assert not list(tmp_path.iterdir())
+
+
+def test_what_is_written_names_the_file_and_not_its_folder(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text("variances_mm2 = [0.1, 2.0]\nweights = [[0.3, 0.2, 0.1], [0.3, 0.1, 0.1]]\n")
+    files = export_skin(subject_of(file), "unity", tmp_path / "out").files
+    assert subject_of(file).name == "mine.toml"
+    assert all(str(tmp_path).encode() not in path.read_bytes() for path in files)

@@ -94,7 +94,7 @@ def subject_of(
     skin = _skin_of(name, profile)
     curve, used, tissue = true_curve(skin, model)
     mean = made.maps.mean_colour
-    return Subject(name, curve, curve.energy if mean is None else mean, used, tissue, Scene(made, skin=skin))
+    return Subject(path.name, curve, curve.energy if mean is None else mean, used, tissue, Scene(made, skin=skin))
 
 
 def _skin(name: str, profile: str | Path | None, model: ModelName | None, head: dict[str, Any]) -> Subject:
@@ -103,7 +103,7 @@ def _skin(name: str, profile: str | Path | None, model: ModelName | None, head: 
     for option in ("profile",) if profile is not None else tuple(head):
         refuse(option, "a head that it is for", f"the skin {name} came", "Leave it out, or name a head")
     curve, used, tissue = true_curve(Skin(profile=name), model)
-    return Subject(name, curve, curve.energy, used, tissue)
+    return Subject(Path(name).name, curve, curve.energy, used, tissue)
 
 
 def _skin_of(name: str, profile: str | Path | None) -> Skin:
