@@ -1,4 +1,4 @@
-"""Writes the tables of docs/engines.md, from the targets and what was measured: python benchmarks/engines_page.py"""
+"""Writes the tables of docs/engines.md: python benchmarks/engines_page.py"""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def predicted() -> str:
             for subject in subjects:
                 told = judged(subject, target, target.versions[-1])
                 errors = told.error.cdf, told.error.edge, told.error.energy, told.naive_error.edge
-                cells = [engines_tables.three(one.round(3)) for one in errors]
+                cells = [engines_tables.three(one.round(3).tolist()) for one in errors]
                 lines.append([target.title, told.version, told.variant or "-", subject.name, *cells])
     return engines_tables.rows_of(_HEADS, lines)
 

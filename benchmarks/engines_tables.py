@@ -60,7 +60,13 @@ def heads() -> str:
 
 def _head(one: dict[str, Any]) -> list[str]:
     outline = "ours" if one["pixels_apart"] == 0 else f"{one['outline_px']:.1f}"
-    return [one["program"], outline, three(one["lit_colour"]), f"{one['relative_rmse']:.3f}", str(one["pixels"])]
+    return [
+        one["program"],
+        outline,
+        three(one["lit_colour"]),
+        f"{one['relative_rmse']:.3f}",
+        str(one["pixels"]),
+    ]
 
 
 def _read(name: str) -> Any:

@@ -94,7 +94,9 @@ def subject_of(
     skin = _skin_of(name, profile)
     curve, used, tissue = true_curve(skin, model)
     mean = made.maps.mean_colour
-    return Subject(path.name, curve, curve.energy if mean is None else mean, used, tissue, Scene(made, skin=skin))
+    return Subject(
+        path.name, curve, curve.energy if mean is None else mean, used, tissue, Scene(made, skin=skin)
+    )
 
 
 def _skin(name: str, profile: str | Path | None, model: ModelName | None, head: dict[str, Any]) -> Subject:
