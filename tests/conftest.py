@@ -35,11 +35,14 @@ _BY_THE_CLOCK = [
     "test_hostile_clients",
     "test_hostile_pictures",
     "test_interruption",
+    "test_lost_twice",
     "test_opening",
     "test_page",
     "test_served",
     "test_streams",
     "test_viewer_heads",
+    "test_web_pages",
+    "test_web_player",
     "test_window",
 ]
 """Modules that watch other programs by the clock, and a busy machine may hold those up: what fails there is
