@@ -135,3 +135,21 @@ def reason(fault: Exception) -> str:
 
 def _temporary_name(target: Path) -> Path:
     return target.with_name(f".dermis-{secrets.token_hex(6)}{target.suffix}")
+
+
+def check_folder(folder: Path, summary: str) -> None:
+    """Make a folder, after a trial that something can be written there: call it before long work.
+
+    summary : name of the .json that will stand in it
+
+    Raises DermisError when it cannot be.
+    """
+    if folder.exists() and not folder.is_dir():
+        refuse(folder, "a folder or a free name", "a file has this name", "Choose another name")
+    try:
+        folder.mkdir(exist_ok=True)
+    except FileNotFoundError:
+        refuse(folder, "a folder inside one that exists", f"there is no {folder.parent}", "Make it first")
+    except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
+        refuse_output(folder, fault)
+    check_output(folder / summary, (".json",))

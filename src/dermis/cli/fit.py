@@ -76,11 +76,12 @@ def fit(
         Which adapter computes: auto, cpu or part of a name.
     """
     from dermis.cli.options import parse_colour
-    from dermis.fitting.files import check_folder, save
+    from dermis.fitting.files import SUMMARY, save
     from dermis.fitting.fit import fit as fitted
+    from dermis.outputs import check_folder
 
     given: Any = white if white == "specular" else parse_colour(white, "--white")
-    check_folder(output)
+    check_folder(output, SUMMARY)
     how = {"suns": suns, "exposure": exposure, "white": given, "noise": noise, "side": side, "atlas": atlas}
     with progress("fitting") as told:
         found = fitted(photo, head, camera=camera, landmarks=landmarks, adapter=adapter, told=told, **how)

@@ -89,12 +89,13 @@ def unmix(
     from dataclasses import replace
 
     from dermis.cli.options import given
-    from dermis.unmixing.files import check_folder, save
+    from dermis.outputs import check_folder
+    from dermis.unmixing.files import SUMMARY, save
     from dermis.unmixing.model import FACE
     from dermis.unmixing.unmix import unmix as unmixed
 
     started = time.perf_counter()
-    check_folder(output)
+    check_folder(output, SUMMARY)
     change = _change(melanin, blood, oxygen, eumelanin)
     own = given(oxygen=model_oxygen, eumelanin=model_eumelanin, epidermis_mm=epidermis_mm)
     with progress("unmixing") as told:

@@ -16,7 +16,7 @@ from dermis.fitting.unknowns import skinned, suns_of
 from dermis.human.person_file import write_numbers
 from dermis.images.exr import encode_exr
 from dermis.images.io import write_image
-from dermis.outputs import check_output, refuse_output, replacing
+from dermis.outputs import replacing
 from dermis.scene.environment import Environment
 from dermis.scene.model import Scene
 from dermis.scene.saving import save_scene
@@ -24,22 +24,6 @@ from dermis.scene.settings import Settings
 
 SUMMARY = "fit.json"
 _GREY = 0.5
-
-
-def check_folder(folder: Path) -> None:
-    """Make a folder, after a trial that something can be written there: call it before long work.
-
-    Raises DermisError when it cannot be.
-    """
-    if folder.exists() and not folder.is_dir():
-        refuse(folder, "a folder or a free name", "a file has this name", "Choose another name")
-    try:
-        folder.mkdir(exist_ok=True)
-    except FileNotFoundError:
-        refuse(folder, "a folder inside one that exists", f"there is no {folder.parent}", "Make it first")
-    except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
-        refuse_output(folder, fault)
-    check_output(folder / SUMMARY, (".json",))
 
 
 def save(folder: Path, found: Fitted) -> list[Path]:

@@ -8,29 +8,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.errors import refuse
 from dermis.images.exr import encode_exr
 from dermis.images.io import write_image
-from dermis.outputs import check_output, refuse_output, replacing
+from dermis.outputs import replacing
 from dermis.unmixing.unmix import Unmixed
 
 SUMMARY = "unmixed.json"
-
-
-def check_folder(folder: Path) -> None:
-    """Make a folder, after a trial that something can be written there: call it before long work.
-
-    Raises DermisError when it cannot be.
-    """
-    if folder.exists() and not folder.is_dir():
-        refuse(folder, "a folder or a free name", "a file has this name", "Choose another name")
-    try:
-        folder.mkdir(exist_ok=True)
-    except FileNotFoundError:
-        refuse(folder, "a folder inside one that exists", f"there is no {folder.parent}", "Make it first")
-    except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
-        refuse_output(folder, fault)
-    check_output(folder / SUMMARY, (".json",))
 
 
 def save(
