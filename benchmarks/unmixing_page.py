@@ -42,7 +42,10 @@ def page(told: Told, widths: Told) -> str:
     text = TEXT.read_text("utf-8")
     tables = {"known": _known(told), "mistaken": _mistaken(told), "counted": _counted(told)}
     tables["fitting"] = _fitting(json.loads(FITTED.read_text("utf-8")))
-    tables |= {"shading": _shading(told["shading"]), "speed": _speed(told["speed"])}
+    tables |= {
+        "shading": _shading(told["shading"]),
+        "speed": _speed(*(told[name] for name in ("speed", "speed_gpu") if name in told)),
+    }
     tables |= {"supplied": _supplied(told["supplied"]), "borders": _borders(widths), "grid": _grid(widths)}
     for name, table in tables.items():
         text = text.replace(f"<!-- {name} -->", table)
@@ -142,9 +145,13 @@ def _grid(told: Told) -> str:
     return _table(("", "red", "green", "blue"), rows)
 
 
-def _speed(told: Told) -> str:
-    rows = [(f"{side} x {side}", f"{ms:.3g}") for side, ms in told.items() if side != "adapter"]
-    return _table(("texels", f"{told['adapter']} [ms]"), rows)
+def _speed(*machines: Told) -> str:
+    rows = [
+        (f"{side} x {side}", *(f"{told[side]:.3g}" for told in machines))
+        for side in machines[0]
+        if side != "adapter"
+    ]
+    return _table(("texels", *(f"{told['adapter']} [ms]" for told in machines)), rows)
 
 
 def _fitting(told: Told) -> str:
