@@ -23,6 +23,7 @@ from dermis.export.run import export_skin, judged
 from dermis.export.subject import Subject, subject_of
 from dermis.export.target import numbers_of
 from dermis.export.targets.babylon_spiral import spiral_curve
+from dermis.export.targets.web_target import camera_of
 
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 WICKED = '"; import os</script><script>alert(1)</script>$head'
@@ -162,3 +163,16 @@ def test_a_browser_draws_the_ball_without_network(skin: Subject, target: str, tm
     ball = picture[80:160, 100:140]
     assert (ball.mean(axis=(0, 1)) > 0.1).all() and ball[..., 0].mean() > 1.2 * ball[..., 2].mean()
     assert picture[200:, 200:].max() < 0.02
+
+
+def test_heads_are_seen_from_where_the_scene_is() -> None:
+    """Cameras are placed around the head's middle, which is not the origin of the file."""
+    human = subject_of("human")
+    assert human.scene is not None
+    where = camera_of(human.scene, human.scene.head.centre_mm)
+    centre = 1e-3 * np.array(human.scene.head.centre_mm)
+    assert np.linalg.norm(centre) > 0.03
+    np.testing.assert_allclose(np.array(where["target"]) - centre, 1e-3 * np.array(human.scene.camera.target))
+    babylon = TARGETS["babylon"].with_variant(None)
+    rows = babylon.parameters(human, babylon.versions[-1])
+    assert babylon._settings(human, rows, babylon.versions[-1])["camera"] == where  # type: ignore[attr-defined]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -71,8 +71,9 @@ class WebPage(Target):
     def _settings(self, subject: Subject, rows: Rows, version: str) -> dict[str, Any]:
         scene = subject.scene or Scene(subject.shape)
         where = self.scripts[version][0].url
+        middle = scene.head.centre_mm if subject.scene else (0.0, 0.0, 0.0)  # a ball's own
         return {
-            "camera": camera_of(scene),
+            "camera": camera_of(scene, middle),
             "lights": [light_of(light) for light in scene.lights],
             "skin": {row.name.rpartition(".")[2]: row.value for row in rows},
             "shadow_side": _SHADOW_SIDE,
@@ -90,10 +91,13 @@ def surface_rows(subject: Subject) -> Rows:
     )
 
 
-def camera_of(scene: Scene) -> dict[str, Any]:
-    """Where the scene is seen from in the head's file [m], and the vertical angle of view [rad]."""
-    camera, centre = scene.camera, np.array(scene.head.centre_mm)
-    position, target = (_M * (centre + each) for each in (camera.position, camera.target))
+def camera_of(scene: Scene, middle_mm: Sequence[float]) -> dict[str, Any]:
+    """Where the scene is seen from in the head's file [m], and the vertical angle of view [rad].
+
+    middle_mm : what cameras are placed around
+    """
+    camera = scene.camera
+    position, target = (_M * (np.array(middle_mm) + each) for each in (camera.position, camera.target))
     up = [float(x) for x in camera.up]
     fov = 2.0 * math.atan(camera.half_tangent)
     return {"position": position.tolist(), "target": target.tolist(), "up": up, "fov": fov}
