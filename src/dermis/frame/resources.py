@@ -108,7 +108,7 @@ def _strands(memo: Memo, device: Device, asked: Asked) -> StrandResources | None
     room = room_of(asked.head)
     tables = memo.keep(make_tables, device, asked.head.bare, memo.keep(make_space, device, room))
     picture = memo.keep(make_strand_picture, device, room, asked.settings.size)
-    shadows = memo.keep(make_strand_shadows, device, asked.shadow_layers, room, of=asked.view)
+    shadows = memo.keep(make_strand_shadows, device, asked.shadow_layers, of=asked.view)
     return StrandResources(tables, picture, shadows, memo.keep(skin_under, asked.head))
 
 

@@ -12,7 +12,7 @@ from dermis.mesh.strands import Strands
 TILE = 8
 """Pixels along a side of the tiles that hairs are listed in."""
 _WAYS = 64  # chains of a tile on GPUs: one for each pixel's invocation to follow
-_FINE_WINDOW, _WINDOW = 256, 288  # texels across what hairs hold back of a light, half as many down
+WINDOW = 256  # texels across what hairs hold back of a light, half as many down
 LAYERS = 6  # of depth there
 HEAD_WORDS = 8  # before them
 _LINKS_OF_PIECE = 4  # for hairs in no more than a few tiles
@@ -36,12 +36,10 @@ class Room(NamedTuple):
 
     fine : hairs of brows and lashes
     knots : of all
-    coarse : whether there is hair of head and beard
     """
 
     fine: int
     knots: int
-    coarse: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,20 +70,11 @@ def counts_of(strands: Strands | None) -> Counts:
     return Counts(0, 2) if strands is None else Counts(*strands.radius_mm.shape)
 
 
-def window_of(coarse: bool) -> int:
-    """Texels across what hairs hold back of a light: brows and lashes alone take a small part of the head."""
-    return _WINDOW if coarse else _FINE_WINDOW
-
-
 def room_of(head: Head) -> Room:
     """Room for the hairs of a head, and for those of most others."""
     fine, coarse = map(counts_of, (head.strands, head.hair))
     knots = fine.hairs * fine.knots + coarse.hairs * coarse.knots
-    return Room(
-        _next(fine.hairs, _FINE_STEP),
-        _next(knots, _KNOT_STEP if coarse.hairs else _FINE_STEP),
-        coarse.hairs > 0,
-    )
+    return Room(_next(fine.hairs, _FINE_STEP), _next(knots, _KNOT_STEP if coarse.hairs else _FINE_STEP))
 
 
 def _next(count: int, step: int) -> int:
@@ -114,10 +103,9 @@ def ways_of(device: Device, tiles: int) -> int:
     return _WAYS if fits and device.adapter.kind != "CPU" else 1
 
 
-def make_strand_shadows(device: Device, layers: int, room: Room) -> Any:
+def make_strand_shadows(device: Device, layers: int) -> Any:
     """Space for what hairs hold back of so many lights."""
-    texels = window_of(room.coarse) ** 2 // 2
-    return _space(device, (HEAD_WORDS + (1 + LAYERS) * texels) * max(1, layers))
+    return _space(device, (HEAD_WORDS + (1 + LAYERS) * WINDOW**2 // 2) * max(1, layers))
 
 
 def no_strand_shadows(device: Device) -> Any:

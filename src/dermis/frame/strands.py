@@ -13,11 +13,11 @@ from dermis.frame.strand_space import (
     HEAD_WORDS,
     LAYERS,
     TILE,
+    WINDOW,
     Counts,
     StrandPicture,
     StrandSpace,
     counts_of,
-    window_of,
 )
 from dermis.frame.surface import DEFAULT_COLOUR
 from dermis.gpu import Constants, Device
@@ -30,10 +30,10 @@ _SHADING = 32_000  # coarse hairs that shade as all do
 _LEAST_DRAWN = 5_000
 _DRAWN_PIXELS = 0.45  # width of the coarse hairs that are drawn
 _DENSER = 0.2  # and more of it where hair hides hair
+WINDOW_KNOTS = 1 << 12  # that a workgroup finds the ends of
 _STRAND = np.dtype([("corner", "u4", 4), ("share", "f4", 4), ("absorption", "f4", 4)])  # in strands_pose.wgsl
-_HAIRS = np.dtype(
-    [("fine", "u4"), ("coarse", "u4"), ("shading", "u4"), ("wider", "f4")]
-)  # in strand_knots.wgsl
+_COUNTS = "fine", "coarse", "shading", "fine_knots", "coarse_knots"
+_HAIRS = np.dtype([*((name, "u4") for name in _COUNTS), ("wider", "f4")])  # in strand_knots.wgsl
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,6 @@ class StrandTables:
     middle_mm : of the coarse hairs at rest (3,) [mm]
     wide_mm : they are on average [mm]
     cover : of their roots by hair, on average [-]
-    constants, window : pipeline constants of the shaders that read knots, and what hairs hold back
     """
 
     strands: Any
@@ -62,8 +61,6 @@ class StrandTables:
     middle_mm: NDArray[np.float64]
     wide_mm: float
     cover: float
-    constants: Constants
-    window: Constants
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +79,8 @@ class StrandResources:
 
 def strand_numbers() -> dict[str, float]:
     """Numbers that the shaders of hairs fill in."""
-    window = {"strand_layers": LAYERS, "strand_window_words": HEAD_WORDS}
+    window = {"strand_window": WINDOW, "strand_layers": LAYERS, "strand_window_words": HEAD_WORDS}
+    window |= {"strand_window_knots": WINDOW_KNOTS}
     return {"strand_tile": TILE, **window, **hair_numbers()}
 
 
@@ -93,9 +91,7 @@ def has_strands(head: Head, settings: Settings) -> bool:
 
 def strand_constants(head: Head, settings: Settings) -> Constants:
     """Pipeline constants of what is lit, for the shadows of hairs."""
-    if not has_strands(head, settings):
-        return ()
-    return (("STRANDS", 1), ("STRAND_WINDOW", window_of(head.hair is not None and len(head.hair) > 0)))
+    return (("STRANDS", 1),) if has_strands(head, settings) else ()
 
 
 def drawn_of(tables: StrandTables, pixel_mm: float) -> int:
@@ -117,7 +113,8 @@ def make_tables(device: Device, head: Head, space: StrandSpace) -> StrandTables:
     rows = [np.concatenate([part.knots_mm, part.radius_mm[..., None]], axis=-1) for part in parts]
     knots = np.concatenate([one.astype(np.float32).reshape(-1, 4) for one in rows])
     shading = min(coarse.hairs, _SHADING)
-    record = np.array((fine.hairs, coarse.hairs, shading, coarse.hairs / max(1, shading)), _HAIRS)
+    wider = coarse.hairs / max(1, shading)
+    record = np.array((fine.hairs, coarse.hairs, shading, fine.knots, coarse.knots, wider), _HAIRS)
     return StrandTables(
         strands=device.buffer(table.view(np.uint32), "STORAGE"),
         knots=device.buffer(knots, "STORAGE"),
@@ -130,8 +127,6 @@ def make_tables(device: Device, head: Head, space: StrandSpace) -> StrandTables:
         middle_mm=np.zeros(3) if head.hair is None else head.hair.middle_mm(head.mesh),
         wide_mm=0.0 if head.hair is None else 2.0 * float(head.hair.radius_mm[:, 0].mean()),
         cover=0.0 if head.hair is None or head.hair.cover is None else float(head.hair.cover.mean()),
-        constants=(("KNOTS", fine.knots), ("COARSE_KNOTS", coarse.knots)),
-        window=(("STRAND_WINDOW", window_of(coarse.hairs > 0)),),
     )
 
 

@@ -10,7 +10,7 @@ from dermis.frame.geometry import HeadResources
 from dermis.frame.passes import each, program
 from dermis.frame.shape import Shape
 from dermis.frame.strand_space import TILE
-from dermis.frame.strands import StrandResources, StrandTables, drawn_of
+from dermis.frame.strands import WINDOW_KNOTS, StrandResources, StrandTables, drawn_of
 from dermis.gpu import ComputeProgram, Constants, Device, Recorder
 from dermis.gpu.program import Resources
 
@@ -19,7 +19,7 @@ Look = tuple[Resources, Any, Constants]
 _ROWS, _ROUNDS = 8, 60_000
 _HEAD_MM = 100.0  # side of a square that has no more hair than a head seen from anywhere
 _CROWDED = 6.0  # pieces that a tile may list, over their mean
-_CLEARING = 64  # workgroups that empty the shadows of hairs, one for each light at least
+_CLEARING = 256  # workgroups that empty the shadows of hairs
 
 
 def pose(graph: Recorder, made: StrandTables, shape: Shape) -> None:
@@ -31,25 +31,21 @@ def pose(graph: Recorder, made: StrandTables, shape: Shape) -> None:
         "hairs": made.record,
     }
     count = made.fine.hairs * made.fine.knots + made.coarse.hairs * made.coarse.knots
-    _each(graph, "strands_pose.wgsl", bound | {"posed": made.posed}, count, made.constants)
+    _each(graph, "strands_pose.wgsl", bound | {"posed": made.posed}, count)
 
 
 def shadow(graph: Recorder, strands: StrandResources, lit: Resources) -> None:
     """Find what the hairs hold back of each light that casts shadows."""
     made = strands.tables
-    bound = {
-        **lit,
-        "posed": made.posed,
-        "windows": strands.shadows,
-        "splatted": strands.shadows,
-        "hairs": made.record,
-    }
     pieces = made.fine.pieces() + made.coarse.pieces(made.shading)
-    constants = made.constants + made.window
-    shader = program(graph.device, "strands_window.wgsl", constants)
-    graph.dispatch("strands", shader, bound, (_CLEARING, 1, 1))
+    knots = made.fine.hairs * made.fine.knots + made.shading * made.coarse.knots
+    bound = {**lit, "posed": made.posed, "hairs": made.record}
+    bound |= {"windows": strands.shadows, "splatted": strands.shadows}
+    graph.dispatch("strands", program(graph.device, "strands_clear.wgsl"), bound, (_CLEARING, 1, 1))
+    ends = program(graph.device, "strands_window.wgsl")
+    graph.dispatch("strands", ends, bound, (max(1, -(-knots // WINDOW_KNOTS)), 1, 1))
     for covers in (0, 1):
-        _each(graph, "strands_shadow.wgsl", bound, pieces, (*constants, ("COVERS", covers)))
+        _each(graph, "strands_shadow.wgsl", bound, pieces, (("COVERS", covers),))
 
 
 def draw(
@@ -61,7 +57,7 @@ def draw(
     visibility : texture of the triangles that samples see
     """
     made, picture, (lit, view, lights) = strands.tables, strands.picture, look
-    light = program(graph.device, "strands_light.wgsl", made.constants + lights)
+    light = program(graph.device, "strands_light.wgsl", lights)
     record, coarse = view_record(light, strands, view)
     seen = {"strand_view": record, "drawn": made.drawn, "hairs": made.record}
     knots = made.fine.hairs * made.fine.knots + coarse * made.coarse.knots
@@ -70,16 +66,16 @@ def draw(
     listed = {"chains": picture.chains, "links": picture.links}
     _each(graph, "strands_empty.wgsl", listed, picture.chains.size // 4)
     ways = (("WAYS", picture.ways),)
-    _each(graph, "strands_bin.wgsl", seen | listed, pieces, made.constants + ways)
+    _each(graph, "strands_bin.wgsl", seen | listed, pieces, ways)
     bound = head.resources | seen | listed
     bound |= {"visibility_buffer": visibility, "behind": radiance, "image": picture.result}
     width, height = picture.result.size[:2]
     if picture.ways > 1:
-        shader = program(graph.device, "strands_draw_tiles.wgsl", made.constants + ways)
+        shader = program(graph.device, "strands_draw_tiles.wgsl", ways)
         graph.compute("strands", shader, bound, (width, height))
         return picture.result
     rows = rows_for(graph.device, strands, view)
-    shader = program(graph.device, "strands_draw.wgsl", (*made.constants, ("ROWS", rows)))
+    shader = program(graph.device, "strands_draw.wgsl", (("ROWS", rows),))
     graph.compute("strands", shader, bound, (width, -(-height // rows)))
     return picture.result
 
@@ -119,14 +115,17 @@ def _most_in_tile(made: StrandTables, pieces: int, pixel_mm: float) -> int:
 
 
 def rows_of(device: Device, pieces: int) -> int:
-    """Pixels that an invocation draws one below the other.
+    """Pixels that an invocation draws one below the other: a power of two, so that few shaders are compiled.
 
     pieces : in a tile, at most
 
     Software adapters run the whole shader for pixels without hairs too, unless a loop skips these. They also
     leave a shader's loops, all together, after 65,535 rounds.
     """
-    return max(1, min(_ROWS, _ROUNDS // max(1, pieces))) if device.adapter.kind == "CPU" else 1
+    if device.adapter.kind != "CPU":
+        return 1
+    most = max(1, min(_ROWS, _ROUNDS // max(1, pieces)))
+    return 1 << most.bit_length() - 1
 
 
 def _each(graph: Recorder, name: str, bound: Any, count: int, constants: Any = ()) -> None:

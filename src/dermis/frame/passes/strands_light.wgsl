@@ -142,14 +142,14 @@ fn is_hidden(hair: u32) -> bool {
     }
     let row = row_of_hair(hair);
     let root = posed[row + ROWS_BEFORE].xyz;
-    let reach = distance(posed[row + ROWS_BEFORE + COARSE_KNOTS - 1u].xyz, root);
+    let reach = distance(posed[row + ROWS_BEFORE + hairs.coarse_knots - 1u].xyz, root);
     return dot(posed[row].xyz, normalize(strand_view.eye - root)) < -(BEYOND_HORIZON + sqrt(2.0 * reach / HEAD_MM));
 }
 
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
     let index = number_of(group, groups, lane);
-    if (index >= hairs.fine * KNOTS + strand_view.coarse * COARSE_KNOTS) {
+    if (index >= all_knots(strand_view.coarse)) {
         return;
     }
     let hair = hair_of_knot(index);

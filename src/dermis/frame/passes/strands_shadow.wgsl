@@ -15,9 +15,9 @@ override SPLAT_STEP: f32 = 1.0; // between places along a hair, at most [texel];
 
 fn window_at(layer: i32) -> Window {
     let word = window_begin(layer);
-    let low = vec2u(atomicLoad(&splatted[word]), atomicLoad(&splatted[word + 1u]));
-    let size = vec2u(atomicLoad(&splatted[word + 2u]), atomicLoad(&splatted[word + 3u]));
-    return Window(bitcast<vec2f>(low), bitcast<vec2f>(size), bitcast<f32>(atomicLoad(&splatted[word + 4u])));
+    let low = vec3u(atomicLoad(&splatted[word]), atomicLoad(&splatted[word + 1u]), atomicLoad(&splatted[word + 2u]));
+    let high = vec3u(atomicLoad(&splatted[word + 3u]), atomicLoad(&splatted[word + 4u]), atomicLoad(&splatted[word + 5u]));
+    return window_around(low, high);
 }
 
 fn add(layer: i32, texel: vec2i, cover: f32, depth: f32) {

@@ -1,16 +1,15 @@
 // Hairs as rows: where each stands on the skin, what its inside absorbs, and its knots from root to tip. Fine hairs come first,
 // brows and lashes; then the coarse ones of head and beard, of which the first few stand for all where that is enough.
 
-override KNOTS: u32 = 2u; // of a fine hair
-override COARSE_KNOTS: u32 = 2u;
-
 const ROWS_BEFORE: u32 = 2u; // of a hair before its knots: the skin's normal, then the absorption [1/mm] and how deep hair is
 
 struct Hairs {
     fine: u32, // how many
     coarse: u32,
     shading: u32, // coarse ones that shade
-    wider: f32, // than they are, for these to shade as all do
+    fine_knots: u32, // of each
+    coarse_knots: u32,
+    wider: f32, // than they are, for those that shade to do so as all do
 }
 
 @group(0) @binding(41) var<uniform> hairs: Hairs;
@@ -25,11 +24,11 @@ fn hair_of(index: u32, of_fine: u32, of_coarse: u32) -> u32 {
 }
 
 fn hair_of_knot(knot: u32) -> u32 {
-    return hair_of(knot, KNOTS, COARSE_KNOTS);
+    return hair_of(knot, hairs.fine_knots, hairs.coarse_knots);
 }
 
 fn hair_of_piece(piece: u32) -> u32 {
-    return hair_of(piece, KNOTS - 1u, COARSE_KNOTS - 1u);
+    return hair_of(piece, hairs.fine_knots - 1u, hairs.coarse_knots - 1u);
 }
 
 fn is_coarse(hair: u32) -> bool {
@@ -37,15 +36,21 @@ fn is_coarse(hair: u32) -> bool {
 }
 
 fn knots_of(hair: u32) -> u32 {
-    return select(KNOTS, COARSE_KNOTS, is_coarse(hair));
+    return select(hairs.fine_knots, hairs.coarse_knots, is_coarse(hair));
 }
 
 fn first_knot(hair: u32) -> u32 {
-    return select(hair * KNOTS, hairs.fine * KNOTS + (hair - hairs.fine) * COARSE_KNOTS, is_coarse(hair));
+    let of_coarse = hairs.fine * hairs.fine_knots + (hair - hairs.fine) * hairs.coarse_knots;
+    return select(hair * hairs.fine_knots, of_coarse, is_coarse(hair));
 }
 
+// Of all fine hairs and some of the coarse ones.
 fn pieces_of(coarse: u32) -> u32 {
-    return hairs.fine * (KNOTS - 1u) + coarse * (COARSE_KNOTS - 1u);
+    return hairs.fine * (hairs.fine_knots - 1u) + coarse * (hairs.coarse_knots - 1u);
+}
+
+fn all_knots(coarse: u32) -> u32 {
+    return hairs.fine * hairs.fine_knots + coarse * hairs.coarse_knots;
 }
 
 // A piece as tiles list it: the knot at which it begins, and whether it is a hair's first and last.

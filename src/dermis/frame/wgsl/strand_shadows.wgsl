@@ -9,9 +9,9 @@ const AMONG_MM: f32 = 0.25; // hairs less far in front of a point do not shade i
 
 fn window_of(layer: i32) -> Window {
     let word = window_begin(layer);
-    let low = vec2u(strand_shadows[word], strand_shadows[word + 1u]);
-    let size = vec2u(strand_shadows[word + 2u], strand_shadows[word + 3u]);
-    return Window(bitcast<vec2f>(low), bitcast<vec2f>(size), bitcast<f32>(strand_shadows[word + 4u]));
+    let low = vec3u(strand_shadows[word], strand_shadows[word + 1u], strand_shadows[word + 2u]);
+    let high = vec3u(strand_shadows[word + 3u], strand_shadows[word + 4u], strand_shadows[word + 5u]);
+    return window_around(low, high);
 }
 
 // What hairs of a texel cover in front of a depth.

@@ -68,7 +68,7 @@ fn label_at(pixel: vec2u) -> u32 {
         for (var link = chain_of(pixel, way); link != 0u; link = links[link - 1u].y) {
             let one = fragment_of(vec2f(pixel) + 0.5, hold(links[link - 1u].x));
             if (one.cover > 0.0 && one.depth < depths.first.x) {
-                sum = added(sum, hair_classes[hair_of(one.begin, KNOTS, COARSE_KNOTS)], dense_of(one.cover));
+                sum = added(sum, hair_classes[hair_of_knot(one.begin)], dense_of(one.cover));
             }
         }
     }

@@ -58,7 +58,7 @@ def draw_hairs(
     view : record of the shading
     """
     tables, picture, rows = made.tables, made.picture, strands.rows_for(graph.device, made, view)
-    constants = (*tables.constants, ("WAYS", picture.ways), ("ROWS", rows))
+    constants = ("WAYS", picture.ways), ("ROWS", rows)
     shader = program(graph.device, "outputs/hair_label.wgsl", constants)
     record, _ = strands.view_record(shader, made, view)
     record["samples"], record["jitter"][0, :2] = 1, 0.5
