@@ -63,15 +63,15 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
 
     Angles, unlike areas, do not depend on how the surface is cut into triangles.
     """
-    corners = [np.ascontiguousarray(column, np.float64)[triangles] for column in positions.T]  # (f, 3) each
-    ax, ay, az = (one[:, [1, 2, 0]] - one for one in corners)
-    bx, by, bz = (one[:, [2, 0, 1]] - one for one in corners)
-    cross = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-    sine = np.sqrt(cross[0] ** 2 + cross[1] ** 2 + cross[2] ** 2)
-    angle = np.arctan2(sine, ax * bx + ay * by + az * bz)
-    length = np.where(sine[:, :1] > 0, sine[:, :1], 1.0)
-    at, count = point[triangles].ravel(), int(point.max()) + 1
-    weighed = [(one[:, :1] / length * angle).ravel() for one in cross]
+    a, b, c = (np.ascontiguousarray(positions.T, np.float64)[:, corner] for corner in triangles.T)
+    b, c = b - a, c - a
+    cross = np.stack([b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]])
+    area, along = np.sqrt((cross**2).sum(axis=0)), (b * c).sum(axis=0)  # twice the triangle's
+    beside = along, (b * b).sum(axis=0) - along, (c * c).sum(axis=0) - along
+    cross /= np.where(area > 0, area, 1.0)
+    angle = np.arctan2(area, np.stack(beside)).ravel()
+    at, count = point[triangles.T].ravel(), int(point.max()) + 1
+    weighed = (np.tile(one, 3) * angle for one in cross)
     summed = np.stack([np.bincount(at, one, count) for one in weighed], axis=1, dtype=np.float64)
     upwards = np.broadcast_to([0.0, 0.0, 1.0], summed.shape)
     return np.asarray(unit(summed, upwards).astype(np.float32)[point])

@@ -68,9 +68,9 @@ def seen_from(mesh: Mesh, roots: Roots, ways_mm: Doubles) -> Floats:
     return seen_in(frames(mesh, roots, points_of(mesh))[1], ways_mm)
 
 
-def seen_in(frame: Doubles, ways_mm: Doubles) -> Floats:
+def seen_in(frame: Doubles, ways_mm: Doubles | Floats) -> Floats:
     """The same in frames (n, 3, 3) of the roots, from `frames`."""
-    return np.asarray(np.einsum("nic,nkc->nki", frame, ways_mm), np.float32)
+    return np.asarray(ways_mm.astype(np.float32) @ frame.transpose(0, 2, 1).astype(np.float32))
 
 
 def points_of(mesh: Mesh) -> Doubles:

@@ -13,7 +13,7 @@ from dermis.human.hair.look import HairLook
 from dermis.human.hair.rooting import Rooting, eye_middles
 from dermis.human.hair.skin import Skin
 from dermis.mesh.head import Head
-from dermis.mesh.strands import Doubles, Roots, Strands, finer_roots, frames, points_of, seen_in
+from dermis.mesh.strands import Doubles, Roots, Strands, finer_roots, seen_in
 from dermis.specular.hair import absorption_per_mm
 
 _LASHES_DARKER = 1.6
@@ -40,15 +40,15 @@ def groomed(
     skin, parts = Skin(head.mesh), list[Grown]()
     for side, eye in zip((1.0, -1.0), eye_middles(plain.mesh), strict=True):
         rng = np.random.default_rng((look.seed, int(side > 0)))
-        parts.append(_brow(head, rooting, levels, look, skin, side, rng))
+        parts.append(_brow(rooting, levels, look, skin, side, rng))
         for lid in (lashes.UPPER, lashes.LOWER):
-            parts.append(_lashes(head, rooting, levels, lid, side, eye, rng))
-    head = replace(head, strands=_joined(head, parts, _absorption(parts, look)))
-    ground = Ground(head, plain, levels, skin, hairs)
+            parts.append(_lashes(rooting, levels, lid, skin, side, eye, rng))
+    head = replace(head, strands=_joined(parts, _absorption(parts, look)))
+    ground = Ground(plain, levels, skin, hairs)
     hair = [*scalp_hair(ground, look, recession), *beard_hair(ground, look)]
     if not hair:
         return head
-    joined = _joined(head, hair, _mixed_absorption(hair, look))
+    joined = _joined(hair, _mixed_absorption(hair, look))
     return replace(head, hair=_shuffled(joined, look.seed))
 
 
@@ -61,7 +61,6 @@ def _shuffled(strands: Strands, seed: int) -> Strands:
 
 
 def _brow(
-    head: Head,
     rooting: Rooting,
     levels: int,
     look: HairLook,
@@ -73,35 +72,35 @@ def _brow(
     roots, there = rooting.in_front(side * x, y)
     kept = np.flatnonzero(there)[: brows.count(look)]
     roots = finer_roots(rooting.mesh, Roots(roots.quad[kept], roots.place[kept]), levels)
-    root, _ = frames(head.mesh, roots, points_of(head.mesh))
-    return Grown(roots, *brows.grown(skin, root, side, u[kept], v[kept], rng, look), 1.0)
+    root, frame = skin.frames(roots)
+    knots, radius = brows.grown(skin, root, side, u[kept], v[kept], rng, look)
+    return Grown(roots, seen_in(frame, knots - root[:, None]), radius, 1.0)
 
 
 def _lashes(
-    head: Head,
     rooting: Rooting,
     levels: int,
     lid: lashes.Lid,
+    skin: Skin,
     side: float,
     eye: Doubles,
     rng: np.random.Generator,
 ) -> Grown:
     u, across = lashes.places(lid, rng)
     roots = finer_roots(rooting.mesh, rooting.beside_lid(lid, side, u, across), levels)
-    root, _ = frames(head.mesh, roots, points_of(head.mesh))
-    return Grown(roots, *lashes.grown(lid, root, eye, side, u, rng), _LASHES_DARKER)
+    root, frame = skin.frames(roots)
+    knots, radius = lashes.grown(lid, root, eye, side, u, rng)
+    return Grown(roots, seen_in(frame, knots - root[:, None]), radius, _LASHES_DARKER)
 
 
-def _joined(head: Head, parts: list[Grown], absorption: Doubles) -> Strands:
+def _joined(parts: list[Grown], absorption: Doubles) -> Strands:
     """All hairs of some kinds.
 
     absorption : (n, 3) of single hairs [1/mm]
     """
     roots = Roots(*(np.concatenate(each) for each in zip(*(part.roots for part in parts), strict=True)))
-    knots, radius = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
+    ways, radius = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
     bundle, cover = (_each(parts, name) for name in ("bundle", "cover"))
-    root, frame = frames(head.mesh, roots, points_of(head.mesh))
-    ways = seen_in(frame, knots - root[:, None])
     numbers = radius, absorption / bundle[:, None], cover
     return Strands(roots, ways, *(one.astype(np.float32) for one in numbers))
 

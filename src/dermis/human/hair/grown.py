@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from dermis.mesh.mesh import Floats
 from dermis.mesh.strands import Doubles, Roots
 
 
 class Grown(NamedTuple):
-    """Hairs of one kind; all but `roots` in the space of the person.
+    """Hairs of one kind.
 
-    knots, radius : (n, k, 3) and (n, k) [mm]
+    ways : (n, k, 3) from the root, as `Strands.knots_mm` has them
+    radius : (n, k) [mm]
     darker : factor of their pigments
     bundle : how many hairs each stands for
     cover : of roots by the hair around them
     """
 
     roots: Roots
-    knots: Doubles
+    ways: Floats
     radius: Doubles
     darker: float
     bundle: float = 1.0

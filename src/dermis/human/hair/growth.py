@@ -7,11 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from dermis.human.hair.combing import Combed, along_skin
+from dermis.human.hair.rooting import Index
 from dermis.human.hair.skin import Skin
+from dermis.mesh.mesh import Floats
 from dermis.mesh.strands import Doubles
 
 _BESIDE = 4  # guides that a hair goes along with
 _TUFT_MM = 2.2  # between tufts
+_RAGGED = 0.3  # of that, by which tufts mix with those beside them
 _LEAST_OVER_MM = 0.35  # the skin
 _HEAD_MM = 85.0  # radius
 
@@ -58,23 +61,38 @@ def grown(
     ways: Doubles,
     rough: Roughness,
     rng: np.random.Generator,
-) -> Doubles:
+) -> Floats:
     """(n, k, 3) ways from the roots of hairs to their knots [mm].
 
     root_mm, normal : (n, 3) of the hairs
     guide_mm, ways : (g, 3) and (g, k, 3) of the guides
     """
-    t = np.linspace(0.0, 1.0, ways.shape[1])
-    found = _astray(_between(root_mm, guide_mm, ways), normal, rough, rng)
-    found = _tufted(root_mm, found, t, rough.tufts, rng)
+    t = np.linspace(0.0, 1.0, ways.shape[1], dtype=np.float32)
+    up = normal.astype(np.float32)
+    first, tuft = _tufts(root_mm, rng)
+    found = _astray(_between(root_mm[first], guide_mm, ways)[tuft], up, rough, rng)
+    _draw_together(found, root_mm.astype(np.float32), first[tuft], (rough.tufts, t), rng)
     size = rough.frizz * np.linalg.norm(found[:, -1], axis=1)
     found += _waves(size, t, rng)
     if rough.coil_mm:
         found += _coils(found[:, -1], t, rough, rng)
-    return _over_skin(found, normal, t)
+    return _over_skin(found, up, t)
 
 
-def _between(root_mm: Doubles, guide_mm: Doubles, ways: Doubles) -> Doubles:
+def _tufts(root_mm: Doubles, rng: np.random.Generator) -> tuple[Index, Index]:
+    """A hair of each tuft (m,), and the tuft of each hair (n,): hairs of a tuft have their way in common.
+
+    They are cells of a grid, whose borders nobody sees, as hairs beside them are of one or the other.
+    """
+    cell = np.floor(root_mm / _TUFT_MM + rng.normal(0.0, _RAGGED, root_mm.shape)).astype(np.int64)
+    cell -= cell.min(axis=0)
+    wide, high, deep = (cell.max(axis=0) + 1).tolist()
+    number = np.ravel_multi_index(cell.T, (wide, high, deep))
+    _, first, tuft = np.unique(number, return_index=True, return_inverse=True)
+    return first, tuft
+
+
+def _between(root_mm: Doubles, guide_mm: Doubles, ways: Doubles) -> Floats:
     """Means of the nearest guides' ways."""
     from scipy.sparse import csr_array
     from scipy.spatial import cKDTree
@@ -85,66 +103,68 @@ def _between(root_mm: Doubles, guide_mm: Doubles, ways: Doubles) -> Doubles:
     share /= share.sum(axis=1, keepdims=True)
     first = np.arange(0, _BESIDE * n + 1, _BESIDE)
     shares = csr_array((share.ravel(), np.asarray(near).ravel(), first), shape=(n, g))
-    return np.asarray(shares @ ways.reshape(g, -1)).reshape(n, *ways.shape[1:])
+    found = np.asarray(shares @ ways.reshape(g, -1))
+    return found.reshape(n, *ways.shape[1:]).astype(np.float32)
 
 
-def _astray(ways: Doubles, normal: Doubles, rough: Roughness, rng: np.random.Generator) -> Doubles:
+def _astray(ways: Floats, normal: Floats, rough: Roughness, rng: np.random.Generator) -> Floats:
     """Turned about the skin's normal, each as a whole, leaning more or less, and longer or shorter."""
     n = len(ways)
     angle, lean = rough.astray * rng.standard_t(4, size=n), 1.0 + rough.astray * rng.normal(size=n)
-    length = np.clip(1.0 + rough.uneven * rng.normal(size=n), 0.35, 1.2)[:, None, None]
+    length = np.clip(1.0 + rough.uneven * rng.normal(size=n), 0.35, 1.2)
     cos, sin = np.cos(angle), np.sin(angle)
-    x, y, z = normal.T
-    along = normal[:, :, None] * ((lean - cos)[:, None] * normal)[:, None, :]
-    across = np.zeros((n, 3, 3))
-    for i, j, part in ((0, 1, -z), (0, 2, y), (1, 2, -x)):
-        across[:, i, j], across[:, j, i] = sin * part, -sin * part
-    turn = length * (along + across + cos[:, None, None] * np.eye(3))
-    return np.asarray(ways @ turn.transpose(0, 2, 1))
+    along, cos, sin = ((length * one).astype(np.float32) for one in (lean - cos, cos, sin))
+    turn = normal[:, :, None] * (along[:, None] * normal)[:, None, :]
+    turn += cos[:, None, None] * np.eye(3, dtype=np.float32)
+    x, y, z = sin * normal.T
+    for i, j, part in ((1, 0, -z), (2, 0, y), (2, 1, -x)):  # transposed: ways are rows
+        turn[:, i, j] += part
+        turn[:, j, i] -= part
+    return ways @ turn
 
 
-def _tufted(root_mm: Doubles, ways: Doubles, t: Doubles, much: float, rng: np.random.Generator) -> Doubles:
-    """Tips drawn to those of a few."""
-    from scipy.spatial import cKDTree
+def _draw_together(
+    ways: Floats, root_mm: Floats, which: Index, much: tuple[float, Floats], rng: np.random.Generator
+) -> None:
+    """Draw tips to those of others.
 
-    cell = np.floor(root_mm / _TUFT_MM).astype(np.int64)
-    cell -= cell.min(axis=0)
-    wide, high, deep = (cell.max(axis=0) + 1).tolist()
-    _, first = np.unique(np.ravel_multi_index(cell.T, (wide, high, deep)), return_index=True)
-    _, near = cKDTree(root_mm[first]).query(root_mm)
-    which = first[near]
-    drawn = (much * rng.uniform(0.3, 1.0, len(root_mm)))[:, None] * t**1.3
-    apart = ways[which] - ways + (root_mm[which] - root_mm)[:, None]
-    apart *= drawn[:, :, None]
-    apart += ways
-    return np.asarray(apart)
+    which : (n,) of each hair, the hair that it is drawn to
+    much : how much, and places along a hair (k,)
+    """
+    share = (much[0] * rng.uniform(0.3, 1.0, len(ways))).astype(np.float32)[:, None] * much[1] ** 1.3
+    apart = ways[which] - ways
+    apart += (root_mm[which] - root_mm)[:, None]
+    apart *= share[:, :, None]
+    ways += apart
 
 
-def _waves(size: Doubles, t: Doubles, rng: np.random.Generator) -> Doubles:
+def _waves(size: Floats, t: Floats, rng: np.random.Generator) -> Floats:
     """(n, k, 3) smooth, 0 at roots; size : (n,)."""
     n, fade, parts, basis = len(size), np.minimum(2 * t, 1.0), list[Doubles](), list[Doubles]()
     for waves in (0.5, 1.1):
         phase, much = rng.uniform(0, 2 * np.pi, (n, 3)), rng.uniform(-1, 1, (n, 3))
-        much *= size[:, None] / waves
+        phase, much = phase.astype(np.float32), (much * size[:, None] / waves).astype(np.float32)
         parts += [much * np.cos(phase), much * np.sin(phase)]  # of a sum of angles
         basis += [fade * np.sin(2 * np.pi * waves * t), fade * (np.cos(2 * np.pi * waves * t) - 1.0)]
-    return np.asarray(np.stack(basis, axis=-1) @ np.stack(parts, axis=1))
+    return np.asarray(np.stack(basis, axis=-1) @ np.stack(parts, axis=1), np.float32)
 
 
-def _coils(tips: Doubles, t: Doubles, rough: Roughness, rng: np.random.Generator) -> Doubles:
+def _coils(tips: Floats, t: Floats, rough: Roughness, rng: np.random.Generator) -> Floats:
     """(n, k, 3) turns around the ways to tips (n, 3), from the root on."""
     n = len(tips)
     along = tips / np.maximum(np.linalg.norm(tips, axis=1, keepdims=True), 1e-9)
-    side = along_skin(rng.normal(size=tips.shape), along)
+    side = along_skin(rng.normal(size=tips.shape), along).astype(np.float32)
     turns = rough.coils * rng.uniform(0.8, 1.2, (n, 1)) * t + rng.random((n, 1))
-    radius = rough.coil_mm * rng.uniform(0.6, 1.2, (n, 1)) * np.minimum(4 * t, 1.0)
-    x, y = radius * np.cos(2 * np.pi * turns), radius * np.sin(2 * np.pi * turns)
+    turns = (2 * np.pi * turns).astype(np.float32)
+    radius = (rough.coil_mm * rng.uniform(0.6, 1.2, (n, 1))).astype(np.float32) * np.minimum(4 * t, 1.0)
+    x, y = radius * np.cos(turns), radius * np.sin(turns)
     return np.asarray(x[..., None] * side[:, None] + y[..., None] * np.cross(along, side)[:, None])
 
 
-def _over_skin(ways: Doubles, normal: Doubles, t: Doubles) -> Doubles:
+def _over_skin(ways: Floats, normal: Floats, t: Floats) -> Floats:
     """Lifted where a knot would be in the skin, taken as round as a head."""
     height = (ways @ normal[:, :, None])[..., 0]
     flat2 = np.einsum("nkc,nkc->nk", ways, ways) - height**2
     least = _LEAST_OVER_MM * np.minimum(3 * t, 1.0) - flat2 / (2 * _HEAD_MM)
-    return np.asarray(ways + np.maximum(least - height, 0.0)[..., None] * normal[:, None])
+    ways += np.maximum(least - height, 0.0)[..., None] * normal[:, None]
+    return ways

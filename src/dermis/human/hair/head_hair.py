@@ -14,7 +14,8 @@ from dermis.human.hair.hairy_skin import Rooted
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.skin import Skin
 from dermis.mesh.head import Head
-from dermis.mesh.strands import Doubles, Roots, finer_roots, frames, points_of
+from dermis.mesh.mesh import Floats
+from dermis.mesh.strands import Doubles, Roots, finer_roots, seen_in
 
 MOST_PER_CM2 = 200.0
 """Hairs of the densest heads."""
@@ -28,20 +29,24 @@ _LONG_BEARD_MM = 8.0
 
 
 class Set(NamedTuple):
-    """Roots, where they are (n, 3) [mm], and the skin's normals there (n, 3)."""
+    """Roots, where they are (n, 3) [mm], and how their quads lie (n, 3, 3)."""
 
     roots: Roots
     places: Doubles
-    normals: Doubles
+    frame: Doubles
+
+    @property
+    def normals(self) -> Doubles:
+        """(n, 3) of the skin."""
+        return self.frame[:, 2]
 
 
 class Ground(NamedTuple):
-    """What hair grows on: the head as it is drawn, and before it was subdivided so many times.
+    """What hair grows on: the head before it was subdivided so many times, and the skin after that.
 
     share : of the usual number of hairs that grows, each as much wider
     """
 
-    head: Head
     plain: Head
     levels: int
     skin: Skin
@@ -50,8 +55,7 @@ class Ground(NamedTuple):
     def rooted(self, where: Rooted) -> Set:
         """Roots on the head as it is drawn."""
         roots = finer_roots(self.plain.mesh, where.roots, self.levels)
-        place, frame = frames(self.head.mesh, roots, points_of(self.head.mesh))
-        return Set(roots, place, frame[:, 2])
+        return Set(roots, *self.skin.frames(roots))
 
 
 def knots_of(look: HairLook) -> int:
@@ -94,7 +98,7 @@ def beard_hair(ground: Ground, look: HairLook) -> list[Grown]:
 
 def _stranded(
     hair: Set,
-    ways: Doubles,
+    ways: Floats,
     drawn: float,
     true: float,
     radius_mm: float,
@@ -109,8 +113,7 @@ def _stranded(
     radius = thick[:, None] * np.where(t < 1.0, 1.0, 0.6)
     length = np.linalg.norm(np.diff(ways, axis=1), axis=2).sum(axis=1)
     area = float(np.mean(2.0 * radius.mean(axis=1) * length))  # seen from the side; halved as hair leans
-    knots = hair.places[:, None] + ways
-    return Grown(hair.roots, knots, radius, 1.0, bundle, 0.5 * area * drawn / 100.0)
+    return Grown(hair.roots, seen_in(hair.frame, ways), radius, 1.0, bundle, 0.5 * area * drawn / 100.0)
 
 
 def _roughness(look: HairLook) -> Roughness:
