@@ -37,6 +37,7 @@ def main(words: list[str]) -> int:
     parser.add_argument("--side", type=int, default=256)
     parser.add_argument("--samples", type=int, default=8)
     parser.add_argument("--scenes", type=int, default=SCENES)
+    parser.add_argument("--variant", default="scalar_rgb", help="of Mitsuba, such as cuda_ad_rgb")
     parser.add_argument("--own", type=int, default=3, help="scenes that are rendered by ourselves too")
     asked = parser.parse_args(words)
     renderer = Renderer(asked.adapter)
@@ -47,7 +48,7 @@ def main(words: list[str]) -> int:
         if number < asked.own:
             settings = Settings(size=(asked.side, asked.side), atlas=512, strands=False)
             told["own"].append(fitted(one, renderer.draw(one.scene, settings).linear(), asked.adapter))
-        image = photograph(renderer, one, asked.side, asked.samples).image
+        image = photograph(renderer, one, asked.side, asked.samples, asked.variant).image
         told["traced"].append(fitted(one, image, asked.adapter))
         sys.stdout.write(f"{told['traced'][-1]}\n")
         sys.stdout.flush()

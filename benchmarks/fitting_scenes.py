@@ -23,7 +23,7 @@ from dermis.frame.renderer import Renderer
 from dermis.human.person import Human
 from dermis.images.exr import encode_exr
 from dermis.reference.half_space import diffuse_albedo, reflected_radiance
-from dermis.reference.path_traced import PathTraced
+from dermis.reference.path_traced import PathTraced, Variant
 from dermis.scene.camera import Camera
 from dermis.scene.environment import Environment
 from dermis.scene.lights import DirectionalLight
@@ -34,7 +34,7 @@ from dermis.scene.skin import USUAL_ROUGHNESS
 FOLDER = Path(gettempdir()) / "dermis-fitting"
 """Of panoramas, which scenes name as files."""
 SCENES = 30
-_SEED = 24
+_SEED = 2411  # of scenes on which no setting was chosen: those were of 24
 _MELANIN, _BLOOD, _ROUGHNESS = (-2.2, -0.8), (-2.5, -1.5), (0.2, 0.4)  # the first two as decimal exponents
 LOBE = "torrance-sparrow-smith"
 """The lobe of the truth, of one kind of slopes."""
@@ -111,7 +111,9 @@ def _panorama(number: int, radiance: NDArray[np.float64]) -> Path:
     return path
 
 
-def photograph(renderer: Renderer, one: Case, side: int, samples: int) -> PathTraced:
+def photograph(
+    renderer: Renderer, one: Case, side: int, samples: int, variant: Variant = "scalar_rgb"
+) -> PathTraced:
     """The case by path tracing; the surface reflects as a dielectric of index 1.4.
 
     A medium that does not refract has one colour under light from everywhere and a darker one where light
@@ -121,7 +123,8 @@ def photograph(renderer: Renderer, one: Case, side: int, samples: int) -> PathTr
     paint = paint_of(renderer, one.scene, _PAINT)
     paint = replace(paint, colour=_measured(paint.colour))
     rough = np.clip(paint.roughness * (one.roughness / USUAL_ROUGHNESS), 0.05, 1.0).astype(np.float32)
-    return traced(renderer, one.scene, replace(paint, roughness=rough), (side, side), samples)
+    paint = replace(paint, roughness=rough)
+    return traced(renderer, one.scene, paint, (side, side), samples, variant=variant)
 
 
 def _measured(colour: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -137,12 +140,13 @@ def main(words: list[str]) -> int:
     parser.add_argument("--side", type=int, default=256)
     parser.add_argument("--samples", type=int, default=8)
     parser.add_argument("--scenes", type=int, default=SCENES)
+    parser.add_argument("--variant", default="scalar_rgb", help="of Mitsuba, such as cuda_ad_rgb")
     parser.add_argument("--adapter", default="auto")
     asked = parser.parse_args(words)
     renderer = Renderer(asked.adapter)
     for number in range(asked.scenes):
         began = time.perf_counter()
-        photograph(renderer, case(number), asked.side, asked.samples)
+        photograph(renderer, case(number), asked.side, asked.samples, asked.variant)
         sys.stdout.write(f"{number} {time.perf_counter() - began:.0f} s\n")
         sys.stdout.flush()
     return 0

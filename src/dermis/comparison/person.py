@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from dermis.frame.renderer import Renderer
 from dermis.images.colour import encode_srgb
 from dermis.mesh.head import Head
 from dermis.reference.metrics import Estimate, energy_ratio, relative_rmse
-from dermis.reference.path_traced import PathTraced
+from dermis.reference.path_traced import PathTraced, Variant
 from dermis.reference.person.traced import Paint, trace_person
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
@@ -112,13 +113,18 @@ def traced(
     samples: int,
     keep: bool = True,
     report: Callable[[int, int], None] | None = None,
+    variant: Variant = "scalar_rgb",
 ) -> PathTraced:
-    """A person path-traced; light below skin of the mean colour spreads as far as the profile says."""
+    """A person path-traced; light below skin of the mean colour spreads as far as the profile says.
+
+    variant : as of `path_trace`
+    """
     profile, colour = renderer.profile_of(scene.skin), scene.head.maps.mean_colour
     assert colour is not None  # painted people have one
     weight, width = profile.weight, np.sqrt(0.5 * np.pi * profile.variance_mm2)
     distance = (weight * width[:, None]).sum(axis=0) / weight.sum(axis=0)
-    return trace_person(scene, paint, distance, colour, size, samples, keep=keep, report=report)
+    how: dict[str, Any] = {"variant": variant, "keep": keep, "report": report}
+    return trace_person(scene, paint, distance, colour, size, samples, **how)
 
 
 def pair_of(name: str, ours: Floats, truth: PathTraced, mask: NDArray[np.bool_]) -> Pair:

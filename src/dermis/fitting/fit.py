@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Literal
@@ -18,7 +19,7 @@ from dermis.fitting.frames import Frames
 from dermis.fitting.photograph import Photograph, read_photograph
 from dermis.fitting.place import placed
 from dermis.fitting.solve import ROBUST, Problem, State, solve, tint
-from dermis.fitting.start import Start, suns_to_try
+from dermis.fitting.start import Start, suns_around, suns_to_try
 from dermis.fitting.subject import subject_of
 from dermis.fitting.unknowns import usual_point
 from dermis.frame.renderer import Renderer
@@ -129,6 +130,9 @@ def _solved(
     problem = Problem(frames, target, noise, free_white, robust)
     first = problem.weights(target.mean(axis=1, keepdims=True) * np.ones(3))
     start = Start(frames, tried, target, first).best(suns)
+    if suns:
+        nearer = replace(start, suns=suns_around(start.suns))
+        start = Start(frames, nearer, target, first).best(suns)
     state, slopes = solve(problem, start, told)
     return state, slopes, problem
 

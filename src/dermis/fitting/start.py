@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.fitting import sky
 from dermis.fitting.frames import Frames
 from dermis.fitting.linear import fault_by, strengths_by
-from dermis.fitting.unknowns import SKIN, Point
+from dermis.fitting.unknowns import SKIN, Point, tangents
 from dermis.human.skin.colours import EPIDERMIS_MM, colours
 
 Floats = NDArray[np.float64]
@@ -19,6 +19,7 @@ _AROUND = 28
 _BEHIND = -0.35  # along z: suns farther behind leave the face dark
 _MELANIN, _BLOOD = np.geomspace(0.002, 0.4, 14), np.geomspace(0.002, 0.06, 8)
 _STRENGTH = 0.5, 0.75, 1.0
+_RINGS, _RING = (9.0, 18.0), 6  # degrees, and directions on each; those tried first are 35 degrees apart
 
 
 def suns_to_try(towards_camera: Floats) -> Floats:
@@ -28,6 +29,15 @@ def suns_to_try(towards_camera: Floats) -> Floats:
     """
     every = sky.spread_directions(_AROUND)
     return every[every @ towards_camera > _BEHIND]
+
+
+def suns_around(towards: Floats) -> Floats:
+    """(k, 3) the directions themselves, and others about them: half as far as those tried first are apart."""
+    turn = np.linspace(0.0, 2.0 * np.pi, _RING, endpoint=False)
+    ring = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    off = np.concatenate([[[0.0, 0.0]], *(np.tan(np.radians(angle)) * ring for angle in _RINGS)])
+    found = towards[:, None] + np.einsum("nt,ktc->knc", off, tangents(towards))
+    return np.asarray((found / np.linalg.norm(found, axis=2, keepdims=True)).reshape(-1, 3))
 
 
 class Start:
