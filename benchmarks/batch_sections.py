@@ -110,7 +110,7 @@ def measured_run(plan: Plan, crew: Crew, spec: Spec, encoders: int, count: int =
 def workers(plan: Plan, count: int, *, moving: bool = False) -> dict[str, Any]:
     """Plain processes, so many of them."""
     seats, encoders = Seating(plan.adapter, workers=count, encoders=plan.encoders).seats()
-    spec = spec_for(plan, plan.images * count, 8 * count, moving=moving)
+    spec = spec_for(plan, plan.images * count, 2 * count, moving=moving)
     found = measured_run(plan, Processes(seats), spec, encoders, count)
     return {"workers": count, "encoders": encoders, "adapters": len({one.adapter for one in seats}), **found}
 
@@ -119,7 +119,7 @@ def dask(plan: Plan, count: int) -> dict[str, Any]:
     """The same work by plain processes and by as many workers of dask, each timed by whole shards."""
     distributed = needed("distributed", "the comparison with dask")
     seats, encoders = Seating(plan.adapter, workers=count, encoders=plan.encoders).seats()
-    spec = spec_for(plan, plan.images * count, 16 * count)
+    spec = spec_for(plan, plan.images * count, 4 * count)
     threads = {"LP_NUM_THREADS": str(seats[0].threads)} if seats[0].threads else {}
     plain = measured_run(plan, Processes(seats), spec, encoders)
     with (
