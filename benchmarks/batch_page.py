@@ -44,7 +44,8 @@ def _machine(told: Told) -> str:
         f"## {', '.join(machine['adapters'])}, {machine['cores']} cores\n",
         f"{width} x {height}, atlas {machine['atlas']}; with each picture {', '.join(machine['outputs'])}, "
         f"landmarks and parameters.\n{told['date'][:10]}, dermis {versions['dermis']}, "
-        f"wgpu {versions['wgpu']}; load average before: {told['load']}.\n",
+        f"wgpu {versions['wgpu']}; load average before: {told['load']}. "
+        f"{told.get('note', '')}\n",
         "### Measured\n",
         _rates(told),
     ]
