@@ -1,6 +1,7 @@
 """Time an exported page in headless Chromium: python benchmarks/web_page.py PAGE.html [SIDE [FORM]].
 
-FORM is gpu or software; without it the page chooses. Where Chromium can use a GPU, add --gpu.
+FORM is gpu or software; without it the page chooses. Where Chromium can use a GPU, add --gpu. With
+--minutes=10 the head is turned for so long instead, and the memory of page and browser is told each minute.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 SOFTWARE = ["--use-webgpu-adapter=swiftshader"]
-FLAGS = ["--no-sandbox", "--enable-unsafe-webgpu"]
+FLAGS = ["--no-sandbox", "--enable-unsafe-webgpu", "--js-flags=--expose-gc", "--enable-precise-memory-info"]
 HARDWARE = ["--enable-features=Vulkan", "--ignore-gpu-blocklist", "--use-angle=vulkan"]
 FRAMES = 4
 STATE = "document.documentElement.dataset.state"
@@ -43,11 +44,41 @@ def timed(page: Any, script: str, count: int) -> tuple[float, float]:
     return (time.perf_counter() - began) / count, (processor_s() - used) / count
 
 
+def resident_mb() -> float:
+    """Memory of all of the browser's processes, each with its part of what they share [MB]."""
+    total = 0
+    for folder in Path("/proc").iterdir():
+        try:
+            if folder.name.isdigit() and b"chrom" in (folder / "cmdline").read_bytes():
+                lines = (folder / "smaps_rollup").read_text().splitlines()
+                total += next(int(line.split()[1]) for line in lines if line.startswith("Pss:"))
+        except OSError:
+            continue
+    return total / 1e3
+
+
+def turned(page: Any, minutes: float) -> None:
+    """Turn the head for so long, and tell what is held each minute."""
+    began, frames, told = time.monotonic(), 0, 0
+    while told <= minutes:
+        page.evaluate(MOVE)
+        frames += 1
+        if time.monotonic() - began >= 60 * told:
+            page.evaluate("window.gc && gc()")
+            heap = page.evaluate("performance.memory.usedJSHeapSize") / 1e6
+            sys.stdout.write(
+                f"{told} min, {frames} frames: heap {heap:.1f} MB, browser {resident_mb():.0f} MB\n"
+            )
+            sys.stdout.flush()
+            told += 1
+
+
 def main() -> None:
     """Open the page and turn the head."""
     from playwright.sync_api import sync_playwright
 
-    words = [word for word in sys.argv[1:] if word != "--gpu"]
+    words = [word for word in sys.argv[1:] if not word.startswith("--")]
+    minutes = next((float(word[10:]) for word in sys.argv if word.startswith("--minutes=")), 0.0)
     file, side, form = Path(words[0]), int([*words, "512"][1]), (words[2:] or [""])[0]
     flags = FLAGS + (HARDWARE if "--gpu" in sys.argv else SOFTWARE)
     with sync_playwright() as play:
@@ -57,6 +88,10 @@ def main() -> None:
         page.goto(file.resolve().as_uri() + (f"#form={form}" if form else ""))
         page.wait_for_function(f"() => {STATE} && {STATE} !== 'loading'", timeout=300_000)
         first = time.perf_counter() - began, processor_s() - used
+        if minutes:
+            turned(page, minutes)
+            browser.close()
+            return
         rows = {"first picture": first, "frame at rest, camera turned": timed(page, STILL, FRAMES)}
         rows["frame in motion"] = timed(page, MOVE, FRAMES)
         size = page.evaluate("dermis.player.frame.size")

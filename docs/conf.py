@@ -11,7 +11,7 @@ sys.path[:0] = [str(HERE)]
 
 project = "dermis"
 author = "The dermis authors"
-extensions = ["myst_parser", "sphinx.ext.autodoc", "made_from_code"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "made_from_code", "turning_head"]
 exclude_patterns = ["*.in.md", "images"]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3

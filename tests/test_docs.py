@@ -13,7 +13,8 @@ DOCS = Path(__file__).parent.parent / "docs"
 
 
 def test_pages_build(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", str(DOCS), str(tmp_path)]
+    quickly = ["-q", "-W", "--keep-going", "-D", "turning_head="]
+    command = [sys.executable, "-m", "sphinx", *quickly, str(DOCS), str(tmp_path)]
     built = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert built.returncode == 0, built.stderr
     reference = (tmp_path / "generated" / "reference.html").read_text("utf-8")
@@ -28,6 +29,16 @@ def test_pages_build(tmp_path: Path) -> None:
     assert "The whole technique in studio light" in (tmp_path / "generated" / "gallery.html").read_text(
         "utf-8"
     )
+
+
+def test_the_front_page_turns_a_head(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(DOCS)
+    from turning_head import FILE, turning
+
+    text = (DOCS / "index.md").read_text("utf-8")
+    shown = turning(text, "human")
+    assert f'<iframe src="{FILE}"' in shown and "![" not in shown and turning(text, "") == text
+    assert shown.partition("{toctree}")[2] == text.partition("{toctree}")[2]
 
 
 def test_equations_of_the_gallery_are_ones_that_tex_can_draw(monkeypatch: pytest.MonkeyPatch) -> None:
