@@ -41,14 +41,14 @@ class Where(NamedTuple):
     near: NDArray[np.bool_]
 
 
-class Rooted(NamedTuple):
+class Sown(NamedTuple):
     """Roots in no order, and where they are on the average person (n, 3) [mm]."""
 
     roots: Roots
     places: Doubles
 
 
-def rooted(plain: Mesh, where: Where, per_cm2: float, rng: np.random.Generator) -> Rooted:
+def rooted(plain: Mesh, where: Where, per_cm2: float, rng: np.random.Generator) -> Sown:
     """Roots on the skin, evenly but for chance; none on ears, lips and in the mouth.
 
     plain : the person's mesh of control points
@@ -67,7 +67,7 @@ def rooted(plain: Mesh, where: Where, per_cm2: float, rng: np.random.Generator) 
     told = np.einsum("nk,nkc->nc", weights(place), _told()[around[which]])
     kept = np.flatnonzero(chance[number] < where.amount(told))
     rng.shuffle(kept)
-    return Rooted(Roots(quad[which[kept]].astype(np.int32), place[kept].astype(np.float32)), told[kept, :3])
+    return Sown(Roots(quad[which[kept]].astype(np.int32), place[kept].astype(np.float32)), told[kept, :3])
 
 
 def above_hairline(places: Doubles, recession: float = 0.0) -> Doubles:

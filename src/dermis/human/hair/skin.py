@@ -20,20 +20,21 @@ class Skin:
     """
 
     def __init__(self, mesh: Mesh) -> None:
-        self._places, self._normals = mesh.positions.astype(np.float64), mesh.normals.astype(np.float64)
+        self._places, normals = mesh.positions.astype(np.float64), mesh.normals.astype(np.float64)
+        self._planes = np.column_stack([normals, (self._places * normals).sum(axis=1)])
 
     def foot(self, places_mm: Doubles) -> tuple[Doubles, Doubles]:
         """Where places (n, 3) are on the skin when put there along its normal, and that normal [mm]."""
         distance, near = self._tree.query(places_mm, k=_NEAR)
         share = 1.0 / (distance**2 + 0.05)
         share /= share.sum(axis=1, keepdims=True)
-        normal = np.einsum("nk,nkc->nc", share, self._normals[near])
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        over = ((places_mm[:, None] - self._places[near]) * self._normals[near]).sum(axis=2)
-        return places_mm - (share * over).sum(axis=1)[:, None] * normal, normal
+        plane = np.einsum("nk,nkc->nc", share, self._planes[near])
+        over = (places_mm * plane[:, :3]).sum(axis=1) - plane[:, 3]
+        normal = plane[:, :3] / np.sqrt((plane[:, :3] ** 2).sum(axis=1, keepdims=True))
+        return places_mm - over[:, None] * normal, normal
 
     @cached_property
     def _tree(self) -> Any:
         from scipy.spatial import cKDTree
 
-        return cKDTree(self._places)
+        return cKDTree(self._places, compact_nodes=False, balanced_tree=False)
