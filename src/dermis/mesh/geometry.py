@@ -63,15 +63,16 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
 
     Angles, unlike areas, do not depend on how the surface is cut into triangles.
     """
-    corners = [np.ascontiguousarray(column, np.float64)[triangles] for column in positions.T]  # (f, 3) each
-    ax, ay, az = (one[:, [1, 2, 0]] - one for one in corners)
-    bx, by, bz = (one[:, [2, 0, 1]] - one for one in corners)
-    cross = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-    sine = np.sqrt(cross[0] ** 2 + cross[1] ** 2 + cross[2] ** 2)
-    angle = np.arctan2(sine, ax * bx + ay * by + az * bz)
-    length = np.where(sine[:, :1] > 0, sine[:, :1], 1.0)
-    at, count = point[triangles].ravel(), int(point.max()) + 1
-    weighed = [(one[:, :1] / length * angle).ravel() for one in cross]
+    columns, corner = np.ascontiguousarray(positions.T, np.float64), np.ascontiguousarray(triangles.T)
+    a, b, c = (columns[:, one] for one in corner)  # (3, f) each
+    ab, bc, ca = b - a, c - b, a - c
+    x, y, z = ab[1] * ca[2] - ab[2] * ca[1], ab[2] * ca[0] - ab[0] * ca[2], ab[0] * ca[1] - ab[1] * ca[0]
+    sine = np.sqrt(x * x + y * y + z * z)  # of each angle, times the lengths of its sides
+    cosines = [-(one * other).sum(axis=0) for one, other in ((ca, ab), (ab, bc), (bc, ca))]
+    angle = np.arctan2(sine, cosines)
+    angle /= np.where(sine > 0, -sine, 1.0)
+    at, count = point[corner].ravel(), int(point.max()) + 1
+    weighed = [(one * angle).ravel() for one in (x, y, z)]
     summed = np.stack([np.bincount(at, one, count) for one in weighed], axis=1, dtype=np.float64)
     upwards = np.broadcast_to([0.0, 0.0, 1.0], summed.shape)
     return np.asarray(unit(summed, upwards).astype(np.float32)[point])

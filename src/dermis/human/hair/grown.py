@@ -37,16 +37,17 @@ class Ground:
     """What hair grows on: the head as it is drawn, and its mesh before it was subdivided.
 
     share : of the usual number of hairs that grows, each as much wider
+    points_mm : (p, 3) of the drawn mesh, the control points first
     """
 
     def __init__(self, head: Head, plain: Mesh, share: float = 1.0) -> None:
         self.plain, self.skin, self.share = plain, Skin(head.mesh), share
-        self._mesh, self._levels, self._points = head.mesh, head.levels, points_of(head.mesh)
+        self._mesh, self._levels, self.points_mm = head.mesh, head.levels, points_of(head.mesh)
 
     def rooted(self, roots: Roots) -> Rooted:
         """Roots on quads of the plain mesh."""
         finer = finer_roots(self.plain, roots, self._levels)
-        return Rooted(finer, *frames(self._mesh, finer, self._points))
+        return Rooted(finer, *frames(self._mesh, finer, self.points_mm))
 
 
 class Grown(NamedTuple):

@@ -1,19 +1,21 @@
-"""Hairs between guides: a few hundred of these follow the skin, and tens of thousands of hairs go along."""
+"""Hairs between guides: these follow the skin from the corners of quads, and tens of thousands of hairs go along."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.human.hair.combing import Combed, along_skin
-from dermis.human.hair.grown import Rooted
+from dermis.human.hair.grown import Ground, Rooted
+from dermis.human.hair.hairy_skin import told
 from dermis.human.hair.skin import Skin
+from dermis.mesh.geometry import compacted
 from dermis.mesh.mesh import Floats
-from dermis.mesh.strands import Doubles
+from dermis.mesh.strands import Doubles, Roots, corners, weights
 
-_BESIDE = 4  # guides that a hair goes along with
 _TUFT_MM = 2.2  # between tufts
 _LEAST_OVER_MM = 0.35  # the skin
 _HEAD_MM = 85.0  # radius
@@ -39,38 +41,29 @@ class Roughness(NamedTuple):
     coils: float = 0.0
 
 
-def guides(skin: Skin, root_mm: Doubles, combed: Combed, knots: int) -> Doubles:
-    """(n, k, 3) ways from roots (n, 3) to knots, over the skin [mm]."""
-    foot, normal = skin.foot(root_mm)
-    off = root_mm - foot  # as far as the skin of few vertices is from the surface
-    way, height = combed.way, np.zeros(len(root_mm))
-    step = combed.length_mm / (knots - 1)
-    found = [root_mm]
-    for k in range(1, knots):
-        rise = combed.rise + (combed.last_rise - combed.rise) * (k - 0.5) / (knots - 1)
-        height = np.maximum(height + step * np.sin(rise), _LEAST_OVER_MM)
-        way = along_skin(way, normal)
-        foot, normal = skin.foot(foot + (step * np.cos(rise))[:, None] * way)
-        found.append(foot + off + height[:, None] * normal)
-    return np.stack(found, axis=1) - root_mm[:, None]
-
-
 def grown(
-    hair: Rooted,
-    guide_mm: Doubles,
-    ways: Doubles,
+    ground: Ground,
+    roots: Roots,
+    comb: Callable[[Doubles, Doubles], Combed],
+    knots: int,
     rough: Roughness,
     rng: np.random.Generator,
-) -> Floats:
-    """(k, 3, n) ways from the roots of hairs to their knots [mm].
+) -> tuple[Rooted, Floats]:
+    """Hairs on the head, and (k, 3, n) ways from their roots to their knots [mm].
 
-    guide_mm, ways : (g, 3) and (g, k, 3) of the guides
+    roots : on quads of the plain mesh, at whose corners the guides of their hairs grow
+    comb : how guides lie, by their places on the average person and the skin's normals, both (g, 3)
 
     Hairs come last in all arrays here, so that what is done to one is done to all at once. What must be the
     same on all machines is so: sines are taken of doubles, and floats are only added and multiplied.
     """
-    t, normal = np.linspace(0.0, 1.0, ways.shape[1])[:, None], hair.along[2]
-    found = _astray(_between(hair.places, guide_mm, ways), normal, rough, rng)
+    hair, around = ground.rooted(roots), corners(ground.plain, roots.quad)
+    point, near = compacted(around)
+    root_mm = ground.points_mm[point]
+    foot, normals = ground.skin.foot(root_mm)
+    ways = _guides(ground.skin, root_mm, foot, normals, comb(told()[point, :3], normals), knots)
+    t, normal = np.linspace(0.0, 1.0, knots)[:, None], hair.along[2]
+    found = _astray(_between(weights(roots.place), near, ways), normal, rough, rng)
     _draw_together(found, hair.places, t, rough.tufts, rng)
     tips = found[-1]
     size = rough.frizz * np.sqrt(dots(tips, tips))
@@ -78,7 +71,26 @@ def grown(
         found += fade[..., None].astype(np.float32) * part
     if rough.coil_mm:
         found += _coils(found[-1], t, rough, rng)
-    return _over_skin(found, normal, t.astype(np.float32))
+    return hair, _over_skin(found, normal, t.astype(np.float32))
+
+
+def _guides(
+    skin: Skin, root_mm: Doubles, foot: Doubles, normal: Doubles, combed: Combed, knots: int
+) -> Doubles:
+    """(g, k, 3) ways from roots to knots, over the skin [mm].
+
+    root_mm, foot, normal : (g, 3) with what `Skin.foot` says of them
+    """
+    off = root_mm - foot  # as far as the skin of few vertices is from the surface
+    way, height, step = combed.way, np.zeros(len(root_mm)), combed.length_mm / (knots - 1)
+    found = [np.zeros_like(root_mm)]
+    for k in range(1, knots):
+        rise = combed.rise + (combed.last_rise - combed.rise) * (k - 0.5) / (knots - 1)
+        height = np.maximum(height + step * np.sin(rise), _LEAST_OVER_MM)
+        way = along_skin(way, normal)
+        foot, normal = skin.foot(foot + (step * np.cos(rise))[:, None] * way)
+        found.append(foot + off + height[:, None] * normal - root_mm)
+    return np.stack(found, axis=1)
 
 
 def dots(a: Floats, b: Floats) -> Floats:
@@ -93,19 +105,17 @@ def _crosses(a: Floats, b: Floats) -> Floats:
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-2)
 
 
-def _between(root_mm: Doubles, guide_mm: Doubles, ways: Doubles) -> Floats:
-    """(k, 3, n) means of the nearest guides' ways."""
-    from scipy.sparse import csr_array
-    from scipy.spatial import cKDTree
+def _between(share: Doubles, near: NDArray[np.int64], ways: Doubles) -> Floats:
+    """(k, 3, n) means of guides' ways.
 
-    n, g = len(root_mm), len(guide_mm)
-    far, near = cKDTree(guide_mm).query(root_mm, k=_BESIDE)
-    share = 1.0 / (np.asarray(far) ** 2 + 4.0)
-    share /= share.sum(axis=1, keepdims=True)
-    first = np.arange(0, _BESIDE * n + 1, _BESIDE)
-    shares = csr_array((share.ravel().astype(np.float32), np.asarray(near).ravel(), first), shape=(n, g))
-    found = shares @ ways.reshape(g, -1).astype(np.float32)
-    return np.ascontiguousarray(found.T).reshape(*ways.shape[1:], n)
+    share, near : (n, 4) of which guides
+    """
+    from scipy.sparse import csr_array
+
+    first = np.arange(0, share.size + 1, share.shape[1])
+    shares = csr_array((share.ravel().astype(np.float32), near.ravel(), first), (len(share), len(ways)))
+    found = shares @ ways.reshape(len(ways), -1).astype(np.float32)
+    return np.ascontiguousarray(found.T).reshape(*ways.shape[1:], len(share))
 
 
 def _astray(ways: Floats, normal: Floats, rough: Roughness, rng: np.random.Generator) -> Floats:
@@ -125,13 +135,12 @@ def _draw_together(
     ways: Floats, root_mm: Doubles, t: Doubles, much: float, rng: np.random.Generator
 ) -> None:
     """Draw tips to those of a few, in tufts."""
-    from scipy.spatial import cKDTree
-
     cell = np.floor(root_mm / _TUFT_MM).astype(np.int64)
     cell -= cell.min(axis=0)
-    wide, high, deep = (cell.max(axis=0) + 1).tolist()
-    _, first = np.unique(np.ravel_multi_index(cell.T, (wide, high, deep)), return_index=True)
-    which = first[cKDTree(root_mm[first]).query(root_mm)[1]]
+    cell = np.ravel_multi_index(cell.T, (cell.max(axis=0) + 1).tolist())
+    hair = np.empty(cell.max() + 1, np.int64)
+    hair[cell] = np.arange(len(cell))  # one of those in each
+    which = hair[cell]
     drawn = (much * rng.uniform(0.3, 1.0, len(root_mm)) * t**1.3).astype(np.float32)
     apart = ways[..., which]
     apart -= ways
@@ -144,10 +153,9 @@ def _waves(size: Floats, t: Doubles, rng: np.random.Generator) -> Iterator[tuple
     """Smooth ways whose sum is 0 at roots: how much (k, 1) of each of some (3, n); size : (n,)."""
     fade = np.minimum(2 * t, 1.0)
     for waves in (0.5, 1.1):
-        phase, much = rng.uniform(0, 2 * np.pi, (3, len(size))), rng.uniform(-1, 1, (3, len(size)))
-        much *= size / waves
-        yield fade * np.sin(2 * np.pi * waves * t), (much * np.cos(phase)).astype(np.float32)
-        yield fade * (np.cos(2 * np.pi * waves * t) - 1.0), (much * np.sin(phase)).astype(np.float32)
+        for shape in (np.sin(2 * np.pi * waves * t), np.cos(2 * np.pi * waves * t) - 1.0):
+            much = rng.random((3, len(size)), np.float32) - np.float32(0.5)
+            yield np.sqrt(2.0) / waves * fade * shape, much * size
 
 
 def _coils(tips: Floats, t: Doubles, rough: Roughness, rng: np.random.Generator) -> Floats:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from dermis.human.hair import hairy_skin
 from dermis.human.hair.combing import combed, combed_beard
 from dermis.human.hair.grown import Ground, Grown, Rooted
-from dermis.human.hair.growth import Roughness, dots, grown, guides
+from dermis.human.hair.growth import Roughness, dots, grown
 from dermis.human.hair.look import HairLook
 from dermis.mesh.mesh import Floats
 
@@ -15,7 +17,6 @@ MOST_PER_CM2 = 200.0
 """Hairs of the densest heads."""
 BEARD_PER_CM2 = 60.0
 """Hairs of beards."""
-_GUIDES_PER_CM2 = 1.6
 _HAIR_MM, _BEARD_MM = 0.034, 0.048  # radius of a hair
 _TIP = 0.6  # of that, at the tip
 _STRAIGHT_KNOTS, _BENT_KNOTS, _COILED_KNOTS = 5, 7, 9
@@ -34,31 +35,23 @@ def scalp_hair(ground: Ground, look: HairLook, recession: float) -> list[Grown]:
     """The hair of the head; none for a bald one."""
     if look.style == "none" or look.density == 0.0:
         return []
-    rng, where = np.random.default_rng((look.seed, 3)), hairy_skin.scalp(recession)
-    drawn = ground.share * (22.0 + 53.0 * look.density)
-    few, many = (hairy_skin.rooted(ground.plain, where, n, rng) for n in (_GUIDES_PER_CM2, drawn))
-    guide, hair = ground.rooted(few.roots), ground.rooted(many.roots)
-    lie = combed(few.places, guide.normals, look, recession)
-    ways = guides(ground.skin, guide.places, lie, knots_of(look))
-    found = grown(hair, guide.places, ways, _roughness(look), rng)
-    return [_stranded(hair, found, drawn, MOST_PER_CM2 * look.density, _HAIR_MM, rng)]
+    rng, drawn = np.random.default_rng((look.seed, 3)), ground.share * (22.0 + 53.0 * look.density)
+    roots = hairy_skin.rooted(ground.plain, hairy_skin.scalp(recession), drawn, rng)
+    comb = partial(combed, look=look, recession=recession)
+    hair, ways = grown(ground, roots, comb, knots_of(look), _roughness(look), rng)
+    return [_stranded(hair, ways, drawn, MOST_PER_CM2 * look.density, _HAIR_MM, rng)]
 
 
 def beard_hair(ground: Ground, look: HairLook) -> list[Grown]:
     """The beard; none for a shaved one."""
     if look.beard_mm == 0.0:
         return []
-    rng, mesh = np.random.default_rng((look.seed, 4)), ground.plain
-    drawn = ground.share * BEARD_PER_CM2
-    both = _GUIDES_PER_CM2, drawn
-    few, many = (hairy_skin.rooted(mesh, hairy_skin.beard(), density, rng) for density in both)
-    guide, hair = ground.rooted(few.roots), ground.rooted(many.roots)
-    lie = combed_beard(few.places, guide.normals, look)
-    ways = guides(ground.skin, guide.places, lie, knots_of(look))
+    rng, drawn = np.random.default_rng((look.seed, 4)), ground.share * BEARD_PER_CM2
+    roots = hairy_skin.rooted(ground.plain, hairy_skin.beard(), drawn, rng)
     tight = max(look.curl - _TIGHT, 0.0) * 2
     rough = Roughness(0.3, 0.22, 0.2, 0.05 + 0.1 * look.curl, 0.5 * tight, 1.5)
-    found = grown(hair, guide.places, ways, rough, rng)
-    return [_stranded(hair, found, drawn, BEARD_PER_CM2, _BEARD_MM, rng)]
+    hair, ways = grown(ground, roots, partial(combed_beard, look=look), knots_of(look), rough, rng)
+    return [_stranded(hair, ways, drawn, BEARD_PER_CM2, _BEARD_MM, rng)]
 
 
 def _stranded(

@@ -61,21 +61,25 @@ class Rooting:
         """Roots on what faces the viewer at places of the front plane (n,) [mm], and which there are."""
         front = self._front
         cell = np.floor((np.column_stack([x, y]) - _LOW) / _CELL_MM).astype(np.int64)
-        column, row = np.clip(cell, 0, np.array(front.listed.shape[:2]) - 1).T
-        quad, place = np.zeros(len(x), np.int32), np.zeros((len(x), 2), np.float32)
-        best = np.full(len(x), -np.inf)
-        for which in front.listed[column, row].T:
-            a, b, c = front.corner[which].transpose(1, 2, 0)
-            det = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
-            v = ((x - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (y - a[1])) / det
-            w = ((b[0] - a[0]) * (y - a[1]) - (x - a[0]) * (b[1] - a[1])) / det
-            share = np.stack([1 - v - w, v, w], axis=-1)
-            z = share[:, 0] * a[2] + share[:, 1] * b[2] + share[:, 2] * c[2]
-            won = (which >= 0) & (share >= -1e-9).all(axis=1) & (z > best)
-            best[won], quad[won] = z[won], front.quad[which[won]]
-            ends = _ENDS[_HALVES[front.half[which[won]]]]
-            place[won] = np.clip(np.einsum("nk,nkc->nc", share[won], ends), 0.0, 1.0)
-        return Roots(quad, place), np.isfinite(best)
+        listed = front.listed[tuple(np.clip(cell, 0, np.array(front.listed.shape[:2]) - 1).T)]
+        asked, column = np.nonzero(listed >= 0)
+        which = listed[asked, column]
+        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = front.corner[which].transpose(1, 2, 0)
+        px, py = x[asked], y[asked]
+        det = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
+        v = ((px - ax) * (cy - ay) - (cx - ax) * (py - ay)) / det
+        w = ((bx - ax) * (py - ay) - (px - ax) * (by - ay)) / det
+        share = np.stack([1 - v - w, v, w], axis=-1)
+        inside = np.flatnonzero(share.min(axis=1) >= -1e-9)
+        z = (az + v * (bz - az) + w * (cz - az))[inside]
+        won = np.full(len(x), -1)
+        order = inside[np.argsort(z)]
+        won[asked[order]] = order  # the last one stays: the foremost
+        there = won >= 0
+        which, share = which[won], share[won]
+        place = np.einsum("nk,nkc->nc", share, _ENDS[_HALVES[front.half[which]]])
+        quad = np.where(there, front.quad[which], 0)
+        return Roots(quad.astype(np.int32), np.clip(place, 0.0, 1.0).astype(np.float32)), there
 
     def beside_lid(self, lid: lashes.Lid, side: float, u: Doubles, across: Doubles) -> Roots:
         """Roots along a lid's edge, on the quads beside it that are farther from the eye.
