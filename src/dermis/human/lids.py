@@ -106,25 +106,26 @@ def conformed_targets(places: Points, sockets: tuple[Socket, Socket]) -> NDArray
     """
     moved, resting = moves(), conformed(places, sockets)
     found = moved.delta_mm.copy()
-    for name, which, part in _lid_moves():
+    for name, which, part, near in _lid_moves():
         point, drawn = moved.point[part], places.copy()
         drawn[point] += found[part]
         for eye in which:
             _conform(drawn, _sides()[eye], sockets[eye], "Blink" in name, _axes().get(name, _AHEAD))
-        near = np.isin(point, np.concatenate([_sides()[eye].point for eye in which]))
-        found[part][near] = (drawn - resting)[point[near]]
+        rows = part.start + near
+        found[rows] = drawn[moved.point[rows]] - resting[moved.point[rows]]
     return found
 
 
 @cache
-def _lid_moves() -> tuple[tuple[str, tuple[int, ...], slice], ...]:
-    """Targets that move lids: the name, near which eyes, and their part of all published displacements."""
+def _lid_moves() -> tuple[tuple[str, list[int], slice, Index], ...]:
+    """Targets that move lids: the name, near which eyes, their part of all displacements, which are near."""
     found = []
     for index, published in enumerate(moves().names):
         if (name := published.removeprefix(EXPRESSIONS)).startswith(_TARGETS):
-            part = slice(*moves().first[index : index + 2])
-            near = [np.isin(side.point, moves().point[part]).any() for side in _sides()]
-            found.append((name, tuple(map(int, np.flatnonzero(near))), part))
+            part = slice(*map(int, moves().first[index : index + 2]))
+            near = [np.isin(moves().point[part], side.point) for side in _sides()]
+            eyes = [eye for eye, one in enumerate(near) if one.any()]
+            found.append((name, eyes, part, np.flatnonzero(near[0] | near[1])))
     return tuple(found)
 
 

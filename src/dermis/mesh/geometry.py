@@ -68,8 +68,8 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
     ab, bc, ca = b - a, c - b, a - c
     x, y, z = ab[1] * ca[2] - ab[2] * ca[1], ab[2] * ca[0] - ab[0] * ca[2], ab[0] * ca[1] - ab[1] * ca[0]
     sine = np.sqrt(x * x + y * y + z * z)  # of each angle, times the lengths of its sides
-    cosines = [-(one * other).sum(axis=0) for one, other in ((ca, ab), (ab, bc), (bc, ca))]
-    angle = np.arctan2(sine, cosines)
+    beside = [np.arctan2(sine, -(one * other).sum(axis=0)) for one, other in ((ca, ab), (ab, bc))]
+    angle = np.stack([*beside, np.pi - beside[0] - beside[1]])
     angle /= np.where(sine > 0, -sine, 1.0)
     at, count = point[corner].ravel(), int(point.max()) + 1
     weighed = [(one * angle).ravel() for one in (x, y, z)]

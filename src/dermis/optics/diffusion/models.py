@@ -60,9 +60,11 @@ def diffusion_profile(
     if closed or model == "better-dipole":
         grid = np.geomspace(1e-6, 1e3, 1500)
         values = _pointwise(medium, model, clamp, grid)
+        values = values if rgb is None else values @ rgb.T
     else:
         grid = hankel.radii()
-        values = hankel.to_radius(transform(medium, model, clamp, hankel.frequencies()))
+        spread = transform(medium, model, clamp, hankel.frequencies())
+        values = hankel.to_radius(spread if rgb is None else spread @ rgb.T)
     if model == "better-dipole":
         total = enclosed(grid[-1:], grid, values)[0]
     else:
@@ -107,7 +109,7 @@ def _assemble(
 ) -> RadialProfile:
     if rgb is not None:
         entering = 1.0 - normal_reflectance(medium.eta)
-        values, total = entering * values @ rgb.T, entering * total @ rgb.T
+        values, total = entering * values, entering * total @ rgb.T
     edges, radius = ring_edges(), radius_grid()
     ring_energy = np.diff(enclosed(edges, grid, values), axis=0)
     return RadialProfile(

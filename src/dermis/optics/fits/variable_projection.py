@@ -15,7 +15,8 @@ from dermis.optics.media import Floats
 Design = Callable[[Floats], tuple[Floats, Floats]]
 _MOST_STEPS = 100
 _LONGEST_STEP = 1.0
-_STILL = 1e-7  # of the cost, a step
+STILL = 1e-7
+"""Share of the cost that a step must save for another one."""
 _HOPELESS = 1e8
 _BLOCK = 512
 
@@ -30,13 +31,16 @@ class Fit(NamedTuple):
     curvature: Floats
 
 
-def descend(design: Design, samples: Floats, log_variance: Floats, bounds: tuple[float, float]) -> Fit:
+def descend(
+    design: Design, samples: Floats, log_variance: Floats, bounds: tuple[float, float], still: float = STILL
+) -> Fit:
     """The local minimum that descent from a start reaches.
 
     design : what a unit Gaussian of each variance adds to the samples, and its slope by log variance
     samples : (n, c)
     log_variance : (k,) start
     bounds : of the log variances
+    still : share of the cost that a step must save for another one
     """
     fit = _project(design, samples, log_variance)
     damping = 1e-2
@@ -47,7 +51,7 @@ def descend(design: Design, samples: Floats, log_variance: Floats, bounds: tuple
         step = np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
         trial = _project(design, samples, np.clip(fit.log_variance + step, *bounds))
         if trial.cost < fit.cost:
-            settled = fit.cost - trial.cost < _STILL * fit.cost
+            settled = fit.cost - trial.cost < still * fit.cost
             fit, damping = trial, max(damping / 5.0, 1e-12)
             if settled:
                 break
