@@ -57,9 +57,7 @@ def _shuffled(strands: Strands, seed: int) -> Strands:
     return replace(strands, roots=roots, **parts)
 
 
-def _brow(
-    ground: Ground, rooting: Rooting, look: HairLook, side: float, rng: np.random.Generator
-) -> Grown:
+def _brow(ground: Ground, rooting: Rooting, look: HairLook, side: float, rng: np.random.Generator) -> Grown:
     u, v, x, y = brows.places(rng)
     roots, there = rooting.in_front(side * x, y)
     kept = np.flatnonzero(there)[: brows.count(look)]

@@ -1,4 +1,4 @@
-"""Hairs between guides: these follow the skin from the corners of quads, and tens of thousands of hairs go along."""
+"""Hairs between guides: these follow the skin from corners of quads, and tens of thousands go along."""
 
 from __future__ import annotations
 
@@ -131,9 +131,7 @@ def _astray(ways: Floats, normal: Floats, rough: Roughness, rng: np.random.Gener
     return found
 
 
-def _draw_together(
-    ways: Floats, root_mm: Doubles, t: Doubles, much: float, rng: np.random.Generator
-) -> None:
+def _draw_together(ways: Floats, root_mm: Doubles, t: Doubles, much: float, rng: np.random.Generator) -> None:
     """Draw tips to those of a few, in tufts."""
     cell = np.floor(root_mm / _TUFT_MM).astype(np.int64)
     cell -= cell.min(axis=0)
