@@ -66,7 +66,7 @@ def grown(
     found = _astray(_between(weights(roots.place), near, ways), normal, rough, rng)
     _draw_together(found, hair.places, t, rough.tufts, rng)
     tips = found[-1]
-    size = rough.frizz * np.sqrt(dots(tips, tips))
+    size = np.asarray(rough.frizz * np.sqrt(dots(tips, tips)), np.float32)
     for fade, part in _waves(size, t, rng):
         found += fade[..., None].astype(np.float32) * part
     if rough.coil_mm:
@@ -125,7 +125,7 @@ def _astray(ways: Floats, normal: Floats, rough: Roughness, rng: np.random.Gener
     length = np.clip(1.0 + rough.uneven * rng.normal(size=n), 0.35, 1.2)
     stay, turn = length * np.cos(angle), length * np.sin(angle)
     stay, turn, rise = (one.astype(np.float32) for one in (stay, turn, length * lean - stay))
-    found = turn * _crosses(normal, ways)
+    found: Floats = turn * _crosses(normal, ways)
     found += (rise * dots(ways, normal))[:, None] * normal
     found += stay * ways
     return found
@@ -133,9 +133,9 @@ def _astray(ways: Floats, normal: Floats, rough: Roughness, rng: np.random.Gener
 
 def _draw_together(ways: Floats, root_mm: Doubles, t: Doubles, much: float, rng: np.random.Generator) -> None:
     """Draw tips to those of a few, in tufts."""
-    cell = np.floor(root_mm / _TUFT_MM).astype(np.int64)
-    cell -= cell.min(axis=0)
-    cell = np.ravel_multi_index(cell.T, (cell.max(axis=0) + 1).tolist())
+    at = np.floor(root_mm / _TUFT_MM).astype(np.int64)
+    at -= at.min(axis=0)
+    cell = np.asarray(np.ravel_multi_index(at.T, (at.max(axis=0) + 1).tolist()))
     hair = np.empty(cell.max() + 1, np.int64)
     hair[cell] = np.arange(len(cell))  # one of those in each
     which = hair[cell]
@@ -159,8 +159,8 @@ def _waves(size: Floats, t: Doubles, rng: np.random.Generator) -> Iterator[tuple
 def _coils(tips: Floats, t: Doubles, rough: Roughness, rng: np.random.Generator) -> Floats:
     """(k, 3, n) turns around the ways to tips (3, n), from the root on."""
     n = tips.shape[-1]
-    along = tips / np.maximum(np.sqrt(dots(tips, tips)), _LEAST)
-    side = rng.normal(size=tips.shape).astype(np.float32)
+    along = np.asarray(tips / np.maximum(np.sqrt(dots(tips, tips)), _LEAST), np.float32)
+    side: Floats = rng.normal(size=tips.shape).astype(np.float32)
     side -= dots(side, along) * along
     side /= np.maximum(np.sqrt(dots(side, side)), _LEAST)
     turns = 2 * np.pi * (rough.coils * rng.uniform(0.8, 1.2, n) * t + rng.random(n))
