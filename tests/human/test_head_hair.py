@@ -59,7 +59,7 @@ def test_the_same_seed_has_the_same_hair() -> None:
 
 def test_roots_are_as_dense_as_is_said() -> None:
     mesh, rng = Human().head(subdivide=0).mesh, np.random.default_rng(0)
-    found = hairy_skin.rooted(mesh, hairy_skin.Where(everywhere, ALL), 40.0, rng).roots
+    found = hairy_skin.rooted(mesh, hairy_skin.Where(everywhere, ALL), 40.0, rng)
     quads, count = np.unique(found.quad, return_counts=True)
     area = hairy_skin.areas_cm2(mesh, quads.astype(np.int64))
     assert count.sum() / area.sum() == pytest.approx(40.0, rel=0.02)
@@ -133,8 +133,8 @@ def test_no_hair_is_lost_where_none_is_looked_for(where: hairy_skin.Where) -> No
     mesh = Human().head(subdivide=0).mesh
     both = where, where._replace(near=ALL)
     some, every = (hairy_skin.rooted(mesh, one, 60.0, np.random.default_rng(0)) for one in both)
-    assert not where.near.all() and len(some.places) > 1000
-    assert np.array_equal(some.places, every.places) and np.array_equal(some.roots.quad, every.roots.quad)
+    assert not where.near.all() and len(some.quad) > 1000
+    assert np.array_equal(some.place, every.place) and np.array_equal(some.quad, every.quad)
 
 
 def test_recession_bares_temples_and_crown() -> None:
@@ -177,6 +177,6 @@ def test_what_is_no_hair_is_refused(bad: dict[str, object]) -> None:
 
 def test_places_on_the_average_person_are_below_the_crown() -> None:
     """The edge of the breast, too, which its file stores as far above."""
-    places = hairy_skin._told()[:, :3]
+    places = hairy_skin.told()[:, :3]
     assert places[:, 1].max() < 130.0 and places[:, 1].min() < -330.0
     assert (knots(grown("cropped"))[:, 0, 1] > -110.0).all()

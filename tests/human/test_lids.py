@@ -10,9 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from dermis import Human
+from dermis.human import lids
 from dermis.human.lids import conformed
-from dermis.human.model import human_head
-from dermis.human.published import places_mm
+from dermis.human.model import _sockets, human_head
+from dermis.human.published import EXPRESSIONS, moves, places_mm
 from dermis.human.skin.surface import lid_rings
 from dermis.mesh.eyeball import SCLERA_MM, apex_mm, clearance_mm
 from dermis.mesh.head import Head
@@ -133,3 +134,17 @@ def test_lids_follow_who_has_another_head() -> None:
     frame = head.eyes.frames(head.control, motion)[0]
     far, surface = clearance_mm(points @ frame[:3, :3].T + frame[:3, 3], np.array([0.0, 0.0, 1.0]))
     assert (far - surface)[ON_BALL, CREST].min() > 0.0
+
+
+def test_targets_are_corrected_wherever_they_move_a_lid() -> None:
+    """As if both eyes were gone over for each, also for blinks, which move the other eye's inner corner."""
+    places = places_mm(Human.drawn(3).weights())
+    sockets = _sockets(places)
+    found, resting = lids.conformed_targets(places, sockets), conformed(places, sockets)
+    for index, published in enumerate(moves().names):
+        name, part = published.removeprefix(EXPRESSIONS), slice(*moves().first[index : index + 2])
+        if name in ("eyeBlinkLeft", "eyeLookOutRight", "eyeLookUpLeft", "eyeWideRight"):
+            point, moved = moves().point[part], places.copy()
+            moved[point] += moves().delta_mm[part]
+            drawn = conformed(moved, sockets, "Blink" in name, lids._axes().get(name, lids._AHEAD))
+            assert found[part] == pytest.approx((drawn - resting)[point], abs=1e-5)

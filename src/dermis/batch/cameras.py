@@ -27,7 +27,8 @@ def face_points(head: Head, count: int = 64) -> NDArray[np.int32]:
     """(n,) control points that stand out of a face: all others lie between them."""
     places = head.control.positions_mm - np.array(head.centre_mm, np.float32)
     low, high = np.array(_FACE_MM, np.float32)
-    inside = np.flatnonzero(((places > low) & (places < high)).all(axis=1))
+    within = [(one > least) & (one < most) for one, least, most in zip(places.T, low, high, strict=True)]
+    inside = np.flatnonzero(within[0] & within[1] & within[2])
     if not len(inside):
         inside = np.arange(len(places))
     ways = np.array([towards(*way) for way in _spiral(count)], np.float32)

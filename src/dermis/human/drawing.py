@@ -128,7 +128,7 @@ def _details(rng: np.random.Generator) -> Iterator[tuple[str, float]]:
 def _value(rng: np.random.Generator, stem: str, spread: float, common: dict[str, float]) -> float:
     """A weight within two standard deviations; left and right are nearly alike."""
     folder, rest = stem.split("/")
-    value = float(np.clip(rng.normal(0.0, spread), -2 * spread, 2 * spread))
+    value = min(max(rng.normal(0.0, spread), -2 * spread), 2 * spread)
     if rest[:2] not in ("l-", "r-"):
         return value
     shared = common.setdefault(f"{folder}/{rest[2:]}", value)

@@ -84,14 +84,19 @@ def conformed(
     """
     found = places.copy()
     for side, eye in zip(_sides(), sockets, strict=True):
-        found[side.point] += side.share @ _ways(places[side.rings], eye, closed)
-        centre = eye.middle + eye.size * FORWARD_MM * _AHEAD
-        size = SPLINE * eye.size
-        off = (found[side.contact] - centre) / size
-        far, surface = clearance_mm(off, axis)
-        out = np.maximum(1.0, (surface + side.clear_mm) / far)
-        found[side.contact] = centre + size * off * out[:, None]
+        _conform(found, side, eye, closed, axis)
     return found
+
+
+def _conform(places: Points, side: _Side, eye: Socket, closed: bool, axis: Points) -> None:
+    """Draw the lids of one eye onto it, see `conformed`."""
+    places[side.point] += side.share @ _ways(places[side.rings], eye, closed)
+    centre = eye.middle + eye.size * FORWARD_MM * _AHEAD
+    size = SPLINE * eye.size
+    off = (places[side.contact] - centre) / size
+    far, surface = clearance_mm(off, axis)
+    out = np.maximum(1.0, (surface + side.clear_mm) / far)
+    places[side.contact] = centre + size * off * out[:, None]
 
 
 def conformed_targets(places: Points, sockets: tuple[Socket, Socket]) -> NDArray[np.float32]:
@@ -99,17 +104,29 @@ def conformed_targets(places: Points, sockets: tuple[Socket, Socket]) -> NDArray
 
     places : (n, 3) the person's published points
     """
-    delta_mm = moves().delta_mm
-    found, resting = delta_mm.copy(), conformed(places, sockets)
-    for index, name in enumerate(moves().names):
-        if name.removeprefix(EXPRESSIONS).startswith(_TARGETS):
-            part = slice(*moves().first[index : index + 2])
-            moved = places.copy()
-            moved[moves().point[part]] += delta_mm[part]
-            axis = _axes().get(name.removeprefix(EXPRESSIONS), _AHEAD)
-            drawn = conformed(moved, sockets, "Blink" in name, axis)
-            found[part] = (drawn - resting)[moves().point[part]]
+    moved, resting = moves(), conformed(places, sockets)
+    found = moved.delta_mm.copy()
+    for name, which, part, near in _lid_moves():
+        point, drawn = moved.point[part], places.copy()
+        drawn[point] += found[part]
+        for eye in which:
+            _conform(drawn, _sides()[eye], sockets[eye], "Blink" in name, _axes().get(name, _AHEAD))
+        rows = part.start + near
+        found[rows] = drawn[moved.point[rows]] - resting[moved.point[rows]]
     return found
+
+
+@cache
+def _lid_moves() -> tuple[tuple[str, list[int], slice, Index], ...]:
+    """Targets that move lids: the name, near which eyes, their part of all displacements, which are near."""
+    found = []
+    for index, published in enumerate(moves().names):
+        if (name := published.removeprefix(EXPRESSIONS)).startswith(_TARGETS):
+            part = slice(*map(int, moves().first[index : index + 2]))
+            near = [np.isin(moves().point[part], side.point) for side in _sides()]
+            eyes = [eye for eye, one in enumerate(near) if one.any()]
+            found.append((name, eyes, part, np.flatnonzero(near[0] | near[1])))
+    return tuple(found)
 
 
 def contact(first: int, globe: int, apex: int, back: int) -> Contact:

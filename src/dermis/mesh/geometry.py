@@ -63,15 +63,16 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
 
     Angles, unlike areas, do not depend on how the surface is cut into triangles.
     """
-    a, b, c = (np.ascontiguousarray(positions.T, np.float64)[:, corner] for corner in triangles.T)
-    b, c = b - a, c - a
-    cross = np.stack([b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]])
-    area, along = np.sqrt((cross**2).sum(axis=0)), (b * c).sum(axis=0)  # twice the triangle's
-    beside = along, (b * b).sum(axis=0) - along, (c * c).sum(axis=0) - along
-    cross /= np.where(area > 0, area, 1.0)
-    angle = np.arctan2(area, np.stack(beside)).ravel()
-    at, count = point[triangles.T].ravel(), int(point.max()) + 1
-    weighed = (np.tile(one, 3) * angle for one in cross)
+    columns, corner = np.ascontiguousarray(positions.T, np.float64), np.ascontiguousarray(triangles.T)
+    a, b, c = (columns[:, one] for one in corner)  # (3, f) each
+    ab, bc, ca = b - a, c - b, a - c
+    x, y, z = ab[1] * ca[2] - ab[2] * ca[1], ab[2] * ca[0] - ab[0] * ca[2], ab[0] * ca[1] - ab[1] * ca[0]
+    sine = np.sqrt(x * x + y * y + z * z)  # of each angle, times the lengths of its sides
+    beside = [np.arctan2(sine, -(one * other).sum(axis=0)) for one, other in ((ca, ab), (ab, bc))]
+    angle = np.stack([*beside, np.pi - beside[0] - beside[1]])
+    angle /= np.where(sine > 0, -sine, 1.0)
+    at, count = point[corner].ravel(), int(point.max()) + 1
+    weighed = [(one * angle).ravel() for one in (x, y, z)]
     summed = np.stack([np.bincount(at, one, count) for one in weighed], axis=1, dtype=np.float64)
     upwards = np.broadcast_to([0.0, 0.0, 1.0], summed.shape)
     return np.asarray(unit(summed, upwards).astype(np.float32)[point])

@@ -53,7 +53,7 @@ class Strands(Summarised):
 
     def middle_mm(self, mesh: Mesh) -> Doubles:
         """(3,) the mean of the roots on a mesh at rest [mm]."""
-        return np.asarray(_places(mesh, self.roots, points_of(mesh))[0].mean(axis=0))
+        return np.asarray(_places(mesh, self.roots, points_of(mesh))[0].mean(axis=1))
 
     def refined(self, mesh: Mesh, finer: Mesh, levels: int) -> Strands:
         """The same hairs on the mesh refined by Catmull's and Clark's rules."""
@@ -68,9 +68,9 @@ def seen_from(mesh: Mesh, roots: Roots, ways_mm: Doubles) -> Floats:
     return seen_in(frames(mesh, roots, points_of(mesh))[1], ways_mm)
 
 
-def seen_in(frame: Doubles, ways_mm: Doubles | Floats) -> Floats:
+def seen_in(frame: Doubles, ways_mm: Doubles) -> Floats:
     """The same in frames (n, 3, 3) of the roots, from `frames`."""
-    return np.asarray(ways_mm.astype(np.float32) @ frame.transpose(0, 2, 1).astype(np.float32))
+    return np.asarray(np.einsum("nic,nkc->nki", frame, ways_mm), np.float32)
 
 
 def points_of(mesh: Mesh) -> Doubles:
@@ -99,17 +99,35 @@ def frames(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tuple[D
     points_mm : (p, 3) of the mesh
     """
     root, (a, b, c, d) = _places(mesh, roots, points_mm)
-    along, normal = (b - a) + (c - d), np.cross(c - a, d - b)
-    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), _LEAST)
-    normal -= (normal * along).sum(axis=1, keepdims=True) * along
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), _LEAST)
-    return root, np.stack([along, np.cross(normal, along), normal], axis=1)
+    along, normal = (b - a) + (c - d), _cross(c - a, d - b)
+    along /= np.maximum(np.sqrt(_dot(along, along)), _LEAST)
+    normal -= _dot(normal, along) * along
+    normal /= np.maximum(np.sqrt(_dot(normal, normal)), _LEAST)
+    return root.T, np.stack([along, _cross(normal, along), normal]).transpose(2, 0, 1)
+
+
+def between(share: Doubles, around: Doubles) -> Doubles:
+    """(n, c) means of values around places; share, around : (n, 4) and (n, 4, c)."""
+    return np.asarray(sum(share[:, k, None] * around[:, k] for k in range(4)))
 
 
 def _places(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:
-    """Where roots are (n, 3), and the corners of their quads (4, n, 3) [mm]."""
-    around = points_mm[corners(mesh, roots.quad)].astype(np.float64).transpose(1, 0, 2)
-    return np.einsum("nk,knc->nc", weights(roots.place), around), around
+    """Where roots are (3, n), and the corners of their quads (4, 3, n) [mm]."""
+    columns = np.ascontiguousarray(points_mm.T, np.float64)
+    around = columns[:, corners(mesh, roots.quad).T].transpose(1, 0, 2)
+    a, b, c, d = weights(roots.place).T[:, None] * around
+    return a + b + c + d, around
+
+
+def _dot(a: Doubles, b: Doubles) -> Doubles:
+    """(n,) of vectors (3, n)."""
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+def _cross(a: Doubles, b: Doubles) -> Doubles:
+    """(3, n) of vectors (3, n)."""
+    (ax, ay, az), (bx, by, bz) = a, b
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
 def finer_roots(mesh: Mesh, roots: Roots, levels: int) -> Roots:

@@ -75,25 +75,16 @@ def grown(
     rise = np.clip(rng.gamma(4.0, 0.15, n), 0.15, 1.3)
     t = np.linspace(0.0, 1.0, KNOTS)
     height = rise[:, None] * (1 - (1 - t) ** 2.2) * (1 - 0.35 * t) - 0.25 * (1 - t) ** 8
-    foot, normal = skin.foot(root_mm)
-    feet, normals = [foot], [normal]
-    for k in range(2, KNOTS, 2):  # hair is short: the skin in between is flat
+    feet, normals = ([one] for one in skin.foot(root_mm))
+    for k in range(2, KNOTS, 2):  # straight between: 0.16 mm off at most
         angle = turn + bend * (t[k - 1] + t[k]) / 2
         out = np.stack([side * np.cos(angle), np.sin(angle), np.zeros(n)], axis=-1)
-        out -= (out * normal).sum(axis=1, keepdims=True) * normal
-        out /= np.linalg.norm(out, axis=1, keepdims=True)
-        foot, normal = skin.foot(foot + (2 * length / (KNOTS - 1))[:, None] * out)
-        feet.append(foot)
-        normals.append(normal)
-    knots = _halved(feet) + height[..., None] * _halved(normals)
+        out -= (out * normals[-1]).sum(axis=1, keepdims=True) * normals[-1]
+        out *= (2 * length / (KNOTS - 1) / np.linalg.norm(out, axis=1))[:, None]
+        foot, normal = skin.foot(feet[-1] + out)
+        feet += [(feet[-1] + foot) / 2, foot]
+        normals += [(normals[-1] + normal) / 2, normal]
+    knots = np.stack(feet, axis=1) + height[..., None] * np.stack(normals, axis=1)
     radius = rng.uniform(0.03, 0.05, n) * (0.9 + 0.2 * look.bushy)
     taper = np.maximum(1.0 - t**2.5, 0.08)
     return knots, radius[:, None] * taper * np.minimum(1.0, 0.75 + t)
-
-
-def _halved(each: list[Doubles]) -> Doubles:
-    """(n, 2 m - 1, 3) of m arrays (n, 3), with means of two between them."""
-    found = np.empty((len(each[0]), 2 * len(each) - 1, 3))
-    found[:, ::2] = np.stack(each, axis=1)
-    found[:, 1::2] = 0.5 * (found[:, :-1:2] + found[:, 2::2])
-    return found

@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from dermis.human.hair import brows, lashes
-from dermis.human.hair.grown import Grown
-from dermis.human.hair.head_hair import Ground, beard_hair, scalp_hair
+from dermis.human.hair.grown import Ground, Grown, Rooted
+from dermis.human.hair.head_hair import beard_hair, scalp_hair
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.rooting import Rooting, eye_middles
-from dermis.human.hair.skin import Skin
 from dermis.mesh.head import Head
-from dermis.mesh.strands import Doubles, Roots, Strands, finer_roots, seen_in
+from dermis.mesh.strands import Doubles, Roots, Strands, seen_in
 from dermis.specular.hair import absorption_per_mm
 
 _LASHES_DARKER = 1.6
@@ -36,15 +35,13 @@ def groomed(
     recession : see `SkinLook`
     hairs : share of those of head and beard that grows, each as much wider
     """
-    levels = head.levels
-    skin, parts = Skin(head.mesh), list[Grown]()
+    ground, parts = Ground(head, plain.mesh, hairs), list[Grown]()
     for side, eye in zip((1.0, -1.0), eye_middles(plain.mesh), strict=True):
         rng = np.random.default_rng((look.seed, int(side > 0)))
-        parts.append(_brow(rooting, levels, look, skin, side, rng))
+        parts.append(_brow(ground, rooting, look, side, rng))
         for lid in (lashes.UPPER, lashes.LOWER):
-            parts.append(_lashes(rooting, levels, lid, skin, side, eye, rng))
+            parts.append(_lashes(ground, rooting, lid, side, eye, rng))
     head = replace(head, strands=_joined(parts, _absorption(parts, look)))
-    ground = Ground(plain, levels, skin, hairs)
     hair = [*scalp_hair(ground, look, recession), *beard_hair(ground, look)]
     if not hair:
         return head
@@ -60,37 +57,26 @@ def _shuffled(strands: Strands, seed: int) -> Strands:
     return replace(strands, roots=roots, **parts)
 
 
-def _brow(
-    rooting: Rooting,
-    levels: int,
-    look: HairLook,
-    skin: Skin,
-    side: float,
-    rng: np.random.Generator,
-) -> Grown:
+def _brow(ground: Ground, rooting: Rooting, look: HairLook, side: float, rng: np.random.Generator) -> Grown:
     u, v, x, y = brows.places(rng)
     roots, there = rooting.in_front(side * x, y)
     kept = np.flatnonzero(there)[: brows.count(look)]
-    roots = finer_roots(rooting.mesh, Roots(roots.quad[kept], roots.place[kept]), levels)
-    root, frame = skin.frames(roots)
-    knots, radius = brows.grown(skin, root, side, u[kept], v[kept], rng, look)
-    return Grown(roots, seen_in(frame, knots - root[:, None]), radius, 1.0)
+    where = ground.rooted(Roots(roots.quad[kept], roots.place[kept]))
+    return _grown(where, *brows.grown(ground.skin, where.places, side, u[kept], v[kept], rng, look), 1.0)
 
 
 def _lashes(
-    rooting: Rooting,
-    levels: int,
-    lid: lashes.Lid,
-    skin: Skin,
-    side: float,
-    eye: Doubles,
-    rng: np.random.Generator,
+    ground: Ground, rooting: Rooting, lid: lashes.Lid, side: float, eye: Doubles, rng: np.random.Generator
 ) -> Grown:
     u, across = lashes.places(lid, rng)
-    roots = finer_roots(rooting.mesh, rooting.beside_lid(lid, side, u, across), levels)
-    root, frame = skin.frames(roots)
-    knots, radius = lashes.grown(lid, root, eye, side, u, rng)
-    return Grown(roots, seen_in(frame, knots - root[:, None]), radius, _LASHES_DARKER)
+    where = ground.rooted(rooting.beside_lid(lid, side, u, across))
+    return _grown(where, *lashes.grown(lid, where.places, eye, side, u, rng), _LASHES_DARKER)
+
+
+def _grown(where: Rooted, knots_mm: Doubles, radius_mm: Doubles, darker: float) -> Grown:
+    """Hairs whose knots (n, k, 3) are told in the space of the person."""
+    ways = seen_in(where.frame, knots_mm - where.places[:, None])
+    return Grown(where.roots, ways, radius_mm.astype(np.float32), darker)
 
 
 def _joined(parts: list[Grown], absorption: Doubles) -> Strands:
@@ -101,8 +87,9 @@ def _joined(parts: list[Grown], absorption: Doubles) -> Strands:
     roots = Roots(*(np.concatenate(each) for each in zip(*(part.roots for part in parts), strict=True)))
     ways, radius = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
     bundle, cover = (_each(parts, name) for name in ("bundle", "cover"))
-    numbers = radius, absorption / bundle[:, None], cover
-    return Strands(roots, ways, *(one.astype(np.float32) for one in numbers))
+    return Strands(
+        roots, ways, radius, (absorption / bundle[:, None]).astype(np.float32), cover.astype(np.float32)
+    )
 
 
 def _each(parts: list[Grown], name: str) -> Doubles:

@@ -1,22 +1,25 @@
-"""Hairs between guides: a few hundred of these follow the skin, and tens of thousands of hairs go along."""
+"""Hairs between guides: these follow the skin from corners of quads, and tens of thousands go along."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.human.hair.combing import Combed, along_skin
-from dermis.human.hair.rooting import Index
+from dermis.human.hair.grown import Ground, Rooted
+from dermis.human.hair.hairy_skin import told
 from dermis.human.hair.skin import Skin
+from dermis.mesh.geometry import compacted
 from dermis.mesh.mesh import Floats
-from dermis.mesh.strands import Doubles
+from dermis.mesh.strands import Doubles, Roots, corners, weights
 
-_BESIDE = 4  # guides that a hair goes along with
 _TUFT_MM = 2.2  # between tufts
-_RAGGED = 0.3  # of that, by which tufts mix with those beside them
 _LEAST_OVER_MM = 0.35  # the skin
 _HEAD_MM = 85.0  # radius
+_LEAST = np.float32(1e-9)
 
 
 class Roughness(NamedTuple):
@@ -38,133 +41,138 @@ class Roughness(NamedTuple):
     coils: float = 0.0
 
 
-def guides(skin: Skin, root_mm: Doubles, combed: Combed, knots: int) -> Doubles:
-    """(n, k, 3) ways from roots (n, 3) to knots, over the skin [mm]."""
-    foot, normal = skin.foot(root_mm)
+def grown(
+    ground: Ground,
+    roots: Roots,
+    comb: Callable[[Doubles, Doubles], Combed],
+    knots: int,
+    rough: Roughness,
+    rng: np.random.Generator,
+) -> tuple[Rooted, Floats]:
+    """Hairs on the head, and (k, 3, n) ways from their roots to their knots [mm].
+
+    roots : on quads of the plain mesh, at whose corners the guides of their hairs grow
+    comb : how guides lie, by their places on the average person and the skin's normals, both (g, 3)
+
+    Hairs come last in all arrays here, so that what is done to one is done to all at once. What must be the
+    same on all machines is so: sines are taken of doubles, and floats are only added and multiplied.
+    """
+    hair, around = ground.rooted(roots), corners(ground.plain, roots.quad)
+    point, near = compacted(around)
+    root_mm = ground.points_mm[point]
+    foot, normals = ground.skin.foot(root_mm)
+    ways = _guides(ground.skin, root_mm, foot, normals, comb(told()[point, :3], normals), knots)
+    t, normal = np.linspace(0.0, 1.0, knots)[:, None], hair.along[2]
+    found = _astray(_between(weights(roots.place), near, ways), normal, rough, rng)
+    _draw_together(found, hair.places, t, rough.tufts, rng)
+    tips = found[-1]
+    size = np.asarray(rough.frizz * np.sqrt(dots(tips, tips)), np.float32)
+    for fade, part in _waves(size, t, rng):
+        found += fade[..., None].astype(np.float32) * part
+    if rough.coil_mm:
+        found += _coils(found[-1], t, rough, rng)
+    return hair, _over_skin(found, normal, t.astype(np.float32))
+
+
+def _guides(
+    skin: Skin, root_mm: Doubles, foot: Doubles, normal: Doubles, combed: Combed, knots: int
+) -> Doubles:
+    """(g, k, 3) ways from roots to knots, over the skin [mm].
+
+    root_mm, foot, normal : (g, 3) with what `Skin.foot` says of them
+    """
     off = root_mm - foot  # as far as the skin of few vertices is from the surface
-    way, height = combed.way, np.zeros(len(root_mm))
-    step = combed.length_mm / (knots - 1)
-    found = [root_mm]
+    way, height, step = combed.way, np.zeros(len(root_mm)), combed.length_mm / (knots - 1)
+    found = [np.zeros_like(root_mm)]
     for k in range(1, knots):
         rise = combed.rise + (combed.last_rise - combed.rise) * (k - 0.5) / (knots - 1)
         height = np.maximum(height + step * np.sin(rise), _LEAST_OVER_MM)
         way = along_skin(way, normal)
         foot, normal = skin.foot(foot + (step * np.cos(rise))[:, None] * way)
-        found.append(foot + off + height[:, None] * normal)
-    return np.stack(found, axis=1) - root_mm[:, None]
+        found.append(foot + off + height[:, None] * normal - root_mm)
+    return np.stack(found, axis=1)
 
 
-def grown(
-    root_mm: Doubles,
-    normal: Doubles,
-    guide_mm: Doubles,
-    ways: Doubles,
-    rough: Roughness,
-    rng: np.random.Generator,
-) -> Floats:
-    """(n, k, 3) ways from the roots of hairs to their knots [mm].
+def dots(a: Floats, b: Floats) -> Floats:
+    """(..., n) products of vectors (..., 3, n)."""
+    x, y, z = (a[..., c, :] * b[..., c, :] for c in range(3))
+    return np.asarray(x + y + z)
 
-    root_mm, normal : (n, 3) of the hairs
-    guide_mm, ways : (g, 3) and (g, k, 3) of the guides
+
+def _crosses(a: Floats, b: Floats) -> Floats:
+    """(..., 3, n) of vectors (3, n) and (..., 3, n)."""
+    (ax, ay, az), (bx, by, bz) = a, (b[..., c, :] for c in range(3))
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-2)
+
+
+def _between(share: Doubles, near: NDArray[np.int64], ways: Doubles) -> Floats:
+    """(k, 3, n) means of guides' ways.
+
+    share, near : (n, 4) of which guides
     """
-    t = np.linspace(0.0, 1.0, ways.shape[1], dtype=np.float32)
-    up = normal.astype(np.float32)
-    first, tuft = _tufts(root_mm, rng)
-    found = _astray(_between(root_mm[first], guide_mm, ways)[tuft], up, rough, rng)
-    _draw_together(found, root_mm.astype(np.float32), first[tuft], (rough.tufts, t), rng)
-    size = rough.frizz * np.linalg.norm(found[:, -1], axis=1)
-    found += _waves(size, t, rng)
-    if rough.coil_mm:
-        found += _coils(found[:, -1], t, rough, rng)
-    return _over_skin(found, up, t)
-
-
-def _tufts(root_mm: Doubles, rng: np.random.Generator) -> tuple[Index, Index]:
-    """A hair of each tuft (m,), and the tuft of each hair (n,): hairs of a tuft have their way in common.
-
-    They are cells of a grid, whose borders nobody sees, as hairs beside them are of one or the other.
-    """
-    cell = np.floor(root_mm / _TUFT_MM + rng.normal(0.0, _RAGGED, root_mm.shape)).astype(np.int64)
-    cell -= cell.min(axis=0)
-    wide, high, deep = (cell.max(axis=0) + 1).tolist()
-    number = np.ravel_multi_index(cell.T, (wide, high, deep))
-    _, first, tuft = np.unique(number, return_index=True, return_inverse=True)
-    return first, tuft
-
-
-def _between(root_mm: Doubles, guide_mm: Doubles, ways: Doubles) -> Floats:
-    """Means of the nearest guides' ways."""
     from scipy.sparse import csr_array
-    from scipy.spatial import cKDTree
 
-    n, g = len(root_mm), len(guide_mm)
-    far, near = cKDTree(guide_mm).query(root_mm, k=_BESIDE)
-    share = 1.0 / (np.asarray(far) ** 2 + 4.0)
-    share /= share.sum(axis=1, keepdims=True)
-    first = np.arange(0, _BESIDE * n + 1, _BESIDE)
-    shares = csr_array((share.ravel(), np.asarray(near).ravel(), first), shape=(n, g))
-    found = np.asarray(shares @ ways.reshape(g, -1))
-    return found.reshape(n, *ways.shape[1:]).astype(np.float32)
+    first = np.arange(0, share.size + 1, share.shape[1])
+    shares = csr_array((share.ravel().astype(np.float32), near.ravel(), first), (len(share), len(ways)))
+    found = shares @ ways.reshape(len(ways), -1).astype(np.float32)
+    return np.ascontiguousarray(found.T).reshape(*ways.shape[1:], len(share))
 
 
 def _astray(ways: Floats, normal: Floats, rough: Roughness, rng: np.random.Generator) -> Floats:
     """Turned about the skin's normal, each as a whole, leaning more or less, and longer or shorter."""
-    n = len(ways)
+    n = ways.shape[-1]
     angle, lean = rough.astray * rng.standard_t(4, size=n), 1.0 + rough.astray * rng.normal(size=n)
     length = np.clip(1.0 + rough.uneven * rng.normal(size=n), 0.35, 1.2)
-    cos, sin = np.cos(angle), np.sin(angle)
-    along, cos, sin = ((length * one).astype(np.float32) for one in (lean - cos, cos, sin))
-    turn = normal[:, :, None] * (along[:, None] * normal)[:, None, :]
-    turn += cos[:, None, None] * np.eye(3, dtype=np.float32)
-    x, y, z = sin * normal.T
-    for i, j, part in ((1, 0, -z), (2, 0, y), (2, 1, -x)):  # transposed: ways are rows
-        turn[:, i, j] += part
-        turn[:, j, i] -= part
-    return ways @ turn
+    stay, turn = length * np.cos(angle), length * np.sin(angle)
+    stay, turn, rise = (one.astype(np.float32) for one in (stay, turn, length * lean - stay))
+    found: Floats = turn * _crosses(normal, ways)
+    found += (rise * dots(ways, normal))[:, None] * normal
+    found += stay * ways
+    return found
 
 
-def _draw_together(
-    ways: Floats, root_mm: Floats, which: Index, much: tuple[float, Floats], rng: np.random.Generator
-) -> None:
-    """Draw tips to those of others.
-
-    which : (n,) of each hair, the hair that it is drawn to
-    much : how much, and places along a hair (k,)
-    """
-    share = (much[0] * rng.uniform(0.3, 1.0, len(ways))).astype(np.float32)[:, None] * much[1] ** 1.3
-    apart = ways[which] - ways
-    apart += (root_mm[which] - root_mm)[:, None]
-    apart *= share[:, :, None]
+def _draw_together(ways: Floats, root_mm: Doubles, t: Doubles, much: float, rng: np.random.Generator) -> None:
+    """Draw tips to those of a few, in tufts."""
+    at = np.floor(root_mm / _TUFT_MM).astype(np.int64)
+    at -= at.min(axis=0)
+    cell = np.asarray(np.ravel_multi_index(at.T, (at.max(axis=0) + 1).tolist()))
+    hair = np.empty(cell.max() + 1, np.int64)
+    hair[cell] = np.arange(len(cell))  # one of those in each
+    which = hair[cell]
+    drawn = (much * rng.uniform(0.3, 1.0, len(root_mm)) * t**1.3).astype(np.float32)
+    apart = ways[..., which]
+    apart -= ways
+    apart += (root_mm[which] - root_mm).T.astype(np.float32)
+    apart *= drawn[:, None]
     ways += apart
 
 
-def _waves(size: Floats, t: Floats, rng: np.random.Generator) -> Floats:
-    """(n, k, 3) smooth, 0 at roots; size : (n,)."""
-    n, fade, parts, basis = len(size), np.minimum(2 * t, 1.0), list[Doubles](), list[Doubles]()
+def _waves(size: Floats, t: Doubles, rng: np.random.Generator) -> Iterator[tuple[Doubles, Floats]]:
+    """Smooth ways whose sum is 0 at roots: how much (k, 1) of each of some (3, n); size : (n,)."""
+    fade = np.minimum(2 * t, 1.0)
     for waves in (0.5, 1.1):
-        phase, much = rng.uniform(0, 2 * np.pi, (n, 3)), rng.uniform(-1, 1, (n, 3))
-        phase, much = phase.astype(np.float32), (much * size[:, None] / waves).astype(np.float32)
-        parts += [much * np.cos(phase), much * np.sin(phase)]  # of a sum of angles
-        basis += [fade * np.sin(2 * np.pi * waves * t), fade * (np.cos(2 * np.pi * waves * t) - 1.0)]
-    return np.asarray(np.stack(basis, axis=-1) @ np.stack(parts, axis=1), np.float32)
+        for shape in (np.sin(2 * np.pi * waves * t), np.cos(2 * np.pi * waves * t) - 1.0):
+            much = rng.random((3, len(size)), np.float32) - np.float32(0.5)
+            yield np.sqrt(2.0) / waves * fade * shape, much * size
 
 
-def _coils(tips: Floats, t: Floats, rough: Roughness, rng: np.random.Generator) -> Floats:
-    """(n, k, 3) turns around the ways to tips (n, 3), from the root on."""
-    n = len(tips)
-    along = tips / np.maximum(np.linalg.norm(tips, axis=1, keepdims=True), 1e-9)
-    side = along_skin(rng.normal(size=tips.shape), along).astype(np.float32)
-    turns = rough.coils * rng.uniform(0.8, 1.2, (n, 1)) * t + rng.random((n, 1))
-    turns = (2 * np.pi * turns).astype(np.float32)
-    radius = (rough.coil_mm * rng.uniform(0.6, 1.2, (n, 1))).astype(np.float32) * np.minimum(4 * t, 1.0)
-    x, y = radius * np.cos(turns), radius * np.sin(turns)
-    return np.asarray(x[..., None] * side[:, None] + y[..., None] * np.cross(along, side)[:, None])
+def _coils(tips: Floats, t: Doubles, rough: Roughness, rng: np.random.Generator) -> Floats:
+    """(k, 3, n) turns around the ways to tips (3, n), from the root on."""
+    n = tips.shape[-1]
+    along = np.asarray(tips / np.maximum(np.sqrt(dots(tips, tips)), _LEAST), np.float32)
+    side: Floats = rng.normal(size=tips.shape).astype(np.float32)
+    side -= dots(side, along) * along
+    side /= np.maximum(np.sqrt(dots(side, side)), _LEAST)
+    turns = 2 * np.pi * (rough.coils * rng.uniform(0.8, 1.2, n) * t + rng.random(n))
+    radius = rough.coil_mm * rng.uniform(0.6, 1.2, n) * np.minimum(4 * t, 1.0)
+    x, y = ((radius * one)[:, None].astype(np.float32) for one in (np.cos(turns), np.sin(turns)))
+    return np.asarray(x * side + y * _crosses(along, side))
 
 
 def _over_skin(ways: Floats, normal: Floats, t: Floats) -> Floats:
     """Lifted where a knot would be in the skin, taken as round as a head."""
-    height = (ways @ normal[:, :, None])[..., 0]
-    flat2 = np.einsum("nkc,nkc->nk", ways, ways) - height**2
+    height = dots(ways, normal)
+    flat2 = dots(ways, ways) - height**2
     least = _LEAST_OVER_MM * np.minimum(3 * t, 1.0) - flat2 / (2 * _HEAD_MM)
-    ways += np.maximum(least - height, 0.0)[..., None] * normal[:, None]
+    ways += np.maximum(least - height, 0.0)[:, None] * normal
     return ways

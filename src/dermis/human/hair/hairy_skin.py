@@ -13,7 +13,7 @@ from dermis.human.hair.rooting import Index
 from dermis.human.skin.face import AMOUNTS, DEGREES, hairline, zones
 from dermis.human.skin.surface import FIELDS, average
 from dermis.mesh.mesh import Floats, Mesh
-from dermis.mesh.strands import Doubles, Roots, corners, weights
+from dermis.mesh.strands import Doubles, Roots, between, corners, weights
 from dermis.tables import read_rows
 
 HEAD_AXIS_Z = -72.0
@@ -41,15 +41,8 @@ class Where(NamedTuple):
     near: NDArray[np.bool_]
 
 
-class Rooted(NamedTuple):
-    """Roots in no order, and where they are on the average person (n, 3) [mm]."""
-
-    roots: Roots
-    places: Doubles
-
-
-def rooted(plain: Mesh, where: Where, per_cm2: float, rng: np.random.Generator) -> Rooted:
-    """Roots on the skin, evenly but for chance; none on ears, lips and in the mouth.
+def rooted(plain: Mesh, where: Where, per_cm2: float, rng: np.random.Generator) -> Roots:
+    """Roots on the skin, evenly but for chance, quad after quad; none on ears, lips and in the mouth.
 
     plain : the person's mesh of control points
     per_cm2 : density where the share is 1
@@ -64,10 +57,8 @@ def rooted(plain: Mesh, where: Where, per_cm2: float, rng: np.random.Generator) 
     number = np.arange(len(which)) + np.repeat(ends - np.cumsum(many[near]), many[near])
     step = number - (np.cumsum(many) - many)[which]
     place = np.mod(began[which] + step[:, None] * _STEPS, 1.0)
-    told = np.einsum("nk,nkc->nc", weights(place), _told()[around[which]])
-    kept = np.flatnonzero(chance[number] < where.amount(told))
-    rng.shuffle(kept)
-    return Rooted(Roots(quad[which[kept]].astype(np.int32), place[kept].astype(np.float32)), told[kept, :3])
+    kept = chance[number] < where.amount(between(weights(place), told()[around][which]))
+    return Roots(quad[which[kept]].astype(np.int32), place[kept].astype(np.float32))
 
 
 def above_hairline(places: Doubles, recession: float = 0.0) -> Doubles:
@@ -99,12 +90,12 @@ def beard() -> Where:
 
 @cache
 def _near_scalp() -> NDArray[np.bool_]:
-    return above_hairline(_told()) > -_BELOW_MM
+    return above_hairline(told()) > -_BELOW_MM
 
 
 @cache
 def _near_beard() -> NDArray[np.bool_]:
-    return _amount("beard", zones(), _told()) > _BESIDE
+    return _amount("beard", zones(), told()) > _BESIDE
 
 
 def _bearded(places: Doubles) -> Doubles:
@@ -137,7 +128,7 @@ def _amount(name: str, rows: Floats, places: Doubles) -> Doubles:
 
 
 @cache
-def _told() -> Doubles:
+def told() -> Doubles:
     """(p, 4) of control points their place on the average person, and how far inside the lips [mm]."""
     places, told = average()
     return np.column_stack([places, told[:, FIELDS.index("lips")]]).astype(np.float64)

@@ -2,60 +2,26 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import partial
 
 import numpy as np
 
 from dermis.human.hair import hairy_skin
 from dermis.human.hair.combing import combed, combed_beard
-from dermis.human.hair.grown import Grown
-from dermis.human.hair.growth import Roughness, grown, guides
-from dermis.human.hair.hairy_skin import Rooted
+from dermis.human.hair.grown import Ground, Grown, Rooted
+from dermis.human.hair.growth import Roughness, dots, grown
 from dermis.human.hair.look import HairLook
-from dermis.human.hair.skin import Skin
-from dermis.mesh.head import Head
 from dermis.mesh.mesh import Floats
-from dermis.mesh.strands import Doubles, Roots, finer_roots, seen_in
 
 MOST_PER_CM2 = 200.0
 """Hairs of the densest heads."""
 BEARD_PER_CM2 = 60.0
 """Hairs of beards."""
-_GUIDES_PER_CM2 = 1.6
 _HAIR_MM, _BEARD_MM = 0.034, 0.048  # radius of a hair
+_TIP = 0.6  # of that, at the tip
 _STRAIGHT_KNOTS, _BENT_KNOTS, _COILED_KNOTS = 5, 7, 9
 _TIGHT = 0.5  # curl from which on there are coils
 _LONG_BEARD_MM = 8.0
-
-
-class Set(NamedTuple):
-    """Roots, where they are (n, 3) [mm], and how their quads lie (n, 3, 3)."""
-
-    roots: Roots
-    places: Doubles
-    frame: Doubles
-
-    @property
-    def normals(self) -> Doubles:
-        """(n, 3) of the skin."""
-        return self.frame[:, 2]
-
-
-class Ground(NamedTuple):
-    """What hair grows on: the head before it was subdivided so many times, and the skin after that.
-
-    share : of the usual number of hairs that grows, each as much wider
-    """
-
-    plain: Head
-    levels: int
-    skin: Skin
-    share: float = 1.0
-
-    def rooted(self, where: Rooted) -> Set:
-        """Roots on the head as it is drawn."""
-        roots = finer_roots(self.plain.mesh, where.roots, self.levels)
-        return Set(roots, *self.skin.frames(roots))
 
 
 def knots_of(look: HairLook) -> int:
@@ -69,35 +35,27 @@ def scalp_hair(ground: Ground, look: HairLook, recession: float) -> list[Grown]:
     """The hair of the head; none for a bald one."""
     if look.style == "none" or look.density == 0.0:
         return []
-    rng, where = np.random.default_rng((look.seed, 3)), hairy_skin.scalp(recession)
-    drawn = ground.share * (22.0 + 53.0 * look.density)
-    few, many = (hairy_skin.rooted(ground.plain.mesh, where, n, rng) for n in (_GUIDES_PER_CM2, drawn))
-    guide, hair = ground.rooted(few), ground.rooted(many)
-    lie = combed(few.places, guide.normals, look, recession)
-    ways = guides(ground.skin, guide.places, lie, knots_of(look))
-    found = grown(hair.places, hair.normals, guide.places, ways, _roughness(look), rng)
-    return [_stranded(hair, found, drawn, MOST_PER_CM2 * look.density, _HAIR_MM, rng)]
+    rng, drawn = np.random.default_rng((look.seed, 3)), ground.share * (22.0 + 53.0 * look.density)
+    roots = hairy_skin.rooted(ground.plain, hairy_skin.scalp(recession), drawn, rng)
+    comb = partial(combed, look=look, recession=recession)
+    hair, ways = grown(ground, roots, comb, knots_of(look), _roughness(look), rng)
+    return [_stranded(hair, ways, drawn, MOST_PER_CM2 * look.density, _HAIR_MM, rng)]
 
 
 def beard_hair(ground: Ground, look: HairLook) -> list[Grown]:
     """The beard; none for a shaved one."""
     if look.beard_mm == 0.0:
         return []
-    rng, mesh = np.random.default_rng((look.seed, 4)), ground.plain.mesh
-    drawn = ground.share * BEARD_PER_CM2
-    both = _GUIDES_PER_CM2, drawn
-    few, many = (hairy_skin.rooted(mesh, hairy_skin.beard(), density, rng) for density in both)
-    guide, hair = ground.rooted(few), ground.rooted(many)
-    lie = combed_beard(few.places, guide.normals, look)
-    ways = guides(ground.skin, guide.places, lie, knots_of(look))
+    rng, drawn = np.random.default_rng((look.seed, 4)), ground.share * BEARD_PER_CM2
+    roots = hairy_skin.rooted(ground.plain, hairy_skin.beard(), drawn, rng)
     tight = max(look.curl - _TIGHT, 0.0) * 2
     rough = Roughness(0.3, 0.22, 0.2, 0.05 + 0.1 * look.curl, 0.5 * tight, 1.5)
-    found = grown(hair.places, hair.normals, guide.places, ways, rough, rng)
-    return [_stranded(hair, found, drawn, BEARD_PER_CM2, _BEARD_MM, rng)]
+    hair, ways = grown(ground, roots, partial(combed_beard, look=look), knots_of(look), rough, rng)
+    return [_stranded(hair, ways, drawn, BEARD_PER_CM2, _BEARD_MM, rng)]
 
 
 def _stranded(
-    hair: Set,
+    hair: Rooted,
     ways: Floats,
     drawn: float,
     true: float,
@@ -106,14 +64,19 @@ def _stranded(
 ) -> Grown:
     """Hairs with their width; fewer than there are, and wider.
 
+    ways : (k, 3, n) from `grown`
     drawn, true : how many are made and how many there are on a square centimetre
     """
-    bundle, t = true / drawn, np.linspace(0.0, 1.0, ways.shape[1])
-    thick = bundle * radius_mm * rng.uniform(0.8, 1.2, len(ways))
-    radius = thick[:, None] * np.where(t < 1.0, 1.0, 0.6)
-    length = np.linalg.norm(np.diff(ways, axis=1), axis=2).sum(axis=1)
+    bundle, (knots, _, n) = true / drawn, ways.shape
+    radius = np.tile((bundle * radius_mm * rng.uniform(0.8, 1.2, (n, 1))).astype(np.float32), knots)
+    radius[:, -1] *= np.float32(_TIP)
+    steps = np.diff(ways, axis=0)
+    length = np.sqrt(dots(steps, steps)).sum(axis=0, dtype=np.float64)
     area = float(np.mean(2.0 * radius.mean(axis=1) * length))  # seen from the side; halved as hair leans
-    return Grown(hair.roots, seen_in(hair.frame, ways), radius, 1.0, bundle, 0.5 * area * drawn / 100.0)
+    seen = np.empty((n, knots, 3), np.float32)
+    for c in range(3):
+        seen[..., c] = dots(ways, hair.along[c]).T
+    return Grown(hair.roots, seen, radius, 1.0, bundle, 0.5 * area * drawn / 100.0)
 
 
 def _roughness(look: HairLook) -> Roughness:

@@ -15,7 +15,7 @@ from dermis.mesh.strands import Doubles, Roots, corners
 
 Index = NDArray[np.int64]
 _ENDS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)  # of a quad
-_CELL_MM = 1.0  # of the grid that triangles are listed in
+_CELL_MM = 2.0  # of the grid that triangles are listed in
 _LOW, _HIGH = np.array([-70.0, -20.0]), np.array([70.0, 50.0])  # of places in front, around the brows [mm]
 
 
@@ -61,25 +61,25 @@ class Rooting:
         """Roots on what faces the viewer at places of the front plane (n,) [mm], and which there are."""
         front = self._front
         cell = np.floor((np.column_stack([x, y]) - _LOW) / _CELL_MM).astype(np.int64)
-        column, row = np.clip(cell, 0, np.array(front.listed.shape[:2]) - 1).T
-        quad, place = np.zeros(len(x), np.int32), np.zeros((len(x), 2), np.float32)
-        best = np.full(len(x), -np.inf)
-        for each in front.listed[column, row].T:
-            asked = np.flatnonzero(each >= 0)
-            which = each[asked]
-            a, b, c = front.corner[which].transpose(1, 2, 0)
-            off_x, off_y = x[asked] - a[0], y[asked] - a[1]
-            det = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
-            v = (off_x * (c[1] - a[1]) - (c[0] - a[0]) * off_y) / det
-            w = ((b[0] - a[0]) * off_y - off_x * (b[1] - a[1])) / det
-            share = np.stack([1 - v - w, v, w], axis=-1)
-            z = share[:, 0] * a[2] + share[:, 1] * b[2] + share[:, 2] * c[2]
-            inside = (share >= -1e-9).all(axis=1) & (z > best[asked])
-            won, which = asked[inside], which[inside]
-            best[won], quad[won] = z[inside], front.quad[which]
-            ends = _ENDS[_HALVES[front.half[which]]]
-            place[won] = np.clip(np.einsum("nk,nkc->nc", share[inside], ends), 0.0, 1.0)
-        return Roots(quad, place), np.isfinite(best)
+        listed = front.listed[tuple(np.clip(cell, 0, np.array(front.listed.shape[:2]) - 1).T)]
+        asked, column = np.nonzero(listed >= 0)
+        which = listed[asked, column]
+        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = front.corner[which].transpose(1, 2, 0)
+        px, py = x[asked], y[asked]
+        det = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
+        v = ((px - ax) * (cy - ay) - (cx - ax) * (py - ay)) / det
+        w = ((bx - ax) * (py - ay) - (px - ax) * (by - ay)) / det
+        share = np.stack([1 - v - w, v, w], axis=-1)
+        inside = np.flatnonzero(share.min(axis=1) >= -1e-9)
+        z = (az + v * (bz - az) + w * (cz - az))[inside]
+        won = np.full(len(x), -1)
+        order = inside[np.argsort(z)]
+        won[asked[order]] = order  # the last one stays: the foremost
+        there = won >= 0
+        which, share = which[won], share[won]
+        place = np.einsum("nk,nkc->nc", share, _ENDS[_HALVES[front.half[which]]])
+        quad = np.where(there, front.quad[which], 0)
+        return Roots(quad.astype(np.int32), np.clip(place, 0.0, 1.0).astype(np.float32)), there
 
     def beside_lid(self, lid: lashes.Lid, side: float, u: Doubles, across: Doubles) -> Roots:
         """Roots along a lid's edge, on the quads beside it that are farther from the eye.

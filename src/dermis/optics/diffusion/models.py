@@ -60,20 +60,17 @@ def diffusion_profile(
     if closed or model == "better-dipole":
         grid = np.geomspace(1e-6, 1e3, 1500)
         values = _pointwise(medium, model, clamp, grid)
+        values = values if rgb is None else values @ rgb.T
     else:
-        grid = hankel.radii()  # of three colours instead of all wavelengths: the transform is linear
-        values = hankel.to_radius(_seen(transform(medium, model, clamp, hankel.frequencies()), medium, rgb))
+        grid = hankel.radii()
+        spread = transform(medium, model, clamp, hankel.frequencies())
+        values = hankel.to_radius(spread if rgb is None else spread @ rgb.T)
     if model == "better-dipole":
         total = enclosed(grid[-1:], grid, values)[0]
     else:
-        total = _seen(transform(medium, model, clamp, hankel.STILL), medium, rgb)[0]
+        total = transform(medium, model, clamp, hankel.STILL)[0]
     near = (grid > 1e-7) & (grid < 1e3)  # beyond, the numbers are noise
     return _assemble(medium, model, clamp, grid[near], values[near], total, rgb)
-
-
-def _seen(light: Floats, medium: Medium, rgb: Floats | None) -> Floats:
-    """Light (n, c) in linear Rec. 709 per incident power, where wavelengths are weighed for that."""
-    return light if rgb is None else (1.0 - normal_reflectance(medium.eta)) * light @ rgb.T
 
 
 def transform(medium: Medium, model: Model, clamp: Clamp, frequency: Floats) -> Floats:
@@ -110,6 +107,9 @@ def _assemble(
     total: Floats,
     rgb: Floats | None,
 ) -> RadialProfile:
+    if rgb is not None:
+        entering = 1.0 - normal_reflectance(medium.eta)
+        values, total = entering * values, entering * total @ rgb.T
     edges, radius = ring_edges(), radius_grid()
     ring_energy = np.diff(enclosed(edges, grid, values), axis=0)
     return RadialProfile(

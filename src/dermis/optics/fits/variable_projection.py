@@ -16,7 +16,7 @@ Design = Callable[[Floats], tuple[Floats, Floats]]
 _MOST_STEPS = 100
 _LONGEST_STEP = 1.0
 STILL = 1e-7
-"""Share of the cost that a step has to save."""
+"""Share of the cost that a step must save for another one."""
 _HOPELESS = 1e8
 _BLOCK = 512
 
@@ -40,7 +40,7 @@ def descend(
     samples : (n, c)
     log_variance : (k,) start
     bounds : of the log variances
-    still : share of the cost that a step has to save for another to follow
+    still : share of the cost that a step must save for another one
     """
     fit = _project(design, samples, log_variance)
     damping = 1e-2
