@@ -1,0 +1,27 @@
+// Irradiance of each cell of the uv square by the light that patches of the skin send it through the air.
+//#include "each.wgsl"
+
+@group(0) @binding(0) var<storage, read> first: array<u32>; // where the links of each cell begin
+@group(0) @binding(1) var<storage, read> links: array<vec2u>; // patch, form factor
+@group(0) @binding(2) var<storage, read> held: array<f32>; // how well each cell is known
+@group(0) @binding(3) var<storage, read> patches: array<vec4f>; // light that leaves
+@group(0) @binding(4) var<storage, read_write> from_skin: array<vec4f>; // as interreflection.wgsl reads it
+
+@compute @workgroup_size(EACH)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let index = number_of(group, groups, lane);
+    if (index >= arrayLength(&from_skin)) {
+        return;
+    }
+    var sum = vec3f(0.0);
+    let end = min(first[index + 1u], arrayLength(&links));
+    for (var k = first[index]; k < end; k++) {
+        let link = links[k];
+        sum += bitcast<f32>(link.y) * patches[link.x].rgb;
+    }
+    from_skin[index] = held[index] * vec4f(sum, 1.0);
+}
