@@ -20,10 +20,12 @@ SIDE = 128
 """Cells along the side of the uv square that take light; 2 x 2 of them are a patch that gives it."""
 SAMPLES = 8
 """Places at which a patch is lit."""
-BUNDLES, LINES = 128, 256  # directions of parallel lines, and lines along the side of each bundle
+BUNDLES, LINES = 128, (96, 256)  # directions of parallel lines; least and most lines along a bundle's side
+_FEW = 12, 64  # the same, to learn whether a surface sees anything of itself
 _FORM = 1  # raise when `find_links` gives other results
 _LEAST = 1e-3  # share of the hemisphere below which links are left out, and the others made up for them
 _SEED = 20
+_ROW = 4096  # of lines: more than a bundle has along its side
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,21 +79,33 @@ def find_links(mesh: Mesh, place: NDArray[np.float32], mapped: NDArray[np.bool_]
     Lines are spread evenly over all directions and places, so those that leave a patch are as many as its light
     has ways, and the share of them that meets another patch next is the form factor.
     """
+    seen, left = _seen(mesh, place, mapped, *_FEW)
+    if len(seen):
+        lines = int(np.clip(np.sqrt(len(mesh.triangles)), *LINES))
+        seen, left = _seen(mesh, place, mapped, BUNDLES, lines)
+    return _links(seen, left, mesh, place, mapped)
+
+
+def _seen(
+    mesh: Mesh, place: NDArray[np.float32], mapped: NDArray[np.bool_], bundles: int, lines: int
+) -> tuple[Index, Floats]:
+    """(m, 2) cells at both ends of lines through the air, and (SIDE^2,) how many lines left each cell.
+
+    bundles, lines : directions, and lines along the side of each
+    """
     corners = mesh.positions[mesh.triangles].astype(np.float64)
-    middle = 0.5 * (corners.min(axis=(0, 1)) + corners.max(axis=(0, 1)))
-    radius = float(np.linalg.norm(corners - middle, axis=2).max()) or 1.0
-    rng, towards = np.random.default_rng(_SEED), _half_sphere(BUNDLES)
-    left, met = np.zeros(SIDE * SIDE), []
-    usual: list[NDArray[np.uint64]] = []
-    for way in towards:
-        axes = _axes(way, rng.uniform(0.0, 2.0 * np.pi)) * (0.5 * LINES / radius)
-        points = (corners - middle) @ axes.T + np.append(0.5 * LINES + rng.uniform(-0.5, 0.5, 2), 0.0)
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    corners -= 0.5 * (low + high)
+    per_mm = 0.5 * lines / (float(np.linalg.norm(corners, axis=2).max()) or 1.0)
+    rng, left, seen = np.random.default_rng(_SEED), np.zeros(SIDE * SIDE), [np.zeros((0, 2), np.int64)]
+    for way in _half_sphere(bundles):
+        axes = per_mm * _axes(way, rng.uniform(0.0, 2.0 * np.pi))
+        points = corners @ axes.T + np.append(lines + rng.uniform(-0.5, 0.5, 2), 0.0)
         line, depth, outward, triangle, weights = crossings(points)
         cell = np.where(mapped[triangle], _cells(place[triangle], weights), -1)
         left += np.bincount(cell[cell >= 0], minlength=SIDE * SIDE)
-        met.append(_neighbours(line, depth, outward, cell))
-    del usual
-    return _links(np.concatenate(met), left, mesh, place, mapped)
+        seen.append(_through_air(line, depth, outward, cell))
+    return np.concatenate(seen), left
 
 
 def crossings(points: Floats) -> tuple[Index, Floats, NDArray[np.bool_], Index, Floats]:
@@ -121,11 +135,11 @@ def crossings(points: Floats) -> tuple[Index, Floats, NDArray[np.bool_], Index, 
     inside = (across * np.sign(area)[:, None] >= 0.0).all(axis=1) & (area != 0.0)
     weights = across[inside] / area[inside, None]
     depth = (weights * points[triangle[inside], :, 2]).sum(axis=1)
-    line = y[inside].astype(np.int64) * (4 * LINES) + x[inside].astype(np.int64)
+    line = (y[inside] * _ROW + x[inside]).astype(np.int64)
     return line, depth, area[inside] > 0.0, triangle[inside], weights
 
 
-def _neighbours(line: Index, depth: Floats, outward: NDArray[np.bool_], cell: Index) -> Index:
+def _through_air(line: Index, depth: Floats, outward: NDArray[np.bool_], cell: Index) -> Index:
     """(m, 2) cells that lines leave, and the cell where each next meets the surface, -1 for one without texels.
 
     Both ways along each line; those that meet nothing more are not among them.
@@ -182,9 +196,7 @@ def _links(
     )
 
 
-def _rows(
-    giver: Index, patch: Index, left: Floats, patches: int
-) -> tuple[Words, Words, NDArray[np.float32]]:
+def _rows(giver: Index, patch: Index, left: Floats, patches: int) -> tuple[Words, Words, NDArray[np.float32]]:
     """Where each row begins, the patches that it leads to, and their shares."""
     pair, lines = np.unique(giver * max(patches, 1) + patch, return_counts=True)
     row, column = pair // max(patches, 1), pair % max(patches, 1)
@@ -196,9 +208,7 @@ def _rows(
     return first.astype(np.uint32), column[kept].astype(np.uint32), share.astype(np.float32)
 
 
-def _patches(
-    mesh: Mesh, place: NDArray[np.float32], mapped: NDArray[np.bool_]
-) -> tuple[Index, Words, Words]:
+def _patches(mesh: Mesh, place: NDArray[np.float32], mapped: NDArray[np.bool_]) -> tuple[Index, Words, Words]:
     """(SIDE^2,) the patch of each cell, -1 for none, and places of all patches, evenly over their surface."""
     corners = mesh.positions[mesh.triangles].astype(np.float64)
     area = 0.5 * np.linalg.norm(
@@ -219,9 +229,11 @@ def _patches(
     own, first, size = np.unique(patch[order], return_index=True, return_counts=True)
     number = np.full((SIDE // 2) ** 2, -1)
     number[own] = np.arange(len(own))
-    chosen = order[(first[:, None] + np.arange(SAMPLES) % np.minimum(size, SAMPLES)[:, None]).ravel()] if len(
-        own
-    ) else order[:0]
+    chosen = (
+        order[(first[:, None] + np.arange(SAMPLES) % np.minimum(size, SAMPLES)[:, None]).ravel()]
+        if len(own)
+        else order[:0]
+    )
     packed = np.rint(65535 * weights[chosen]).astype(np.uint32)
     y, x = np.divmod(np.arange(SIDE * SIDE), SIDE)
     patch_of = number[(y // 2) * (SIDE // 2) + x // 2]

@@ -10,7 +10,7 @@ from dermis.frame.passes import each, program
 from dermis.gpu import Constants, Recorder
 from dermis.gpu.program import Resources
 
-_BOUNCES = 2  # between patches; gathering adds another
+_BOUNCES = 4  # between patches; gathering adds another
 
 
 def draw(graph: Recorder, lit: Resources, made: Interreflection, constants: Constants) -> None:

@@ -1,6 +1,9 @@
 // Light that leaves places of the skin's patches, and which share of more light would.
 //#include "lighting.wgsl"
+//#include "fine_light.wgsl"
 //#include "each.wgsl"
+
+const SPREAD: f32 = 0.5; // standard deviation over which light that is finer is averaged, over the footprint
 
 struct Leaving {
     places: u32,
@@ -32,6 +35,11 @@ fn main(
     var point = interpolate(a, b, c, w, t.w);
     point.place = place_of_point(triangle, w);
     let surface = surface_at(point, leaving.footprint * maps_over_atlas(triangle, a, b, c));
+    if (STRIPE_LIGHT) {
+        let axes = texel_axes(triangle, a, b, c, 1.0 / leaving.footprint);
+        area_u = SPREAD * axes.u;
+        area_v = SPREAD * axes.v;
+    }
     let lit = light_up(point, surface, point.normal, open_at(point.place));
     let out = leaving.albedo * surface.colour * leaves_everywhere(surface.roughness, surface.rho_s);
     var around = vec3f(enters_from_everywhere(surface.roughness, surface.rho_s));
