@@ -128,4 +128,4 @@ INTEGRATING_SPHERE = {0.3: 0.03, 0.6: 0.1}
 """Light by bounces in a sphere by its albedo, relative: five bounces of all, and shares of few lines."""
 
 FURNACE_OF_LINKS = 0.015
-"""White skin in a corner under light from everywhere alike against 1, in the mean: five bounces, and few lines."""
+"""White skin in a corner under light from everywhere alike against 1, in the mean: five bounces."""

@@ -1,4 +1,4 @@
-"""Form factors between patches: rooms and spheres seen from inside, and bodies that see nothing of themselves."""
+"""Form factors between patches: rooms and balls from inside, and a body that sees nothing of itself."""
 
 from __future__ import annotations
 

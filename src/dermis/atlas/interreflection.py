@@ -22,7 +22,7 @@ SAMPLES = 8
 """Places at which a patch is lit."""
 BUNDLES, LINES = 128, (96, 256)  # directions of parallel lines; least and most lines along a bundle's side
 _FEW = 12, 64  # the same, to learn whether a surface sees anything of itself
-_FORM = 1  # raise when `find_links` gives other results
+_FORM = 2  # raise when `find_links` gives other results
 _LEAST = 1e-3  # share of the hemisphere below which links are left out, and the others made up for them
 _SEED = 20
 _ROW = 4096  # of lines: more than a bundle has along its side
@@ -32,8 +32,9 @@ _ROW = 4096  # of lines: more than a bundle has along its side
 class Links:
     """What cells of the uv square see of the surface's own patches.
 
-    first, patch, share : (SIDE^2 + 1,), (k,) and (k,) float32 where the links of each cell begin, the patch that
-        each leads to, and its form factor [0..1]
+    first, patch, share : (SIDE^2 + 1,), (k,) and (k,) float32 where the links of each cell begin, the patch
+        that each leads to, and its form factor [0..1]
+    own : (SIDE^2,) the patch that each belongs to, 0 for those of none, which are not known
     held : (SIDE^2,) float32 how well a cell is known: lines that left it, over the usual number, at most 1
     bounce_first, bounce_patch, bounce_share : the same links of patches
     triangle, weights : (p * SAMPLES,) uint32 places of the patches: triangle, its packed weights
@@ -42,6 +43,7 @@ class Links:
     first: Words
     patch: Words
     share: NDArray[np.float32]
+    own: Words
     held: NDArray[np.float32]
     bounce_first: Words
     bounce_patch: Words
@@ -76,8 +78,8 @@ def find_links(mesh: Mesh, place: NDArray[np.float32], mapped: NDArray[np.bool_]
     place : (f, 3, 2) uv of the triangles' corners in the atlas
     mapped : (f,) triangles that have texels; the others are in the way of light and give none
 
-    Lines are spread evenly over all directions and places, so those that leave a patch are as many as its light
-    has ways, and the share of them that meets another patch next is the form factor.
+    Lines are spread evenly over all directions and places, so those that leave a patch are as many as its
+    light has ways, and the share of them that meets another patch next is the form factor.
     """
     seen, left = _seen(mesh, place, mapped, *_FEW)
     if len(seen):
@@ -140,7 +142,7 @@ def crossings(points: Floats) -> tuple[Index, Floats, NDArray[np.bool_], Index, 
 
 
 def _through_air(line: Index, depth: Floats, outward: NDArray[np.bool_], cell: Index) -> Index:
-    """(m, 2) cells that lines leave, and the cell where each next meets the surface, -1 for one without texels.
+    """(m, 2) cells that lines leave, and the cell that each meets next, -1 for one without texels.
 
     Both ways along each line; those that meet nothing more are not among them.
     """
@@ -184,12 +186,13 @@ def _links(
     there = (met >= 0).all(axis=1)
     cell, patch = met[there, 0], patch_of[met[there, 1]]
     giver, known = patch_of[cell], patch >= 0
-    gone = np.bincount(patch_of[patch_of >= 0], left[patch_of >= 0], count)
+    gone = np.bincount(patch_of[patch_of >= 0], left[patch_of >= 0], count).astype(np.float64)
     usual = np.median(left[left > 0]) if (left > 0).any() else 1.0
     known_giver = known & (giver >= 0)
     return Links(
         *_rows(cell[known], patch[known], left, count),
-        np.minimum(left / usual, 1.0).astype(np.float32),
+        np.maximum(patch_of, 0).astype(np.uint32),
+        np.where(patch_of >= 0, np.minimum(left / usual, 1.0), 0.0).astype(np.float32),
         *_rows(giver[known_giver], patch[known_giver], gone, count),
         triangle,
         weights,
@@ -209,32 +212,33 @@ def _rows(giver: Index, patch: Index, left: Floats, patches: int) -> tuple[Words
 
 
 def _patches(mesh: Mesh, place: NDArray[np.float32], mapped: NDArray[np.bool_]) -> tuple[Index, Words, Words]:
-    """(SIDE^2,) the patch of each cell, -1 for none, and places of all patches, evenly over their surface."""
-    corners = mesh.positions[mesh.triangles].astype(np.float64)
-    area = 0.5 * np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
-    area = np.where(mapped, area, 0.0)
-    wanted = SIDE * SIDE * SAMPLES
-    each = 1 + np.floor(wanted * area / max(area.sum(), 1e-30)).astype(np.int64)
-    triangle = np.repeat(np.flatnonzero(mapped), each[mapped])
-    rng = np.random.default_rng(_SEED)
-    u, v = np.sqrt(rng.random(len(triangle))), rng.random(len(triangle))
-    weights = np.stack([1.0 - u, u * (1.0 - v), u * v], axis=1)
-    cell = _cells(place[triangle], weights)
-    patch = (cell // SIDE // 2) * (SIDE // 2) + cell % SIDE // 2
-    # by patch, each with its places in an order of chance by the surface that they stand for
-    key = rng.random(len(triangle)) ** (each[triangle] / np.maximum(area[triangle], 1e-30))
-    order = np.lexsort((-key, patch))
+    """(SIDE^2,) the patch of each cell, -1 for none, and places by chance over all patches."""
+    triangle, weights, rank = _places(mesh, mapped)
+    half, cell = SIDE // 2, _cells(place[triangle], weights)
+    patch = (cell // SIDE // 2) * half + cell % SIDE // 2
+    order = np.lexsort((rank, patch))
     own, first, size = np.unique(patch[order], return_index=True, return_counts=True)
-    number = np.full((SIDE // 2) ** 2, -1)
+    number = np.full(half * half, -1, np.int64)
     number[own] = np.arange(len(own))
-    chosen = (
-        order[(first[:, None] + np.arange(SAMPLES) % np.minimum(size, SAMPLES)[:, None]).ravel()]
-        if len(own)
-        else order[:0]
-    )
+    # where a patch has fewer places, they come again
+    chosen = order[(first[:, None] + np.arange(SAMPLES) % np.maximum(size, 1)[:, None]).ravel()]
     packed = np.rint(65535 * weights[chosen]).astype(np.uint32)
     y, x = np.divmod(np.arange(SIDE * SIDE), SIDE)
-    patch_of = number[(y // 2) * (SIDE // 2) + x // 2]
-    return patch_of, triangle[chosen].astype(np.uint32), packed[:, 1] | (packed[:, 2] << 16)
+    patch_of = number[(y // 2) * half + x // 2]
+    words = packed[:, 1] | (packed[:, 2] << np.uint32(16))
+    return patch_of, triangle[chosen].astype(np.uint32), words.astype(np.uint32)
+
+
+def _places(mesh: Mesh, mapped: NDArray[np.bool_]) -> tuple[Index, Floats, Floats]:
+    """Places by chance: at least one of each triangle with texels; its weights, and a rank.
+
+    The first of them by rank lie evenly over the surface, as each counts for as much as it stands for.
+    """
+    a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
+    area = np.where(mapped, 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), 0.0)
+    each = 1 + np.floor(SIDE * SIDE * SAMPLES * area / max(area.sum(), 1e-30)).astype(np.int64)
+    triangle = np.repeat(np.flatnonzero(mapped), each[mapped])
+    rng, count = np.random.default_rng(_SEED), each[triangle]
+    u, v = np.sqrt(rng.random(len(triangle))), rng.random(len(triangle))
+    weights = np.stack([1.0 - u, u * (1.0 - v), u * v], axis=1)
+    return triangle, weights, rng.exponential(size=len(triangle)) * count / np.maximum(area[triangle], 1e-30)

@@ -140,7 +140,7 @@ def check_choices(against: str, light: str, region: str, medium: str) -> None:
 
 def _render(subject: Subject, technique: str, truth: Truth) -> tuple[Floats, float]:
     """Linear radiance of a technique, and the device time of its frame at four samples a pixel [ms]."""
-    without = {} if truth.through else {"transmission": "none"}
+    without: dict[str, object] = {} if truth.through else {"transmission": "none"}
     without |= {} if truth.between else {"interreflection": False}
     chosen = subject.settings.model_dump() | {"technique": technique} | without
     drawn = subject.renderer.draw(subject.scene, Settings(**(chosen | {"samples": truth.subpixels})))

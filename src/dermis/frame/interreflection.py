@@ -42,6 +42,12 @@ class Interreflection:
     from_skin: Any
     unlit: Any
 
+    @property
+    def nbytes(self) -> int:
+        """Of all but the space between passes, each once."""
+        read = (self.places[0], *self.bounces.values(), *self.cells.values(), self.from_skin)
+        return sum(int(one.size) for one in read)
+
 
 def interreflection_of(
     memo: Memo, device: Device, head: Head, atlas: Atlas, albedo: NDArray[np.float64], light: str, of: str
@@ -73,7 +79,8 @@ def _uploaded(device: Device, links: Links) -> tuple[tuple[Any, int], dict[str, 
     places = np.stack([links.triangle, links.weights], axis=1)
     bounces = _rows(device, links.bounce_first, links.bounce_patch, links.bounce_share)
     cells = _rows(device, links.first, links.patch, links.share)
-    cells["held"] = device.buffer(links.held, "STORAGE")
+    own = np.stack([links.own, links.held.view(np.uint32)], axis=1)
+    cells["cells"] = device.buffer(own, "STORAGE")
     return (device.buffer(places, "STORAGE"), len(places)), bounces, cells
 
 

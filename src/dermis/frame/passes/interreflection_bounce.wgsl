@@ -9,12 +9,12 @@ override BOUNCES: bool = false; // whether patches already have light
 @group(0) @binding(1) var<storage, read> first: array<u32>; // where the links of each patch begin
 @group(0) @binding(2) var<storage, read> links: array<vec2u>; // patch, form factor
 @group(0) @binding(3) var<storage, read> before: array<vec4f>;
-@group(0) @binding(4) var<storage, read_write> after: array<vec4f>;
+@group(0) @binding(4) var<storage, read_write> after: array<vec4f>; // light, and the share of light from everywhere that enters
 
-fn mean_of(index: u32, part: u32) -> vec3f {
-    var sum = vec3f(0.0);
+fn mean_of(index: u32, part: u32) -> vec4f {
+    var sum = vec4f(0.0);
     for (var k = 0u; k < SAMPLES; k++) {
-        sum += emitted[2u * (index * SAMPLES + k) + part].rgb;
+        sum += emitted[2u * (index * SAMPLES + k) + part];
     }
     return sum / f32(SAMPLES);
 }
@@ -39,9 +39,10 @@ fn main(
     if (index >= arrayLength(&after)) {
         return;
     }
-    var light = mean_of(index, 0u);
+    let more = mean_of(index, 1u);
+    var light = mean_of(index, 0u).rgb;
     if (BOUNCES) {
-        light += mean_of(index, 1u) * gathered(index);
+        light += more.rgb * gathered(index);
     }
-    after[index] = vec4f(light, 0.0);
+    after[index] = vec4f(light, more.a);
 }

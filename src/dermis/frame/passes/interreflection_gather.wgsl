@@ -1,10 +1,10 @@
-// Irradiance of each cell of the uv square by the light that patches of the skin send it through the air.
+// What enters each cell of the uv square of the light that patches of the skin send it through the air.
 //#include "each.wgsl"
 
 @group(0) @binding(0) var<storage, read> first: array<u32>; // where the links of each cell begin
 @group(0) @binding(1) var<storage, read> links: array<vec2u>; // patch, form factor
-@group(0) @binding(2) var<storage, read> held: array<f32>; // how well each cell is known
-@group(0) @binding(3) var<storage, read> patches: array<vec4f>; // light that leaves
+@group(0) @binding(2) var<storage, read> cells: array<vec2u>; // the patch that each belongs to, and how well it is known
+@group(0) @binding(3) var<storage, read> patches: array<vec4f>; // light that leaves, and the share of light from everywhere that enters
 @group(0) @binding(4) var<storage, read_write> from_skin: array<vec4f>; // as interreflection.wgsl reads it
 
 @compute @workgroup_size(EACH)
@@ -23,5 +23,6 @@ fn main(
         let link = links[k];
         sum += bitcast<f32>(link.y) * patches[link.x].rgb;
     }
-    from_skin[index] = held[index] * vec4f(sum, 1.0);
+    let own = cells[index];
+    from_skin[index] = bitcast<f32>(own.y) * vec4f(patches[own.x].a * sum, 1.0);
 }

@@ -13,7 +13,7 @@ struct Leaving {
 
 @group(0) @binding(30) var<uniform> leaving: Leaving;
 @group(0) @binding(31) var<storage, read> places: array<vec2u>; // triangle, its packed weights
-@group(0) @binding(32) var<storage, read_write> emitted: array<vec4f>; // radiant exitance; then of 1 that comes from everywhere
+@group(0) @binding(32) var<storage, read_write> emitted: array<vec4f>; // radiant exitance; then that of 1 from everywhere, and how much of it enters
 
 @compute @workgroup_size(EACH)
 fn main(
@@ -42,10 +42,11 @@ fn main(
     }
     let lit = light_up(point, surface, point.normal, open_at(point.place));
     let out = leaving.albedo * surface.colour * leaves_everywhere(surface.roughness, surface.rho_s);
-    var around = vec3f(enters_from_everywhere(surface.roughness, surface.rho_s));
+    let enters = enters_from_everywhere(surface.roughness, surface.rho_s);
+    var around = vec3f(enters);
     if (HALF_SPACE) {
         around *= skin.back_from_everywhere;
     }
     emitted[2u * index] = vec4f(out * lit.entered, 0.0);
-    emitted[2u * index + 1u] = vec4f(out * around, 0.0);
+    emitted[2u * index + 1u] = vec4f(out * around, enters);
 }

@@ -199,7 +199,7 @@ fn pre_integrated(point: Point, surface: Surface, footprint: f32, open: f32) -> 
     }
     if (ENVIRONMENT || INTERREFLECTION) {
         let smooth_surface = Surface(normals[1], surface.colour, surface.roughness, surface.rho_s);
-        var entering = from_around(point, smooth_surface, open) * enters_from_everywhere(surface.roughness, surface.rho_s);
+        var entering = entering_from_around(point, smooth_surface, open);
         if (HALF_SPACE) {
             entering *= skin.back_from_everywhere;
         }

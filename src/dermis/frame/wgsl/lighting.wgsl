@@ -71,18 +71,19 @@ fn reaching(light: Light, point: Point, l: vec3f) -> f32 {
     return visibility(light, point, l) * past_strands(light, point.position);
 }
 
-// Irradiance from all around: from the environment, and from other skin. Where that is known, the environment's own guess of it
-// is left out.
-fn from_around(point: Point, surface: Surface, open: f32) -> vec3f {
+// Light that enters from all around: from the environment, and from other skin. Where that is known, the environment's own guess
+// of it is left out.
+fn entering_from_around(point: Point, surface: Surface, open: f32) -> vec3f {
     let linked = INTERREFLECTION && (point.flags & MAPPED) != 0u;
-    var around = vec3f(0.0);
-    if (linked) {
-        around = from_skin_at(point.place);
-    }
+    var entering = vec3f(0.0);
     if (ENVIRONMENT) {
-        around += ambient(surface.normal, open, select(surface.colour * environment.albedo, vec3f(0.0), linked));
+        let albedo = select(surface.colour * environment.albedo, vec3f(0.0), linked);
+        entering = ambient(surface.normal, open, albedo) * enters_from_everywhere(surface.roughness, surface.rho_s);
     }
-    return around;
+    if (linked) {
+        entering += from_skin_at(point.place);
+    }
+    return entering;
 }
 
 // open: share of the sky that the point sees
@@ -138,7 +139,7 @@ fn light_through(point: Point, surface: Surface, film: Film, v: vec3f, open: f32
         }
     }
     if (ENVIRONMENT || INTERREFLECTION) {
-        var entering = from_around(point, surface, open) * enters_from_everywhere(surface.roughness, surface.rho_s);
+        var entering = entering_from_around(point, surface, open);
         if (by_direction) {
             lit.directional += entering * beyond_mean_from_everywhere(facing);
             entering *= skin.back_from_everywhere;
