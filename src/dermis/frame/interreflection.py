@@ -28,6 +28,7 @@ class Interreflection:
     places : buffer of the places at which patches are lit, and how many there are
     bounces, cells : buffers of the links of patches and of cells, by their names in the shaders
     albedo : (3,) of the profile
+    occluded : whether cells hold the mean of what they see, as the map of occlusion says how much that is
     emitted : buffer of the light that leaves places
     patches : two buffers of the light that leaves patches, in turn
     from_skin, unlit : buffers of the light that reaches cells, and of none
@@ -37,6 +38,7 @@ class Interreflection:
     bounces: dict[str, Any]
     cells: dict[str, Any]
     albedo: NDArray[np.float64]
+    occluded: bool
     emitted: Any
     patches: tuple[Any, Any]
     from_skin: Any
@@ -50,11 +52,19 @@ class Interreflection:
 
 
 def interreflection_of(
-    memo: Memo, device: Device, head: Head, atlas: Atlas, albedo: NDArray[np.float64], light: str, of: str
+    memo: Memo,
+    device: Device,
+    head: Head,
+    atlas: Atlas,
+    albedo: NDArray[np.float64],
+    occluded: bool,
+    light: str,
+    of: str,
 ) -> Interreflection | None:
     """Light from skin to skin, None for a head that sees nothing of itself.
 
     albedo : (3,) of the profile
+    occluded : whether it is known how much of the sky each place sees
     light : whose it is, of several views in turn
     of : name of the atlas among several
     """
@@ -62,7 +72,7 @@ def interreflection_of(
     if not len(links.share):
         return None
     buffers = memo.keep(_uploaded, device, links, of=of)
-    return memo.keep(_made, device, buffers, albedo, light, of=f"{of} {light}")
+    return memo.keep(_made, device, buffers, albedo, occluded, light, of=f"{of} {light}")
 
 
 def no_interreflection(device: Device) -> Any:
@@ -96,6 +106,7 @@ def _made(
     device: Device,
     buffers: tuple[tuple[Any, int], dict[str, Any], dict[str, Any]],
     albedo: NDArray[np.float64],
+    occluded: bool,
     _: str,
 ) -> Interreflection:
     places, bounces, cells = buffers
@@ -105,6 +116,7 @@ def _made(
         bounces=bounces,
         cells=cells,
         albedo=np.asarray(albedo),
+        occluded=occluded,
         emitted=scratch(device, device.space(2 * _TEXEL * places[1])),
         patches=(patches[0], patches[1]),
         from_skin=device.space(_TEXEL * SIDE * SIDE),

@@ -192,8 +192,8 @@ def _layout(
         how = thin_tables(memo, asked), asked.skin.has_own_tissue
         translucency = translucency_of(memo, device, now, then, atlas, *blurred, *how, of=number)
     between = None
-    if asked.settings.interreflection:
-        whose = asked.split.total, asked.light_of
+    if asked.interreflects:
+        whose = asked.split.total, asked.occluded, asked.light_of
         between = interreflection_of(memo, device, head, atlas, *whose, of=number)
     lit["from_skin"] = between.from_skin if between else no_interreflection(device)
     side = asked.settings.atlas if asked.count else 1

@@ -2,6 +2,7 @@
 //#include "each.wgsl"
 
 override BOUNCES: bool = false; // whether patches already have light
+override MEAN: bool = false; // whether places know how much they see of other skin, so that its mean is wanted
 
 //#fill const SAMPLES: u32 = {linked_samples}u; // places of a patch
 
@@ -20,13 +21,13 @@ fn mean_of(index: u32, part: u32) -> vec4f {
 }
 
 fn gathered(index: u32) -> vec3f {
-    var sum = vec3f(0.0);
+    var sum = vec4f(0.0);
     let end = min(first[index + 1u], arrayLength(&links));
     for (var k = first[index]; k < end; k++) {
         let link = links[k];
-        sum += bitcast<f32>(link.y) * before[link.x].rgb;
+        sum += bitcast<f32>(link.y) * vec4f(before[link.x].rgb, 1.0);
     }
-    return sum;
+    return sum.rgb / select(1.0, max(sum.a, 1e-6), MEAN);
 }
 
 @compute @workgroup_size(EACH)

@@ -40,10 +40,11 @@ fn main(
         area_u = SPREAD * axes.u;
         area_v = SPREAD * axes.v;
     }
-    let lit = light_up(point, surface, point.normal, open_at(point.place));
+    let open = open_at(point.place);
+    let lit = light_up(point, surface, point.normal, open);
     let out = leaving.albedo * surface.colour * leaves_everywhere(surface.roughness, surface.rho_s);
     let enters = enters_from_everywhere(surface.roughness, surface.rho_s);
-    var around = vec3f(enters);
+    var around = vec3f(enters * select(1.0, 1.0 - open, environment.occluded != 0u)); // as entering_from_around has it
     if (HALF_SPACE) {
         around *= skin.back_from_everywhere;
     }

@@ -81,7 +81,8 @@ fn entering_from_around(point: Point, surface: Surface, open: f32) -> vec3f {
         entering = ambient(surface.normal, open, albedo) * enters_from_everywhere(surface.roughness, surface.rho_s);
     }
     if (linked) {
-        entering += from_skin_at(point.place);
+        // Where it is known how much of the sky is hidden, cells say only how bright that is.
+        entering += from_skin_at(point.place) * select(1.0, 1.0 - open, environment.occluded != 0u);
     }
     return entering;
 }
