@@ -22,7 +22,7 @@ SAMPLES = 8
 """Places at which a patch is lit."""
 BUNDLES, LINES = 128, (96, 256)  # directions of parallel lines; least and most lines along a bundle's side
 _FEW = 12, 64  # the same, to learn whether a surface sees anything of itself
-_FORM = 2  # raise when `find_links` gives other results
+_FORM = 3  # raise when `find_links` gives other results
 _LEAST = 1e-3  # share of the hemisphere below which links are left out, and the others made up for them
 _SEED = 20
 _ROW = 4096  # of lines: more than a bundle has along its side
@@ -34,7 +34,7 @@ class Links:
 
     first, patch, share : (SIDE^2 + 1,), (k,) and (k,) float32 where the links of each cell begin, the patch
         that each leads to, and its form factor [0..1]
-    own : (SIDE^2,) the patch that each belongs to, 0 for those of none, which are not known
+    own : (SIDE^2,) the patch that each belongs to, or the nearest one
     held : (SIDE^2,) float32 how well a cell is known: lines that left it, over the usual number, at most 1
     bounce_first, bounce_patch, bounce_share : the same links of patches
     triangle, weights : (p * SAMPLES,) uint32 places of the patches: triangle, its packed weights
@@ -191,12 +191,23 @@ def _links(
     known_giver = known & (giver >= 0)
     return Links(
         *_rows(cell[known], patch[known], left, count),
-        np.maximum(patch_of, 0).astype(np.uint32),
-        np.where(patch_of >= 0, np.minimum(left / usual, 1.0), 0.0).astype(np.float32),
+        _nearest(patch_of),
+        np.minimum(left / usual, 1.0).astype(np.float32),
         *_rows(giver[known_giver], patch[known_giver], gone, count),
         triangle,
         weights,
     )
+
+
+def _nearest(patch_of: Index) -> Words:
+    """(SIDE^2,) the patch of each cell, for those of none that of the nearest cell in uv."""
+    from scipy.ndimage import distance_transform_edt
+
+    known = patch_of.reshape(SIDE, SIDE)
+    if not (known >= 0).any():
+        return np.zeros(SIDE * SIDE, np.uint32)
+    nearest = distance_transform_edt(known < 0, return_distances=False, return_indices=True)
+    return np.asarray(known[tuple(nearest)].ravel(), np.uint32)
 
 
 def _rows(giver: Index, patch: Index, left: Floats, patches: int) -> tuple[Words, Words, NDArray[np.float32]]:
