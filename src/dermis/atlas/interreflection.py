@@ -78,8 +78,8 @@ def find_links(mesh: Mesh, place: NDArray[np.float32], mapped: NDArray[np.bool_]
     place : (f, 3, 2) uv of the triangles' corners in the atlas
     mapped : (f,) triangles that have texels; the others are in the way of light and give none
 
-    Lines are spread evenly over all directions and places, so those that leave a patch are as many as its
-    light has ways, and the share of them that meets another patch next is the form factor.
+    Lines lie evenly in all directions and places: the share of those leaving one patch that meet another next
+    is its form factor.
     """
     seen, left = _seen(mesh, place, mapped, *_FEW)
     if len(seen):
@@ -91,10 +91,7 @@ def find_links(mesh: Mesh, place: NDArray[np.float32], mapped: NDArray[np.bool_]
 def _seen(
     mesh: Mesh, place: NDArray[np.float32], mapped: NDArray[np.bool_], bundles: int, lines: int
 ) -> tuple[Index, Floats]:
-    """(m, 2) cells at both ends of lines through the air, and (SIDE^2,) how many lines left each cell.
-
-    bundles, lines : directions, and lines along the side of each
-    """
+    """(m, 2) cells at both ends of lines through the air, and (SIDE^2,) how many lines left each cell."""
     corners = mesh.positions[mesh.triangles].astype(np.float64)
     low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     corners -= 0.5 * (low + high)
@@ -113,9 +110,7 @@ def _seen(
 def crossings(points: Floats) -> tuple[Index, Floats, NDArray[np.bool_], Index, Floats]:
     """Where the lines x, y = whole numbers meet triangles.
 
-    points : (f, 3, 3) corners
-
-    Returns line, z, whether the surface looks towards +z there, triangle, and (n, 3) its weights.
+    Returns line, z, whether the surface looks towards +z there, triangle, and (n, 3) its weights; of (f, 3, 3).
     """
     low, high = np.ceil(points[..., :2].min(axis=1)), np.floor(points[..., :2].max(axis=1))
     wide, tall = (np.maximum(high - low + 1, 0).astype(np.int64)).T
@@ -144,7 +139,7 @@ def crossings(points: Floats) -> tuple[Index, Floats, NDArray[np.bool_], Index, 
 def _through_air(line: Index, depth: Floats, outward: NDArray[np.bool_], cell: Index) -> Index:
     """(m, 2) cells that lines leave, and the cell that each meets next, -1 for one without texels.
 
-    Both ways along each line; those that meet nothing more are not among them.
+    Both ways along each line, without those that meet nothing more.
     """
     order = np.lexsort((depth, line))
     line, outward, cell = line[order], outward[order], cell[order]
@@ -231,7 +226,6 @@ def _patches(mesh: Mesh, place: NDArray[np.float32], mapped: NDArray[np.bool_]) 
     own, first, size = np.unique(patch[order], return_index=True, return_counts=True)
     number = np.full(half * half, -1, np.int64)
     number[own] = np.arange(len(own))
-    # where a patch has fewer places, they come again
     chosen = order[(first[:, None] + np.arange(SAMPLES) % np.maximum(size, 1)[:, None]).ravel()]
     packed = np.rint(65535 * weights[chosen]).astype(np.uint32)
     y, x = np.divmod(np.arange(SIDE * SIDE), SIDE)
@@ -243,7 +237,7 @@ def _patches(mesh: Mesh, place: NDArray[np.float32], mapped: NDArray[np.bool_]) 
 def _places(mesh: Mesh, mapped: NDArray[np.bool_]) -> tuple[Index, Floats, Floats]:
     """Places by chance: at least one of each triangle with texels; its weights, and a rank.
 
-    The first of them by rank lie evenly over the surface, as each counts for as much as it stands for.
+    The first by rank lie evenly over the surface.
     """
     a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
     area = np.where(mapped, 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), 0.0)
