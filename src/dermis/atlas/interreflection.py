@@ -110,7 +110,7 @@ def _seen(
 def crossings(points: Floats) -> tuple[Index, Floats, NDArray[np.bool_], Index, Floats]:
     """Where the lines x, y = whole numbers meet triangles.
 
-    Returns line, z, whether the surface looks towards +z there, triangle, and (n, 3) its weights; of (f, 3, 3).
+    Returns line, z, whether the surface looks towards +z there, triangle, (n, 3) its weights; of (f, 3, 3).
     """
     low, high = np.ceil(points[..., :2].min(axis=1)), np.floor(points[..., :2].max(axis=1))
     wide, tall = (np.maximum(high - low + 1, 0).astype(np.int64)).T
