@@ -123,3 +123,9 @@ HARMONIC = 0.003
 
 POSED = 0.005
 """A picture of a posed head against one of a head loaded in that shape, relative root mean square."""
+
+INTEGRATING_SPHERE = {0.3: 0.03, 0.6: 0.1}
+"""Light by bounces in a sphere by its albedo, relative: five bounces of all, and shares of few lines."""
+
+FURNACE_OF_LINKS = 0.015
+"""White skin in a corner under light from everywhere alike against 1, in the mean: five bounces."""

@@ -26,16 +26,17 @@ def upright(mesh: Mesh, face: float) -> Mesh:
     return replace(mesh, **turned)
 
 
-def corner() -> Head:
+def corner(**maps: Floats) -> Head:
     """A floor 200 x 200 at z = 0 and a wall 40 high that rises at x = -100, over all of its length.
 
     They share no points, so that each has normals of its own.
+
+    maps : as of `head_of`
     """
     wall = upright(plane(200.0, 20), 1.0)
     low = replace(wall, positions=(wall.positions * [1, 1, 0.2]).astype(np.float32))
-    return head_of(
-        joined((plane(200.0, 20), (0, 0, 0), (0, 0, 0.6)), (low, (-100, 0, 20.01), (0.65, 0.65, 0.3)))
-    )
+    parts = (plane(200.0, 20), (0, 0, 0), (0, 0, 0.6)), (low, (-100, 0, 20.01), (0.65, 0.65, 0.3))
+    return head_of(joined(*parts), **maps)
 
 
 def hinged(head: Head, degrees: float) -> NDArray[np.float32]:

@@ -18,7 +18,8 @@ fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
         return vec4f(0.0);
     }
     let surface = unpack_surface(packed);
-    let open = open_at(at.xy / vec2f(textureDimensions(surfaces)));
-    let lit = light_up(unpack_point(packed), surface, surface.normal, open);
+    var point = unpack_point(packed);
+    point.place = at.xy / vec2f(textureDimensions(surfaces));
+    let lit = light_up(point, surface, surface.normal, open_at(point.place));
     return vec4f(entering.scale * lit.entered * share_of(surface.colour, skin.mix), 1.0);
 }

@@ -140,8 +140,9 @@ def check_choices(against: str, light: str, region: str, medium: str) -> None:
 
 def _render(subject: Subject, technique: str, truth: Truth) -> tuple[Floats, float]:
     """Linear radiance of a technique, and the device time of its frame at four samples a pixel [ms]."""
-    through = {} if truth.through else {"transmission": "none"}
-    chosen = subject.settings.model_dump() | {"technique": technique} | through
+    without: dict[str, object] = {} if truth.through else {"transmission": "none"}
+    without |= {} if truth.between else {"interreflection": False}
+    chosen = subject.settings.model_dump() | {"technique": technique} | without
     drawn = subject.renderer.draw(subject.scene, Settings(**(chosen | {"samples": truth.subpixels})))
     image = drawn.linear().astype(np.float64)
     timed = subject.renderer.draw_warm(subject.scene, Settings(**(chosen | {"samples": 4})))

@@ -53,6 +53,7 @@ class Truth:
     seconds : that it took
     notes : for the reader
     through : whether it includes light through thin parts
+    between : whether it includes light from skin to skin through the air
     """
 
     image: Floats
@@ -62,6 +63,7 @@ class Truth:
     seconds: float
     notes: tuple[str, ...] = ()
     through: bool = True
+    between: bool = True
 
 
 def surface_integral(subject: Subject, samples: int) -> Truth:
@@ -192,7 +194,9 @@ def positions(subject: Subject, seen: SurfacePoints) -> Floats:
 def _by_pixel(seen: SurfacePoints, exitance: Floats, started: float, note: str) -> Truth:
     image = np.zeros((*seen.mask.shape, 3))
     image[seen.mask] = exitance / np.pi
-    return Truth(image, np.zeros_like(image), seen.mask, 1, time.perf_counter() - started, (note,))
+    return Truth(
+        image, np.zeros_like(image), seen.mask, 1, time.perf_counter() - started, (note,), between=False
+    )
 
 
 def check_seen(mask: NDArray[np.bool_]) -> None:

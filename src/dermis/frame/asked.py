@@ -98,6 +98,11 @@ class Asked:
         return surroundings.is_occluded(self.environment, self.settings)
 
     @property
+    def interreflects(self) -> bool:
+        """Whether skin sends light to skin; not where an environment shines through the head."""
+        return self.settings.interreflection and (self.occluded or self.environment is None)
+
+    @property
     def occlusion_moves(self) -> bool:
         """Whether that follows the head's shape."""
         elsewhere = self.posed or self.person is not None

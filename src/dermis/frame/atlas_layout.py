@@ -9,6 +9,7 @@ from dermis.atlas.translucency.cells import Cells
 from dermis.frame.atlas_textures import AtlasTextures
 from dermis.frame.geometry import HeadResources
 from dermis.frame.gutters import Walks
+from dermis.frame.interreflection import Interreflection
 from dermis.gpu.program import Resources
 
 
@@ -113,6 +114,7 @@ class AtlasLayout:
     translucency : light through thin parts, None without any
     walked : what its gutters follow the person by, None where they are the head's own or there are none
     occlusion : what the map of occlusion follows the head's shape by, None where it does not
+    interreflection : light from skin to skin, None for none
     """
 
     atlas: AtlasTextures
@@ -123,3 +125,4 @@ class AtlasLayout:
     translucency: Translucency | None = None
     walked: Walked | None = None
     occlusion: MovingOcclusion | None = None
+    interreflection: Interreflection | None = None

@@ -7,6 +7,7 @@ from dermis.frame.output_stages import draw_outputs
 from dermis.frame.passes import (
     background,
     bloom,
+    interreflection,
     meter,
     moving_occlusion,
     post,
@@ -37,6 +38,9 @@ def draw_frame(graph: Graph, inputs: Inputs, technique: Technique) -> None:
             strands.shadow(graph, made.strands, inputs.lit)
     if made.sky and inputs.around:
         moving_occlusion.draw(graph, made.sky, *inputs.around, inputs.layouts)
+    for layout in inputs.layouts:
+        if layout.interreflection:
+            interreflection.draw(graph, layout.lit, layout.interreflection, inputs.light_constants)
     below = technique.scatter(graph, inputs)
     visibility_buffer.draw(graph, made.visibility, inputs.camera, made.head)
     look, apart = (inputs.lit, inputs.view, inputs.constants), technique.apart(made.own)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dermis.errors import refuse
 from dermis.frame.asked import Asked
 from dermis.frame.atlas_layout import AtlasLayout
-from dermis.frame.inputs import EyesSeen, Inputs, camera_views, pinhole, seen_by
+from dermis.frame.inputs import EyesSeen, Inputs, Resources, camera_views, pinhole, seen_by
 from dermis.frame.levels import Blur, scale_of
 from dermis.frame.lights import light_constants, light_parts, light_records, light_views
 from dermis.frame.limits import no_room
@@ -26,7 +26,7 @@ from dermis.frame.sky import Anchors, Look, anchors_of, look_around, turn_of
 from dermis.frame.strands import strand_constants
 from dermis.frame.surroundings import brightest, load_surroundings, with_suns
 from dermis.frame.techniques.technique import Technique
-from dermis.gpu import Device, Memo
+from dermis.gpu import Constants, Device, Memo
 from dermis.gpu.memo import same
 from dermis.gpu.no_room import NoRoomError
 from dermis.human.skin.movements import movements
@@ -112,7 +112,7 @@ class Preparation:
             self.memo.forget()
             raise no_room(error, device, asked) from error
         seen_from = pinhole(scene.camera, head, settings)
-        shone_on = light_constants(scene) + strand_constants(head, settings)
+        shone_on = light_constants(scene) + strand_constants(head, settings) + linked(resources)
         scale = scale_of(resources.levels.texel, brightest(scene, surroundings))
         return Inputs(
             resources=resources,
@@ -160,6 +160,11 @@ class Preparation:
         """The head as it is posed, or at rest where no motion came."""
         at_rest = self.memo.keep(_resting, head)
         return self.memo.keep(_posed, head, motion or head.control.rest, at_rest)
+
+
+def linked(resources: Resources) -> Constants:
+    """Whether skin sends light to skin."""
+    return (("INTERREFLECTION", 1),) if resources.layouts[0].interreflection else ()
 
 
 def _kind_of(around: Environment | None) -> str:

@@ -16,6 +16,7 @@ from dermis.frame.curvature import Curvature, make_curvature, no_curvature
 from dermis.frame.geometry import HeadResources, upload_geometry
 from dermis.frame.gutters import Walks, make_walks, with_lists
 from dermis.frame.inputs import Resources, view_record
+from dermis.frame.interreflection import interreflection_of, no_interreflection
 from dermis.frame.limits import check_limits
 from dermis.frame.maps import fine_detail, upload_maps
 from dermis.frame.passes import shade, shadows, surface_texels, visibility_buffer
@@ -190,10 +191,15 @@ def _layout(
         blurred = asked.split.blurred_mm2, asked.split.weight
         how = thin_tables(memo, asked), asked.skin.has_own_tissue
         translucency = translucency_of(memo, device, now, then, atlas, *blurred, *how, of=number)
+    between = None
+    if asked.interreflects:
+        whose = asked.split.total, asked.occluded, asked.light_of
+        between = interreflection_of(memo, device, head, atlas, *whose, of=number)
+    lit["from_skin"] = between.from_skin if between else no_interreflection(device)
     side = asked.settings.atlas if asked.count else 1
     surfaces = keep(surface_texels.make_surfaces, device, side, of=number)
     scattered = _sum(memo, device, asked, side, number)
-    return AtlasLayout(textures, held, lit, surfaces, scattered, translucency, walked, follows)
+    return AtlasLayout(textures, held, lit, surfaces, scattered, translucency, walked, follows, between)
 
 
 def _walked(walks: Walks, held: HeadResources, person: Shape) -> Walked:

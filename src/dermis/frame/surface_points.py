@@ -82,7 +82,8 @@ def irradiance_at(
 ) -> Floats:
     """(n, 3) light that enters the skin at points, times the colour's share before scattering.
 
-    scene : without maps and environment, whose texels and occlusion are looked up by place in the atlas
+    scene : without maps and environment, whose texels and occlusion are looked up by place in the atlas, as
+        light from other skin is, which is therefore left out
     triangle, barycentric : (n,) and (n, 3)
     """
     side = max(1, int(np.ceil(np.sqrt(len(triangle)))))
@@ -97,7 +98,7 @@ def irradiance_at(
 def _lit(renderer: Renderer, scene: Scene, settings: Settings, records: NDArray[np.uint32]) -> Floats:
     """(n * n, 3) light at the (n, n) places of an atlas."""
     device, side = renderer.device, len(records)
-    inputs = renderer.prepare(scene, settings)
+    inputs = renderer.prepare(scene, settings.model_copy(update={"interreflection": False}))
     first = inputs.layouts[0]
     listed = AtlasTextures({"atlas": texture_from(device, records, "rg32uint")})
     lit = make_texture(device, (side, side), "rgba32float")

@@ -84,6 +84,8 @@ class Settings(Plain):
     occlusion: Literal["baked", "rest", "none"] = "baked"
     """Ambient occlusion, which dims the environment's light where the head is in its way: "baked" follows a
     head that moves, "rest" leaves it as the head rests, "none" for none."""
+    interreflection: bool = True
+    """Light from skin to skin through the air: in ears, around eyes, under chin and nose."""
     exposure: Exposure = 1.0
     """Factor from radiance to the picture; "auto" meters the light that falls on the skin in view."""
     bloom: Annotated[float, Field(ge=0, le=1, json_schema_extra=slider(0, 0.5))] = 0.0

@@ -10,6 +10,7 @@ from dermis.environment.mirrors import mirror_numbers
 from dermis.frame.atlas_textures import atlas_numbers
 from dermis.frame.baked_numbers import baking_numbers
 from dermis.frame.fine_light import fine_numbers
+from dermis.frame.interreflection import link_numbers
 from dermis.frame.levels import FLOATS, HALVES, usual_texel
 from dermis.frame.lights import light_numbers
 from dermis.frame.lights.kind import light_shaders
@@ -42,6 +43,7 @@ SHARED_SHADERS = ShaderFolder(
         **baking_numbers(),
         **fine_numbers(),
         **mirror_numbers(),
+        **link_numbers(),
     },
 )
 TILE = 16

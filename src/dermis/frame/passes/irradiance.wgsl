@@ -44,8 +44,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         area_u = entering.area * texel_step(vec2i(id.xy), position, vec2i(1, 0));
         area_v = entering.area * texel_step(vec2i(id.xy), position, vec2i(0, 1));
     }
-    let open = open_at((vec2f(id.xy) + 0.5) / vec2f(size));
+    var point = unpack_point(packed);
+    point.place = (vec2f(id.xy) + 0.5) / vec2f(size);
     // Any view will do: the reflection is not used, so the compiler drops it.
-    let lit = light_up(unpack_point(packed), surface, surface.normal, open);
+    let lit = light_up(point, surface, surface.normal, open_at(point.place));
     store(id.xy, vec4f(entering.scale * lit.entered * share_of(surface.colour, skin.mix), 1.0));
 }

@@ -30,8 +30,9 @@ fn main(
     var slant = vec3f(1.0); // where it is dark, light comes from around
     if (packed.look.w != 0u) {
         let surface = unpack_surface(packed);
-        let open = open_at((vec2f(texel) + 0.5) / vec2f(textureDimensions(surfaces)));
-        let lit = light_up(unpack_point(packed), surface, surface.normal, open);
+        var point = unpack_point(packed);
+        point.place = (vec2f(texel) + 0.5) / vec2f(textureDimensions(surfaces));
+        let lit = light_up(point, surface, surface.normal, open_at(point.place));
         slant = select(slant, lit.across / max(lit.entered, vec3f(1e-20)), lit.entered > vec3f(0.0));
     }
     slants[index] = light_words(slant);

@@ -197,9 +197,9 @@ fn pre_integrated(point: Point, surface: Surface, footprint: f32, open: f32) -> 
             }
         }
     }
-    if (ENVIRONMENT) {
-        let around = ambient(normals[1], open, surface.colour * environment.albedo);
-        var entering = around * enters_from_everywhere(surface.roughness, surface.rho_s);
+    if (ENVIRONMENT || INTERREFLECTION) {
+        let smooth_surface = Surface(normals[1], surface.colour, surface.roughness, surface.rho_s);
+        var entering = entering_from_around(point, smooth_surface, open);
         if (HALF_SPACE) {
             entering *= skin.back_from_everywhere;
         }

@@ -7,6 +7,7 @@
 //#include "lights.wgsl"
 //#include "strand_shadows.wgsl"
 //#include "environment.wgsl"
+//#include "interreflection.wgsl"
 
 // Whether each point skips the lights behind its surface by itself. Without that, software adapters shade it with every light
 // that a point beside it sees. GPUs do without: they read lights faster when all points read the same one.
@@ -70,6 +71,22 @@ fn reaching(light: Light, point: Point, l: vec3f) -> f32 {
     return visibility(light, point, l) * past_strands(light, point.position);
 }
 
+// Light that enters from all around: from the environment, and from other skin. Where that is known, the environment's own guess
+// of it is left out.
+fn entering_from_around(point: Point, surface: Surface, open: f32) -> vec3f {
+    let linked = INTERREFLECTION && (point.flags & MAPPED) != 0u;
+    var entering = vec3f(0.0);
+    if (ENVIRONMENT) {
+        let albedo = select(surface.colour * environment.albedo, vec3f(0.0), linked);
+        entering = ambient(surface.normal, open, albedo) * enters_from_everywhere(surface.roughness, surface.rho_s);
+    }
+    if (linked) {
+        // Where it is known how much of the sky is hidden, cells say only how bright that is.
+        entering += from_skin_at(point.place) * select(1.0, 1.0 - open, environment.occluded != 0u);
+    }
+    return entering;
+}
+
 // open: share of the sky that the point sees
 fn light_up(point: Point, surface: Surface, v: vec3f, open: f32) -> Lit {
     return light_through(point, surface, Film(surface.normal, vec3f(0.0)), v, open);
@@ -122,16 +139,17 @@ fn light_through(point: Point, surface: Surface, film: Film, v: vec3f, open: f32
             break;
         }
     }
-    if (ENVIRONMENT) {
-        let around = ambient(surface.normal, open, surface.colour * environment.albedo);
-        let albedo = surface.rho_s * surface_albedo(dot(mirror, v), surface.roughness).x;
-        var entering = around * enters_from_everywhere(surface.roughness, surface.rho_s);
+    if (ENVIRONMENT || INTERREFLECTION) {
+        var entering = entering_from_around(point, surface, open);
         if (by_direction) {
             lit.directional += entering * beyond_mean_from_everywhere(facing);
             entering *= skin.back_from_everywhere;
             lit.across += entering;
         }
         lit.entered += entering;
+    }
+    if (ENVIRONMENT) {
+        let albedo = surface.rho_s * surface_albedo(dot(mirror, v), surface.roughness).x;
         lit.reflected += albedo * mirrored(point, mirror, v, surface.roughness, open);
     }
     return lit;

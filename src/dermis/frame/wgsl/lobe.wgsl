@@ -39,6 +39,12 @@ fn enters_from_everywhere(m: f32, rho_s: f32) -> f32 {
     return max(0.0, 1.0 - rho_s * skin.loss * surface_albedo(1.0, m).y);
 }
 
+// Mean over directions of the share of light that leaves, as of uniform light.
+fn leaves_everywhere(m: f32, rho_s: f32) -> f32 {
+    let rho = rho_s * skin.loss * surface_albedo(1.0, m).y;
+    return max(0.0, 1.0 - rho) / max(1.0 - skin.returned * rho, 0.5);
+}
+
 // Share of light that leaves in a direction, over the mean of all directions unless light reflected inside is lost [Kelemen2001].
 fn leaves(cos_theta: f32, m: f32, rho_s: f32) -> f32 {
     let rho = rho_s * skin.loss * surface_albedo(cos_theta, m);

@@ -1,0 +1,124 @@
+"""What light from skin to skin needs on the device: places of patches, links, and space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dermis.atlas.atlas import Atlas
+from dermis.atlas.interreflection import SAMPLES, SIDE, Links, cached_links
+from dermis.gpu import Device, Memo, scratch
+from dermis.mesh.head import Head
+
+_TEXEL = 16  # bytes of four floats
+
+
+def link_numbers() -> dict[str, int]:
+    """What shaders fill in."""
+    return {"linked_side": SIDE, "linked_samples": SAMPLES}
+
+
+@dataclass(frozen=True, eq=False)
+class Interreflection:
+    """Light from skin to skin.
+
+    places : buffer of the places at which patches are lit, and how many there are
+    bounces, cells : buffers of the links of patches and of cells, by their names in the shaders
+    albedo : (3,) of the profile
+    occluded : whether cells hold the mean of what they see, as the map of occlusion says how much that is
+    emitted : buffer of the light that leaves places
+    patches : two buffers of the light that leaves patches, in turn
+    from_skin, unlit : buffers of the light that reaches cells, and of none
+    """
+
+    places: tuple[Any, int]
+    bounces: dict[str, Any]
+    cells: dict[str, Any]
+    albedo: NDArray[np.float64]
+    occluded: bool
+    emitted: Any
+    patches: tuple[Any, Any]
+    from_skin: Any
+    unlit: Any
+
+    @property
+    def nbytes(self) -> int:
+        """Of all but the space between passes, each once."""
+        read = (self.places[0], *self.bounces.values(), *self.cells.values(), self.from_skin)
+        return sum(int(one.size) for one in read)
+
+
+def interreflection_of(
+    memo: Memo,
+    device: Device,
+    head: Head,
+    atlas: Atlas,
+    albedo: NDArray[np.float64],
+    occluded: bool,
+    light: str,
+    of: str,
+) -> Interreflection | None:
+    """Light from skin to skin, None for a head that sees nothing of itself.
+
+    albedo : (3,) of the profile
+    occluded : whether it is known how much of the sky each place sees
+    light : whose it is, of several views in turn
+    of : name of the atlas among several
+    """
+    links = memo.keep(_found, head, atlas, of=of)
+    if not len(links.share):
+        return None
+    buffers = memo.keep(_uploaded, device, links, of=of)
+    return memo.keep(_made, device, buffers, albedo, occluded, light, of=f"{of} {light}")
+
+
+def no_interreflection(device: Device) -> Any:
+    """A buffer of no light."""
+    return device.shared("no interreflection", lambda: device.space(_TEXEL * SIDE * SIDE))
+
+
+def _found(head: Head, atlas: Atlas) -> Links:
+    return cached_links(head.mesh, atlas.place, atlas.mapped)
+
+
+def _uploaded(device: Device, links: Links) -> tuple[tuple[Any, int], dict[str, Any], dict[str, Any]]:
+    """Places, and links of patches and cells."""
+    places = np.stack([links.triangle, links.weights], axis=1)
+    bounces = _rows(device, links.bounce_first, links.bounce_patch, links.bounce_share)
+    cells = _rows(device, links.first, links.patch, links.share)
+    own = np.stack([links.own, links.held.view(np.uint32)], axis=1)
+    cells["cells"] = device.buffer(own, "STORAGE")
+    return (device.buffer(places, "STORAGE"), len(places)), bounces, cells
+
+
+def _rows(
+    device: Device, first: NDArray[np.uint32], patch: NDArray[np.uint32], share: NDArray[np.float32]
+) -> dict[str, Any]:
+    links = np.stack([patch, share.view(np.uint32)], axis=1)
+    links = links if len(links) else np.zeros((1, 2), np.uint32)
+    return {"first": device.buffer(first, "STORAGE"), "links": device.buffer(links, "STORAGE")}
+
+
+def _made(
+    device: Device,
+    buffers: tuple[tuple[Any, int], dict[str, Any], dict[str, Any]],
+    albedo: NDArray[np.float64],
+    occluded: bool,
+    _: str,
+) -> Interreflection:
+    places, bounces, cells = buffers
+    patches = tuple(scratch(device, device.space(_TEXEL * (places[1] // SAMPLES))) for _ in range(2))
+    return Interreflection(
+        places=places,
+        bounces=bounces,
+        cells=cells,
+        albedo=np.asarray(albedo),
+        occluded=occluded,
+        emitted=scratch(device, device.space(2 * _TEXEL * places[1])),
+        patches=(patches[0], patches[1]),
+        from_skin=device.space(_TEXEL * SIDE * SIDE),
+        unlit=no_interreflection(device),
+    )

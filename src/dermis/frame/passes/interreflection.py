@@ -1,0 +1,43 @@
+"""Light from skin to skin through the air: patches lit, a few bounces, and what reaches each cell."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dermis.atlas.interreflection import SAMPLES, SIDE
+from dermis.frame.interreflection import Interreflection
+from dermis.frame.passes import each, program
+from dermis.gpu import Constants, Recorder
+from dermis.gpu.program import Resources
+
+_BOUNCES = 4  # between patches; gathering adds another
+
+
+def draw(graph: Recorder, lit: Resources, made: Interreflection, constants: Constants) -> None:
+    """Find the light that skin sends to skin.
+
+    lit : what patches are lit with
+    constants : pipeline constants of the lights
+
+    Source: [Goral1984].
+    """
+    shader = program(graph.device, "interreflection_places.wgsl", constants)
+    footprint = 2.0 / (SIDE * SAMPLES**0.5)
+    record = shader.record("Leaving", places=made.places[1], footprint=footprint, albedo=made.albedo)
+    own = {"leaving": record, "places": made.places[0], "emitted": made.emitted, "from_skin": made.unlit}
+    graph.dispatch("interreflection", shader, {**lit, **own}, each(made.places[1]))
+    graph.repeat(_carry, made)
+
+
+def _carry(graph: Any, made: Interreflection) -> None:
+    """Let light bounce between the patches, and gather it."""
+    device, now, other = graph.device, *made.patches
+    mean: Constants = (("MEAN", 1),) if made.occluded else ()
+    for bounce in range(1 + _BOUNCES):
+        shader = program(device, "interreflection_bounce.wgsl", (("BOUNCES", 1), *mean) if bounce else ())
+        bound = {**made.bounces, "emitted": made.emitted, "before": other, "after": now}
+        graph.dispatch("interreflection", shader, bound, each(made.places[1] // SAMPLES))
+        now, other = other, now
+    gather = program(device, "interreflection_gather.wgsl", mean)
+    bound = {**made.cells, "patches": other, "from_skin": made.from_skin}
+    graph.dispatch("interreflection", gather, bound, each(SIDE * SIDE))

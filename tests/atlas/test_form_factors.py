@@ -1,0 +1,90 @@
+"""Form factors between patches: rooms and balls from inside, and a body that sees nothing of itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dermis.atlas.interreflection import SAMPLES, SIDE, Links, find_links
+from dermis.mesh.geometry import build_mesh
+from dermis.mesh.mesh import Mesh
+from dermis.mesh.primitives import SKIN, uv_sphere
+
+OPPOSITE, BESIDE = 0.199825, 0.200044  # form factors of a cube's faces, in closed form
+CLOSE = 0.01
+
+
+def inside_out(mesh: Mesh) -> Mesh:
+    """The same surface seen from within."""
+    return replace(mesh, normals=-mesh.normals, triangles=np.ascontiguousarray(mesh.triangles[:, ::-1]))
+
+
+def room() -> Mesh:
+    """A cube of side 2 seen from within, each face on a sixth of the uv square: -x, +x, -y, +y, -z, +z."""
+    points, uv, triangles = [], [], []
+    for face in range(6):
+        axis, sign = face // 2, 2.0 * (face % 2) - 1.0
+        square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], float)
+        at = np.insert(square, axis, sign, axis=1)
+        turned = sign * (1 if axis != 1 else -1) > 0
+        points.append(at)
+        uv.append((0.5 + 0.5 * square) * [1 / 4, 1 / 2] + [(face % 4) / 4, face // 4 / 2])
+        pair = np.array([[0, 1, 2], [0, 2, 3]])
+        triangles.append(4 * face + (pair[:, ::-1] if turned else pair))
+    made = np.concatenate(points), np.concatenate(uv), np.concatenate(triangles)
+    return build_mesh(*made, np.zeros(12, int), (SKIN,))
+
+
+def found(mesh: Mesh) -> Links:
+    place = mesh.uv[mesh.triangles].astype(np.float32)
+    return find_links(mesh, place, np.ones(len(mesh.triangles), bool))
+
+
+def face_of(x: np.ndarray, y: np.ndarray, side: int) -> np.ndarray:
+    return 4 * x // side + 4 * (2 * y // side)
+
+
+def test_the_faces_of_a_room() -> None:
+    links = found(room())
+    given = np.zeros((6, 6))
+    y, x = np.divmod(np.arange(SIDE * SIDE), SIDE)
+    face = face_of(x, y, SIDE)
+    held = face < 6
+    patch = face[(y % 2 == 0) & (x % 2 == 0) & held]  # in the order of patches
+    assert len(patch) == links.patches
+    row = np.repeat(np.arange(SIDE * SIDE), np.diff(links.first.astype(np.int64)))
+    np.add.at(given, (face[row], patch[links.patch]), links.share)
+    given /= np.bincount(face[held])[:, None]
+    opposite = np.array([1, 0, 3, 2, 5, 4])
+    expected = np.full((6, 6), BESIDE)
+    expected[np.arange(6), np.arange(6)], expected[np.arange(6), opposite] = 0.0, OPPOSITE
+    assert np.abs(given - expected).max() < CLOSE
+    assert np.abs(given.sum(axis=1) - 1.0).max() < CLOSE
+
+
+def test_places_lie_on_their_patch() -> None:
+    mesh = room()
+    links = found(mesh)
+    w = np.stack([links.weights & 0xFFFF, links.weights >> 16], axis=1) / 65535.0
+    w = np.column_stack([1.0 - w.sum(axis=1), w])
+    uv = np.einsum("nk,nkc->nc", w, mesh.uv[mesh.triangles[links.triangle]])
+    patch = np.floor(SIDE // 2 * uv.reshape(-1, SAMPLES, 2) - 1e-4 * (uv.reshape(-1, SAMPLES, 2) == 1.0))
+    apart = np.abs(patch - np.median(patch, axis=1, keepdims=True))
+    assert (apart.max(axis=(1, 2)) < 1.0).mean() > 0.99  # weights are rounded at a patch's edge
+
+
+@pytest.mark.parametrize("outside", [True, False])
+def test_a_ball_sees_all_of_itself_from_within_and_nothing_from_without(outside: bool) -> None:
+    ball = uv_sphere(10.0, 24, 12)
+    links = found(ball if outside else inside_out(ball))
+    if outside:
+        assert not len(links.share)
+    else:
+        seen = np.bincount(
+            np.repeat(np.arange(links.patches), np.diff(links.bounce_first.astype(np.int64))),
+            links.bounce_share,
+            links.patches,
+        )
+        assert np.abs(seen - 1.0).mean() < 1e-3 and np.abs(seen - 1.0).max() < 0.05  # lines through edges
