@@ -74,7 +74,7 @@ def stage_bytes(moved: Moved) -> dict[str, float]:
         "post": pixels * (radiance + texel_bytes(picture.exposed) + texel_bytes(picture.bytes)),
     }
     if between := inputs.layouts[0].interreflection:
-        found["interreflection"] = float(between.nbytes)
+        found["interreflection"] = float(between.space.nbytes)
     return (found | _scattering_bytes(moved, looked_up)) if inputs.resources.scatters else found
 
 

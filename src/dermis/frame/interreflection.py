@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +22,11 @@ def link_numbers() -> dict[str, int]:
 
 
 @dataclass(frozen=True, eq=False)
-class Interreflection:
-    """Light from skin to skin.
+class LinkSpace:
+    """What light from skin to skin needs that is alike for all skins.
 
     places : buffer of the places at which patches are lit, and how many there are
     bounces, cells : buffers of the links of patches and of cells, by their names in the shaders
-    albedo : (3,) of the profile
     occluded : whether cells hold the mean of what they see, as the map of occlusion says how much that is
     emitted : buffer of the light that leaves places
     patches : two buffers of the light that leaves patches, in turn
@@ -37,7 +36,6 @@ class Interreflection:
     places: tuple[Any, int]
     bounces: dict[str, Any]
     cells: dict[str, Any]
-    albedo: NDArray[np.float64]
     occluded: bool
     emitted: Any
     patches: tuple[Any, Any]
@@ -49,6 +47,13 @@ class Interreflection:
         """Of all but the space between passes, each once."""
         read = (self.places[0], *self.bounces.values(), *self.cells.values(), self.from_skin)
         return sum(int(one.size) for one in read)
+
+
+class Interreflection(NamedTuple):
+    """Light from skin to skin, and the (3,) albedo of the profile."""
+
+    space: LinkSpace
+    albedo: NDArray[np.float64]
 
 
 def interreflection_of(
@@ -72,7 +77,7 @@ def interreflection_of(
     if not len(links.share):
         return None
     buffers = memo.keep(_uploaded, device, links, of=of)
-    return memo.keep(_made, device, buffers, albedo, occluded, light, of=f"{of} {light}")
+    return Interreflection(memo.keep(_space, device, buffers, occluded, light, of=f"{of} {light}"), albedo)
 
 
 def no_interreflection(device: Device) -> Any:
@@ -102,20 +107,15 @@ def _rows(
     return {"first": device.buffer(first, "STORAGE"), "links": device.buffer(links, "STORAGE")}
 
 
-def _made(
-    device: Device,
-    buffers: tuple[tuple[Any, int], dict[str, Any], dict[str, Any]],
-    albedo: NDArray[np.float64],
-    occluded: bool,
-    _: str,
-) -> Interreflection:
+def _space(
+    device: Device, buffers: tuple[tuple[Any, int], dict[str, Any], dict[str, Any]], occluded: bool, _: str
+) -> LinkSpace:
     places, bounces, cells = buffers
     patches = tuple(scratch(device, device.space(_TEXEL * (places[1] // SAMPLES))) for _ in range(2))
-    return Interreflection(
+    return LinkSpace(
         places=places,
         bounces=bounces,
         cells=cells,
-        albedo=np.asarray(albedo),
         occluded=occluded,
         emitted=scratch(device, device.space(2 * _TEXEL * places[1])),
         patches=(patches[0], patches[1]),

@@ -195,7 +195,7 @@ def _layout(
     if asked.interreflects:
         whose = asked.split.total, asked.occluded, asked.light_of
         between = interreflection_of(memo, device, head, atlas, *whose, of=number)
-    lit["from_skin"] = between.from_skin if between else no_interreflection(device)
+    lit["from_skin"] = between.space.from_skin if between else no_interreflection(device)
     side = asked.settings.atlas if asked.count else 1
     surfaces = keep(surface_texels.make_surfaces, device, side, of=number)
     scattered = _sum(memo, device, asked, side, number)

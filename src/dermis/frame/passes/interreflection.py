@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from dermis.atlas.interreflection import SAMPLES, SIDE
-from dermis.frame.interreflection import Interreflection
+from dermis.frame.interreflection import Interreflection, LinkSpace
 from dermis.frame.passes import each, program
 from dermis.gpu import Constants, Recorder
 from dermis.gpu.program import Resources
@@ -21,15 +21,15 @@ def draw(graph: Recorder, lit: Resources, made: Interreflection, constants: Cons
 
     Source: [Goral1984].
     """
-    shader = program(graph.device, "interreflection_places.wgsl", constants)
-    footprint = 2.0 / (SIDE * SAMPLES**0.5)
-    record = shader.record("Leaving", places=made.places[1], footprint=footprint, albedo=made.albedo)
-    own = {"leaving": record, "places": made.places[0], "emitted": made.emitted, "from_skin": made.unlit}
-    graph.dispatch("interreflection", shader, {**lit, **own}, each(made.places[1]))
-    graph.repeat(_carry, made)
+    shader, (space, albedo) = program(graph.device, "interreflection_places.wgsl", constants), made
+    (places, count), footprint = space.places, 2.0 / (SIDE * SAMPLES**0.5)
+    record = shader.record("Leaving", places=count, footprint=footprint, albedo=albedo)
+    own = {"leaving": record, "places": places, "emitted": space.emitted, "from_skin": space.unlit}
+    graph.dispatch("interreflection", shader, {**lit, **own}, each(count))
+    graph.repeat(_carry, space)
 
 
-def _carry(graph: Any, made: Interreflection) -> None:
+def _carry(graph: Any, made: LinkSpace) -> None:
     """Let light bounce between the patches, and gather it."""
     device, now, other = graph.device, *made.patches
     mean: Constants = (("MEAN", 1),) if made.occluded else ()
