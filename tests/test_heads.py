@@ -171,7 +171,7 @@ def test_light_is_continuous_across_seams(subject: Subject, view: str, tmp_path:
     narrow = tmp_path / "narrow.csv"
     narrow.write_text("variance_mm2,red,green,blue\n0.02,1,1,1\n")
     camera = VIEWS[view](subject.head)
-    settings = {"profile": str(narrow), "atlas": 1024}
+    settings = {"profile": str(narrow), "atlas": 1024, "interreflection": False}
     gathered = _frontal(subject.bare_renderer, subject.bare, camera, **settings)
     direct = _frontal(subject.bare_renderer, subject.bare, camera, **settings, technique="none")
     facing = _inside(subject, camera) & (direct[..., 0] > 0.3)

@@ -27,7 +27,7 @@ def test_scan(renderer: Renderer) -> None:
     atlas = made.pop("texture-space")
     off = {name: np.sqrt(((image - atlas) ** 2).mean()) for name, image in made.items()}
     assert off["screen-space"] < 0.4 * off["none"]
-    assert off["pre-integrated"] < 0.6 * off["none"]
+    assert off["pre-integrated"] < 0.65 * off["none"]
     for image in made.values():
         assert np.isfinite(image).all() and image.min() >= -1e-6
         assert image.sum() == pytest.approx(atlas.sum(), rel=0.03)

@@ -105,6 +105,7 @@ SETTINGS = Settings(
     tone="filmic",
     gamma="wrong",
     strands=False,
+    interreflection=False,
     background=(0.1, 0.0, 0.0),
     background_blur=0.2,
     parts="diffuse",
