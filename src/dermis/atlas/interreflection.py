@@ -22,9 +22,8 @@ SAMPLES = 8
 """Places at which a patch is lit."""
 BUNDLES, LINES = 128, (96, 256)  # directions of parallel lines; least and most lines along a bundle's side
 _FEW = 12, 64  # the same, to learn whether a surface sees anything of itself
-_FORM = 4  # raise when `find_links` gives other results
+_FORM = 3  # raise when `find_links` gives other results
 _LEAST = 1e-3  # share of the hemisphere below which links are left out, and the others made up for them
-_STEPS = 1 << 14  # of shares: finer ones are noise, which takes room in files
 _SEED = 20
 _ROW = 4096  # of lines: more than a bundle has along its side
 
@@ -213,7 +212,7 @@ def _rows(giver: Index, patch: Index, left: Floats, patches: int) -> tuple[Words
     share = lines / left[row]
     kept = share >= _LEAST
     whole, rest = (np.bincount(row[some], share[some], len(left)) for some in (slice(None), kept))
-    share = np.rint(_STEPS * share[kept] * (whole / np.maximum(rest, 1e-12))[row[kept]]) / _STEPS
+    share = share[kept] * (whole / np.maximum(rest, 1e-12))[row[kept]]
     first = np.concatenate([[0], np.cumsum(np.bincount(row[kept], minlength=len(left)))])
     return first.astype(np.uint32), column[kept].astype(np.uint32), share.astype(np.float32)
 
