@@ -6,6 +6,7 @@ From what `unmixing.py`, `widths.py` and `fitting.py` measured.
 from __future__ import annotations
 
 import json
+import math
 import statistics
 import sys
 from collections.abc import Callable, Sequence
@@ -20,6 +21,8 @@ TEXT = ROOT / "docs" / "fit.in.md"
 RESULTS = ROOT / "benchmarks" / "results" / "unmixing.json"
 WIDTHS = RESULTS.with_name("widths.json")
 FITTED = ROOT / "benchmarks" / "results" / "fitting.json"
+
+_TRUE_STRENGTH = 1.0  # of the surface of all faces that are fitted, as fitting_scenes.py has them
 
 Told = dict[str, Any]
 
@@ -165,19 +168,35 @@ def _fitting(told: Told) -> str:
     busy = statistics.median(one["processor_seconds"] for one in told["traced"])
     size = f"{told['side']} x {told['side']} pixels, {told['samples']} paths a pixel"
     took = f"{told['adapter']}: {seconds:.3g} s for a fit in the median, {busy:.3g} s of processor time"
-    return _table(heads, rows) + f"\n{size}. {took}.\n"
+    return _table(heads, rows) + f"\n{size}, fitted at 128 across. {took}.\n\n{_stated(told['traced'])}"
 
 
 def _errors(cases: Sequence[Told], words: str) -> list[tuple[str, ...]]:
     """Rows of the errors of each number."""
     rows = []
-    for name in ("melanin", "blood", "roughness"):
-        pairs = [(one[name]["found"], one[name]["true"]) for one in cases]
-        off = [a - b if name == "roughness" else a / b - 1.0 for a, b in pairs]
-        told = _thousandths if name == "roughness" else _percent
+    for name in ("melanin", "blood", "roughness", "rho_s"):
+        pairs = [(one["rho_s"], _TRUE_STRENGTH) if name == "rho_s" else _pair(one[name]) for one in cases]
+        shares = name in ("melanin", "blood")
+        off = [a / b - 1.0 if shares else a - b for a, b in pairs]
+        told = _percent if shares else _thousandths
         rows.append((words, name, *_spread([abs(x) for x in off], told), told(statistics.median(off))))
     turns = [one["sun_degrees"] for one in cases]
     return [*rows, (words, "direction of the sun", *_spread(turns, lambda x: f"{x:.1f} degrees"), "")]
+
+
+def _pair(one: Told) -> tuple[float, float]:
+    return one["found"], one["true"]
+
+
+def _stated(cases: Sequence[Told]) -> str:
+    """How far off pigments are over the deviations that the fits state."""
+    words = []
+    for name in ("melanin", "blood"):
+        over = [math.log(a / b) / one[name]["relative_sd"] for one in cases for a, b in [_pair(one[name])]]
+        within = sum(abs(x) < 2.0 for x in over) / len(over)
+        rms = math.sqrt(statistics.fmean(x * x for x in over))
+        words.append(f"{name} {rms:.1f} times (RMS; within twice of it in {_percent(within)} of the faces)")
+    return f"Errors of path-traced faces over the stated standard deviations: {', '.join(words)}.\n"
 
 
 def _thousandths(value: float) -> str:
@@ -186,7 +205,8 @@ def _thousandths(value: float) -> str:
 
 def _spread(values: Sequence[float], told: Callable[[float], str]) -> tuple[str, str, str]:
     ordered = sorted(values)
-    return told(statistics.median(ordered)), told(ordered[int(0.9 * (len(ordered) - 1))]), told(ordered[-1])
+    most = ordered[math.ceil(0.9 * len(ordered)) - 1]
+    return told(statistics.median(ordered)), told(most), told(ordered[-1])
 
 
 def _percent(share: float) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,7 @@ def analyse(radiance: Floats, degree: int) -> list[Complex]:
     height, width = radiance.shape[:2]
     weighted = radiance * solid_angles(height, width)[..., None]
     around = np.fft.rfft(weighted, axis=1)
-    table = legendre(_polar_cosines(height), degree, degree + 1)
+    table = _table(height, degree)
     return [
         table[m] @ (around[:, m] * np.exp(-1j * m * _first_azimuth(width)))
         if m < around.shape[1]
@@ -59,8 +60,7 @@ def zonal(kernel: Callable[[Floats], Floats], degree: int) -> Floats:
     Source: the Funk-Hecke theorem, as in [RamamoorthiHanrahan2001].
     """
     theta = 0.5 * np.pi * (np.arange(_KERNEL_NODES) + 0.5) / _KERNEL_NODES
-    (polynomials,) = legendre(np.cos(theta), degree, orders=1)
-    polynomials *= np.sqrt(4.0 * np.pi / (2.0 * np.arange(degree + 1) + 1.0))[:, None]
+    polynomials = _polynomials(degree)
     measure = np.pi**2 / _KERNEL_NODES * np.sin(theta)
     return np.asarray(polynomials @ (kernel(theta) * measure))
 
@@ -69,12 +69,26 @@ def synthesise(coefficients: list[Complex], factors: Floats, height: int) -> Flo
     """The panorama (height, 2 height, c) of the coefficients, each degree multiplied by its factor."""
     width = 2 * height
     degree = len(factors) - 1
-    table = legendre(_polar_cosines(height), degree, degree + 1)
+    table = _table(height, degree)
     around = np.zeros((height, width // 2 + 1, coefficients[0].shape[1]), complex)
     for m in range(min(degree, width // 2 - 1) + 1):
         scaled = coefficients[m] * factors[m:, None]
         around[:, m] = (table[m].T @ scaled) * np.exp(1j * m * _first_azimuth(width))
     return np.fft.irfft(around, width, axis=1) * width
+
+
+@lru_cache(maxsize=4)
+def _table(height: int, degree: int) -> list[Floats]:
+    """Functions of all orders at the rows of a panorama."""
+    return legendre(_polar_cosines(height), degree, degree + 1)
+
+
+@lru_cache(maxsize=4)
+def _polynomials(degree: int) -> Floats:
+    """(degree + 1, n) Legendre's at the nodes of kernels."""
+    theta = 0.5 * np.pi * (np.arange(_KERNEL_NODES) + 0.5) / _KERNEL_NODES
+    (functions,) = legendre(np.cos(theta), degree, orders=1)
+    return np.asarray(functions * np.sqrt(4.0 * np.pi / (2.0 * np.arange(degree + 1) + 1.0))[:, None])
 
 
 def _polar_cosines(height: int) -> Floats:

@@ -15,6 +15,7 @@ from dermis.fitting.unknowns import SKIN
 Floats = NDArray[np.float64]
 _BLOCKS = 16
 """Along the longer side: what the frame gets wrong is alike within one."""
+_EDGE = 1e-6
 _HELD = 0.5
 _ALIKE = 0.95
 
@@ -24,7 +25,8 @@ class Certainty:
     """Of the unknowns by name, all as logarithms or angles.
 
     sd : standard deviations, from residuals that are alike within blocks of the picture
-    held : names whose deviation is more than half of what was believed before: the belief says them
+    held : names whose deviation is more than half of what was believed before, so that the belief says them,
+        and those that ended on a limit
     alike : pairs that the photograph cannot tell apart, with their correlation
     singular : values of the derivatives in units of what is believed, largest first
     """
@@ -57,7 +59,9 @@ def certainty_of(problem: Problem, state: State, slopes: Floats) -> Certainty:
     covariance = H @ (sums.T @ sums + np.diag(spread**-2.0)) @ H
     sd = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(sd, sd)
-    held = tuple(name for name, one, before in zip(names, sd, spread, strict=False) if one > _HELD * before)
+    ended = _on_limits(state)
+    each = zip(names, sd, spread, strict=False)
+    held = tuple(name for name, one, before in each if one > _HELD * before or name in ended)
     alike = tuple(
         (names[a], names[b], float(correlation[a, b]))
         for a in range(count)
@@ -67,6 +71,12 @@ def certainty_of(problem: Problem, state: State, slopes: Floats) -> Certainty:
     singular = np.linalg.svd(J * spread, compute_uv=False)
     told = dict(zip(names, map(float, sd), strict=False))
     return Certainty(told, held, alike, tuple(map(float, singular)))
+
+
+def _on_limits(state: State) -> set[str]:
+    """Names of the skin's numbers that ended as low or as high as they may."""
+    found = state.point.values()
+    return {one.name for one in SKIN if not one.low * (1 + _EDGE) < found[one.name] < one.high * (1 - _EDGE)}
 
 
 def _blocks(frames: Frames) -> NDArray[np.int64]:
