@@ -44,8 +44,7 @@ def _machine(told: Told) -> str:
         f"## {', '.join(machine['adapters'])}, {machine['cores']} cores\n",
         f"{width} x {height}, atlas {machine['atlas']}; with each picture {', '.join(machine['outputs'])}, "
         f"landmarks and parameters.\n{told['date'][:10]}, dermis {versions['dermis']}, "
-        f"wgpu {versions['wgpu']}; load average before: {told['load']}. "
-        f"{told.get('note', '')}\n",
+        f"wgpu {versions['wgpu']}; load average before: {told['load']}.{_noted(told)}\n",
         "### Measured\n",
         _rates(told),
     ]
@@ -54,6 +53,11 @@ def _machine(told: Told) -> str:
         parts += ["### An image by itself\n", _table(("step", "ms"), rows)]
     parts += [f"### On paper: {IMAGES:,} images of new people\n", _table(("", ""), paper(told))]
     return "\n".join(parts)
+
+
+def _noted(told: Told) -> str:
+    """What is to be said of the machine's figures besides, after a sentence."""
+    return f" {told['note']}" if "note" in told else ""
 
 
 def _memory(told: Told) -> str:

@@ -37,8 +37,8 @@ def _read(app: Any, page: str, source: list[str]) -> None:
 
 
 def _finished(app: Any, fault: Exception | None) -> None:
-    head, place = app.config.turning_head, Path(app.outdir) / FILE
-    if fault is None and head and app.builder.format == "html" and not place.exists():
+    head = app.config.turning_head
+    if fault is None and head and app.builder.format == "html":
         from dermis.export.run import export_skin
 
-        export_skin(head, "web", place)
+        export_skin(head, "web", Path(app.outdir) / FILE)

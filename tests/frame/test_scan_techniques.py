@@ -13,6 +13,7 @@ from dermis.scene.heads import load_head
 
 FACE = Camera(position=(0, 10, 600), target=(0, -5, 90), frame_mm=110.0)
 SIZES = {"size": (160, 160), "atlas": 512, "shadow_size": 1024, "samples": 4, "transmission": "none"}
+SIZES["interreflection"] = False  # whose cells lie otherwise on each technique's atlas
 
 
 @pytest.mark.samples
@@ -27,7 +28,7 @@ def test_scan(renderer: Renderer) -> None:
     atlas = made.pop("texture-space")
     off = {name: np.sqrt(((image - atlas) ** 2).mean()) for name, image in made.items()}
     assert off["screen-space"] < 0.4 * off["none"]
-    assert off["pre-integrated"] < 0.65 * off["none"]
+    assert off["pre-integrated"] < 0.6 * off["none"]
     for image in made.values():
         assert np.isfinite(image).all() and image.min() >= -1e-6
         assert image.sum() == pytest.approx(atlas.sum(), rel=0.03)

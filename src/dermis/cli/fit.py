@@ -106,7 +106,7 @@ def _report(found: Fitted, written: list[Path], as_json: bool) -> None:
     lines.append(f"  light      {', '.join(f'{x:.3f}' for x in told['white'])}")
     lines.append(f"  photograph and fit differ by {100 * told['residual']:.1f} % (median)")
     for name in told["not_determined"]:
-        lines.append(f"  not determined: {name}, which what is believed beforehand says")
+        lines.append(f"  not determined: {name}, which a belief or a limit says")
     for one in told["not_told_apart"]:
         lines.append(f"  not told apart: {' and '.join(one['pair'])} (correlation {one['correlation']:.2f})")
     lines += [f"  believed: {one}" for one in told["priors"]]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,8 +122,9 @@ def traced(
     assert colour is not None  # painted people have one
     weight, width = profile.weight, np.sqrt(0.5 * np.pi * profile.variance_mm2)
     distance = (weight * width[:, None]).sum(axis=0) / weight.sum(axis=0)
-    how: dict[str, Any] = {"variant": variant, "keep": keep, "report": report}
-    return trace_person(scene, paint, distance, colour, size, samples, **how)
+    return trace_person(
+        scene, paint, distance, colour, size, samples, variant=variant, keep=keep, report=report
+    )
 
 
 def pair_of(name: str, ours: Floats, truth: PathTraced, mask: NDArray[np.bool_]) -> Pair:

@@ -59,10 +59,9 @@ def zonal(kernel: Callable[[Floats], Floats], degree: int) -> Floats:
 
     Source: the Funk-Hecke theorem, as in [RamamoorthiHanrahan2001].
     """
-    theta = 0.5 * np.pi * (np.arange(_KERNEL_NODES) + 0.5) / _KERNEL_NODES
-    polynomials = _polynomials(degree)
+    theta = _nodes()
     measure = np.pi**2 / _KERNEL_NODES * np.sin(theta)
-    return np.asarray(polynomials @ (kernel(theta) * measure))
+    return np.asarray(_polynomials(degree) @ (kernel(theta) * measure))
 
 
 def synthesise(coefficients: list[Complex], factors: Floats, height: int) -> Floats:
@@ -77,18 +76,22 @@ def synthesise(coefficients: list[Complex], factors: Floats, height: int) -> Flo
     return np.fft.irfft(around, width, axis=1) * width
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=2)  # of panoramas that are read and of those that are made: 38 kB a row at degree 96
 def _table(height: int, degree: int) -> list[Floats]:
     """Functions of all orders at the rows of a panorama."""
     return legendre(_polar_cosines(height), degree, degree + 1)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=1)
 def _polynomials(degree: int) -> Floats:
     """(degree + 1, n) Legendre's at the nodes of kernels."""
-    theta = 0.5 * np.pi * (np.arange(_KERNEL_NODES) + 0.5) / _KERNEL_NODES
-    (functions,) = legendre(np.cos(theta), degree, orders=1)
+    (functions,) = legendre(np.cos(_nodes()), degree, orders=1)
     return np.asarray(functions * np.sqrt(4.0 * np.pi / (2.0 * np.arange(degree + 1) + 1.0))[:, None])
+
+
+def _nodes() -> Floats:
+    """(n,) angles at which kernels are read."""
+    return np.asarray(0.5 * np.pi * (np.arange(_KERNEL_NODES) + 0.5) / _KERNEL_NODES)
 
 
 def _polar_cosines(height: int) -> Floats:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.mesh.columns import crosses, dots
 from dermis.mesh.mesh import Floats, Ints, Mesh
 from dermis.summary import Summarised
 
@@ -99,11 +100,11 @@ def frames(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tuple[D
     points_mm : (p, 3) of the mesh
     """
     root, (a, b, c, d) = _places(mesh, roots, points_mm)
-    along, normal = (b - a) + (c - d), _cross(c - a, d - b)
-    along /= np.maximum(np.sqrt(_dot(along, along)), _LEAST)
-    normal -= _dot(normal, along) * along
-    normal /= np.maximum(np.sqrt(_dot(normal, normal)), _LEAST)
-    return root.T, np.stack([along, _cross(normal, along), normal]).transpose(2, 0, 1)
+    along, normal = (b - a) + (c - d), crosses(c - a, d - b)
+    along /= np.maximum(np.sqrt(dots(along, along)), _LEAST)
+    normal -= dots(normal, along) * along
+    normal /= np.maximum(np.sqrt(dots(normal, normal)), _LEAST)
+    return root.T, np.stack([along, crosses(normal, along), normal]).transpose(2, 0, 1)
 
 
 def between(share: Doubles, around: Doubles) -> Doubles:
@@ -117,17 +118,6 @@ def _places(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tuple[
     around = columns[:, corners(mesh, roots.quad).T].transpose(1, 0, 2)
     a, b, c, d = weights(roots.place).T[:, None] * around
     return a + b + c + d, around
-
-
-def _dot(a: Doubles, b: Doubles) -> Doubles:
-    """(n,) of vectors (3, n)."""
-    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
-
-
-def _cross(a: Doubles, b: Doubles) -> Doubles:
-    """(3, n) of vectors (3, n)."""
-    (ax, ay, az), (bx, by, bz) = a, b
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
 def finer_roots(mesh: Mesh, roots: Roots, levels: int) -> Roots:

@@ -53,13 +53,7 @@ class Views:
         Raises DermisError for what the technique does not make.
         """
         inputs = self._renderer.prepare(scene, settings, side)
-        around = (
-            "ENVIRONMENT",
-            "HALF_SPACE",
-            "INTERREFLECTION",
-            "STRANDS",
-            "STRAND_WINDOW",
-        )  # which the shader has not
+        around = ("ENVIRONMENT", "HALF_SPACE", "INTERREFLECTION", "STRANDS")  # which the shader has not
         constants = tuple(switch for switch in inputs.light_constants if switch[0] not in around)
         shader = program(self._renderer.device, _INTERMEDIATE, constants)
         layer, scale = self._layer(inputs, view, settings)

@@ -35,9 +35,9 @@ def _carry(graph: Any, made: LinkSpace) -> None:
     mean: Constants = (("MEAN", 1),) if made.occluded else ()
     for bounce in range(1 + _BOUNCES):
         shader = program(device, "interreflection_bounce.wgsl", (("BOUNCES", 1), *mean) if bounce else ())
-        bound = {**made.bounces, "emitted": made.emitted, "before": other, "after": now}
+        bound = {**made.bounces, "emitted": made.emitted, "sent": other, "after": now}
         graph.dispatch("interreflection", shader, bound, each(made.places[1] // SAMPLES))
         now, other = other, now
     gather = program(device, "interreflection_gather.wgsl", mean)
-    bound = {**made.cells, "patches": other, "from_skin": made.from_skin}
+    bound = {**made.cells, "sent": other, "from_skin": made.from_skin}
     graph.dispatch("interreflection", gather, bound, each(SIDE * SIDE))

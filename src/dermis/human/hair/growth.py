@@ -12,6 +12,7 @@ from dermis.human.hair.combing import Combed, along_skin
 from dermis.human.hair.grown import Ground, Rooted
 from dermis.human.hair.hairy_skin import told
 from dermis.human.hair.skin import Skin
+from dermis.mesh.columns import crosses, dots
 from dermis.mesh.geometry import compacted
 from dermis.mesh.mesh import Floats
 from dermis.mesh.strands import Doubles, Roots, corners, weights
@@ -93,18 +94,6 @@ def _guides(
     return np.stack(found, axis=1)
 
 
-def dots(a: Floats, b: Floats) -> Floats:
-    """(..., n) products of vectors (..., 3, n)."""
-    x, y, z = (a[..., c, :] * b[..., c, :] for c in range(3))
-    return np.asarray(x + y + z)
-
-
-def _crosses(a: Floats, b: Floats) -> Floats:
-    """(..., 3, n) of vectors (3, n) and (..., 3, n)."""
-    (ax, ay, az), (bx, by, bz) = a, (b[..., c, :] for c in range(3))
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-2)
-
-
 def _between(share: Doubles, near: NDArray[np.int64], ways: Doubles) -> Floats:
     """(k, 3, n) means of guides' ways.
 
@@ -125,7 +114,7 @@ def _astray(ways: Floats, normal: Floats, rough: Roughness, rng: np.random.Gener
     length = np.clip(1.0 + rough.uneven * rng.normal(size=n), 0.35, 1.2)
     stay, turn = length * np.cos(angle), length * np.sin(angle)
     stay, turn, rise = (one.astype(np.float32) for one in (stay, turn, length * lean - stay))
-    found: Floats = turn * _crosses(normal, ways)
+    found: Floats = turn * crosses(normal, ways)
     found += (rise * dots(ways, normal))[:, None] * normal
     found += stay * ways
     return found
@@ -166,7 +155,7 @@ def _coils(tips: Floats, t: Doubles, rough: Roughness, rng: np.random.Generator)
     turns = 2 * np.pi * (rough.coils * rng.uniform(0.8, 1.2, n) * t + rng.random(n))
     radius = rough.coil_mm * rng.uniform(0.6, 1.2, n) * np.minimum(4 * t, 1.0)
     x, y = ((radius * one)[:, None].astype(np.float32) for one in (np.cos(turns), np.sin(turns)))
-    return np.asarray(x * side + y * _crosses(along, side))
+    return np.asarray(x * side + y * crosses(along, side))
 
 
 def _over_skin(ways: Floats, normal: Floats, t: Floats) -> Floats:

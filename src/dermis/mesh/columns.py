@@ -1,0 +1,22 @@
+"""Products of many vectors at once, whose numbers x, y, z are rows: what is done to one is done to all."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+T = TypeVar("T", np.float32, np.float64)
+
+
+def dots(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
+    """(..., n) of vectors (..., 3, n)."""
+    x, y, z = (a[..., c, :] * b[..., c, :] for c in range(3))
+    return np.asarray(x + y + z)
+
+
+def crosses(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
+    """(..., 3, n) of vectors (3, n) and (..., 3, n)."""
+    (ax, ay, az), (bx, by, bz) = a, (b[..., c, :] for c in range(3))
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-2)
