@@ -29,7 +29,9 @@ class LinkSpace:
     bounces, cells : buffers of the links of patches and of cells, by their names in the shaders
     occluded : whether cells hold the mean of what they see, as the map of occlusion says how much that is
     emitted : buffer of the light that leaves places
-    patches : two buffers of the light that leaves patches, in turn
+    leaving : buffer of the light that leaves patches without bounces
+    around : buffer of that which leaves them where 1 arrives from everywhere
+    patches : two buffers of the light that leaves patches after bounces, in turn
     from_skin, unlit : buffers of the light that reaches cells, and of none
     """
 
@@ -38,6 +40,8 @@ class LinkSpace:
     cells: dict[str, Any]
     occluded: bool
     emitted: Any
+    leaving: Any
+    around: Any
     patches: tuple[Any, Any]
     from_skin: Any
     unlit: Any
@@ -111,13 +115,17 @@ def _space(
     device: Device, buffers: tuple[tuple[Any, int], dict[str, Any], dict[str, Any]], occluded: bool, _: str
 ) -> LinkSpace:
     places, bounces, cells = buffers
-    patches = tuple(scratch(device, device.space(_TEXEL * (places[1] // SAMPLES))) for _ in range(2))
+    leaving, around, *patches = (
+        scratch(device, device.space(_TEXEL * (places[1] // SAMPLES))) for _ in range(4)
+    )
     return LinkSpace(
         places=places,
         bounces=bounces,
         cells=cells,
         occluded=occluded,
         emitted=scratch(device, device.space(2 * _TEXEL * places[1])),
+        leaving=leaving,
+        around=around,
         patches=(patches[0], patches[1]),
         from_skin=device.space(_TEXEL * SIDE * SIDE),
         unlit=no_interreflection(device),

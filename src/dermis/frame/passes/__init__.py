@@ -51,7 +51,9 @@ TILE = 16
 _LEVELS = PASSES / "levels"
 _SOURCES = {FLOATS: _LEVELS / "loaded", HALVES: _LEVELS / "filtered"}
 _STORES = {FLOATS: _LEVELS / "floats", HALVES: _LEVELS / "halves"}
-_EACH, _ROW = 64, 32768  # invocations of a workgroup as in each.wgsl; workgroups in a row, at most 65535
+EACH = 64
+"""Invocations of a workgroup, as in each.wgsl."""
+_ROW = 32768  # workgroups in a row, at most 65535
 _STRIP = 16  # pixels of an invocation on software adapters, see shade.wgsl
 _SPLAT_STEP = 2.0  # of hairs' shadows on software adapters [texel], see docs/performance.md
 _SAMPLES = 64  # that an invocation may meet: drivers end what goes round loops 65,535 times
@@ -89,7 +91,7 @@ def suited(
     return declared(path, folders, device_constants(device)) | dict(constants)
 
 
-def each(count: int, workgroup: int = _EACH) -> tuple[int, int, int]:
+def each(count: int, workgroup: int = EACH) -> tuple[int, int, int]:
     """Workgroups of shaders that have an invocation for each of a list, see each.wgsl.
 
     workgroup : how many of the list a workgroup does

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from itertools import cycle, islice
 from typing import Any
 
 from dermis.atlas.interreflection import SAMPLES, SIDE
 from dermis.frame.interreflection import Interreflection, LinkSpace
-from dermis.frame.passes import each, program
-from dermis.gpu import Constants, Recorder
+from dermis.frame.passes import EACH, each, program
+from dermis.gpu import Constants, Device, Recorder
 from dermis.gpu.program import Resources
 
 _BOUNCES = 4  # between patches; gathering adds another
+_TEAM = 16  # invocations of a patch or a cell
 
 
 def draw(graph: Recorder, lit: Resources, made: Interreflection, constants: Constants) -> None:
@@ -31,13 +33,22 @@ def draw(graph: Recorder, lit: Resources, made: Interreflection, constants: Cons
 
 def _carry(graph: Any, made: LinkSpace) -> None:
     """Let light bounce between the patches, and gather it."""
-    device, now, other = graph.device, *made.patches
-    mean: Constants = (("MEAN", 1),) if made.occluded else ()
-    for bounce in range(1 + _BOUNCES):
-        shader = program(device, "interreflection_bounce.wgsl", (("BOUNCES", 1), *mean) if bounce else ())
-        bound = {**made.bounces, "emitted": made.emitted, "sent": other, "after": now}
-        graph.dispatch("interreflection", shader, bound, each(made.places[1] // SAMPLES))
-        now, other = other, now
-    gather = program(device, "interreflection_gather.wgsl", mean)
-    bound = {**made.cells, "sent": other, "from_skin": made.from_skin}
-    graph.dispatch("interreflection", gather, bound, each(SIDE * SIDE))
+    device, sent, team = graph.device, made.leaving, _team(graph.device)
+    chosen: Constants = (("TEAM", team), ("MEAN", int(made.occluded)))
+    patches, cells = each(made.places[1] // SAMPLES, EACH // team), each(SIDE * SIDE, EACH // team)
+    alike = {"leaving": made.leaving, "around": made.around}
+    means = program(device, "interreflection_means.wgsl", chosen[:1])
+    graph.dispatch("interreflection", means, {"emitted": made.emitted, **alike}, patches)
+    bounce = program(device, "interreflection_bounce.wgsl", chosen)
+    for after in islice(cycle(made.patches), _BOUNCES):
+        bound = {**made.bounces, **alike, "sent": sent, "after": after}
+        graph.dispatch("interreflection", bounce, bound, patches)
+        sent = after
+    gather = program(device, "interreflection_gather.wgsl", chosen)
+    bound = {**made.cells, "sent": sent, "from_skin": made.from_skin}
+    graph.dispatch("interreflection", gather, bound, cells)
+
+
+def _team(device: Device) -> int:
+    """Invocations that share links: few patches leave a GPU idle, and software waits at barriers."""
+    return 1 if device.adapter.kind == "CPU" else _TEAM

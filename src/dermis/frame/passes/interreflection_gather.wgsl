@@ -1,5 +1,4 @@
 // What enters each cell of the uv square of the light that patches of the skin send it through the air.
-//#include "each.wgsl"
 //#include "links.wgsl"
 
 override MEAN: bool = false; // whether the mean of what a cell sees is wanted, and not how much that is
@@ -13,12 +12,12 @@ fn main(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let index = number_of(group, groups, lane);
-    if (index >= arrayLength(&from_skin)) {
-        return;
+    let index = number_of(group, groups, lane) / TEAM;
+    let here = index < arrayLength(&from_skin);
+    let sum = gathered(index, here, lane);
+    if (here && lane % TEAM == 0u) {
+        let own = cells[index];
+        let weight = select(1.0, sum.a, MEAN);
+        from_skin[index] = bitcast<f32>(own.y) * vec4f(sent[own.x].a * sum.rgb, weight);
     }
-    let sum = gathered(index);
-    let own = cells[index];
-    let weight = select(1.0, sum.a, MEAN);
-    from_skin[index] = bitcast<f32>(own.y) * vec4f(sent[own.x].a * sum.rgb, weight);
 }
