@@ -13,6 +13,7 @@ import numpy as np
 
 from dermis.errors import DermisError
 from dermis.gpu.access import Access, new_number, slot_of
+from dermis.gpu.bind_groups import UNIFORM, make_group
 from dermis.gpu.by_resources import ByResources, key_of
 from dermis.gpu.device import Device
 from dermis.gpu.shader_types import Binding, bindings, members_read, record_of
@@ -22,7 +23,6 @@ from dermis.gpu.wgsl_source import Folder, Source, compose
 Resources = Mapping[str, Any]
 P = TypeVar("P")
 _TOOLKIT_SHADERS = Path(__file__).parent / "wgsl"
-_UNIFORM = {"type": "uniform"}
 _LARGE_RECORD = 2048  # bytes; a skin is smaller, of which few shaders read all
 _MOST_VARIANTS = 12  # of a shader: on a software adapter each takes some 7 MB
 Constants = tuple[tuple[str, float], ...]
@@ -37,22 +37,7 @@ def _reader(names: Sequence[str]) -> Callable[[Resources], Sequence[Any]]:
 
 
 def _is_uniform(binding: Binding) -> bool:
-    return binding.entry.get("buffer") == _UNIFORM
-
-
-def _entry(binding: Binding, value: Any, given: Any) -> Any:
-    """What is bound, as wgpu takes it.
-
-    given : the record whose place the value is, or the value itself
-    """
-    if _is_uniform(binding):
-        return {"buffer": value, "offset": 0, "size": given.nbytes}
-    if "buffer" in binding.entry:
-        return {"buffer": value, "offset": 0, "size": value.size}
-    texture = binding.entry.get("texture") or binding.entry.get("storage_texture")
-    if texture and hasattr(value, "create_view"):
-        return value.create_view(dimension=texture["view_dimension"])
-    return value
+    return binding.entry.get("buffer") == UNIFORM
 
 
 class Program:
@@ -141,11 +126,8 @@ class Program:
 
     def _make_group(self, bound: Sequence[Any], resources: Resources) -> Any:
         """The group of what the others are, and then the uniforms' buffers."""
-        entries = [
-            {"binding": one.index, "resource": _entry(one, value, resources[one.name])}
-            for one, value in zip((*self._others, *self._uniforms), bound, strict=True)
-        ]
-        return self.device.handle.create_bind_group(layout=self._group_layout, entries=entries)
+        sizes = [resources[one.name].nbytes for one in self._uniforms]
+        return make_group(self.device, self._group_layout, (*self._others, *self._uniforms), bound, sizes)
 
     def _compile(self, path: Path) -> Any:
         try:
@@ -156,7 +138,7 @@ class Program:
             ) from error
 
     def _layout_entries(self) -> list[dict[str, Any]]:
-        offset = {"buffer": {**_UNIFORM, "has_dynamic_offset": True}}
+        offset = {"buffer": {**UNIFORM, "has_dynamic_offset": True}}
         return [
             {
                 "binding": one.index,
