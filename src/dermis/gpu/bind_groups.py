@@ -1,0 +1,69 @@
+"""Bind groups, made by the native library: a frame of another head needs dozens of new ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+from weakref import WeakKeyDictionary
+
+from dermis.gpu.device import Device
+from dermis.gpu.shader_types import Binding
+
+UNIFORM = {"type": "uniform"}
+_DIMENSIONS = {"2d": 2, "2d-array": 3}  # WGPUTextureViewDimension
+_ALL_LEVELS = _ALL_LAYERS = 0xFFFFFFFF
+_WHOLE = 1  # WGPUTextureAspect_All
+
+
+class BindGroup:
+    """A bind group of the library, which keeps alive what is bound; released with this.
+
+    _internal : the library's, as `wgpu` calls it too
+    """
+
+    __slots__ = ("__weakref__", "_internal")
+
+    def __init__(self, device: Device, layout: Any, entries: Any) -> None:
+        described = device.ffi.new("WGPUBindGroupDescriptor *")
+        described.layout, described.entries, described.entryCount = layout._internal, entries, len(entries)
+        made = device.checked.wgpuDeviceCreateBindGroup(device.handle._internal, described)
+        self._internal = device.ffi.gc(made, device.lib.wgpuBindGroupRelease)
+
+
+def make_group(
+    device: Device, layout: Any, bindings: Sequence[Binding], values: Sequence[Any], records: Sequence[int]
+) -> BindGroup:
+    """The bind group of values for bindings.
+
+    values : a buffer, a texture, a view of one or a sampler each
+    records : bytes of the records that the last ones, uniform buffers, have places for
+    """
+    entries = device.ffi.new("WGPUBindGroupEntry[]", len(values))
+    plain = len(values) - len(records)
+    for k, (binding, value) in enumerate(zip(bindings, values, strict=True)):
+        entry, kind = entries[k], binding.entry
+        entry.binding = binding.index
+        if "buffer" in kind:
+            entry.buffer, entry.size = value._internal, value.size if k < plain else records[k - plain]
+        elif "sampler" in kind:
+            entry.sampler = value._internal
+        else:
+            entry.textureView = _view(device, value, kind.get("texture") or kind["storage_texture"])
+    return BindGroup(device, layout, entries)
+
+
+def _view(device: Device, value: Any, texture: dict[str, Any]) -> Any:
+    """The library's view of a whole texture, made once for each dimension; a view's own."""
+    if not hasattr(value, "create_view"):
+        return value._internal
+    known = device.shared("whole views", WeakKeyDictionary[Any, dict[str, Any]])
+    views: dict[str, Any] = known.setdefault(value, {})
+    dimension = texture["view_dimension"]
+    if dimension not in views:
+        described = device.ffi.new("WGPUTextureViewDescriptor *")
+        described.dimension, described.aspect = _DIMENSIONS[dimension], _WHOLE
+        described.mipLevelCount = _ALL_LEVELS
+        described.arrayLayerCount = 1 if dimension == "2d" else _ALL_LAYERS
+        made = device.checked.wgpuTextureCreateView(value._internal, described)
+        views[dimension] = device.ffi.gc(made, device.lib.wgpuTextureViewRelease)
+    return views[dimension]
