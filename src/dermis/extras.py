@@ -13,6 +13,7 @@ EXTRAS = {
     "numba": "truth",
     "mitsuba": "truth",
     "flip_evaluator": "truth",
+    "isal": "batch",
     "pyarrow": "batch",
     "webdataset": "batch",
     "distributed": "cluster",

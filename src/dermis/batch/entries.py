@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.batch.encodings import EFFORT, encode_output, file_kind
+from dermis.batch.encodings import encode_output, file_kind
 from dermis.batch.spec import Spec
 from dermis.frame.observation import Landmarks, Observation
 from dermis.images.codecs import encode_png
@@ -32,7 +32,7 @@ def entries(
     NAME.png, NAME.exr or NAME.npy : each output, as `encodings.stored_as` says
     json : number, parameters, camera, head_pose, gaze and landmarks
     """
-    found = {PICTURE: encode_png(observation.picture, EFFORT, runs=True)}
+    found = {PICTURE: encode_png(observation.picture, quick=True)}
     for name in spec.outputs:
         suffix = f"{name}.{file_kind(name, spec.encoding)}"
         found[suffix] = encode_output(name, observation.outputs[name], spec.encoding)
