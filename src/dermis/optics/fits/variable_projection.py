@@ -1,6 +1,7 @@
 """Least squares over the variances of Gaussians, with the best weights solved for at each step.
 
-Source: [GolubPereyra1973] with the slopes of [Kaufman1975], steps after [Marquardt1963].
+Source: [GolubPereyra1973] with the slopes of [Kaufman1975], steps after [Marquardt1963], extrapolated as in
+[Anderson1965].
 """
 
 from __future__ import annotations
@@ -43,23 +44,43 @@ def descend(
     still : share of the cost that a step must save for another one
     """
     fit = _project(design, samples, log_variance)
-    damping = 1e-2
+    damping, before = 1e-2, None
     for _ in range(_MOST_STEPS):
-        scale = fit.curvature.diagonal()
-        damped = fit.curvature + np.diag(damping * (scale + 1e-12 * scale.max()))
-        step = -np.linalg.lstsq(damped, fit.gradient, rcond=None)[0]
-        step = np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
-        trial = _project(design, samples, np.clip(fit.log_variance + step, *bounds))
+        step = _step(fit, damping)
+        onwards = step if before is None else _extrapolated(fit.log_variance, step, *before)
+        trial = _project(design, samples, np.clip(fit.log_variance + onwards, *bounds))
         if trial.cost < fit.cost:
             settled = fit.cost - trial.cost < still * fit.cost
+            before = fit.log_variance, step
             fit, damping = trial, max(damping / 5.0, 1e-12)
             if settled:
                 break
+        elif before is not None:
+            before = None
         else:
             damping = max(4.0 * damping, 1e-6)
             if damping > _HOPELESS:
                 break
     return fit
+
+
+def _step(fit: Fit, damping: float) -> Floats:
+    scale = fit.curvature.diagonal()
+    damped = fit.curvature + np.diag(damping * (scale + 1e-12 * scale.max()))
+    step = -np.linalg.lstsq(damped, fit.gradient, rcond=None)[0]
+    return np.asarray(np.clip(step, -_LONGEST_STEP, _LONGEST_STEP))
+
+
+def _extrapolated(place: Floats, step: Floats, last_place: Floats, last_step: Floats) -> Floats:
+    """The step to where steps would vanish if they went on changing as they did from the last place.
+
+    Without the residuals' own curvature each step goes the same small share of the way: a dozen become one.
+    """
+    change = step - last_step
+    size = float(change @ change)
+    share = float(step @ change) / size if size > 0.0 else 0.0
+    onwards = step - share * (place - last_place + change)
+    return np.asarray(np.clip(onwards, -_LONGEST_STEP, _LONGEST_STEP))
 
 
 def _project(design: Design, samples: Floats, log_variance: Floats) -> Fit:
