@@ -93,7 +93,9 @@ def _of_files(device: Device, head: Head, use_colour: bool, decoded: bool) -> di
         "colour_map": map_mips.colours(device, colour),
         "specular_map": _grey(device, _factor(maps.specular, head.mesh)),
         "roughness_map": _grey(device, _plain(maps.roughness)),
-        "beckmann_table": texture_from(device, beckmann_table(), "r32float"),
+        "beckmann_table": device.shared(
+            "Beckmann's distribution", lambda: texture_from(device, beckmann_table(), "r32float")
+        ),
     }
 
 

@@ -109,14 +109,15 @@ def _strands(memo: Memo, device: Device, asked: Asked) -> StrandResources | None
     room = room_of(asked.head)
     tables = memo.keep(make_tables, device, asked.head.bare, memo.keep(make_space, device, room))
     picture = memo.keep(make_strand_picture, device, room, asked.settings.size)
-    shadows = memo.keep(make_strand_shadows, device, asked.shadow_layers, of=asked.view)
+    layers = asked.shadow_layers
+    shadows = memo.keep(make_strand_shadows, device, layers, of=f"{layers} {asked.view}")
     return StrandResources(tables, picture, shadows, memo.keep(skin_under, asked.head))
 
 
 def _shadows(memo: Memo, device: Device, asked: Asked) -> shadows.ShadowMaps:
     layers = asked.shadow_layers
     size = asked.settings.shadow_size if layers else 1
-    return memo.keep(_shadow_maps, device, asked.topology, layers, size, of=asked.view)
+    return memo.keep(_shadow_maps, device, asked.topology, layers, size, of=f"{layers} {asked.view}")
 
 
 def _shared(
