@@ -30,6 +30,7 @@ _FROM, _TO = 0.25, 0.9  # of the images: processes that start, and those that ha
 _STILL = {"light": {"kind": "studio"}, "environment": {"name": "none"}, "background": {"kind": "gradient"}}
 _DISK_BYTES = 1 << 28
 _MOST_STEPS = 40
+_SHARDS = 10  # of each worker, where only whole shards are told of
 MARKS = 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000
 """Images of a worker after which its memory is read."""
 
@@ -119,7 +120,7 @@ def dask(plan: Plan, count: int) -> dict[str, Any]:
     """The same work by plain processes and by as many workers of dask, each timed by whole shards."""
     distributed = needed("distributed", "the comparison with dask")
     seats, encoders = Seating(plan.adapter, workers=count, encoders=plan.encoders).seats()
-    spec = spec_for(plan, plan.images * count, 4 * count)
+    spec = spec_for(plan, plan.images * count, _SHARDS * count)
     threads = {"LP_NUM_THREADS": str(seats[0].threads)} if seats[0].threads else {}
     plain = measured_run(plan, Processes(seats), spec, encoders)
     with (
