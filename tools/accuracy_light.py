@@ -12,7 +12,8 @@ import numpy as np
 
 import dermis
 from dermis.atlas.cached import cached_atlas
-from dermis.environment.mirrors import ROUGH, VIEWS, equivalent_mirrors
+from dermis.environment.mirror_fits import MIRROR_ROUGHNESSES, ROUGH, VIEWS
+from dermis.environment.mirrors import equivalent_mirrors
 from dermis.environment.panorama import directions, load_panorama, resampled, solid_angles, split_suns
 from dermis.environment.prefilter import (
     ROUGHEST,
@@ -81,14 +82,15 @@ def reflection_error(name: str, m: float, cosine: float, count: int = 60) -> flo
         weight = kelemen(cosines(normal, towards, view), np.array(m)) * np.maximum(towards @ normal, 0)
         exact.append(weight @ light)
     lobes = mirror(cosine, m)
-    seen = np.mean([reflected(made.layers, z * normals + x * along, wide) for x, z, wide in lobes], axis=0)
+    seen = sum(w * reflected(made.layers, z * normals + x * along, wide) for x, z, wide, w in lobes)
     error = directional_albedo(cosine, m) * seen - np.array(exact)
     return float(np.sqrt((error**2).mean()) / np.mean(exact))
 
 
 def mirror(cosine: float, m: float) -> Array:
-    """Where the round lobes point, and their roughness, between the table's nodes."""
-    x, y = np.sqrt(cosine) * (VIEWS - 1), np.log(m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST) * (ROUGH - 1)
+    """Where the round lobes point, their roughness and weight, between the table's nodes."""
+    x = np.sqrt(cosine) * (VIEWS - 1)
+    y = np.interp(np.log(m), np.log(MIRROR_ROUGHNESSES), np.arange(ROUGH))
     j, i = min(int(x), VIEWS - 2), min(int(y), ROUGH - 2)
     rows = equivalent_mirrors()[i : i + 2, j : j + 2]
     return np.asarray(np.einsum("i,j,ijlk->lk", [1 - (y - i), y - i], [1 - (x - j), x - j], rows))

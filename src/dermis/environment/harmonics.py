@@ -76,7 +76,7 @@ def synthesise(coefficients: list[Complex], factors: Floats, height: int) -> Flo
     return np.fft.irfft(around, width, axis=1) * width
 
 
-@lru_cache(maxsize=2)  # of panoramas that are read and of those that are made: 38 kB a row at degree 96
+@lru_cache(maxsize=2)  # of panoramas that are read and of those that are made: 76 kB a row at degree 136
 def _table(height: int, degree: int) -> list[Floats]:
     """Functions of all orders at the rows of a panorama."""
     return legendre(_polar_cosines(height), degree, degree + 1)
