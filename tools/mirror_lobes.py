@@ -14,7 +14,7 @@ from dermis.specular.models import MODELS
 
 OUT = Path(__file__).parent.parent / "src" / "dermis" / "environment" / "data" / "mirrors.csv"
 HEAD = """\
-# quantity: round lobes whose weighted sum stands for a surface's, by its roughness m and the cosine of the view:
+# quantity: round lobes whose weighted sum stands for a surface's, by its roughness m and the view's cosine:
 #   angle from the normal in the plane of view, away from the eye, roughness, and share of the light
 # unit: angle in radians; all others dimensionless
 # source: tools/mirror_lobes.py, least squares over directions

@@ -83,6 +83,7 @@ def test_grazing_reflections_are_the_lobes(lit_room: tuple[str, Floats], cosine:
         exact.append(np.einsum("yxc,yx->c", radiance, weight) / weight.sum())
         lobes = lobes_between(cosine)
         made.append(np.sum([one[3] * seen_in(layers, normal, along, one) for one in lobes], axis=0))
+    print("RATIO", cosine, np.sqrt(np.mean(np.subtract(made, exact) ** 2)) / np.mean(exact))
     assert np.sqrt(np.mean(np.subtract(made, exact) ** 2)) < most * np.mean(exact)
 
 

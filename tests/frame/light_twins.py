@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 ROUGH, VIEWS, LOBES = 12, 16, 4  # of the table of mirrors
-LEVELS = 14  # of reflections
-RANGE = np.log(1 / 0.02)  # of their roughness, from the smoothest to the roughest
+LEVELS = 13  # of reflections
+RANGE = np.log(1 / 0.026)  # of their roughness, from the smoothest to the roughest
 MIRROR_RANGE = np.log(20.0)  # of the roughness in the table, from 0.05
 
 
@@ -43,7 +43,7 @@ def panorama_at(layer: Floats, environment: Any, direction: Floats) -> Floats:
 
 def reflection(layers: Floats, environment: Any, direction: Floats, m: Floats) -> Floats:
     """(..., 3) mean radiance under round lobes, between the layers of two roughnesses."""
-    place = (LEVELS - 1) * np.clip(np.log(m / 0.02) / RANGE, 0, 1)
+    place = (LEVELS - 1) * np.clip(np.log(m / 0.026) / RANGE, 0, 1)
     low = np.minimum(place.astype(int), LEVELS - 2)
     read = np.stack([panorama_at(layer, environment, direction) for layer in layers[1:]])
     rows, columns = np.indices(m.shape)

@@ -1,4 +1,4 @@
-"""Which round lobes in the plane of view stand for a surface's lobe, by least squares over a sky's spectrum."""
+"""Round lobes in the plane of view that stand for a surface's, by least squares over a sky's spectrum."""
 
 from __future__ import annotations
 
@@ -25,12 +25,13 @@ MIRROR_VIEWS = np.maximum(np.linspace(0.0, 1.0, VIEWS) ** 2, 0.02)
 """Cosines of the table's columns; the first stand for 0."""
 _DEGREE = 96
 _POWER = 2.0  # by which a sky's power per harmonic falls with the degree; 0.6 and 2.7 of the samples
+_FIRST = 3.0  # times the weight of degree 1, so that the sum has the lobe's mean direction
 _NODES = (160, 40)  # of the sum over a lobe, along the plane of view and across
 _PASSES = 2
 _HELD = 0.02  # keeps lobes near the mean of their neighbours', where light leaves them undetermined
 _STEPS = 30
 _FURTHEST = 5.0  # in widths of the lobe from its middle, and for logarithms of weights
-_EVEN = np.repeat([0.0, -0.5, 0.0], LOBES) + np.concatenate([np.linspace(-1.0, 1.0, LOBES), np.zeros(8)])
+_START = np.repeat([0.0, -0.5, 0.0], LOBES) + np.concatenate([np.linspace(-1.0, 1.0, LOBES), np.zeros(8)])
 
 
 class Target(NamedTuple):
@@ -63,8 +64,11 @@ def fitted_mirrors(lobe: Lobe) -> Floats:
     for _ in range(_PASSES):
         for i, j in _nodes():
             near = [found[at] for at in ((i, j - 1), (i + 1, j), (i, j + 1), (i - 1, j)) if at in found]
-            middle = np.mean(near, axis=0) if near else _EVEN
-            found[i, j] = _fit(targets[i, j], found.get((i, j), middle), middle)
+            middle = np.mean(near, axis=0) if near else _START
+            start = found.get((i, j), middle)
+            if j == VIEWS - 1:
+                start, middle = _even(start), _even(middle)  # and so is what the fit gives
+            found[i, j] = _fit(targets[i, j], start, middle)
     table = np.empty((ROUGH, VIEWS, LOBES, 3))
     for at in _nodes():
         angle, rough, weight = _lobes(found[at], targets[at])
@@ -82,6 +86,7 @@ def _terms() -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
     pairs = [(l, m) for m in range(_DEGREE + 1) for l in range(m, _DEGREE + 1, 2)]
     degree, order = np.array(pairs, np.intp).T
     weight = np.sqrt(4.0 * np.pi * (degree + 1.0) ** -_POWER * np.where(order > 0, 2.0, 1.0))
+    weight[degree == 1] *= _FIRST
     return degree, order, weight
 
 
@@ -141,6 +146,12 @@ def _fit(target: Target, start: Floats, near: Floats) -> Floats:
         residual, inside, jac=slopes, bounds=(low, high), max_nfev=_STEPS, ftol=1e-4, xtol=1e-5
     )
     return np.asarray(done.x)
+
+
+def _even(vector: Floats) -> Floats:
+    """The same on both sides of the normal, as a lobe is that is seen along it."""
+    place, wide, share = vector.reshape(3, LOBES)
+    return 0.5 * np.concatenate([place - place[::-1], wide + wide[::-1], share + share[::-1]])
 
 
 def _lobes(vector: Floats, target: Target) -> tuple[Floats, Floats, Floats]:
