@@ -40,10 +40,9 @@ def test_mirrors_have_the_lobes_mean_direction(model: str) -> None:
         own = round_lobe(np.arccos(light[..., 1]), wide) * area
         made += share * np.array([sine, cos]) * (own * light[..., 1]).sum() / own.sum()
         across += share * (own * z**2).sum() / own.sum()
-    print(model, made - mean, across / (weight * z**2).sum())
     assert np.allclose(made, mean, atol=3e-3)
     assert across < 1.2 * (weight * z**2).sum()
-    assert model in ("two-lobe", "phong") or across > 0.97 * (weight * z**2).sum()
+    assert model in ("two-lobe", "phong", "phong-plain") or across > 0.97 * (weight * z**2).sum()
 
 
 def test_mirrors_of_another_packages_model_are_fitted_when_asked_for() -> None:
@@ -65,41 +64,53 @@ def lit_room(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Floats]:
     return str(path), radiance
 
 
-@pytest.mark.parametrize(("cosine", "most"), [(0.7, 0.03), (0.4, 0.03), (0.2, 0.03)])
-def test_grazing_reflections_are_the_lobes(lit_room: tuple[str, Floats], cosine: float, most: float) -> None:
-    """Roughness 0.3, against a plain sum of the whole lobe; one round lobe errs by 7, 20 and 25 %."""
+@pytest.mark.parametrize(
+    ("m", "angle", "most"),
+    [(0.15, 78, 0.03), (0.3, 45, 0.03), (0.3, 66, 0.03), (0.3, 78, 0.03), (0.3, 85, 0.05), (0.5, 66, 0.08)],
+)
+def test_grazing_reflections_are_the_lobes(
+    lit_room: tuple[str, Floats], m: float, angle: float, most: float
+) -> None:
+    """Against a plain sum of the whole lobe, over 24 views.
+
+    Four lobes of equal weights, no sharper than 0.05, err by 9, 4, 7, 6, 7 and 15 %.
+    """
     name, radiance = lit_room
     layers, towards, area = prefilter(name).layers, directions(256, 512), solid_angles(256, 512)
+    cosine, rng = float(np.cos(np.radians(angle))), np.random.default_rng(5)
     made, exact = [], []
-    for turn in np.linspace(0, 2 * np.pi, 7)[:-1]:
-        tangent = np.array([np.cos(turn), 0.3, np.sin(turn)])
-        normal = np.cross(tangent, [0.2, 1.0, -0.4])
+    for normal, tangent in rng.normal(size=(24, 2, 3)):
         normal /= np.linalg.norm(normal)
-        along = np.cross(normal, np.cross(tangent, normal))
+        along = np.cross(normal, tangent)
         along /= np.linalg.norm(along)
         view = cosine * normal - np.sqrt(1 - cosine**2) * along
-        weight = MODELS["kelemen"].lobe(cosines(normal, towards, view), 0.3) * np.maximum(towards @ normal, 0)
+        weight = MODELS["kelemen"].lobe(cosines(normal, towards, view), m) * np.maximum(towards @ normal, 0)
         weight *= area
         exact.append(np.einsum("yxc,yx->c", radiance, weight) / weight.sum())
-        lobes = lobes_between(cosine)
-        made.append(np.sum([one[3] * seen_in(layers, normal, along, one) for one in lobes], axis=0))
-    print("RATIO", cosine, np.sqrt(np.mean(np.subtract(made, exact) ** 2)) / np.mean(exact))
+        seen = [one[3] * seen_in(layers, normal, along, one) for one in lobes_between(cosine, m)]
+        made.append(np.sum(seen, axis=0))
     assert np.sqrt(np.mean(np.subtract(made, exact) ** 2)) < most * np.mean(exact)
 
 
-def lobes_between(cosine: float) -> Floats:
-    """(4, 4) round lobes for roughness 0.3 between the nodes of the table."""
-    x, y = np.sqrt(cosine) * 15, np.interp(np.log(0.3), np.log(MIRROR_ROUGHNESSES), np.arange(12))
+def lobes_between(cosine: float, m: float) -> Floats:
+    """(4, 4) round lobes between the nodes of the table."""
+    x, y = np.sqrt(cosine) * 15, np.interp(np.log(m), np.log(MIRROR_ROUGHNESSES), np.arange(12))
     j, i = int(x), int(y)
     four = equivalent_mirrors()[i : i + 2, j : j + 2]
     return np.asarray(np.einsum("i,j,ijlk->lk", [1 - (y - i), y - i], [1 - (x - j), x - j], four))
 
 
 def seen_in(layers: NDArray[np.float32], normal: Floats, along: Floats, lobe: Floats) -> Floats:
-    """(3,) mean radiance under a round lobe, at the nearest texel."""
+    """(3,) mean radiance under a round lobe, between texels and layers."""
     direction = lobe[1] * normal + lobe[0] * along
-    nearest = (directions(HEIGHT, 2 * HEIGHT) @ direction).argmax()
+    direction /= np.linalg.norm(direction)
+    row = np.arccos(direction[1]) / np.pi * HEIGHT - 0.5
+    column = (0.5 + np.arctan2(direction[0], -direction[2]) / (2 * np.pi)) * 2 * HEIGHT - 0.5
     at = np.interp(np.log(lobe[2]), np.log(ROUGHNESSES), np.arange(len(ROUGHNESSES)))
-    low = min(int(at), len(ROUGHNESSES) - 2)
-    of = layers.reshape(len(layers), -1, 3)[:, nearest].astype(float)
-    return np.asarray(of[1 + low] + (at - low) * (of[2 + low] - of[1 + low]))
+    layer = min(int(at), len(ROUGHNESSES) - 2)
+    seen = np.zeros(3)
+    for k, j, i in np.ndindex(2, 2, 2):
+        y, x = int(np.floor(row)) + j, int(np.floor(column)) + i
+        share = np.prod(1 - np.abs([layer + k - at, y - row, x - column]))
+        seen += share * layers[1 + layer + k, np.clip(y, 0, HEIGHT - 1), x % (2 * HEIGHT)]
+    return seen

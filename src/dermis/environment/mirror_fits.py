@@ -25,7 +25,7 @@ MIRROR_VIEWS = np.maximum(np.linspace(0.0, 1.0, VIEWS) ** 2, 0.02)
 """Cosines of the table's columns; the first stand for 0."""
 _DEGREE = 96
 _POWER = 2.0  # by which a sky's power per harmonic falls with the degree; 0.6 and 2.7 of the samples
-_FIRST = 3.0  # times the weight of degree 1, so that the sum has the lobe's mean direction
+_FIRST = 10.0  # times the weight of degree 1, so that the sum has the lobe's mean direction
 _NODES = (160, 40)  # of the sum over a lobe, along the plane of view and across
 _PASSES = 2
 _HELD = 0.02  # keeps lobes near the mean of their neighbours', where light leaves them undetermined
