@@ -78,7 +78,7 @@ CHANCE = 0.0027
 """Probability with which a right program fails one statistical test: that of three standard errors."""
 
 PREFILTERED = 1e-3
-"""Panoramas convolved in harmonics of degree 96 against plain sums over their texels, relative."""
+"""Panoramas convolved in harmonics of degree 112 against plain sums over their texels, relative."""
 
 PANORAMA = 1e-3
 """Panoramas read in a direction, shader against float64 twin, of the scale: acos and atan2 are coarse."""

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
 import dermis
 from dermis.atlas.cached import cached_atlas
-from dermis.environment.mirrors import ROUGH, VIEWS, equivalent_mirrors
+from dermis.environment.mirror_fits import MIRROR_ROUGHNESSES, ROUGH, VIEWS
+from dermis.environment.mirrors import equivalent_mirrors
 from dermis.environment.panorama import directions, load_panorama, resampled, solid_angles, split_suns
 from dermis.environment.prefilter import (
     ROUGHEST,
@@ -32,6 +34,8 @@ from dermis.specular.cosines import cosines
 from dermis.specular.kelemen import kelemen
 
 MAPS = ("royal_esplanade", "lebombo")
+ANGLES = (0, 30, 45, 60, 70, 75, 80, 85)  # degrees
+NARROW = 0.25  # roughness below which lobes are summed over finer texels
 Array = np.ndarray
 UP = np.array([0.0, 1.0, 0.0])
 
@@ -54,9 +58,10 @@ def unit(v: Array) -> Array:
     return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
 
 
-def panorama(name: str) -> tuple[Array, Array, Prefiltered]:
+@cache
+def panorama(name: str, rows: int = 256) -> tuple[Array, Array, Prefiltered]:
     """Directions and light of a panorama's texels without its suns, and what the frame reads."""
-    radiance = resampled(split_suns(load_panorama(name))[0], 256)
+    radiance = resampled(split_suns(load_panorama(name))[0], rows)
     light = radiance * solid_angles(*radiance.shape[:2])[..., None]
     return directions(*radiance.shape[:2]).reshape(-1, 3), light.reshape(-1, 3), prefilter(name)
 
@@ -69,26 +74,32 @@ def irradiance_error(name: str, count: int = 200) -> float:
     return float(np.abs(looked_up(made.layers[0], normals) / exact - 1).max())
 
 
-def reflection_error(name: str, m: float, cosine: float, count: int = 60) -> float:
-    """Root mean square error of reflected radiance over random normals and views, over its mean."""
-    towards, light, made = panorama(name)
+def reflection_error(name: str, m: float, angle: float, count: int = 40) -> float:
+    """Root mean square error of reflected radiance over random normals and views, over its mean.
+
+    angle : of the view from the normal [degrees]
+    """
+    cosine = float(np.cos(np.radians(angle)))
+    towards, light, made = panorama(name, 512 if m < NARROW else 256)
     rng = np.random.default_rng(2)
     normals = unit(rng.normal(size=(count, 3)))
     along = unit(np.cross(normals, rng.normal(size=(count, 3))))
     views = cosine * normals - np.sqrt(1 - cosine**2) * along
     exact = []
     for normal, view in zip(normals, views, strict=True):
-        weight = kelemen(cosines(normal, towards, view), np.array(m)) * np.maximum(towards @ normal, 0)
-        exact.append(weight @ light)
+        above = towards @ normal > 0
+        weight = kelemen(cosines(normal, towards[above], view), np.array(m)) * (towards[above] @ normal)
+        exact.append(weight @ light[above])
     lobes = mirror(cosine, m)
-    seen = np.mean([reflected(made.layers, z * normals + x * along, wide) for x, z, wide in lobes], axis=0)
+    seen = sum(w * reflected(made.layers, z * normals + x * along, wide) for x, z, wide, w in lobes)
     error = directional_albedo(cosine, m) * seen - np.array(exact)
     return float(np.sqrt((error**2).mean()) / np.mean(exact))
 
 
 def mirror(cosine: float, m: float) -> Array:
-    """Where the round lobes point, and their roughness, between the table's nodes."""
-    x, y = np.sqrt(cosine) * (VIEWS - 1), np.log(m / SMOOTHEST) / np.log(ROUGHEST / SMOOTHEST) * (ROUGH - 1)
+    """Where the round lobes point, their roughness and weight, between the table's nodes."""
+    x = np.sqrt(cosine) * (VIEWS - 1)
+    y = np.interp(np.log(m), np.log(MIRROR_ROUGHNESSES), np.arange(ROUGH))
     j, i = min(int(x), VIEWS - 2), min(int(y), ROUGH - 2)
     rows = equivalent_mirrors()[i : i + 2, j : j + 2]
     return np.asarray(np.einsum("i,j,ijlk->lk", [1 - (y - i), y - i], [1 - (x - j), x - j], rows))
@@ -189,10 +200,10 @@ def tables(adapter: str = "auto") -> dict[str, str]:
         "irradiance": f"{max(map(irradiance_error, MAPS)):.1e}",
         "reflections": "\n".join(
             f"| {name} | {m} | "
-            + " | ".join(f"{reflection_error(name, m, c):.0%}" for c in (1.0, 0.7, 0.4, 0.2))
+            + " | ".join(f"{100 * reflection_error(name, m, angle):.1f}" for angle in ANGLES)
             + " |"
             for name in MAPS
-            for m in (0.15, 0.3, 0.5)
+            for m in (0.15, 0.2, 0.3, 0.45, 0.6)
         ),
         "furnaces": furnaces(renderer),
         "soft_shadows": "\n".join(f"| {rig} | {bias:+.1%} | {rms:.1%} |" for rig, bias, rms in shadows),

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-ROUGH, VIEWS, LOBES = 8, 16, 4  # of the table of mirrors
-LEVELS = 10  # of reflections
-RANGE = np.log(20.0)  # from the smoothest roughness, 0.05, to the roughest
+ROUGH, VIEWS, LOBES = 12, 16, 4  # of the table of mirrors
+LEVELS = 13  # of reflections
+RANGE = np.log(1 / 0.026)  # of their roughness, from the smoothest to the roughest
+MIRROR_RANGE = np.log(20.0)  # of the roughness in the table, from 0.05
 
 
 def dot(a: Floats, b: Floats) -> Floats:
@@ -42,7 +43,7 @@ def panorama_at(layer: Floats, environment: Any, direction: Floats) -> Floats:
 
 def reflection(layers: Floats, environment: Any, direction: Floats, m: Floats) -> Floats:
     """(..., 3) mean radiance under round lobes, between the layers of two roughnesses."""
-    place = (LEVELS - 1) * np.clip(np.log(m / 0.05) / RANGE, 0, 1)
+    place = (LEVELS - 1) * np.clip(np.log(m / 0.026) / RANGE, 0, 1)
     low = np.minimum(place.astype(int), LEVELS - 2)
     read = np.stack([panorama_at(layer, environment, direction) for layer in layers[1:]])
     rows, columns = np.indices(m.shape)
@@ -62,9 +63,9 @@ def mirrored(
 ) -> Floats:
     """(..., 3) radiance that the surface's lobe sees."""
     cosine = np.clip(dot(normal, view), 0, 1)
-    x, y = np.sqrt(cosine) * (VIEWS - 1), np.clip(np.log(m / 0.05) / RANGE, 0, 1) * (ROUGH - 1)
+    x, y = np.sqrt(cosine) * (VIEWS - 1), np.clip(np.log(m / 0.05) / MIRROR_RANGE, 0, 1) * (ROUGH - 1)
     j, i = np.minimum(x.astype(int), VIEWS - 2), np.minimum(y.astype(int), ROUGH - 2)
-    table = environment["mirrors"].astype(float).reshape(ROUGH, VIEWS, LOBES, 4)[..., :3]
+    table = environment["mirrors"].astype(float).reshape(ROUGH, VIEWS, LOBES, 4)
     fx, fy = (x - j)[..., None, None], (y - i)[..., None, None]
     low = (1 - fx) * table[i, j] + fx * table[i, j + 1]
     high = (1 - fx) * table[i + 1, j] + fx * table[i + 1, j + 1]
@@ -76,8 +77,8 @@ def mirrored(
     for mirror in lobes:
         direction = unit(mirror[..., 1:2] * normal + mirror[..., :1] * along)
         risen = np.clip(1 + dot(direction, smooth) / m, 0, 1)[..., None]
-        total += risen * reflection(layers, environment, direction, mirror[..., 2])
-    return np.asarray(total * seen[..., None] / LOBES)
+        total += mirror[..., 3:] * risen * reflection(layers, environment, direction, mirror[..., 2])
+    return np.asarray(total * seen[..., None])
 
 
 def part_of(light: Any, points: Floats, part: int) -> tuple[Floats, Floats]:

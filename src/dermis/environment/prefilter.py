@@ -13,11 +13,11 @@ from dermis.preparing import preparing
 from dermis.specular.beckmann import beckmann
 
 Floats = NDArray[np.float64]
-SMOOTHEST, ROUGHEST = 0.05, 1.0
-ROUGHNESSES = np.geomspace(SMOOTHEST, ROUGHEST, 10)
+SMOOTHEST, ROUGHEST = 0.026, 1.0
+ROUGHNESSES = np.geomspace(SMOOTHEST, ROUGHEST, 13)
 """Of the reflections' layers, even in the logarithm, between which the shader interpolates."""
 HEIGHT = 128
-_DEGREE = 96  # the smoothest lobe multiplies this degree by 1e-10: no ringing around lamps
+_DEGREE = 112  # the smoothest lobe multiplies this degree by 2e-4: hardly any ringing around lamps
 
 
 def round_lobe(theta: Floats, m: float) -> Floats:
@@ -34,11 +34,20 @@ def round_lobe(theta: Floats, m: float) -> Floats:
         return np.asarray(beckmann(half, m) * np.cos(theta) / half**2)
 
 
+def reflection_numbers() -> dict[str, float]:
+    """Numbers that environment.wgsl fills in."""
+    return {
+        "reflections": len(ROUGHNESSES),
+        "smoothest_reflection": SMOOTHEST,
+        "roughest_reflection": ROUGHEST,
+    }
+
+
 @dataclass(frozen=True)
 class Prefiltered:
     """A panorama, prefiltered.
 
-    layers : (11, h, 2 h, 3) float32: irradiance by normal, then mean radiance by mirror direction
+    layers : (14, h, 2 h, 3) float32: irradiance by normal, then mean radiance by mirror direction
     suns : its peaks, which the layers leave out
     """
 
@@ -52,7 +61,7 @@ def prefilter(name: str) -> Prefiltered:
 
     name : as for `load_panorama`
 
-    Each layer is the panorama convolved with a round kernel, exactly, in spherical harmonics of degree 96:
+    Each layer is the panorama convolved with a round kernel, exactly, in spherical harmonics of degree 112:
     no samples are drawn, so lamps leave no fireflies.
 
     Sources: [KautzMcCool2000] for reflections by roughness, [RamamoorthiHanrahan2001] for irradiance.
@@ -65,6 +74,6 @@ def prefilter(name: str) -> Prefiltered:
 
 
 def mirror_kernel(m: float) -> Floats:
-    """(97,) factors of the round lobe of roughness m, with the sum 1 over the sphere."""
+    """(113,) factors of the round lobe of roughness m, with the sum 1 over the sphere."""
     factors = zonal(lambda theta: round_lobe(theta, m), _DEGREE)
     return np.asarray(factors / factors[0])

@@ -114,7 +114,7 @@ def environment_record(
         exposure=environment.exposure,
         albedo=np.minimum(total, 1.0),
         occluded=int(occluded),
-        mirrors=np.pad(equivalent_mirrors(model_of(skin)).reshape(-1, 3), ((0, 0), (0, 1))),
+        mirrors=equivalent_mirrors(model_of(skin)).reshape(-1, 4),
     )
 
 

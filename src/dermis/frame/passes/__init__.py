@@ -7,6 +7,7 @@ from pathlib import Path
 
 from dermis import specular
 from dermis.environment.mirrors import mirror_numbers
+from dermis.environment.prefilter import reflection_numbers
 from dermis.frame.atlas_textures import atlas_numbers
 from dermis.frame.baked_numbers import baking_numbers
 from dermis.frame.fine_light import fine_numbers
@@ -43,6 +44,7 @@ SHARED_SHADERS = ShaderFolder(
         **baking_numbers(),
         **fine_numbers(),
         **mirror_numbers(),
+        **reflection_numbers(),
         **link_numbers(),
     },
 )

@@ -2,18 +2,20 @@
 
 override ENVIRONMENT: bool = false; // whether there is one
 
-const LAYERS: f32 = 10.0; // of reflections, even in the logarithm of the roughness
-const SMOOTHEST: f32 = 0.05; // roughness of the first and of the last of them
-const ROUGHEST: f32 = 1.0;
+//#fill const LAYERS: f32 = {reflections}; // of reflections, even in the logarithm of the roughness
+//#fill const SMOOTHEST: f32 = {smoothest_reflection}; // roughness of the first and of the last of them
+//#fill const ROUGHEST: f32 = {roughest_reflection};
 //#fill const MIRRORS: vec2u = vec2u({mirror_views}u, {mirror_rough}u); // columns and rows of the table of mirror lobes
-//#fill const LOBES: u32 = {mirror_lobes}u; // round lobes whose mean stands for the surface's
+//#fill const LOBES: u32 = {mirror_lobes}u; // round lobes whose sum stands for the surface's
+//#fill const SMOOTHEST_MIRROR: f32 = {mirror_smoothest}; // roughness of that table's first row and of its last
+//#fill const ROUGHEST_MIRROR: f32 = {mirror_roughest};
 
 struct Environment {
     turn: vec2f, // cosine and sine of the rotation about +Y
     exposure: f32,
     albedo: vec3f, // of skin whose colour map is white
     occluded: u32, // whether the occlusion map holds anything
-    mirrors: array<vec4f, 512>, // by roughness, cosine and lobe: sine and cosine of where it points, its roughness
+    mirrors: array<vec4f, 768>, // by roughness, cosine and lobe: sine and cosine of where it points, its roughness, its weight
 }
 
 @group(0) @binding(20) var<uniform> environment: Environment;
@@ -56,19 +58,19 @@ fn ambient(normal: vec3f, open: f32, albedo: vec3f) -> vec3f {
 
 // Place in the table of mirrors: by the root of the cosine, and by the logarithm of the roughness.
 fn mirror_place(cosine: f32, m: f32) -> vec2f {
-    let place = vec2f(sqrt(cosine), log(m / SMOOTHEST) / log(ROUGHEST / SMOOTHEST));
+    let place = vec2f(sqrt(cosine), log(m / SMOOTHEST_MIRROR) / log(ROUGHEST_MIRROR / SMOOTHEST_MIRROR));
     return clamp(place, vec2f(0.0), vec2f(1.0)) * vec2f(MIRRORS - 1u);
 }
 
-// Direction and roughness of a round lobe, in the plane of view and normal.
-fn mirror_at(place: vec2f, lobe: u32) -> vec3f {
+// Direction, roughness and weight of a round lobe, in the plane of view and normal.
+fn mirror_at(place: vec2f, lobe: u32) -> vec4f {
     let at = min(vec2u(place), MIRRORS - 2u);
     let f = place - vec2f(at);
     let row = LOBES * (at.y * MIRRORS.x + at.x) + lobe;
     let below = row + LOBES * MIRRORS.x;
     let low = mix(environment.mirrors[row], environment.mirrors[row + LOBES], f.x);
     let high = mix(environment.mirrors[below], environment.mirrors[below + LOBES], f.x);
-    return mix(low, high, f.y).xyz;
+    return mix(low, high, f.y);
 }
 
 // Reflected radiance for a surface albedo of 1, dimmed by specular occlusion [LagardeRousiers2014] and below the horizon of
@@ -84,14 +86,14 @@ fn mirrored(point: Point, normal: vec3f, v: vec3f, m: f32, open: f32) -> vec3f {
         let mirror = mirror_at(place, k);
         let direction = normalize(mirror.y * normal + mirror.x * along);
         let risen = clamp(1.0 + dot(direction, point.normal) / m, 0.0, 1.0);
-        sum += risen * reflection(direction, mirror.z);
+        sum += mirror.w * risen * reflection(direction, mirror.z);
         k++;
         if (k >= LOBES) {
             break;
         }
     }
     let seen = clamp(pow(cosine + open, exp2(-16.0 * m - 1.0)) - 1.0 + open, 0.0, 1.0);
-    return sum * (seen / f32(LOBES));
+    return seen * sum;
 }
 
 // Open share of the sky on the atlas.

@@ -1,0 +1,42 @@
+"""Makes src/dermis/environment/data/mirrors.csv: surface lobes as four round ones in the plane of view.
+
+python tools/mirror_lobes.py, a minute or two. `dermis.environment.mirror_fits` says how they are found.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from dermis.environment.mirror_fits import LOBES, MIRROR_ROUGHNESSES, MIRROR_VIEWS, fitted_mirrors
+from dermis.outputs import replacing
+from dermis.specular.models import MODELS
+
+OUT = Path(__file__).parent.parent / "src" / "dermis" / "environment" / "data" / "mirrors.csv"
+HEAD = """\
+# quantity: round lobes whose weighted sum stands for a surface's, by its roughness m and the view's cosine:
+#   angle from the normal in the plane of view, away from the eye, roughness, and share of the light
+# unit: angle in radians; all others dimensionless
+# source: tools/mirror_lobes.py, least squares over directions
+# licence: Apache-2.0
+"""
+
+
+def main() -> int:
+    """Fit all and write the table."""
+    columns = [f"{name}_{k}" for k in range(LOBES) for name in ("angle", "roughness", "weight")]
+    lines = [",".join(["model", "m", "cosine", *columns])]
+    for model in MODELS:
+        table = fitted_mirrors(MODELS[model].lobe)
+        for i, m in enumerate(MIRROR_ROUGHNESSES):
+            for j, cosine in enumerate(MIRROR_VIEWS):
+                values = ",".join(f"{x:.4f}" for x in table[i, j].ravel())
+                lines.append(f"{model},{m:.5g},{cosine:.5g},{values}")
+    OUT.parent.mkdir(exist_ok=True)
+    with replacing(OUT) as trial:
+        trial.write_text(HEAD + "\n".join([*lines, ""]), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
