@@ -42,6 +42,7 @@ def main(
     head: str = "lee_perry_smith",
     adapter: str = "auto",
     frames: int = 0,
+    interreflection: bool = True,
 ) -> int:
     """Measure and print, and write the figures where a file is named.
 
@@ -55,6 +56,8 @@ def main(
         auto (the best), cpu (software), or a part of an adapter's name.
     frames:
         Of motion for the memory; 5000 for the table of docs/performance.md.
+    interreflection:
+        Whether light passes from skin to skin in the frames that are timed.
     """
     if output is not None:
         check_output(output, (".json",))
@@ -63,7 +66,8 @@ def main(
     case, effort = (_ON_CPU, ON_CPU) if software else (_ON_GPU, Effort())
     with tempfile.TemporaryDirectory() as folder:
         found: dict[str, Any] = {"adapter": renderer.device.adapter.name, "head": head}
-        found |= moving(renderer, case, loaded, Path(folder), effort)
+        settings = settings_of(case).model_copy(update={"interreflection": interreflection})
+        found |= moving(renderer, case, settings, loaded, Path(folder), effort)
         found |= {"another_person_ms": people(renderer, case, loaded)}
         if frames:
             found |= {
@@ -76,9 +80,11 @@ def main(
     return 0
 
 
-def moving(renderer: Renderer, case: Case, head: Head, folder: Path, effort: Effort) -> dict[str, Any]:
+def moving(
+    renderer: Renderer, case: Case, settings: Settings, head: Head, folder: Path, effort: Effort
+) -> dict[str, Any]:
     """Frames that each have another skin, other lights and another camera; at rest, and with a new shape."""
-    settings, found = settings_of(case), dict[str, Any]()
+    found = dict[str, Any]()
     scenes = {
         "still": scenes_of(case, head, folder, _MOMENTS),
         "moving": scenes_of(replace(case, targets=_TARGETS), head, folder, _MOMENTS),
