@@ -125,7 +125,13 @@ def dask(plan: Plan, count: int) -> dict[str, Any]:
     plain = measured_run(plan, Processes(seats), spec, encoders)
     with (
         _environment(threads),
-        distributed.LocalCluster(count, threads_per_worker=1, processes=True, dashboard_address=None) as made,
+        distributed.LocalCluster(
+            count,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=None,
+            memory_limit=0,  # of its own dask pauses workers at a share of what the machine had at first
+        ) as made,
     ):
         there = measured_run(plan, Cluster(made.scheduler_address, None, plan.adapter), spec, encoders)
     rates = plain["images_per_s"], there["images_per_s"]

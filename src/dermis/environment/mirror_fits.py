@@ -65,7 +65,7 @@ def fitted_mirrors(lobe: Lobe) -> Floats:
         for i, j in _nodes():
             near = [found[at] for at in ((i, j - 1), (i + 1, j), (i, j + 1), (i - 1, j)) if at in found]
             middle = np.mean(near, axis=0) if near else _START
-            start = found[i, j] if (i, j) in found else middle
+            start = found.get((i, j), np.asarray(middle))
             if j == VIEWS - 1:
                 start, middle = _even(start), _even(middle)  # and so is what the fit gives
             found[i, j] = _fit(targets[i, j], start, middle)

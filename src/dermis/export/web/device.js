@@ -50,11 +50,12 @@ export function texelBytes(format) {
 
 /** Everything of a file on one device. */
 export class Made {
-    /** @param {GPUDevice} device @param {Scene} scene @param {Store} store */
-    constructor(device, scene, store) {
+    /** @param {GPUDevice} device @param {Scene} scene */
+    constructor(device, scene) {
         this.device = device;
         this.scene = scene;
-        this.store = store;
+        /** @type {Store} there before any resource is asked for */
+        this.store = { blobs: [], data: new Uint8Array(), pictures: [] };
         /** @type {any[]} */
         this.resources = [];
         /** @type {Map<number, Float32Array>} */

@@ -9,15 +9,9 @@
 /** Bytes of a text with seven bits in each letter, 256 more where it could not stand in a page. @param {string} text */
 export function bytesOf(text) {
     const found = new Uint8Array((text.length * 7) >> 3);
-    let [bits, count, end] = [0, 0, 0];
-    for (let k = 0; k < text.length; k++) {
-        bits = (bits << 7) | (text.charCodeAt(k) & 127);
-        count += 7;
-        if (count >= 8) {
-            count -= 8;
-            found[end++] = bits >> count;
-            bits &= (1 << count) - 1;
-        }
+    const letter = (/** @type {number} */ k) => text.charCodeAt(k) & 127; // 0 beyond the end
+    for (let [k, end] = [0, 0]; end < found.length; k += 8, end += 7) {
+        for (let j = 0; j < 7; j++) found[end + j] = (letter(k + j) << (j + 1)) | (letter(k + j + 1) >> (6 - j));
     }
     return found;
 }

@@ -23,23 +23,29 @@ function tell(words, state) {
     document.documentElement.dataset.state = state;
 }
 
-/** What the file holds, unpacked once. @returns {Promise<[File, import("./device.js").Store]>} */
+/** What part of the file holds. @param {string} id */
+function part(id) {
+    return bytesOf(element(id).textContent);
+}
+
+/** What the frames are. @returns {Promise<File>} */
 async function readFile() {
-    const part = (/** @type {string} */ id) => bytesOf(element(id).textContent);
-    const [told, data] = await Promise.all(["scene", "data"].map((id) => inflated(part(id))));
-    const file = JSON.parse(new TextDecoder().decode(told));
+    return JSON.parse(new TextDecoder().decode(await inflated(part("scene"))));
+}
+
+/** Their numbers and pictures, which take longest to unpack. @param {File} file @returns {Promise<import("./device.js").Store>} */
+async function readStore(file) {
     const all = part("pictures");
     let end = 0;
     const pictures = file.images.map((/** @type {number} */ size) => all.subarray(end, (end += size)));
-    return [file, { blobs: file.blobs, data, pictures }];
+    return { blobs: file.blobs, data: await inflated(part("data")), pictures };
 }
 
 /** The page at work on one device. */
 class Page {
-    /** @param {File} file @param {import("./device.js").Store} store */
-    constructor(file, store) {
+    /** @param {File} file */
+    constructor(file) {
         this.file = file;
-        this.store = store;
         this.state = atRest(file.dials);
         this.technique = AFTER;
         /** @type {Map<string, Player>} */
@@ -48,6 +54,8 @@ class Page {
         this.busy = false;
         this.painted = "";
         this.frames = 0;
+        /** @type {Promise<import("./device.js").Store> | null} */
+        this.store = null;
         /** @type {Player | null} */
         this.player = null;
         /** @type {Screen | null} */
@@ -70,13 +78,15 @@ class Page {
             if (info.reason !== "destroyed") await this.reopen();
         });
         device.addEventListener("uncapturederror", (event) => tell(`The device refused: ${/** @type {GPUUncapturedErrorEvent} */ (event).error.message}`, "failed"));
-        this.made = new Made(device, scene, this.store);
+        this.made = new Made(device, scene);
         this.players.clear();
         this.painted = "";
         this.soft = soft;
         this.screen = null;
-        const maps = fillMaps(this.made);
-        await Promise.all([maps, this.choose()]);
+        this.#compile(this.made);
+        this.store ??= readStore(this.file);
+        this.made.store = await this.store;
+        await Promise.all([fillMaps(this.made), this.choose()]);
         this.dirty = true;
         await this.draw();
         tell("", "drawn");
@@ -95,9 +105,7 @@ class Page {
     /** The player for the technique and the size of the window. */
     async choose() {
         const made = /** @type {Made} */ (this.made);
-        const side = this.moving ? 0 : Math.min(innerWidth, innerHeight) * devicePixelRatio;
-        const fitting = made.scene.frames.filter((one) => one.name === this.technique);
-        const frame = fitting.find((one) => one.size[0] >= 0.9 * side) ?? fitting[fitting.length - 1];
+        const frame = this.#fitting(made);
         const key = `${frame.name} ${frame.size[0]}`;
         if (!this.players.has(key)) {
             const player = new Player(made, frame);
@@ -110,6 +118,19 @@ class Page {
             this.screen = new Screen(element("picture"), made, frame, this.soft);
         }
         this.dirty = true;
+    }
+
+    /** The frame for the technique and the size of the window. @param {Made} made */
+    #fitting(made) {
+        const side = this.moving ? 0 : Math.min(innerWidth, innerHeight) * devicePixelRatio;
+        const fitting = made.scene.frames.filter((one) => one.name === this.technique);
+        return fitting.find((one) => one.size[0] >= 0.9 * side) ?? fitting[fitting.length - 1];
+    }
+
+    /** Begin to compile what the first frame needs, while the page unpacks the rest of the file. @param {Made} made */
+    #compile(made) {
+        const passes = [...this.#fitting(made).passes, ...Object.values(made.scene.halved).flat()];
+        for (const one of passes) if (!one.written) made.pipeline(one.program).catch(failed);
     }
 
     /** Draw what is stale, and wait until it is there: one frame at a time. */
@@ -210,7 +231,7 @@ function addDials(page) {
 
 async function start() {
     if (!navigator.gpu) return tell(NO_WEBGPU, "without");
-    const page = new Page(...(await readFile()));
+    const page = new Page(await readFile());
     addDials(page);
     listen(page, failed);
     await page.open();

@@ -1,0 +1,88 @@
+"""How far a page's pictures are from `dermis render`: python benchmarks/web_difference.py HEAD [ADAPTER].
+
+Headless Chromium on its software adapter draws the page in both forms; its linear pictures are held against
+those of a renderer whose maps are the ones that the page decodes, and these against the maps as they were.
+"""
+
+from __future__ import annotations
+
+import base64
+import shutil
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from web_page import FLAGS, SOFTWARE, STATE
+
+import dermis
+from dermis.cli.console import print_lines
+from dermis.export.web.build import Asked, built
+from dermis.export.web.maps import smaller
+from dermis.export.web.page import web_page
+from dermis.frame.taping import renderer_for
+
+ATLAS, MAP = 512, 1024  # as exported
+SHOWN = ("software", 512), ("software", 256), ("gpu", 256)
+LINEAR = """async () => {
+  const page = dermis, frame = page.player.frame, device = page.made.device, [width, height] = frame.size;
+  const buffer = device.createBuffer({ size: 16 * width * height, usage: 9 });
+  const encoder = device.createCommandEncoder();
+  const texture = page.made.resource(frame.linear);
+  encoder.copyTextureToBuffer({ texture }, { buffer, bytesPerRow: 16 * width }, [width, height]);
+  device.queue.submit([encoder.finish()]);
+  await buffer.mapAsync(1);
+  const bytes = new Uint8Array(buffer.getMappedRange());
+  let text = "";
+  for (let k = 0; k < bytes.length; k += 32768) text += String.fromCharCode(...bytes.subarray(k, k + 32768));
+  return btoa(text);
+}"""
+
+
+def main() -> None:
+    """Print a row for each form and size."""
+    name, adapter = sys.argv[1], (*sys.argv[2:], "auto")[0]
+    scene = dermis.Scene(dermis.load_head(name))
+    scene = replace(scene, head=smaller(scene.head, MAP))
+    settings = dermis.Settings(atlas=ATLAS)
+    print_lines("| head | form | size | difference | what maps and hairs lose |", "|---|---|---|---|---|")
+    for form, side in SHOWN:
+        sized = settings.model_copy(update={"size": (side, side)})
+        given = renderer_for(form, adapter).draw(scene, sized).linear()
+        wanted = list[NDArray[np.float32]]()
+        made = built(
+            Asked(scene, (), settings, {form: (side,)}, adapter),
+            lambda renderer, *_, sized=sized: wanted.append(renderer.draw(scene, sized).linear()),  # noqa: B023
+        )
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "head.html"
+            file.write_text(web_page(made, (), name, ""), encoding="utf-8")
+            found = drawn(file, side)
+        off, lost = distance(found, wanted[0]), distance(wanted[0], given)
+        print_lines(f"| {name} | {form} | {side} x {side} | {off:.2%} | {lost:.2%} |")
+
+
+def drawn(file: Path, side: int) -> NDArray[np.float32]:
+    """(h, w, 3) linear, what a browser draws of a page."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play:
+        one: Any = play.chromium.launch(executable_path=shutil.which("chromium"), args=[*FLAGS, *SOFTWARE])
+        page = one.new_page(viewport={"width": side, "height": side}, offline=True)
+        page.goto(file.as_uri())
+        page.wait_for_function(f"() => {STATE} && {STATE} !== 'loading'", timeout=120_000)
+        raw = base64.b64decode(page.evaluate(LINEAR))
+        one.close()
+    return np.frombuffer(raw, np.float32).reshape(side, side, 4)[..., :3]
+
+
+def distance(found: NDArray[np.float32], wanted: NDArray[np.float32]) -> float:
+    """Relative RMSE."""
+    return float(np.sqrt(((found - wanted) ** 2).mean() / (wanted**2).mean()))
+
+
+if __name__ == "__main__":
+    main()
