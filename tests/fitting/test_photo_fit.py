@@ -22,6 +22,7 @@ from dermis.fitting.place import placed
 from dermis.fitting.subject import subject_of
 from dermis.human.landmarks.points import landmark_points
 from dermis.images.colour import encode_srgb8
+from dermis.mesh.directions import fibonacci_sphere
 from dermis.scene.camera import Camera
 from dermis.scene.files import load_scene
 from dermis.scene.people import skin_of
@@ -104,7 +105,7 @@ def test_light_is_nowhere_negative_and_what_it_was() -> None:
 
 
 def test_lobes_make_up_all_of_the_second_order() -> None:
-    places = sky.spread_directions(200)
+    places = fibonacci_sphere(200)
     x, y, z = places.T
     wanted = np.stack([np.ones(200), x, y, z, x * y, y * z, z * x, x * x - y * y, 3 * z * z - 1], axis=-1)
     lobes = sky.lobe(sky.middles(), places)

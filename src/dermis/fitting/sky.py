@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.environment.panorama import directions
+from dermis.mesh.directions import fibonacci_sphere
 
 Floats = NDArray[np.float64]
 ROWS = 32
@@ -31,7 +32,7 @@ def lobe(towards: Floats, places: Floats) -> Floats:
 @cache
 def middles() -> Floats:
     """(9, 3) middles of lobes that all others are sums of, spread as far as a greedy choice has it."""
-    every = spread_directions(_CANDIDATES)
+    every = fibonacci_sphere(_CANDIDATES)
     chosen = [int(np.argmax(every[:, 2]))]
     for _ in range(BASIS - 1):  # the candidate that the lobes chosen so far describe worst
         before = lobe(every[chosen], every)
@@ -44,18 +45,10 @@ def middles() -> Floats:
 @cache
 def mixtures() -> tuple[Floats, Floats]:
     """(9, n) shares of the nine lobes that make up n others all around, and their middles (n, 3)."""
-    towards = spread_directions(_LOBES)
-    places = spread_directions(_CANDIDATES)
+    towards = fibonacci_sphere(_LOBES)
+    places = fibonacci_sphere(_CANDIDATES)
     shares = np.linalg.lstsq(lobe(middles(), places), lobe(towards, places), rcond=None)[0]
     return np.asarray(shares, np.float64), towards
-
-
-def spread_directions(count: int) -> Floats:
-    """(count, 3) unit vectors, each for an equal share of the sphere [Keinert2015]."""
-    index = np.arange(count) + 0.5
-    y = 1.0 - 2.0 * index / count
-    turn, radius = np.pi * (1.0 + np.sqrt(5.0)) * index, np.sqrt(1.0 - y**2)
-    return np.stack([radius * np.cos(turn), y, radius * np.sin(turn)], axis=-1)
 
 
 def panorama(strengths: Floats) -> Floats:

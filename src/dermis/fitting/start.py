@@ -13,6 +13,7 @@ from dermis.fitting.frames import Frames
 from dermis.fitting.linear import fault_by, strengths_by
 from dermis.fitting.unknowns import SKIN, Point, tangents
 from dermis.human.skin.colours import EPIDERMIS_MM, colours
+from dermis.mesh.directions import fibonacci_sphere
 
 Floats = NDArray[np.float64]
 _AROUND = 28
@@ -27,7 +28,7 @@ def suns_to_try(towards_camera: Floats) -> Floats:
 
     towards_camera : (3,) unit vector
     """
-    every = sky.spread_directions(_AROUND)
+    every = fibonacci_sphere(_AROUND)
     return every[every @ towards_camera > _BEHIND]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.frame.projection import MIDDLE, Views, frame_of
+from dermis.mesh.directions import fibonacci_sphere
 from dermis.mesh.head import Head
 from dermis.mesh.morph_targets import no_targets
 from dermis.mesh.outline import Outline
@@ -53,15 +54,6 @@ class Anchors:
     points: NDArray[np.intp]
     arms: Floats
     outline: RigOutline
-
-
-def fibonacci_sphere(count: int) -> Floats:
-    """(count, 3) unit vectors, each for an equal share of the sphere [Keinert2015]."""
-    index = np.arange(count) + 0.5
-    y = 1.0 - 2.0 * index / count
-    phi = np.pi * (1.0 + np.sqrt(5.0)) * index
-    r = np.sqrt(1.0 - y**2)
-    return np.stack([r * np.cos(phi), y, r * np.sin(phi)], axis=-1)
 
 
 def look_around(outline: Outline, turn: Floats) -> Look:

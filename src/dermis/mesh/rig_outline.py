@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.mesh.directions import fibonacci_sphere
 from dermis.mesh.morph_targets import MorphTargets
 from dermis.mesh.outline import hull_points
 from dermis.mesh.skeleton import Floats, Skeleton
@@ -130,10 +131,7 @@ def _heights(places: Floats, count: int) -> Iterator[Floats]:
 @lru_cache(maxsize=3)
 def _directions(count: int) -> Floats:
     """(n, 3) unit vectors, even over the sphere: points of a golden spiral."""
-    k = np.arange(count) + 0.5
-    z = 1 - 2 * k / count
-    around, r = np.pi * (1 + np.sqrt(5)) * k, np.sqrt(1 - z * z)
-    return np.column_stack([r * np.cos(around), r * np.sin(around), z]).astype(np.float32)
+    return np.ascontiguousarray(fibonacci_sphere(count)[:, [0, 2, 1]], np.float32)
 
 
 def _pool(places: Floats, targets: MorphTargets, skeleton: Skeleton | None) -> Index:

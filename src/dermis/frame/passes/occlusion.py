@@ -14,9 +14,9 @@ from dermis.frame.passes.shape import rest_shape
 from dermis.frame.passes.visibility_buffer import draw_layers, make_layers
 from dermis.frame.projection import ShadowView, parallel_view, shadow_layers
 from dermis.frame.shape import shape_tables
-from dermis.frame.sky import fibonacci_sphere
 from dermis.gpu import ComputeProgram, Device, Frame
 from dermis.gpu.program import Resources
+from dermis.mesh.directions import fibonacci_sphere
 from dermis.mesh.head import Head
 
 DIRECTIONS = 128
