@@ -23,26 +23,34 @@ function tell(words, state) {
     document.documentElement.dataset.state = state;
 }
 
-/** What the file holds, unpacked once. @returns {Promise<[File, import("./device.js").Store]>} */
+/** @param {string} id */
+const part = (id) => bytesOf(element(id).textContent);
+
+/** What there is to draw. @returns {Promise<File>} */
 async function readFile() {
-    const part = (/** @type {string} */ id) => bytesOf(element(id).textContent);
-    const [told, data] = await Promise.all(["scene", "data"].map((id) => inflated(part(id))));
-    const file = JSON.parse(new TextDecoder().decode(told));
+    return JSON.parse(new TextDecoder().decode(await inflated(part("scene"))));
+}
+
+/** Numbers and pictures of a file. @param {File} file @returns {Promise<import("./device.js").Store>} */
+async function readStore(file) {
+    await new Promise((done) => setTimeout(done)); // what was asked of the device goes first
+    const data = inflated(part("data"));
     const all = part("pictures");
     let end = 0;
-    const pictures = file.images.map((/** @type {number} */ size) => all.subarray(end, (end += size)));
-    return [file, { blobs: file.blobs, data, pictures }];
+    const pictures = file.images.map((size) => all.subarray(end, (end += size)));
+    return { blobs: file.blobs, data: await data, pictures };
 }
 
 /** The page at work on one device. */
 class Page {
-    /** @param {File} file @param {import("./device.js").Store} store */
-    constructor(file, store) {
+    /** @param {File} file */
+    constructor(file) {
         this.file = file;
-        this.store = store;
+        /** @type {import("./device.js").Store | null} */
+        this.store = null;
         this.state = atRest(file.dials);
         this.technique = AFTER;
-        /** @type {Map<string, Player>} */
+        /** @type {Map<import("./device.js").Frame, Player>} */
         this.players = new Map();
         this.dirty = true;
         this.busy = false;
@@ -70,16 +78,21 @@ class Page {
             if (info.reason !== "destroyed") await this.reopen();
         });
         device.addEventListener("uncapturederror", (event) => tell(`The device refused: ${/** @type {GPUUncapturedErrorEvent} */ (event).error.message}`, "failed"));
-        this.made = new Made(device, scene, this.store);
+        const made = new Made(device, scene);
+        made.compile(this.#fitting(scene));
+        made.store = this.store ??= await readStore(this.file);
+        this.made = made;
         this.players.clear();
         this.painted = "";
         this.soft = soft;
         this.screen = null;
-        const maps = fillMaps(this.made);
-        await Promise.all([maps, this.choose()]);
+        const maps = fillMaps(made);
+        this.choose();
+        await maps;
         this.dirty = true;
         await this.draw();
         tell("", "drawn");
+        for (const one of scene.frames) if (one.moving && one.name === this.technique) made.compile(one);
     }
 
     async reopen() {
@@ -92,19 +105,26 @@ class Page {
         while (this.dirty || this.busy) await new Promise((done) => setTimeout(done, 1));
     }
 
-    /** The player for the technique and the size of the window. */
-    async choose() {
-        const made = /** @type {Made} */ (this.made);
-        const side = this.moving ? 0 : Math.min(innerWidth, innerHeight) * devicePixelRatio;
-        const fitting = made.scene.frames.filter((one) => one.name === this.technique);
-        const frame = fitting.find((one) => one.size[0] >= 0.9 * side) ?? fitting[fitting.length - 1];
-        const key = `${frame.name} ${frame.size[0]}`;
-        if (!this.players.has(key)) {
+    /** The frame for the technique, the size of the window and what hands do. @param {Scene} scene */
+    #fitting(scene) {
+        const side = Math.min(innerWidth, innerHeight) * devicePixelRatio;
+        const fitting = scene.frames.filter((one) => one.name === this.technique);
+        const moving = this.moving && fitting.find((one) => one.moving);
+        const still = fitting.filter((one) => !one.moving);
+        return moving || (still.find((one) => one.size[0] >= 0.9 * side) ?? still[still.length - 1]);
+    }
+
+    /** The player for it. */
+    choose() {
+        const { made } = this;
+        if (!made) return;
+        const frame = this.#fitting(made.scene);
+        if (!this.players.has(frame)) {
             const player = new Player(made, frame);
-            await player.prepare();
-            this.players.set(key, player);
+            player.prepare();
+            this.players.set(frame, player);
         }
-        this.player = /** @type {Player} */ (this.players.get(key));
+        this.player = /** @type {Player} */ (this.players.get(frame));
         if (this.screen?.frame !== frame) {
             this.screen?.close();
             this.screen = new Screen(element("picture"), made, frame, this.soft);
@@ -117,7 +137,7 @@ class Page {
         if (!this.dirty || this.busy || !this.player || !this.made || !this.screen) return;
         [this.dirty, this.busy] = [false, true];
         try {
-            if (this.soft) await this.choose();
+            if (this.soft) this.choose();
             this.dirty = false;
             await this.#frame(this.player, this.made, /** @type {Screen} */ (this.screen));
         } finally {
@@ -132,8 +152,7 @@ class Page {
         const began = performance.now();
         apply(player, this.file.dials, this.state);
         await this.#paint(made);
-        const encoder = made.device.createCommandEncoder();
-        player.draw(encoder);
+        const encoder = await player.draw();
         screen.copy(encoder);
         made.device.queue.submit([encoder.finish()]);
         await screen.show();
@@ -157,7 +176,7 @@ class Page {
     /** @param {string} technique */
     async turnTo(technique) {
         this.technique = technique;
-        await this.choose();
+        this.choose();
         await this.draw();
     }
 
@@ -210,7 +229,7 @@ function addDials(page) {
 
 async function start() {
     if (!navigator.gpu) return tell(NO_WEBGPU, "without");
-    const page = new Page(...(await readFile()));
+    const page = new Page(await readFile());
     addDials(page);
     listen(page, failed);
     await page.open();
