@@ -212,6 +212,8 @@ def test_a_skin_by_itself_is_refused(tmp_path: Path) -> None:
 def test_modules_are_joined_in_order() -> None:
     assert {f"{name}.js" for name in MODULES} == {file.name for file in MODULES_FOLDER.glob("*.js")}
     assert not re.search(r"^(import|export) ", player(), re.MULTILINE)
+    names = re.findall(r"^(?:async function|function|class|const|let) (\w+)", player(), re.MULTILINE)
+    assert len(names) > 40 and len(names) == len(set(names))
 
 
 def test_the_player_is_well_typed() -> None:

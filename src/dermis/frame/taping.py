@@ -37,6 +37,15 @@ def taken(tape: Tape, inputs: Inputs) -> Take:
     return tape.take(lambda graph: draw_frame(graph, inputs, technique))
 
 
+def sparser(take: Take, times: int) -> Take:
+    """The same frame with one coarse hair for so many, as much wider; with all for 0."""
+    for _, record in (one for one in take.records if one[0] == "StrandView" and times > 1):
+        kept = int(record["coarse"]) // times
+        record["wider"] *= record["coarse"] / max(1, kept)
+        record["coarse"] = kept
+    return take
+
+
 def halving(tape: Tape, texture: Any) -> Take:
     """The passes that fill a map's mips from its first."""
     return tape.take(lambda graph: map_mips.halve(graph, map_mips.mipped(texture)))

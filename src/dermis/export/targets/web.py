@@ -59,7 +59,7 @@ class Web(Target):
 
     def write(self, subject: Subject, rows: Rows, place: Path, version: str) -> list[Path]:
         """The page."""
-        from dermis.export.web.build import SIZES, Asked, built
+        from dermis.export.web.build import MOVING, SIZES, Asked, built
         from dermis.export.web.dials import dials_of
         from dermis.export.web.maps import smaller
         from dermis.export.web.page import web_page
@@ -72,7 +72,7 @@ class Web(Target):
             )
         scene = replace(scene, head=smaller(scene.head, min(self.side, _MAP)))
         dials = dials_of(scene)
-        made = built(Asked(scene, dials, Settings(atlas=_ATLAS), SIZES, self.adapter))
+        made = built(Asked(scene, dials, Settings(atlas=_ATLAS), SIZES, self.adapter, MOVING))
         place.write_text(web_page(made, dials, subject.name, self.wrong), encoding="utf-8")
         return [place]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,15 +17,17 @@ from dermis.export.web.packing import Packer
 from dermis.export.web.pictures import picture_of
 from dermis.frame.inputs import Inputs
 from dermis.frame.renderer import Renderer
-from dermis.frame.taping import FORMS, renderer_for, taken
-from dermis.gpu.tape import Take, Tape
+from dermis.frame.taping import FORMS, renderer_for, sparser, taken
+from dermis.gpu.tape import Tape
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
 
 Json = dict[str, Any]
 TECHNIQUES = ("texture-space", "none")
-SIZES = {"gpu": (512, 1024, 1600), "software": (256, 512)}
+SIZES = {"gpu": (512, 1024, 1600), "software": (512,)}
 """Sides of the square pictures of each form [pixel]."""
+MOVING = {"software": (256, 1, 4)}
+"""Of forms that draw less while hands move: side [pixel], samples, and how many coarse hairs become one."""
 
 
 @dataclass
@@ -54,6 +56,7 @@ class Asked:
 
     settings : of all frames, but for size and technique
     sizes : sides of the pictures of each form, see `SIZES`; forms that are left out are not built
+    moving : what is drawn while hands move, see `MOVING`; forms that are left out draw all
     """
 
     scene: Scene
@@ -61,6 +64,16 @@ class Asked:
     settings: Settings
     sizes: dict[str, tuple[int, ...]]
     adapter: str = "auto"
+    moving: dict[str, tuple[int, int, int]] = field(default_factory=dict)
+
+    def frames(self, form: str) -> Iterator[tuple[Settings, int]]:
+        """Of a form's frames the settings, and how many coarse hairs become one, 0 for those that rest."""
+        for technique in TECHNIQUES:
+            for side in self.sizes[form]:
+                yield self.sized(side, technique), 0
+            if form in self.moving:
+                side, samples, fewer = self.moving[form]
+                yield self.sized(side, technique).model_copy(update={"samples": samples}), fewer
 
     def sized(self, side: int, technique: str = TECHNIQUES[0]) -> Settings:
         """The settings of a frame; before light spreads it does not pass between surfaces either.
@@ -79,7 +92,7 @@ def built(asked: Asked, look: Callable[[Renderer, Scene, Settings], None] | None
     made = Built()
     for form in (one for one in FORMS if asked.sizes.get(one)):
         renderer = renderer_for(form, asked.adapter)
-        made.forms[form] = _form(made, renderer, asked, asked.sizes[form])
+        made.forms[form] = _form(made, renderer, asked, form)
         settings = asked.sized(asked.sizes[form][0])
         if look is not None:
             look(renderer, asked.scene, settings)
@@ -88,16 +101,15 @@ def built(asked: Asked, look: Callable[[Renderer, Scene, Settings], None] | None
     return made
 
 
-def _form(made: Built, renderer: Renderer, asked: Asked, sizes: tuple[int, ...]) -> Json:
+def _form(made: Built, renderer: Renderer, asked: Asked, form: str) -> Json:
     tape, frames, turned = Tape(renderer.device), list[Named](), list[Json]()
     base: Inputs | None = None
-    for technique in TECHNIQUES:
-        for side in sizes:
-            settings = asked.sized(side, technique)
-            inputs = renderer.prepare(asked.scene, settings)
-            base, picture = base or inputs, inputs.resources.picture
-            frames.append(Named(technique, taken(tape, inputs), picture, (side, side)))
-            turned.append(_turned(made.packer, renderer, asked, settings, inputs, frames[-1].take))
+    for settings, fewer in asked.frames(form):
+        inputs = renderer.prepare(asked.scene, settings)
+        base, picture = base or inputs, inputs.resources.picture
+        take = sparser(taken(tape, inputs), fewer)
+        frames.append(Named(settings.technique, take, picture, settings.size, fewer))
+        turned.append(_turned(made.packer, renderer, asked, settings, inputs, frames[-1]))
     mapped = made.maps.put(renderer, tape, [one.take for one in frames])
     steps = shorten(renderer, tape, [one.take for one in frames])
     found = described(tape, frames, mapped, steps, made.packer)
@@ -111,14 +123,15 @@ def _form(made: Built, renderer: Renderer, asked: Asked, sizes: tuple[int, ...])
 
 
 def _turned(
-    packer: Packer, renderer: Renderer, asked: Asked, settings: Settings, base: Inputs, take: Take
+    packer: Packer, renderer: Renderer, asked: Asked, settings: Settings, base: Inputs, one: Named
 ) -> Json:
     """What each dial's nodes change in a frame."""
     found, beside = {}, Tape(renderer.device)
     for dial in asked.dials:
         nodes = node_inputs(dial, lambda scene: renderer.prepare(scene, settings), base)
         found[dial.name] = [
-            None if inputs is None else changes(take, taken(beside, inputs), packer) for inputs in nodes
+            None if inputs is None else changes(one.take, sparser(taken(beside, inputs), one.fewer), packer)
+            for inputs in nodes
         ]
     return found
 

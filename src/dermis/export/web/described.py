@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from dermis.export.web.packing import Packer
-from dermis.export.web.reads import needed
+from dermis.export.web.reads import bound, needed
 from dermis.frame.passes.post import Picture
 from dermis.gpu.tape import Take, Taken, Tape
 
 Json = dict[str, Any]
+_TABLES = "triangle_table", "triangle_buffer"
 
 
 @dataclass(frozen=True)
@@ -20,12 +22,14 @@ class Named:
     """A take with its name and picture.
 
     picture : what it fills
+    fewer : of a frame that is drawn while hands move, how many coarse hairs became one; else 0
     """
 
     name: str
     take: Take
     picture: Picture
     size: tuple[int, int]
+    fewer: int = 0
 
 
 Mapped = dict[int, tuple[str, int, Take | None]]
@@ -42,7 +46,7 @@ def described(tape: Tape, frames: list[Named], mapped: Mapped, steps: Stepped, p
     Of resources that hold nothing but zeros, as new ones do, no content is kept.
     """
     pictures = [[tape.resource(one.picture.bytes), tape.resource(one.picture.exposed)] for one in frames]
-    contents = {}
+    contents, tables = {}, set(bound(tape, [one.take for one in frames], _TABLES))
     for number in needed(tape, [one.take for one in frames]):
         if number in steps:
             floats = tape.content(number)[0].view(np.float32).reshape(-1, len(steps[number]))
@@ -51,7 +55,8 @@ def described(tape: Tape, frames: list[Named], mapped: Mapped, steps: Stepped, p
         _, pictured, halving = mapped.get(number, ("", 0, None))
         mips = [] if halving else _mips(tape, number)[pictured:]
         if any(one.any() for one in mips):
-            contents[number] = [-1] * pictured + [packer.add(one) for one in mips]
+            add = packer.add if number not in tables else _in_parts(packer)
+            contents[number] = [-1] * pictured + [add(one) for one in mips]
     fills = [(number, take) for number, (*_, take) in mapped.items() if take]
     return {
         "shaders": tape.shaders,
@@ -62,6 +67,11 @@ def described(tape: Tape, frames: list[Named], mapped: Mapped, steps: Stepped, p
         "frames": [_frame(one, k, packer) for one, k in zip(frames, pictures, strict=True)],
         "halved": {number: [_pass(one, packer) for one in take.passes] for number, take in fills},
     }
+
+
+def _in_parts(packer: Packer) -> Callable[[Any], int]:
+    """Of a table of three columns, one below the other, each is packed its own way."""
+    return lambda data: packer.add_parts(np.split(data, 3) if len(data) % 3 == 0 else [data])
 
 
 def _mips(tape: Tape, number: int) -> list[Any]:
@@ -78,6 +88,7 @@ def _frame(one: Named, picture: list[int], packer: Packer) -> Json:
     return {
         "name": one.name,
         "size": one.size,
+        "moving": one.fewer > 0,
         "picture": picture[0],
         "linear": picture[1],
         "views": {stage: _views(one.take, stage) for stage in ("visibility", "shadows")},
@@ -89,8 +100,8 @@ def _frame(one: Named, picture: list[int], packer: Packer) -> Json:
 def _views(take: Take, stage: str) -> int:
     """The record by which a stage's passes see the head, -1 for none."""
     views = [k for k, (struct, _) in enumerate(take.records) if struct == "Views"]
-    bound = (-1 - k for one in take.passes if one.stage == stage for k in one.bound if k < 0)
-    return next((k for k in bound if k in views), -1)
+    records = (-1 - k for one in take.passes if one.stage == stage for k in one.bound if k < 0)
+    return next((k for k in records if k in views), -1)
 
 
 def _pass(one: Taken, packer: Packer) -> Json:

@@ -26,7 +26,7 @@ import { unpacked } from "./packed.js";
  */
 /**
  * @typedef {{name: string, passes: Pass[], records: [string, number][], picture: number, linear: number,
- *     size: number[], views: Record<string, number>, dials: Record<string, (Change | null)[]>}} Frame
+ *     size: number[], moving: boolean, views: Record<string, number>, dials: Record<string, (Change | null)[]>}} Frame
  */
 /** A layer of a map: its picture, the blob of its curves, and how many channels are a colour. @typedef {number[]} Layer */
 /**
@@ -54,8 +54,8 @@ export class Made {
     constructor(device, scene) {
         this.device = device;
         this.scene = scene;
-        /** @type {Store} there before any resource is asked for */
-        this.store = { blobs: [], data: new Uint8Array(), pictures: [] };
+        /** @type {Store} what it is filled from, which comes after what is compiled */
+        this.store = { blobs: [], data: new Uint8Array(0), pictures: [] };
         /** @type {any[]} */
         this.resources = [];
         /** @type {Map<number, Float32Array>} */
@@ -72,7 +72,7 @@ export class Made {
 
     /** @param {number} blob */
     bytes(blob) {
-        return unpacked(this.store.data, this.store.blobs[blob]);
+        return unpacked(this.store.data, this.store.blobs, blob);
     }
 
     /** @param {number} blob */
@@ -139,6 +139,11 @@ export class Made {
     pipeline(number) {
         if (!this.pipelines.has(number)) this.pipelines.set(number, this.#compile(number));
         return /** @type {Promise<any>} */ (this.pipelines.get(number));
+    }
+
+    /** Begin to compile what maps and a frame need, in that order. @param {Frame} frame */
+    compile(frame) {
+        for (const one of [...Object.values(this.scene.halved).flat(), ...frame.passes]) if (!one.written) this.pipeline(one.program).catch(() => {}); // told where it is drawn
     }
 
     /** @param {number} number */

@@ -2,7 +2,7 @@
 
 /**
  * What hands turn.
- * @typedef {{state: import("./turned.js").Turned, touch: () => void, choose: () => Promise<void>,
+ * @typedef {{state: import("./turned.js").Turned, touch: () => void, choose: () => void,
  *     draw: () => Promise<void>}} Page
  */
 
@@ -41,7 +41,10 @@ export function listen(page, failed) {
         if (event.key === "+") zoom(page, 0.9);
         if (event.key === "-") zoom(page, 1.1);
     });
-    addEventListener("resize", () => page.choose().then(() => page.draw()).catch(failed));
+    addEventListener("resize", () => {
+        page.choose();
+        page.draw().catch(failed);
+    });
 }
 
 /** @param {Page} page @param {boolean} light @param {number} x @param {number} y [pixel] */

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dermis.export.web.packing import stepped
 from dermis.export.web.pictures import LEAST, Picture, picture_of
+from dermis.export.web.reads import bound
 from dermis.frame.renderer import Renderer
 from dermis.frame.taping import halving, refill
 from dermis.gpu.tape import Take, Tape
@@ -82,7 +83,7 @@ def _halved(values: NDArray[np.float32], most: int) -> NDArray[np.float32]:
 def shorten(renderer: Renderer, tape: Tape, takes: list[Take]) -> dict[int, tuple[float, ...]]:
     """Round the places of hairs on a device; of each buffer of them the steps of its columns."""
     found: dict[int, tuple[float, ...]] = {}
-    for number in _bound(tape, takes, ("knots",)):
+    for number in bound(tape, takes, ("knots",)):
         data = stepped(tape.content(number)[0].view(np.float32).reshape(-1, len(_KNOT_MM)), _KNOT_MM)
         renderer.device.write(tape.object(number), data.tobytes(), data.nbytes)
         found[number] = _KNOT_MM
@@ -111,17 +112,7 @@ def _mapped(tape: Tape, takes: list[Take]) -> dict[int, str]:
     """Textures of halves bound as maps, large enough for pictures, with their roles."""
     return {
         number: role
-        for number, role in _bound(tape, takes, _ROLES).items()
+        for number, role in bound(tape, takes, _ROLES).items()
         if tape.resources[number].get("format", "").endswith("16float")
         and min(tape.resources[number]["size"][:2]) >= LEAST
     }
-
-
-def _bound(tape: Tape, takes: list[Take], names: tuple[str, ...]) -> dict[int, str]:
-    """What is bound by some names."""
-    found: dict[int, str] = {}
-    for take in takes:
-        for one in (each for each in take.passes if each.program is not None):
-            bound = [name for _, name, _ in tape.programs[one.program or 0]["bindings"]]
-            found |= {k: name for k, name in zip(one.bound, bound, strict=True) if name in names and k >= 0}
-    return found

@@ -1,8 +1,9 @@
-// What the file holds: one gzip of numbers as differences, byte plane by byte plane, seven bits to a letter.
+// What the file holds: one gzip of numbers as differences, byte column by byte column, seven bits to a letter.
 
 /**
  * A run of bytes: where it begins, how many there are, the bytes of a word, words of a row, how often
- * differences from row to row were taken, and of floats the step of each word of a row.
+ * differences from row to row were taken, and of floats the step of each word of a row. Words of no bytes:
+ * numbers of runs to join instead.
  * @typedef {[number, number, number, number, number, number[]]} Run
  */
 
@@ -22,22 +23,40 @@ export async function inflated(bytes) {
     return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/** @param {Uint8Array} data @param {Run} run */
-export function unpacked(data, [start, size, word, row, order, steps]) {
-    const planes = data.subarray(start, start + size);
-    if (word === 1 && order === 0) return planes;
-    const count = size / word;
-    const words = word === 4 ? new Uint32Array(count) : word === 2 ? new Uint16Array(count) : new Uint8Array(count);
-    for (let plane = 0; plane < word; plane++) {
-        const shift = 8 * plane;
-        const from = plane * count;
-        for (let k = 0; k < count; k++) words[k] |= planes[from + k] << shift;
-    }
+/** @param {Uint8Array} data @param {Run[]} runs @param {number} number of a run @returns {Uint8Array} */
+export function unpacked(data, runs, number) {
+    const [start, size, word, row, order, steps] = runs[number];
+    if (!word) return inOne(size, steps.map((one) => unpacked(data, runs, one)));
+    const columns = data.subarray(start, start + size);
+    if (word * row === 1 && order === 0) return columns;
+    const bytes = inRows(columns, word * row);
+    const words = word === 4 ? new Uint32Array(bytes.buffer) : word === 2 ? new Uint16Array(bytes.buffer) : bytes;
     for (let time = 0; time < order; time++) {
-        for (let k = row; k < count; k++) words[k] += words[k - row];
+        for (let k = row; k < words.length; k++) words[k] += words[k - row];
     }
-    if (!steps.length) return new Uint8Array(words.buffer);
-    const floats = new Float32Array(count);
-    for (let k = 0; k < count; k++) floats[k] = (words[k] | 0) * steps[k % row];
+    if (!steps.length) return bytes;
+    const floats = new Float32Array(words.length);
+    for (let k = 0; k < words.length; k++) floats[k] = (words[k] | 0) * steps[k % row];
     return new Uint8Array(floats.buffer);
+}
+
+/** Columns of bytes, one after the other, row by row. @param {Uint8Array} columns @param {number} across */
+function inRows(columns, across) {
+    const found = new Uint8Array(columns.length);
+    let from = 0;
+    for (let column = 0; column < across; column++) {
+        for (let to = column; to < found.length; to += across) found[to] = columns[from++];
+    }
+    return found;
+}
+
+/** @param {number} size @param {Uint8Array[]} parts */
+function inOne(size, parts) {
+    const found = new Uint8Array(size);
+    let end = 0;
+    for (const one of parts) {
+        found.set(one, end);
+        end += one.length;
+    }
+    return found;
 }

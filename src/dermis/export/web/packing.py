@@ -1,4 +1,4 @@
-"""Numbers packed for one gzip: differences from row to row, byte plane by byte plane, see packed.js."""
+"""Numbers packed for one gzip: differences from row to row, byte column by byte column, see packed.js."""
 
 from __future__ import annotations
 
@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 Bytes = NDArray[np.uint8]
 Run = tuple[int, int, int, int, int, tuple[float, ...]]
 """Where a run of bytes begins, how many it has, bytes of a word, words of a row, how often rows are
-subtracted, and of floats the step of each word of a row."""
+subtracted, and of floats the step of each word of a row. Words of no bytes: numbers of runs to join."""
 _FORBIDDEN = frozenset({0, 13, ord("<")})  # letters that a script element would change, or end at
-_ROWS = (1, 2, 3, 4, 8)
+_ROWS = (1, 2, 3, 4, 6, 8, 12, 16, 24)
 _ORDERS = (0, 1, 2)
-_TRIED = 1 << 15  # bytes in the middle by which a way is chosen
+_TRIED, _PLACES = 3 << 15, 3  # bytes by which a way is chosen, a multiple of all rows, and how often
+_WHOLE = 192  # bytes: a multiple of all rows of words
+_FAST = 4  # of zlib's levels, to compare ways
 _WORDS = {1: np.uint8, 2: np.uint16, 4: np.uint32}
 
 
@@ -37,6 +39,12 @@ class Packer:
         """
         raw = np.frombuffer(data, np.uint8)
         return self._add(raw, list(ways or _all_ways(len(raw))), ())
+
+    def add_parts(self, parts: Iterable[Bytes]) -> int:
+        """The number of a run of bytes that is joined from others, each packed its own way."""
+        numbers = tuple(self.add(one) for one in parts)
+        self.runs.append((0, sum(self.runs[k][1] for k in numbers), 0, 0, 0, numbers))
+        return len(self.runs) - 1
 
     def add_floats(self, values: NDArray[np.float32], steps: tuple[float, ...]) -> int:
         """The number of (n, c) floats that are multiples of steps, c powers of two; see `stepped`."""
@@ -74,26 +82,23 @@ def seven_bits(data: bytes) -> str:
 
 
 def planes(raw: Bytes, word: int, row: int, order: int) -> bytes:
-    """The bytes of words, all of their first before all of their second, of what differences leave."""
+    """Of rows of words, or their differences, all the first bytes before all the second, and so on."""
     words = raw.view(_WORDS[word]).copy()
     for _ in range(order):
         words[row:] -= words[:-row].copy()
-    return words.view(np.uint8).reshape(-1, word).T.tobytes()
+    return words.view(np.uint8).reshape(-1, word * row).T.tobytes()
 
 
 def _all_ways(size: int) -> Iterable[tuple[int, int, int]]:
     yield 1, 1, 0
-    for word in (2, 4):
-        if size % word == 0:
-            yield word, 1, 0
-            rows = [row for row in _ROWS if size % (word * row) == 0]
-            yield from ((word, row, order) for row in rows for order in _ORDERS[1:])
+    for word, row in ((word, row) for word in _WORDS for row in _ROWS if size % (word * row) == 0):
+        yield from ((word, row, order) for order in _ORDERS)
 
 
 def _best(raw: Bytes, ways: list[tuple[int, int, int]]) -> tuple[int, int, int]:
-    """The way that packs the middle of the bytes best."""
-    middle = len(raw) // 2 // 96 * 96  # a multiple of all rows of words
-    tried = (
-        raw[max(0, middle - _TRIED // 96 * 96) :][: 2 * (_TRIED // 96 * 96)] if len(raw) > 2 * _TRIED else raw
-    )
-    return min(ways, key=lambda way: len(zlib.compress(planes(tried, *way), 6)))
+    """The way that packs some of the bytes best."""
+    tried = raw
+    if len(raw) > _PLACES * _TRIED:
+        starts = [k * (len(raw) - _TRIED) // (_PLACES - 1) // _WHOLE * _WHOLE for k in range(_PLACES)]
+        tried = np.concatenate([raw[start : start + _TRIED] for start in starts])
+    return min(ways, key=lambda way: len(zlib.compress(planes(tried, *way), _FAST)))

@@ -23,22 +23,22 @@ function tell(words, state) {
     document.documentElement.dataset.state = state;
 }
 
-/** What part of the file holds. @param {string} id */
-function part(id) {
-    return bytesOf(element(id).textContent);
-}
+/** @param {string} id */
+const part = (id) => bytesOf(element(id).textContent);
 
-/** What the frames are. @returns {Promise<File>} */
+/** What there is to draw. @returns {Promise<File>} */
 async function readFile() {
     return JSON.parse(new TextDecoder().decode(await inflated(part("scene"))));
 }
 
-/** Their numbers and pictures, which take longest to unpack. @param {File} file @returns {Promise<import("./device.js").Store>} */
+/** Numbers and pictures of a file. @param {File} file @returns {Promise<import("./device.js").Store>} */
 async function readStore(file) {
+    await new Promise((done) => setTimeout(done)); // what was asked of the device goes first
+    const data = inflated(part("data"));
     const all = part("pictures");
     let end = 0;
-    const pictures = file.images.map((/** @type {number} */ size) => all.subarray(end, (end += size)));
-    return { blobs: file.blobs, data: await inflated(part("data")), pictures };
+    const pictures = file.images.map((size) => all.subarray(end, (end += size)));
+    return { blobs: file.blobs, data: await data, pictures };
 }
 
 /** The page at work on one device. */
@@ -46,16 +46,16 @@ class Page {
     /** @param {File} file */
     constructor(file) {
         this.file = file;
+        /** @type {import("./device.js").Store | null} */
+        this.store = null;
         this.state = atRest(file.dials);
         this.technique = AFTER;
-        /** @type {Map<string, Player>} */
+        /** @type {Map<import("./device.js").Frame, Player>} */
         this.players = new Map();
         this.dirty = true;
         this.busy = false;
         this.painted = "";
         this.frames = 0;
-        /** @type {Promise<import("./device.js").Store> | null} */
-        this.store = null;
         /** @type {Player | null} */
         this.player = null;
         /** @type {Screen | null} */
@@ -78,18 +78,21 @@ class Page {
             if (info.reason !== "destroyed") await this.reopen();
         });
         device.addEventListener("uncapturederror", (event) => tell(`The device refused: ${/** @type {GPUUncapturedErrorEvent} */ (event).error.message}`, "failed"));
-        this.made = new Made(device, scene);
+        const made = new Made(device, scene);
+        made.compile(this.#fitting(scene));
+        made.store = this.store ??= await readStore(this.file);
+        this.made = made;
         this.players.clear();
         this.painted = "";
         this.soft = soft;
         this.screen = null;
-        this.#compile(this.made);
-        this.store ??= readStore(this.file);
-        this.made.store = await this.store;
-        await Promise.all([fillMaps(this.made), this.choose()]);
+        const maps = fillMaps(made);
+        this.choose();
+        await maps;
         this.dirty = true;
         await this.draw();
         tell("", "drawn");
+        for (const one of scene.frames) if (one.moving && one.name === this.technique) made.compile(one);
     }
 
     async reopen() {
@@ -102,17 +105,26 @@ class Page {
         while (this.dirty || this.busy) await new Promise((done) => setTimeout(done, 1));
     }
 
-    /** The player for the technique and the size of the window. */
-    async choose() {
-        const made = /** @type {Made} */ (this.made);
-        const frame = this.#fitting(made);
-        const key = `${frame.name} ${frame.size[0]}`;
-        if (!this.players.has(key)) {
+    /** The frame for the technique, the size of the window and what hands do. @param {Scene} scene */
+    #fitting(scene) {
+        const side = Math.min(innerWidth, innerHeight) * devicePixelRatio;
+        const fitting = scene.frames.filter((one) => one.name === this.technique);
+        const moving = this.moving && fitting.find((one) => one.moving);
+        const still = fitting.filter((one) => !one.moving);
+        return moving || (still.find((one) => one.size[0] >= 0.9 * side) ?? still[still.length - 1]);
+    }
+
+    /** The player for it. */
+    choose() {
+        const { made } = this;
+        if (!made) return;
+        const frame = this.#fitting(made.scene);
+        if (!this.players.has(frame)) {
             const player = new Player(made, frame);
-            await player.prepare();
-            this.players.set(key, player);
+            player.prepare();
+            this.players.set(frame, player);
         }
-        this.player = /** @type {Player} */ (this.players.get(key));
+        this.player = /** @type {Player} */ (this.players.get(frame));
         if (this.screen?.frame !== frame) {
             this.screen?.close();
             this.screen = new Screen(element("picture"), made, frame, this.soft);
@@ -120,25 +132,12 @@ class Page {
         this.dirty = true;
     }
 
-    /** The frame for the technique and the size of the window. @param {Made} made */
-    #fitting(made) {
-        const side = this.moving ? 0 : Math.min(innerWidth, innerHeight) * devicePixelRatio;
-        const fitting = made.scene.frames.filter((one) => one.name === this.technique);
-        return fitting.find((one) => one.size[0] >= 0.9 * side) ?? fitting[fitting.length - 1];
-    }
-
-    /** Begin to compile what the first frame needs, while the page unpacks the rest of the file. @param {Made} made */
-    #compile(made) {
-        const passes = [...this.#fitting(made).passes, ...Object.values(made.scene.halved).flat()];
-        for (const one of passes) if (!one.written) made.pipeline(one.program).catch(failed);
-    }
-
     /** Draw what is stale, and wait until it is there: one frame at a time. */
     async draw() {
         if (!this.dirty || this.busy || !this.player || !this.made || !this.screen) return;
         [this.dirty, this.busy] = [false, true];
         try {
-            if (this.soft) await this.choose();
+            if (this.soft) this.choose();
             this.dirty = false;
             await this.#frame(this.player, this.made, /** @type {Screen} */ (this.screen));
         } finally {
@@ -153,8 +152,7 @@ class Page {
         const began = performance.now();
         apply(player, this.file.dials, this.state);
         await this.#paint(made);
-        const encoder = made.device.createCommandEncoder();
-        player.draw(encoder);
+        const encoder = await player.draw();
         screen.copy(encoder);
         made.device.queue.submit([encoder.finish()]);
         await screen.show();
@@ -178,7 +176,7 @@ class Page {
     /** @param {string} technique */
     async turnTo(technique) {
         this.technique = technique;
-        await this.choose();
+        this.choose();
         await this.draw();
     }
 

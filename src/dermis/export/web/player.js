@@ -82,7 +82,7 @@ export class Player {
         this.units = unitsOf(frame.passes);
         this.dependencies = new Dependencies(this.units.map((unit) => joined(unit.map((k) => this.#access(frame.passes[k])))));
         this.keys = frame.passes.map(keyOf);
-        /** @type {any[]} */
+        /** @type {any[]} by pass, those that are compiled */
         this.pipelines = [];
         /** @type {(GPUBindGroup | null)[]} */
         this.groups = [];
@@ -90,28 +90,35 @@ export class Player {
         this.ran = [];
     }
 
-    /** Compile and fill everything. */
-    async prepare() {
-        const programs = this.frame.passes.map((one) => (one.written ? null : this.made.pipeline(one.program)));
+    /** Fill everything; what is not compiled yet goes on beside it. */
+    prepare() {
+        this.made.compile(this.frame);
         this.groups = this.frame.passes.map((one) => (one.written ? null : this.made.group(one, (k) => this.#record(k))));
-        this.pipelines = await Promise.all(programs);
     }
 
-    /** Run what is stale. @param {GPUCommandEncoder} encoder */
-    draw(encoder) {
+    /** Run what is stale, each pass once it is compiled; returns an encoder with those that are not submitted yet. */
+    async draw() {
+        const { device } = this.made;
+        let encoder = device.createCommandEncoder();
         const versions = this.#versions();
         const now = this.dependencies.due(versions);
         /** @type {boolean[]} */
         const due = [];
         this.units.forEach((unit, index) => unit.forEach((k) => (due[k] = now[index])));
-        this.made.device.queue.writeBuffer(this.records.buffer, 0, this.records.bytes);
+        device.queue.writeBuffer(this.records.buffer, 0, this.records.bytes);
         /** @type {GPUComputePassEncoder | null} */
         let open = null;
-        due.forEach((run, index) => {
-            const one = this.frame.passes[index];
-            if (!run) return;
+        for (const [index, one] of this.frame.passes.entries()) {
+            if (!due[index]) continue;
+            if (!one.written && !this.pipelines[index]) {
+                open?.end();
+                open = null;
+                device.queue.submit([encoder.finish()]);
+                this.pipelines[index] = await this.made.pipeline(one.program);
+                encoder = device.createCommandEncoder();
+            }
             if (one.written) {
-                this.made.device.queue.writeBuffer(this.made.resource(one.written[0]), 0, /** @type {any} */ (this.written[index]));
+                device.queue.writeBuffer(this.made.resource(one.written[0]), 0, /** @type {any} */ (this.written[index]));
             } else if (one.raster) {
                 open?.end();
                 open = null;
@@ -122,10 +129,11 @@ export class Player {
                 open.setBindGroup(0, this.groups[index]);
                 open.dispatchWorkgroups(one.groups[0], one.groups[1], one.groups[2]);
             }
-        });
-        /** @type {GPUComputePassEncoder | null} */ (open)?.end();
+        }
+        open?.end();
         this.dependencies.ran(now, versions);
         this.ran = [...new Set(this.frame.passes.filter((_, k) => due[k]).map((one) => one.stage))];
+        return encoder;
     }
 
     #versions() {

@@ -19,6 +19,16 @@ def needed(tape: Tape, takes: list[Take]) -> list[int]:
     return sorted(found)
 
 
+def bound(tape: Tape, takes: list[Take], names: tuple[str, ...]) -> dict[int, str]:
+    """What is bound by some names."""
+    found: dict[int, str] = {}
+    for take in takes:
+        for one in (each for each in take.passes if each.program is not None):
+            known = [name for _, name, _ in tape.programs[one.program or 0]["bindings"]]
+            found |= {k: name for k, name in zip(one.bound, known, strict=True) if name in names and k >= 0}
+    return found
+
+
 def whole(tape: Tape, number: int) -> int:
     """The texture of a view; others themselves."""
     return int(tape.resources[number].get("of", number))
