@@ -11,6 +11,7 @@ from dermis.export.run import export_skin
 from dermis.mesh.samples import cached
 
 HEADS = {"human": "the human", "human-7": "human:7", "human-12": "human:12", "scan": "lee_perry_smith"}
+VIEWPORT = '<meta name="viewport" content="width=device-width, initial-scale=1">'
 STYLE = (
     "body{background:#000;color:#ddd;font:16px system-ui,sans-serif;margin:0;display:grid;gap:8px;"
     "padding:8px;"
@@ -32,7 +33,8 @@ def main(folder: Path) -> None:
         poster = re.search(r'src="(data:image/webp;base64,[^"]*)"', text)
         assert poster is not None
         shown.append(f'<a href="{name}.html"><img alt="" src="{poster[1]}">{html.escape(title)}</a>')
-    head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>dermis</title><style>{STYLE}</style>'
+    told = f"{VIEWPORT}<title>dermis</title><style>{STYLE}</style>"
+    head = f'<!doctype html><html lang="en"><meta charset="utf-8">{told}'
     (folder / "index.html").write_text("\n".join([head, *shown, "</html>\n"]), encoding="utf-8")
 
 

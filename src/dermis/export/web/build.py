@@ -26,7 +26,7 @@ Json = dict[str, Any]
 TECHNIQUES = ("texture-space", "none")
 SIZES = {"gpu": (512, 1024, 1600), "software": (512,)}
 """Sides of the square pictures of each form [pixel]."""
-MOVING = {"software": (256, 1, 4)}
+MOVING = {"software": (256, 1, 2)}
 """Of forms that draw less while hands move: side [pixel], samples, and how many coarse hairs become one."""
 
 
