@@ -89,7 +89,7 @@ def _project(design: Design, samples: Floats, log_variance: Floats) -> Fit:
     k = len(log_variance)
     size = np.linalg.norm(columns, axis=0)
     # All that follows lives in the space of these few columns: one factorisation serves every channel.
-    small = _triangle(np.hstack([columns / size, slopes / size, samples]))
+    small = triangle(np.hstack([columns / size, slopes / size, samples]))
     weight = np.zeros((k, samples.shape[1]))
     cost, gradient, curvature = 0.0, np.zeros(k), np.zeros((k, k))
     for i, sample in enumerate(small.T[2 * k :]):
@@ -100,7 +100,7 @@ def _project(design: Design, samples: Floats, log_variance: Floats) -> Fit:
     return Fit(log_variance, weight / size[:, None], cost, gradient, curvature)
 
 
-def _triangle(tall: Floats) -> Floats:
+def triangle(tall: Floats) -> Floats:
     """The factor R of a QR factorisation, by blocks of rows.
 
     For a whole tall matrix BLAS starts threads that wait longer than they work.
