@@ -26,7 +26,7 @@ from dermis.export.web.page import web_page
 from dermis.frame.taping import renderer_for
 
 ATLAS, MAP = 512, 1024  # as exported
-SHOWN = ("software", 512), ("software", 256), ("gpu", 256)
+SHOWN = ("software", 512), ("gpu", 256)
 LINEAR = """async () => {
   const page = dermis, frame = page.player.frame, device = page.made.device, [width, height] = frame.size;
   const buffer = device.createBuffer({ size: 16 * width * height, usage: 9 });
