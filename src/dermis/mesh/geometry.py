@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dermis.mesh.columns import dots
+from dermis.mesh.columns import crosses, dots
 from dermis.mesh.mesh import Floats, Ints, Material, Mesh
 
 
@@ -66,13 +66,13 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
     columns, corner = np.ascontiguousarray(positions.T, np.float64), np.ascontiguousarray(triangles.T)
     a, b, c = (columns.take(one, axis=1) for one in corner)  # (3, f) each
     ab, bc, ca = b - a, c - b, a - c
-    x, y, z = ab[1] * ca[2] - ab[2] * ca[1], ab[2] * ca[0] - ab[0] * ca[2], ab[0] * ca[1] - ab[1] * ca[0]
-    sine = np.sqrt(x * x + y * y + z * z)  # of each angle, times the lengths of its sides
+    across = crosses(ab, ca)
+    sine = np.sqrt(dots(across, across))  # of each angle, times the lengths of its sides
     beside = [np.arctan2(sine, -dots(one, other)) for one, other in ((ca, ab), (ab, bc))]
     angle = np.stack([*beside, np.pi - beside[0] - beside[1]])
     angle /= np.where(sine > 0, -sine, 1.0)
     at, count = point[corner].ravel(), int(point.max()) + 1
-    summed = np.stack([np.bincount(at, (one * angle).ravel(), count) for one in (x, y, z)], dtype=np.float64)
+    summed = np.stack([np.bincount(at, (one * angle).ravel(), count) for one in across], dtype=np.float64)
     length = np.sqrt(dots(summed, summed))
     flat = ~(length > 0)
     length[flat], summed[:, flat] = 1.0, [[0.0], [0.0], [1.0]]

@@ -1,7 +1,7 @@
 // Sums over teams of invocations that are neighbours in a workgroup.
 //#include "each.wgsl"
 
-override TEAM: u32 = 16u; // invocations of a team: a power of two up to EACH
+override TEAM: u32 = 1u; // invocations of a team: a power of two up to EACH
 
 var<workgroup> part: array<vec4f, EACH>;
 
