@@ -11,6 +11,7 @@ from typing import Any, Self
 
 from distributed import WorkerPlugin, get_worker
 
+from dermis.batch.allocator import keep_freed_memory
 from dermis.batch.faults import LostProcessError
 from dermis.batch.ranks import taken_rank
 from dermis.batch.shards import Shard
@@ -48,6 +49,7 @@ class Drawing(WorkerPlugin):  # type: ignore[misc]
 
     def setup(self, worker: Any) -> None:
         """Called by dask when the worker has the plugin."""
+        keep_freed_memory()
         self._kept = {"lock": threading.Lock(), "ends": ExitStack(), "over": threading.Event()}
 
     def teardown(self, worker: Any) -> None:
