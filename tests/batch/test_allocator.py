@@ -18,16 +18,16 @@ from dermis.batch.allocator import keep_freed_memory
 if sys.argv[1] == "keep":
     assert keep_freed_memory()
     assert "MALLOC_TRIM_THRESHOLD_" not in os.environ
-np.ones(1 << 19)
+np.ones(1 << 17)
 before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
 for _ in range(10):
-    np.ones(1 << 19)
+    np.ones(1 << 17)
 print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
 """
 
 
 def faults(what: str) -> int:
-    """Pages that ten arrays of 4 MiB fault in, in a process of dask's."""
+    """Pages that ten arrays of 1 MiB fault in, in a process of dask's."""
     environment = {**os.environ, "MALLOC_TRIM_THRESHOLD_": "65536"}
     done = subprocess.run(
         [sys.executable, "-c", COUNT, what], env=environment, capture_output=True, text=True, check=True
