@@ -60,7 +60,9 @@ def front_camera(head: Head, centre: ArrayLike = (0, 0, 0), frame_mm: float = 80
 
 
 def scene_of(head: Head, *lights: AnyLight, camera: Camera | None = None, **skin: Any) -> Scene:
-    return Scene(head, lights=lights, camera=camera or front_camera(head), skin=Skin(**skin))
+    """A scene with Lambertian skin, unless `skin` says otherwise: what it returns has closed forms."""
+    chosen = Skin(**{"direction": "lambertian", **skin})
+    return Scene(head, lights=lights, camera=camera or front_camera(head), skin=chosen)
 
 
 def frontal(irradiance: float = 3.0, *, shadows: bool = False) -> DirectionalLight:

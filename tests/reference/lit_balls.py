@@ -23,7 +23,7 @@ from dermis.scene.lights import (
 from dermis.scene.model import Scene
 from dermis.scene.skin import Skin
 
-DRY = Skin(albedo="profile", specular="none", energy="none")
+DRY = Skin(albedo="profile", specular="none", energy="none", direction="lambertian")
 COLOUR = (3.0, 2.0, 1.0)
 BALL = Head("ball", uv_sphere(50.0, 256, 128), Maps())
 MIDDLE = -np.array(BALL.centre_mm)

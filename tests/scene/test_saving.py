@@ -84,7 +84,7 @@ SKIN = Skin(
     fresnel="exact",
     specular_colour="wrong",
     energy="published",
-    direction="half-space",
+    direction="lambertian",
     pigments=PIGMENTS,
     layers=LAYERS,
 )

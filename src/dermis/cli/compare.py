@@ -18,6 +18,7 @@ from dermis.scene.techniques import TECHNIQUES
 
 _BY_PATHS = ("path-traced", "cycles")
 _SIZES = {"size": (256, 256), "atlas": 1024}
+_DIRECTION = {"direction": "half-space against path-traced, lambertian against the others"}
 
 if TYPE_CHECKING:
     from dermis.comparison.compare import Comparison
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     SkinOptions = dict[str, Any]
 else:
     SizeOptions = options_of(Settings, only=_SIZES, defaults=_SIZES)
-    SkinOptions = options_of(Skin, only=("direction", "roughness"))
+    SkinOptions = options_of(Skin, only=("direction", "roughness"), defaults=_DIRECTION)
 
 
 def compare(
@@ -124,7 +125,7 @@ def _choose(chosen: Mapping[str, Any], sizes: Mapping[str, Any]) -> dict[str, An
         "light": light,
         "region": chosen.get("region", usual_region(light)),
         "medium": chosen.get("medium", "skin1"),
-        "direction": chosen.get("direction", "lambertian"),
+        "direction": chosen.get("direction"),
         "settings": Settings(**{**_SIZES, **sizes}),
         "samples": chosen.get("samples", 64),
     }

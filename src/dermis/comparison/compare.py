@@ -79,7 +79,7 @@ def compare(
     region: str = "portrait",
     medium: str = "skin1",
     settings: Settings | None = None,
-    direction: Literal["lambertian", "half-space"] = "lambertian",
+    direction: Literal["lambertian", "half-space"] | None = None,
     samples: int = 64,
     adapter: str = "auto",
     report: Callable[[str], None] = lambda doing: None,
@@ -89,7 +89,7 @@ def compare(
     against : of TRUTHS
     light, region : of `scenes.LIGHTS` and `scenes.REGIONS`
     medium : a named medium, taken as index-matched
-    direction : of the techniques' skin; the surface integral and heat are always lambertian
+    direction : of the techniques' skin; None for that of the truth's
     samples : paths through each pixel
     report : called with what is being done
 
@@ -102,7 +102,7 @@ def compare(
         report(f"truth: {against}")
         truth = TRUTHS[against](subject, samples)
         check_seen(truth.mask)
-        skin = Skin(**(subject.scene.skin.model_dump() | {"direction": direction}))
+        skin = Skin(**(subject.scene.skin.model_dump() | {"direction": direction or truth.direction}))
         judged = replace(subject, scene=replace(subject.scene, skin=skin))
         images, ms = {}, {}
         for technique in techniques:
@@ -110,7 +110,7 @@ def compare(
             images[technique], ms[technique] = _render(judged, technique, truth)
         name = subject.renderer.device.adapter.name
     title = f"{head.name}, {medium}, light: {light}, region: {region}, {settings.size[0]}x{settings.size[1]}"
-    title += f", {direction} skin" if direction != "lambertian" else ""
+    title += f", {skin.direction} skin"
     made = Comparison(title, name, truth, against, (), images)
     return replace(made, rows=tuple(_row(made, technique, ms[technique]) for technique in techniques))
 

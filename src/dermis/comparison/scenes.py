@@ -86,7 +86,7 @@ def comparison_scene(head: Head, light: str, region: str, profile: str) -> Scene
     profile : name or file
     """
     bare = Head(head.name, head.mesh, Maps(), head.attribution)
-    skin = Skin(profile=profile, albedo="profile", specular="none", energy="none")
+    skin = Skin(profile=profile, albedo="profile", specular="none", energy="none", direction="lambertian")
     return Scene(bare, lights=LIGHTS[light](head), camera=REGIONS[region](head), skin=skin)
 
 

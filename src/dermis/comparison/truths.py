@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,7 @@ class Truth:
     notes : for the reader
     through : whether it includes light through thin parts
     between : whether it includes light from skin to skin through the air
+    direction : of `Skin`, by which light enters and leaves in it
     """
 
     image: Floats
@@ -64,6 +65,7 @@ class Truth:
     notes: tuple[str, ...] = ()
     through: bool = True
     between: bool = True
+    direction: Literal["lambertian", "half-space"] = "lambertian"
 
 
 def surface_integral(subject: Subject, samples: int) -> Truth:
@@ -143,7 +145,8 @@ def path_traced(subject: Subject, samples: int) -> Truth:
     from dermis.reference.path_traced import path_trace
 
     made = path_trace(subject.scene, subject.medium, samples, subject.settings)
-    return _rendered(made, made.mask, f"{made.samples} paths a pixel", *made.notes)
+    truth = _rendered(made, made.mask, f"{made.samples} paths a pixel", *made.notes)
+    return replace(truth, direction="half-space")
 
 
 def cycles(subject: Subject, samples: int) -> Truth:

@@ -17,8 +17,11 @@ MOST_OTHERS = 2
 """Profiles that a map can mix into another."""
 _OILY_STRENGTH, _OILY_SMOOTHING = 2.0, 0.6
 USUAL_ROUGHNESS, USUAL_RHO_S = 0.3, 0.45
-PRESETS: dict[str, dict[str, Any]] = {"default": {}, "deck-2007": {"specular": "kelemen", "rho_s": 0.18}}
-"""Fields of skins by name: what dermis takes for skin, and the surface as the talk of 2007 had it."""
+PRESETS: dict[str, dict[str, Any]] = {
+    "default": {},
+    "deck-2007": {"specular": "kelemen", "rho_s": 0.18, "direction": "lambertian"},
+}
+"""Fields of skins by name: what dermis takes for skin, and what the talk of 2007 had."""
 
 
 _Share = Annotated[float | None, Field(ge=0, le=1)]
@@ -110,7 +113,7 @@ class Skin(Plain):
     energy: EnergyName = "full"
     """Light that the surface reflects does not enter: "full" subtracts it all, "published" as the deck does,
     pi times too much, "none" nothing."""
-    direction: Literal["lambertian", "half-space"] = "lambertian"
+    direction: Literal["lambertian", "half-space"] = "half-space"
     """How skin returns light: "lambertian" alike from and to all directions; "half-space" as a half-space
     of the skin's mean colour: more of what arrives at a slant, and light scattered once leaves at a slant."""
     pigments: Pigments | None = None
