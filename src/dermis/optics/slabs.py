@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.optics.directions import critical_cosine, gaussian_nodes, internal_reflectance
 
 Floats = NDArray[np.float64]
-_NODES = 16  # of an interval of cosines
 _THINNEST = 1e-6  # optical thickness in which light scatters once at most
 
 
@@ -29,17 +28,18 @@ class Slabs:
     through: Floats
 
 
-def slabs(albedo: float, optical_depth: ArrayLike, eta: float) -> Slabs:
+def slabs(albedo: float, optical_depth: ArrayLike, eta: float, nodes: int = 16) -> Slabs:
     """Slabs that scatter isotropically, by adding and doubling; exact but for the number of directions.
 
     albedo : of single scattering [-]
     optical_depth : (n,) thickness in mean free paths, above 0 [-]
     eta : index of refraction against the air on both sides, at least 1 [-]
+    nodes : cosines of those that leave, and as many of those that are held back
 
     Source: [Chandrasekhar1960] section 50 for what layers do together.
     """
     tau = np.atleast_1d(np.asarray(optical_depth, np.float64))
-    mu, weight = _cosines(eta)
+    mu, weight = _cosines(eta, nodes)
     flux, escapes = 2.0 * weight * mu, mu > critical_cosine(eta)
     R, T, straight = _doubled(albedo, tau, mu, flux)
     back, through = _between_faces(R * flux, T * flux, straight, internal_reflectance(mu, eta), R, T)
@@ -49,11 +49,11 @@ def slabs(albedo: float, optical_depth: ArrayLike, eta: float) -> Slabs:
     return Slabs(mu[escapes], entering, up, down)
 
 
-def _cosines(eta: float) -> tuple[Floats, Floats]:
+def _cosines(eta: float, nodes: int) -> tuple[Floats, Floats]:
     """Gaussian nodes and weights below the surface: those that escape, and those that it holds back."""
     critical = critical_cosine(eta)
     spans = [(critical, 1.0), (0.0, critical)] if critical > 0.0 else [(0.0, 1.0)]
-    parts = [gaussian_nodes(low, high, _NODES) for low, high in spans]
+    parts = [gaussian_nodes(low, high, nodes) for low, high in spans]
     mu, weight = (np.concatenate(both) for both in zip(*parts, strict=True))
     return mu, weight
 

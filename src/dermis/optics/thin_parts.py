@@ -23,8 +23,10 @@ ROWS = 32
 """Thicknesses of the tables."""
 _MOST_ALBEDO, _LEAST_ALBEDO = 1.0 - 1e-6, 1e-3
 _LOGS = (-14.0, 14.0)  # of frequencies that are searched [1/mm]
+_KEPT = 64  # shares and indices whose numbers are remembered
 _LAW_DEPTH = 10.0  # mean free paths from which on directions of entry count alike
 _DEEP = 1e4  # mean free paths that are as good as a half-space
+_FEW, _MANY = 8, 16  # cosines for what uniform light does, off by 3e-4 of it, and for what directions do
 _FREQUENCIES = np.geomspace(0.02, 5.0, 24)  # at which shapes are compared [1/mean free path]
 
 
@@ -93,16 +95,20 @@ def across(total: Floats, eta: float) -> Floats:
 
     total : (c,) that the half-space returns of what enters perpendicularly [-]
     """
+    return np.stack([_across(float(share), eta) for share in total], axis=-1)
+
+
+@lru_cache(maxsize=_KEPT)
+def _across(total: float, eta: float) -> Floats:
     cosine = refracted(np.linspace(0.0, 1.0, DIRECTIONS) ** 2, eta)
-    laws = [_law(_albedo_of(float(share), eta), eta) for share in total]
-    return np.stack([np.interp(cosine, *law) for law in laws], axis=-1)
+    return np.interp(cosine, *_law(_albedo_of(total, eta), eta, _MANY))
 
 
-@lru_cache(maxsize=64)
-def _law(albedo: float, eta: float) -> tuple[Floats, Floats]:
+@lru_cache(maxsize=_KEPT)
+def _law(albedo: float, eta: float, nodes: int) -> tuple[Floats, Floats]:
     """Cosines of entry below the surface, and what passes deep slabs as `across` has it."""
-    whole = slabs(albedo, _DEEP, eta)
-    slanted = _slanted(slabs(albedo, _LAW_DEPTH, eta), whole)[0]
+    whole = slabs(albedo, _DEEP, eta, nodes)
+    slanted = _slanted(slabs(albedo, _LAW_DEPTH, eta, nodes), whole)[0]
     return whole.cosine, slanted
 
 
@@ -124,8 +130,8 @@ class _Shares(NamedTuple):
 
 def _shares(layer: Layer, depth_mm: Floats, eta: float) -> _Shares:
     albedo, extinction = float(layer.alpha_prime[0]), float(layer.sigma_t_prime[0])
-    cut, whole = slabs(albedo, extinction * depth_mm, eta), slabs(albedo, _DEEP, eta)
-    returned, law = _uniform(whole, whole.back), _law(albedo, eta)[1] - 1.0
+    cut, whole = slabs(albedo, extinction * depth_mm, eta, _FEW), slabs(albedo, _DEEP, eta, _FEW)
+    returned, law = _uniform(whole, whole.back), _law(albedo, eta, _FEW)[1] - 1.0
     weight = whole.flux * whole.back[0]
     deep = (_slanted(cut, whole) - 1.0) @ (weight * law) / (weight * law**2).sum()
     amount, lost = _uniform(cut, cut.through), np.maximum(1.0 - _uniform(cut, cut.back) / returned, 0.0)
