@@ -115,10 +115,13 @@ def _surface_of_blurs(inputs: Inputs, texels: int) -> float:
 
 
 def _through(thin: Translucency, levels: Levels, blur: Blur) -> float:
-    """Bytes of translucency: pairs and their texels, the light of the sources, and the light that leaves."""
+    """Bytes of translucency: pairs and their texels, the light of the sources, and the light that leaves.
+
+    Slabs ask for the light at the sources by its direction too, so for the surface there.
+    """
     pairs, halved = thin.pairs, blur.halvings[blur.own[1 + thin.layer]]
     receivers, sources = pairs.receivers[1], pairs.sources[1]
-    lists = thin.weights.size + pairs.sums.size + _TEXEL * sources
+    lists = thin.weights.size + pairs.sums.size + (_TEXEL + SURFACE_BYTES * thin.slabs) * sources
     level = (levels.size >> halved) ** 2
     read = min(_BILINEAR * sources, level) * FORMAT_BYTES[levels.texel]
     return float(lists + read + receivers * texel_bytes(thin.light))

@@ -27,6 +27,7 @@ Floats = NDArray[np.float64]
 DEFAULT_COLOUR = 0.8
 """Albedo of heads without a colour map."""
 _EYE_SEEDS = 1000  # that look different
+_COLOURS = 256  # shares of light that half-spaces are told apart by
 _NO_BAND = -1.0
 
 
@@ -103,9 +104,16 @@ def _derived(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any]:
 
 
 def half_space_of(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Floats, float]:
-    """(3,) what the half-space of the skin's mean colour returns of light from above, and its index."""
-    colour = profile.albedo if skin.albedo == "profile" else maps.mean_colour
-    colour = np.full(3, DEFAULT_COLOUR) if colour is None else np.asarray(colour, np.float64)
+    """(3,) what the half-space of the skin's mean colour returns of light from above, and its index.
+
+    That of a map is one of some, so that people who look alike share their tables: it is a mean anyhow.
+    """
+    if skin.albedo == "profile":
+        colour = np.asarray(profile.albedo, np.float64)
+    elif maps.mean_colour is None:
+        colour = np.full(3, DEFAULT_COLOUR)
+    else:
+        colour = np.round(maps.mean_colour * _COLOURS) / _COLOURS
     return colour, 1.0 if skin.specular == "none" else SKIN_ETA
 
 

@@ -13,7 +13,7 @@ ROWS = 32
 """Of the table over directions."""
 _NODES = 32
 _MOST_ALBEDO = 1.0 - 1e-8
-_KEPT = 64  # colours
+_KEPT = 1024  # colours
 
 
 @dataclass(frozen=True)

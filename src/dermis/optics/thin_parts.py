@@ -23,10 +23,13 @@ ROWS = 32
 """Thicknesses of the tables."""
 _MOST_ALBEDO, _LEAST_ALBEDO = 1.0 - 1e-6, 1e-3
 _LOGS = (-14.0, 14.0)  # of frequencies that are searched [1/mm]
-_KEPT = 64  # shares and indices whose numbers are remembered
+_KEPT = 1024  # shares and indices whose numbers are remembered
 _LAW_DEPTH = 10.0  # mean free paths from which on directions of entry count alike
 _DEEP = 1e4  # mean free paths that are as good as a half-space
 _FEW, _MANY = 8, 16  # cosines for what uniform light does, off by 3e-4 of it, and for what directions do
+_DEPTHS = np.geomspace(1e-4, 3e3, 40)  # of slabs that are cut [mean free path]
+_LEAST = 1e-300  # share that passes black slabs as deep as the last
+_DIGITS = 12  # of albedos, by which they are alike
 _FREQUENCIES = np.geomspace(0.02, 5.0, 24)  # at which shapes are compared [1/mean free path]
 
 
@@ -115,7 +118,8 @@ def _law(albedo: float, eta: float, nodes: int) -> tuple[Floats, Floats]:
 def _slanted(cut: Slabs, whole: Slabs) -> Floats:
     """(n, m) what passes of light from each direction, as `across` has it."""
     returned = whole.back[0] / _uniform(whole, whole.back)
-    return np.asarray(cut.through / _uniform(cut, cut.through)[:, None] / returned)
+    passing = np.maximum(_uniform(cut, cut.through), _LEAST)[:, None]
+    return np.asarray(cut.through / passing / returned)
 
 
 class _Shares(NamedTuple):
@@ -129,8 +133,22 @@ class _Shares(NamedTuple):
 
 
 def _shares(layer: Layer, depth_mm: Floats, eta: float) -> _Shares:
-    albedo, extinction = float(layer.alpha_prime[0]), float(layer.sigma_t_prime[0])
-    cut, whole = slabs(albedo, extinction * depth_mm, eta, _FEW), slabs(albedo, _DEEP, eta, _FEW)
+    """By cubics between depths for which an albedo's slabs are cut once."""
+    depth = np.clip(float(layer.sigma_t_prime[0]) * depth_mm, _DEPTHS[0], _DEPTHS[-1])
+    return _Shares(*_by_depth(round(float(layer.alpha_prime[0]), _DIGITS), eta)(np.log(depth)).T)
+
+
+@lru_cache(maxsize=_KEPT)
+def _by_depth(albedo: float, eta: float) -> Callable[[Floats], Floats]:
+    """(n, 4) what `_Shares` holds by the logarithm of depths in mean free paths."""
+    from scipy.interpolate import CubicSpline
+
+    return CubicSpline(np.log(_DEPTHS), np.stack(_cut(albedo, eta), axis=-1))
+
+
+def _cut(albedo: float, eta: float) -> _Shares:
+    """Of slabs of `_DEPTHS`."""
+    cut, whole = slabs(albedo, _DEPTHS, eta, _FEW), slabs(albedo, _DEEP, eta, _FEW)
     returned, law = _uniform(whole, whole.back), _law(albedo, eta, _FEW)[1] - 1.0
     weight = whole.flux * whole.back[0]
     deep = (_slanted(cut, whole) - 1.0) @ (weight * law) / (weight * law**2).sum()
