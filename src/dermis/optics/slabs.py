@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,9 +40,29 @@ def slabs(albedo: float, optical_depth: ArrayLike, eta: float, nodes: int = 16) 
     Source: [Chandrasekhar1960] section 50 for what layers do together.
     """
     tau = np.atleast_1d(np.asarray(optical_depth, np.float64))
+    times = int(np.ceil(np.log2(max(float(tau.max()) / _THINNEST, 1.0))))
     mu, weight = _cosines(eta, nodes)
+    *_, (R, T, straight) = _doubled(albedo, tau / 2.0**times, times, mu, 2.0 * weight * mu)
+    return _cut(eta, mu, weight, R, T, straight)
+
+
+def doubled_slabs(albedo: float, least: ArrayLike, times: int, eta: float, nodes: int = 16) -> Slabs:
+    """`slabs` of the least depths, of twice those and so on: each is on the way to the next.
+
+    least : (n,) optical depths, of about the same size [-]
+    times : that they are doubled; there are n (times + 1) slabs, ordered by times, then by `least`
+    """
+    before = int(np.ceil(np.log2(max(float(np.max(least)) / _THINNEST, 1.0))))
+    mu, weight = _cosines(eta, nodes)
+    start = np.asarray(least, np.float64) / 2.0**before
+    made = list(_doubled(albedo, start, before + times, mu, 2.0 * weight * mu))[before:]
+    R, T, straight = (np.concatenate(part) for part in zip(*made, strict=True))
+    return _cut(eta, mu, weight, R, T, straight)
+
+
+def _cut(eta: float, mu: Floats, weight: Floats, R: Floats, T: Floats, straight: Floats) -> Slabs:
+    """What slabs between two faces make of light from the air."""
     flux, escapes = 2.0 * weight * mu, mu > critical_cosine(eta)
-    R, T, straight = _doubled(albedo, tau, mu, flux)
     back, through = _between_faces(R * flux, T * flux, straight, internal_reflectance(mu, eta), R, T)
     leaving = flux * (1.0 - internal_reflectance(mu, eta))
     entering = leaving[escapes] / leaving[escapes].sum()
@@ -58,21 +79,24 @@ def _cosines(eta: float, nodes: int) -> tuple[Floats, Floats]:
     return mu, weight
 
 
-def _doubled(albedo: float, tau: Floats, mu: Floats, flux: Floats) -> tuple[Floats, Floats, Floats]:
-    """(n, m, m) radiance over pi, back and through, per power from each direction; (n, m) unscattered."""
-    times = int(np.ceil(np.log2(max(float(tau.max()) / _THINNEST, 1.0))))
-    t = (tau / 2.0**times)[:, None, None]
+def _doubled(
+    albedo: float, tau: Floats, times: int, mu: Floats, flux: Floats
+) -> Iterator[tuple[Floats, Floats, Floats]]:
+    """Of slabs so thin, then of ones twice as thick each time: (n, m, m) radiance over pi, back and through,
+    per power from each direction; (n, m) unscattered."""
+    t = tau[:, None, None]
     a, b = mu[:, None], mu[None, :]
     R = -0.25 * albedo / (a + b) * np.expm1(-t * (1.0 / a + 1.0 / b))
     T = 0.25 * albedo * t / (a * b) * np.exp(-0.5 * t * (1.0 / a + 1.0 / b))
     straight = np.exp(-t[..., 0] / mu)
+    yield R, T, straight
     for _ in range(times):
         up, down = R * flux, T * flux + straight[:, :, None] * np.eye(len(mu))
         entering = R * straight[:, None, :]
         between = np.linalg.solve(np.eye(len(mu)) - up @ up, T + up @ entering)
         R, T = R + down @ (up @ between + entering), down @ between + T * straight[:, None, :]
         straight = straight**2
-    return R, T, straight
+        yield R, T, straight
 
 
 def _between_faces(

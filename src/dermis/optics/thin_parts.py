@@ -16,7 +16,7 @@ from dermis.optics.directions import ROWS as DIRECTIONS
 from dermis.optics.directions import refracted
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Layer, Medium
-from dermis.optics.slabs import Slabs, slabs
+from dermis.optics.slabs import Slabs, doubled_slabs, slabs
 
 Floats = NDArray[np.float64]
 ROWS = 32
@@ -27,7 +27,8 @@ _KEPT = 1024  # shares and indices whose numbers are remembered
 _LAW_DEPTH = 10.0  # mean free paths from which on directions of entry count alike
 _DEEP = 1e4  # mean free paths that are as good as a half-space
 _FEW, _MANY = 8, 16  # cosines for what uniform light does, off by 3e-4 of it, and for what directions do
-_DEPTHS = np.geomspace(1e-4, 3e3, 40)  # of slabs that are cut [mean free path]
+_LEAST_DEPTHS, _DOUBLED = 1e-4 * np.array([1.0, 2.0**0.5]), 25  # of slabs that are cut [mean free path]
+_DEPTHS = (_LEAST_DEPTHS * 2.0 ** np.arange(_DOUBLED + 1)[:, None]).ravel()
 _LEAST = 1e-300  # share that passes black slabs as deep as the last
 _DIGITS = 12  # of albedos, by which they are alike
 _FREQUENCIES = np.geomspace(0.02, 5.0, 24)  # at which shapes are compared [1/mean free path]
@@ -147,8 +148,9 @@ def _by_depth(albedo: float, eta: float) -> Callable[[Floats], Floats]:
 
 
 def _cut(albedo: float, eta: float) -> _Shares:
-    """Of slabs of `_DEPTHS`."""
-    cut, whole = slabs(albedo, _DEPTHS, eta, _FEW), slabs(albedo, _DEEP, eta, _FEW)
+    """Of slabs of `_DEPTHS`; within 4e-4 in between, by cubics, of what slabs of that depth do."""
+    cut = doubled_slabs(albedo, _LEAST_DEPTHS, _DOUBLED, eta, _FEW)
+    whole = slabs(albedo, _DEEP, eta, _FEW)
     returned, law = _uniform(whole, whole.back), _law(albedo, eta, _FEW)[1] - 1.0
     weight = whole.flux * whole.back[0]
     deep = (_slanted(cut, whole) - 1.0) @ (weight * law) / (weight * law**2).sum()
