@@ -175,8 +175,8 @@ def test_each_part_of_a_scene(renderer: Renderer, name: str) -> None:
         assert kept == fresh
 
 
-SPREAD = ("translucency", "diffuse", "combine")  # what thin parts let pass is weighed first
-ALIKE = ("diffuse", "translucency", "combine")  # and not again where their light comes as before
+SPREAD = ("translucency", "diffuse", "combine")  # where light comes from at thin parts is found first
+ALIKE = ("diffuse", "translucency", "combine")  # and not again where it comes as before
 SEEN = ("shade", "post")
 RUNS: dict[str, tuple[Callable[[], tuple[Scene, Settings]], tuple[str, ...]]] = {
     "nothing": (lambda: (BASE, SETTINGS), ()),

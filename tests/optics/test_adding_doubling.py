@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dermis.optics.directions import directional_albedo, refracted
-from dermis.optics.slabs import slabs
+from dermis.optics.slabs import doubled_slabs, slabs
 from dermis.reference.slab import ScatteringLayer
 from dermis.reference.slab_mc import trace_slab
 
@@ -48,3 +48,12 @@ def test_a_deep_slab_is_a_half_space(eta: float) -> None:
     made = slabs(0.95, 64.0, eta)
     found = np.interp(refracted(air, eta), made.cosine, made.back[0])
     assert found == pytest.approx(directional_albedo(air, 0.95, eta), abs=2e-3)
+
+
+@pytest.mark.parametrize("eta", [1.0, 1.4])
+def test_doubling_gives_all_depths_on_its_way(eta: float) -> None:
+    least = np.array([0.3, 0.5])
+    made = doubled_slabs(0.9, least, 3, eta)
+    one_by_one = slabs(0.9, np.concatenate([least * 2.0**k for k in range(4)]), eta)
+    for name in ("back", "through"):
+        assert getattr(made, name) == pytest.approx(getattr(one_by_one, name), abs=1e-5)

@@ -47,6 +47,22 @@ def test_what_passes_from_any_direction(profile: GaussianSum) -> None:
         assert np.abs(found - exact).max() < exact[0] / 6.0, thickness
 
 
+@pytest.mark.parametrize("eta", [1.0, 1.4])
+def test_amounts_are_those_of_slabs_cut_one_by_one(profile: GaussianSum, eta: float) -> None:
+    """Found with twice as many cosines, and for each thickness."""
+    body = media()["skin1"].with_eta(eta)
+    made, layer = thin_parts(body, profile.variance_mm2, REACH), body.layers[0]
+    for c in range(3):
+        albedo, extinction = float(layer.alpha_prime[c]), float(layer.sigma_t_prime[c])
+        cut, whole = slabs(albedo, extinction * DEPTH[1:], eta), slabs(albedo, 1e4, eta)
+        returned = whole.back @ whole.flux
+        assert made.through[1:, :, c].sum(axis=1) == pytest.approx(
+            cut.through @ cut.flux / returned, abs=1e-3
+        )
+        lost = 1.0 - cut.back @ cut.flux / returned
+        assert made.lost[1:, :, c].sum(axis=1) == pytest.approx(lost, abs=1e-3)
+
+
 def test_light_that_a_white_medium_lets_pass_is_lost_to_its_near_side() -> None:
     white = Medium("white", (Layer(np.array([1e-6]), np.array([2.0])),), 1.0)
     made = thin_parts(white, np.array([0.01, 0.1, 1.0, 10.0]), 8.0)

@@ -15,7 +15,8 @@ def keep_freed_memory() -> bool:
     """Undo `MALLOC_TRIM_THRESHOLD_`, by which dask's nannies have workers give all memory back at once.
 
     Pictures and maps are arrays of megabytes: each new one would fault in page by page, which more than
-    doubles the processor time of an image. Processes that this one starts do not see the variable either.
+    doubles the processor time of making a person. Processes that this one starts do not see the variable
+    either.
 
     Returns whether there was something to undo, and it was undone.
     """

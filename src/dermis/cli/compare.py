@@ -18,7 +18,7 @@ from dermis.scene.techniques import TECHNIQUES
 
 _BY_PATHS = ("path-traced", "cycles")
 _SIZES = {"size": (256, 256), "atlas": 1024}
-_DIRECTION = {"direction": "half-space against path-traced, lambertian against the others"}
+_DIRECTION = {"direction": "that of the truth's skin"}
 
 if TYPE_CHECKING:
     from dermis.comparison.compare import Comparison

@@ -59,8 +59,8 @@ class SceneOptions:
         SkinPreset,
         Parameter(
             name="--skin",
-            help="Skin to start from: default, or deck-2007 for the surface as the talk had it: one lobe "
-            "of strength 0.18, alike all over.",
+            help="Skin to start from: default, or deck-2007 as the talk had it: one lobe of strength 0.18, "
+            "alike all over, over Lambertian skin.",
         ),
     ] = None
     lights: Annotated[

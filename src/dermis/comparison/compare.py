@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,7 @@ from dermis.images.colour import encode_srgb
 from dermis.mesh.head import Head
 from dermis.optics.media import media
 from dermis.scene.settings import Settings
-from dermis.scene.skin import Skin
+from dermis.scene.skin import DirectionName, Skin
 
 Floats = NDArray[np.float64]
 _SHOWN_PERCENTILE = 99.0
@@ -79,7 +78,7 @@ def compare(
     region: str = "portrait",
     medium: str = "skin1",
     settings: Settings | None = None,
-    direction: Literal["lambertian", "half-space"] | None = None,
+    direction: DirectionName | None = None,
     samples: int = 64,
     adapter: str = "auto",
     report: Callable[[str], None] = lambda doing: None,

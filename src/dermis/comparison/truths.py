@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Medium
 from dermis.scene.model import Scene
 from dermis.scene.settings import Settings
+from dermis.scene.skin import DirectionName
 
 if TYPE_CHECKING:
     from dermis.reference.cycles import CyclesRendered
@@ -65,7 +66,7 @@ class Truth:
     notes: tuple[str, ...] = ()
     through: bool = True
     between: bool = True
-    direction: Literal["lambertian", "half-space"] = "lambertian"
+    direction: DirectionName = "lambertian"
 
 
 def surface_integral(subject: Subject, samples: int) -> Truth:

@@ -13,7 +13,8 @@ ROWS = 32
 """Of the table over directions."""
 _NODES = 32
 _MOST_ALBEDO = 1.0 - 1e-8
-_KEPT = 1024  # colours
+KEPT = 1024
+"""Shares of light, or albedos, whose numbers are remembered."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +114,7 @@ class _Matched:
         return float((self.leaving * self.returned(self._mu)).sum() / self.leaving.sum())
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=KEPT)
 def _channel(total: float, eta: float) -> tuple[Floats, float, float]:
     """Table of what is returned, the same from everywhere, and the strength of what scattered once."""
     albedo = _albedo_of(total, eta)
@@ -125,7 +126,7 @@ def _channel(total: float, eta: float) -> tuple[Floats, float, float]:
     return table, space.from_everywhere() / above, 0.25 * albedo * float(space.leaving.sum()) / above
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=KEPT)
 def _mean_once(eta: float) -> float:
     """Mean of 1/(a + b) over both directions."""
     mu, weight = gaussian_nodes(0.0, 1.0)

@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from dermis.optics.directions import critical_cosine, gaussian_nodes, internal_reflectance
 
 Floats = NDArray[np.float64]
+NODES = 16
+"""Cosines of those directions that leave a slab, and as many of those that are held back."""
 _THINNEST = 1e-6  # optical thickness in which light scatters once at most
 
 
@@ -29,13 +31,13 @@ class Slabs:
     through: Floats
 
 
-def slabs(albedo: float, optical_depth: ArrayLike, eta: float, nodes: int = 16) -> Slabs:
+def slabs(albedo: float, optical_depth: ArrayLike, eta: float, nodes: int = NODES) -> Slabs:
     """Slabs that scatter isotropically, by adding and doubling; exact but for the number of directions.
 
     albedo : of single scattering [-]
     optical_depth : (n,) thickness in mean free paths, above 0 [-]
     eta : index of refraction against the air on both sides, at least 1 [-]
-    nodes : cosines of those that leave, and as many of those that are held back
+    nodes : as `NODES`
 
     Source: [Chandrasekhar1960] section 50 for what layers do together.
     """
@@ -46,7 +48,7 @@ def slabs(albedo: float, optical_depth: ArrayLike, eta: float, nodes: int = 16) 
     return _cut(eta, mu, weight, R, T, straight)
 
 
-def doubled_slabs(albedo: float, least: ArrayLike, times: int, eta: float, nodes: int = 16) -> Slabs:
+def doubled_slabs(albedo: float, least: ArrayLike, times: int, eta: float, nodes: int = NODES) -> Slabs:
     """`slabs` of the least depths, of twice those and so on: each is on the way to the next.
 
     least : (n,) optical depths, of about the same size [-]

@@ -12,21 +12,20 @@ from numpy.typing import NDArray
 
 from dermis.optics.diffusion import hankel, layered_diffusion
 from dermis.optics.diffusion.boundary import mismatch
+from dermis.optics.directions import KEPT, refracted
 from dermis.optics.directions import ROWS as DIRECTIONS
-from dermis.optics.directions import refracted
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Layer, Medium
-from dermis.optics.slabs import Slabs, doubled_slabs, slabs
+from dermis.optics.slabs import NODES, Slabs, doubled_slabs, slabs
 
 Floats = NDArray[np.float64]
 ROWS = 32
 """Thicknesses of the tables."""
 _MOST_ALBEDO, _LEAST_ALBEDO = 1.0 - 1e-6, 1e-3
 _LOGS = (-14.0, 14.0)  # of frequencies that are searched [1/mm]
-_KEPT = 1024  # shares and indices whose numbers are remembered
 _LAW_DEPTH = 10.0  # mean free paths from which on directions of entry count alike
 _DEEP = 1e4  # mean free paths that are as good as a half-space
-_FEW, _MANY = 8, 16  # cosines for what uniform light does, off by 3e-4 of it, and for what directions do
+_FEW = 8  # cosines for what uniform light does
 _LEAST_DEPTHS, _DOUBLED = 1e-4 * np.array([1.0, 2.0**0.5]), 25  # of slabs that are cut [mean free path]
 _DEPTHS = (_LEAST_DEPTHS * 2.0 ** np.arange(_DOUBLED + 1)[:, None]).ravel()
 _LEAST = 1e-300  # share that passes black slabs as deep as the last
@@ -102,18 +101,17 @@ def across(total: Floats, eta: float) -> Floats:
     return np.stack([_across(float(share), eta) for share in total], axis=-1)
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=KEPT)
 def _across(total: float, eta: float) -> Floats:
     cosine = refracted(np.linspace(0.0, 1.0, DIRECTIONS) ** 2, eta)
-    return np.interp(cosine, *_law(_albedo_of(total, eta), eta, _MANY))
+    whole, law = _law(_albedo_of(total, eta), eta, NODES)
+    return np.interp(cosine, whole.cosine, law)
 
 
-@lru_cache(maxsize=_KEPT)
-def _law(albedo: float, eta: float, nodes: int) -> tuple[Floats, Floats]:
-    """Cosines of entry below the surface, and what passes deep slabs as `across` has it."""
+def _law(albedo: float, eta: float, nodes: int) -> tuple[Slabs, Floats]:
+    """The half-space, and what passes deep slabs of it by its cosines of entry, as `across` has it."""
     whole = slabs(albedo, _DEEP, eta, nodes)
-    slanted = _slanted(slabs(albedo, _LAW_DEPTH, eta, nodes), whole)[0]
-    return whole.cosine, slanted
+    return whole, _slanted(slabs(albedo, _LAW_DEPTH, eta, nodes), whole)[0]
 
 
 def _slanted(cut: Slabs, whole: Slabs) -> Floats:
@@ -139,7 +137,7 @@ def _shares(layer: Layer, depth_mm: Floats, eta: float) -> _Shares:
     return _Shares(*_by_depth(round(float(layer.alpha_prime[0]), _DIGITS), eta)(np.log(depth)).T)
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=KEPT)
 def _by_depth(albedo: float, eta: float) -> Callable[[Floats], Floats]:
     """(n, 4) what `_Shares` holds by the logarithm of depths in mean free paths."""
     from scipy.interpolate import CubicSpline
@@ -148,10 +146,10 @@ def _by_depth(albedo: float, eta: float) -> Callable[[Floats], Floats]:
 
 
 def _cut(albedo: float, eta: float) -> _Shares:
-    """Of slabs of `_DEPTHS`; within 4e-4 in between, by cubics, of what slabs of that depth do."""
+    """Of slabs of `_DEPTHS`."""
     cut = doubled_slabs(albedo, _LEAST_DEPTHS, _DOUBLED, eta, _FEW)
-    whole = slabs(albedo, _DEEP, eta, _FEW)
-    returned, law = _uniform(whole, whole.back), _law(albedo, eta, _FEW)[1] - 1.0
+    whole, slanted = _law(albedo, eta, _FEW)
+    returned, law = _uniform(whole, whole.back), slanted - 1.0
     weight = whole.flux * whole.back[0]
     deep = (_slanted(cut, whole) - 1.0) @ (weight * law) / (weight * law**2).sum()
     amount, lost = _uniform(cut, cut.through), np.maximum(1.0 - _uniform(cut, cut.back) / returned, 0.0)

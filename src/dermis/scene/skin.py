@@ -12,6 +12,7 @@ from dermis.scene.plain import Plain, slider
 from dermis.specular.models import EnergyName, FresnelName, SpecularName
 
 StructureName = Literal["dj2006", "donner2008", "biospec"]
+DirectionName = Literal["lambertian", "half-space"]
 MOST_LAYERS = 8
 MOST_OTHERS = 2
 """Profiles that a map can mix into another."""
@@ -113,7 +114,7 @@ class Skin(Plain):
     energy: EnergyName = "full"
     """Light that the surface reflects does not enter: "full" subtracts it all, "published" as the deck does,
     pi times too much, "none" nothing."""
-    direction: Literal["lambertian", "half-space"] = "half-space"
+    direction: DirectionName = "half-space"
     """How skin returns light: "lambertian" alike from and to all directions; "half-space" as a half-space
     of the skin's mean colour: more of what arrives at a slant, and light scattered once leaves at a slant."""
     pigments: Pigments | None = None
