@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from dermis.atlas.translucency.cells import Cells
@@ -48,8 +48,8 @@ class Translucency:
     gathered : buffer for the light of the sources
     evenly : buffer of the same for sources that all give 1
     slants : buffer of how much of the sources' light passes deep slabs, by its directions
-    weighing, losing : records of translucency_weights.wgsl for what a profile lets pass and for what it
-        therefore does not return
+    weighing, losing : what translucency_weights.wgsl reads of a profile, for what it lets pass and for what
+        it therefore does not return
     gaussians, slabs : how many these have, and whether they have tables by thickness
     layer : blurred level, counted from 0, whose light passes
     """
@@ -62,8 +62,8 @@ class Translucency:
     gathered: Any
     evenly: Any
     slants: Any
-    weighing: Any = None
-    losing: Any = None
+    weighing: Resources = field(default_factory=dict)
+    losing: Resources = field(default_factory=dict)
     gaussians: int = 0
     slabs: bool = False
     layer: int = 0

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +10,7 @@ from dermis.frame.passes import program
 from dermis.frame.passes.translucency import add_up
 from dermis.frame.passes.translucency_points import draw_receivers, draw_sources
 from dermis.gpu import ComputeProgram, Device, Recorder
+from dermis.gpu.program import Resources
 from dermis.optics.gaussians import MOST_GAUSSIANS
 from dermis.optics.thin_parts import ROWS, ThinParts
 
@@ -36,7 +35,7 @@ def draw(graph: Recorder, thin: Translucency) -> None:
     }
     shader, groups = _shader(graph.device, thin.gaussians, thin.slabs), max(1, -(-pairs.count // _ROW))
     for weighed in (thin.losing, thin.weighing):
-        graph.dispatch("pairs", shader, bound | {"weighing": weighed}, (_ROW // _SIZE, groups, 1))
+        graph.dispatch("pairs", shader, {**bound, **weighed}, (_ROW // _SIZE, groups, 1))
         if weighed is thin.losing:
             add_up(graph, thin, thin.evenly, pairs.lost, stage="pairs")
 
@@ -54,28 +53,33 @@ def weighing(
     weight: Floats,
     thin: ThinParts | None = None,
     passing: Floats | None = None,
-) -> Any:
-    """The record of a profile's pass.
+) -> Resources:
+    """The record of a profile's pass, and its table.
 
     variance_mm2, weight : (k,) and (k, 3) of the blurred levels
     passing : (ROWS, k, 3) of the tables of thin parts
     """
-    through = np.zeros((ROWS * MOST_GAUSSIANS, 4), np.float32)
-    if thin is not None and passing is not None:
-        through[: ROWS * len(weight), :3] = passing.reshape(-1, 3)
-        through[: ROWS * len(weight) : len(weight), 3] = thin.deep
     gaussian = np.zeros((MOST_GAUSSIANS, 4), np.float32)
     gaussian[: len(weight), :3], gaussian[: len(weight), 3] = weight, variance_mm2
-    return _shader(device, len(weight), thin is not None).record(
+    record = _shader(device, len(weight), thin is not None).record(
         "Weighing",
         reach_mm=1.0 if thin is None else thin.reach_mm,
-        through=through,
         radius_mm=pairs.cells.radius_mm,
         before_mm2=variance_mm2[source_level(pairs.cells.spacing_mm, variance_mm2)],
         cell_mm2=pairs.cells.spacing_mm**2,
         grain=GRAIN,
         gaussian=gaussian,
     )
+    return {"weighing": record, "passing": device.buffer(_table(len(weight), thin, passing), "STORAGE")}
+
+
+def _table(gaussians: int, thin: ThinParts | None, passing: Floats | None) -> NDArray[np.float32]:
+    """(ROWS k, 4) what passes by thickness and Gaussian, and how deep each thickness is; one row for none."""
+    if thin is None or passing is None:
+        return np.zeros((1, 4), np.float32)
+    table = np.zeros((ROWS, gaussians, 4), np.float32)
+    table[..., :3], table[:, 0, 3] = passing, thin.deep
+    return table.reshape(-1, 4)
 
 
 def _shader(device: Device, gaussians: int, slabs: bool) -> ComputeProgram:

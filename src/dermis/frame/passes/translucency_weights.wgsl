@@ -14,7 +14,6 @@ struct Weighing {
     grain: f32, // least variance that is added, over that or the source's own area: it hides their pattern
     reach_mm: f32, // thickness of the table's last row
     gaussian: array<vec4f, 24>, // weight per channel of what the blurs bring, variance [mm^2]
-    through: array<vec4f, 768>, // weights of what passes: COUNT of each row, evenly spaced by the root of the thickness; the first's w: how deep it is, as pair_word takes it
 }
 
 @group(0) @binding(0) var<uniform> weighing: Weighing;
@@ -22,6 +21,9 @@ struct Weighing {
 @group(0) @binding(2) var<storage, read> receiver_points: array<Receiver>;
 @group(0) @binding(3) var<storage, read> source_points: array<Source>;
 @group(0) @binding(4) var<storage, read_write> weights: array<vec2u>; // source and depth as in pair_words.wgsl; share of its light, as encoded says
+// Weights of what passes: COUNT of each row, evenly spaced by the root of the thickness; the first's w: how deep it is, as
+// pair_word takes it. Not among the uniforms, where invocations that read different rows would take turns.
+@group(0) @binding(5) var<storage, read> passing: array<vec4f>;
 
 const ROW: u32 = 1024u; // of the pairs, as they are spread over invocations
 const PI: f32 = 3.14159265358979;
@@ -50,8 +52,8 @@ fn along2_of(offset: u32, metric: vec3f, area: f32) -> f32 {
 // Weight of a Gaussian in what passes a thickness.
 fn through(k: u32, row: f32) -> vec3f {
     let low = min(u32(row), ROWS - 2u);
-    let near = weighing.through[low * COUNT + k].rgb;
-    return mix(near, weighing.through[(low + 1u) * COUNT + k].rgb, row - f32(low));
+    let near = passing[low * COUNT + k].rgb;
+    return mix(near, passing[(low + 1u) * COUNT + k].rgb, row - f32(low));
 }
 
 fn row_of(depth2: f32) -> f32 {
@@ -61,7 +63,7 @@ fn row_of(depth2: f32) -> f32 {
 fn deep_at(depth2: f32) -> f32 {
     let row = row_of(depth2);
     let low = min(u32(row), ROWS - 2u);
-    return mix(weighing.through[low * COUNT].w, weighing.through[(low + 1u) * COUNT].w, row - f32(low));
+    return mix(passing[low * COUNT].w, passing[(low + 1u) * COUNT].w, row - f32(low));
 }
 
 // A Gaussian of the distance sqrt(t^2 + r^2) is exp(-t^2 / 2v) G(v, r) [dEonLuebke2007]; what is already in the sources'
