@@ -57,8 +57,9 @@ def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
 
 
 def drawn(subject: Subject, technique: str, **changes: object) -> np.ndarray:
-    """Linear radiance at one sample for each pixel, as the truths have it."""
-    chosen = subject.settings.model_dump() | {"technique": technique, "samples": 1} | changes
+    """Linear radiance at one sample for each pixel, without light between surfaces: as the truths have it."""
+    alike = {"technique": technique, "samples": 1, "interreflection": False}
+    chosen = subject.settings.model_dump() | alike | changes
     return subject.renderer.draw(subject.scene, Settings(**chosen)).linear().astype(np.float64)
 
 

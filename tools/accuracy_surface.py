@@ -159,7 +159,7 @@ def judged(head: Head, where: Choice) -> tuple[Points, Points]:
     kept = where(places) & (np.abs(one.on(mesh.normals[mesh.triangles])[:, 2]) > LEAST_FACING)
     for size in (BALL_SIDE, HEAD_SIDE):
         for layout in ("mesh", "stitched"):
-            mapped = cached_atlas(mesh, size, layout).mapped
+            mapped = cached_atlas(head.topology.mesh, size, layout).mapped
             kept &= mapped[one.triangle] & mapped[other.triangle]
     return Points(one.triangle[kept], one.weights[kept]), Points(other.triangle[kept], other.weights[kept])
 
@@ -173,18 +173,17 @@ def banded(head: Head) -> Scene:
     for away in ((0.0, 0.0, -1.0), (0.0, 0.0, 1.0)):
         lights += [stripe(direction=away, position=(place, 0, 0)) for place in places]
         lights.append(DirectionalLight(direction=away, irradiance=(1, 1, 1), shadows=False))
-    skin = Skin(profile="gpu-gems-3", albedo="profile", specular="none")
+    skin = Skin(profile="gpu-gems-3", albedo="profile", specular="none", direction="lambertian")
     return Scene(replace(head, maps=Maps()), lights=lights, skin=skin)
 
 
 def jumps(renderer: Renderer, scene: Scene, remedy: str, side: int, one: Points, other: Points) -> np.ndarray:
     """Change of red light from one side of each seam to the other, of the light there."""
-    settings = Settings.model_validate(
-        {"size": (16, 16), "atlas": side, "seams": remedy, "transmission": "none"}
-    )
+    asked = {"size": (16, 16), "atlas": side, "seams": remedy, "transmission": "none"}
+    settings = Settings.model_validate(asked | {"interreflection": False})
     renderer.draw(scene, settings)
     scattered = renderer.prepare(scene, settings).resources.scattered
     light = download(renderer.device, scattered).astype(float)[..., :3]
-    atlas = cached_atlas(scene.head.mesh, side, REMEDIES[remedy].layouts[0])
+    atlas = cached_atlas(scene.head.topology.mesh, side, REMEDIES[remedy].layouts[0])
     a, b = (lit_at(light, atlas, points)[:, 0] for points in (one, other))
     return np.abs(a - b) / np.maximum((a + b) / 2, 1e-9)

@@ -27,7 +27,6 @@ Floats = NDArray[np.float64]
 DEFAULT_COLOUR = 0.8
 """Albedo of heads without a colour map."""
 _EYE_SEEDS = 1000  # that look different
-_COLOURS = 256  # shares of light that half-spaces are told apart by
 _NO_BAND = -1.0
 
 
@@ -104,16 +103,13 @@ def _derived(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any]:
 
 
 def half_space_of(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Floats, float]:
-    """(3,) what the half-space of the skin's mean colour returns of light from above, and its index.
-
-    That of a map is one of some, so that people who look alike share their tables: it is a mean anyhow.
-    """
+    """(3,) what the half-space of the skin's mean colour returns of light from above, and its index."""
     if skin.albedo == "profile":
         colour = np.asarray(profile.albedo, np.float64)
     elif maps.mean_colour is None:
         colour = np.full(3, DEFAULT_COLOUR)
     else:
-        colour = np.round(maps.mean_colour * _COLOURS) / _COLOURS
+        colour = np.asarray(maps.mean_colour, np.float64)
     return colour, 1.0 if skin.specular == "none" else SKIN_ETA
 
 

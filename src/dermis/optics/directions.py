@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from dermis.optics.interpolated import interpolated
 
 Floats = NDArray[np.float64]
 ROWS = 32
 """Of the table over directions."""
 _NODES = 32
 _MOST_ALBEDO = 1.0 - 1e-8
-KEPT = 1024
+KEPT = 256
 """Shares of light, or albedos, whose numbers are remembered."""
 
 
@@ -48,9 +50,9 @@ def directions(total: ArrayLike, eta: float) -> Directions:
     Sources: [Chandrasekhar1960] for the half-space, which scatters isotropically; [Jensen2001] for taking
     single scattering apart.
     """
-    channels = [_channel(float(share), eta) for share in np.atleast_1d(np.asarray(total, np.float64))]
-    returned, everywhere, once = (np.stack(values, axis=-1) for values in zip(*channels, strict=True))
-    return Directions(eta, returned, everywhere, once, _mean_once(eta))
+    shares = np.atleast_1d(np.asarray(total, np.float64))
+    found = np.stack([interpolated(partial(_numbers, eta), float(one)) for one in shares], axis=-1)
+    return Directions(eta, found[:ROWS], found[ROWS], found[ROWS + 1], _mean_once(eta))
 
 
 def h_function(cosine: ArrayLike, albedo: float) -> Floats:
@@ -115,15 +117,16 @@ class _Matched:
 
 
 @lru_cache(maxsize=KEPT)
-def _channel(total: float, eta: float) -> tuple[Floats, float, float]:
-    """Table of what is returned, the same from everywhere, and the strength of what scattered once."""
+def _numbers(eta: float, total: float) -> Floats:
+    """(ROWS + 2,) what is returned, the same from everywhere, and the strength of what scattered once."""
     albedo = _albedo_of(total, eta)
     space = _Matched(albedo, eta)
     above = float(space.returned(1.0))
     if above <= 0.0:
-        return np.ones(ROWS), 1.0, 0.0
-    table = space.returned(refracted(np.linspace(0.0, 1.0, ROWS) ** 2, eta)) / above
-    return table, space.from_everywhere() / above, 0.25 * albedo * float(space.leaving.sum()) / above
+        return np.append(np.ones(ROWS + 1), 0.0)
+    table = space.returned(refracted(np.linspace(0.0, 1.0, ROWS) ** 2, eta))
+    once = 0.25 * albedo * float(space.leaving.sum())
+    return np.concatenate([table, [space.from_everywhere(), once]]) / above
 
 
 @lru_cache(maxsize=KEPT)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import NamedTuple
 
@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from dermis.optics.diffusion import hankel, layered_diffusion
 from dermis.optics.diffusion.boundary import mismatch
+from dermis.optics.diffusion.layered_diffusion import respond_sheets
 from dermis.optics.directions import KEPT, refracted
 from dermis.optics.directions import ROWS as DIRECTIONS
 from dermis.optics.gaussians import GaussianSum
+from dermis.optics.interpolated import interpolated
 from dermis.optics.media import Layer, Medium
 from dermis.optics.slabs import NODES, Slabs, doubled_slabs, slabs
 
@@ -29,7 +31,6 @@ _FEW = 8  # cosines for what uniform light does
 _LEAST_DEPTHS, _DOUBLED = 1e-4 * np.array([1.0, 2.0**0.5]), 25  # of slabs that are cut [mean free path]
 _DEPTHS = (_LEAST_DEPTHS * 2.0 ** np.arange(_DOUBLED + 1)[:, None]).ravel()
 _LEAST = 1e-300  # share that passes black slabs as deep as the last
-_DIGITS = 12  # of albedos, by which they are alike
 _FREQUENCIES = np.geomspace(0.02, 5.0, 24)  # at which shapes are compared [1/mean free path]
 
 
@@ -59,9 +60,9 @@ def medium_of(profile: GaussianSum, total: Floats, eta: float) -> Medium:
     """
     albedo, extinction = np.empty(len(total)), np.empty(len(total))
     for c, share in enumerate(total):
-        albedo[c] = _albedo_of(float(share), eta)
+        root, half = interpolated(partial(_returning, eta), float(share))
         one = GaussianSum("", profile.variance_mm2, profile.weight[:, [c]])
-        extinction[c] = _half(partial(_spread, one)) / _half(partial(_returned, _unit(albedo[c], eta)))
+        albedo[c], extinction[c] = 1.0 - root**2, _half(partial(_spread, one)) / half
     layer = Layer((1.0 - albedo) * extinction, albedo * extinction)
     return Medium("flesh", (layer,), eta)
 
@@ -98,11 +99,11 @@ def across(total: Floats, eta: float) -> Floats:
 
     total : (c,) that the half-space returns of what enters perpendicularly [-]
     """
-    return np.stack([_across(float(share), eta) for share in total], axis=-1)
+    return np.stack([interpolated(partial(_across, eta), float(share)) for share in total], axis=-1)
 
 
 @lru_cache(maxsize=KEPT)
-def _across(total: float, eta: float) -> Floats:
+def _across(eta: float, total: float) -> Floats:
     cosine = refracted(np.linspace(0.0, 1.0, DIRECTIONS) ** 2, eta)
     whole, law = _law(_albedo_of(total, eta), eta, NODES)
     return np.interp(cosine, whole.cosine, law)
@@ -133,16 +134,17 @@ class _Shares(NamedTuple):
 
 def _shares(layer: Layer, depth_mm: Floats, eta: float) -> _Shares:
     """By cubics between depths for which an albedo's slabs are cut once."""
+    from scipy.interpolate import CubicSpline
+
     depth = np.clip(float(layer.sigma_t_prime[0]) * depth_mm, _DEPTHS[0], _DEPTHS[-1])
-    return _Shares(*_by_depth(round(float(layer.alpha_prime[0]), _DIGITS), eta)(np.log(depth)).T)
+    cut = interpolated(partial(_by_depth, eta), float(np.sqrt(1.0 - layer.alpha_prime[0])))
+    return _Shares(*CubicSpline(np.log(_DEPTHS), cut)(np.log(depth)).T)
 
 
 @lru_cache(maxsize=KEPT)
-def _by_depth(albedo: float, eta: float) -> Callable[[Floats], Floats]:
-    """(n, 4) what `_Shares` holds by the logarithm of depths in mean free paths."""
-    from scipy.interpolate import CubicSpline
-
-    return CubicSpline(np.log(_DEPTHS), np.stack(_cut(albedo, eta), axis=-1))
+def _by_depth(eta: float, root: float) -> Floats:
+    """(n, 4) what `_Shares` holds by `_DEPTHS`, for the root of what a scattering absorbs."""
+    return np.stack(_cut(min(max(1.0 - root**2, _LEAST_ALBEDO), _MOST_ALBEDO), eta), axis=-1)
 
 
 def _cut(albedo: float, eta: float) -> _Shares:
@@ -164,16 +166,20 @@ def _shapes(body: Medium, depth_mm: Floats, variance_mm2: Floats) -> Floats:
     """(n, k) weights of Gaussians, which sum to 1, that spread as what comes through each thickness."""
     from scipy.optimize import nnls
 
-    s = _FREQUENCIES * float(body.layers[0].sigma_t_prime[0])
-    bells = np.exp(-0.5 * variance_mm2 * s[:, None] ** 2)
-    A, sure = mismatch(body.eta, "exact"), 100.0
-    made = np.empty((len(depth_mm), len(variance_mm2)))
-    for row, thickness in enumerate(depth_mm):
-        sheet = replace(body, layers=(replace(body.layers[0], thickness_mm=float(thickness)),))
-        spread = layered_diffusion.respond(np.concatenate([hankel.STILL, s]), sheet, A)[1][:, 0]
-        ones = np.full((1, len(variance_mm2)), sure)
-        made[row] = nnls(np.vstack([bells, ones]), np.append(spread[1:] / spread[0], sure))[0]
+    layer, A, sure = body.layers[0], mismatch(body.eta, "exact"), 100.0
+    s = _FREQUENCIES * float(layer.sigma_t_prime[0])
+    passed = respond_sheets(np.concatenate([hankel.STILL, s]), layer, depth_mm, A)[1][..., 0]
+    bells = np.vstack([np.exp(-0.5 * variance_mm2 * s[:, None] ** 2), np.full((1, len(variance_mm2)), sure)])
+    made = np.stack([nnls(bells, np.append(one[1:] / one[0], sure))[0] for one in passed])
     return np.asarray(made / made.sum(axis=1, keepdims=True))
+
+
+@lru_cache(maxsize=KEPT)
+def _returning(eta: float, total: float) -> Floats:
+    """(2,) of the half-space that returns this share: the root of what a scattering absorbs [-], and the
+    frequency at which what it returns has fallen to half [1/mean free path]."""
+    albedo = _albedo_of(total, eta)
+    return np.array([np.sqrt(1.0 - albedo), _half(partial(_returned, _unit(albedo, eta)))])
 
 
 def _albedo_of(total: float, eta: float) -> float:

@@ -47,9 +47,22 @@ def respond(frequency: ArrayLike, medium: Medium, A: float, source: Source = "be
 
     Source: [Haskell1994] for the boundary, [Kienle1998] for layers, [Farrell1992] for the beam.
     """
-    s = np.asarray(frequency, dtype=np.float64)[..., None]
     sheets = list(_beam(medium) if source == "beam" else _split(medium))
-    zero = np.zeros((*s.shape[:-1], medium.channels))
+    return _respond(frequency, sheets, medium.channels, A)
+
+
+def respond_sheets(
+    frequency: ArrayLike, layer: Layer, thickness_mm: Floats, A: float
+) -> tuple[Floats, Floats]:
+    """`respond` of layers that are as thick as n numbers say, each by itself: (n, m, c) by m frequencies."""
+    ones = np.ones(len(layer.sigma_a))
+    sheet = _Sheet(layer, thickness_mm[:, None, None], ones, np.zeros_like(ones))
+    return _respond(frequency, [sheet], len(ones), A)
+
+
+def _respond(frequency: ArrayLike, sheets: list[_Sheet], channels: int, A: float) -> tuple[Floats, Floats]:
+    s = np.asarray(frequency, dtype=np.float64)[..., None]
+    zero = np.zeros((*s.shape[:-1], channels))
     face = _Face(zero + 1.0 / (2.0 * A), zero)
     passages = []
     for sheet in reversed(sheets):
