@@ -28,6 +28,7 @@ from dermis.scene.settings import Settings
 LIGHTS = ("front", "back", "laser")
 ATLASES = (512, 1024, 2048)
 RADIUS_MM = 14.0
+LEAST_EVEN = 1e-3
 LEAST_MM2 = 1.0  # of Gaussians for which the surface and straight lines differ
 PLACES: dict[str, dict[str, tuple[str, ...]]] = {
     "front": {
@@ -47,12 +48,13 @@ def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
     found: dict[str, list[str]] = {"by_atlas": [], "zero_width": [], "places": [], "even": []}
     for light in LIGHTS:
         with subject_of(head, light, usual_region(light), "skin1", settings, adapter) as subject:
-            straight = surface_integral(subject, 0)
-            found["by_atlas"] += by_atlas(subject, straight, light)
+            straight, even = surface_integral(subject, 0), even_light(subject)
+            fair = replace(straight, image=straight.image / np.maximum(even, LEAST_EVEN))
+            found["by_atlas"] += by_atlas(subject, straight, fair, light)
             found["zero_width"].append(zero_width(subject, light))
             found["places"] += places(subject, straight, light) if light in PLACES else []
             if light == "front":
-                found["even"].append(even_light(subject))
+                found["even"].append(told(even[straight.mask]))
     return {name: "\n".join(rows) for name, rows in found.items()}
 
 
@@ -63,17 +65,16 @@ def drawn(subject: Subject, technique: str, **changes: object) -> np.ndarray:
     return subject.renderer.draw(subject.scene, Settings(**chosen)).linear().astype(np.float64)
 
 
-def by_atlas(subject: Subject, straight: Truth, light: str) -> list[str]:
-    """Texture space by the size of its map, compared with no scattering."""
-
-    def error(image: np.ndarray) -> float:
-        return relative_rmse(image, straight.image, straight.mask).value
-
-    none, rows = error(drawn(subject, "none")), []
+def by_atlas(subject: Subject, straight: Truth, fair: Truth, light: str) -> list[str]:
+    """Texture space by the size of its map, compared with no scattering, by two truths."""
+    none, rows = drawn(subject, "none"), []
     for side in ATLASES:
-        image = drawn(subject, "texture-space", atlas=side)
-        energy = energy_ratio(image, straight.image, straight.mask).value
-        rows.append(f"| {light} | {side} | {error(image):.4f} | {error(image) / none:.2f} | {energy:.4f} |")
+        image, cells = drawn(subject, "texture-space", atlas=side), [light, str(side)]
+        for truth in (straight, fair):
+            error, most = (relative_rmse(one, truth.image, truth.mask).value for one in (image, none))
+            energy = energy_ratio(image, truth.image, truth.mask).value
+            cells += [f"{error:.4f}", f"{error / most:.2f}", f"{energy:.4f}"]
+        rows.append(f"| {' | '.join(cells)} |")
     return rows
 
 
@@ -86,14 +87,20 @@ def zero_width(subject: Subject, light: str) -> str:
     return f"| {light} | {relative_rmse(*pair).value:.4f} | {energy_ratio(*pair).value:.4f} |"
 
 
-def even_light(subject: Subject) -> str:
-    """The integral of uniform light: mean and 95th percentile by channel."""
+def even_light(subject: Subject) -> np.ndarray:
+    """(h, w, 3) what the integral makes of light that is 1 everywhere; 1 beside the head."""
     lit = irradiance_samples(subject)
     evenly = replace(lit, irradiance=np.ones_like(lit.irradiance))
     seen = surface_points(subject.renderer, subject.scene, subject.settings)
     profile = Profile(subject.profile.weight / subject.profile.albedo, subject.profile.variance_mm2)
-    back = integrate(positions(subject, seen), evenly, profile)
-    pairs = zip(back.mean(axis=0), np.percentile(back, 95, axis=0), strict=True)
+    image = np.ones((*seen.mask.shape, 3))
+    image[seen.mask] = integrate(positions(subject, seen), evenly, profile)
+    return image
+
+
+def told(even: np.ndarray) -> str:
+    """Mean and 95th percentile by channel."""
+    pairs = zip(even.mean(axis=0), np.percentile(even, 95, axis=0), strict=True)
     return ", ".join(f"{mean:.3f} ({high:.3f})" for mean, high in pairs)
 
 
