@@ -32,17 +32,20 @@ class Way:
 
     technique: str
     atlas: int = 1024
-    direction: str = "lambertian"
+    direction: str = "half-space"
 
 
 OURS = {
     "texture space, atlas 1024": Way("texture-space"),
     "texture space, atlas 512": Way("texture-space", 512),
-    "half-space skin, atlas 512": Way("texture-space", 512, "half-space"),
+    "Lambertian skin, atlas 1024": Way("texture-space", 1024, "lambertian"),
     "screen space": Way("screen-space", 64),
 }
 """By their names in the table; screen space needs no atlas."""
-OF_2007 = {"passes of 2007 as compute": Way(GPU_GEMS_3), "passes of 2007 as fragments": Way(FRAGMENTS)}
+OF_2007 = {
+    "passes of 2007 as compute": Way(GPU_GEMS_3, direction="lambertian"),
+    "passes of 2007 as fragments": Way(FRAGMENTS, direction="lambertian"),
+}
 """The structure of 2007 in our renderer, to set beside the first of ours."""
 SEEDS = (100, 200)
 """Of the first pass of each turn; the passes of a turn have the following ones."""
