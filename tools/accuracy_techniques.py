@@ -64,6 +64,35 @@ def finer_heat(head: Head, adapter: str) -> str:
     return line("laser, atlas 2048", made.rows[0])
 
 
+def counted(head: Head, adapter: str) -> str:
+    """Against path tracing, by how the medium's profile is known."""
+    rows = []
+    for light, samples in LIGHTS.items():
+        for medium in ("skin1", "skin2"):
+            for model in ("layered", "montecarlo"):
+                made = compare(
+                    head,
+                    "path-traced",
+                    ("texture-space", "screen-space"),
+                    light=light,
+                    region=usual_region(light),
+                    medium=medium,
+                    model=model,
+                    settings=SETTINGS,
+                    samples=samples,
+                    adapter=adapter,
+                )
+                by_technique = [_told(made, row) for row in made.rows]
+                rows.append(f"| {light} | {medium} | {model} | {' | '.join(by_technique)} |")
+    return "\n".join(rows)
+
+
+def _told(made: Comparison, row: Row) -> str:
+    """Error, and energy in red, green and blue."""
+    _, energy = direction.by_channel(made.images[row.technique], made.truth, made.truth.mask)
+    return f"{row.relrmse:.4f} | {energy}"
+
+
 def floor(head: Head, medium: str, traced: Comparison, adapter: str) -> str:
     """The front light on lambertian skin with the albedo of a half-space for light from its direction."""
     renderer = dermis.Renderer(adapter)
@@ -98,6 +127,7 @@ def main() -> None:
         found[f"traced_{medium}"], made = table(head, "path-traced", medium, adapter)
         found[f"floor_{medium}"] = floor(head, medium, made["front"], adapter)
     found["direction"] = direction.table(head, LIGHTS, SETTINGS, adapter)
+    found["counted"] = counted(head, adapter)
     found["half_space"] = half_space.table(head, adapter)
     found["integral"], _ = table(head, "surface-integral", "skin1", adapter)
     found["heat"], _ = table(head, "heat", "skin1", adapter)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from dermis.cli.console import print_json, print_lines, working_on
 from dermis.cli.eye_options import note_eyes
@@ -39,6 +39,7 @@ def compare(
     light: str | None = None,
     region: str | None = None,
     medium: str | None = None,
+    model: Literal["layered", "montecarlo"] | None = None,
     sizes: SizeOptions = NOTHING,
     skin: SkinOptions = NOTHING,
     shape: ShapeOptions = NOTHING,
@@ -58,6 +59,8 @@ def compare(
         dermis compare head.obj --unit-mm 100 --against heat
 
         dermis compare human --against path-traced --light back --samples 256 --json
+
+        dermis compare human --against path-traced --light laser --model montecarlo
 
         dermis compare human --against heat --region ear --techniques gpu-gems-3,texture-space
 
@@ -79,13 +82,16 @@ def compare(
         portrait, three-quarter, ear, cheek or nose [where the light shows most].
     medium:
         skin1, skin2 or another medium with a name, index-matched [skin1].
+    model:
+        The medium's profile, as techniques have it: by layered diffusion, or by photons one by one, which
+        leaves out what diffusion errs [layered].
     samples:
         Paths through each pixel, for path-traced and cycles [64].
     output:
         HTML report; for specular a folder of plots.
     """
     words = given(against=against, techniques=techniques, light=light, region=region)
-    chosen = words | given(medium=medium, samples=samples) | sizes | skin | shape
+    chosen = words | given(medium=medium, model=model, samples=samples) | sizes | skin | shape
     _check_used(what, chosen)
     if what == "specular":
         from dermis.cli.compare_specular import compare_specular
@@ -126,6 +132,7 @@ def _choose(chosen: Mapping[str, Any], sizes: Mapping[str, Any]) -> dict[str, An
         "region": chosen.get("region", usual_region(light)),
         "medium": chosen.get("medium", "skin1"),
         "direction": chosen.get("direction"),
+        "model": chosen.get("model", "layered"),
         "settings": Settings(**{**_SIZES, **sizes}),
         "samples": chosen.get("samples", 64),
     }

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.comparison.scenes import LIGHTS, REGIONS, medium_scene
+from dermis.comparison.scenes import LIGHTS, REGIONS, ModelName, medium_scene
 from dermis.comparison.truths import TRUTHS, Subject, Truth, check_seen
 from dermis.errors import refuse
 from dermis.frame.renderer import Renderer
@@ -79,6 +79,7 @@ def compare(
     medium: str = "skin1",
     settings: Settings | None = None,
     direction: DirectionName | None = None,
+    model: ModelName = "layered",
     samples: int = 64,
     adapter: str = "auto",
     report: Callable[[str], None] = lambda doing: None,
@@ -89,6 +90,7 @@ def compare(
     light, region : of `scenes.LIGHTS` and `scenes.REGIONS`
     medium : a named medium, taken as index-matched
     direction : of the techniques' skin; None for that of the truth's
+    model : of the medium's profile, as the techniques have it
     samples : paths through each pixel
     report : called with what is being done
 
@@ -96,7 +98,7 @@ def compare(
     """
     check_choices(against, light, region, medium)
     settings = settings or Settings(size=(256, 256), atlas=1024)
-    with subject_of(head, light, region, medium, settings, adapter) as subject:
+    with subject_of(head, light, region, medium, settings, adapter, model) as subject:
         check_seen(surface_points(subject.renderer, subject.scene, settings).mask)
         report(f"truth: {against}")
         truth = TRUTHS[against](subject, samples)
@@ -109,18 +111,24 @@ def compare(
             images[technique], ms[technique] = _render(judged, technique, truth)
         name = subject.renderer.device.adapter.name
     title = f"{head.name}, {medium}, light: {light}, region: {region}, {settings.size[0]}x{settings.size[1]}"
-    title += f", {skin.direction} skin"
+    title += f", {skin.direction} skin" + (", profile by photons" if model == "montecarlo" else "")
     made = Comparison(title, name, truth, against, (), images)
     return replace(made, rows=tuple(_row(made, technique, ms[technique]) for technique in techniques))
 
 
 @contextmanager
 def subject_of(
-    head: Head, light: str, region: str, medium: str, settings: Settings, adapter: str
+    head: Head,
+    light: str,
+    region: str,
+    medium: str,
+    settings: Settings,
+    adapter: str,
+    model: ModelName = "layered",
 ) -> Iterator[Subject]:
     """What a comparison judges, valid within the context; arguments as of `compare`."""
     body = media()[medium].with_eta(1.0)
-    with medium_scene(head, light, region, body) as (scene, profile):
+    with medium_scene(head, light, region, body, model) as (scene, profile):
         yield Subject(Renderer(adapter), scene, profile, body, settings)
 
 

@@ -1,0 +1,48 @@
+"""Profiles by photons, in place of layered diffusion's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dermis.comparison import scenes
+from dermis.comparison.scenes import ModelName, medium_scene
+from dermis.mesh.head import Head
+from dermis.mesh.maps import Maps
+from dermis.mesh.primitives import uv_sphere
+from dermis.optics.gaussians import GaussianSum
+from dermis.optics.media import media
+from dermis.reference.half_space import directional_albedo
+
+BALL = Head("ball", uv_sphere(100.0, 12, 6), Maps())
+BODY = media()["skin1"].with_eta(1.0)
+
+
+@pytest.fixture(scope="module")
+def profiles() -> dict[ModelName, GaussianSum]:
+    found: dict[ModelName, GaussianSum] = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(scenes, "_PHOTONS", 100_000)
+        models: tuple[ModelName, ...] = ("layered", "montecarlo")
+        for model in models:
+            with medium_scene(BALL, "laser", "ear", BODY, model) as (_, found[model]):
+                pass
+    return found
+
+
+def test_total_is_the_half_spaces(profiles: dict[ModelName, GaussianSum]) -> None:
+    exact = np.array([float(directional_albedo(1.0, float(one))) for one in BODY.layers[0].alpha_prime])
+    counted, layered = (np.abs(profiles[name].albedo / exact - 1.0) for name in ("montecarlo", "layered"))
+    assert (counted < 0.005).all()
+    assert counted.mean() < 0.2 * layered.mean()
+
+
+def test_less_light_goes_far(profiles: dict[ModelName, GaussianSum]) -> None:
+    """Diffusion has too little of what leaves within half a mean free path."""
+    near = [profiles[name] for name in ("montecarlo", "layered")]
+    radius = 0.5 * BODY.layers[0].mean_free_path_mm[0]
+    counted, layered = (
+        (one.weight[:, 0] * -np.expm1(-(radius**2) / (2.0 * one.variance_mm2))).sum() / one.albedo[0]
+        for one in near
+    )
+    assert counted > 1.05 * layered
