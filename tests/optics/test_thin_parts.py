@@ -72,6 +72,14 @@ def test_light_that_a_white_medium_lets_pass_is_lost_to_its_near_side() -> None:
     assert lost[clear] == pytest.approx(through[clear], abs=5e-3)
 
 
+def test_nothing_passes_deep_in_dark_flesh() -> None:
+    """So dark that not even a double holds what would."""
+    dark = Medium("dark", (Layer(np.array([40.0]), np.array([10.0])),), 1.4)
+    made = thin_parts(dark, np.array([0.01, 0.1, 1.0, 100.0]), 40.0)
+    assert np.isfinite(made.through).all() and np.isfinite(made.lost).all() and np.isfinite(made.deep).all()
+    assert made.through[-5:].max() < 1e-12 and made.lost[-5:].max() < 1e-6
+
+
 def test_thicker_parts_spread_light_wider() -> None:
     variance = np.array([0.05, 0.5, 5.0, 20.0])
     made = thin_parts(BODY.channel(0), variance, REACH).through[1:, :, 0]

@@ -170,7 +170,8 @@ def _shapes(body: Medium, depth_mm: Floats, variance_mm2: Floats) -> Floats:
     s = _FREQUENCIES * float(layer.sigma_t_prime[0])
     passed = respond_sheets(np.concatenate([hankel.STILL, s]), layer, depth_mm, A)[1][..., 0]
     bells = np.vstack([np.exp(-0.5 * variance_mm2 * s[:, None] ** 2), np.full((1, len(variance_mm2)), sure)])
-    made = np.stack([nnls(bells, np.append(one[1:] / one[0], sure))[0] for one in passed])
+    shape = passed[:, 1:] / np.maximum(passed[:, :1], _LEAST)  # deep in dark flesh nothing passes
+    made = np.stack([nnls(bells, np.append(one, sure))[0] for one in shape])
     return np.asarray(made / made.sum(axis=1, keepdims=True))
 
 

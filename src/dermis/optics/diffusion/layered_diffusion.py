@@ -61,6 +61,7 @@ def respond_sheets(
 
 
 def _respond(frequency: ArrayLike, sheets: list[_Sheet], channels: int, A: float) -> tuple[Floats, Floats]:
+    """`respond` of sheets, topmost first."""
     s = np.asarray(frequency, dtype=np.float64)[..., None]
     zero = np.zeros((*s.shape[:-1], channels))
     face = _Face(zero + 1.0 / (2.0 * A), zero)
