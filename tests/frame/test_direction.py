@@ -25,7 +25,7 @@ from dermis.scene.model import Scene
 
 Floats = NDArray[np.float64]
 FLAT, BALL = head_of(plane(100.0)), head_of(uv_sphere(30.0, 64, 32))
-COLOUR = np.array([146.0, 84.0, 51.0]) / 256.0  # means of maps are told apart by that
+COLOUR = np.array([146.0, 84.0, 51.0]) / 256.0
 DRY = {"specular": "none", "energy": "none"}
 ASLANT = 72.0
 LIGHT = DirectionalLight(direction=(1.0, 0.5, -0.6), irradiance=(3.0, 2.0, 1.0), shadows=False)

@@ -18,6 +18,7 @@ from dermis.mesh.mesh import Mesh
 from dermis.mesh.primitives import wedge
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.fits.gaussian import fit_gaussians
+from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import media
 from dermis.optics.profiles import write_profile
 from dermis.optics.slabs import slabs
@@ -81,3 +82,20 @@ def test_half_space_skin_is_thin_as_its_medium(renderer: Renderer, skin1: str, d
             exact = [np.interp(cosine, made.cosine, part[0]) for part in (made.through, made.back)]
             assert through[c] == pytest.approx(exact[0], rel=0.15)
             assert back[c] == pytest.approx(exact[1], rel=0.25)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("direction", ["lambertian", "half-space"])
+def test_a_colour_that_nothing_blurs_passes_nowhere(
+    renderer: Renderer, tmp_path: Path, direction: str
+) -> None:
+    """All blue is in the narrowest Gaussian, which stays where it is: none is missing from thin parts."""
+    weight = np.array([[0.2, 0.2, 0.3], [0.2, 0.1, 0.0], [0.2, 0.1, 0.0]])
+    write_profile(tmp_path / "red.toml", GaussianSum("red", np.array([1e-4, 0.5, 4.0]), weight), {})
+    skin = {"albedo": "profile", "profile": str(tmp_path / "red.toml"), "direction": direction}
+    lamp = DirectionalLight(direction=(0.0, 0.0, -1.0), irradiance=(1.0, 1.0, 1.0), shadows=False)
+    thick, thin = (left(renderer, wedge(40.0, d, d), lamp, specular="none", **skin) for d in (30.0, 1.0))
+    (lit, _), (thinly, behind) = thick, thin
+    assert np.isfinite(thinly).all() and np.isfinite(behind).all()
+    assert behind[:, 0].min() > 1e-3 and behind[:, 2].max() < 1e-6
+    assert thinly[:, 2] == pytest.approx(lit[:, 2].mean(), rel=1e-2)

@@ -26,6 +26,7 @@ Floats = NDArray[np.float64]
 _WIDTHS_TO_DOUBLE, _LEAST_SHARED_MM = 2, 0.5
 _WIDTHS = 4  # whose pairs are kept
 _ONE = np.array([0xFE000, 0x3F8FE000], np.uint32)  # white light of 1, as light_words.wgsl has it
+_LEAST = 1e-12  # weight, of a colour that nothing blurs
 _COARSER = 1.5  # times the side of cells whose pairs memory does not hold
 
 
@@ -146,13 +147,13 @@ def translucency_from(
 def _weighed(
     device: Device, made: Translucency, variance_mm2: Floats, weight: Floats, thin: ThinParts | None
 ) -> Translucency:
-    total = weight.sum(axis=0)
+    share = weight / np.maximum(weight.sum(axis=0), _LEAST)
     passing = weight if thin is None else thin.through
-    losing = weight / total if thin is None else thin.lost
+    losing = share if thin is None else thin.lost
     return replace(
         made,
         weighing=weighing(device, made.pairs, variance_mm2, weight, thin, passing),
-        losing=weighing(device, made.pairs, variance_mm2, weight / total, thin, losing),
+        losing=weighing(device, made.pairs, variance_mm2, share, thin, losing),
         gaussians=len(weight),
         slabs=thin is not None,
         layer=source_level(made.pairs.cells.spacing_mm, variance_mm2),
