@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from dermis.comparison import scenes
-from dermis.comparison.scenes import ModelName, medium_scene
+from dermis.comparison.profile_models import ModelName
+from dermis.comparison.scenes import medium_scene
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere

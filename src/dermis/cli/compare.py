@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from dermis.cli.console import print_json, print_lines, working_on
 from dermis.cli.eye_options import note_eyes
 from dermis.cli.head_options import ShapeOptions, check_head
 from dermis.cli.options import NOTHING, Adapter, Json, Output, Whole, check, given, option_name, options_of
+from dermis.comparison.profile_models import ModelName
 from dermis.errors import refuse
 from dermis.scene.settings import Settings
 from dermis.scene.skin import Skin
@@ -39,7 +40,7 @@ def compare(
     light: str | None = None,
     region: str | None = None,
     medium: str | None = None,
-    model: Literal["layered", "montecarlo"] | None = None,
+    model: ModelName | None = None,
     sizes: SizeOptions = NOTHING,
     skin: SkinOptions = NOTHING,
     shape: ShapeOptions = NOTHING,

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.comparison.scenes import LIGHTS, REGIONS, ModelName, medium_scene
+from dermis.comparison.profile_models import ModelName
+from dermis.comparison.scenes import LIGHTS, REGIONS, medium_scene
 from dermis.comparison.truths import TRUTHS, Subject, Truth, check_seen
 from dermis.errors import refuse
 from dermis.frame.renderer import Renderer

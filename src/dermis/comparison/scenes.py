@@ -6,10 +6,10 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
+from dermis.comparison.profile_models import ModelName
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.optics.diffusion.models import diffusion_profile
@@ -23,8 +23,6 @@ from dermis.scene.lights import Light, SpotLight, StripeLight
 from dermis.scene.model import Scene
 from dermis.scene.skin import Skin
 
-ModelName = Literal["layered", "montecarlo"]
-"""How a medium's profile is known: by layered diffusion, or by photons one by one."""
 _WHITE = (3.14, 3.14, 3.14)
 _NOSE = (14.0, -28.0, 90.0)  # between tip, wing and lip, from the head's centre [mm]
 _PHOTONS = 2_000_000  # a channel

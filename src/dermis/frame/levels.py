@@ -83,6 +83,10 @@ class Blur:
         return tuple(k for k in range(len(self.halvings)) if k not in self.steps)
 
 
+LEAST_WEIGHT = 1e-12
+"""By which shares of a colour that nothing blurs are taken."""
+
+
 @dataclass(frozen=True)
 class Split:
     """A profile divided into the level that is lit again in the image and those that are blurred.

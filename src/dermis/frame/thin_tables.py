@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from dermis.frame import surface
 from dermis.frame.asked import Asked
+from dermis.frame.levels import LEAST_WEIGHT
 from dermis.gpu import Memo
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.thin_parts import ThinParts, medium_of, thin_parts
 
 Floats = NDArray[np.float64]
-_LEAST = 1e-12  # of a colour that nothing blurs, or that is not there
 _REACH, _FARTHEST_MM = 4.0, 40.0  # standard deviations of the widest Gaussian, beyond all pairs
 
 
@@ -32,7 +32,7 @@ def _made(
     """Tables as weights of the blurred levels, which alone lose what passes: no more than they have."""
     reach = min(_REACH * float(np.sqrt(variance_mm2[-1])), _FARTHEST_MM)
     made = thin_parts(medium_of(profile, colour, eta), variance_mm2, reach)
-    blurred = weight.sum(axis=0) / np.maximum(total, _LEAST)
-    share = np.minimum(1.0, blurred / np.maximum(made.lost.sum(axis=1), _LEAST))[:, None]
-    lost = made.lost * share / np.maximum(blurred, _LEAST)
+    blurred = weight.sum(axis=0) / np.maximum(total, LEAST_WEIGHT)
+    share = np.minimum(1.0, blurred / np.maximum(made.lost.sum(axis=1), LEAST_WEIGHT))[:, None]
+    lost = made.lost * share / np.maximum(blurred, LEAST_WEIGHT)
     return replace(made, through=made.through * share * total, lost=lost)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dermis.atlas.atlas import Atlas
 from dermis.atlas.translucency.cells import Cells, divide
 from dermis.frame.atlas_layout import PairBuffers, Translucency
+from dermis.frame.levels import LEAST_WEIGHT
 from dermis.frame.passes.pair_search.passes import CellTables, cell_tables
 from dermis.frame.passes.pair_search.places import upload_receivers, upload_sources
 from dermis.frame.passes.pair_search.search import Found, search
@@ -26,7 +27,6 @@ Floats = NDArray[np.float64]
 _WIDTHS_TO_DOUBLE, _LEAST_SHARED_MM = 2, 0.5
 _WIDTHS = 4  # whose pairs are kept
 _ONE = np.array([0xFE000, 0x3F8FE000], np.uint32)  # white light of 1, as light_words.wgsl has it
-_LEAST = 1e-12  # weight, of a colour that nothing blurs
 _COARSER = 1.5  # times the side of cells whose pairs memory does not hold
 
 
@@ -147,7 +147,7 @@ def translucency_from(
 def _weighed(
     device: Device, made: Translucency, variance_mm2: Floats, weight: Floats, thin: ThinParts | None
 ) -> Translucency:
-    share = weight / np.maximum(weight.sum(axis=0), _LEAST)
+    share = weight / np.maximum(weight.sum(axis=0), LEAST_WEIGHT)
     passing = weight if thin is None else thin.through
     losing = share if thin is None else thin.lost
     return replace(
