@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Any
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,28 +109,48 @@ def _hair(rng: np.random.Generator, shares: NDArray[np.float64]) -> tuple[float,
 
 def _details(rng: np.random.Generator) -> Iterator[tuple[str, float]]:
     """Weights of targets, always drawn in the same order."""
-    known = human_targets()
     common: dict[str, float] = {}
-    for name in known:
-        folder, rest = name.split("/")
-        if folder == "asym" and name.endswith("-l"):
-            value = rng.normal(0.0, _ASYMMETRY)
-            yield (name if value > 0 else f"{name[:-1]}r"), abs(float(value))
-        if folder not in _SPREAD or any(word in rest for word in _LEFT_OUT):
-            continue
-        for low, high in _WAYS:
-            stem = name.removesuffix(low)
-            if stem != name and f"{stem}{high}" in known:
-                value = _value(rng, stem, _SPREAD[folder], common)
-                yield f"{stem}{high if value > 0 else low}", abs(value)
+    chance = iter(rng.standard_normal(sum(1 + bool(one.shared) for one in _differences())).tolist())
+    for one in _differences():
+        value = one.spread * next(chance)
+        if one.limited:
+            value = min(max(value, -2 * one.spread), 2 * one.spread)
+        if one.shared:  # left and right are nearly alike
+            value = common.setdefault(one.shared, value) + _SIDES * one.spread * next(chance)
+        yield (one.more if value > 0 else one.less), abs(value)
     yield f"head/head-{rng.choice(_SHAPES)}", float(rng.uniform(0.0, _MOST_SHAPE))
 
 
-def _value(rng: np.random.Generator, stem: str, spread: float, common: dict[str, float]) -> float:
-    """A weight within two standard deviations; left and right are nearly alike."""
-    folder, rest = stem.split("/")
-    value = min(max(rng.normal(0.0, spread), -2 * spread), 2 * spread)
-    if rest[:2] not in ("l-", "r-"):
-        return value
-    shared = common.setdefault(f"{folder}/{rest[2:]}", value)
-    return shared + float(rng.normal(0.0, _SIDES * spread))
+class _Difference(NamedTuple):
+    """What people differ by: two targets that are each other's opposite.
+
+    less, more : their names
+    spread : standard deviation of the weight
+    limited : whether it lies within two of these
+    shared : what the other side of the face has too, or ""
+    """
+
+    less: str
+    more: str
+    spread: float
+    limited: bool
+    shared: str
+
+
+@cache
+def _differences() -> tuple[_Difference, ...]:
+    """All that details are drawn for, in their order."""
+    known, found = human_targets(), list[_Difference]()
+    for name in known:
+        folder, rest = name.split("/")
+        if folder == "asym" and name.endswith("-l"):
+            found.append(_Difference(f"{name[:-1]}r", name, _ASYMMETRY, False, ""))
+        if folder not in _SPREAD or any(word in rest for word in _LEFT_OUT):
+            continue
+        sided = rest[:2] in ("l-", "r-")
+        for low, high in _WAYS:
+            stem = name.removesuffix(low)
+            if stem != name and f"{stem}{high}" in known:
+                shared = f"{folder}/{rest[2:].removesuffix(low)}" if sided else ""
+                found.append(_Difference(name, f"{stem}{high}", _SPREAD[folder], True, shared))
+    return tuple(found)

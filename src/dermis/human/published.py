@@ -44,7 +44,7 @@ def places_mm(weights: Mapping[str, float]) -> Points:
     points = [np.arange(len(found["positions_mm"]))]
     deltas: list[NDArray[np.floating]] = [found["positions_mm"].astype(np.float64)]
     check_targets(weights)
-    known = {name: index for index, name in enumerate(moved.names)}
+    known = _numbers()
     for name, weight in weights.items():
         part = slice(*moved.first[known[name] : known[name] + 2])
         points.append(moved.point[part])
@@ -55,17 +55,24 @@ def places_mm(weights: Mapping[str, float]) -> Points:
     return np.asarray(places - places[count() :][eyes].mean(axis=0))
 
 
+@cache
+def _numbers() -> Mapping[str, int]:
+    """By names of targets which they are."""
+    return {name: number for number, name in enumerate(moves().names)}
+
+
 def check_targets(names: Iterable[str]) -> None:
     """Raises DermisError for a target that is not published."""
-    known = moves().names
     for name in names:
-        if name not in known:
+        if name not in _numbers():
+            known = moves().names
             close = [one for one in known if name.split("/")[-1] in one][:3]
             hint = f"Did you mean {' or '.join(close)}?" if close else "List: dermis head --list-targets"
             came = "there is none of this name"
             refuse(f"target {shown_value(name)}", "a published target", came, hint)
 
 
+@cache
 def human_targets() -> tuple[str, ...]:
     """Names of the published targets by which people differ, for `Human(targets=...)`."""
     return tuple(name for name in moves().names if not name.startswith((EXPRESSIONS, "expression/")))
