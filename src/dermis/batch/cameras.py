@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -31,8 +32,7 @@ def face_points(head: Head, count: int = 64) -> NDArray[np.int32]:
     inside = np.flatnonzero(within[0] & within[1] & within[2])
     if not len(inside):
         inside = np.arange(len(places))
-    ways = np.array([towards(*way) for way in _spiral(count)], np.float32)
-    return np.unique(inside[(places[inside] @ ways.T).argmax(axis=0)]).astype(np.int32)
+    return np.unique(inside[(_ways(count) @ places[inside].T).argmax(axis=1)]).astype(np.int32)
 
 
 def camera_of(
@@ -116,6 +116,11 @@ def _axes(yaw_deg: float, pitch_deg: float, roll_deg: float) -> Doubles:
 def _triple(vector: Doubles) -> tuple[float, float, float]:
     x, y, z = map(float, vector)
     return x, y, z
+
+
+@cache
+def _ways(count: int) -> NDArray[np.float32]:
+    return np.array([towards(*way) for way in _spiral(count)], np.float32)
 
 
 def _spiral(count: int) -> list[tuple[float, float]]:

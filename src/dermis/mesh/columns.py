@@ -18,5 +18,9 @@ def dots(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
 
 def crosses(a: NDArray[T], b: NDArray[T]) -> NDArray[T]:
     """(..., 3, n) of vectors (3, n) and (..., 3, n)."""
-    (ax, ay, az), (bx, by, bz) = a, (b[..., c, :] for c in range(3))
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-2)
+    found: NDArray[T] = np.empty(np.broadcast_shapes(a.shape, b.shape), np.result_type(a, b))
+    for c in range(3):  # each into its place: to stack three new arrays takes ten times as long
+        one, other, into = (c + 1) % 3, (c + 2) % 3, found[..., c, :]
+        np.multiply(a[one], b[..., other, :], out=into)
+        into -= a[other] * b[..., one, :]
+    return found

@@ -109,7 +109,7 @@ def frames(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tuple[D
 
 def between(share: Doubles, around: Doubles) -> Doubles:
     """(n, c) means of values around places; share, around : (n, 4) and (n, 4, c)."""
-    return np.asarray(sum(share[:, k, None] * around[:, k] for k in range(4)))
+    return np.asarray(np.einsum("nk,nkc->nc", share, around))
 
 
 def _places(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tuple[Doubles, Doubles]:

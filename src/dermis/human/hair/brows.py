@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from dermis.human.hair.brow_skin import BrowSkin
 from dermis.human.hair.look import HairLook
-from dermis.human.hair.skin import Skin
 from dermis.mesh.strands import Doubles
 
 KNOTS = 9
@@ -52,21 +52,19 @@ def count(look: HairLook) -> int:
 
 
 def grown(
-    skin: Skin,
+    skin: BrowSkin,
     root_mm: Doubles,
-    side: float,
-    u: Doubles,
-    v: Doubles,
+    along: tuple[Doubles, Doubles],
+    front_mm: tuple[Doubles, Doubles],
     rng: np.random.Generator,
     look: HairLook,
 ) -> tuple[Doubles, Doubles]:
     """Knots (n, k, 3) and radii (n, k) of the hairs of one brow [mm].
 
     root_mm : (n, 3) on the skin
-    side : 1 for the left one
-    u, v : places along and across the brow
+    along, front_mm : (n,) along and across the brow, and x, y in the front plane, from `places`
     """
-    n = len(u)
+    (u, v), (x, y), n = along, front_mm, len(root_mm)
     # hairs from above and from below lean together
     turn = np.interp(u, _ALONG, _TURN) - 0.6 * v * np.minimum(2.5 * u, 1.0) + rng.normal(0, 0.13, n)
     bend = -0.5 * np.clip(turn - np.interp(np.minimum(u + 0.2, 1), _ALONG, _TURN), 0, 1) - 0.25 * v * u
@@ -75,15 +73,17 @@ def grown(
     rise = np.clip(rng.gamma(4.0, 0.15, n), 0.15, 1.3)
     t = np.linspace(0.0, 1.0, KNOTS)
     height = rise[:, None] * (1 - (1 - t) ** 2.2) * (1 - 0.35 * t) - 0.25 * (1 - t) ** 8
-    feet, normals = ([one] for one in skin.foot(root_mm))
+    here = skin.at(x, y)
+    off, feet, normals = root_mm - here.place, [root_mm], [here.normal]
     for k in range(2, KNOTS, 2):  # straight between: 0.16 mm off at most
         angle = turn + bend * (t[k - 1] + t[k]) / 2
-        out = np.stack([side * np.cos(angle), np.sin(angle), np.zeros(n)], axis=-1)
-        out -= (out * normals[-1]).sum(axis=1, keepdims=True) * normals[-1]
-        out *= (2 * length / (KNOTS - 1) / np.linalg.norm(out, axis=1))[:, None]
-        foot, normal = skin.foot(feet[-1] + out)
-        feet += [(feet[-1] + foot) / 2, foot]
-        normals += [(normals[-1] + normal) / 2, normal]
+        across, up = np.cos(angle), np.sin(angle)
+        way = across[:, None] * here.along_x + up[:, None] * here.along_y
+        step = 2 * length / (KNOTS - 1) / np.sqrt(np.einsum("nc,nc->n", way, way))
+        x, y = x + step * across, y + step * up
+        here = skin.at(x, y)
+        feet += [(feet[-1] + here.place + off) / 2, here.place + off]
+        normals += [(normals[-1] + here.normal) / 2, here.normal]
     knots = np.stack(feet, axis=1) + height[..., None] * np.stack(normals, axis=1)
     radius = rng.uniform(0.03, 0.05, n) * (0.9 + 0.2 * look.bushy)
     taper = np.maximum(1.0 - t**2.5, 0.08)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from dermis.human.hair import brows, lashes
+from dermis.human.hair.brow_skin import BrowSkin
 from dermis.human.hair.grown import Ground, Grown, Rooted
 from dermis.human.hair.head_hair import beard_hair, scalp_hair
 from dermis.human.hair.look import HairLook
@@ -62,7 +63,9 @@ def _brow(ground: Ground, rooting: Rooting, look: HairLook, side: float, rng: np
     roots, there = rooting.in_front(side * x, y)
     kept = np.flatnonzero(there)[: brows.count(look)]
     where = ground.rooted(Roots(roots.quad[kept], roots.place[kept]))
-    return _grown(where, *brows.grown(ground.skin, where.places, side, u[kept], v[kept], rng, look), 1.0)
+    skin = BrowSkin(ground.rooted(rooting.around_brow(side)).places, side)
+    along, front_mm = (u[kept], v[kept]), (x[kept], y[kept])
+    return _grown(where, *brows.grown(skin, where.places, along, front_mm, rng, look), 1.0)
 
 
 def _lashes(

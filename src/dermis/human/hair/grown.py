@@ -37,12 +37,20 @@ class Ground:
     """What hair grows on: the head as it is drawn, and its mesh before it was subdivided.
 
     share : of the usual number of hairs that grows, each as much wider
-    points_mm : (p, 3) of the drawn mesh, the control points first
     """
 
     def __init__(self, head: Head, plain: Mesh, share: float = 1.0) -> None:
         self.plain, self.skin, self.share = plain, Skin(head.mesh), share
-        self._mesh, self._levels, self.points_mm = head.mesh, head.levels, points_of(head.mesh)
+        self._mesh, self._levels, self._columns = (
+            head.mesh,
+            head.levels,
+            np.ascontiguousarray(points_of(head.mesh).T),
+        )
+
+    @property
+    def points_mm(self) -> Doubles:
+        """(p, 3) of the drawn mesh, the control points first; numbers lie as `frames` reads them."""
+        return self._columns.T
 
     def rooted(self, roots: Roots) -> Rooted:
         """Roots on quads of the plain mesh."""

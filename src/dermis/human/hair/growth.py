@@ -122,16 +122,19 @@ def _astray(ways: Floats, normal: Floats, rough: Roughness, rng: np.random.Gener
 
 def _draw_together(ways: Floats, root_mm: Doubles, t: Doubles, much: float, rng: np.random.Generator) -> None:
     """Draw tips to those of a few, in tufts."""
-    at = np.floor(root_mm / _TUFT_MM).astype(np.int64)
-    at -= at.min(axis=0)
-    cell = np.asarray(np.ravel_multi_index(at.T, (at.max(axis=0) + 1).tolist()))
+    places = np.ascontiguousarray(root_mm.T)
+    cell = np.zeros(len(root_mm), np.int64)
+    for at in np.floor(places / _TUFT_MM).astype(np.int64):
+        at -= at.min()
+        cell *= at.max() + 1
+        cell += at
     hair = np.empty(cell.max() + 1, np.int64)
     hair[cell] = np.arange(len(cell))  # one of those in each
     which = hair[cell]
     drawn = (much * rng.uniform(0.3, 1.0, len(root_mm)) * t**1.3).astype(np.float32)
-    apart = ways[..., which]
+    apart = ways.take(which, axis=-1)
     apart -= ways
-    apart += (root_mm[which] - root_mm).T.astype(np.float32)
+    apart += (places.take(which, axis=-1) - places).astype(np.float32)
     apart *= drawn[:, None]
     ways += apart
 
@@ -152,10 +155,20 @@ def _coils(tips: Floats, t: Doubles, rough: Roughness, rng: np.random.Generator)
     side: Floats = rng.normal(size=tips.shape).astype(np.float32)
     side -= dots(side, along) * along
     side /= np.maximum(np.sqrt(dots(side, side)), _LEAST)
-    turns = 2 * np.pi * (rough.coils * rng.uniform(0.8, 1.2, n) * t + rng.random(n))
-    radius = rough.coil_mm * rng.uniform(0.6, 1.2, n) * np.minimum(4 * t, 1.0)
-    x, y = ((radius * one)[:, None].astype(np.float32) for one in (np.cos(turns), np.sin(turns)))
+    step, turn = (
+        _turn(2 * np.pi * one) for one in (rough.coils * rng.uniform(0.8, 1.2, n) * t[1], rng.random(n))
+    )
+    turns = np.empty((len(t), n), np.complex128)
+    for one in turns:  # knots are as far from each other all along
+        one[:] = turn
+        turn = turn * step
+    turns *= rough.coil_mm * rng.uniform(0.6, 1.2, n) * np.minimum(4 * t, 1.0)
+    x, y = (one[:, None].astype(np.float32) for one in (turns.real, turns.imag))
     return np.asarray(x * side + y * crosses(along, side))
+
+
+def _turn(angle: Doubles) -> NDArray[np.complex128]:
+    return np.asarray(np.cos(angle) + 1j * np.sin(angle))
 
 
 def _over_skin(ways: Floats, normal: Floats, t: Floats) -> Floats:

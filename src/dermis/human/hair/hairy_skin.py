@@ -56,7 +56,8 @@ def rooted(plain: Mesh, where: Where, per_cm2: float, rng: np.random.Generator) 
     ends = np.cumsum(many)[near]
     number = np.arange(len(which)) + np.repeat(ends - np.cumsum(many[near]), many[near])
     step = number - (np.cumsum(many) - many)[which]
-    place = np.mod(began[which] + step[:, None] * _STEPS, 1.0)
+    place = began[which] + step[:, None] * _STEPS
+    place -= np.floor(place)
     kept = chance[number] < where.amount(between(weights(place), told()[around][which]))
     return Roots(quad[which[kept]].astype(np.int32), place[kept].astype(np.float32))
 
@@ -75,7 +76,8 @@ def scalp(recession: float) -> Where:
     """Hair of the head."""
 
     def amount(places: Doubles) -> Doubles:
-        above = above_hairline(places, recession) + np.sin(places[:, :3] @ _RAGGED.T).sum(axis=1)
+        above = above_hairline(places, recession)
+        above += sum(np.sin(places[:, :3] @ wave) for wave in _RAGGED)
         share = smoothstep(*_SOFT_MM, above) * (places[:, 1] > _LOWEST)
         thinned = _amount("hair", zones(recession), places) - _amount("hair", zones(), places)
         return np.asarray(share * np.clip(1.0 + thinned, 0.0, 1.0))

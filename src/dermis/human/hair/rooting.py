@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.human.hair import lashes
+from dermis.human.hair.brow_skin import nodes
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Doubles, Roots, corners
 
@@ -55,6 +56,7 @@ class Rooting:
 
     def __init__(self, mesh: Mesh, points_mm: Doubles, eyes_mm: Doubles) -> None:
         self.mesh, self._points_mm, self._eyes_mm = mesh, points_mm, eyes_mm
+        self._grids: dict[float, Roots] = {}
         self._rows: dict[tuple[tuple[int, ...], float], _Row] = {}
 
     def in_front(self, x: Doubles, y: Doubles) -> tuple[Roots, NDArray[np.bool_]]:
@@ -80,6 +82,16 @@ class Rooting:
         place = np.einsum("nk,nkc->nc", share, _ENDS[_HALVES[front.half[which]]])
         quad = np.where(there, front.quad[which], 0)
         return Roots(quad.astype(np.int32), np.clip(place, 0.0, 1.0).astype(np.float32)), there
+
+    def around_brow(self, side: float) -> Roots:
+        """The grid of `BrowSkin`; what faces the viewer is all around a brow.
+
+        side : 1 for the left one
+        """
+        if side not in self._grids:
+            x, y = nodes()
+            self._grids[side] = self.in_front(side * x, y)[0]
+        return self._grids[side]
 
     def beside_lid(self, lid: lashes.Lid, side: float, u: Doubles, across: Doubles) -> Roots:
         """Roots along a lid's edge, on the quads beside it that are farther from the eye.

@@ -1,0 +1,65 @@
+"""The skin around a brow, as a grid over the front plane of the mean person: hairs walk on it by looking up."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dermis.mesh.strands import Doubles
+
+_CELL_MM = 3.0  # straight between: 0.1 mm off at most
+_LOW, _HIGH = (1.0, -2.0), (64.0, 40.0)  # around the left brow and the tips of its hairs [mm]
+
+
+class Walked(NamedTuple):
+    """Where hairs are on the skin.
+
+    place, normal : (n, 3) [mm]
+    along_x, along_y : (n, 3) by how much the place moves with those on the front plane [-]
+    """
+
+    place: Doubles
+    normal: Doubles
+    along_x: Doubles
+    along_y: Doubles
+
+
+def nodes() -> tuple[Doubles, Doubles]:
+    """x and y of the grid (nodes,) on the front plane, the left brow's side [mm]."""
+    x, y = np.meshgrid(*_axes(), indexing="ij")
+    return x.ravel(), y.ravel()
+
+
+def _axes() -> tuple[Doubles, Doubles]:
+    x, y = (np.arange(low, high + 0.5, _CELL_MM) for low, high in zip(_LOW, _HIGH, strict=True))
+    return x, y
+
+
+class BrowSkin:
+    """A person's skin around a brow.
+
+    node_mm : (nodes, 3) where the grid's places are on the person
+    side : 1 for the left brow; x counts from the nose outwards on both
+    """
+
+    def __init__(self, node_mm: Doubles, side: float) -> None:
+        shape = tuple(map(len, _axes()))
+        place = node_mm.reshape(*shape, 3)
+        x, y = np.gradient(place, _CELL_MM, axis=(0, 1))
+        normal = side * np.cross(x, y)
+        normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+        self._last = np.array(shape) - 1
+        self._node = np.concatenate([place, normal, x, y], axis=2).reshape(-1, 12)
+
+    def at(self, x: Doubles, y: Doubles) -> Walked:
+        """The skin behind places of the front plane (n,) [mm]; beyond the grid, as at its edge."""
+        place = (np.stack([x, y]) - np.array(_LOW)[:, None]) / _CELL_MM
+        place = np.clip(place, 0.0, self._last[:, None] - 1e-9)
+        cell = place.astype(np.int64)
+        s, t = place - cell
+        first = cell[0] * (self._last[1] + 1) + cell[1]
+        near = first[:, None] + [0, 1, self._last[1] + 1, self._last[1] + 2]
+        share = np.stack([(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t], axis=-1)
+        found = np.einsum("nk,nkc->nc", share, self._node[near])
+        return Walked(*np.split(found, 4, axis=1))
