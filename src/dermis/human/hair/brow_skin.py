@@ -1,4 +1,4 @@
-"""The skin around a brow, as a grid over the front plane of the mean person: hairs walk on it by looking up."""
+"""The skin around a brow, as a grid over the front plane of the mean person, for hairs to walk on."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from dermis.mesh.strands import Doubles
 
-_CELL_MM = 3.0  # straight between: 0.1 mm off at most
+_CELL_MM = 2.5
 _LOW, _HIGH = (1.0, -2.0), (64.0, 40.0)  # around the left brow and the tips of its hairs [mm]
 
 
@@ -39,27 +39,28 @@ def _axes() -> tuple[Doubles, Doubles]:
 class BrowSkin:
     """A person's skin around a brow.
 
-    node_mm : (nodes, 3) where the grid's places are on the person
-    side : 1 for the left brow; x counts from the nose outwards on both
+    node_mm, normal : (nodes, 3) where the grid's places are on the person, see `Skin.foot`; x counts from the
+        nose outwards on both sides
     """
 
-    def __init__(self, node_mm: Doubles, side: float) -> None:
+    def __init__(self, node_mm: Doubles, normal: Doubles) -> None:
         shape = tuple(map(len, _axes()))
-        place = node_mm.reshape(*shape, 3)
-        x, y = np.gradient(place, _CELL_MM, axis=(0, 1))
-        normal = side * np.cross(x, y)
-        normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+        ways = np.gradient(node_mm.reshape(*shape, 3), _CELL_MM, axis=(0, 1))
         self._last = np.array(shape) - 1
-        self._node = np.concatenate([place, normal, x, y], axis=2).reshape(-1, 12)
+        plane = (node_mm * normal).sum(axis=1, keepdims=True)
+        self._node = np.concatenate([node_mm, normal, *(way.reshape(-1, 3) for way in ways), plane], axis=1)
 
     def at(self, x: Doubles, y: Doubles) -> Walked:
         """The skin behind places of the front plane (n,) [mm]; beyond the grid, as at its edge."""
-        place = (np.stack([x, y]) - np.array(_LOW)[:, None]) / _CELL_MM
-        place = np.clip(place, 0.0, self._last[:, None] - 1e-9)
-        cell = place.astype(np.int64)
-        s, t = place - cell
+        at = (np.stack([x, y]) - np.array(_LOW)[:, None]) / _CELL_MM
+        at = np.clip(at, 0.0, self._last[:, None] - 1e-9)
+        cell = at.astype(np.int64)
+        s, t = at - cell
         first = cell[0] * (self._last[1] + 1) + cell[1]
         near = first[:, None] + [0, 1, self._last[1] + 1, self._last[1] + 2]
         share = np.stack([(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t], axis=-1)
         found = np.einsum("nk,nkc->nc", share, self._node[near])
-        return Walked(*np.split(found, 4, axis=1))
+        place, normal, along_x, along_y, plane = np.split(found, [3, 6, 9, 12], axis=1)
+        # curved skin lies as far from its chords as from its tangent planes
+        lift = 0.5 * (plane - np.einsum("nc,nc->n", place, normal)[:, None])
+        return Walked(place + lift * normal, normal, along_x, along_y)

@@ -6,6 +6,7 @@ import numpy as np
 
 from dermis.human.hair.brow_skin import BrowSkin
 from dermis.human.hair.look import HairLook
+from dermis.human.hair.skin import flattened
 from dermis.mesh.strands import Doubles
 
 KNOTS = 9
@@ -64,7 +65,7 @@ def grown(
     root_mm : (n, 3) on the skin
     along, front_mm : (n,) along and across the brow, and x, y in the front plane, from `places`
     """
-    (u, v), (x, y), n = along, front_mm, len(root_mm)
+    (u, v), (x, y), n = along, front_mm, len(along[0])
     # hairs from above and from below lean together
     turn = np.interp(u, _ALONG, _TURN) - 0.6 * v * np.minimum(2.5 * u, 1.0) + rng.normal(0, 0.13, n)
     bend = -0.5 * np.clip(turn - np.interp(np.minimum(u + 0.2, 1), _ALONG, _TURN), 0, 1) - 0.25 * v * u
@@ -74,7 +75,8 @@ def grown(
     t = np.linspace(0.0, 1.0, KNOTS)
     height = rise[:, None] * (1 - (1 - t) ** 2.2) * (1 - 0.35 * t) - 0.25 * (1 - t) ** 8
     here = skin.at(x, y)
-    off, feet, normals = root_mm - here.place, [root_mm], [here.normal]
+    beside = flattened(root_mm - here.place, here.normal)
+    feet, normals = [here.place + beside], [here.normal]
     for k in range(2, KNOTS, 2):  # straight between: 0.16 mm off at most
         angle = turn + bend * (t[k - 1] + t[k]) / 2
         across, up = np.cos(angle), np.sin(angle)
@@ -82,7 +84,7 @@ def grown(
         step = 2 * length / (KNOTS - 1) / np.sqrt(np.einsum("nc,nc->n", way, way))
         x, y = x + step * across, y + step * up
         here = skin.at(x, y)
-        feet += [(feet[-1] + here.place + off) / 2, here.place + off]
+        feet += [(feet[-1] + here.place + beside) / 2, here.place + beside]
         normals += [(normals[-1] + here.normal) / 2, here.normal]
     knots = np.stack(feet, axis=1) + height[..., None] * np.stack(normals, axis=1)
     radius = rng.uniform(0.03, 0.05, n) * (0.9 + 0.2 * look.bushy)

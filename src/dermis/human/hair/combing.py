@@ -8,6 +8,7 @@ import numpy as np
 
 from dermis.human.hair.hairy_skin import HEAD_AXIS_Z, above_hairline, smoothstep
 from dermis.human.hair.look import HairLook
+from dermis.human.hair.skin import flattened
 from dermis.mesh.strands import Doubles
 
 # Artist's values on the average person [mm].
@@ -64,7 +65,7 @@ def combed_beard(places: Doubles, normals: Doubles, look: HairLook) -> Combed:
 
 def along_skin(ways: Doubles, normals: Doubles) -> Doubles:
     """Unit vectors: what of ways (n, 3) lies along the skin."""
-    flat = ways - (ways * normals).sum(axis=1, keepdims=True) * normals
+    flat = flattened(ways, normals)
     return np.asarray(flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-9))
 
 

@@ -63,7 +63,7 @@ def _brow(ground: Ground, rooting: Rooting, look: HairLook, side: float, rng: np
     roots, there = rooting.in_front(side * x, y)
     kept = np.flatnonzero(there)[: brows.count(look)]
     where = ground.rooted(Roots(roots.quad[kept], roots.place[kept]))
-    skin = BrowSkin(ground.rooted(rooting.around_brow(side)).places, side)
+    skin = BrowSkin(*ground.skin.foot(ground.rooted(rooting.around_brow(side)).places))
     along, front_mm = (u[kept], v[kept]), (x[kept], y[kept])
     return _grown(where, *brows.grown(skin, where.places, along, front_mm, rng, look), 1.0)
 

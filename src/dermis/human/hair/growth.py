@@ -155,20 +155,21 @@ def _coils(tips: Floats, t: Doubles, rough: Roughness, rng: np.random.Generator)
     side: Floats = rng.normal(size=tips.shape).astype(np.float32)
     side -= dots(side, along) * along
     side /= np.maximum(np.sqrt(dots(side, side)), _LEAST)
-    step, turn = (
-        _turn(2 * np.pi * one) for one in (rough.coils * rng.uniform(0.8, 1.2, n) * t[1], rng.random(n))
-    )
-    turns = np.empty((len(t), n), np.complex128)
-    for one in turns:  # knots are as far from each other all along
-        one[:] = turn
-        turn = turn * step
-    turns *= rough.coil_mm * rng.uniform(0.6, 1.2, n) * np.minimum(4 * t, 1.0)
-    x, y = (one[:, None].astype(np.float32) for one in (turns.real, turns.imag))
+    step = 2 * np.pi * rough.coils * rng.uniform(0.8, 1.2, n) * t[1]
+    turn = 2 * np.pi * rng.random(n)
+    radius = rough.coil_mm * rng.uniform(0.6, 1.2, n) * np.minimum(4 * t, 1.0)
+    x, y = ((radius * one)[:, None].astype(np.float32) for one in _turned(turn, step, len(t)))
     return np.asarray(x * side + y * crosses(along, side))
 
 
-def _turn(angle: Doubles) -> NDArray[np.complex128]:
-    return np.asarray(np.cos(angle) + 1j * np.sin(angle))
+def _turned(turn: Doubles, step: Doubles, knots: int) -> tuple[Doubles, Doubles]:
+    """Cosines and sines (k, n) of angles (n,) that grow by equal steps, of which only the first are taken."""
+    x, y = np.empty((knots, len(turn))), np.empty((knots, len(turn)))
+    x[0], y[0], more, across = np.cos(turn), np.sin(turn), np.cos(step), np.sin(step)
+    for k in range(1, knots):
+        x[k] = x[k - 1] * more - y[k - 1] * across
+        y[k] = y[k - 1] * more + x[k - 1] * across
+    return x, y
 
 
 def _over_skin(ways: Floats, normal: Floats, t: Floats) -> Floats:

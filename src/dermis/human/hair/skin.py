@@ -38,3 +38,8 @@ class Skin:
         from scipy.spatial import cKDTree
 
         return cKDTree(self._places, compact_nodes=False, balanced_tree=False)
+
+
+def flattened(ways: Doubles, normals: Doubles) -> Doubles:
+    """What of ways (n, 3) lies along the skin."""
+    return np.asarray(ways - (ways * normals).sum(axis=1, keepdims=True) * normals)
