@@ -155,8 +155,8 @@ def _coils(tips: Floats, t: Doubles, rough: Roughness, rng: np.random.Generator)
     side: Floats = rng.normal(size=tips.shape).astype(np.float32)
     side -= dots(side, along) * along
     side /= np.maximum(np.sqrt(dots(side, side)), _LEAST)
-    step = 2 * np.pi * rough.coils * rng.uniform(0.8, 1.2, n) * t[1]
-    turn = 2 * np.pi * rng.random(n)
+    step = 2 * np.pi * t[1] * rough.coils * rng.uniform(0.8, 1.2, n)
+    turn = np.asarray(2 * np.pi * rng.random(n))
     radius = rough.coil_mm * rng.uniform(0.6, 1.2, n) * np.minimum(4 * t, 1.0)
     x, y = ((radius * one)[:, None].astype(np.float32) for one in _turned(turn, step, len(t)))
     return np.asarray(x * side + y * crosses(along, side))
