@@ -16,7 +16,8 @@ from dermis.mesh.eyes import EyeLook
 from dermis.mesh.maps import Maps
 from dermis.optics.directions import directions
 from dermis.optics.gaussians import GaussianSum
-from dermis.optics.thin_parts import across
+from dermis.optics.oblique import aside_mm
+from dermis.optics.thin_parts import across, medium_of
 from dermis.scene.skin import USUAL_ROUGHNESS, Skin
 from dermis.specular.albedo import ROOT_OF_FIRST_ROW
 from dermis.specular.energy import ENERGY
@@ -119,6 +120,7 @@ def _by_direction(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any
     law = directions(*half_space)
     return {
         "inner_eta": law.eta,
+        "aside_mm": aside_mm(medium_of(profile, *half_space)),
         "mean_once": law.mean_once,
         "once": law.once,
         "back_from_everywhere": law.from_everywhere,

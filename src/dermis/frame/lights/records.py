@@ -23,7 +23,7 @@ from dermis.frame.projection import (
     point_views,
     unit,
 )
-from dermis.gpu import ComputeProgram
+from dermis.gpu import ComputeProgram, Constants
 from dermis.mesh.outline import Outline
 from dermis.scene.environment import Environment
 from dermis.scene.lights import DirectionalLight, Light
@@ -70,6 +70,11 @@ def light_constants(scene: Scene) -> tuple[tuple[str, int], ...]:
         "HALF_SPACE": scene.skin.direction != "lambertian",
     }
     return tuple((name, 1) for name, used in named.items() if used)
+
+
+def oblique(constants: Constants) -> Constants:
+    """Of passes that know how the surface goes on beside a point, which half-spaces ask for."""
+    return (*constants, ("OBLIQUE", 1)) if ("HALF_SPACE", 1) in constants else constants
 
 
 def light_parts(scene: Scene) -> tuple[int, ...]:

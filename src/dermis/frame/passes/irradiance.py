@@ -6,6 +6,7 @@ from typing import Any
 
 from dermis.frame.atlas_layout import AtlasLayout
 from dermis.frame.levels import FLOATS
+from dermis.frame.lights.records import oblique
 from dermis.frame.passes import program
 from dermis.gpu import Constants, Recorder
 
@@ -28,6 +29,8 @@ def draw(
     area : standard deviation of what a texel averages of light that is finer [texel]; 0 for its centre alone,
         as where texels beside each other are not beside each other on the surface
     """
+    if area:  # the surface goes on beside each texel
+        constants = oblique(constants)
     shader = program(graph.device, "irradiance.wgsl", constants, store=texel)
     entering = shader.record("Entering", scale=scale, area=area)
     bound = {**layout.lit, "surfaces": layout.surfaces, "entering": entering, "stored": into}

@@ -6,6 +6,7 @@ from typing import Any
 
 from dermis.frame.atlas_layout import AtlasLayout, Translucency
 from dermis.frame.levels import Blur, Levels
+from dermis.frame.lights.records import oblique
 from dermis.frame.passes import each, program
 from dermis.gpu import Constants, Recorder
 
@@ -50,7 +51,8 @@ def draw_slants(graph: Recorder, layout: AtlasLayout, constants: Constants) -> N
     """
     thin = layout.translucency
     assert thin is not None
-    shader, count = program(graph.device, "translucency_slants.wgsl", constants), thin.pairs.sources[1]
+    shader = program(graph.device, "translucency_slants.wgsl", oblique(constants))
+    count = thin.pairs.sources[1]
     bound = {
         **layout.lit,
         "surfaces": layout.surfaces,

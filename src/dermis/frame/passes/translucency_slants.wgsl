@@ -1,6 +1,6 @@
 // How much of the light that enters where sources lie passes deep slabs: over that of uniform light of which as much comes back.
 //#include "lighting.wgsl"
-//#include "packed_surface.wgsl"
+//#include "texels_beside.wgsl"
 //#include "light_words.wgsl"
 //#include "translucent_source.wgsl"
 
@@ -8,7 +8,6 @@ struct Slanted {
     sources: u32,
 }
 
-@group(0) @binding(30) var surfaces: texture_2d_array<u32>; // as surface_texels.wgsl packs them
 @group(0) @binding(31) var<uniform> slanted: Slanted;
 @group(0) @binding(32) var<storage, read> source_points: array<Source>;
 @group(0) @binding(33) var<storage, read_write> slants: array<vec2u>; // as in light_words.wgsl
@@ -26,12 +25,15 @@ fn main(
         return;
     }
     let texel = vec2u(source_points[index].texel & 0xffffu, source_points[index].texel >> 16u);
-    let packed = Packed(textureLoad(surfaces, texel, 0, 0), textureLoad(surfaces, texel, 1, 0));
+    let packed = packed_at(vec2i(texel));
     var slant = vec3f(1.0); // where it is dark, light comes from around
     if (packed.look.w != 0u) {
         let surface = unpack_surface(packed);
         var point = unpack_point(packed);
         point.place = (vec2f(texel) + 0.5) / vec2f(textureDimensions(surfaces));
+        if (OBLIQUE) {
+            goes_on = beside_texel(vec2i(texel), point);
+        }
         let lit = light_up(point, surface, surface.normal, open_at(point.place));
         slant = select(slant, lit.across / max(lit.entered, vec3f(1e-20)), lit.entered > vec3f(0.0));
     }

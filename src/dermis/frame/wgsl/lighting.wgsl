@@ -5,6 +5,7 @@
 //#include "direction.wgsl"
 //#include "lobe.wgsl"
 //#include "lights.wgsl"
+//#include "oblique.wgsl"
 //#include "strand_shadows.wgsl"
 //#include "environment.wgsl"
 //#include "interreflection.wgsl"
@@ -12,6 +13,8 @@
 // Whether each point skips the lights behind its surface by itself. Without that, software adapters shade it with every light
 // that a point beside it sees. GPUs do without: they read lights faster when all points read the same one.
 override PASSES_DARK: bool = false;
+
+const MOST_BEHIND: f32 = -0.75; // cosine at which oblique light may still shine
 
 struct Lit {
     entered: vec3f, // irradiance that enters the skin, times the share that comes back over that from straight above
@@ -46,7 +49,8 @@ fn next_that_may_shine(first: u32, p: vec3f, n: vec3f) -> u32 {
     loop {
         let light = lights.light[i];
         let towards = select(light.position - p, -light.direction, is_parallel(light));
-        if (light.narrow == 0u || dot(towards, n) > 0.0 || i + 1u >= skin.light_count) {
+        let behind = select(0.0, MOST_BEHIND * length(towards), OBLIQUE);
+        if (light.narrow == 0u || dot(towards, n) > behind || i + 1u >= skin.light_count) {
             break;
         }
         i++;
@@ -55,10 +59,11 @@ fn next_that_may_shine(first: u32, p: vec3f, n: vec3f) -> u32 {
 }
 
 // The first part of a light that is in front of a surface; how many parts there are where none is.
-fn first_that_faces(light: Light, p: vec3f, n: vec3f) -> u32 {
+fn first_that_faces(light: Light, point: Point, n: vec3f) -> u32 {
     var part = 0u;
     loop {
-        if (dot(n, incident(light, p, part).direction) > 0.0 || part >= parts_of(light)) {
+        let l = incident(light, point.position, part).direction;
+        if (dot(met_by(light, point, n, l).normal, l) > 0.0 || part >= parts_of(light)) {
             break;
         }
         part++;
@@ -107,14 +112,16 @@ fn light_through(point: Point, surface: Surface, film: Film, v: vec3f, open: f32
             i = next_that_may_shine(i, point.position, surface.normal);
         }
         let light = lights.light[i];
-        var part = first_that_faces(light, point.position, surface.normal);
+        var part = first_that_faces(light, point, surface.normal);
         if (part < parts_of(light)) {
             // Once for all parts, and not where the first of them is shaded: software adapters run what is in a branch for
             // each round of the loop around it.
-            let seen = reaching(light, point, incident(light, point.position, part).direction);
+            let l = incident(light, point.position, part).direction;
+            let seen = reaching(light, met_by(light, point, surface.normal, l).point, l);
             loop {
-                let arriving = incident(light, point.position, part);
-                let cosine = dot(surface.normal, arriving.direction);
+                let met = met_by(light, point, surface.normal, incident(light, point.position, part).direction);
+                let arriving = incident(light, met.point.position, part);
+                let cosine = dot(met.normal, arriving.direction);
                 if (cosine > 0.0) {
                     let e = arriving.irradiance * seen;
                     let filled = arriving.irradiance * max(vec3f(seen), film.scattered);

@@ -17,6 +17,7 @@ struct Skin {
     light_count: u32,
     inner_eta: f32, // index of half-spaces, 1 for those without a surface; see direction.wgsl
     mean_once: f32, // of 1/(a + b) over both directions
+    aside_mm: f32, // how far beside where it entered the middle of light comes back that came along the surface
     once: vec3f, // strength of single scattering
     back_from_everywhere: vec3f, // share of uniform light that comes back, over that of light from straight above
     back: array<vec4f, 32>, // the same for light from one direction, by evenly spaced roots of its cosine
