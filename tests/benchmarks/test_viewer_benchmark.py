@@ -56,7 +56,7 @@ def test_each_motion_moves_the_picture_and_nothing_else_is_computed(driver: Any,
     assert list(found) == list(MOTIONS)
     ran = {name: set(one["stages"]) for name, one in found.items()}
     assert ran["camera"] == {"visibility", "shade", "post"} and ran["exposure"] == {"post"}
-    assert "shadows" in ran["light"] and "irradiance" in ran["roughness"] - ran["melanin"]
+    assert "shadows" in ran["light"] and "surface" in ran["roughness"] - ran["melanin"]
     assert "diffuse" in ran["melanin"] and "shape" in ran["expression"]
     assert all(one["frames_per_s"] > 0.0 and one["processor_ms"] > 0.0 for one in found.values())
     assert {one["frames"] for one in found.values()} == {plan.frames}

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
 from setups import frontal, head_of, place, probe, run_frame, scene_of
 from tolerances import TWIN
 
@@ -181,7 +182,10 @@ def test_light_from_around_is_not_multiplied_by_what_scattered_once(
 
 
 def test_light_that_came_from_beside_leaves_all_ways_alike(renderer: Renderer, profile: str) -> None:
-    """In a shadow nothing scattered only once: no direction is darkened below nothing, nor an edge drawn."""
+    """In a shadow nothing scattered only once: no direction is darkened below nothing, nor an edge drawn.
+
+    Lambertian skin is as bright there, or a pixel nearer to the light: so far aside light comes back.
+    """
     ball = scene_of(
         BALL,
         SpotLight(position=place(BALL, (300, 0, 60)), target=place(BALL, (0, 0, 0)), irradiance=(3, 3, 3)),
@@ -199,7 +203,7 @@ def test_light_that_came_from_beside_leaves_all_ways_alike(renderer: Renderer, p
     assert made.min() >= 0.0 and np.isfinite(made).all()
     dark = (usual.sum(axis=-1) > 0.0) & (usual.sum(axis=-1) < 0.01 * usual.sum(axis=-1).max())
     assert dark.sum() > 20
-    assert (made[dark] < 3.0 * usual[dark] + 1e-6).all()
+    assert (made[dark] < 3.0 * maximum_filter(usual, (3, 3, 1))[dark] + 1e-6).all()
 
 
 def test_white_skin_is_not_made_brighter(renderer: Renderer) -> None:

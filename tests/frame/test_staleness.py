@@ -197,7 +197,7 @@ RUNS: dict[str, tuple[Callable[[], tuple[Scene, Settings]], tuple[str, ...]]] = 
     ),
     "profile": (
         lambda: (replace(BASE, skin=Skin(profile="dj3")), SETTINGS),
-        ("pairs", *SPREAD, *SEEN),
+        ("irradiance", "pairs", *SPREAD, *SEEN),  # how far aside light comes back
     ),
     "roughness": (
         lambda: (replace(BASE, skin=Skin(roughness=0.4)), SETTINGS),
