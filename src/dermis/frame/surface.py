@@ -29,6 +29,7 @@ DEFAULT_COLOUR = 0.8
 """Albedo of heads without a colour map."""
 _EYE_SEEDS = 1000  # that look different
 _NO_BAND = -1.0
+_MOST_ASIDE_MM = 3.0  # farther, the surface no longer goes on as it does at a texel
 
 
 def model_of(skin: Skin) -> str:
@@ -120,7 +121,7 @@ def _by_direction(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any
     law = directions(*half_space)
     return {
         "inner_eta": law.eta,
-        "aside_mm": aside_mm(medium_of(profile, *half_space)),
+        "aside_mm": min(aside_mm(medium_of(profile, *half_space)), _MOST_ASIDE_MM),
         "mean_once": law.mean_once,
         "once": law.once,
         "back_from_everywhere": law.from_everywhere,

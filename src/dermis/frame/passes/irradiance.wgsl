@@ -23,14 +23,13 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let surface = unpack_surface(packed);
     if (STRIPE_LIGHT && entering.area > 0.0) {
-        let position = bitcast<vec3f>(packed.place.xyz);
-        area_u = entering.area * texel_step(vec2i(id.xy), position, vec2i(1, 0));
-        area_v = entering.area * texel_step(vec2i(id.xy), position, vec2i(0, 1));
+        area_u = entering.area * texel_step(vec2i(id.xy), packed.place, vec2i(1, 0));
+        area_v = entering.area * texel_step(vec2i(id.xy), packed.place, vec2i(0, 1));
     }
     var point = unpack_point(packed);
     point.place = (vec2f(id.xy) + 0.5) / vec2f(size);
     if (OBLIQUE) {
-        goes_on = beside_texel(vec2i(id.xy), point);
+        goes_on = beside_texel(vec2i(id.xy), packed.place);
     }
     // Any view will do: the reflection is not used, so the compiler drops it.
     let lit = light_up(point, surface, surface.normal, open_at(point.place));

@@ -10,19 +10,21 @@ fn packed_at(at: vec2i) -> Packed {
     return Packed(textureLoad(surfaces, at, 0, 0), textureLoad(surfaces, at, 1, 0));
 }
 
-// A texel along an axis, the nearer one of both sides; the texel itself where neither shows surface.
-fn texel_beside(at: vec2i, position: vec3f, axis: vec2i) -> vec2i {
+// `place` of the texel beside one along an axis, the nearer one of both sides; its own where neither shows surface.
+fn place_beside(at: vec2i, own: vec4u, axis: vec2i) -> vec4u {
+    let position = bitcast<vec3f>(own.xyz);
     let last = vec2i(textureDimensions(surfaces)) - 1;
-    var found = at;
+    var found = own;
     var least = 0.0;
     for (var side = -1; side <= 1; side += 2) {
         let other = at + side * axis;
         let within = clamp(other, vec2i(0), last);
-        let way = bitcast<vec3f>(textureLoad(surfaces, within, 0, 0).xyz) - position;
+        let place = textureLoad(surfaces, within, 0, 0);
+        let way = bitcast<vec3f>(place.xyz) - position;
         let square = dot(way, way);
-        let shown = textureLoad(surfaces, within, 1, 0).w != 0u && all(other == within);
+        let shown = any(place != vec4u(0u)) && all(other == within); // no surface is all zeros
         if (shown && (least == 0.0 || square < least)) {
-            found = within;
+            found = place;
             least = square;
         }
     }
@@ -30,18 +32,20 @@ fn texel_beside(at: vec2i, position: vec3f, axis: vec2i) -> vec2i {
 }
 
 // mm from a texel to the next along an axis; 0 where it shows no surface.
-fn texel_step(at: vec2i, position: vec3f, axis: vec2i) -> vec3f {
-    return bitcast<vec3f>(textureLoad(surfaces, texel_beside(at, position, axis), 0, 0).xyz) - position;
+fn texel_step(at: vec2i, own: vec4u, axis: vec2i) -> vec3f {
+    return bitcast<vec3f>(place_beside(at, own, axis).xyz) - bitcast<vec3f>(own.xyz);
 }
 
 // How the surface goes on beside a texel.
-fn beside_texel(at: vec2i, point: Point) -> GoesOn {
-    let u = textureLoad(surfaces, texel_beside(at, point.position, vec2i(APART, 0)), 0, 0);
-    let v = textureLoad(surfaces, texel_beside(at, point.position, vec2i(0, APART)), 0, 0);
+fn beside_texel(at: vec2i, own: vec4u) -> GoesOn {
+    let u = place_beside(at, own, vec2i(APART, 0));
+    let v = place_beside(at, own, vec2i(0, APART));
+    let position = bitcast<vec3f>(own.xyz);
+    let normal = unpack_direction(own.w);
     return GoesOn(
-        bitcast<vec3f>(u.xyz) - point.position,
-        bitcast<vec3f>(v.xyz) - point.position,
-        unpack_direction(u.w) - point.normal,
-        unpack_direction(v.w) - point.normal,
+        bitcast<vec3f>(u.xyz) - position,
+        bitcast<vec3f>(v.xyz) - position,
+        unpack_direction(u.w) - normal,
+        unpack_direction(v.w) - normal,
     );
 }
