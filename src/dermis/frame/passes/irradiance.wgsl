@@ -29,7 +29,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var point = unpack_point(packed);
     point.place = (vec2f(id.xy) + 0.5) / vec2f(size);
     if (OBLIQUE) {
-        goes_on = beside_texel(vec2i(id.xy), packed.place);
+        bend_here = bend_at(vec2i(id.xy), packed.place);
     }
     // Any view will do: the reflection is not used, so the compiler drops it.
     let lit = light_up(point, surface, surface.normal, open_at(point.place));

@@ -32,7 +32,7 @@ fn main(
         var point = unpack_point(packed);
         point.place = (vec2f(texel) + 0.5) / vec2f(textureDimensions(surfaces));
         if (OBLIQUE) {
-            goes_on = beside_texel(vec2i(texel), packed.place);
+            bend_here = bend_at(vec2i(texel), packed.place);
         }
         let lit = light_up(point, surface, surface.normal, open_at(point.place));
         slant = select(slant, lit.across / max(lit.entered, vec3f(1e-20)), lit.entered > vec3f(0.0));

@@ -63,7 +63,7 @@ fn first_that_faces(light: Light, point: Point, n: vec3f) -> u32 {
     var part = 0u;
     loop {
         let l = incident(light, point.position, part).direction;
-        if (dot(met_by(light, point, n, l).normal, l) > 0.0 || part >= parts_of(light)) {
+        if (dot(turned(n, aside_of(light, point.normal, l)), l) > 0.0 || part >= parts_of(light)) {
             break;
         }
         part++;
@@ -117,11 +117,11 @@ fn light_through(point: Point, surface: Surface, film: Film, v: vec3f, open: f32
             // Once for all parts, and not where the first of them is shaded: software adapters run what is in a branch for
             // each round of the loop around it.
             let l = incident(light, point.position, part).direction;
-            let seen = reaching(light, met_by(light, point, surface.normal, l).point, l);
+            let seen = reaching(light, moved_point(point, aside_of(light, point.normal, l)), l);
             loop {
-                let met = met_by(light, point, surface.normal, incident(light, point.position, part).direction);
-                let arriving = incident(light, met.point.position, part);
-                let cosine = dot(met.normal, arriving.direction);
+                let aside = aside_of(light, point.normal, incident(light, point.position, part).direction);
+                let arriving = incident(light, point.position + aside.moved, part);
+                let cosine = dot(turned(surface.normal, aside), arriving.direction);
                 if (cosine > 0.0) {
                     let e = arriving.irradiance * seen;
                     let filled = arriving.irradiance * max(vec3f(seen), film.scattered);

@@ -4,46 +4,48 @@
 
 override OBLIQUE: bool = false; // whether passes tell how the surface goes on beside a point
 
-// Ways along the surface to two places beside a point [mm], and by how much the normal turns there; 0 where it ends.
-struct GoesOn {
-    way_u: vec3f,
-    way_v: vec3f,
-    turn_u: vec3f,
-    turn_v: vec3f,
+// How the surface bends around a point: a unit vector along it, and how the normal turns [1/mm] along that, along both that and
+// the one across it, and across it.
+struct Bend {
+    along: vec3f,
+    turns: vec3f,
 }
 
-var<private> goes_on: GoesOn;
+var<private> bend_here: Bend;
 
-const LEAST_APART: f32 = 1e-4; // of the square of the sine between the two ways
-
-// A point as light from one direction meets it.
-struct MetByLight {
-    point: Point,
-    normal: vec3f, // with the relief
+// By how much light from a direction moves on before it comes back around a point, and the normal turns over there. Light that is
+// finer than this way, as a laser's, mostly comes back from where it entered, and so stays.
+struct Aside {
+    moved: vec3f, // [mm]
+    turn: vec3f,
 }
 
-// What light from a direction meets that comes back around a point. Light that is finer than this way, as a laser's, mostly
-// comes back from where it entered, and so stays.
-fn met_by(light: Light, point: Point, normal: vec3f, l: vec3f) -> MetByLight {
+fn aside_of(light: Light, normal: vec3f, l: vec3f) -> Aside {
     if (!OBLIQUE || light.sheet != 0u) {
-        return MetByLight(point, normal);
+        return Aside(vec3f(0.0), vec3f(0.0));
     }
-    let way = skin.aside_mm * (l - dot(l, point.normal) * point.normal);
-    let uu = dot(goes_on.way_u, goes_on.way_u);
-    let vv = dot(goes_on.way_v, goes_on.way_v);
-    let uv = dot(goes_on.way_u, goes_on.way_v);
-    let apart = uu * vv - uv * uv;
-    if (apart <= LEAST_APART * uu * vv) {
-        return MetByLight(point, normal);
+    let way = skin.aside_mm * (l - dot(l, normal) * normal);
+    let across = cross(normal, bend_here.along);
+    let a = dot(way, bend_here.along);
+    let b = dot(way, across);
+    let turn = vec2f(bend_here.turns.x * a + bend_here.turns.y * b, bend_here.turns.y * a + bend_here.turns.z * b);
+    let below = 0.5 * clamp(turn.x * a + turn.y * b, -skin.aside_mm, skin.aside_mm); // the tangent plane
+    return Aside(way - below * normal, turn.x * bend_here.along + turn.y * across);
+}
+
+fn turned(normal: vec3f, aside: Aside) -> vec3f {
+    if (!OBLIQUE) {
+        return normal;
     }
-    let u = dot(way, goes_on.way_u);
-    let v = dot(way, goes_on.way_v);
-    let turn = ((vv * u - uv * v) * goes_on.turn_u + (uu * v - uv * u) * goes_on.turn_v) / apart;
-    let bent = 0.5 * clamp(dot(turn, way), -skin.aside_mm, skin.aside_mm); // below the tangent plane
-    let moved = way - bent * point.normal;
+    return normalize(normal + aside.turn);
+}
+
+fn moved_point(point: Point, aside: Aside) -> Point {
     var there = point;
-    there.position += moved;
-    there.lit_position += moved;
-    there.normal = normalize(point.normal + turn);
-    return MetByLight(there, normalize(normal + turn));
+    if (OBLIQUE) {
+        there.position += aside.moved;
+        there.lit_position += aside.moved;
+        there.normal = turned(point.normal, aside);
+    }
+    return there;
 }

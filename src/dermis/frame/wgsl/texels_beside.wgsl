@@ -36,16 +36,27 @@ fn texel_step(at: vec2i, own: vec4u, axis: vec2i) -> vec3f {
     return bitcast<vec3f>(place_beside(at, own, axis).xyz) - bitcast<vec3f>(own.xyz);
 }
 
-// How the surface goes on beside a texel.
-fn beside_texel(at: vec2i, own: vec4u) -> GoesOn {
+const LEAST_APART: f32 = 1e-4; // of the square of the sine between two ways
+
+// How the surface bends at a texel; not at all where it ends.
+fn bend_at(at: vec2i, own: vec4u) -> Bend {
     let u = place_beside(at, own, vec2i(APART, 0));
     let v = place_beside(at, own, vec2i(0, APART));
-    let position = bitcast<vec3f>(own.xyz);
     let normal = unpack_direction(own.w);
-    return GoesOn(
-        bitcast<vec3f>(u.xyz) - position,
-        bitcast<vec3f>(v.xyz) - position,
-        unpack_direction(u.w) - normal,
-        unpack_direction(v.w) - normal,
-    );
+    let position = bitcast<vec3f>(own.xyz);
+    let way_u = bitcast<vec3f>(u.xyz) - position;
+    let way_v = bitcast<vec3f>(v.xyz) - position;
+    let along = normalize(way_u - dot(way_u, normal) * normal);
+    let across = cross(normal, along);
+    let ways = mat2x2f(dot(way_u, along), dot(way_u, across), dot(way_v, along), dot(way_v, across));
+    let apart = determinant(ways);
+    if (!(apart * apart > LEAST_APART * dot(way_u, way_u) * dot(way_v, way_v))) {
+        return Bend(along, vec3f(0.0));
+    }
+    let turn_u = unpack_direction(u.w) - normal;
+    let turn_v = unpack_direction(v.w) - normal;
+    let turns = mat2x2f(dot(turn_u, along), dot(turn_u, across), dot(turn_v, along), dot(turn_v, across));
+    let inverse = mat2x2f(ways[1][1], -ways[0][1], -ways[1][0], ways[0][0]) * (1.0 / apart);
+    let bend = turns * inverse;
+    return Bend(along, vec3f(bend[0][0], 0.5 * (bend[0][1] + bend[1][0]), bend[1][1]));
 }
