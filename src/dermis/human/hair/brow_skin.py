@@ -24,6 +24,21 @@ class Walked(NamedTuple):
     along_x: Doubles
     along_y: Doubles
 
+    def step(self, ways: Doubles, length: Doubles) -> tuple[Doubles, Doubles]:
+        """Along x and y of the front plane, how far what lies of ways (n, 3) along the skin leads [mm].
+
+        length : (n,) of the step on the skin [mm]
+        """
+        u, v = self.along_x, self.along_y
+        xx, xy, yy, x, y = (_dots(a, b) for a, b in ((u, u), (u, v), (v, v), (u, ways), (v, ways)))
+        dx, dy = yy * x - xy * y, xx * y - xy * x
+        scale = length / np.sqrt(xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy)
+        return scale * dx, scale * dy
+
+
+def _dots(a: Doubles, b: Doubles) -> Doubles:
+    return np.asarray(np.einsum("nc,nc->n", a, b))
+
 
 def nodes() -> tuple[Doubles, Doubles]:
     """x and y of the grid (nodes,) on the front plane, the left brow's side [mm]."""
@@ -62,5 +77,5 @@ class BrowSkin:
         found = np.einsum("nk,nkc->nc", share, self._node[near])
         place, normal, along_x, along_y, plane = np.split(found, [3, 6, 9, 12], axis=1)
         # curved skin lies as far from its chords as from its tangent planes
-        lift = 0.5 * (plane - np.einsum("nc,nc->n", place, normal)[:, None])
+        lift = 0.5 * (plane - _dots(place, normal)[:, None])
         return Walked(place + lift * normal, normal, along_x, along_y)

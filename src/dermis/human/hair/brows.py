@@ -55,6 +55,7 @@ def count(look: HairLook) -> int:
 def grown(
     skin: BrowSkin,
     root_mm: Doubles,
+    side: float,
     along: tuple[Doubles, Doubles],
     front_mm: tuple[Doubles, Doubles],
     rng: np.random.Generator,
@@ -63,6 +64,7 @@ def grown(
     """Knots (n, k, 3) and radii (n, k) of the hairs of one brow [mm].
 
     root_mm : (n, 3) on the skin
+    side : 1 for the left one
     along, front_mm : (n,) along and across the brow, and x, y in the front plane, from `places`
     """
     (u, v), (x, y), n = along, front_mm, len(along[0])
@@ -79,10 +81,9 @@ def grown(
     feet, normals = [here.place + beside], [here.normal]
     for k in range(2, KNOTS, 2):  # straight between: 0.16 mm off at most
         angle = turn + bend * (t[k - 1] + t[k]) / 2
-        across, up = np.cos(angle), np.sin(angle)
-        way = across[:, None] * here.along_x + up[:, None] * here.along_y
-        step = 2 * length / (KNOTS - 1) / np.sqrt(np.einsum("nc,nc->n", way, way))
-        x, y = x + step * across, y + step * up
+        out = np.stack([side * np.cos(angle), np.sin(angle), np.zeros(n)], axis=-1)
+        across, up = here.step(out, 2 * length / (KNOTS - 1))
+        x, y = x + across, y + up
         here = skin.at(x, y)
         feet += [(feet[-1] + here.place + beside) / 2, here.place + beside]
         normals += [(normals[-1] + here.normal) / 2, here.normal]

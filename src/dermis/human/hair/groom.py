@@ -65,7 +65,7 @@ def _brow(ground: Ground, rooting: Rooting, look: HairLook, side: float, rng: np
     where = ground.rooted(Roots(roots.quad[kept], roots.place[kept]))
     skin = BrowSkin(*ground.skin.foot(ground.rooted(rooting.around_brow(side)).places))
     along, front_mm = (u[kept], v[kept]), (x[kept], y[kept])
-    return _grown(where, *brows.grown(skin, where.places, along, front_mm, rng, look), 1.0)
+    return _grown(where, *brows.grown(skin, where.places, side, along, front_mm, rng, look), 1.0)
 
 
 def _lashes(
