@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -77,6 +78,16 @@ def test_even_light_on_a_plane_stays(renderer: Renderer) -> None:
     told, rows = directions(load_profile("skin1").albedo, 1.0), np.linspace(0.0, 1.0, ROWS)
     back = [np.interp(np.sqrt(cosine), rows, told.returned[:, c]) for c in range(3)]
     assert lit.mean(axis=0) == pytest.approx(cosine * np.array(back), rel=1e-3)
+
+
+def test_a_chart_of_few_texels_is_lit(renderer: Renderer) -> None:
+    """A chart of two texels and its gutter, at whose corners it is not known how the surface goes on."""
+    head = head_of(replace(FLAT, uv=0.5 + 2.0 / SIZE * FLAT.uv))
+    light = DirectionalLight(direction=(-1.0, 0.0, -0.5), irradiance=(1.0, 1.0, 1.0), shadows=False)
+    made = entered(renderer, head, light)
+    lit = made.any(axis=-1)
+    assert np.isfinite(made).all() and 0 < lit.sum() < 100
+    assert made[lit].min() > 0.3
 
 
 def test_a_stripe_stays_where_it_is(renderer: Renderer) -> None:

@@ -46,11 +46,12 @@ fn bend_at(at: vec2i, own: vec4u) -> Bend {
     let position = bitcast<vec3f>(own.xyz);
     let way_u = bitcast<vec3f>(u.xyz) - position;
     let way_v = bitcast<vec3f>(v.xyz) - position;
-    let along = normalize(way_u - dot(way_u, normal) * normal);
+    let flat = way_u - dot(way_u, normal) * normal;
+    let along = flat / max(length(flat), 1e-9);
     let across = cross(normal, along);
     let ways = mat2x2f(dot(way_u, along), dot(way_u, across), dot(way_v, along), dot(way_v, across));
     let apart = determinant(ways);
-    if (!(apart * apart > LEAST_APART * dot(way_u, way_u) * dot(way_v, way_v))) {
+    if (apart * apart <= LEAST_APART * dot(way_u, way_u) * dot(way_v, way_v)) {
         return Bend(along, vec3f(0.0));
     }
     let turn_u = unpack_direction(u.w) - normal;

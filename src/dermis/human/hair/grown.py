@@ -41,11 +41,8 @@ class Ground:
 
     def __init__(self, head: Head, plain: Mesh, share: float = 1.0) -> None:
         self.plain, self.skin, self.share = plain, Skin(head.mesh), share
-        self._mesh, self._levels, self._columns = (
-            head.mesh,
-            head.levels,
-            np.ascontiguousarray(points_of(head.mesh).T),
-        )
+        self._mesh, self._levels = head.mesh, head.levels
+        self._columns = np.ascontiguousarray(points_of(head.mesh).T)
 
     @property
     def points_mm(self) -> Doubles:
