@@ -62,12 +62,12 @@ CHANGES: dict[str, tuple[Callable[[ViewerState], ViewerState], set[str]]] = {
         {"surface", "irradiance"} | SPREAD | PICTURE,
     ),
     "mix": (lambda state: state.with_skin(mix=1.0), {"irradiance"} | SPREAD | PICTURE),
-    "profile": (lambda state: state.with_skin(profile="dark"), WEIGHED | SPREAD | PICTURE),
+    "profile": (lambda state: state.with_skin(profile="dark"), {"irradiance"} | WEIGHED | SPREAD | PICTURE),
     "fewer Gaussians": (  # which have another space for their levels
         lambda state: state.with_skin(profile="skin1"),
         {"irradiance"} | WEIGHED | SPREAD | PICTURE,
     ),
-    "pigments": (skin_of(0.05), WEIGHED | SPREAD | PICTURE),
+    "pigments": (skin_of(0.05), {"irradiance"} | WEIGHED | SPREAD | PICTURE),
     "stretch": (
         lambda state: state.with_settings(stretch="none"),
         {"stretch", "surface", "irradiance"} | WEIGHED | SPREAD | PICTURE,
