@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
+
+import pytest
+
+from dermis.batch.children import start
 
 FOLDER = Path(__file__).parent
 DRIVER = """
@@ -24,6 +29,25 @@ os._exit(0)
 def talk(pipe: Any) -> None:
     while True:
         pipe.send_bytes(b"word")  # until nobody is there
+
+
+def tell_threads(pipe: Any) -> None:
+    pipe.send(os.environ.get("OPENBLAS_NUM_THREADS"))
+
+
+@pytest.mark.parametrize(("asked", "had"), [(None, "1"), ("3", "3")])
+def test_linear_algebra_has_one_thread_unless_the_user_says(
+    asked: str | None, had: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    if asked:
+        monkeypatch.setenv("OPENBLAS_NUM_THREADS", asked)
+    child = start(tell_threads)
+    try:
+        assert child.pipe.recv() == had
+        assert os.environ.get("OPENBLAS_NUM_THREADS") == asked  # of this process, as it was
+    finally:
+        child.end()
 
 
 def test_whose_driver_is_gone_ends_in_silence() -> None:

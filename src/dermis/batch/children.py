@@ -16,6 +16,7 @@ from typing import Any
 _CONTEXT = multiprocessing.get_context("spawn")
 _BLOCKS = hasattr(signal, "pthread_sigmask")
 _ENDING_S = 1.0  # that a process may take to end after its pipe has broken
+_BLAS_THREADS = "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"
 
 
 @dataclass(frozen=True)
@@ -46,11 +47,11 @@ class Child:
 def start(target: Callable[..., None], *args: Any) -> Child:
     """Start `target(pipe, *args)` in a process of its own, which ends when this one does.
 
-    Ctrl-C, which the terminal sends to all, is left to this one.
+    Ctrl-C, which the terminal sends to all, is left to this one. NumPy has one thread in it.
     """
     ours, theirs = _CONTEXT.Pipe()
     process = _CONTEXT.Process(target=_begin, args=(target, theirs, args))
-    with _may_start(), _without_interrupts():
+    with _may_start(), _without_interrupts(), _one_thread():
         process.start()
     theirs.close()  # only its process holds it now: when that ends, our end tells
     return Child(process, ours)
@@ -90,6 +91,22 @@ def _may_start() -> Iterator[None]:
     finally:
         if was:
             here.daemon = True
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Let NumPy's linear algebra have one thread, unless the user says how many.
+
+    Of its own it has one for each core, in each process: for the small systems of a person these wait for
+    each other in loops, and took twice the processor time of all else.
+    """
+    ours = [name for name in _BLAS_THREADS if name not in os.environ]
+    os.environ.update(dict.fromkeys(ours, "1"))
+    try:
+        yield
+    finally:
+        for name in ours:
+            del os.environ[name]
 
 
 @contextmanager

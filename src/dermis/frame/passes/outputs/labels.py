@@ -57,9 +57,12 @@ def draw_hairs(
 
     view : record of the shading
     """
-    tables, picture, rows = made.tables, made.picture, strands.rows_for(graph.device, made, view)
-    constants = ("WAYS", picture.ways), ("ROWS", rows)
-    shader = program(graph.device, "outputs/hair_label.wgsl", constants)
+    tables, picture, rows = made.tables, made.picture, 1
+    if picture.ways > 1:
+        shader = program(graph.device, "outputs/hair_label_tiles.wgsl", (("WAYS", picture.ways),))
+    else:
+        rows = strands.rows_for(graph.device, made, view)
+        shader = program(graph.device, "outputs/hair_label.wgsl", (("ROWS", rows),))
     record, _ = strands.view_record(shader, made, view)
     record["samples"], record["jitter"][0, :2] = 1, 0.5
     bound = head.resources | {"strand_view": record, "drawn": tables.drawn, "hairs": tables.record}

@@ -1,0 +1,70 @@
+// Which class of hairs covers most of a pixel, where they cover at least half of it.
+//#include "strand_fragments.wgsl"
+
+//#fill const RIGHT_BROW: u32 = {class_right_brow};
+//#fill const LEFT_BROW: u32 = {class_left_brow};
+//#fill const HAIR: u32 = {class_hair};
+//#fill const BEARD: u32 = {class_beard};
+//#fill const LASHES: u32 = {class_lashes};
+const HALF: u32 = 11356u; // of `dense_of`, where what is let through is half
+
+@group(0) @binding(56) var<storage, read> hair_classes: array<u32>; // of each hair
+@group(0) @binding(57) var<storage, read_write> hair_labels: array<u32>; // a byte of all hairs, then one without lashes
+
+// By class, the logarithm of what hairs let through: sums do not depend on the order of the hairs.
+struct Dense {
+    brows: vec2u, // right and left
+    hair: u32,
+    beard: u32,
+    lashes: u32,
+}
+
+const NO_HAIRS = Dense(vec2u(0u), 0u, 0u, 0u);
+
+fn dense_of(cover: f32) -> u32 {
+    return u32(FIXED * -log(max(1.0 - cover, 1e-4)));
+}
+
+fn added(sum: Dense, kind: u32, much: u32) -> Dense {
+    let none = vec2u(0u);
+    return Dense(
+        sum.brows + select(none, vec2u(much), vec2u(kind) == vec2u(RIGHT_BROW, LEFT_BROW)),
+        sum.hair + select(0u, much, kind == HAIR),
+        sum.beard + select(0u, much, kind == BEARD),
+        sum.lashes + select(0u, much, kind == LASHES),
+    );
+}
+
+// Class of most of the hairs, 0 where they cover too little.
+fn class_of(sum: Dense) -> u32 {
+    let brow = max(sum.brows.x, sum.brows.y);
+    if (sum.brows.x + sum.brows.y + sum.hair + sum.beard + sum.lashes < HALF) {
+        return 0u;
+    }
+    let most = max(max(sum.hair, sum.beard), max(brow, sum.lashes));
+    if (most == sum.hair) {
+        return HAIR;
+    }
+    if (most == sum.beard) {
+        return BEARD;
+    }
+    if (most == sum.lashes) {
+        return LASHES;
+    }
+    return select(LEFT_BROW, RIGHT_BROW, most == sum.brows.x);
+}
+
+// With a piece of hair over the pixel, where the surface is farther away.
+fn with_piece(sum: Dense, one: Fragment, surface: f32) -> Dense {
+    if (one.cover > 0.0 && one.depth < surface) {
+        return added(sum, hair_classes[hair_of_knot(one.begin)], dense_of(one.cover));
+    }
+    return sum;
+}
+
+// Of all hairs, then of those but lashes.
+fn labels_of(sum: Dense) -> u32 {
+    var bare = sum;
+    bare.lashes = 0u;
+    return class_of(sum) | class_of(bare) << 8u;
+}
