@@ -59,11 +59,10 @@ fn next_that_may_shine(first: u32, p: vec3f, n: vec3f) -> u32 {
 }
 
 // The first part of a light that is in front of a surface; how many parts there are where none is.
-fn first_that_faces(light: Light, point: Point, n: vec3f) -> u32 {
+fn first_that_faces(light: Light, p: vec3f, n: vec3f) -> u32 {
     var part = 0u;
     loop {
-        let l = incident(light, point.position, part).direction;
-        if (dot(turned(n, aside_of(light, point.normal, l)), l) > 0.0 || part >= parts_of(light)) {
+        if (dot(n, incident(light, p, part).direction) > 0.0 || part >= parts_of(light)) {
             break;
         }
         part++;
@@ -112,16 +111,17 @@ fn light_through(point: Point, surface: Surface, film: Film, v: vec3f, open: f32
             i = next_that_may_shine(i, point.position, surface.normal);
         }
         let light = lights.light[i];
-        var part = first_that_faces(light, point, surface.normal);
+        // Once for all parts, and not where the first of them is shaded: software adapters run what is in a branch for
+        // each round of the loop around it.
+        let aside = aside_of(light, point.normal, towards_light(light, point.position));
+        let place = point.position + aside.moved;
+        let normal = turned(surface.normal, aside);
+        var part = first_that_faces(light, place, normal);
         if (part < parts_of(light)) {
-            // Once for all parts, and not where the first of them is shaded: software adapters run what is in a branch for
-            // each round of the loop around it.
-            let l = incident(light, point.position, part).direction;
-            let seen = reaching(light, moved_point(point, aside_of(light, point.normal, l)), l);
+            let seen = reaching(light, moved_point(point, aside), incident(light, place, part).direction);
             loop {
-                let aside = aside_of(light, point.normal, incident(light, point.position, part).direction);
-                let arriving = incident(light, point.position + aside.moved, part);
-                let cosine = dot(turned(surface.normal, aside), arriving.direction);
+                let arriving = incident(light, place, part);
+                let cosine = dot(normal, arriving.direction);
                 if (cosine > 0.0) {
                     let e = arriving.irradiance * seen;
                     let filled = arriving.irradiance * max(vec3f(seen), film.scattered);

@@ -66,6 +66,14 @@ fn is_parallel(light: Light) -> bool {
     return light.parallel != 0u;
 }
 
+// To the middle of a light.
+fn towards_light(light: Light, p: vec3f) -> vec3f {
+    if (is_parallel(light)) {
+        return -light.direction;
+    }
+    return normalize(light.position - p);
+}
+
 // Number of directions that a light is sampled from.
 fn parts_of(light: Light) -> u32 {
     return select(1u, light.side * light.side, SHAPES);
