@@ -10,10 +10,10 @@
 // A piece on its way through the tiles.
 struct Piece {
     begin: vec2f, // [pixel]
-    way: vec2f,
+    across: vec2f, // unit
     low: vec2f, // tiles that it may cover, first and last
     high: vec2f,
-    far: f32, // distance from the middle of a tile within which it may cover some of that [pixel]
+    far: f32, // distance from the middle of a tile within which its line may cover some of that [pixel]
 }
 
 fn piece_of(a: Drawn, b: Drawn) -> Piece {
@@ -21,13 +21,14 @@ fn piece_of(a: Drawn, b: Drawn) -> Piece {
     let reach = 0.5 * max(max(a.width, b.width), 1.0) + 1.0;
     let low = max(floor((min(a.place, b.place) - reach) / side), vec2f(0.0));
     let high = min(floor((max(a.place, b.place) + reach) / side), ceil(strand_view.size / side) - 1.0);
-    return Piece(a.place, b.place - a.place, low, high, reach + 0.7072 * side);
+    let way = b.place - a.place;
+    let across = vec2f(-way.y, way.x) / max(length(way), 1e-6);
+    return Piece(a.place, across, low, high, reach + 0.5 * side * (abs(across.x) + abs(across.y)));
 }
 
+// Of the tiles from `low` to `high`, which all lie along it.
 fn covers(piece: Piece, tile: vec2f) -> bool {
-    let middle = (tile + 0.5) * f32(STRAND_TILE) - piece.begin;
-    let t = clamp(dot(middle, piece.way) / max(dot(piece.way, piece.way), 1e-12), 0.0, 1.0);
-    return distance(middle, t * piece.way) <= piece.far;
+    return abs(dot((tile + 0.5) * f32(STRAND_TILE) - piece.begin, piece.across)) <= piece.far;
 }
 
 @compute @workgroup_size(64)

@@ -73,6 +73,8 @@ fn free_share(depth: f32, depths: Depths) -> f32 {
 struct Held {
     a: vec2f,
     b: vec2f,
+    way: vec2f, // unit
+    run: f32, // [pixel]
     first: vec2f,
     last: vec2f,
     ends: vec4f, // widths, then depths
@@ -87,7 +89,8 @@ fn hold(listed: u32) -> Held {
     let begin = begin_of(listed);
     let a = drawn[begin];
     let b = drawn[begin + 1u];
-    let way = (b.place - a.place) / max(distance(a.place, b.place), 1e-4);
+    let run = distance(a.place, b.place);
+    let way = (b.place - a.place) / max(run, 1e-4);
     var first = way;
     var last = way;
     if ((listed & FIRST_PIECE) == 0u) {
@@ -96,20 +99,18 @@ fn hold(listed: u32) -> Held {
     if ((listed & LAST_PIECE) == 0u) {
         last += unit(drawn[begin + 2u].place - b.place);
     }
-    return Held(a.place, b.place, first, last, vec4f(a.width, b.width, a.depth, b.depth), begin);
+    return Held(a.place, b.place, way, run, first, last, vec4f(a.width, b.width, a.depth, b.depth), begin);
 }
 
 // A hair narrower than a pixel is drawn a pixel wide and covers less of it.
 fn fragment_of(place: vec2f, one: Held) -> Fragment {
     let none = Fragment(0.0, 0u, 0.0, 0.0);
-    let run = distance(one.a, one.b);
-    if (run < 1e-4) {
+    if (one.run < 1e-4) {
         return none;
     }
-    let way = (one.b - one.a) / run;
     let from_a = place - one.a;
-    let along = clamp(dot(from_a, way) / run, 0.0, 1.0);
-    let beside = abs(from_a.x * way.y - from_a.y * way.x);
+    let along = clamp(dot(from_a, one.way) / one.run, 0.0, 1.0);
+    let beside = abs(from_a.x * one.way.y - from_a.y * one.way.x);
     let width = mix(one.ends.x, one.ends.y, along);
     let shown = max(width, 1.0);
     if (beside >= 0.5 * shown + 0.5 || dot(from_a, one.first) < 0.0 || dot(place - one.b, one.last) >= 0.0) {
