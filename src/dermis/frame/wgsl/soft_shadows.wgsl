@@ -4,7 +4,10 @@ const STEPS: u32 = 8u; // of a shadow ray
 const CLOSE: u32 = 2u; // steps that are near the point's own surface
 const THICKNESS: f32 = 4.0; // least thickness of occluders [mm]
 const STEEP: f32 = 1.5; // steps by which a ray may be behind a surface that it goes through
+const LEAST_LINES: u32 = 12u; // as in lights/records.py
 const LEAST_PROBES: u32 = 8u; // rays after which the others are skipped if all agree
+override RAYS_APART: u32 = 1u; // of the rays to a light one in so many is followed, where edges of shadows do not show
+
 const LEAST_TEXELS: f32 = 1.5; // half width of the sharpest soft shadow's edge
 
 // A point as the light sees it, in the map's frame: right, up, forward.
@@ -41,12 +44,13 @@ fn soft_visibility(light: Light, point: Point) -> f32 {
         return 1.0;
     }
     let steps = steps_with_something(light, at);
-    let probes = max(light.lines / 4u, LEAST_PROBES);
+    let lines = min(light.lines, max(light.lines / RAYS_APART, LEAST_LINES));
+    let probes = max(lines / 4u, LEAST_PROBES);
     var followed = 0u;
     var hidden = 0u;
-    for (var i = 0u; i < light.lines; i += 4u) {
+    for (var i = 0u; i < lines; i += 4u) {
         let places = four_places(light, i);
-        let rising = bits(rise(light, at, places)) & ((1u << min(light.lines - i, 4u)) - 1u);
+        let rising = bits(rise(light, at, places)) & ((1u << min(lines - i, 4u)) - 1u);
         if (rising == 0u) {
             continue; // below the tangent plane: they give no light here
         }

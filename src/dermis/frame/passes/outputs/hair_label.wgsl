@@ -1,30 +1,25 @@
 // The class of the hairs over each pixel.
 //#include "hair_class.wgsl"
+//#include "strand_rows.wgsl"
 
-override ROWS: u32 = 1u; // pixels of an invocation, one below the other; see `rows_of`
+fn put(pixel: vec2u, label: u32) {
+    hair_labels[pixel.y * u32(strand_view.size.x) + pixel.x] = label;
+}
 
-@group(0) @binding(31) var<storage, read> chains: array<u32>; // see strands_bin.wgsl
-@group(0) @binding(32) var<storage, read> links: array<vec2u>;
+fn leave(pixel: vec2u) {
+    put(pixel, 0u);
+}
 
-fn label_at(pixel: vec2u) -> u32 {
+fn cover(pixel: vec2u, first: u32) {
     let depths = depths_at(pixel);
     var sum = NO_HAIRS;
-    let tile = pixel.y / STRAND_TILE * tiles_across(strand_view.size) + pixel.x / STRAND_TILE;
-    for (var link = chains[1u + tile]; link != 0u; link = links[link - 1u].y) {
+    for (var link = first; link != 0u; link = links[link - 1u].y) {
         sum = with_piece(sum, fragment_of(vec2f(pixel) + 0.5, hold(links[link - 1u].x)), depths.first.x);
     }
-    return labels_of(sum);
+    put(pixel, labels_of(sum));
 }
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let size = vec2u(strand_view.size);
-    let first = vec2u(id.x, id.y * ROWS);
-    if (any(first >= size)) {
-        return;
-    }
-    let end = min(first.y + ROWS, size.y);
-    for (var y = first.y; y < end; y += 1u) {
-        hair_labels[y * size.x + id.x] = label_at(vec2u(id.x, y));
-    }
+    cover_rows(id.xy, vec2u(strand_view.size));
 }

@@ -1,0 +1,44 @@
+// Pixels one below the other, for an invocation that does them. What it makes of one that hairs may cover is its own function
+// `cover`, of one that none does `leave`: a loop passes these over, as software adapters run what is in a branch for all.
+//#include "strand_fragments.wgsl"
+
+override ROWS: u32 = 1u; // pixels of an invocation; see `rows_of`
+
+@group(0) @binding(31) var<storage, read> chains: array<u32>; // see strands_bin.wgsl
+@group(0) @binding(32) var<storage, read> links: array<vec2u>;
+
+fn chain_at(pixel: vec2u) -> u32 {
+    return chains[1u + pixel.y / STRAND_TILE * tiles_across(strand_view.size) + pixel.x / STRAND_TILE];
+}
+
+// The next pixel that hairs may cover.
+fn next_covered(first: vec2u, end: u32) -> vec2u {
+    var at = first;
+    loop {
+        if (at.y >= end || chain_at(at) != 0u) {
+            break;
+        }
+        leave(at);
+        at.y += 1u;
+    }
+    return at;
+}
+
+fn cover_rows(id: vec2u, size: vec2u) {
+    let first = vec2u(id.x, id.y * ROWS);
+    if (any(first >= size)) {
+        return;
+    }
+    let end = min(first.y + ROWS, size.y);
+    var at = next_covered(first, end);
+    if (at.y >= end) {
+        return;
+    }
+    loop {
+        cover(at, chain_at(at));
+        at = next_covered(at + vec2u(0u, 1u), end);
+        if (at.y >= end) {
+            break;
+        }
+    }
+}
