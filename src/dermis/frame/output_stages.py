@@ -13,28 +13,44 @@ from dermis.frame.passes.outputs.planes import Drawn, Planes
 from dermis.frame.passes.visibility_buffer import draw_layers
 from dermis.frame.projection import MIDDLE, Views
 from dermis.gpu import Graph
+from dermis.gpu.program import Resources
 
 Stage = Callable[[Graph, Planes, Inputs, Drawn], None]
 _OF_THE_SURFACE = ("DETAIL",)  # pipeline constants of surface.wgsl
 
 
-def draw_outputs(graph: Graph, inputs: Inputs, below: Any) -> None:
+def draw_centres(graph: Graph, inputs: Inputs) -> Any:
+    """Find the triangle at each pixel's centre, where outputs are asked; a texture."""
+    made = inputs.resources
+    if made.outputs is None or made.outputs.centres is None:
+        return made.visibility.texture
+    centres, views = made.outputs.centres, Views(inputs.camera.clips, MIDDLE)
+    draw_layers(graph, "outputs", centres, views, made.head)
+    return centres.texture
+
+
+def labels_of_hairs(inputs: Inputs, centres: Any) -> Resources | None:
+    """What the pass that draws hairs is given to label them; None where nobody asks."""
+    made = inputs.resources.outputs
+    if made is None or made.labels is None or made.labels.classes is None:
+        return None
+    return labels.of_hairs(made.labels, centres)
+
+
+def draw_outputs(graph: Graph, inputs: Inputs, centres: Any, below: Any) -> None:
     """Fill the planes of all outputs that are asked.
 
+    centres : from `draw_centres`
     below : what the shading read as `scattered`
     """
     made = inputs.resources.outputs
     if made is None:
         return
-    centres = inputs.resources.visibility
-    if made.centres is not None:
-        centres, views = made.centres, Views(inputs.camera.clips, MIDDLE)
-        draw_layers(graph, "outputs", centres, views, inputs.resources.head)
     for planes in made.planes:
-        STAGES[planes.stage](graph, planes, inputs, Drawn(centres.texture, below))
+        STAGES[planes.stage](graph, planes, inputs, Drawn(centres, below))
     if made.landmarks:
         look, shape_now = _look(inputs), inputs.resources.shape
-        landmarks.draw(graph, made.landmarks, inputs.lit, look, centres.texture, shape_now)
+        landmarks.draw(graph, made.landmarks, inputs.lit, look, centres, shape_now)
 
 
 def _geometry(graph: Graph, planes: Planes, inputs: Inputs, drawn: Drawn) -> None:
@@ -62,12 +78,9 @@ def _alpha(graph: Graph, planes: Planes, inputs: Inputs, drawn: Drawn) -> None:
 
 
 def _label(graph: Graph, planes: Planes, inputs: Inputs, drawn: Drawn) -> None:
-    made = inputs.resources
-    assert made.outputs is not None
-    space = made.outputs.labels
-    if made.strands and space.classes is not None:
-        labels.draw_hairs(graph, space, made.strands, inputs.view, made.head, drawn.centres)
-    labels.draw(graph, planes, inputs.lit, _look(inputs), drawn.centres, space)
+    made = inputs.resources.outputs
+    assert made is not None
+    labels.draw(graph, planes, inputs.lit, _look(inputs), drawn.centres, made.labels)
 
 
 def _look(inputs: Inputs) -> tuple[Any, Any]:

@@ -52,7 +52,15 @@ TILE = 16
 """Side of workgroups that do little: smaller ones finish before the H200 has started the next."""
 _LEVELS = PASSES / "levels"
 _SOURCES = {FLOATS: _LEVELS / "loaded", HALVES: _LEVELS / "filtered"}
-_STORES = {FLOATS: _LEVELS / "floats", HALVES: _LEVELS / "halves"}
+LABELS, NO_LABELS = "labels", "no labels"
+"""What a pass of hairs stores besides the picture."""
+_STRANDS = PASSES / "strand_labels"
+_STORES = {
+    FLOATS: _LEVELS / "floats",
+    HALVES: _LEVELS / "halves",
+    LABELS: _STRANDS / "counted",
+    NO_LABELS: _STRANDS / "none",
+}
 EACH = 64
 """Invocations of a workgroup, as in each.wgsl."""
 _ROW = 32768  # workgroups in a row, at most 65535
@@ -64,7 +72,8 @@ _SAMPLES = 64  # that an invocation may meet: drivers end what goes round loops 
 def shader_folders(source: str = "", store: str = "") -> tuple[Folder, ...]:
     """Where includes are looked up.
 
-    source, store : formats in which the shader reads and stores blurred light, if it does
+    source, store : formats in which the shader reads and stores blurred light, if it does; of passes of hairs
+        whether they store labels
     """
     levels = [_SOURCES[source]] if source else []
     levels += [_STORES[store]] if store else []

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from dermis.frame.geometry import HeadResources
-from dermis.frame.passes import each, program
+from dermis.frame.passes import LABELS, NO_LABELS, each, program
 from dermis.frame.shape import Shape
 from dermis.frame.strand_space import TILE
 from dermis.frame.strands import WINDOW_KNOTS, StrandResources, StrandTables, drawn_of
@@ -50,16 +50,23 @@ def shadow(graph: Recorder, strands: StrandResources, lit: Resources) -> None:
 
 
 def draw(
-    graph: Recorder, strands: StrandResources, look: Look, head: HeadResources, visibility: Any, radiance: Any
+    graph: Recorder,
+    strands: StrandResources,
+    look: Look,
+    head: HeadResources,
+    visibility: Any,
+    radiance: Any,
+    labels: Resources | None = None,
 ) -> Any:
     """The picture with hairs over it, a texture of theirs.
 
     look : resources and record of the shading, and pipeline constants of the lights
     visibility : texture of the triangles that samples see
+    labels : what is bound where the class of the hairs over each pixel is found as well
     """
     made, picture, (lit, view, lights) = strands.tables, strands.picture, look
     light = program(graph.device, "strands_light.wgsl", (*lights, ("RAYS_APART", _RAYS_APART)))
-    record, coarse = view_record(light, strands, view)
+    record, coarse = _view_record(light, strands, view)
     seen = {"strand_view": record, "drawn": made.drawn, "hairs": made.record}
     knots = made.fine.hairs * made.fine.knots + coarse * made.coarse.knots
     pieces = made.fine.pieces() + made.coarse.pieces(coarse)
@@ -69,19 +76,19 @@ def draw(
     ways = (("WAYS", picture.ways),)
     _each(graph, "strands_bin.wgsl", seen | listed, pieces, ways)
     bound = head.resources | seen | listed
-    bound |= {"visibility_buffer": visibility, "behind": radiance, "image": picture.result}
-    width, height = picture.result.size[:2]
+    bound |= {"visibility_buffer": visibility, "behind": radiance, "image": picture.result, **(labels or {})}
+    (width, height), store = picture.result.size[:2], LABELS if labels else NO_LABELS
     if picture.ways > 1:
-        shader = program(graph.device, "strands_draw_tiles.wgsl", ways)
+        shader = program(graph.device, "strands_draw_tiles.wgsl", ways, store=store)
         graph.compute("strands", shader, bound, (width, height))
         return picture.result
-    rows = rows_for(graph.device, strands, view)
-    shader = program(graph.device, "strands_draw.wgsl", (("ROWS", rows),))
+    rows = _rows_for(graph.device, strands, view)
+    shader = program(graph.device, "strands_draw.wgsl", (("ROWS", rows),), store=store)
     graph.compute("strands", shader, bound, (width, -(-height // rows)))
     return picture.result
 
 
-def view_record(shader: ComputeProgram, strands: StrandResources, view: Any) -> tuple[Any, int]:
+def _view_record(shader: ComputeProgram, strands: StrandResources, view: Any) -> tuple[Any, int]:
     """A shader's record StrandView, and how many coarse hairs stand for all.
 
     view : record of the shading
@@ -95,7 +102,7 @@ def view_record(shader: ComputeProgram, strands: StrandResources, view: Any) -> 
     return record, coarse
 
 
-def rows_for(device: Device, strands: StrandResources, view: Any) -> int:
+def _rows_for(device: Device, strands: StrandResources, view: Any) -> int:
     """`rows_of` what tiles of this picture may list."""
     made = strands.tables
     pixel_mm = _pixel_mm(view, made, strands.picture.result.size[1])

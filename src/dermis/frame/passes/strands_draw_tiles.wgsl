@@ -1,5 +1,6 @@
 // The same by tiles.
 //#include "strand_team.wgsl"
+//#include "strand_labels.wgsl"
 
 @group(0) @binding(34) var behind: texture_2d<f32>; // radiance and coverage
 @group(0) @binding(35) var image: texture_storage_2d<rgba32float, write>;
@@ -11,10 +12,12 @@ fn begin_pieces(pixel: vec2u) {
     depths = Depths(vec4f(-1.0), vec4f(-1.0), 1.0);
     if (all(pixel < textureDimensions(image))) {
         depths = depths_at(pixel);
+        begin_labels(pixel);
     }
 }
 
 fn see_piece(seen: Fragment) {
+    label_piece(seen);
     var one = seen;
     one.cover *= free_share(one.depth, depths);
     if (one.cover > 0.0) {
@@ -32,6 +35,7 @@ fn main(
     if (any(id.xy >= textureDimensions(image))) {
         return;
     }
+    put_label(id.xy);
     let under = textureLoad(behind, id.xy, 0);
     if (covered) {
         textureStore(image, id.xy, laid_over(under));

@@ -1,4 +1,4 @@
-// Which class of hairs covers most of a pixel, where they cover at least half of it.
+// The class of hairs that covers most of each pixel, where they cover at least half of it, in front of what its centre sees.
 //#include "strand_fragments.wgsl"
 
 //#fill const RIGHT_BROW: u32 = {class_right_brow};
@@ -8,6 +8,7 @@
 //#fill const LASHES: u32 = {class_lashes};
 const HALF: u32 = 11356u; // of `dense_of`, where what is let through is half
 
+@group(0) @binding(51) var centres: texture_2d_array<u32>; // triangle + 1 at the centre of each pixel
 @group(0) @binding(56) var<storage, read> hair_classes: array<u32>; // of each hair
 @group(0) @binding(57) var<storage, read_write> hair_labels: array<u32>; // a byte of all hairs, then one without lashes
 
@@ -54,17 +55,31 @@ fn class_of(sum: Dense) -> u32 {
     return select(LEFT_BROW, RIGHT_BROW, most == sum.brows.x);
 }
 
-// With a piece of hair over the pixel, where the surface is farther away.
-fn with_piece(sum: Dense, one: Fragment, surface: f32) -> Dense {
-    if (one.cover > 0.0 && one.depth < surface) {
-        return added(sum, hair_classes[hair_of_knot(one.begin)], dense_of(one.cover));
-    }
-    return sum;
-}
-
 // Of all hairs, then of those but lashes.
 fn labels_of(sum: Dense) -> u32 {
     var bare = sum;
     bare.lashes = 0u;
     return class_of(sum) | class_of(bare) << 8u;
+}
+
+var<private> counted: Dense; // all 0 at first
+var<private> surface: f32; // how deep it is
+
+fn begin_labels(pixel: vec2u) {
+    surface = 1e30;
+    let found = textureLoad(centres, pixel, 0, 0).x;
+    if (found > 0u) {
+        surface = depth_at(found - 1u, vec2f(pixel) + 0.5);
+    }
+}
+
+fn label_piece(one: Fragment) {
+    if (one.cover > 0.0 && one.depth < surface) {
+        counted = added(counted, hair_classes[hair_of_knot(one.begin)], dense_of(one.cover));
+    }
+}
+
+fn put_label(pixel: vec2u) {
+    hair_labels[pixel.y * u32(strand_view.size.x) + pixel.x] = labels_of(counted);
+    counted = NO_HAIRS; // for the next pixel
 }
