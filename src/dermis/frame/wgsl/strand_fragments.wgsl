@@ -152,14 +152,17 @@ fn settle(k: u32, one: Fragment) -> Fragment {
 }
 
 fn take(fragment: Fragment) {
-    var one = settle(0u, fragment); // without a loop, see `rows_of`
-    one = settle(1u, one);
-    one = settle(2u, one);
-    one = settle(3u, one);
-    one = settle(4u, one);
-    one = settle(5u, one);
-    one = settle(6u, one);
-    one = settle(7u, one);
+    var one = fragment;
+    if (in_front(one, kept[NEAREST - 1u])) {
+        one = settle(0u, one); // without a loop, see `rows_of`
+        one = settle(1u, one);
+        one = settle(2u, one);
+        one = settle(3u, one);
+        one = settle(4u, one);
+        one = settle(5u, one);
+        one = settle(6u, one);
+        one = settle(7u, one);
+    }
     farther += vec2u(FIXED * vec2f(one.cover, -log(max(1.0 - one.cover, 1e-4))));
     light += vec3u(FIXED * one.cover * min(radiance_at(one), vec3f(BRIGHTEST)));
 }

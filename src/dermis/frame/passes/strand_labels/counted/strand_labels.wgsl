@@ -79,6 +79,20 @@ fn label_piece(one: Fragment) {
     }
 }
 
+var<workgroup> handed_labels: array<Dense, 64>; // from one layer of a workgroup to another, see strand_team.wgsl
+
+fn hand_labels_over(lane: u32) {
+    handed_labels[lane] = counted;
+}
+
+fn take_labels_over(lane: u32) {
+    let other = handed_labels[lane];
+    counted.brows += other.brows;
+    counted.hair += other.hair;
+    counted.beard += other.beard;
+    counted.lashes += other.lashes;
+}
+
 fn put_label(pixel: vec2u) {
     hair_labels[pixel.y * u32(strand_view.size.x) + pixel.x] = labels_of(counted);
     counted = NO_HAIRS; // for the next pixel
