@@ -43,7 +43,9 @@ fn highlights(lane: u32, brightness: array<f32, OF_LANE>) -> f32 {
         for (var i = 0u; i < OF_LANE; i += 1u) {
             count += u32(logs[i] > middle);
         }
-        atomicAdd(&over, count);
+        if (count > 0u) {
+            atomicAdd(&over, count);
+        }
         workgroupBarrier();
         let brighter = atomicLoad(&over) > most;
         low = select(low, middle, brighter);

@@ -26,7 +26,10 @@ fn add(layer: i32, texel: vec2i, cover: f32, depth: f32) {
     }
     let word = window_word(layer, vec2u(texel));
     if (!COVERS) {
-        atomicMin(&splatted[word], u32(DEEP * max(depth, 0.0)));
+        let deep = u32(DEEP * max(depth, 0.0));
+        if (deep < atomicLoad(&splatted[word])) { // few are nearer, and changes wait for each other
+            atomicMin(&splatted[word], deep);
+        }
         return;
     }
     let behind = depth - f32(atomicLoad(&splatted[word])) / DEEP;
