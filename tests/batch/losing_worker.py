@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from dermis.batch.processes import _serve
+from dermis.batch.processes import serve as draw
 from dermis.frame import renderer as renderer_module
 from dermis.gpu import Device, Frame, open_device
 
@@ -21,7 +21,7 @@ def serve(pipe: Any, *given: Any) -> None:
     folder = Path(os.environ[FOLDER])
     number = len(list(folder.iterdir()))
     if number >= int(os.environ[WORKERS]):
-        _serve(pipe, *given)
+        draw(pipe, *given)
         return
     (folder / str(number)).touch()
     opened: list[Device] = []
@@ -37,4 +37,4 @@ def serve(pipe: Any, *given: Any) -> None:
         usual(frame)
 
     with patch.object(renderer_module, "open_device", open_noted), patch.object(Frame, "submit", submit):
-        _serve(pipe, *given)
+        draw(pipe, *given)

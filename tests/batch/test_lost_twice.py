@@ -29,7 +29,7 @@ def begun(
         if not name.startswith((SHARD, "index", "README")):
             (out / name).parent.mkdir(parents=True, exist_ok=True)
             (out / name).write_bytes(data)
-    monkeypatch.setattr("dermis.batch.processes._serve", losing_worker.serve)
+    monkeypatch.setattr("dermis.batch.processes.serve", losing_worker.serve)
     monkeypatch.setenv(losing_worker.FOLDER, str(lost))
     return out, lost
 

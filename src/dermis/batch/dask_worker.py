@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import tomllib
+import warnings
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,21 +13,26 @@ from typing import Any, Self
 
 from distributed import WorkerPlugin, get_worker
 
-from dermis.batch.allocator import keep_freed_memory
+from dermis.batch.children import Child, start
 from dermis.batch.faults import LostProcessError
+from dermis.batch.processes import Seat, serve
 from dermis.batch.ranks import taken_rank
 from dermis.batch.shards import Shard
 from dermis.batch.spec import spec_of
 from dermis.batch.told import Told
-from dermis.batch.worker import Work, Worker
-from dermis.errors import DermisError
+from dermis.batch.worker import Work
+from dermis.errors import DermisError, DermisWarning
 from dermis.gpu.adapters import alike_adapters
-from dermis.gpu.failures import DeviceError
+
+_TRIM = "MALLOC_TRIM_THRESHOLD_"
+"""By which dask's nannies have all memory given back at once: arrays of megabytes would fault in each time."""
 
 
 @dataclass
 class Drawing(WorkerPlugin):  # type: ignore[misc]
-    """Keeps a worker of ours in one of dask's, from its first shard to the end of the run.
+    """Keeps a process of ours beside a worker of dask's, from its first shard to the end of the run.
+
+    It draws as without dask: dask's worker waits for it, and has no part in the drawing.
 
     text, folder : of the spec; the files that it names are known by their hashes, which are in the text
     out, encoders, keep_going : of `Work`
@@ -49,7 +56,7 @@ class Drawing(WorkerPlugin):  # type: ignore[misc]
 
     def setup(self, worker: Any) -> None:
         """Called by dask when the worker has the plugin."""
-        keep_freed_memory()
+        os.environ.pop(_TRIM, None)
         self._kept = {"lock": threading.Lock(), "ends": ExitStack(), "over": threading.Event()}
 
     def teardown(self, worker: Any) -> None:
@@ -62,12 +69,12 @@ class Drawing(WorkerPlugin):  # type: ignore[misc]
     def draw(self, shard: Shard) -> Told:
         """Draw a shard: what became of it.
 
-        Raises DeviceError and LostProcessError, after which dask tries again.
+        Raises LostProcessError where the process or its device was lost, after which dask tries again.
         """
         with self._kept["lock"]:
             try:
-                failed = self._worker().draw(shard, self._go_on)
-            except (DeviceError, LostProcessError):
+                return self._drawn(shard)
+            except LostProcessError:
                 self._close()
                 raise
             except DermisError as fault:
@@ -75,27 +82,42 @@ class Drawing(WorkerPlugin):  # type: ignore[misc]
             finally:
                 if self._kept["over"].is_set():
                     self._close()
-        return Told(shard.stop - shard.first, shard, failed)
 
-    def _go_on(self) -> None:
-        if self._kept["over"].is_set():
-            raise DermisError("the run: expected to go on, but it is over. Give the command again.")
+    def _drawn(self, shard: Shard) -> Told:
+        child = self._child()
+        try:
+            child.pipe.send(shard)
+            while not self._kept["over"].is_set():
+                told: Told = child.pipe.recv()
+                if told.again:
+                    raise LostProcessError(told.again)
+                if told.note:
+                    warnings.warn(told.note, DermisWarning, stacklevel=2)
+                if told.refusal:
+                    self._close()
+                    return told
+                if told.shard is not None:
+                    return Told(shard.stop - shard.first, shard, told.failed)
+        except (EOFError, OSError) as fault:
+            raise LostProcessError(f"a worker: {child.fate()}") from fault
+        return Told(refusal="the run: expected to go on, but it is over. Give the command again.")
 
-    def _worker(self) -> Worker:
-        """Ours, opened for the first shard."""
-        if "worker" not in self._kept:
+    def _child(self) -> Child:
+        """The process, started for the first shard."""
+        if "child" not in self._kept:
             ends = self._kept["ends"]
             rank = ends.enter_context(taken_rank())
             adapters = alike_adapters(self.adapter)
             spec = spec_of(tomllib.loads(self.text), self.folder)
             work = Work(spec, self.out, self.encoders, self.keep_going)
-            chosen = f"#{adapters[rank % len(adapters)].number}"
-            self._kept["worker"] = ends.enter_context(Worker(chosen, work))
-        found: Worker = self._kept["worker"]
+            seat = Seat(f"#{adapters[rank % len(adapters)].number}")
+            self._kept["child"] = start(serve, seat, work)
+            ends.callback(self._kept["child"].end)
+        found: Child = self._kept["child"]
         return found
 
     def _close(self) -> None:
-        self._kept.pop("worker", None)
+        self._kept.pop("child", None)
         self._kept["ends"].close()
 
 

@@ -84,7 +84,7 @@ class _Crew:
     def _employ(self, seat: Seat) -> None:
         """Start a worker, if there is a shard for it."""
         if self._waiting:
-            member = _Member(seat, start(_serve, seat, self._work), self._waiting.popleft())
+            member = _Member(seat, start(serve, seat, self._work), self._waiting.popleft())
             self._members.append(member)
             self._give(member)
 
@@ -131,7 +131,7 @@ class _Crew:
         member.child.end()
 
 
-def _serve(pipe: Any, seat: Seat, work: Work) -> None:
+def serve(pipe: Any, seat: Seat, work: Work) -> None:
     """What a worker process does: draw the shards that come, and tell."""
     if seat.threads:
         os.environ["LP_NUM_THREADS"] = str(seat.threads)  # before its driver is loaded
