@@ -25,7 +25,7 @@ from dermis.errors import DermisError, DermisWarning
 from dermis.gpu.adapters import alike_adapters
 
 _TRIM = "MALLOC_TRIM_THRESHOLD_"
-"""By which dask's nannies have all memory given back at once: arrays of megabytes would fault in each time."""
+"""By which dask's nannies have all memory given back at once: large arrays would fault in each time."""
 
 
 @dataclass
