@@ -86,20 +86,28 @@ def lit_room(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Floats]:
 
 @pytest.mark.parametrize(
     ("m", "angle", "most"),
-    [(0.15, 78, 0.03), (0.3, 45, 0.03), (0.3, 66, 0.04), (0.3, 78, 0.03), (0.3, 85, 0.05), (0.5, 66, 0.08)],
+    [
+        (0.15, 12, 0.015),
+        (0.3, 12, 0.025),
+        (0.15, 78, 0.01),
+        (0.3, 45, 0.03),
+        (0.3, 66, 0.035),
+        (0.3, 78, 0.03),
+        (0.3, 85, 0.02),
+        (0.5, 66, 0.035),
+    ],
 )
-def test_grazing_reflections_are_the_lobes(
-    lit_room: tuple[str, Floats], m: float, angle: float, most: float
-) -> None:
+def test_reflections_are_the_lobes(lit_room: tuple[str, Floats], m: float, angle: float, most: float) -> None:
     """Against a plain sum of the whole lobe, over 24 views.
 
-    Four lobes of equal weights, no sharper than 0.05, err by 9, 4, 7, 6, 7 and 15 %.
+    Four lobes in the plane of view, whose directions are averaged from column to column of the table, err by
+    49, 21, 1.5, 2.7, 3.6, 1.9, 0.8 and 5.7 %.
     """
     pairs = np.random.default_rng(5).normal(size=(24, 2, 3))
     assert error_of(lit_room, pairs, float(np.cos(np.radians(angle))), m) < most
 
 
-@pytest.mark.parametrize(("cosine", "most"), [(0.7, 0.05), (0.4, 0.09), (0.2, 0.07)])
+@pytest.mark.parametrize(("cosine", "most"), [(0.7, 0.03), (0.4, 0.025), (0.2, 0.025)])
 def test_grazing_reflections_all_around_are_the_lobes(
     lit_room: tuple[str, Floats], cosine: float, most: float
 ) -> None:

@@ -38,12 +38,12 @@ _START = np.array(
 def fitted_mirrors(lobe: Lobe) -> Floats:
     """(12, 16, 5, 4) angle, angle beside the plane of view [rad], roughness, weight, by the table's nodes.
 
-    Angles are from the normal, away from the eye. Three lobes lie in the plane of view; of these steep views
-    have two or one, and the others no weight. Two are a pair: to the left and right of the plane, or both in
-    it where the surface's lobe is long. Their sum differs least from it under skies whose power falls with
-    the degree of harmonics: what a picture would show of the difference is made small, light from below
-    the horizon as well. Fits go from rough and grazing to smooth and steep, each from its neighbours', so that
-    lobes keep their places and change evenly between the nodes.
+    Angles are from the normal, away from the eye. Three lobes lie in the plane of view; of these steep
+    views have two or one, and the others no weight. Two are a pair: to the left and right of the plane, or
+    both in it where the surface's lobe is long. Their sum differs least from it under skies whose power
+    falls with the degree of harmonics: what a picture would show of the difference is made small, light
+    from below the horizon as well. Fits go from rough and grazing to smooth and steep, each from its
+    neighbours', so that lobes keep their places and change evenly between the nodes.
     """
     found: dict[Node, Floats] = {}
     targets = {

@@ -39,15 +39,14 @@ def equivalent_mirrors(model: str = "kelemen") -> Floats:
 
     model : name in MODELS
 
-    Rows are even in the logarithm of the roughness from 0.05 to 1, columns in the root of the view's cosine.
-    A direction is given as a place (x, y), by stereographic projection about the mirror direction: it is
-    2 x away from the eye, 2 y beside the plane of view and 1 - x^2 - y^2 along the mirror direction, all over
-    1 + x^2 + y^2. So lobes follow that direction between the columns, the last two of which are 29
-    degrees apart.
-    The weighted sum of the five stands for the lobe, which towards grazing views leaves the mirror direction,
-    gets longer in the plane of view than across, and ends at the horizon. Lobes without weight need not be
-    looked up. Models that the package does not ship are fitted when they are first used, in half
-    a minute.
+    Rows are even in the logarithm of the roughness from 0.05 to 1, columns in the root of the view's
+    cosine. A direction is given as a place (x, y), by stereographic projection about the mirror direction:
+    it is 2 x away from the eye, 2 y beside the plane of view and 1 - x^2 - y^2 along the mirror direction,
+    all over 1 + x^2 + y^2. So lobes follow that direction between the columns, the last two of which are 29
+    degrees apart. The weighted sum of the five stands for the lobe, which towards grazing views leaves the
+    mirror direction, gets longer in the plane of view than across, and ends at the horizon. Lobes without
+    weight need not be looked up. Models that the package does not ship are fitted when they are first used,
+    in half a minute.
     """
     rows = [row for row in read_rows("dermis.environment", "data/mirrors") if row["model"] == model]
     columns = " ".join(
