@@ -1,6 +1,6 @@
-"""Makes src/dermis/environment/data/mirrors.csv: surface lobes as four round ones in the plane of view.
+"""Makes src/dermis/environment/data/mirrors.csv: surface lobes as round ones about the plane of view.
 
-python tools/mirror_lobes.py, a minute or two. `dermis.environment.mirror_fits` says how they are found.
+python tools/mirror_lobes.py, two or three minutes. `dermis.environment.mirror_fits` says how they are found.
 """
 
 from __future__ import annotations
@@ -15,16 +15,17 @@ from dermis.specular.models import MODELS
 OUT = Path(__file__).parent.parent / "src" / "dermis" / "environment" / "data" / "mirrors.csv"
 HEAD = """\
 # quantity: round lobes whose weighted sum stands for a surface's, by its roughness m and the view's cosine:
-#   angle from the normal in the plane of view, away from the eye, roughness, and share of the light
-# unit: angle in radians; all others dimensionless
-# source: tools/mirror_lobes.py, least squares over directions
+#   angle from the normal in the plane of view, away from the eye, angle beside that plane, roughness,
+#   and share of the light
+# unit: angles in radians; all others dimensionless
+# source: tools/mirror_lobes.py, least squares over the harmonics of skies
 # licence: Apache-2.0
 """
 
 
 def main() -> int:
     """Fit all and write the table."""
-    columns = [f"{name}_{k}" for k in range(LOBES) for name in ("angle", "roughness", "weight")]
+    columns = [f"{name}_{k}" for k in range(LOBES) for name in ("angle", "beside", "roughness", "weight")]
     lines = [",".join(["model", "m", "cosine", *columns])]
     for model in MODELS:
         table = fitted_mirrors(MODELS[model].lobe)

@@ -195,7 +195,7 @@ def test_kernels_are_too_smooth_to_ring() -> None:
 
 def test_samples_are_found(sample_folder: Path) -> None:
     made = prefilter("royal_esplanade")
-    assert len(made.suns) == 3 and made.layers.max() < 20  # its brightest texel is 49,664
+    assert len(made.suns) == 3 and made.layers.max() < 40  # its brightest texel is 49,664
     assert all(sun.direction[1] > 0.8 for sun in made.suns)  # lamps in the ceiling
     assert prefilter("lebombo").suns == ()
 

@@ -20,9 +20,24 @@ Floats = NDArray[np.float64]
 def test_mirrors_seen_along_the_normal_are_the_lobe() -> None:
     """Their sum looks along the normal, and their shares are all of the light."""
     table = equivalent_mirrors()
-    assert np.allclose(table[..., 0] ** 2 + table[..., 1] ** 2, 1)
     assert np.allclose(table[..., 3].sum(axis=-1), 1) and table[..., 3].min() >= 0
-    assert np.allclose((table[:, -1, :, 0] * table[:, -1, :, 3]).sum(axis=-1), 0, atol=1e-3)
+    assert np.allclose(table[:, -1, :, :2], 0)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_mirrors_are_alike_on_both_sides_of_the_plane_of_view(model: str) -> None:
+    """Of those that lie beside it there are two each; the rest lie in it."""
+    table = equivalent_mirrors(model)
+    assert np.allclose(table[..., :3, 1], 0) and np.allclose(table[..., 3, 1], -table[..., 4, 1], atol=1e-4)
+    beside = table[..., 3, 1] > 0
+    assert beside.any() and np.allclose(
+        table[beside][:, 3, [0, 2, 3]], table[beside][:, 4, [0, 2, 3]], atol=1e-4
+    )
+
+
+def test_mirrors_that_are_looked_up_are_five_at_most_and_three_at_steep_views() -> None:
+    weights = equivalent_mirrors()[..., 3] > 0
+    assert (weights.sum(axis=-1) == np.array([5] * 10 + [4] * 3 + [3] * 3)).all()
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -36,10 +51,15 @@ def test_mirrors_have_the_lobes_mean_direction(model: str) -> None:
     x, _, z = np.moveaxis(light, -1, 0)
     mean = np.array([(weight * x).sum(), (weight * light[..., 1]).sum()])
     made, across = np.zeros(2), 0.0
-    for sine, cos, wide, share in equivalent_mirrors(model)[6, 7]:
+    along, ahead, aside = np.array([1.0, 0.0, 0.0]), view * [-1, 1, 1], np.array([0.0, 0.0, 1.0])
+    away = cosine * along - np.sqrt(1 - cosine**2) * up
+    for x, y, wide, share in equivalent_mirrors(model)[6, 7]:
+        to = (2 * (x * away + y * aside) + (1 - x**2 - y**2) * ahead) / (1 + x**2 + y**2)
         own = round_lobe(np.arccos(light[..., 1]), wide) * area
-        made += share * np.array([sine, cos]) * (own * light[..., 1]).sum() / own.sum()
-        across += share * (own * z**2).sum() / own.sum()
+        own /= own.sum()
+        inward, tilt = (own * light[..., 1]).sum(), to @ aside
+        made += share * np.array([to @ along, to @ up]) * inward
+        across += share * ((own * light[..., 1] ** 2).sum() * tilt**2 + (own * z**2).sum() * (1 - tilt**2))
     assert np.allclose(made, mean, atol=3e-3)
     assert across < 1.2 * (weight * z**2).sum()
     assert model in ("two-lobe", "phong", "phong-plain") or across > 0.97 * (weight * z**2).sum()
@@ -66,20 +86,28 @@ def lit_room(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Floats]:
 
 @pytest.mark.parametrize(
     ("m", "angle", "most"),
-    [(0.15, 78, 0.03), (0.3, 45, 0.03), (0.3, 66, 0.04), (0.3, 78, 0.03), (0.3, 85, 0.05), (0.5, 66, 0.08)],
+    [
+        (0.15, 12, 0.015),
+        (0.3, 12, 0.025),
+        (0.15, 78, 0.01),
+        (0.3, 45, 0.03),
+        (0.3, 66, 0.035),
+        (0.3, 78, 0.03),
+        (0.3, 85, 0.02),
+        (0.5, 66, 0.035),
+    ],
 )
-def test_grazing_reflections_are_the_lobes(
-    lit_room: tuple[str, Floats], m: float, angle: float, most: float
-) -> None:
+def test_reflections_are_the_lobes(lit_room: tuple[str, Floats], m: float, angle: float, most: float) -> None:
     """Against a plain sum of the whole lobe, over 24 views.
 
-    Four lobes of equal weights, no sharper than 0.05, err by 9, 4, 7, 6, 7 and 15 %.
+    Four lobes in the plane of view, whose directions are averaged from column to column of the table, err by
+    49, 21, 1.5, 2.7, 3.6, 1.9, 0.8 and 5.7 %.
     """
     pairs = np.random.default_rng(5).normal(size=(24, 2, 3))
     assert error_of(lit_room, pairs, float(np.cos(np.radians(angle))), m) < most
 
 
-@pytest.mark.parametrize(("cosine", "most"), [(0.7, 0.05), (0.4, 0.09), (0.2, 0.07)])
+@pytest.mark.parametrize(("cosine", "most"), [(0.7, 0.03), (0.4, 0.025), (0.2, 0.025)])
 def test_grazing_reflections_all_around_are_the_lobes(
     lit_room: tuple[str, Floats], cosine: float, most: float
 ) -> None:
@@ -99,27 +127,34 @@ def error_of(lit_room: tuple[str, Floats], pairs: Floats, cosine: float, m: floa
         normal = normal / np.linalg.norm(normal)
         along = np.cross(normal, tangent)
         along /= np.linalg.norm(along)
-        view = cosine * normal - np.sqrt(1 - cosine**2) * along
+        sine = np.sqrt(1 - cosine**2)
+        view = cosine * normal - sine * along
+        frame = np.array(
+            [cosine * along - sine * normal, np.cross(normal, along), cosine * normal + sine * along]
+        )
         weight = MODELS["kelemen"].lobe(cosines(normal, towards, view), m) * np.maximum(towards @ normal, 0)
         weight *= area
         exact.append(np.einsum("yxc,yx->c", radiance, weight) / weight.sum())
-        seen = [one[3] * seen_in(layers, normal, along, one) for one in lobes_between(cosine, m)]
+        seen = [one[3] * seen_in(layers, frame, one) for one in lobes_between(cosine, m)]
         made.append(np.sum(seen, axis=0))
     return float(np.sqrt(np.mean(np.subtract(made, exact) ** 2)) / np.mean(exact))
 
 
 def lobes_between(cosine: float, m: float) -> Floats:
-    """(4, 4) round lobes between the nodes of the table."""
+    """(5, 4) round lobes between the nodes of the table."""
     x, y = np.sqrt(cosine) * 15, np.interp(np.log(m), np.log(MIRROR_ROUGHNESSES), np.arange(12))
     j, i = int(x), int(y)
-    four = equivalent_mirrors()[i : i + 2, j : j + 2]
-    return np.asarray(np.einsum("i,j,ijlk->lk", [1 - (y - i), y - i], [1 - (x - j), x - j], four))
+    five = equivalent_mirrors()[i : i + 2, j : j + 2]
+    return np.asarray(np.einsum("i,j,ijlk->lk", [1 - (y - i), y - i], [1 - (x - j), x - j], five))
 
 
-def seen_in(layers: NDArray[np.float32], normal: Floats, along: Floats, lobe: Floats) -> Floats:
-    """(3,) mean radiance under a round lobe, between texels and layers."""
-    direction = lobe[1] * normal + lobe[0] * along
-    direction /= np.linalg.norm(direction)
+def seen_in(layers: NDArray[np.float32], frame: Floats, lobe: Floats) -> Floats:
+    """(3,) mean radiance under a round lobe, between texels and layers.
+
+    frame : (3, 3) across the mirror direction in the plane of view and beside it, and that direction
+    """
+    x, y = lobe[:2]
+    direction = np.array([2 * x, 2 * y, 1 - x**2 - y**2]) / (1 + x**2 + y**2) @ frame
     row = np.arccos(direction[1]) / np.pi * HEIGHT - 0.5
     column = (0.5 + np.arctan2(direction[0], -direction[2]) / (2 * np.pi)) * 2 * HEIGHT - 0.5
     at = np.interp(np.log(lobe[2]), np.log(ROUGHNESSES), np.arange(len(ROUGHNESSES)))

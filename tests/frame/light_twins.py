@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-ROUGH, VIEWS, LOBES = 12, 16, 4  # of the table of mirrors
+ROUGH, VIEWS, LOBES = 12, 16, 5  # of the table of mirrors
 LEVELS = 13  # of reflections
-RANGE = np.log(1 / 0.026)  # of their roughness, from the smoothest to the roughest
+RANGE = np.log(1 / 0.018)  # of their roughness, from the smoothest to the roughest
 MIRROR_RANGE = np.log(20.0)  # of the roughness in the table, from 0.05
 
 
@@ -43,7 +43,7 @@ def panorama_at(layer: Floats, environment: Any, direction: Floats) -> Floats:
 
 def reflection(layers: Floats, environment: Any, direction: Floats, m: Floats) -> Floats:
     """(..., 3) mean radiance under round lobes, between the layers of two roughnesses."""
-    place = (LEVELS - 1) * np.clip(np.log(m / 0.026) / RANGE, 0, 1)
+    place = (LEVELS - 1) * np.clip(np.log(m / 0.018) / RANGE, 0, 1)
     low = np.minimum(place.astype(int), LEVELS - 2)
     read = np.stack([panorama_at(layer, environment, direction) for layer in layers[1:]])
     rows, columns = np.indices(m.shape)
@@ -70,12 +70,16 @@ def mirrored(
     low = (1 - fx) * table[i, j] + fx * table[i, j + 1]
     high = (1 - fx) * table[i + 1, j] + fx * table[i + 1, j + 1]
     lobes = np.moveaxis((1 - fy) * low + fy * high, -2, 0)
-    along = cosine[..., None] * normal - view
-    along = along / np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-6)
+    across = cosine[..., None] * normal - view
+    sine = np.linalg.norm(across, axis=-1, keepdims=True)
+    along = across / np.maximum(sine, 1e-6)
+    ahead, away = 2.0 * cosine[..., None] * normal - view, cosine[..., None] * along - sine * normal
+    aside = np.cross(normal, along)
     seen = np.clip((cosine + open_) ** np.exp2(-16 * m - 1) - 1 + open_, 0, 1)
     total = np.zeros_like(normal)
     for mirror in lobes:
-        direction = unit(mirror[..., 1:2] * normal + mirror[..., :1] * along)
+        x, y = mirror[..., :1], mirror[..., 1:2]
+        direction = unit(2.0 * (x * away + y * aside) + (1.0 - x**2 - y**2) * ahead)
         risen = np.clip(1 + dot(direction, smooth) / m, 0, 1)[..., None]
         total += mirror[..., 3:] * risen * reflection(layers, environment, direction, mirror[..., 2])
     return np.asarray(total * seen[..., None])

@@ -17,7 +17,7 @@ from twins import DEFAULT_COLOUR, surface, surface_albedo
 from dermis.atlas.cached import cached_atlas
 from dermis.environment.mirrors import equivalent_mirrors
 from dermis.environment.panorama import directions, solid_angles
-from dermis.environment.prefilter import prefilter
+from dermis.environment.prefilter import SMOOTHEST, prefilter
 from dermis.errors import DermisError
 from dermis.frame.renderer import Renderer
 from dermis.gpu import download
@@ -199,7 +199,7 @@ def test_suns_count_among_the_lights(renderer: Renderer, room: str) -> None:
         renderer.draw(full, settings_of(occlusion="none"))
 
 
-SEEN = {"background": "environment", "background_blur": 0.026}
+SEEN = {"background": "environment", "background_blur": SMOOTHEST}
 
 
 @pytest.mark.parametrize("rotation", [60.0, -150.0])

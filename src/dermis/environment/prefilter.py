@@ -13,11 +13,11 @@ from dermis.preparing import preparing
 from dermis.specular.beckmann import beckmann
 
 Floats = NDArray[np.float64]
-SMOOTHEST, ROUGHEST = 0.026, 1.0
+SMOOTHEST, ROUGHEST = 0.018, 1.0
 ROUGHNESSES = np.geomspace(SMOOTHEST, ROUGHEST, 13)
 """Of the reflections' layers, even in the logarithm, between which the shader interpolates."""
-HEIGHT = 128
-_DEGREE = 112  # the smoothest lobe multiplies this degree by 2e-4: hardly any ringing around lamps
+HEIGHT = 192
+_DEGREE = 160  # the smoothest lobe multiplies this degree by 2e-4: hardly any ringing around lamps
 
 
 def round_lobe(theta: Floats, m: float) -> Floats:
@@ -61,7 +61,7 @@ def prefilter(name: str) -> Prefiltered:
 
     name : as for `load_panorama`
 
-    Each layer is the panorama convolved with a round kernel, exactly, in spherical harmonics of degree 112:
+    Each layer is the panorama convolved with a round kernel, exactly, in spherical harmonics of degree 160:
     no samples are drawn, so lamps leave no fireflies.
 
     Sources: [KautzMcCool2000] for reflections by roughness, [RamamoorthiHanrahan2001] for irradiance.
@@ -74,6 +74,6 @@ def prefilter(name: str) -> Prefiltered:
 
 
 def mirror_kernel(m: float) -> Floats:
-    """(113,) factors of the round lobe of roughness m, with the sum 1 over the sphere."""
+    """(161,) factors of the round lobe of roughness m, with the sum 1 over the sphere."""
     factors = zonal(lambda theta: round_lobe(theta, m), _DEGREE)
     return np.asarray(factors / factors[0])

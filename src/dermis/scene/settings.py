@@ -98,8 +98,8 @@ class Settings(Plain):
     """What is behind the head, which sheds no light: "none", so that pictures have alpha, a studio's grey
     "gradient", the "environment", or a colour, linear Rec. 709 or #rrggbb."""
     background_blur: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """Roughness of the mirror in which the environment behind the head is seen, at least 0.05; 0 for none, so
-    that it is sharp."""
+    """Roughness of the mirror in which the environment behind the head is seen, at least 0.018; 0 for none,
+    so that it is sharp."""
     strands: bool = True
     """Hairs of heads that have them, as the human's hair, beard, brows and lashes."""
     parts: Literal["all", "diffuse", "specular"] = "all"

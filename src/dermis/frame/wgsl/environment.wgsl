@@ -15,7 +15,7 @@ struct Environment {
     exposure: f32,
     albedo: vec3f, // of skin whose colour map is white
     occluded: u32, // whether the occlusion map holds anything
-    mirrors: array<vec4f, 768>, // by roughness, cosine and lobe: sine and cosine of where it points, its roughness, its weight
+    mirrors: array<vec4f, 960>, // by roughness, cosine and lobe: where it points, its roughness, its weight
 }
 
 @group(0) @binding(20) var<uniform> environment: Environment;
@@ -62,7 +62,8 @@ fn mirror_place(cosine: f32, m: f32) -> vec2f {
     return clamp(place, vec2f(0.0), vec2f(1.0)) * vec2f(MIRRORS - 1u);
 }
 
-// Direction, roughness and weight of a round lobe, in the plane of view and normal.
+// Place of a round lobe as the sphere is projected onto a plane about the mirror direction, away from the eye and beside the plane
+// of view; its roughness and weight.
 fn mirror_at(place: vec2f, lobe: u32) -> vec4f {
     let at = min(vec2u(place), MIRRORS - 2u);
     let f = place - vec2f(at);
@@ -78,15 +79,22 @@ fn mirror_at(place: vec2f, lobe: u32) -> vec4f {
 fn mirrored(point: Point, normal: vec3f, v: vec3f, m: f32, open: f32) -> vec3f {
     let cosine = clamp(dot(normal, v), 0.0, 1.0);
     let place = mirror_place(cosine, m);
-    var along = cosine * normal - v; // away from the eye, as long as the angle's sine
-    along /= max(length(along), 1e-6);
+    let across = cosine * normal - v; // away from the eye
+    let sine = length(across);
+    let along = across / max(sine, 1e-6);
+    let ahead = sine * along + cosine * normal; // the mirror direction
+    let aside = cross(normal, along);
+    let away = cosine * along - sine * normal;
     var sum = vec3f(0.0);
     var k = 0u;
     loop {
         let mirror = mirror_at(place, k);
-        let direction = normalize(mirror.y * normal + mirror.x * along);
-        let risen = clamp(1.0 + dot(direction, point.normal) / m, 0.0, 1.0);
-        sum += mirror.w * risen * reflection(direction, mirror.z);
+        if (mirror.w > 0.0) {
+            let square = dot(mirror.xy, mirror.xy);
+            let direction = (2.0 * (mirror.x * away + mirror.y * aside) + (1.0 - square) * ahead) / (1.0 + square);
+            let risen = clamp(1.0 + dot(direction, point.normal) / m, 0.0, 1.0);
+            sum += mirror.w * risen * reflection(direction, mirror.z);
+        }
         k++;
         if (k >= LOBES) {
             break;
