@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dermis.frame.inputs import Inputs
-from dermis.frame.output_stages import draw_centres, draw_outputs, labels_of_hairs
+from dermis.frame.output_stages import draw_outputs, labels_of_hairs
 from dermis.frame.passes import (
     background,
     bloom,
@@ -46,10 +46,10 @@ def draw_frame(graph: Graph, inputs: Inputs, technique: Technique) -> None:
     look, apart = (inputs.lit, inputs.view, inputs.constants), technique.apart(made.own)
     radiance = shade.draw(graph, *look, made.visibility, below, made.picture, apart)
     radiance = technique.finish(graph, inputs, radiance)
-    seen, centres = (inputs.lit, inputs.view, inputs.light_constants), draw_centres(graph, inputs)
+    seen = inputs.lit, inputs.view, inputs.light_constants
     if made.strands:
-        hairs, labels = (made.strands, seen, made.head), labels_of_hairs(inputs, centres)
-        radiance = strands.draw(graph, *hairs, made.visibility.texture, radiance, labels)
+        over, labels = (made.visibility.texture, radiance), labels_of_hairs(graph, inputs)
+        radiance = strands.draw(graph, made.strands, seen, made.head, *over, labels)
     if made.meter:
         meter.draw(graph, made.meter, seen, made.visibility.texture, radiance)
     if made.backdrop:
@@ -57,4 +57,4 @@ def draw_frame(graph: Graph, inputs: Inputs, technique: Technique) -> None:
     if made.glow:
         radiance = bloom.draw(graph, made.glow, radiance, inputs.settings.bloom)
     post.draw(graph, radiance, made.picture, inputs.settings, made.meter)
-    draw_outputs(graph, inputs, centres, below)
+    draw_outputs(graph, inputs, below)

@@ -10,7 +10,7 @@ from dermis.frame.inputs import Inputs
 from dermis.frame.passes import shape
 from dermis.frame.passes.outputs import alpha, geometry, labels, landmarks, motion
 from dermis.frame.passes.outputs.planes import Drawn, Planes
-from dermis.frame.passes.visibility_buffer import draw_layers
+from dermis.frame.passes.visibility_buffer import Layers, draw_layers
 from dermis.frame.projection import MIDDLE, Views
 from dermis.gpu import Graph
 from dermis.gpu.program import Resources
@@ -19,38 +19,48 @@ Stage = Callable[[Graph, Planes, Inputs, Drawn], None]
 _OF_THE_SURFACE = ("DETAIL",)  # pipeline constants of surface.wgsl
 
 
-def draw_centres(graph: Graph, inputs: Inputs) -> Any:
-    """Find the triangle at each pixel's centre, where outputs are asked; a texture."""
-    made = inputs.resources
-    if made.outputs is None or made.outputs.centres is None:
-        return made.visibility.texture
-    centres, views = made.outputs.centres, Views(inputs.camera.clips, MIDDLE)
-    draw_layers(graph, "outputs", centres, views, made.head)
-    return centres.texture
-
-
-def labels_of_hairs(inputs: Inputs, centres: Any) -> Resources | None:
-    """What the pass that draws hairs is given to label them; None where nobody asks."""
+def labels_of_hairs(graph: Graph, inputs: Inputs) -> Resources | None:
+    """What the pass that draws hairs is given to label them too; None where nobody asks."""
     made = inputs.resources.outputs
-    if made is None or made.labels is None or made.labels.classes is None:
+    if made is None or not _labels_hairs(inputs):
         return None
-    return labels.of_hairs(made.labels, centres)
+    return labels.of_hairs(made.labels, _draw_centres(graph, inputs))
 
 
-def draw_outputs(graph: Graph, inputs: Inputs, centres: Any, below: Any) -> None:
+def draw_outputs(graph: Graph, inputs: Inputs, below: Any) -> None:
     """Fill the planes of all outputs that are asked.
 
-    centres : from `draw_centres`
     below : what the shading read as `scattered`
     """
     made = inputs.resources.outputs
     if made is None:
         return
+    centres = _centres(inputs).texture if _labels_hairs(inputs) else _draw_centres(graph, inputs)
     for planes in made.planes:
         STAGES[planes.stage](graph, planes, inputs, Drawn(centres, below))
     if made.landmarks:
         look, shape_now = _look(inputs), inputs.resources.shape
         landmarks.draw(graph, made.landmarks, inputs.lit, look, centres, shape_now)
+
+
+def _labels_hairs(inputs: Inputs) -> bool:
+    made = inputs.resources
+    space = made.outputs.labels if made.outputs else None
+    return made.strands is not None and space is not None and space.classes is not None
+
+
+def _centres(inputs: Inputs) -> Layers:
+    """Where the triangles at the pixels' centres are."""
+    made = inputs.resources
+    return (made.outputs and made.outputs.centres) or made.visibility
+
+
+def _draw_centres(graph: Graph, inputs: Inputs) -> Any:
+    """Find them, unless the picture's only sample lies there; a texture."""
+    centres = _centres(inputs)
+    if centres is not inputs.resources.visibility:
+        draw_layers(graph, "outputs", centres, Views(inputs.camera.clips, MIDDLE), inputs.resources.head)
+    return centres.texture
 
 
 def _geometry(graph: Graph, planes: Planes, inputs: Inputs, drawn: Drawn) -> None:
