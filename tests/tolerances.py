@@ -129,3 +129,12 @@ INTEGRATING_SPHERE = {0.3: 0.03, 0.6: 0.1}
 
 FURNACE_OF_LINKS = 0.015
 """White skin in a corner under light from everywhere alike against 1, in the mean: five bounces."""
+
+COUNTED_TOTAL = 0.002
+"""What half-spaces return by tables of photons against H-functions, relative: three million photons."""
+
+COUNTED_RINGS = 0.04
+"""Light through rings by tables of photons against photons of another run, relative: the noise of both."""
+
+COUNTED_FLESH = 0.08
+"""Density of the medium that a counted profile stands for, relative: six Gaussians are not quite as wide."""

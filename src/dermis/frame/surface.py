@@ -126,7 +126,7 @@ def _by_direction(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any
         "once": law.once,
         "back_from_everywhere": law.from_everywhere,
         "back": np.pad(law.returned, ((0, 0), (0, 1))),
-        "across": np.pad(across(*half_space), ((0, 0), (0, 1))),
+        "across": np.pad(across(*half_space, profile.counted), ((0, 0), (0, 1))),
     }
 
 

@@ -10,12 +10,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dermis.optics.curve import Curve
 from dermis.optics.diffusion import hankel, layered_diffusion
 from dermis.optics.diffusion.boundary import mismatch
 from dermis.optics.diffusion.layered_diffusion import respond_sheets
 from dermis.optics.directions import KEPT, refracted
 from dermis.optics.directions import ROWS as DIRECTIONS
 from dermis.optics.gaussians import GaussianSum
+from dermis.optics.half_space import Kind, albedo_of, half_space, kind_under
 from dermis.optics.interpolated import interpolated
 from dermis.optics.media import Layer, Medium
 from dermis.optics.slabs import NODES, Slabs, doubled_slabs, slabs
@@ -60,7 +62,7 @@ def medium_of(profile: GaussianSum, total: Floats, eta: float) -> Medium:
     """
     albedo, extinction = np.empty(len(total)), np.empty(len(total))
     for c, share in enumerate(total):
-        root, half = interpolated(partial(_returning, eta), float(share))
+        root, half = interpolated(partial(_returning, eta, profile.counted), float(share))
         one = GaussianSum("", profile.variance_mm2, profile.weight[:, [c]])
         albedo[c], extinction[c] = 1.0 - root**2, _half(partial(_spread, one)) / half
     layer = Layer((1.0 - albedo) * extinction, albedo * extinction)
@@ -92,20 +94,22 @@ def thin_parts(body: Medium, variance_mm2: Floats, reach_mm: float) -> ThinParts
     return ThinParts(reach_mm, through, lost, np.clip(mean, -1.0, 1.0))
 
 
-def across(total: Floats, eta: float) -> Floats:
+def across(total: Floats, eta: float, counted: bool = False) -> Floats:
     """(directions.ROWS, c) what passes deep slabs from a direction, over what does of uniform light.
 
     Both for light of which as much comes back; by evenly spaced roots of the cosine, as `directions` has it.
 
     total : (c,) that the half-space returns of what enters perpendicularly [-]
+    counted : whether the profile is of photons, as of `GaussianSum`
     """
-    return np.stack([interpolated(partial(_across, eta), float(share)) for share in total], axis=-1)
+    return np.stack([interpolated(partial(_across, eta, counted), float(one)) for one in total], axis=-1)
 
 
 @lru_cache(maxsize=KEPT)
-def _across(eta: float, total: float) -> Floats:
-    cosine = refracted(np.linspace(0.0, 1.0, DIRECTIONS) ** 2, eta)
-    whole, law = _law(_albedo_of(total, eta), eta, NODES)
+def _across(eta: float, counted: bool, total: float) -> Floats:
+    cosine, kind = refracted(np.linspace(0.0, 1.0, DIRECTIONS) ** 2, eta), _tabled(eta, counted)
+    albedo = _albedo_of(total, eta) if kind is None else float(albedo_of(kind, total))
+    whole, law = _law(albedo, eta, NODES)
     return np.interp(cosine, whole.cosine, law)
 
 
@@ -176,11 +180,21 @@ def _shapes(body: Medium, depth_mm: Floats, variance_mm2: Floats) -> Floats:
 
 
 @lru_cache(maxsize=KEPT)
-def _returning(eta: float, total: float) -> Floats:
+def _returning(eta: float, counted: bool, total: float) -> Floats:
     """(2,) of the half-space that returns this share: the root of what a scattering absorbs [-], and the
-    frequency at which what it returns has fallen to half [1/mean free path]."""
+    frequency at which what it returns has fallen to half [1/mean free path]; by photons or by diffusion, as
+    the profile is: that of photons is narrower."""
+    kind = _tabled(eta, counted)
+    if kind is not None:
+        albedo = float(albedo_of(kind, total))
+        curve = half_space(kind, np.full(3, albedo), np.ones(3))
+        return np.array([np.sqrt(1.0 - albedo), _half(partial(_transform, curve))])
     albedo = _albedo_of(total, eta)
     return np.array([np.sqrt(1.0 - albedo), _half(partial(_returned, _unit(albedo, eta)))])
+
+
+def _tabled(eta: float, counted: bool) -> Kind | None:
+    return kind_under(eta) if counted else None
 
 
 def _albedo_of(total: float, eta: float) -> float:
@@ -203,6 +217,15 @@ def _unit(albedo: float, eta: float) -> Medium:
 def _spread(profile: GaussianSum, frequency: float) -> float:
     """Hankel transform of a profile of one channel."""
     return float(profile.hankel(frequency)[0])
+
+
+def _transform(curve: Curve, frequency: float) -> float:
+    """Hankel transform of a curve's first channel, over its total."""
+    from scipy.special import j0
+
+    edges = curve.radii_mm
+    middle = np.append(0.5 * edges[1], np.sqrt(edges[1:-1] * edges[2:]))
+    return float(j0(frequency * middle) @ np.diff(curve.share[:, 0]))
 
 
 def _returned(body: Medium, frequency: float) -> float:
