@@ -138,3 +138,9 @@ COUNTED_RINGS = 0.04
 
 COUNTED_FLESH = 0.08
 """Density of the medium that a counted profile stands for, relative: six Gaussians are not quite as wide."""
+
+FORWARD_AMOUNT = 0.004
+"""Shares of light that slabs of forward scattering return and let through: eight cosines and terms."""
+
+FORWARD_CONTINUOUS = 0.005
+"""Laws of a mean cosine of next to 0 against those of 0, relative: one by nodes, the other by H-functions."""

@@ -46,8 +46,8 @@ def slabs(albedo: float, optical_depth: ArrayLike, eta: float, nodes: int = NODE
     Source: [Chandrasekhar1960] section 50 for what layers do together.
     """
     tau = np.atleast_1d(np.asarray(optical_depth, np.float64))
-    times = int(np.ceil(np.log2(max(float(tau.max()) / _THINNEST, 1.0))))
     way = _Way.of(albedo, eta, nodes, g)
+    times = way.times(float(tau.max()))
     *_, (R, T, straight) = _doubled(way, tau / 2.0**times, times)
     return _cut(way, R, T, straight)
 
@@ -60,8 +60,8 @@ def doubled_slabs(
     least : (n,) optical depths, of about the same size [-]
     times : that they are doubled; there are n (times + 1) slabs, ordered by times, then by `least`
     """
-    before = int(np.ceil(np.log2(max(float(np.max(least)) / _THINNEST, 1.0))))
     way = _Way.of(albedo, eta, nodes, g)
+    before = way.times(float(np.max(least)))
     made = list(_doubled(way, np.asarray(least, np.float64) / 2.0**before, before + times))[before:]
     R, T, straight = (np.concatenate(part) for part in zip(*made, strict=True))
     return _cut(way, R, T, straight)
@@ -74,7 +74,7 @@ def leaving_deep(albedo: float, eta: float, nodes: int, g: float) -> tuple[Float
     that leaves by direction, of exit first, over what enters: its mean by the shares is all that leaves.
     """
     way = _Way.of(albedo, eta, nodes, g)
-    times = int(np.ceil(np.log2(DEEP / _THINNEST)))
+    times = way.times(DEEP)
     *_, (R, T, straight) = _doubled(way, np.array([DEEP / 2.0**times]), times)
     back, _ = _between_faces(R * way.flux, T * way.flux, straight, way.held, R, T)
     leaving = (way.flux * (1.0 - way.held))[way.escapes]
@@ -98,6 +98,10 @@ class _Way:
         mu, weight = _cosines(eta, nodes)
         held, escapes = internal_reflectance(mu, eta), mu > critical_cosine(eta)
         return cls(mu, 2.0 * weight * mu, held, escapes, phase(albedo, g, mu, nodes))
+
+    def times(self, depth: float) -> int:
+        """How often slabs are doubled that begin so thin that light scatters in them once at most."""
+        return int(np.ceil(np.log2(max(depth * self.phase.extinction / _THINNEST, 1.0))))
 
 
 def _cut(way: _Way, R: Floats, T: Floats, straight: Floats) -> Slabs:
