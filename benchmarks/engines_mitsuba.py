@@ -16,12 +16,12 @@ from cyclopts import run
 from figures_file import write_figures
 from numpy.typing import NDArray
 
-from dermis.export.curve import Curve
 from dermis.export.lobe import fit_d
 from dermis.export.subject import Subject, subject_of
 from dermis.export.target import numbers_of
 from dermis.export.targets.mitsuba import TARGET
 from dermis.export.targets.mitsuba_files import BOUNDARIES, Boundary, Walked, medium_words, surface_words
+from dermis.optics.curve import Curve
 from dermis.reference.described import rgb
 from dermis.reference.mitsuba_scene import load_mitsuba, variant_of
 

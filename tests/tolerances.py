@@ -129,3 +129,18 @@ INTEGRATING_SPHERE = {0.3: 0.03, 0.6: 0.1}
 
 FURNACE_OF_LINKS = 0.015
 """White skin in a corner under light from everywhere alike against 1, in the mean: five bounces."""
+
+COUNTED_TOTAL = 0.002
+"""What half-spaces return by tables of photons against H-functions, relative: three million photons."""
+
+COUNTED_RINGS = 0.04
+"""Light through rings by tables of photons against photons of another run, relative: the noise of both."""
+
+COUNTED_FLESH = 0.08
+"""Density of the medium that a counted profile stands for, relative: six Gaussians are not quite as wide."""
+
+FORWARD_AMOUNT = 0.004
+"""Shares of light that slabs of forward scattering return and let through: eight cosines and terms."""
+
+FORWARD_CONTINUOUS = 0.005
+"""Laws of a mean cosine of next to 0 against those of 0, relative: one by nodes, the other by H-functions."""

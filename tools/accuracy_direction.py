@@ -44,6 +44,7 @@ def _rows(head: Head, light: str, region: str, samples: int, settings: Settings,
                 medium=medium,
                 settings=settings,
                 direction=direction,
+                model="layered",
                 samples=samples,
                 adapter=adapter,
             )

@@ -47,7 +47,7 @@ def tables(head: Head, settings: Settings, adapter: str) -> dict[str, str]:
     """Rows for docs/techniques.in.md by their names there."""
     found: dict[str, list[str]] = {"by_atlas": [], "zero_width": [], "places": [], "even": []}
     for light in LIGHTS:
-        with subject_of(head, light, usual_region(light), "skin1", settings, adapter) as subject:
+        with subject_of(head, light, usual_region(light), "skin1", settings, adapter, "layered") as subject:
             straight, even = surface_integral(subject, 0), even_light(subject)
             fair = replace(straight, image=straight.image / np.maximum(even, LEAST_EVEN))
             found["by_atlas"] += by_atlas(subject, straight, fair, light)

@@ -12,7 +12,7 @@ from dermis.optics.fits.burley import fit_burley
 from dermis.optics.fits.gaussian import fit_gaussians
 from dermis.optics.fits.separable import fit_separable
 from dermis.optics.fits.targets import ring_error
-from dermis.optics.media import media
+from dermis.optics.media import SKIN_ETA, media
 from dermis.optics.profiles import load_profile
 from dermis.optics.radial import RadialProfile
 from dermis.optics.tissue import Tissue, load_tissue
@@ -62,6 +62,21 @@ def _rows(name: str, tissue: Tissue) -> Iterator[str]:
         total = _percent(profile.total / truth.total - 1.0)
         rings = _percent(ring_error(truth.rings(), profile.ring_energy), sign=False)
         yield f"| | {label} | {total} | {rings} |"
+
+
+def counted_table() -> str:
+    """Errors of tables of photons and of layered diffusion for homogeneous skin."""
+    rows = []
+    for name in ("skin1", "skin2"):
+        for eta in (1.0, SKIN_ETA):
+            tissue = Tissue(media()[name].with_eta(eta))
+            truth = counted_profile(tissue.medium, photons=PHOTONS, seed=1)
+            for model in ("counted", "layered"):
+                profile = tissue.profile(model)
+                total = " ".join(f"{100 * one:+.2f}" for one in profile.total / truth.total - 1.0)
+                rings = _percent(ring_error(truth.rings(), profile.ring_energy), sign=False)
+                rows.append(f"| {name}, index {eta:g} | {model} | {total} % | {rings} |")
+    return "\n".join(rows)
 
 
 def fits_table() -> str:
@@ -144,6 +159,7 @@ def tables() -> dict[str, str]:
     """All tables, by their names in the page's template."""
     return {
         "models": models_table(),
+        "counted": counted_table(),
         "fits": fits_table(),
         "pointwise": pointwise_table(),
         "transmission": transmission_table(),

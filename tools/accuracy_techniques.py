@@ -17,6 +17,7 @@ import numpy as np
 
 import dermis
 from dermis.comparison.compare import Comparison, Row, compare
+from dermis.comparison.profile_models import ModelName
 from dermis.comparison.report import cells
 from dermis.comparison.scenes import comparison_scene, usual_region
 from dermis.frame.surface_points import irradiance_at, surface_points
@@ -36,8 +37,13 @@ def line(first: str, row: Row) -> str:
     return f"| {first} | " + " | ".join(cells(row)) + " |"
 
 
-def table(head: Head, against: str, medium: str, adapter: str) -> tuple[str, dict[str, Comparison]]:
-    """Rows of all techniques under each light, and the comparisons behind them."""
+def table(
+    head: Head, against: str, medium: str, adapter: str, model: ModelName | None = None
+) -> tuple[str, dict[str, Comparison]]:
+    """Rows of all techniques under each light, and the comparisons behind them.
+
+    model : of the medium's profile
+    """
     rows, made = [HEAD], {}
     for light, samples in LIGHTS.items():
         region = "ear" if against == "heat" else usual_region(light)
@@ -50,6 +56,7 @@ def table(head: Head, against: str, medium: str, adapter: str) -> tuple[str, dic
             region=region,
             medium=medium,
             settings=SETTINGS,
+            model=model,
             samples=samples,
             adapter=adapter,
         )
@@ -60,31 +67,33 @@ def table(head: Head, against: str, medium: str, adapter: str) -> tuple[str, dic
 def finer_heat(head: Head, adapter: str) -> str:
     """The laser's stripe against heat on an atlas of 2048."""
     settings, only = SETTINGS.model_copy(update={"atlas": 2048}), ("texture-space",)
-    made = compare(head, "heat", only, light="laser", region="ear", settings=settings, adapter=adapter)
+    made = compare(
+        head, "heat", only, light="laser", region="ear", settings=settings, model="layered", adapter=adapter
+    )
     return line("laser, atlas 2048", made.rows[0])
 
 
 def counted(head: Head, traced: dict[str, dict[str, Comparison]], adapter: str) -> str:
     """Against path tracing, by how the medium's profile is known.
 
-    traced : by medium and light, what layered diffusion's comes to
+    traced : by medium and light, what counted photons' comes to
     """
     rows, techniques = [], ("texture-space", "screen-space")
     for light, samples in LIGHTS.items():
-        for medium, layered in traced.items():
-            by_photons = compare(
+        for medium, by_photons in traced.items():
+            layered = compare(
                 head,
                 "path-traced",
                 techniques,
                 light=light,
                 region=usual_region(light),
                 medium=medium,
-                model="montecarlo",
+                model="layered",
                 settings=SETTINGS,
                 samples=samples,
                 adapter=adapter,
             )
-            for model, made in (("layered", layered[light]), ("montecarlo", by_photons)):
+            for model, made in (("layered", layered), ("counted", by_photons[light])):
                 by_technique = [_told(made, row) for row in made.rows if row.technique in techniques]
                 rows.append(f"| {light} | {medium} | {model} | {' | '.join(by_technique)} |")
     return "\n".join(rows)
@@ -133,8 +142,8 @@ def main() -> None:
     found["direction"] = direction.table(head, LIGHTS, SETTINGS, adapter)
     found["counted"] = counted(head, traced, adapter)
     found["half_space"] = half_space.table(head, adapter)
-    found["integral"], _ = table(head, "surface-integral", "skin1", adapter)
-    found["heat"], _ = table(head, "heat", "skin1", adapter)
+    found["integral"], _ = table(head, "surface-integral", "skin1", adapter, "layered")
+    found["heat"], _ = table(head, "heat", "skin1", adapter, "layered")
     found["heat"] += "\n" + finer_heat(head, adapter)
     found |= error.tables(head, SETTINGS, adapter) | surface.tables(adapter)
     text = (PAGE.parent / "techniques.in.md").read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Makes src/dermis/export/data/half_space.csv: profiles of homogeneous half-spaces by Monte Carlo.
+"""Makes src/dermis/optics/data/half_space.csv: profiles of homogeneous half-spaces by Monte Carlo.
 
 python tools/half_space_table.py [PHOTONS], some minutes. Scattering is isotropic and lengths are in mean free
 paths, so that a profile depends on the albedo alone, the surface and how light enters. Photons are never
@@ -22,7 +22,7 @@ from dermis.reference.photon import deflect, refract, uniform
 Floats = NDArray[np.float64]
 Words = NDArray[np.uint64]
 
-OUT = Path(__file__).parent.parent / "src" / "dermis" / "export" / "data" / "half_space.csv"
+OUT = Path(__file__).parent.parent / "src" / "dermis" / "optics" / "data" / "half_space.csv"
 KINDS = {"skin": (1.4, False), "matched": (1.0, False), "walk": (1.0, True)}
 """Index of refraction of the surface, and whether light enters by the cosine of all directions."""
 ABSORBED = np.concatenate([np.geomspace(1e-5, 0.2, 25), np.linspace(0.25, 0.95, 15), [0.98]])

@@ -76,15 +76,18 @@ def test_the_models_own_error_stands_beside_that_of_the_fit(
 ) -> None:
     page = (Path(__file__).parents[2] / "docs" / "accuracy.md").read_text("utf-8")
     row = page.partition("| **skin2** |")[2].partition("| | layered |")[2].split("|")[1]
-    own = told("skin2")["model_error"]
+    own = told("skin2", "--model", "layered")["model_error"]
     assert own["tissues"] == ["skin2"] and own["least"] == own["most"]
     np.testing.assert_allclose(own["most"], [float(x) / 100 for x in row.split("%")[0].split()], atol=1e-9)
     other = told("skin2", "--eta", 1.2)["model_error"]
     assert len(other["tissues"]) == 6 and other["least"][0] <= own["most"][0] < other["most"][0]
     assert "\nmodel  " in run("profile", "skin2").stdout
+    assert max(told("skin2")["model_error"]["most"]) < 0.1 * min(own["most"])  # counted photons
     assert "model_error" not in told("skin2", "--model", "montecarlo", "--photons", 2000)
-    checked = told("skin2", "--plot", tmp_path / "a.svg", "--check", "--photons", 20000)["model_error"]
-    np.testing.assert_allclose(checked["most"], own["most"], rtol=0.35)  # few photons, another index
+    plot = told("skin2", "--plot", tmp_path / "a.svg", "--check", "--photons", 20000, "--model", "layered")
+    np.testing.assert_allclose(
+        plot["model_error"]["most"], own["most"], rtol=0.35
+    )  # few photons, another index
 
 
 @pytest.mark.parametrize("model", ["dipole", "better-dipole", "multipole", "layered", "layered-point"])
@@ -149,7 +152,7 @@ def test_colour_through_a_thickness(run: Run, told: Callable[..., dict[str, Any]
 
 @pytest.mark.parametrize("kind", ["burley", "separable"])
 def test_other_kinds_of_fit(told: Callable[..., dict[str, Any]], kind: str) -> None:
-    report = told("skin1", "--fit-kind", kind)
+    report = told("skin1", "--model", "layered", "--fit-kind", kind)
     assert np.shape(report[kind]["error"]) == (3,)
     assert min(report[kind]["error"]) > max(report["gaussians"]["ring_error"])
     if kind == "burley":
@@ -210,7 +213,8 @@ def test_lines_are_for_people(run: Run) -> None:
     ended = run("profile", "dj3", "--fit-kind", "burley", "--through", "1")
     assert ended.code == 0
     assert "epidermis" in ended.stdout and "variance mm2" in ended.stdout and "1 mm" in ended.stdout
-    assert "warning" in run("profile", "skin1").stderr
+    assert "warning" in run("profile", "skin1", "--model", "layered").stderr
+    assert "skin1, model counted" in run("profile", "skin1").stdout
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,7 @@ def test_model_and_its_fit_in_each_colour(drawn: Drawn) -> None:
     figure = drawn("skin1", "--fit", 3, "--fit-kind", "burley")
     entries = legend(figure)
     assert [entry.partition(",")[0] for entry in entries] == 3 * ["red"] + 3 * ["green"] + 3 * ["blue"]
-    assert entries[0] == "red, layered" and entries[1].startswith("red, 3 Gaussians, error ")
+    assert entries[0] == "red, counted" and entries[1].startswith("red, 3 Gaussians, error ")
     assert entries[2].startswith("red, Burley")
     assert len(figure.axes[0].lines) == 9 and not figure.axes[0].containers
 

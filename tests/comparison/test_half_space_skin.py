@@ -53,4 +53,4 @@ def test_half_space_keeps_the_energy(both: tuple[Comparison, Comparison]) -> Non
 
 
 def test_report_says_so(both: tuple[Comparison, Comparison]) -> None:
-    assert both[1].title.endswith("half-space skin") and both[0].title.endswith("lambertian skin")
+    assert ", half-space skin, profile by photons" in both[1].title and ", lambertian skin" in both[0].title

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from dermis.errors import DermisError
-from dermis.export.curve import Curve
 from dermis.export.deviation import deviation
 from dermis.export.equivalent import homogeneous
-from dermis.export.half_space import albedo_of, half_space
 from dermis.export.lobe import fit_d, lobe
 from dermis.export.subject import Subject, subject_of
+from dermis.optics.curve import Curve
+from dermis.optics.half_space import albedo_of, half_space
 
 WHITE = np.ones(3)
 

@@ -9,7 +9,6 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from dermis.export.curve import Curve
 from dermis.export.deviation import deviation
 from dermis.export.run import export_skin
 from dermis.export.subject import Subject, subject_of
@@ -18,6 +17,7 @@ from dermis.export.targets.mitsuba import TARGET, medium_for
 from dermis.export.targets.mitsuba_colours import Colours
 from dermis.export.targets.mitsuba_painted import divided
 from dermis.export.targets.mitsuba_words import Bitmap, Transform, Words, element
+from dermis.optics.curve import Curve
 from dermis.optics.media import media
 from dermis.reference.mitsuba_scene import variant_of
 

@@ -15,9 +15,9 @@ from dermis.atlas.cached import cached_atlas
 from dermis.frame.renderer import Renderer
 from dermis.mesh.primitives import plane, uv_sphere
 from dermis.optics.directions import ROWS, directions
+from dermis.optics.flesh import medium_of
 from dermis.optics.oblique import aside_mm
 from dermis.optics.profiles import load_profile
-from dermis.optics.thin_parts import medium_of
 from dermis.scene.lights import DirectionalLight, StripeLight
 
 Floats = NDArray[np.float64]

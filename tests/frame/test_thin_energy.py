@@ -84,6 +84,27 @@ def test_half_space_skin_is_thin_as_its_medium(renderer: Renderer, skin1: str, d
             assert back[c] == pytest.approx(exact[1], rel=0.25)
 
 
+@pytest.mark.parametrize("degrees", [0.0, 60.0])
+def test_flesh_that_scatters_forward_lets_more_through(
+    renderer: Renderer, skin1: str, degrees: float
+) -> None:
+    """Red light on the far face beside the exact slab, which passes twice as much as an isotropic one."""
+    angle = np.radians(degrees)
+    way = (float(np.sin(angle)), 0.0, float(np.cos(angle)))
+    lamp = DirectionalLight(direction=way, irradiance=(1.0, 1.0, 1.0), shadows=False)
+    skin = {"albedo": "profile", "profile": skin1, "direction": "half-space", "specular": "none"}
+    layer, cosine = BODY.layers[0], float(np.cos(angle))
+    for thickness, more in ((1.0, 1.5), (3.0, 1.05)):
+        mesh = wedge(40.0, thickness, thickness)
+        even, forward = (
+            float(left(renderer, mesh, lamp, anisotropy=g, **skin)[0][:, 0].mean()) / cosine
+            for g in (0.0, 0.8)
+        )
+        made = slabs(float(layer.alpha_prime[0]), float(layer.sigma_t_prime[0]) * thickness, 1.0, g=0.8)
+        assert forward == pytest.approx(float(np.interp(cosine, made.cosine, made.through[0])), rel=0.12)
+        assert forward > more * even
+
+
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("direction", ["lambertian", "half-space"])
 def test_a_colour_that_nothing_blurs_passes_nowhere(

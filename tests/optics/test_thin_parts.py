@@ -9,10 +9,11 @@ from dermis.optics.diffusion.boundary import fresnel
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.directions import directions
 from dermis.optics.fits.gaussian import fit_gaussians
+from dermis.optics.flesh import medium_of
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Layer, Medium, media
 from dermis.optics.slabs import slabs
-from dermis.optics.thin_parts import ROWS, across, medium_of, thin_parts
+from dermis.optics.thin_parts import ROWS, across, thin_parts
 
 BODY = media()["skin1"].with_eta(1.0)
 REACH = 12.0

@@ -10,11 +10,13 @@ _LEAST_WEIGHT = 0.01
 
 
 def returned(
-    cosine: float, albedo: float, eta: float, photons: int, rings: int = 4, seed: int = 1
+    cosine: float, albedo: float, eta: float, photons: int, rings: int = 4, seed: int = 1, g: float = 0.0
 ) -> tuple[float, float, Floats]:
     """Share of the light entering at a cosine that leaves, its standard error, and that share by direction.
 
     The last is (rings,) by the square of the cosine of leaving, in which light off a diffuse surface is even.
+
+    g : mean cosine of scattering
     """
     rng = np.random.default_rng(seed)
     depth, weight = np.zeros(photons), np.ones(photons)
@@ -23,18 +25,30 @@ def returned(
     while len(depth):
         depth = depth - np.log(rng.random(len(depth))) * down
         above = depth < 0.0
-        through = above & (rng.random(len(depth)) > fresnel(-down, eta))
+        through = above & (rng.random(len(depth)) > fresnel(np.abs(down), eta))
         given[born[through]] += weight[through]
         outside = np.clip(1.0 - eta**2 * (1.0 - down[through] ** 2), 0.0, 1.0)
         square += np.histogram(outside, rings, (0.0, 1.0), weights=weight[through])[0]
+        down = np.where(above, -down, down)
         depth = np.abs(depth)  # thrown back inside, the way goes on below
         weight = albedo * weight
         lucky = (weight > _LEAST_WEIGHT) | (rng.random(len(depth)) < 0.1)
         weight = np.where(weight > _LEAST_WEIGHT, weight, 10.0 * weight)
         keep = lucky & ~through
         depth, weight, born = depth[keep], weight[keep], born[keep]
-        down = 2.0 * rng.random(len(depth)) - 1.0
+        down = deflected(down[keep], g, rng)
     return float(given.mean()), float(given.std() / np.sqrt(photons)), square / photons
+
+
+def deflected(down: Floats, g: float, rng: np.random.Generator) -> Floats:
+    """Cosines after scattering, by the phase function of [HenyeyGreenstein1941]."""
+    chance = rng.random(len(down))
+    if g == 0.0:
+        return np.asarray(2.0 * chance - 1.0)
+    cosine = (1.0 + g**2 - ((1.0 - g**2) / (1.0 - g + 2.0 * g * chance)) ** 2) / (2.0 * g)
+    sines = np.sqrt(np.maximum((1.0 - cosine**2) * (1.0 - down**2), 0.0))
+    turned = down * cosine + sines * np.cos(2.0 * np.pi * rng.random(len(down)))
+    return np.asarray(np.clip(turned, -1.0, 1.0))
 
 
 def fresnel(cosine: Floats, eta: float) -> Floats:

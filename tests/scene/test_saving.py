@@ -84,6 +84,7 @@ SKIN = Skin(
     fresnel="exact",
     specular_colour="wrong",
     energy="published",
+    anisotropy=0.8,
     direction="lambertian",
     pigments=PIGMENTS,
     layers=LAYERS,

@@ -61,7 +61,7 @@ def compare(
 
         dermis compare human --against path-traced --light back --samples 256 --json
 
-        dermis compare human --against path-traced --light laser --model montecarlo
+        dermis compare human --against path-traced --light laser --model layered
 
         dermis compare human --against heat --region ear --techniques gpu-gems-3,texture-space
 
@@ -84,8 +84,8 @@ def compare(
     medium:
         skin1, skin2 or another medium with a name, index-matched [skin1].
     model:
-        The medium's profile, as techniques have it: by layered diffusion, or by photons one by one, which
-        leaves out what diffusion errs [layered].
+        The medium's profile, as techniques have it: by tables of photons (counted), by layered diffusion, or
+        by photons one by one (montecarlo) [counted for one semi-infinite layer, else layered].
     samples:
         Paths through each pixel, for path-traced and cycles [64].
     output:
@@ -133,7 +133,7 @@ def _choose(chosen: Mapping[str, Any], sizes: Mapping[str, Any]) -> dict[str, An
         "region": chosen.get("region", usual_region(light)),
         "medium": chosen.get("medium", "skin1"),
         "direction": chosen.get("direction"),
-        "model": chosen.get("model", "layered"),
+        "model": chosen.get("model"),
         "settings": Settings(**{**_SIZES, **sizes}),
         "samples": chosen.get("samples", 64),
     }

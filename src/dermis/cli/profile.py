@@ -17,6 +17,7 @@ from dermis.scene.skin import Pigments
 _NAMES = {"structure": "skin"}
 
 if TYPE_CHECKING:
+    from dermis.optics.media import Floats
     from dermis.optics.radial import RadialProfile
     from dermis.optics.tissue import Tissue
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 else:
     PigmentOptions = options_of(Pigments, names=_NAMES)
 
-Model = Literal["dipole", "better-dipole", "multipole", "layered", "layered-point", "montecarlo"]
+Model = Literal["counted", "dipole", "better-dipole", "multipole", "layered", "layered-point", "montecarlo"]
 Flag = Annotated[bool, Parameter(negative="")]
 
 _TERMS, _PHOTONS, _MOST_PHOTONS = 6, 1_000_000, 10**10
@@ -70,8 +71,10 @@ def profile(
         A medium (dj3, skin1, skin2, marble ...), a skin of pigments (spectral, light, medium, dark), the
         published table gpu-gems-3, or a .toml file: [[layers]], a table [skin], or what -o wrote.
     model:
-        dipole and better-dipole take one semi-infinite layer; multipole is the deck's; layered is diffusion
-        with continuous flux [the default]; layered-point is finite at its centre; montecarlo is the truth.
+        counted is photons counted beforehand, for one semi-infinite layer of index 1 or 1.4 [its default];
+        layered is diffusion with continuous flux [the default of all else], layered-point finite at its
+        centre; dipole and better-dipole take one semi-infinite layer; multipole is the deck's; montecarlo
+        is the truth.
     clamp:
         Where the multipole puts the source of a layer thinner than a mean free path: inside it (layer), or
         below it as printed (none).
@@ -92,7 +95,7 @@ def profile(
     variances:
         One set of widths for all channels, as a renderer wants it, or a set for each.
     keep_energy:
-        Have the weights sum to the total reflectance.
+        Have the weights sum to the total reflectance; those of counted do.
     through:
         Also give the colour that comes through these thicknesses, such as 0.5,1,2 [mm].
     output:
@@ -103,13 +106,13 @@ def profile(
         Add Monte Carlo points with error bars to the plot.
     """
     from dermis.cli.profile_report import Report, Request
+    from dermis.optics.counted import COUNTED
     from dermis.optics.diffusion.known_errors import counted_error, known_error
     from dermis.optics.profiles import find_table
     from dermis.optics.radial import profile_of_table
 
     given = pigments | ({"oiliness": oiliness} if oiliness is not None else {})
     _check_outputs(output, plot, check)
-    request = Request(_TERMS if fit is None else fit, fit_kind, variances == "shared", keep_energy)
     thicknesses = () if through is None else parse_lengths("--through", through)
     light = _light(photons, seed, anisotropy, check or model == "montecarlo")
     table = find_table(name)
@@ -119,11 +122,13 @@ def profile(
         error, spectrum = None, None
     else:
         tissue = _tissue(name, given, eta)
-        radial = _profile(tissue, model or "layered", clamp, light)
+        radial = _profile(tissue, model, clamp, light)
         counted = _profile(tissue, "montecarlo", clamp, light) if check and model != "montecarlo" else None
         usual = name if not given and eta is None else ""
-        error = counted_error(radial, counted) if counted else known_error(model or "layered", usual)
-        spectrum = tissue.spectrum("layered" if model is None or model == "montecarlo" else model, clamp)
+        error = counted_error(radial, counted) if counted else known_error(radial.model, usual)
+        spectrum = _spectrum(tissue, model, clamp)
+    kept = keep_energy or radial.model == COUNTED
+    request = Request(_TERMS if fit is None else fit, fit_kind, variances == "shared", kept)
     own = None if fit is not None else table
     found = Report.of(radial, tissue, request, own, thicknesses, error, spectrum)
     if output is not None:
@@ -180,7 +185,13 @@ def _tissue(name: str, given: dict[str, Any], eta: float | None) -> Tissue:
     return tissue if eta is None else replace(tissue, medium=tissue.medium.with_eta(eta))
 
 
-def _profile(tissue: Tissue, model: Model, clamp: Any, light: dict[str, Any]) -> RadialProfile:
+def _spectrum(tissue: Tissue, model: Model | None, clamp: Any) -> Floats | None:
+    if model is None or model == "counted" or model == "montecarlo":
+        return tissue.spectrum(clamp=clamp)
+    return tissue.spectrum(model, clamp)
+
+
+def _profile(tissue: Tissue, model: Model | None, clamp: Any, light: dict[str, Any]) -> RadialProfile:
     if model != "montecarlo":
         return tissue.profile(model, clamp)
     from dermis.reference.slab_mc import counted_profile

@@ -80,7 +80,7 @@ def compare(
     medium: str = "skin1",
     settings: Settings | None = None,
     direction: DirectionName | None = None,
-    model: ModelName = "layered",
+    model: ModelName | None = None,
     samples: int = 64,
     adapter: str = "auto",
     report: Callable[[str], None] = lambda doing: None,
@@ -91,7 +91,7 @@ def compare(
     light, region : of `scenes.LIGHTS` and `scenes.REGIONS`
     medium : a named medium, taken as index-matched
     direction : of the techniques' skin; None for that of the truth's
-    model : of the medium's profile, as the techniques have it
+    model : of the medium's profile, as the techniques have it; see `gaussians_of` for the default
     samples : paths through each pixel
     report : called with what is being done
 
@@ -112,7 +112,7 @@ def compare(
             images[technique], ms[technique] = _render(judged, technique, truth)
         name = subject.renderer.device.adapter.name
     title = f"{head.name}, {medium}, light: {light}, region: {region}, {settings.size[0]}x{settings.size[1]}"
-    title += f", {skin.direction} skin" + (", profile by photons" if model == "montecarlo" else "")
+    title += f", {skin.direction} skin, profile by {'photons' if subject.profile.counted else 'diffusion'}"
     made = Comparison(title, name, truth, against, (), images)
     return replace(made, rows=tuple(_row(made, technique, ms[technique]) for technique in techniques))
 
@@ -125,7 +125,7 @@ def subject_of(
     medium: str,
     settings: Settings,
     adapter: str,
-    model: ModelName = "layered",
+    model: ModelName | None = None,
 ) -> Iterator[Subject]:
     """What a comparison judges, valid within the context; arguments as of `compare`."""
     body = media()[medium].with_eta(1.0)

@@ -9,15 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from dermis.comparison.profile_models import ModelName
+from dermis.comparison.profile_models import ModelName, gaussians_of
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
-from dermis.optics.diffusion.models import diffusion_profile
-from dermis.optics.fits.gaussian import fit_gaussians
+from dermis.optics.counted import COUNTED
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Medium
-from dermis.optics.profiles import TERMS, write_profile
-from dermis.reference.slab_mc import counted_profile
+from dermis.optics.profiles import write_profile
 from dermis.scene.camera import Camera, portrait, three_quarter
 from dermis.scene.lights import Light, SpotLight, StripeLight
 from dermis.scene.model import Scene
@@ -25,7 +23,6 @@ from dermis.scene.skin import Skin
 
 _WHITE = (3.14, 3.14, 3.14)
 _NOSE = (14.0, -28.0, 90.0)  # between tip, wing and lip, from the head's centre [mm]
-_PHOTONS = 2_000_000  # a channel
 _EARS_MM = 60.0  # above and below the centre; farther below, shoulders are wider
 
 
@@ -95,19 +92,13 @@ def comparison_scene(head: Head, light: str, region: str, profile: str) -> Scene
 
 @contextmanager
 def medium_scene(
-    head: Head, light: str, region: str, body: Medium, model: ModelName = "layered"
+    head: Head, light: str, region: str, body: Medium, model: ModelName | None = None
 ) -> Iterator[tuple[Scene, GaussianSum]]:
-    """`comparison_scene` with a medium's profile, kept as a file within the context, and the profile.
-
-    Six Gaussians miss 2 % of the light of photons, whose profile is steeper than diffusion's: those are made
-    to keep it.
-    """
-    counted = model == "montecarlo"
-    radial = counted_profile(body, photons=_PHOTONS) if counted else diffusion_profile(body)
-    profile = fit_gaussians(radial.rings(), TERMS, keep_energy=counted, name=body.name).profile
+    """`comparison_scene` with a medium's profile, kept as a file within the context, and the profile."""
+    profile = gaussians_of(body, model)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "profile.toml"
-        write_profile(file, profile, {})
+        write_profile(file, profile, {"model": COUNTED if profile.counted else "layered"})
         yield comparison_scene(head, light, region, str(file)), profile
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dermis.export.curve import Curve
+from dermis.optics.curve import Curve
 from dermis.optics.media import Floats
 from dermis.optics.radial import TINY
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dermis.export.curve import Curve
-from dermis.export.half_space import Kind, albedo_of, half_space
 from dermis.export.lobe import fit_d
+from dermis.optics.curve import Curve
+from dermis.optics.half_space import Kind, albedo_of, half_space
 from dermis.optics.media import Floats
 
 

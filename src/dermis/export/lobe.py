@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.export.curve import Curve
+from dermis.optics.curve import Curve
 from dermis.optics.fits.burley import BurleyProfile
 from dermis.optics.media import Floats
 

@@ -8,12 +8,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dermis.export.curve import Curve
 from dermis.export.truth import ModelName, true_curve
 from dermis.mesh.head import Head
 from dermis.mesh.maps import Maps
 from dermis.mesh.primitives import uv_sphere
 from dermis.mesh.samples import SAMPLES
+from dermis.optics.curve import Curve
 from dermis.optics.media import Floats
 from dermis.optics.tissue import Tissue
 from dermis.reading import named_path

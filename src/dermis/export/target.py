@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import ClassVar, TypeVar
 
 from dermis.errors import refuse, shown_value
-from dermis.export.curve import Curve
 from dermis.export.subject import Subject
+from dermis.optics.curve import Curve
 
 Value = bool | int | float | str | tuple[float, ...]
 T = TypeVar("T", bound="Target")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 from dermis.errors import refuse, shown_value
-from dermis.export.counted import counted_curve
-from dermis.export.curve import Curve
+from dermis.optics.counted import counted_curve
+from dermis.optics.curve import Curve
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.profiles import find_table
 from dermis.optics.radial import RadialProfile, profile_of_table
@@ -35,11 +35,15 @@ def true_curve(skin: Skin, model: ModelName | None = None) -> tuple[Curve, str, 
             refuse("model", "a tissue", f"{skin.profile} is a table of Gaussians", "Leave it out")
         return Curve.of_profile(profile_of_table(table)), "table", None
     tissue = tissue_of(skin)
-    if model in (None, "montecarlo") and (counted := counted_curve(tissue)) is not None:
+    if model in (None, "montecarlo") and (counted := _counted(tissue)) is not None:
         return counted, "montecarlo", tissue
     used: ModelName = model or "layered"
     entering = 1.0 if tissue.rgb is None else 1.0 - normal_reflectance(tissue.medium.eta)
     return Curve.of_profile(_profile(tissue, used), entering), used, tissue
+
+
+def _counted(tissue: Tissue) -> Curve | None:
+    return counted_curve(tissue.medium) if tissue.rgb is None else None
 
 
 def _profile(tissue: Tissue, model: ModelName) -> RadialProfile:

@@ -14,10 +14,11 @@ from dermis.human import teeth
 from dermis.mesh.eyeball import CORNEA_MM, LIMBUS_MM, SCLERA_MM, apex_mm, cornea_centre_mm, iris_mm
 from dermis.mesh.eyes import EyeLook
 from dermis.mesh.maps import Maps
-from dermis.optics.directions import directions
+from dermis.optics.flesh import medium_of
+from dermis.optics.forward import forward_directions
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.oblique import aside_mm
-from dermis.optics.thin_parts import across, medium_of
+from dermis.optics.thin_parts import across
 from dermis.scene.skin import USUAL_ROUGHNESS, Skin
 from dermis.specular.albedo import ROOT_OF_FIRST_ROW
 from dermis.specular.energy import ENERGY
@@ -118,7 +119,7 @@ def half_space_of(skin: Skin, maps: Maps, profile: GaussianSum) -> tuple[Floats,
 def _by_direction(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any]:
     """Members that direction.wgsl reads, for half-spaces of the skin's mean colour."""
     half_space = half_space_of(skin, maps, profile)
-    law = directions(*half_space)
+    law = forward_directions(*half_space, skin.anisotropy)
     return {
         "inner_eta": law.eta,
         "aside_mm": min(aside_mm(medium_of(profile, *half_space)), _MOST_ASIDE_MM),
@@ -126,7 +127,7 @@ def _by_direction(skin: Skin, maps: Maps, profile: GaussianSum) -> dict[str, Any
         "once": law.once,
         "back_from_everywhere": law.from_everywhere,
         "back": np.pad(law.returned, ((0, 0), (0, 1))),
-        "across": np.pad(across(*half_space), ((0, 0), (0, 1))),
+        "across": np.pad(across(*half_space, profile.counted, skin.anisotropy), ((0, 0), (0, 1))),
     }
 
 

@@ -119,7 +119,7 @@ class _Matched:
 @lru_cache(maxsize=KEPT)
 def _numbers(eta: float, total: float) -> Floats:
     """(ROWS + 2,) what is returned, the same from everywhere, and the strength of what scattered once."""
-    albedo = _albedo_of(total, eta)
+    albedo = albedo_returning(total, eta)
     space = _Matched(albedo, eta)
     above = float(space.returned(1.0))
     if above <= 0.0:
@@ -136,7 +136,7 @@ def _mean_once(eta: float) -> float:
     return float((2.0 * weight * mu * mean_of_once(mu, eta)).sum())
 
 
-def _albedo_of(total: float, eta: float) -> float:
+def albedo_returning(total: float, eta: float) -> float:
     """Single-scattering albedo of the half-space that returns this share of what enters from above."""
     from scipy.optimize import brentq
 

@@ -28,6 +28,7 @@ class GaussianSum:
     variance_mm2 : (k,) increasing [mm2]
     weight : (k, c) share of the light that each Gaussian spreads in c channels; a frame takes three, linear
         Rec. 709 [-]
+    counted : whether they are fitted to counted photons, not to diffusion
 
     Source: [dEonLuebke2007] section 14.4.
     """
@@ -35,6 +36,7 @@ class GaussianSum:
     name: str
     variance_mm2: Floats
     weight: Floats
+    counted: bool = False
 
     def __post_init__(self) -> None:
         variance, weight = self.variance_mm2, self.weight

@@ -49,7 +49,7 @@ class RadialProfile:
     @property
     def finite(self) -> bool:
         """Whether R(r) has a value at the point of entry: a beam's does not."""
-        return self.model not in ("layered", "montecarlo")
+        return self.model not in ("layered", "montecarlo", "counted")
 
     def points(self) -> Points:
         """What a fit of R(r) itself is judged by."""

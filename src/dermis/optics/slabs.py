@@ -9,10 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dermis.optics.directions import critical_cosine, gaussian_nodes, internal_reflectance
+from dermis.optics.phase import Phase, phase
 
 Floats = NDArray[np.float64]
 NODES = 16
 """Cosines of those directions that leave a slab, and as many of those that are held back."""
+DEEP = 1e4
+"""Mean free paths that are as good as a half-space."""
 _THINNEST = 1e-6  # optical thickness in which light scatters once at most
 
 
@@ -31,45 +34,94 @@ class Slabs:
     through: Floats
 
 
-def slabs(albedo: float, optical_depth: ArrayLike, eta: float, nodes: int = NODES) -> Slabs:
-    """Slabs that scatter isotropically, by adding and doubling; exact but for the number of directions.
+def slabs(albedo: float, optical_depth: ArrayLike, eta: float, nodes: int = NODES, g: float = 0.0) -> Slabs:
+    """Slabs by adding and doubling; exact but for the number of directions.
 
-    albedo : of single scattering [-]
-    optical_depth : (n,) thickness in mean free paths, above 0 [-]
+    albedo : of single scattering, reduced where that goes forward [-]
+    optical_depth : (n,) thickness in mean free paths, reduced ones likewise, above 0 [-]
     eta : index of refraction against the air on both sides, at least 1 [-]
     nodes : as `NODES`
+    g : mean cosine of scattering, 0 or more [-]
 
     Source: [Chandrasekhar1960] section 50 for what layers do together.
     """
     tau = np.atleast_1d(np.asarray(optical_depth, np.float64))
-    times = int(np.ceil(np.log2(max(float(tau.max()) / _THINNEST, 1.0))))
-    mu, weight = _cosines(eta, nodes)
-    *_, (R, T, straight) = _doubled(albedo, tau / 2.0**times, times, mu, 2.0 * weight * mu)
-    return _cut(eta, mu, weight, R, T, straight)
+    way = _Way.of(albedo, eta, nodes, g)
+    times = way.times(float(tau.max()))
+    *_, (R, T, straight) = _doubled(way, tau / 2.0**times, times)
+    return _cut(way, R, T, straight)
 
 
-def doubled_slabs(albedo: float, least: ArrayLike, times: int, eta: float, nodes: int = NODES) -> Slabs:
+def doubled_slabs(
+    albedo: float, least: ArrayLike, times: int, eta: float, nodes: int = NODES, g: float = 0.0
+) -> Slabs:
     """`slabs` of the least depths, of twice those and so on: each is on the way to the next.
 
     least : (n,) optical depths, of about the same size [-]
     times : that they are doubled; there are n (times + 1) slabs, ordered by times, then by `least`
     """
-    before = int(np.ceil(np.log2(max(float(np.max(least)) / _THINNEST, 1.0))))
-    mu, weight = _cosines(eta, nodes)
-    start = np.asarray(least, np.float64) / 2.0**before
-    made = list(_doubled(albedo, start, before + times, mu, 2.0 * weight * mu))[before:]
+    way = _Way.of(albedo, eta, nodes, g)
+    before = way.times(float(np.max(least)))
+    made = list(_doubled(way, np.asarray(least, np.float64) / 2.0**before, before + times))[before:]
     R, T, straight = (np.concatenate(part) for part in zip(*made, strict=True))
-    return _cut(eta, mu, weight, R, T, straight)
+    return _cut(way, R, T, straight)
 
 
-def _cut(eta: float, mu: Floats, weight: Floats, R: Floats, T: Floats, straight: Floats) -> Slabs:
+def leaving_deep(albedo: float, eta: float, nodes: int, g: float) -> tuple[Floats, Floats, Floats]:
+    """What a half-space makes of light by its directions.
+
+    Cosines (m,) below the surface, shares (m,) of uniform light that enters or leaves there, and (m, m) light
+    that leaves by direction, of exit first, over what enters: its mean by the shares is all that leaves.
+    """
+    way = _Way.of(albedo, eta, nodes, g)
+    times = way.times(DEEP)
+    *_, (R, T, straight) = _doubled(way, np.array([DEEP / 2.0**times]), times)
+    back, _ = _between_faces(R * way.flux, T * way.flux, straight, way.held, R, T)
+    leaving = (way.flux * (1.0 - way.held))[way.escapes]
+    radiance = back[0][np.ix_(way.escapes, way.escapes)] * leaving.sum()
+    return way.mu[way.escapes], leaving / leaving.sum(), radiance
+
+
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """How light goes on in a medium: cosines (m,), their shares of uniform light inside, what faces hold
+    back, which of them leave, and what scattering does."""
+
+    mu: Floats
+    flux: Floats
+    held: Floats
+    escapes: NDArray[np.bool_]
+    phase: Phase
+
+    @classmethod
+    def of(cls, albedo: float, eta: float, nodes: int, g: float) -> _Way:
+        mu, weight = _cosines(eta, nodes)
+        held, escapes = internal_reflectance(mu, eta), mu > critical_cosine(eta)
+        return cls(mu, 2.0 * weight * mu, held, escapes, phase(albedo, g, mu, nodes))
+
+    def times(self, depth: float) -> int:
+        """How often slabs are doubled that begin so thin that light scatters in them once at most."""
+        return int(np.ceil(np.log2(max(depth * self.phase.extinction / _THINNEST, 1.0))))
+
+
+def _cut(way: _Way, R: Floats, T: Floats, straight: Floats) -> Slabs:
     """What slabs between two faces make of light from the air."""
-    flux, escapes = 2.0 * weight * mu, mu > critical_cosine(eta)
-    back, through = _between_faces(R * flux, T * flux, straight, internal_reflectance(mu, eta), R, T)
-    leaving = flux * (1.0 - internal_reflectance(mu, eta))
+    flux, escapes = way.flux, way.escapes
+    back, through = _between_faces(R * flux, T * flux, straight, way.held, R, T)
+    leaving = flux * (1.0 - way.held)
     entering = leaving[escapes] / leaving[escapes].sum()
     up, down = (np.einsum("k,nkm->nm", leaving, part[..., escapes]) for part in (back, through))
-    return Slabs(mu[escapes], entering, up, down)
+    if way.phase.extinction < way.phase.whole_extinction:  # what scattered straight on has scattered too
+        whole = straight ** (way.phase.whole_extinction / way.phase.extinction)
+        (up_on, down_on), (up_off, down_off) = (_unscattered(one, way.held) for one in (straight, whole))
+        up, down = up + (up_on - up_off)[:, escapes], down + (down_on - down_off)[:, escapes]
+    return Slabs(way.mu[escapes], entering, up, down)
+
+
+def _unscattered(straight: Floats, held: Floats) -> tuple[Floats, Floats]:
+    """(n, m) light that leaves as it entered, on the side of entry and on the far one."""
+    down = (1.0 - held) * straight / (1.0 - (straight * held) ** 2)
+    return down * straight * held, down
 
 
 def _cosines(eta: float, nodes: int) -> tuple[Floats, Floats]:
@@ -81,15 +133,17 @@ def _cosines(eta: float, nodes: int) -> tuple[Floats, Floats]:
     return mu, weight
 
 
-def _doubled(
-    albedo: float, tau: Floats, times: int, mu: Floats, flux: Floats
-) -> Iterator[tuple[Floats, Floats, Floats]]:
+def _doubled(way: _Way, tau: Floats, times: int) -> Iterator[tuple[Floats, Floats, Floats]]:
     """Of slabs so thin, then of ones twice as thick each time: (n, m, m) radiance over pi, back and through,
-    per power from each direction; (n, m) unscattered."""
-    t = tau[:, None, None]
+    per power from each direction; (n, m) unscattered.
+
+    tau : (n,) in reduced mean free paths
+    """
+    mu, flux, albedo = way.mu, way.flux, way.phase.albedo
+    t = way.phase.extinction * tau[:, None, None]
     a, b = mu[:, None], mu[None, :]
-    R = -0.25 * albedo / (a + b) * np.expm1(-t * (1.0 / a + 1.0 / b))
-    T = 0.25 * albedo * t / (a * b) * np.exp(-0.5 * t * (1.0 / a + 1.0 / b))
+    R = -0.25 * albedo / (a + b) * np.expm1(-t * (1.0 / a + 1.0 / b)) * way.phase.backward
+    T = 0.25 * albedo * t / (a * b) * np.exp(-0.5 * t * (1.0 / a + 1.0 / b)) * way.phase.forward
     straight = np.exp(-t[..., 0] / mu)
     yield R, T, straight
     for _ in range(times):

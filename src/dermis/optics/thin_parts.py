@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import NamedTuple
@@ -10,23 +9,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.optics.diffusion import hankel, layered_diffusion
+from dermis.optics.diffusion import hankel
 from dermis.optics.diffusion.boundary import mismatch
 from dermis.optics.diffusion.layered_diffusion import respond_sheets
 from dermis.optics.directions import KEPT, refracted
 from dermis.optics.directions import ROWS as DIRECTIONS
-from dermis.optics.gaussians import GaussianSum
+from dermis.optics.flesh import LEAST_ALBEDO, MOST_ALBEDO, albedo_of_total
 from dermis.optics.interpolated import interpolated
 from dermis.optics.media import Layer, Medium
-from dermis.optics.slabs import NODES, Slabs, doubled_slabs, slabs
+from dermis.optics.slabs import DEEP, NODES, Slabs, doubled_slabs, slabs
 
 Floats = NDArray[np.float64]
 ROWS = 32
 """Thicknesses of the tables."""
-_MOST_ALBEDO, _LEAST_ALBEDO = 1.0 - 1e-6, 1e-3
-_LOGS = (-14.0, 14.0)  # of frequencies that are searched [1/mm]
 _LAW_DEPTH = 10.0  # mean free paths from which on directions of entry count alike
-_DEEP = 1e4  # mean free paths that are as good as a half-space
 _FEW = 8  # cosines for what uniform light does
 _LEAST_DEPTHS, _DOUBLED = 1e-4 * np.array([1.0, 2.0**0.5]), 25  # of slabs that are cut [mean free path]
 _DEPTHS = (_LEAST_DEPTHS * 2.0 ** np.arange(_DOUBLED + 1)[:, None]).ravel()
@@ -52,26 +48,12 @@ class ThinParts:
     deep: Floats
 
 
-def medium_of(profile: GaussianSum, total: Floats, eta: float) -> Medium:
-    """The half-space that returns a share of light, and half of it within the profile's own distance.
-
-    total : (c,) that it returns of what enters perpendicularly [-]
-    eta : index of refraction against the air [-]
-    """
-    albedo, extinction = np.empty(len(total)), np.empty(len(total))
-    for c, share in enumerate(total):
-        root, half = interpolated(partial(_returning, eta), float(share))
-        one = GaussianSum("", profile.variance_mm2, profile.weight[:, [c]])
-        albedo[c], extinction[c] = 1.0 - root**2, _half(partial(_spread, one)) / half
-    layer = Layer((1.0 - albedo) * extinction, albedo * extinction)
-    return Medium("flesh", (layer,), eta)
-
-
-def thin_parts(body: Medium, variance_mm2: Floats, reach_mm: float) -> ThinParts:
+def thin_parts(body: Medium, variance_mm2: Floats, reach_mm: float, g: float = 0.0) -> ThinParts:
     """The tables of slabs that are cut from a half-space of one layer.
 
     variance_mm2 : (k,) of the Gaussians that spread light
     reach_mm : largest thickness of use
+    g : mean cosine of the body's scattering, whose coefficients are reduced [-]
 
     How much goes through is exact, for uniform light from all directions, as its change with direction nearly
     is; how wide it spreads is layered diffusion's, for light from above.
@@ -83,7 +65,7 @@ def thin_parts(body: Medium, variance_mm2: Floats, reach_mm: float) -> ThinParts
     deep, weight = np.zeros((2, ROWS, body.channels))
     for c in range(body.channels):
         one = body.channel(c)
-        share, shape = _shares(one.layers[0], depth[1:], body.eta), _shapes(one, depth[1:], variance_mm2)
+        share, shape = _shares(one.layers[0], depth[1:], body.eta, g), _shapes(one, depth[1:], variance_mm2)
         through[1:, :, c], lost[1:, :, c] = share.passed[:, None] * shape, share.lost[:, None] * shape
         deep[1:, c], weight[1:, c] = share.deep, share.amount
         lost[0, :, c] = shape[0]
@@ -92,27 +74,29 @@ def thin_parts(body: Medium, variance_mm2: Floats, reach_mm: float) -> ThinParts
     return ThinParts(reach_mm, through, lost, np.clip(mean, -1.0, 1.0))
 
 
-def across(total: Floats, eta: float) -> Floats:
+def across(total: Floats, eta: float, counted: bool = False, g: float = 0.0) -> Floats:
     """(directions.ROWS, c) what passes deep slabs from a direction, over what does of uniform light.
 
     Both for light of which as much comes back; by evenly spaced roots of the cosine, as `directions` has it.
 
     total : (c,) that the half-space returns of what enters perpendicularly [-]
+    counted : whether the profile is of photons, as of `GaussianSum`
+    g : as of `thin_parts`
     """
-    return np.stack([interpolated(partial(_across, eta), float(share)) for share in total], axis=-1)
+    return np.stack([interpolated(partial(_across, eta, counted, g), float(one)) for one in total], axis=-1)
 
 
 @lru_cache(maxsize=KEPT)
-def _across(eta: float, total: float) -> Floats:
+def _across(eta: float, counted: bool, g: float, total: float) -> Floats:
     cosine = refracted(np.linspace(0.0, 1.0, DIRECTIONS) ** 2, eta)
-    whole, law = _law(_albedo_of(total, eta), eta, NODES)
+    whole, law = _law(albedo_of_total(total, eta, counted), eta, NODES, g)
     return np.interp(cosine, whole.cosine, law)
 
 
-def _law(albedo: float, eta: float, nodes: int) -> tuple[Slabs, Floats]:
+def _law(albedo: float, eta: float, nodes: int, g: float) -> tuple[Slabs, Floats]:
     """The half-space, and what passes deep slabs of it by its cosines of entry, as `across` has it."""
-    whole = slabs(albedo, _DEEP, eta, nodes)
-    return whole, _slanted(slabs(albedo, _LAW_DEPTH, eta, nodes), whole)[0]
+    whole = slabs(albedo, DEEP, eta, nodes, g)
+    return whole, _slanted(slabs(albedo, _LAW_DEPTH, eta, nodes, g), whole)[0]
 
 
 def _slanted(cut: Slabs, whole: Slabs) -> Floats:
@@ -132,25 +116,25 @@ class _Shares(NamedTuple):
     deep: Floats
 
 
-def _shares(layer: Layer, depth_mm: Floats, eta: float) -> _Shares:
+def _shares(layer: Layer, depth_mm: Floats, eta: float, g: float) -> _Shares:
     """By cubics between depths for which an albedo's slabs are cut once."""
     from scipy.interpolate import CubicSpline
 
     depth = np.clip(float(layer.sigma_t_prime[0]) * depth_mm, _DEPTHS[0], _DEPTHS[-1])
-    cut = interpolated(partial(_by_depth, eta), float(np.sqrt(1.0 - layer.alpha_prime[0])))
+    cut = interpolated(partial(_by_depth, eta, g), float(np.sqrt(1.0 - layer.alpha_prime[0])))
     return _Shares(*CubicSpline(np.log(_DEPTHS), cut)(np.log(depth)).T)
 
 
 @lru_cache(maxsize=KEPT)
-def _by_depth(eta: float, root: float) -> Floats:
+def _by_depth(eta: float, g: float, root: float) -> Floats:
     """(n, 4) what `_Shares` holds by `_DEPTHS`, for the root of what a scattering absorbs."""
-    return np.stack(_cut(min(max(1.0 - root**2, _LEAST_ALBEDO), _MOST_ALBEDO), eta), axis=-1)
+    return np.stack(_cut(min(max(1.0 - root**2, LEAST_ALBEDO), MOST_ALBEDO), eta, g), axis=-1)
 
 
-def _cut(albedo: float, eta: float) -> _Shares:
+def _cut(albedo: float, eta: float, g: float) -> _Shares:
     """Of slabs of `_DEPTHS`."""
-    cut = doubled_slabs(albedo, _LEAST_DEPTHS, _DOUBLED, eta, _FEW)
-    whole, slanted = _law(albedo, eta, _FEW)
+    cut = doubled_slabs(albedo, _LEAST_DEPTHS, _DOUBLED, eta, _FEW, g)
+    whole, slanted = _law(albedo, eta, _FEW, g)
     returned, law = _uniform(whole, whole.back), slanted - 1.0
     weight = whole.flux * whole.back[0]
     deep = (_slanted(cut, whole) - 1.0) @ (weight * law) / (weight * law**2).sum()
@@ -173,47 +157,3 @@ def _shapes(body: Medium, depth_mm: Floats, variance_mm2: Floats) -> Floats:
     shape = passed[:, 1:] / np.maximum(passed[:, :1], _LEAST)  # deep in dark flesh nothing passes
     made = np.stack([nnls(bells, np.append(one, sure))[0] for one in shape])
     return np.asarray(made / made.sum(axis=1, keepdims=True))
-
-
-@lru_cache(maxsize=KEPT)
-def _returning(eta: float, total: float) -> Floats:
-    """(2,) of the half-space that returns this share: the root of what a scattering absorbs [-], and the
-    frequency at which what it returns has fallen to half [1/mean free path]."""
-    albedo = _albedo_of(total, eta)
-    return np.array([np.sqrt(1.0 - albedo), _half(partial(_returned, _unit(albedo, eta)))])
-
-
-def _albedo_of(total: float, eta: float) -> float:
-    """Albedo of single scattering of the half-space that returns this share, by layered diffusion."""
-    from scipy.optimize import brentq
-
-    def beyond(albedo: float) -> float:
-        return _returned(_unit(albedo, eta), float(hankel.STILL[0])) - total
-
-    if beyond(_LEAST_ALBEDO) >= 0.0:
-        return _LEAST_ALBEDO
-    return float(brentq(beyond, _LEAST_ALBEDO, _MOST_ALBEDO)) if beyond(_MOST_ALBEDO) > 0.0 else _MOST_ALBEDO
-
-
-def _unit(albedo: float, eta: float) -> Medium:
-    """A half-space whose mean free path is 1 mm."""
-    return Medium("flesh", (Layer(np.array([1.0 - albedo]), np.array([albedo])),), eta)
-
-
-def _spread(profile: GaussianSum, frequency: float) -> float:
-    """Hankel transform of a profile of one channel."""
-    return float(profile.hankel(frequency)[0])
-
-
-def _returned(body: Medium, frequency: float) -> float:
-    """Hankel transform of what it returns."""
-    A = mismatch(body.eta, "exact")
-    return float(layered_diffusion.respond(np.array([frequency]), body, A)[0][0, 0])
-
-
-def _half(transform: Callable[[float], float]) -> float:
-    """The frequency at which a transform has fallen to half of its total [1/mm]."""
-    from scipy.optimize import brentq
-
-    total = transform(float(hankel.STILL[0]))
-    return float(np.exp(brentq(lambda log: transform(float(np.exp(log))) - 0.5 * total, *_LOGS)))

@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dermis.errors import DermisError, refuse, shown_value
+from dermis.optics.counted import COUNTED, is_counted, tabulated_profile
 from dermis.optics.diffusion.boundary import normal_reflectance
 from dermis.optics.diffusion.models import Model, diffusion_profile, through_slab
 from dermis.optics.diffusion.multipole import Clamp
-from dermis.optics.media import Floats, Layer, Medium, media, medium_from_toml
+from dermis.optics.half_space import ALBEDOS
+from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium, media, medium_from_toml
 from dermis.optics.pigments.skin import EXAMPLES, SkinParameters, Structure, spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
 from dermis.optics.radial import RadialProfile
@@ -22,6 +24,9 @@ from dermis.reading import named_path, read_toml
 
 SPECTRAL = "spectral"
 _STRUCTURE: Structure = "dj2006"
+
+ProfileModel = Model | Literal["counted"]
+"""A diffusion model, or photons counted beforehand for half-spaces of one medium."""
 
 
 @dataclass(frozen=True)
@@ -74,9 +79,27 @@ class Tissue:
             refuse("layers", "a medium with a name (skin1, dj3 ...) or of a file", came, "Leave them out")
         return replace(self, medium=replace(self.medium, layers=tuple(layers)))
 
-    def profile(self, model: Model = "layered", clamp: Clamp = "layer") -> RadialProfile:
-        """R(r) in linear Rec. 709: per power that enters, or per incident power for wavelengths."""
-        return diffusion_profile(self.medium, model, clamp, self.rgb)
+    @property
+    def usual_model(self) -> ProfileModel:
+        """Of its profile: counted photons for a half-space of one medium that they were counted for."""
+        return COUNTED if self.rgb is None and is_counted(self.medium) else "layered"
+
+    def profile(self, model: ProfileModel | None = None, clamp: Clamp = "layer") -> RadialProfile:
+        """R(r) in linear Rec. 709: per power that enters, or per incident power for wavelengths.
+
+        model : by default `usual_model`
+
+        Raises DermisError when the model cannot take the medium.
+        """
+        used = model or self.usual_model
+        if used != COUNTED:
+            return diffusion_profile(self.medium, used, clamp, self.rgb)
+        found = tabulated_profile(self.medium) if self.rgb is None else None
+        if found is None:
+            least, most = ALBEDOS
+            expected = f"one layer without end of index 1 or {SKIN_ETA} and reduced albedo {least} to {most}"
+            refuse(f"model {COUNTED}", expected, f"{self.medium.name} is none", "Take the model layered")
+        return found
 
     def through(self, thickness_mm: ArrayLike) -> Floats:
         """Light that comes through the tissue cut at each thickness, (n, 3), per the same power [-]."""

@@ -117,6 +117,11 @@ class Skin(Plain):
     direction: DirectionName = "half-space"
     """How skin returns light: "lambertian" alike from and to all directions; "half-space" as a half-space
     of the skin's mean colour: more of what arrives at a slant, and light scattered once leaves at a slant."""
+    anisotropy: Annotated[
+        float, Field(ge=0, le=0.95), Because("of more, the law takes nearly all as going straight on")
+    ] = 0.0
+    """Mean cosine of scattering in half-space skin, whose reduced scattering stays as it is: at 0.8, as in
+    real flesh, more comes back of light at a slant, and more passes thin parts."""
     pigments: Pigments | None = None
     """What replaces pigments of the profile's skin, of "spectral", "light", "medium", "dark" or a file."""
     layers: Annotated[tuple[TissueLayer, ...], Field(max_length=MOST_LAYERS)] = ()

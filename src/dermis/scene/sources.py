@@ -13,6 +13,7 @@ from dermis.scene.techniques import TECHNIQUES
 _FRAME = ("dEonLuebke2007", "Burns2013")
 _FRESNEL = {"schlick": ("Schlick1994", "Dudash2007"), "exact": ("CookTorrance1982",)}
 _HALF_SPACE = ("Chandrasekhar1960", "Jensen2001")
+_FORWARD = ("HenyeyGreenstein1941", "Wiscombe1977")
 _TONES = {"none": (), "filmic": ("Hable2010",), "neutral": ("Khronos2024",)}
 _SHADOWS = ("Williams1978", "Reeves1987", "Hanika2021")
 _RELIEF = ("Mikkelsen2010", "OlanoBaker2010")
@@ -36,7 +37,8 @@ def sources_of(
     """
     keys = [*_FRAME, *scattering_sources(settings), *_surface(skin)]
     keys += profile_sources(skin)
-    keys += _HALF_SPACE * (skin.direction == "half-space")
+    if skin.direction == "half-space":
+        keys += _HALF_SPACE + _FORWARD * (skin.anisotropy > 0)
     keys += _RELIEF * relief
     keys += _light(lights)
     if environment is not None:

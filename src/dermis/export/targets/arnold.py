@@ -11,13 +11,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from dermis.export.curve import Curve
 from dermis.export.equivalent import homogeneous
-from dermis.export.half_space import albedo_of, half_space
 from dermis.export.lobe import fit_d
 from dermis.export.subject import Subject
 from dermis.export.target import Row, Rows, Target, numbers_of
 from dermis.export.values import write_values
+from dermis.optics.curve import Curve
+from dermis.optics.half_space import albedo_of, half_space
 from dermis.optics.media import Floats
 
 _COLOUR, _RADIUS, _SCALE = "subsurface_color", "subsurface_radius", "subsurface_scale"

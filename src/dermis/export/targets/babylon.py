@@ -6,7 +6,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from dermis.export.curve import Curve
 from dermis.export.inlining import hash_of, inline
 from dermis.export.lobe import fit_d
 from dermis.export.subject import Subject
@@ -15,6 +14,7 @@ from dermis.export.targets.babylon_spiral import TOO_WIDE, spiral_curve
 from dermis.export.targets.web_library import Script
 from dermis.export.targets.web_page import linked
 from dermis.export.targets.web_target import WebPage, surface_rows
+from dermis.optics.curve import Curve
 
 _PROFILE = "subSurface.scatteringDiffusionProfile"
 _SCALE = "subSurfaceConfiguration.metersPerUnit"

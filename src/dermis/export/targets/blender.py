@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dermis.export.curve import Curve
 from dermis.export.subject import Subject
 from dermis.export.target import Row, Rows, Target, numbers_of
 from dermis.export.targets.blender_files import write_scene
@@ -22,6 +21,7 @@ from dermis.export.targets.blender_walks import (
     skin_stretch,
     walk_within,
 )
+from dermis.optics.curve import Curve
 from dermis.optics.media import SKIN_ETA, Floats
 
 Within = Callable[[Floats], Floats]

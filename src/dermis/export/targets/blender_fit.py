@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dermis.export.curve import Curve
+from dermis.optics.curve import Curve
 from dermis.optics.media import Floats
 
 _LEAST, _MOST, _NODES = 1e-2, 60.0, 400  # radii that a fit is judged at, by the true median

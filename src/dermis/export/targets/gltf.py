@@ -7,12 +7,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from dermis.export.curve import Curve
 from dermis.export.lobe import fit_d
 from dermis.export.subject import Subject
 from dermis.export.target import Row, Rows, Target, numbers_of
 from dermis.export.targets.gltf_file import encoded
 from dermis.export.targets.gltf_medium import Volume, fitted, walked
+from dermis.optics.curve import Curve
 from dermis.optics.media import SKIN_ETA
 
 SCATTER, DIFFUSE = "scatter", "diffuse-transmission"

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.export.curve import Curve
 from dermis.export.equivalent import homogeneous
-from dermis.export.half_space import albedo_of, half_space
+from dermis.optics.curve import Curve
+from dermis.optics.half_space import albedo_of, half_space
 from dermis.optics.media import Floats
 
 _LEAST = 1e-300  # share of the light without an event

@@ -8,11 +8,11 @@ from typing import ClassVar
 import numpy as np
 
 from dermis.errors import refuse
-from dermis.export.curve import Curve
 from dermis.export.subject import Subject
 from dermis.export.target import Row, Rows, Target, value_of
 from dermis.export.targets.maps_files import SIDES, baked_maps, check_side, map_files
 from dermis.frame.skin_profiles import SkinProfiles
+from dermis.optics.curve import Curve
 from dermis.optics.media import Floats
 from dermis.scene.settings import Settings
 

@@ -11,14 +11,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from dermis.export.curve import Curve
 from dermis.export.equivalent import homogeneous
-from dermis.export.half_space import Kind, albedo_of, half_space
 from dermis.export.lobe import fit_d
 from dermis.export.subject import Subject
 from dermis.export.target import Row, Rows, Target, numbers_of
 from dermis.export.targets.mitsuba_colours import Colours, colours_of, rough, textures
 from dermis.export.targets.mitsuba_files import BOUNDARIES, REFLECTED, Boundary, Looks, Walked, scene_files
+from dermis.optics.curve import Curve
+from dermis.optics.half_space import Kind, albedo_of, half_space
 from dermis.optics.media import Floats
 from dermis.scene.model import Scene
 

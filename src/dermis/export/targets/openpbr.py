@@ -11,7 +11,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from dermis.export.curve import Curve
 from dermis.export.deviation import deviation
 from dermis.export.lobe import fit_d
 from dermis.export.subject import Subject
@@ -26,6 +25,7 @@ from dermis.export.targets.openpbr_document import (
 from dermis.export.targets.openpbr_files import looks_of, place_of, skin_of, write_pictures
 from dermis.export.targets.openpbr_fit import fitted_mm, profile_of_specification, typed_mm, walk
 from dermis.extras import needed
+from dermis.optics.curve import Curve
 from dermis.optics.media import Floats
 from dermis.specular.fresnel import SKIN_ETA
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from dermis.export.curve import Curve
 from dermis.export.equivalent import homogeneous
-from dermis.export.half_space import half_space
 from dermis.export.lobe import fit_d, lobe
 from dermis.export.subject import Subject
+from dermis.optics.curve import Curve
+from dermis.optics.half_space import half_space
 from dermis.optics.media import Floats, Layer
 from dermis.optics.van_de_hulst import albedo_of_colour
 

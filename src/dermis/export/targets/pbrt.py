@@ -7,7 +7,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from dermis.export.curve import Curve
 from dermis.export.sized import nearest_size, resized
 from dermis.export.subject import Subject
 from dermis.export.target import Row, Rows, Target, numbers_of
@@ -23,6 +22,7 @@ from dermis.export.targets.pbrt_scene import (
 )
 from dermis.export.targets.pbrt_textures import textures_of
 from dermis.mesh.head import Head
+from dermis.optics.curve import Curve
 from dermis.optics.media import SKIN_ETA, Floats
 from dermis.scene.camera import Camera
 from dermis.scene.model import Scene

@@ -11,11 +11,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from dermis.export.curve import Curve
 from dermis.export.lobe import fit_d, lobe
 from dermis.export.subject import Subject
 from dermis.export.target import Row, Rows, Target, numbers_of
 from dermis.export.values import write_values
+from dermis.optics.curve import Curve
 from dermis.optics.fits.burley import shape_factor_diffuse
 from dermis.optics.media import Floats
 

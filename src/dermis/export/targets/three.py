@@ -7,12 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from dermis.export.curve import Curve
 from dermis.export.inlining import hash_of
 from dermis.export.subject import Subject
 from dermis.export.target import Row, Rows
 from dermis.export.targets.web_library import Script, module_url
 from dermis.export.targets.web_target import WebPage, surface_rows
+from dermis.optics.curve import Curve
 
 _HASHES = {
     "three": ("build/three.module.js", "T/E3B9AvPtLn5PKD7aTSFqizQcA4kHDfU0lub7u0fvM4w9BMGcSb3yI7r5LqMAMn"),

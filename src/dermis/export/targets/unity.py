@@ -11,12 +11,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from dermis.export.curve import Curve
 from dermis.export.lobe import fit_d, lobe
 from dermis.export.naming import yaml_text
 from dermis.export.subject import Subject
 from dermis.export.target import Row, Rows, Target, Value, numbers_of
 from dermis.export.textures import write_maps
+from dermis.optics.curve import Curve
 from dermis.optics.fits.burley import BurleyProfile, unity_parameters
 from dermis.optics.media import Floats
 

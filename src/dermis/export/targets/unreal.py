@@ -11,13 +11,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from dermis.export.curve import Curve
 from dermis.export.equivalent import homogeneous
 from dermis.export.lobe import fit_d, lobe
 from dermis.export.subject import Subject
 from dermis.export.target import Row, Rows, Target, numbers_of
 from dermis.export.targets.unreal_script import script
 from dermis.export.textures import write_maps
+from dermis.optics.curve import Curve
 from dermis.optics.fits.burley import UNREAL_FACTOR, BurleyProfile, shape_factor, unreal_parameters
 from dermis.optics.media import Floats
 

@@ -9,7 +9,6 @@ from typing import ClassVar
 import numpy as np
 
 from dermis.errors import refuse
-from dermis.export.curve import Curve
 from dermis.export.subject import Subject
 from dermis.export.target import Row, Rows, Target, numbers_of
 from dermis.export.targets.openpbr import TYPED, misread, radii_mm, surface_rows
@@ -23,6 +22,7 @@ from dermis.extras import needed
 from dermis.frame.passes.painting.eye_pictures import eye_pictures
 from dermis.gpu.failures import on_device
 from dermis.mesh.eyes import Eyes
+from dermis.optics.curve import Curve
 
 _PACKAGE, _BINARY = ".usdz", ".usdc"
 _UNIT = Row("metersPerUnit", 1.0, "m", "lengths of the stage are metres, those of materials too")

@@ -9,9 +9,9 @@ from typing import ClassVar
 import numpy as np
 
 from dermis.errors import refuse
-from dermis.export.curve import Curve
 from dermis.export.subject import Subject
 from dermis.export.target import Row, Rows, Target, numbers_of
+from dermis.optics.curve import Curve
 from dermis.optics.media import Floats
 
 _ATLAS = 512

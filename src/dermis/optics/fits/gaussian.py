@@ -157,7 +157,9 @@ def single_gaussian(profile: GaussianSum) -> GaussianSum:
     from scipy.optimize import minimize_scalar
 
     def at(log_variance: float) -> GaussianSum:
-        return GaussianSum(f"{profile.name}, one blur", np.exp([log_variance]), profile.albedo[None])
+        return GaussianSum(
+            f"{profile.name}, one blur", np.exp([log_variance]), profile.albedo[None], profile.counted
+        )
 
     def misfit(log_variance: float) -> float:
         one = at(log_variance)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -27,7 +28,8 @@ def shared_gaussians(profiles: Sequence[GaussianSum], terms: int = SHARED_TERMS)
     first = profiles[0].variance_mm2
     if all(np.array_equal(first, one.variance_mm2) for one in profiles):
         return tuple(profiles)
-    return _fitted(tuple(map(_table, profiles)), terms)
+    fitted = _fitted(tuple(map(_table, profiles)), terms)
+    return tuple(replace(one, counted=own.counted) for one, own in zip(fitted, profiles, strict=True))
 
 
 def shared_errors(profiles: Sequence[GaussianSum], shared: Sequence[GaussianSum]) -> Floats:

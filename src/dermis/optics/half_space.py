@@ -9,14 +9,17 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dermis.export.curve import Curve, between
-from dermis.optics.media import Floats
+from dermis.optics.curve import Curve, between
+from dermis.optics.media import SKIN_ETA, Floats
 from dermis.tables import read_rows
 
 Kind = Literal["skin", "matched", "walk"]
 """A smooth surface of index 1.4 lit at right angles, an index-matched one, and an index-matched one that
 light enters by the cosine of all directions."""
 
+SOURCES = ("Wang1995",)
+ALBEDOS = 0.02, 0.99999
+"""Least and most of the tables [-]."""
 _PLAIN = ("kind", "albedo", "total")
 
 
@@ -30,23 +33,36 @@ class _Table(NamedTuple):
     totals: Callable[[Floats], Floats]
 
 
+def kind_under(eta: float) -> Kind | None:
+    """The kind of half-spaces lit at right angles through a surface of this index; None without a table."""
+    return "skin" if eta == SKIN_ETA else "matched" if eta == 1.0 else None
+
+
 def half_space(kind: Kind, albedo: ArrayLike, mfp_mm: ArrayLike) -> Curve:
     """The curve of a half-space in three channels.
 
-    albedo : (3,) of one scattering, 0 to 1; beyond the table's 0.02 and 0.99999 as there [-]
+    albedo : (3,) of one scattering, 0 to 1; beyond those of the table as there [-]
     mfp_mm : (3,) mean free path [mm]
 
     Source: [Wang1995].
     """
     table = _table(kind)
-    place = np.clip(_scale(albedo), table.scale[0], table.scale[-1])
-    share, mfp = table.share(place), np.asarray(mfp_mm, np.float64)
+    return Curve.of(shares_within(kind, albedo, mfp_mm), table.totals(_place(table, albedo)))
+
+
+def shares_within(kind: Kind, albedo: ArrayLike, mfp_mm: ArrayLike) -> Callable[[Floats], Floats]:
+    """A function of radii (n,) [mm]: share (n, 3) of what leaves a half-space that leaves within them.
+
+    albedo, mfp_mm : as of `half_space`
+    """
+    table = _table(kind)
+    share, mfp = table.share(_place(table, albedo)), np.asarray(mfp_mm, np.float64)
 
     def within(radius_mm: Floats) -> Floats:
         columns = [between(radius_mm / mfp[i], table.edges, share[i, :, None])[:, 0] for i in range(3)]
         return np.stack(columns, axis=-1)
 
-    return Curve.of(within, table.totals(place))
+    return within
 
 
 def albedo_of(kind: Kind, total: ArrayLike) -> Floats:
@@ -55,6 +71,10 @@ def albedo_of(kind: Kind, total: ArrayLike) -> Floats:
     fine = np.linspace(table.scale[0], table.scale[-1], 2000)
     place = np.interp(np.asarray(total, np.float64), table.totals(fine)[::-1], fine[::-1])
     return np.asarray(1.0 - place**2)
+
+
+def _place(table: _Table, albedo: ArrayLike) -> Floats:
+    return np.clip(_scale(albedo), table.scale[0], table.scale[-1])
 
 
 def _scale(albedo: ArrayLike) -> Floats:
@@ -66,7 +86,7 @@ def _scale(albedo: ArrayLike) -> Floats:
 def _table(kind: Kind) -> _Table:
     from scipy.interpolate import PchipInterpolator
 
-    rows = [row for row in read_rows("dermis.export", "data/half_space") if row["kind"] == kind]
+    rows = [row for row in read_rows("dermis.optics", "data/half_space") if row["kind"] == kind]
     columns = [name for name in rows[0] if name not in _PLAIN]
     scale = _scale([float(row["albedo"]) for row in rows])
     total = np.array([float(row["total"]) for row in rows])
