@@ -9,9 +9,11 @@ import numpy as np
 from dermis.human.hair import brows, lashes
 from dermis.human.hair.brow_skin import BrowSkin
 from dermis.human.hair.grown import Ground, Grown, Rooted
+from dermis.human.hair.hairy_skin import skin_beside
 from dermis.human.hair.head_hair import beard_hair, scalp_hair
 from dermis.human.hair.look import HairLook
 from dermis.human.hair.rooting import Rooting, eye_middles
+from dermis.human.hair.skin import Skin
 from dermis.mesh.head import Head
 from dermis.mesh.strands import Doubles, Roots, Strands, seen_in
 from dermis.specular.hair import absorption_per_mm
@@ -36,7 +38,8 @@ def groomed(
     recession : see `SkinLook`
     hairs : share of those of head and beard that grows, each as much wider
     """
-    ground, parts = Ground(head, plain.mesh, hairs), list[Grown]()
+    skin = Skin(head.mesh, skin_beside(rooting, look.beard_mm > 0.0))
+    ground, parts = Ground(head, plain.mesh, skin, hairs), list[Grown]()
     for side, eye in zip((1.0, -1.0), eye_middles(plain.mesh), strict=True):
         rng = np.random.default_rng((look.seed, int(side > 0)))
         parts.append(_brow(ground, rooting, look, side, rng))

@@ -52,10 +52,11 @@ class Rooting:
 
     mesh : with control points at points_mm (p, 3)
     eyes_mm : (2, 3) middles of the left and of the right eye
+    drawn : the mesh as it is drawn, of the same person
     """
 
-    def __init__(self, mesh: Mesh, points_mm: Doubles, eyes_mm: Doubles) -> None:
-        self.mesh, self._points_mm, self._eyes_mm = mesh, points_mm, eyes_mm
+    def __init__(self, mesh: Mesh, points_mm: Doubles, eyes_mm: Doubles, drawn: Mesh) -> None:
+        self.mesh, self.points_mm, self.drawn, self._eyes_mm = mesh, points_mm, drawn, eyes_mm
         self._grids: dict[float, Roots] = {}
         self._rows: dict[tuple[tuple[int, ...], float], _Row] = {}
 
@@ -113,7 +114,7 @@ class Rooting:
         return Roots(quad[at].astype(np.int32), place.astype(np.float32))
 
     def _row(self, loop: Index, side: float) -> _Row:
-        points, around, away = self._points_mm, self._around, self._eyes_mm[0 if side > 0 else 1]
+        points, around, away = self.points_mm, self._around, self._eyes_mm[0 if side > 0 else 1]
         loop = loop if side > 0 else _mirrored(points, loop)
         off = np.linalg.norm(points[around].mean(axis=1) - away, axis=1)
         run = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points[loop], axis=0), axis=1))])
@@ -135,7 +136,7 @@ class Rooting:
     def _front(self) -> _Front:
         quad = np.repeat(np.arange(len(self.mesh.quads)), 2)
         half = np.tile([0, 1], len(self.mesh.quads))
-        corner = self._points_mm[np.take_along_axis(self._around[quad], _HALVES[half], axis=1)]
+        corner = self.points_mm[np.take_along_axis(self._around[quad], _HALVES[half], axis=1)]
         (ab, ac), low, high = np.diff(corner[..., :2], axis=1).transpose(1, 0, 2), *_box(corner)
         ac = ab + ac
         seen = ab[:, 0] * ac[:, 1] - ac[:, 0] * ab[:, 1] > 1e-9

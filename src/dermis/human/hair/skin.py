@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Doubles
@@ -17,18 +18,20 @@ class Skin:
     """A surface, by its vertices with their normals.
 
     mesh : as it is drawn
+    which : those of its vertices that are near enough to count; all when left out
     """
 
-    def __init__(self, mesh: Mesh) -> None:
-        self._places, normals = mesh.positions.astype(np.float64), mesh.normals.astype(np.float64)
-        self._planes = np.column_stack([normals, (self._places * normals).sum(axis=1)])
+    def __init__(self, mesh: Mesh, which: NDArray[np.int64] | slice = slice(None)) -> None:
+        places, normals = (one[which].astype(np.float64) for one in (mesh.positions, mesh.normals))
+        self._places = places
+        self._planes = np.column_stack([normals, (places * normals).sum(axis=1)])
 
     def foot(self, places_mm: Doubles) -> tuple[Doubles, Doubles]:
         """Where places (n, 3) are on the skin when put there along its normal, and that normal [mm]."""
         distance, near = self._tree.query(places_mm, k=_NEAR)
         share = 1.0 / (distance**2 + 0.05)
         share /= share.sum(axis=1, keepdims=True)
-        plane = np.einsum("nk,nkc->nc", share, self._planes[near])
+        plane = np.einsum("nk,nkc->nc", share, self._planes.take(near, axis=0))
         over = (places_mm * plane[:, :3]).sum(axis=1) - plane[:, 3]
         normal = plane[:, :3] / np.sqrt((plane[:, :3] ** 2).sum(axis=1, keepdims=True))
         return places_mm - over[:, None] * normal, normal
