@@ -74,7 +74,7 @@ class BrowSkin:
         first = cell[0] * (self._last[1] + 1) + cell[1]
         near = first[:, None] + [0, 1, self._last[1] + 1, self._last[1] + 2]
         share = np.stack([(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t], axis=-1)
-        found = np.einsum("nk,nkc->nc", share, self._node[near])
+        found = np.einsum("nk,nkc->nc", share, self._node.take(near, axis=0))
         place, normal, along_x, along_y, plane = np.split(found, [3, 6, 9, 12], axis=1)
         # curved skin lies as far from its chords as from its tangent planes
         lift = 0.5 * (plane - _dots(place, normal)[:, None])

@@ -56,8 +56,9 @@ def groomed(
 def _shuffled(strands: Strands, seed: int) -> Strands:
     """The same hairs in no order, so that the first few are like all."""
     order = np.random.default_rng((seed, 5)).permutation(len(strands))
-    roots = Roots(strands.roots.quad[order], strands.roots.place[order])
-    parts = {name: getattr(strands, name)[order] for name in ("knots_mm", "radius_mm", "absorption", "cover")}
+    roots = Roots(*(one.take(order, axis=0) for one in strands.roots))
+    names = "knots_mm", "radius_mm", "absorption", "cover"
+    parts = {name: getattr(strands, name).take(order, axis=0) for name in names}
     return replace(strands, roots=roots, **parts)
 
 

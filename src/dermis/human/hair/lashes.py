@@ -83,16 +83,13 @@ def grown(
     last = lid.rise[1] + rng.normal(0, 0.18, n)
     length = np.interp(share, _ALONG, lid.length) * rng.uniform(0.7, 1.08, n)
     t = np.linspace(0.0, 1.0, KNOTS)
-    place = root_mm - 0.25 * ahead
-    knots = [place]
-    for k in range(1, KNOTS):
-        angle = first + (last - first) * (t[k] - 0.5 / (KNOTS - 1)) ** 0.8
-        way = np.cos(angle)[:, None] * ahead + np.sin(angle)[:, None] * up
-        way = way + (splay * (0.4 + 0.6 * t[k]))[:, None] * out
-        way /= np.linalg.norm(way, axis=1, keepdims=True)
-        place = place + (length / (KNOTS - 1))[:, None] * way
-        knots.append(place)
-    made = _clumped(np.stack(knots, axis=1), u, t, rng)
+    angle = first + (last - first) * ((t[1:] - 0.5 / (KNOTS - 1)) ** 0.8)[:, None]
+    ways = np.cos(angle)[..., None] * ahead + np.sin(angle)[..., None] * up
+    ways += (splay * (0.4 + 0.6 * t[1:, None]))[..., None] * out
+    ways /= np.sqrt((ways**2).sum(axis=-1, keepdims=True))
+    steps = (length / (KNOTS - 1))[:, None] * ways
+    knots = np.cumsum(np.concatenate([[root_mm - 0.25 * ahead], steps]), axis=0).swapaxes(0, 1)
+    made = _clumped(knots, u, t, rng)
     radius = lid.radius * rng.uniform(0.8, 1.15, n)
     return made, radius[:, None] * np.maximum(1.0 - t, 0.0) ** 0.55 * np.minimum(1.0, 0.8 + t)
 
