@@ -56,7 +56,7 @@ def groomed(
 def _shuffled(strands: Strands, seed: int) -> Strands:
     """The same hairs in no order, so that the first few are like all."""
     order = np.random.default_rng((seed, 5)).permutation(len(strands))
-    roots = Roots(*(one.take(order, axis=0) for one in strands.roots))
+    roots = Roots(strands.roots.quad.take(order), strands.roots.place.take(order, axis=0))
     names = "knots_mm", "radius_mm", "absorption", "cover"
     parts = {name: getattr(strands, name).take(order, axis=0) for name in names}
     return replace(strands, roots=roots, **parts)
