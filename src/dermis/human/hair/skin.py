@@ -21,10 +21,11 @@ class Skin:
     which : those of its vertices that are near enough to count; all when left out
     """
 
-    def __init__(self, mesh: Mesh, which: NDArray[np.int64] | slice = slice(None)) -> None:
-        places, normals = (one[which].astype(np.float64) for one in (mesh.positions, mesh.normals))
-        self._places = places
-        self._planes = np.column_stack([normals, (places * normals).sum(axis=1)])
+    def __init__(self, mesh: Mesh, which: NDArray[np.int64] | None = None) -> None:
+        both = mesh.positions, mesh.normals
+        places, normals = (one if which is None else one.take(which, axis=0) for one in both)
+        self._places, normals = places.astype(np.float64), normals.astype(np.float64)
+        self._planes = np.column_stack([normals, (self._places * normals).sum(axis=1)])
 
     def foot(self, places_mm: Doubles) -> tuple[Doubles, Doubles]:
         """Where places (n, 3) are on the skin when put there along its normal, and that normal [mm]."""
