@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -82,6 +83,14 @@ class Mesh(Summarised):
         skull = y > top - 2 * _CROWN_TO_CENTRE_MM
         middle_x, middle_z = (float(c.min() + c.max()) / 2 for c in (x[skull], z[skull]))
         return middle_x, top - _CROWN_TO_CENTRE_MM, middle_z
+
+    @cached_property
+    def layout_key(self) -> bytes:
+        """The same for all meshes that differ in where their points are alone."""
+        digest = hashlib.blake2b(digest_size=16)
+        for part in (self.uv, self.point, self.triangles, self.material):
+            digest.update(np.ascontiguousarray(part).tobytes())
+        return digest.digest()
 
     @property
     def dpdu(self) -> Floats:
