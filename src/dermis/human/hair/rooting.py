@@ -16,6 +16,7 @@ from dermis.mesh.strands import Doubles, Roots, corners
 
 Index = NDArray[np.int64]
 _ENDS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)  # of a quad
+_INSIDE = -1e-9  # least share of a corner
 _CELL_MM = 2.0  # of the grid that triangles are listed in
 _LOW, _HIGH = np.array([-70.0, -20.0]), np.array([70.0, 50.0])  # of places in front, around the brows [mm]
 
@@ -67,20 +68,20 @@ class Rooting:
         listed = front.listed[tuple(np.clip(cell, 0, np.array(front.listed.shape[:2]) - 1).T)]
         asked, column = np.nonzero(listed >= 0)
         which = listed[asked, column]
-        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = front.corner[which].transpose(1, 2, 0)
+        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = front.corner.take(which, axis=0).transpose(1, 2, 0)
         px, py = x[asked], y[asked]
         det = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
         v = ((px - ax) * (cy - ay) - (cx - ax) * (py - ay)) / det
         w = ((bx - ax) * (py - ay) - (px - ax) * (by - ay)) / det
-        share = np.stack([1 - v - w, v, w], axis=-1)
-        inside = np.flatnonzero(share.min(axis=1) >= -1e-9)
+        u = 1 - v - w
+        inside = np.flatnonzero((u >= _INSIDE) & (v >= _INSIDE) & (w >= _INSIDE))
         z = (az + v * (bz - az) + w * (cz - az))[inside]
         won = np.full(len(x), -1)
         order = inside[np.argsort(z)]
         won[asked[order]] = order  # the last one stays: the foremost
         there = won >= 0
-        which, share = which[won], share[won]
-        place = np.einsum("nk,nkc->nc", share, _ENDS[_HALVES[front.half[which]]])
+        which, share = which[won], np.stack([u[won], v[won], w[won]], axis=-1)
+        place = np.einsum("nk,nkc->nc", share, _ENDS[_HALVES].take(front.half[which], axis=0))
         quad = np.where(there, front.quad[which], 0)
         return Roots(quad.astype(np.int32), np.clip(place, 0.0, 1.0).astype(np.float32)), there
 
