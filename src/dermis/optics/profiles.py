@@ -131,7 +131,7 @@ def fit_profile(tissue: Tissue, name: str | Path, near: GaussianSum | None = Non
 
     Raises DermisError when its numbers cannot be a profile.
     """
-    return fit_gaussians(tissue.profile().rings(), TERMS, near=near, name=f"profile {name}").profile
+    return fit_gaussians(tissue.rings(), TERMS, near=near, name=f"profile {name}").profile
 
 
 @cache

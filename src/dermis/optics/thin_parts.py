@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import NamedTuple
@@ -61,7 +62,7 @@ def medium_of(profile: GaussianSum, total: Floats, eta: float) -> Medium:
     albedo, extinction = np.empty(len(total)), np.empty(len(total))
     for c, share in enumerate(total):
         root, half = interpolated(partial(_returning, eta), float(share))
-        one = GaussianSum("", profile.variance_mm2, profile.weight[:, [c]])
+        one = tuple(zip(profile.variance_mm2.tolist(), profile.weight[:, c].tolist(), strict=True))
         albedo[c], extinction[c] = 1.0 - root**2, _half(partial(_spread, one)) / half
     layer = Layer((1.0 - albedo) * extinction, albedo * extinction)
     return Medium("flesh", (layer,), eta)
@@ -81,9 +82,8 @@ def thin_parts(body: Medium, variance_mm2: Floats, reach_mm: float) -> ThinParts
     depth = reach_mm * np.linspace(0.0, 1.0, ROWS) ** 2
     through, lost = np.zeros((2, ROWS, len(variance_mm2), body.channels))
     deep, weight = np.zeros((2, ROWS, body.channels))
-    for c in range(body.channels):
-        one = body.channel(c)
-        share, shape = _shares(one.layers[0], depth[1:], body.eta), _shapes(one, depth[1:], variance_mm2)
+    for c, share in enumerate(_shares(body.layers[0], depth[1:], body.eta)):
+        shape = _shapes(body.channel(c), depth[1:], variance_mm2)
         through[1:, :, c], lost[1:, :, c] = share.passed[:, None] * shape, share.lost[:, None] * shape
         deep[1:, c], weight[1:, c] = share.deep, share.amount
         lost[0, :, c] = shape[0]
@@ -132,13 +132,17 @@ class _Shares(NamedTuple):
     deep: Floats
 
 
-def _shares(layer: Layer, depth_mm: Floats, eta: float) -> _Shares:
-    """By cubics between depths for which an albedo's slabs are cut once."""
+def _shares(layer: Layer, depth_mm: Floats, eta: float) -> Iterator[_Shares]:
+    """Of each channel, by cubics between depths for which an albedo's slabs are cut once."""
     from scipy.interpolate import CubicSpline
 
-    depth = np.clip(float(layer.sigma_t_prime[0]) * depth_mm, _DEPTHS[0], _DEPTHS[-1])
-    cut = interpolated(partial(_by_depth, eta), float(np.sqrt(1.0 - layer.alpha_prime[0])))
-    return _Shares(*CubicSpline(np.log(_DEPTHS), cut)(np.log(depth)).T)
+    roots = np.sqrt(1.0 - layer.alpha_prime).tolist()
+    spline = CubicSpline(
+        np.log(_DEPTHS), np.stack([interpolated(partial(_by_depth, eta), root) for root in roots], axis=1)
+    )
+    for c, extinction in enumerate(layer.sigma_t_prime.tolist()):
+        depth = np.clip(extinction * depth_mm, _DEPTHS[0], _DEPTHS[-1])
+        yield _Shares(*spline(np.log(depth))[:, c].T)
 
 
 @lru_cache(maxsize=KEPT)
@@ -200,9 +204,9 @@ def _unit(albedo: float, eta: float) -> Medium:
     return Medium("flesh", (Layer(np.array([1.0 - albedo]), np.array([albedo])),), eta)
 
 
-def _spread(profile: GaussianSum, frequency: float) -> float:
-    """Hankel transform of a profile of one channel."""
-    return float(profile.hankel(frequency)[0])
+def _spread(gaussians: tuple[tuple[float, float], ...], frequency: float) -> float:
+    """`GaussianSum.hankel` of one channel, by its variances and weights; in plain floats, as they are few."""
+    return sum(weight * math.exp(-0.5 * variance * frequency**2) for variance, weight in gaussians)
 
 
 def _returned(body: Medium, frequency: float) -> float:

@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 
 from dermis.errors import DermisError, refuse, shown_value
 from dermis.optics.diffusion.boundary import normal_reflectance
-from dermis.optics.diffusion.models import Model, diffusion_profile, through_slab
+from dermis.optics.diffusion.models import Model, diffusion_profile, diffusion_rings, through_slab
 from dermis.optics.diffusion.multipole import Clamp
+from dermis.optics.fits.targets import Rings
 from dermis.optics.media import Floats, Layer, Medium, media, medium_from_toml
 from dermis.optics.pigments.skin import EXAMPLES, SkinParameters, Structure, spectral_medium
 from dermis.optics.pigments.spectra import WAVELENGTHS_NM, rgb_weights
@@ -77,6 +78,10 @@ class Tissue:
     def profile(self, model: Model = "layered", clamp: Clamp = "layer") -> RadialProfile:
         """R(r) in linear Rec. 709: per power that enters, or per incident power for wavelengths."""
         return diffusion_profile(self.medium, model, clamp, self.rgb)
+
+    def rings(self, model: Model = "layered", clamp: Clamp = "layer") -> Rings:
+        """Those of `profile`, without the rest of it."""
+        return diffusion_rings(self.medium, model, clamp, self.rgb)
 
     def through(self, thickness_mm: ArrayLike) -> Floats:
         """Light that comes through the tissue cut at each thickness, (n, 3), per the same power [-]."""
