@@ -117,8 +117,11 @@ def _places(mesh: Mesh, roots: Roots, points_mm: NDArray[np.floating]) -> tuple[
 
 def between(place: NDArray[np.floating], around: Doubles) -> Doubles:
     """(c, n) means in places (n, 2) on quads of what is at their corners (c, 4, n)."""
-    a, b, c, d = (weights(place).T * around).swapaxes(0, 1)
-    return np.asarray(a + b + c + d)
+    share = weights(place).T
+    found: Doubles = share[0] * around[:, 0]
+    for k in range(1, 4):
+        found += share[k] * around[:, k]
+    return found
 
 
 def finer_roots(mesh: Mesh, roots: Roots, levels: int) -> Roots:

@@ -58,11 +58,11 @@ def rooted(plain: Mesh, where: Where, per_cm2: float, rng: np.random.Generator) 
     ends = np.cumsum(many)[near]
     number = np.arange(len(which)) + np.repeat(ends - np.cumsum(many[near]), many[near])
     step = number - (np.cumsum(many) - many)[which]
-    place = began[which] + step[:, None] * _STEPS
+    place = began.take(which, axis=0) + step[:, None] * _STEPS
     place -= np.floor(place)
     values = told().T.take(around.T.take(which, axis=1), axis=1)
-    kept = chance[number] < where.amount(between(place, values).T)
-    return Roots(quad[which[kept]].astype(np.int32), place[kept].astype(np.float32))
+    kept = np.flatnonzero(chance.take(number) < where.amount(between(place, values).T))
+    return Roots(quad.take(which.take(kept)).astype(np.int32), place.take(kept, axis=0).astype(np.float32))
 
 
 def above_hairline(places: Doubles, recession: float = 0.0) -> Doubles:
@@ -82,7 +82,8 @@ def scalp(recession: float) -> Where:
 
     def amount(places: Doubles) -> Doubles:
         above = above_hairline(places, recession)
-        above += sum(np.sin(places[:, :3] @ wave) for wave in _RAGGED)
+        soft = np.flatnonzero((above > _SOFT_MM[0] - len(_RAGGED)) & (above < _SOFT_MM[1] + len(_RAGGED)))
+        above[soft] += sum(np.sin(places[soft, :3] @ wave) for wave in _RAGGED)
         share = smoothstep(*_SOFT_MM, above) * (places[:, 1] > _LOWEST)
         thinned = _amount("hair", zones(recession)[gone], places)
         return np.asarray(share * np.clip(1.0 + thinned, 0.0, 1.0))
