@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from dermis.human.hair.grown import Ground, Grown, Rooted
 from dermis.human.hair.hairy_skin import skin_beside
 from dermis.human.hair.head_hair import beard_hair, scalp_hair
 from dermis.human.hair.look import HairLook
-from dermis.human.hair.rooting import Rooting, eye_middles
+from dermis.human.hair.rooting import SIDES, Rooting, eye_middles
 from dermis.human.hair.skin import Skin
 from dermis.mesh.head import Head
 from dermis.mesh.strands import Doubles, Roots, Strands, seen_in
@@ -40,9 +41,10 @@ def groomed(
     """
     skin = Skin(head.mesh, skin_beside(rooting, look.beard_mm > 0.0))
     ground, parts = Ground(head, plain.mesh, skin, hairs), list[Grown]()
-    for side, eye in zip((1.0, -1.0), eye_middles(plain.mesh), strict=True):
-        rng = np.random.default_rng((look.seed, int(side > 0)))
-        parts.append(_brow(ground, rooting, look, side, rng))
+    rngs = [np.random.default_rng((look.seed, int(side > 0))) for side in SIDES]
+    grown_brows, eyes = _brows(ground, rooting, look, rngs), eye_middles(plain.mesh)
+    for side, brow, eye, rng in zip(SIDES, grown_brows, eyes, rngs, strict=True):
+        parts.append(brow)
         for lid in (lashes.UPPER, lashes.LOWER):
             parts.append(_lashes(ground, rooting, lid, side, eye, rng))
     head = replace(head, strands=_joined(parts, _absorption(parts, look)))
@@ -62,14 +64,24 @@ def _shuffled(strands: Strands, seed: int) -> Strands:
     return replace(strands, roots=roots, **parts)
 
 
-def _brow(ground: Ground, rooting: Rooting, look: HairLook, side: float, rng: np.random.Generator) -> Grown:
-    u, v, x, y = brows.places(rng)
-    roots, there = rooting.in_front(side * x, y)
-    kept = np.flatnonzero(there)[: brows.count(look)]
-    where = ground.rooted(Roots(roots.quad[kept], roots.place[kept]))
-    skin = BrowSkin(*ground.skin.foot(ground.rooted(rooting.around_brow(side)).places))
-    along, front_mm = (u[kept], v[kept]), (x[kept], y[kept])
-    return _grown(where, *brows.grown(skin, where.places, side, along, front_mm, rng, look), 1.0)
+def _brows(
+    ground: Ground, rooting: Rooting, look: HairLook, rngs: list[np.random.Generator]
+) -> Iterator[Grown]:
+    """The left and the right brow, grown at once: for so few hairs each step costs what it costs for one."""
+    roots, told = [], []
+    for side, rng in zip(SIDES, rngs, strict=True):
+        u, v, x, y = brows.places(rng)
+        found, there = rooting.in_front(side * x, y)
+        kept = np.flatnonzero(there)[: brows.count(look)]
+        roots.append(Roots(found.quad[kept], found.place[kept]))
+        shape = brows.shapes(u[kept], v[kept], rng, look)
+        told.append(np.vstack([np.full(len(kept), side), x[kept], y[kept], shape]))
+    where, hair = ground.rooted(_roots(roots)), np.concatenate(told, axis=1)
+    skin = BrowSkin(*ground.skin.foot(ground.rooted(rooting.around_brows).places))
+    both = _grown(where, *brows.grown(skin, where.places, hair[0], hair[1:3], hair[3:]), 1.0)
+    (quad, place), lefts = both.roots, len(roots[0].quad)
+    for part in (slice(lefts), slice(lefts, None)):
+        yield Grown(Roots(quad[part], place[part]), both.knots[part], both.radius[part], both.darker)
 
 
 def _lashes(
@@ -91,12 +103,17 @@ def _joined(parts: list[Grown], absorption: Doubles) -> Strands:
 
     absorption : (n, 3) of single hairs [1/mm]
     """
-    roots = Roots(*(np.concatenate(each) for each in zip(*(part.roots for part in parts), strict=True)))
+    roots = _roots(part.roots for part in parts)
     ways, radius = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
     bundle, cover = (_each(parts, name) for name in ("bundle", "cover"))
     return Strands(
         roots, ways, radius, (absorption / bundle[:, None]).astype(np.float32), cover.astype(np.float32)
     )
+
+
+def _roots(parts: Iterable[Roots]) -> Roots:
+    quads, places = zip(*parts, strict=True)
+    return Roots(np.concatenate(quads), np.concatenate(places))
 
 
 def _each(parts: list[Grown], name: str) -> Doubles:

@@ -142,10 +142,9 @@ def skin_beside(rooting: Rooting, bearded: bool) -> Index:
 
     mesh = rooting.mesh
     around = corners(mesh, _hairy_quads(mesh))
-    brows = np.concatenate([rooting.around_brow(side).quad for side in (1.0, -1.0)])
     near = np.zeros(len(rooting.drawn.positions), bool)
     hairy = _near_scalp() | _near_beard() if bearded else _near_scalp()
-    places = around[hairy[around].any(axis=1)], corners(mesh, brows)
+    places = around[hairy[around].any(axis=1)], corners(mesh, rooting.around_brows.quad)
     for points, reach in zip(places, (_BESIDE_MM, _BESIDE_BROWS_MM), strict=True):
         tree = cKDTree(rooting.points_mm[np.unique(points)])
         near |= tree.query(rooting.drawn.positions)[0] < reach

@@ -15,6 +15,8 @@ from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Doubles, Roots, corners
 
 Index = NDArray[np.int64]
+SIDES = 1.0, -1.0
+"""Of x: the left one and the right one."""
 _ENDS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)  # of a quad
 _INSIDE = -1e-9  # least share of a corner
 _CELL_MM = 2.0  # of the grid that triangles are listed in
@@ -58,7 +60,6 @@ class Rooting:
 
     def __init__(self, mesh: Mesh, points_mm: Doubles, eyes_mm: Doubles, drawn: Mesh) -> None:
         self.mesh, self.points_mm, self.drawn, self._eyes_mm = mesh, points_mm, drawn, eyes_mm
-        self._grids: dict[float, Roots] = {}
         self._rows: dict[tuple[tuple[int, ...], float], _Row] = {}
 
     def in_front(self, x: Doubles, y: Doubles) -> tuple[Roots, NDArray[np.bool_]]:
@@ -85,15 +86,11 @@ class Rooting:
         quad = np.where(there, front.quad[which], 0)
         return Roots(quad.astype(np.int32), np.clip(place, 0.0, 1.0).astype(np.float32)), there
 
-    def around_brow(self, side: float) -> Roots:
-        """The grid of `BrowSkin`; what faces the viewer is all around a brow.
-
-        side : 1 for the left one
-        """
-        if side not in self._grids:
-            x, y = nodes()
-            self._grids[side] = self.in_front(side * x, y)[0]
-        return self._grids[side]
+    @cached_property
+    def around_brows(self) -> Roots:
+        """The grids of `BrowSkin`; what faces the viewer is all around a brow."""
+        x, y = nodes()
+        return self.in_front(np.concatenate([side * x for side in SIDES]), np.tile(y, len(SIDES)))[0]
 
     def beside_lid(self, lid: lashes.Lid, side: float, u: Doubles, across: Doubles) -> Roots:
         """Roots along a lid's edge, on the quads beside it that are farther from the eye.
