@@ -147,7 +147,7 @@ def skin_beside(rooting: Rooting, bearded: bool) -> Index:
     places = around[hairy[around].any(axis=1)], corners(mesh, rooting.around_brows.quad)
     for points, reach in zip(places, (_BESIDE_MM, _BESIDE_BROWS_MM), strict=True):
         tree = cKDTree(rooting.points_mm[np.unique(points)])
-        near |= tree.query(rooting.drawn.positions)[0] < reach
+        near |= tree.query(rooting.drawn.positions, distance_upper_bound=reach)[0] < reach
     return np.flatnonzero(near)
 
 
