@@ -40,13 +40,11 @@ def groomed(
     hairs : share of those of head and beard that grows, each as much wider
     """
     skin = Skin(head.mesh, skin_beside(rooting, look.beard_mm > 0.0))
-    ground, parts = Ground(head, plain.mesh, skin, hairs), list[Grown]()
+    ground = Ground(head, plain.mesh, skin, hairs)
     rngs = [np.random.default_rng((look.seed, int(side > 0))) for side in SIDES]
-    grown_brows, eyes = _brows(ground, rooting, look, rngs), eye_middles(plain.mesh)
-    for side, brow, eye, rng in zip(SIDES, grown_brows, eyes, rngs, strict=True):
-        parts.append(brow)
-        for lid in (lashes.UPPER, lashes.LOWER):
-            parts.append(_lashes(ground, rooting, lid, side, eye, rng))
+    left, right = _brows(ground, rooting, look, rngs)
+    rows = list(_lashes(ground, rooting, eye_middles(plain.mesh), rngs))
+    parts = [left, *rows[:2], right, *rows[2:]]
     head = replace(head, strands=_joined(parts, _absorption(parts, look)))
     hair = [*scalp_hair(ground, look, recession), *beard_hair(ground, look)]
     if not hair:
@@ -79,17 +77,35 @@ def _brows(
     where, hair = ground.rooted(_roots(roots)), np.concatenate(told, axis=1)
     skin = BrowSkin(*ground.skin.foot(ground.rooted(rooting.around_brows).places))
     both = _grown(where, *brows.grown(skin, where.places, hair[0], hair[1:3], hair[3:]), 1.0)
-    (quad, place), lefts = both.roots, len(roots[0].quad)
-    for part in (slice(lefts), slice(lefts, None)):
-        yield Grown(Roots(quad[part], place[part]), both.knots[part], both.radius[part], both.darker)
+    yield from _parted(both, [len(part.quad) for part in roots])
 
 
 def _lashes(
-    ground: Ground, rooting: Rooting, lid: lashes.Lid, side: float, eye: Doubles, rng: np.random.Generator
-) -> Grown:
-    u, across = lashes.places(lid, rng)
-    where = ground.rooted(rooting.beside_lid(lid, side, u, across))
-    return _grown(where, *lashes.grown(lid, where.places, eye, side, u, rng), _LASHES_DARKER)
+    ground: Ground, rooting: Rooting, eyes: Doubles, rngs: list[np.random.Generator]
+) -> Iterator[Grown]:
+    """The upper and the lower lashes of the left eye, then those of the right one, grown at once too.
+
+    eyes : (2, 3) middles
+    """
+    roots, told, before = [], [], 0
+    for side, eye, rng in zip(SIDES, eyes, rngs, strict=True):
+        for lid in (lashes.UPPER, lashes.LOWER):
+            u, across = lashes.places(lid, rng)
+            roots.append(rooting.beside_lid(lid, side, u, across))
+            shape = lashes.shapes(lid, u, rng, before)
+            told.append(np.vstack([np.full((len(u), 4), [side, *eye]).T, shape]))
+            before += len(u) + 1
+    where, hair = ground.rooted(_roots(roots)), np.concatenate(told, axis=1)
+    grown = lashes.grown(where.places, hair[1:4].T, hair[0], hair[4:])
+    yield from _parted(_grown(where, *grown, _LASHES_DARKER), [len(part.quad) for part in roots])
+
+
+def _parted(hair: Grown, counts: list[int]) -> Iterator[Grown]:
+    """So many of some hairs after the other."""
+    for end, count in zip(np.cumsum(counts).tolist(), counts, strict=True):
+        part = slice(end - count, end)
+        roots = Roots(hair.roots.quad[part], hair.roots.place[part])
+        yield hair._replace(roots=roots, knots=hair.knots[part], radius=hair.radius[part])
 
 
 def _grown(where: Rooted, knots_mm: Doubles, radius_mm: Doubles, darker: float) -> Grown:
