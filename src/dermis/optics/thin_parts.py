@@ -212,7 +212,7 @@ def _spread(gaussians: tuple[tuple[float, float], ...], frequency: float) -> flo
 def _returned(body: Medium, frequency: float) -> float:
     """Hankel transform of what it returns."""
     A = mismatch(body.eta, "exact")
-    return float(layered_diffusion.respond(np.array([frequency]), body, A)[0][0, 0])
+    return float(layered_diffusion.reflect(np.array([frequency]), body, A)[0, 0])
 
 
 def _half(transform: Callable[[float], float]) -> float:

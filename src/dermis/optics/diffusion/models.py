@@ -110,7 +110,7 @@ def transform(medium: Medium, model: Model, clamp: Clamp, frequency: Floats) -> 
     if model in ("layered", "layered-point"):
         A = mismatch(medium.eta, "exact")
         source: layered_diffusion.Source = "beam" if model == "layered" else "point"
-        return layered_diffusion.respond(frequency, medium, A, source)[0]
+        return layered_diffusion.reflect(frequency, medium, A, source)
     return multipole.respond(frequency, medium, mismatch(medium.eta), clamp).R_above
 
 
