@@ -16,7 +16,7 @@ from dermis.atlas.cached import cached_atlas
 from dermis.errors import DermisError
 from dermis.frame.fine_light import TEXEL_AREA
 from dermis.frame.lights import light_records, light_views
-from dermis.frame.lights.rectangle import KIND, facing_irradiance, rectangle_irradiance
+from dermis.frame.lights.rectangle import KIND, facing_irradiance
 from dermis.frame.passes import device_constants, strip_for
 from dermis.frame.passes.shade import shade_program
 from dermis.frame.renderer import Renderer
@@ -38,17 +38,29 @@ def above(head: Any, height: float, **given: Any) -> dict[str, Any]:
     return {"position": place(head, (0, 0, height)), "target": place(head, (0, 0, 0)), **given}
 
 
-def rectangle_from_a_corner(width: float, height: float, distance: float) -> float:
-    """Irradiance of radiance 1 on a surface parallel to a rectangle, opposite its corner: tabulated."""
-    x, y = width / distance, height / distance
-    a, b = np.sqrt(1 + x * x), np.sqrt(1 + y * y)
-    return float(0.5 * (x / a * np.arctan(y / a) + y / b * np.arctan(x / b)))
+def polygon_irradiance(corners: Floats, normal: Floats) -> float:
+    """Irradiance from a uniform polygon of radiance 1 on a surface at the origin that sees all of it [-].
+
+    Source: Lambert's formula, as in [Baum1989].
+    """
+    unit = corners / np.linalg.norm(corners, axis=1, keepdims=True)
+    after = np.roll(unit, -1, axis=0)
+    edge = np.cross(unit, after)
+    angle = np.arctan2(np.linalg.norm(edge, axis=1), (unit * after).sum(axis=1))
+    edge /= np.linalg.norm(edge, axis=1, keepdims=True)
+    return abs(0.5 * float((angle * (edge @ normal)).sum()))
 
 
-def test_the_closed_form_is_the_tabulated_one() -> None:
+def from_rectangle(size: tuple[float, float], place: Floats) -> float:
+    """The same from a rectangle at (0, 0, 0) that faces +z, at a place on a floor that faces it."""
+    corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [0.5 * size[0], 0.5 * size[1], 0.0]
+    return polygon_irradiance(corners - place, np.array([0.0, 0.0, 1.0]))
+
+
+def test_irradiance_opposite_the_middle_is_lamberts() -> None:
     for width, height, distance in ((1.0, 1.0, 1.0), (3.0, 0.5, 2.0), (10.0, 20.0, 0.7)):
-        whole = 4 * rectangle_from_a_corner(width / 2, height / 2, distance)
-        assert facing_irradiance(width, height, distance) == pytest.approx(whole, rel=1e-12)
+        exact = from_rectangle((width, height), np.array([0.0, 0.0, distance]))
+        assert facing_irradiance(width, height, distance) == pytest.approx(exact, rel=1e-12)
     assert facing_irradiance(1e6, 1e6, 1.0) == pytest.approx(np.pi, rel=1e-4)
 
 
@@ -78,14 +90,7 @@ def test_irradiance_of_a_rectangle(renderer: Renderer, size: tuple[float, float]
     made, points = entered(renderer, FLOOR, RectangleLight(**above(FLOOR, 300.0, **given)))
     radiance = np.array([1.0, 2.0, 3.0]) / facing_irradiance(*size, 300.0)
     picked = [(y, x) for y in (2, 20, 31, 60) for x in (3, 32, 44, 61)]
-    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * np.array(size) / 2
-    exact = [
-        radiance
-        * rectangle_irradiance(
-            np.column_stack([corners, np.full(4, 300.0)]) - points[at], np.array([0.0, 0.0, 1.0])
-        )
-        for at in picked
-    ]
+    exact = [radiance * from_rectangle(size, points[at] - [0.0, 0.0, 300.0]) for at in picked]
     assert np.abs([made[at] for at in picked] - np.array(exact)).max() < AREA_LIGHT * np.max(exact)
 
 

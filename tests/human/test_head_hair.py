@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from dermis import Human, Pose
 from dermis.errors import DermisError
-from dermis.human.hair import hairy_skin
+from dermis.human.hair import groom, hairy_skin
 from dermis.human.hair.head_hair import MOST_PER_CM2
 from dermis.human.hair.look import HairLook
+from dermis.human.hair.rooting import Rooting
 from dermis.human.hair.skin import Skin
 from dermis.human.skin.surface import average
 from dermis.mesh.head import Head
@@ -135,6 +136,19 @@ def test_no_hair_is_lost_where_none_is_looked_for(where: hairy_skin.Where) -> No
     some, every = (hairy_skin.rooted(mesh, one, 60.0, np.random.default_rng(0)) for one in both)
     assert not where.near.all() and len(some.quad) > 1000
     assert np.array_equal(some.place, every.place) and np.array_equal(some.quad, every.quad)
+
+
+@pytest.mark.parametrize("seed", [2, 11, 30])
+def test_hair_lies_as_if_all_skin_counted(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
+    def every(rooting: Rooting, _: bool) -> NDArray[np.int64]:
+        return np.arange(len(rooting.drawn.positions))
+
+    person = Human.drawn(seed, hair={"beard_mm": 12.0, "style": "short", "length_mm": 45.0})
+    some = person.head(hairs=0.1)
+    monkeypatch.setattr(groom, "skin_beside", every)
+    whole = person.head(hairs=0.1)
+    for one, other in ((some.strands, whole.strands), (some.hair, whole.hair)):
+        assert one is not None and other is not None and np.array_equal(one.knots_mm, other.knots_mm)
 
 
 def test_recession_bares_temples_and_crown() -> None:

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from dermis import Human
 from dermis.human import lids
+from dermis.human.lid_targets import axes, conformed_targets
 from dermis.human.lids import conformed
 from dermis.human.model import _sockets, human_head
-from dermis.human.published import EXPRESSIONS, moves, places_mm
+from dermis.human.movement import expressions
+from dermis.human.published import places_mm
 from dermis.human.skin.surface import lid_rings
 from dermis.mesh.eyeball import SCLERA_MM, apex_mm, clearance_mm
 from dermis.mesh.head import Head
@@ -140,11 +142,11 @@ def test_targets_are_corrected_wherever_they_move_a_lid() -> None:
     """As if both eyes were gone over for each, also for blinks, which move the other eye's inner corner."""
     places = places_mm(Human.drawn(3).weights())
     sockets = _sockets(places)
-    found, resting = lids.conformed_targets(places, sockets), conformed(places, sockets)
-    for index, published in enumerate(moves().names):
-        name, part = published.removeprefix(EXPRESSIONS), slice(*moves().first[index : index + 2])
-        if name in ("eyeBlinkLeft", "eyeLookOutRight", "eyeLookUpLeft", "eyeWideRight"):
-            point, moved = moves().point[part], places.copy()
-            moved[point] += moves().delta_mm[part]
-            drawn = conformed(moved, sockets, "Blink" in name, lids._axes().get(name, lids._AHEAD))
-            assert found[part] == pytest.approx((drawn - resting)[point], abs=1e-5)
+    found, resting = conformed_targets(places, sockets), conformed(places, sockets)
+    targets = expressions()
+    for name in ("eyeBlinkLeft", "eyeLookOutRight", "eyeLookUpLeft", "eyeWideRight"):
+        part, moved = targets.of(targets.index[name]), places.copy()
+        point = targets.point[part]
+        moved[point] += targets.delta_mm[part]
+        drawn = conformed(moved, sockets, "Blink" in name, axes().get(name, lids.AHEAD))
+        assert found[part] == pytest.approx((drawn - resting)[point], abs=1e-5)

@@ -10,6 +10,7 @@ import pytest
 from dermis.errors import DermisError
 from dermis.optics.diffusion.models import diffusion_profile
 from dermis.optics.media import Layer, Medium, media, medium_from_toml
+from dermis.optics.tissue import load_tissue
 from dermis.reading import read_toml
 
 ONE = np.array([1.0])
@@ -133,3 +134,10 @@ def test_light_below_zero_and_finer_than_its_numbers_is_told() -> None:
 def _thin() -> Medium:
     thin = Layer(0.02 * ONE, 0.98 * ONE, 0.1)
     return Medium("cut", (thin, Layer(0.02 * ONE, 0.98 * ONE)))
+
+
+@pytest.mark.parametrize("name", ["skin1", "spectral"])
+def test_rings_alone_are_those_of_the_profile(name: str) -> None:
+    tissue = load_tissue(name)
+    alone, whole = tissue.rings(), tissue.profile().rings()
+    assert np.array_equal(alone.energy, whole.energy) and np.array_equal(alone.total, whole.total)

@@ -16,7 +16,7 @@ from dermis.gpu import Device, make_texture, upload
 from dermis.gpu.textures import texture_from
 from dermis.human.skin.detail import detail_slopes
 from dermis.human.skin.painted import PaintedMaps
-from dermis.human.skin.surface import painting
+from dermis.human.skin.surface import Painting, painting
 from dermis.images.colour import encode_srgb
 from dermis.images.filters import mip_chain
 from dermis.mesh.head import Head
@@ -43,7 +43,7 @@ def upload_maps(
     if not isinstance(maps, PaintedMaps):
         return _of_files(device, head, use_colour, decoded)
     if not decoded and use_colour and maps.colour is None:  # which only pictures can be
-        found = paint.painted_maps(device, painting(head.mesh, head.control.stencils), maps.look, side)
+        found = paint.painted_maps(device, _surface(head), maps.look, side)
         maps = replace(maps, colour=found.colour)
         head = replace(head, maps=maps)
     painted = _painted(device, head, maps, use_colour, (side, moving))
@@ -65,7 +65,7 @@ def _painted(
 
     how : their side [texels], and whether expressions change them
     """
-    surface, (side, moving) = painting(head.mesh, head.control.stencils), how
+    surface, (side, moving) = _surface(head), how
     if device.adapter.kind == "CPU":
         side = min(side, _SOFTWARE_SIDE)
     given = {"relief": maps.height if maps.normal is None else maps.normal, "colour": maps.colour}
@@ -75,6 +75,11 @@ def _painted(
     given |= {"specular": maps.specular, "roughness": maps.roughness}
     kept = [role for role in found if given[role] is None and (use_colour or role != "colour")]
     return {f"{role}_map": found[role] for role in kept} | {"face": face}
+
+
+def _surface(head: Head) -> Painting:
+    """What is painted of a head, told by its topology: everyone's is that of one template."""
+    return painting(head.topology.mesh, head.topology.control.stencils)
 
 
 def _of_files(device: Device, head: Head, use_colour: bool, decoded: bool) -> dict[str, Any]:

@@ -150,8 +150,8 @@ def displacements(targets: MorphTargets, template: MorphTargets) -> NDArray[np.f
     number = np.repeat(np.arange(len(targets.names), dtype=np.uint32), np.diff(targets.first))
     order = template.by_point
     table = np.zeros((max(1, len(order)), 4), np.float32)
-    table[: len(order), :3] = targets.delta_mm[order]
-    table[: len(order), 3] = number[order].view(np.float32)
+    table[: len(order), :3] = targets.delta_mm.take(order, axis=0)
+    table[: len(order), 3] = number.take(order).view(np.float32)
     return table
 
 

@@ -109,9 +109,10 @@ def make_tables(device: Device, head: Head, space: StrandSpace) -> StrandTables:
     both = head.strands, head.hair
     parts = [part for part in both if part is not None]
     fine, coarse = map(counts_of, both)
-    table = np.concatenate([_rows(head, part) for part in parts])
-    rows = [np.concatenate([part.knots_mm, part.radius_mm[..., None]], axis=-1) for part in parts]
-    knots = np.concatenate([one.astype(np.float32).reshape(-1, 4) for one in rows])
+    table = np.zeros(fine.hairs + coarse.hairs, _STRAND)
+    for part, first in zip(parts, (0, len(parts[0])), strict=False):
+        _tell(table[first : first + len(part)], head, part)
+    knots = np.concatenate([_knots(part) for part in parts])
     shading = min(coarse.hairs, _SHADING)
     wider = coarse.hairs / max(1, shading)
     record = np.array((fine.hairs, coarse.hairs, shading, fine.knots, coarse.knots, wider), _HAIRS)
@@ -130,18 +131,23 @@ def make_tables(device: Device, head: Head, space: StrandSpace) -> StrandTables:
     )
 
 
-def _rows(head: Head, strands: Strands) -> NDArray[Any]:
-    """What strands_pose.wgsl reads of each hair."""
+def _tell(rows: NDArray[Any], head: Head, strands: Strands) -> None:
+    """Fill in what strands_pose.wgsl reads of each hair."""
     if int(strands.roots.quad.max()) >= len(head.mesh.quads):
         came = f"its mesh has {len(head.mesh.quads)} quads"
         refuse(head.name, "hairs rooted in quads of its mesh", came, "Leave its strands out")
-    table = np.zeros(len(strands), _STRAND)
-    table["corner"] = corners(head.mesh, strands.roots.quad)
-    table["share"] = weights(strands.roots.place)
-    table["absorption"][:, :3] = strands.absorption
+    rows["corner"] = corners(head.mesh, strands.roots.quad)
+    rows["share"] = weights(strands.roots.place)
+    rows["absorption"][:, :3] = strands.absorption
     if strands.cover is not None:
-        table["absorption"][:, 3] = strands.cover
-    return table
+        rows["absorption"][:, 3] = strands.cover
+
+
+def _knots(strands: Strands) -> NDArray[np.float32]:
+    """(n k, 4) knots with their radius [mm]."""
+    found = np.empty((*strands.radius_mm.shape, 4), np.float32)
+    found[..., :3], found[..., 3] = strands.knots_mm, strands.radius_mm
+    return found.reshape(-1, 4)
 
 
 def skin_under(head: Head) -> tuple[float, ...]:

@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.human.movement import gaze
 from dermis.human.published import EXPRESSIONS, Points, data, moves
 from dermis.human.skin.surface import average, lid_rings
 from dermis.mesh.contact import Contact
 from dermis.mesh.eyeball import SCLERA_MM, clearance_mm
 
 Index = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 BALL_MM = 15.4
 """Mean radius of the published ball, which the published lids lie on, where the eye is of usual size [mm]."""
@@ -40,8 +40,8 @@ _OVER_MM = 1.6 * np.array(
 _ROWS = 6  # of quads, of skin that may slide
 _MOVED_MM = 2.0  # by a blink: skin that slides over the eye
 _RINGS, _EDGE, _CREST = 4, 1, 2  # columns of lid_rings.csv
-_TARGETS = "eyeBlink", "eyeLook", "eyeSquint", "eyeWide"
-_AHEAD = np.array([0.0, 0.0, 1.0])
+AHEAD = np.array([0.0, 0.0, 1.0])
+"""Where eyes look at rest."""
 
 
 class Socket(NamedTuple):
@@ -51,7 +51,7 @@ class Socket(NamedTuple):
     size: float
 
 
-class _Side(NamedTuple):
+class Side(NamedTuple):
     """What follows the lids of one eye.
 
     rings : (r,) points of lids, see lid_rings.csv
@@ -66,6 +66,11 @@ class _Side(NamedTuple):
     contact: Index
     clear_mm: Points
 
+    def numbered(self, point: Index) -> Side:
+        """The same by numbers of sorted points, among which all these are."""
+        rings, own, contact = (np.searchsorted(point, one) for one in (self.rings, self.point, self.contact))
+        return self._replace(rings=rings, point=own, contact=contact)
+
 
 def socket(balls: Points) -> Socket:
     """The eye whose published ball has points (b, 3)."""
@@ -74,7 +79,7 @@ def socket(balls: Points) -> Socket:
 
 
 def conformed(
-    places: Points, sockets: tuple[Socket, Socket], closed: bool = False, axis: Points = _AHEAD
+    places: Points, sockets: tuple[Socket, Socket], closed: bool = False, axis: Points = AHEAD
 ) -> Points:
     """(n, 3) a person's published points with the lids on eyes of true size [mm].
 
@@ -83,50 +88,23 @@ def conformed(
     axis : (3,) along which the eyes look, unit
     """
     found = places.copy()
-    for side, eye in zip(_sides(), sockets, strict=True):
-        _conform(found, side, eye, closed, axis)
+    for side, eye in zip(sides(), sockets, strict=True):
+        draw_onto(found, side, eye, closed, axis)
     return found
 
 
-def _conform(places: Points, side: _Side, eye: Socket, closed: bool, axis: Points) -> None:
-    """Draw the lids of one eye onto it, see `conformed`."""
-    places[side.point] += side.share @ _ways(places[side.rings], eye, closed)
-    centre = eye.middle + eye.size * FORWARD_MM * _AHEAD
+def draw_onto(places: Points, side: Side, eye: Socket, closed: bool | Flags, axis: Points) -> None:
+    """Draw the lids of one eye onto it, see `conformed`; of one person, or in several movements (m, n, 3).
+
+    closed, axis : (m,) and (m, 1, 3) of those
+    """
+    places[..., side.point, :] += side.share @ _ways(places[..., side.rings, :], eye, closed)
+    centre = eye.middle + eye.size * FORWARD_MM * AHEAD
     size = SPLINE * eye.size
-    off = (places[side.contact] - centre) / size
+    off = (places[..., side.contact, :] - centre) / size
     far, surface = clearance_mm(off, axis)
     out = np.maximum(1.0, (surface + side.clear_mm) / far)
-    places[side.contact] = centre + size * off * out[:, None]
-
-
-def conformed_targets(places: Points, sockets: tuple[Socket, Socket]) -> NDArray[np.float32]:
-    """(m, 3) what all published targets move points by, corrected where they move a person's lids [mm].
-
-    places : (n, 3) the person's published points
-    """
-    moved, resting = moves(), conformed(places, sockets)
-    found = moved.delta_mm.copy()
-    for name, which, part, near in _lid_moves():
-        point, drawn = moved.point[part], places.copy()
-        drawn[point] += found[part]
-        for eye in which:
-            _conform(drawn, _sides()[eye], sockets[eye], "Blink" in name, _axes().get(name, _AHEAD))
-        rows = part.start + near
-        found[rows] = drawn[moved.point[rows]] - resting[moved.point[rows]]
-    return found
-
-
-@cache
-def _lid_moves() -> tuple[tuple[str, list[int], slice, Index], ...]:
-    """Targets that move lids: the name, near which eyes, their part of all displacements, which are near."""
-    found = []
-    for index, published in enumerate(moves().names):
-        if (name := published.removeprefix(EXPRESSIONS)).startswith(_TARGETS):
-            part = slice(*map(int, moves().first[index : index + 2]))
-            near = [np.isin(moves().point[part], side.point) for side in _sides()]
-            eyes = [eye for eye, one in enumerate(near) if one.any()]
-            found.append((name, eyes, part, np.flatnonzero(near[0] | near[1])))
-    return tuple(found)
+    places[..., side.contact, :] = centre + size * off * out[..., None]
 
 
 def contact(first: int, globe: int, apex: int, back: int) -> Contact:
@@ -135,35 +113,37 @@ def contact(first: int, globe: int, apex: int, back: int) -> Contact:
     first, globe : number of the left eyeball's first point, and how many points an eyeball has
     apex, back : of an eyeball's points
     """
-    sides = _sides()
+    both = sides()
     return Contact(
-        np.concatenate([side.contact for side in sides]).astype(np.int32),
-        np.repeat(np.arange(2, dtype=np.int32), [len(side.contact) for side in sides]),
-        np.concatenate([side.clear_mm for side in sides]).astype(np.float32),
+        np.concatenate([side.contact for side in both]).astype(np.int32),
+        np.repeat(np.arange(2, dtype=np.int32), [len(side.contact) for side in both]),
+        np.concatenate([side.clear_mm for side in both]).astype(np.float32),
         np.array([first + apex, first + globe + apex], np.int32),
         np.array([first + back, first + globe + back], np.int32),
         lid_rings()[..., _EDGE].astype(np.int32),
     )
 
 
-def _ways(rings: Points, eye: Socket, closed: bool) -> Points:
-    """(r, 3) from where points of the lids are published to where they lie on the true ball [mm].
+def _ways(rings: Points, eye: Socket, closed: bool | Flags) -> Points:
+    """(..., r, 3) from where points of the lids are published to where they lie on the true ball [mm].
 
     Seen from the front they stay where they are, but near the ball's outline. Edges touch the ball; lids stay
     as thick.
     """
     published = (rings - eye.middle) / eye.size
-    off = published.copy()
-    if closed:
-        _close(off.reshape(-1, _RINGS, 3))
-    above = (np.linalg.norm(published, axis=1) - BALL_MM).reshape(-1, _RINGS)
-    above += (_LIES_ON * (_TOUCHING_MM - above[:, _EDGE]))[:, None]
-    radius = SCLERA_MM + np.maximum(above.ravel(), _DEEPEST_MM)
-    across = np.linalg.norm(off[:, :2], axis=1)
+    off, shut = published.copy(), np.asarray(closed)
+    lids = off.reshape(-1, len(_LIES_ON), _RINGS, 3)
+    for one in np.flatnonzero(shut):
+        _close(lids[one])
+    above = (np.linalg.norm(published, axis=-1) - BALL_MM).reshape(*shut.shape, -1, _RINGS)
+    above += (_LIES_ON * (_TOUCHING_MM - above[..., _EDGE]))[..., None]
+    radius = SCLERA_MM + np.maximum(above.reshape(*shut.shape, -1), _DEEPEST_MM)
+    across = np.linalg.norm(off[..., :2], axis=-1)
     wanted = radius * _narrowed(across / radius)
-    depth = FORWARD_MM + np.sqrt(radius**2 - wanted**2) + (0.0 if closed else _CARUNCLE_MM.ravel())
-    flat = off[:, :2] * (wanted / np.maximum(across, 1e-9))[:, None]
-    return np.asarray(eye.size * (np.column_stack([flat, depth]) - published))
+    floor = np.where(shut[..., None], 0.0, _CARUNCLE_MM.ravel())
+    depth = FORWARD_MM + np.sqrt(radius**2 - wanted**2) + floor
+    flat = off[..., :2] * (wanted / np.maximum(across, 1e-9))[..., None]
+    return np.asarray(eye.size * (np.concatenate([flat, depth[..., None]], axis=-1) - published))
 
 
 def _close(rings: Points) -> None:
@@ -181,24 +161,14 @@ def _narrowed(across: Points) -> Points:
 
 
 @cache
-def _axes() -> dict[str, Points]:
-    """Along which an eye looks by each target of gaze."""
-    turns = {turn.target: np.radians(turn.degrees) for turn in gaze()}
-    found = {
-        name: np.array([np.sin(y), -np.sin(x), np.cos(x) * np.cos(y)]) for name, (x, y, _) in turns.items()
-    }
-    return {name: axis / np.linalg.norm(axis) for name, axis in found.items()}
-
-
-@cache
-def _sides() -> tuple[_Side, _Side]:
+def sides() -> tuple[Side, Side]:
     """Of the left and of the right eye; told on the average person, so the same for all people."""
     places, (left, right) = average()[0].astype(np.float64), lid_rings()
     body = np.unique(data()["quads"][data()["group"] == 0]).astype(np.int64)
     return _side(left, places, body, "Left"), _side(right, places, body, "Right")
 
 
-def _side(rings: Index, places: Points, body: Index, name: str) -> _Side:
+def _side(rings: Index, places: Points, body: Index, name: str) -> Side:
     every = rings.ravel()
     near = body[np.abs(places[body] - places[every].mean(axis=0)).max(axis=1) < 4 * _REACH_MM]
     far = np.linalg.norm(places[near][:, None] - places[every], axis=-1)
@@ -211,7 +181,7 @@ def _side(rings: Index, places: Points, body: Index, name: str) -> _Side:
     share[own] = point[own][:, None] == every
     sliding = _sliding(rings, point, name)
     clear = np.concatenate([np.repeat(_CLEAR_MM, len(rings)), np.full(len(sliding), _CLEAR_MM[-1])])
-    return _Side(every, point, share, np.concatenate([rings.T.ravel(), sliding]), clear)
+    return Side(every, point, share, np.concatenate([rings.T.ravel(), sliding]), clear)
 
 
 def _sliding(rings: Index, point: Index, name: str) -> Index:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from typing import Literal, NamedTuple
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.human import globes, lids, teeth
+from dermis.human.lid_targets import conformed_targets
 from dermis.human.movement import expressions, gaze, skeleton
 from dermis.human.published import Points, count, data, places_mm
 from dermis.mesh import globe
@@ -73,7 +75,7 @@ def human_head(weights: Mapping[str, float], maps: Maps, layout: Layout, eyes: E
         quads=np.arange(2 * len(laid.quads)).reshape(-1, 2),
     )
     bones = skeleton(places[count() :], (left_centre, right_centre), len(left))
-    moved = expressions(lids.conformed_targets(places, sockets))
+    moved = replace(expressions(), delta_mm=conformed_targets(places, sockets))
     apex, back, _ = globe.marks()
     contact = lids.contact(count(), len(left), apex, back)
     rig = Rig(points.astype(np.float32), moved, bones, turns=gaze(), contact=contact)

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dermis.human.published import EXPRESSIONS, Points, data, moves
-from dermis.mesh.mesh import Ints
 from dermis.mesh.rig import MorphTargets, Skeleton, Turn
 
 _BEGINS: dict[str, tuple[str, str, float]] = {  # a joint, or how far on the way between two
@@ -45,18 +44,9 @@ def gaze() -> tuple[Turn, ...]:
     )
 
 
-def expressions(delta_mm: NDArray[np.float32]) -> MorphTargets:
-    """The ARKit blend shapes of the skin, the teeth and the tongue; eyeballs turn by `gaze` instead.
-
-    delta_mm : (m, 3) of all published targets
-    """
-    names, first, point, chosen = _expressions()
-    return MorphTargets(names, first, point, delta_mm[chosen])
-
-
 @cache
-def _expressions() -> tuple[tuple[str, ...], Ints, Ints, NDArray[np.intp]]:
-    """Names, where the displacements of each begin, the points, and which of all published ones these are."""
+def expressions() -> MorphTargets:
+    """The ARKit blend shapes of the skin, the teeth and the tongue; eyeballs turn by `gaze` instead."""
     moved, names, rows = moves(), list[str](), list[NDArray[np.intp]]()
     for index, name in enumerate(moved.names):
         if name.startswith(EXPRESSIONS):
@@ -64,7 +54,8 @@ def _expressions() -> tuple[tuple[str, ...], Ints, Ints, NDArray[np.intp]]:
             names.append(name.removeprefix(EXPRESSIONS))
             rows.append(part[_moving()[moved.point[part]]])
     first, chosen = np.cumsum([0, *map(len, rows)]), np.concatenate(rows)
-    return tuple(names), first.astype(np.int32), moved.point[chosen].astype(np.int32), chosen
+    point, delta_mm = moved.point[chosen].astype(np.int32), moved.delta_mm[chosen]
+    return MorphTargets(tuple(names), first.astype(np.int32), point, delta_mm)
 
 
 @cache

@@ -52,12 +52,10 @@ def template(layout: Layout, levels: int) -> Template:
 
     levels : of subdivision
     """
-    plain = human_head(MEAN, Maps(), layout, EyeLook())
+    head = plain = human_head(MEAN, Maps(), layout, EyeLook())
+    found = refinement(plain.mesh, levels) if levels else None
+    if found is not None:
+        rig = replace(plain.control, stencils=found.stencils)
+        head = replace(plain, mesh=found.mesh(plain.mesh), rig=rig, levels=levels)
     mean_mm = plain.control.positions_mm.astype(np.float64)
-    rooting = Rooting(plain.mesh, mean_mm, eye_middles(plain.mesh))
-    if levels == 0:
-        return Template(plain, rooting, None)
-    found = refinement(plain.mesh, levels)
-    rig = replace(plain.control, stencils=found.stencils)
-    head = replace(plain, mesh=found.mesh(plain.mesh), rig=rig, levels=levels)
-    return Template(head, rooting, found)
+    return Template(head, Rooting(plain.mesh, mean_mm, eye_middles(plain.mesh), head.mesh), found)

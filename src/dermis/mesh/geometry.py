@@ -71,7 +71,7 @@ def vertex_normals(positions: Floats, point: Ints, triangles: Ints) -> Floats:
     beside = [np.arctan2(sine, -dots(one, other)) for one, other in ((ca, ab), (ab, bc))]
     angle = np.stack([*beside, np.pi - beside[0] - beside[1]])
     angle /= np.where(sine > 0, -sine, 1.0)
-    at, count = point[corner].ravel(), int(point.max()) + 1
+    at, count = point.astype(np.intp).take(corner.ravel()), int(point.max()) + 1
     summed = np.stack([np.bincount(at, (one * angle).ravel(), count) for one in across], dtype=np.float64)
     length = np.sqrt(dots(summed, summed))
     flat = ~(length > 0)

@@ -13,8 +13,6 @@ from dermis.mesh.mesh import Floats, Mesh
 from dermis.mesh.rig import Rig
 from dermis.mesh.strands import Strands
 
-_CROWN_TO_CENTRE_MM = 120.0  # half the height of an adult head
-
 
 @dataclass(frozen=True, repr=False)
 class Head:
@@ -98,14 +96,10 @@ class Head:
         skeleton = self.control.skeleton
         return skeleton.names if skeleton else ()
 
-    @cached_property
+    @property
     def centre_mm(self) -> tuple[float, float, float]:
         """The middle of the head itself, without neck and shoulders: scenes are placed around it [mm]."""
-        p = self.mesh.positions
-        top = float(p[:, 1].max())
-        skull = p[p[:, 1] > top - 2 * _CROWN_TO_CENTRE_MM]
-        low, high = skull.min(axis=0), skull.max(axis=0)
-        return float(low[0] + high[0]) / 2, top - _CROWN_TO_CENTRE_MM, float(low[2] + high[2]) / 2
+        return self.mesh.skull_mm
 
     def frontmost(self, x_mm: float, y_mm: float) -> tuple[float, float, float]:
         """The point of the surface in front of (x, y), relative to the centre [mm]."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -15,6 +16,8 @@ from dermis.summary import Summarised
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]
+
+_CROWN_TO_CENTRE_MM = 120.0  # half the height of an adult head
 
 Part = Literal["upper teeth", "lower teeth", "tongue"]
 PARTS: tuple[Part, ...] = ("upper teeth", "lower teeth", "tongue")
@@ -71,6 +74,23 @@ class Mesh(Summarised):
     def outline(self) -> Outline:
         """Corners of the convex hull."""
         return hull(self.positions)
+
+    @cached_property
+    def skull_mm(self) -> tuple[float, float, float]:
+        """The middle of a head, without neck and shoulders [mm]."""
+        x, y, z = self.positions.T
+        top = float(y.max())
+        skull = y > top - 2 * _CROWN_TO_CENTRE_MM
+        middle_x, middle_z = (float(c.min() + c.max()) / 2 for c in (x[skull], z[skull]))
+        return middle_x, top - _CROWN_TO_CENTRE_MM, middle_z
+
+    @cached_property
+    def layout_key(self) -> bytes:
+        """The same for all meshes that differ in where their points are alone."""
+        digest = hashlib.blake2b(digest_size=16)
+        for part in (self.uv, self.point, self.triangles, self.material):
+            digest.update(np.ascontiguousarray(part).tobytes())
+        return digest.digest()
 
     @property
     def dpdu(self) -> Floats:

@@ -52,10 +52,11 @@ class MorphTargets(Summarised):
         """
         place = np.full(count, -1, np.int64)
         place[points] = np.arange(len(points))
-        at, target = place[self.point], np.repeat(np.arange(len(self.names)), np.diff(self.first))
-        kept = at >= 0
+        at = place.take(self.point)
+        kept = np.flatnonzero(at >= 0)
+        target = np.searchsorted(self.first, kept, side="right") - 1
         found = np.zeros((len(self.names), len(points), 3), np.float32)
-        found[target[kept], at[kept]] = self.delta_mm[kept]
+        found[target, at.take(kept)] = self.delta_mm.take(kept, axis=0)
         return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import lru_cache, partial
 
@@ -31,7 +32,7 @@ def medium_of(profile: GaussianSum, total: Floats, eta: float) -> Medium:
     albedo, extinction = np.empty(len(total)), np.empty(len(total))
     for c, share in enumerate(total):
         root, half = interpolated(partial(_returning, eta, profile.counted), float(share))
-        one = GaussianSum("", profile.variance_mm2, profile.weight[:, [c]])
+        one = tuple(zip(profile.variance_mm2.tolist(), profile.weight[:, c].tolist(), strict=True))
         albedo[c], extinction[c] = 1.0 - root**2, _half(partial(_spread, one)) / half
     layer = Layer((1.0 - albedo) * extinction, albedo * extinction)
     return Medium("flesh", (layer,), eta)
@@ -77,9 +78,9 @@ def _unit(albedo: float, eta: float) -> Medium:
     return Medium("flesh", (Layer(np.array([1.0 - albedo]), np.array([albedo])),), eta)
 
 
-def _spread(profile: GaussianSum, frequency: float) -> float:
-    """Hankel transform of a profile of one channel."""
-    return float(profile.hankel(frequency)[0])
+def _spread(gaussians: tuple[tuple[float, float], ...], frequency: float) -> float:
+    """`GaussianSum.hankel` of one channel, by its variances and weights; in plain floats, as they are few."""
+    return sum(weight * math.exp(-0.5 * variance * frequency**2) for variance, weight in gaussians)
 
 
 def _transform(curve: Curve, frequency: float) -> float:
@@ -94,7 +95,7 @@ def _transform(curve: Curve, frequency: float) -> float:
 def _returned(body: Medium, frequency: float) -> float:
     """Hankel transform of what it returns."""
     A = mismatch(body.eta, "exact")
-    return float(layered_diffusion.respond(np.array([frequency]), body, A)[0][0, 0])
+    return float(layered_diffusion.reflect(np.array([frequency]), body, A)[0, 0])
 
 
 def _half(transform: Callable[[float], float]) -> float:

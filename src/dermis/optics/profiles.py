@@ -14,6 +14,7 @@ import numpy as np
 
 from dermis.errors import refuse
 from dermis.optics.fits.gaussian import fit_gaussians
+from dermis.optics.fits.targets import Rings
 from dermis.optics.gaussians import MOST_WEIGHT, WIDEST_MM2, GaussianSum
 from dermis.optics.media import Floats
 from dermis.optics.radial import RadialProfile
@@ -139,7 +140,7 @@ def fit_profile(tissue: Tissue, name: str | Path, near: GaussianSum | None = Non
 
     Raises DermisError when its numbers cannot be a profile.
     """
-    return fit_radial(tissue.profile(), f"profile {name}", near)
+    return _fit_rings(tissue.rings(), tissue.usual_model, f"profile {name}", near)
 
 
 def fit_radial(radial: RadialProfile, name: str, near: GaussianSum | None = None) -> GaussianSum:
@@ -147,8 +148,12 @@ def fit_radial(radial: RadialProfile, name: str, near: GaussianSum | None = None
 
     near : as of `fit_profile`
     """
-    counted = radial.model in COUNTED_MODELS
-    fit = fit_gaussians(radial.rings(), TERMS, keep_energy=counted, near=near, name=name)
+    return _fit_rings(radial.rings(), radial.model, name, near)
+
+
+def _fit_rings(rings: Rings, model: str, name: str, near: GaussianSum | None) -> GaussianSum:
+    counted = model in COUNTED_MODELS
+    fit = fit_gaussians(rings, TERMS, keep_energy=counted, near=near, name=name)
     return replace(fit.profile, counted=counted)
 
 

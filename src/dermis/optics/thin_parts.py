@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import NamedTuple
@@ -63,9 +64,8 @@ def thin_parts(body: Medium, variance_mm2: Floats, reach_mm: float, g: float = 0
     depth = reach_mm * np.linspace(0.0, 1.0, ROWS) ** 2
     through, lost = np.zeros((2, ROWS, len(variance_mm2), body.channels))
     deep, weight = np.zeros((2, ROWS, body.channels))
-    for c in range(body.channels):
-        one = body.channel(c)
-        share, shape = _shares(one.layers[0], depth[1:], body.eta, g), _shapes(one, depth[1:], variance_mm2)
+    for c, share in enumerate(_shares(body.layers[0], depth[1:], body.eta, g)):
+        shape = _shapes(body.channel(c), depth[1:], variance_mm2)
         through[1:, :, c], lost[1:, :, c] = share.passed[:, None] * shape, share.lost[:, None] * shape
         deep[1:, c], weight[1:, c] = share.deep, share.amount
         lost[0, :, c] = shape[0]
@@ -116,13 +116,16 @@ class _Shares(NamedTuple):
     deep: Floats
 
 
-def _shares(layer: Layer, depth_mm: Floats, eta: float, g: float) -> _Shares:
-    """By cubics between depths for which an albedo's slabs are cut once."""
+def _shares(layer: Layer, depth_mm: Floats, eta: float, g: float) -> Iterator[_Shares]:
+    """Of each channel, by cubics between depths for which an albedo's slabs are cut once."""
     from scipy.interpolate import CubicSpline
 
-    depth = np.clip(float(layer.sigma_t_prime[0]) * depth_mm, _DEPTHS[0], _DEPTHS[-1])
-    cut = interpolated(partial(_by_depth, eta, g), float(np.sqrt(1.0 - layer.alpha_prime[0])))
-    return _Shares(*CubicSpline(np.log(_DEPTHS), cut)(np.log(depth)).T)
+    roots = np.sqrt(1.0 - layer.alpha_prime).tolist()
+    cut = [interpolated(partial(_by_depth, eta, g), root) for root in roots]
+    spline = CubicSpline(np.log(_DEPTHS), np.stack(cut, axis=1))
+    for c, extinction in enumerate(layer.sigma_t_prime.tolist()):
+        depth = np.clip(extinction * depth_mm, _DEPTHS[0], _DEPTHS[-1])
+        yield _Shares(*spline(np.log(depth))[:, c].T)
 
 
 @lru_cache(maxsize=KEPT)

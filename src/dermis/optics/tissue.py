@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 from dermis.errors import DermisError, refuse, shown_value
 from dermis.optics.counted import COUNTED, is_counted, tabulated_profile
 from dermis.optics.diffusion.boundary import normal_reflectance
-from dermis.optics.diffusion.models import Model, diffusion_profile, through_slab
+from dermis.optics.diffusion.models import Model, diffusion_profile, diffusion_rings, through_slab
 from dermis.optics.diffusion.multipole import Clamp
+from dermis.optics.fits.targets import Rings
 from dermis.optics.half_space import ALBEDOS
 from dermis.optics.media import SKIN_ETA, Floats, Layer, Medium, media, medium_from_toml
 from dermis.optics.pigments.skin import EXAMPLES, SkinParameters, Structure, spectral_medium
@@ -100,6 +101,11 @@ class Tissue:
             expected = f"one layer without end of index 1 or {SKIN_ETA} and reduced albedo {least} to {most}"
             refuse(f"model {COUNTED}", expected, f"{self.medium.name} is none", "Take the model layered")
         return found
+
+    def rings(self) -> Rings:
+        """Those of `profile`, of diffusion without the rest of it."""
+        used = self.usual_model
+        return self.profile().rings() if used == COUNTED else diffusion_rings(self.medium, used, rgb=self.rgb)
 
     def through(self, thickness_mm: ArrayLike) -> Floats:
         """Light that comes through the tissue cut at each thickness, (n, 3), per the same power [-]."""

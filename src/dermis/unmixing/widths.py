@@ -98,7 +98,7 @@ def _tissue(skin: SkinParameters, melanin: float, blood: float) -> Tissue:
 
 def _white(tissue: Tissue) -> Floats:
     """(n, 3) share of what leaves that leaves through each ring."""
-    rings = tissue.profile().rings()
+    rings = tissue.rings()
     return np.asarray(rings.energy / rings.total)
 
 

@@ -172,3 +172,10 @@ def test_two_layer_total_is_near_monte_carlo(sample_folder: Path) -> None:
     layered = diffusion_profile(TWO_LAYER, "layered").total[0]
     multipole = diffusion_profile(TWO_LAYER, "multipole").total[0]
     assert abs(layered / truth - 1.0) < 0.04 < abs(multipole / truth - 1.0)
+
+
+@pytest.mark.parametrize("source", ["beam", "point"])
+def test_what_is_reflected_alone_is_the_same(source: layered_diffusion.Source) -> None:
+    medium, frequency = media()["dj3"], hankel.frequencies()
+    alone = layered_diffusion.reflect(frequency, medium, A, source)
+    assert np.array_equal(alone, layered_diffusion.respond(frequency, medium, A, source)[0])

@@ -6,16 +6,13 @@ import inspect
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-import numpy as np
-
-from dermis.frame.projection import Triple, between, frame_of
+from dermis.frame.projection import Triple, axes_of, between
 from dermis.gpu.wgsl_source import Member
 from dermis.mesh.head import Head
 from dermis.registry import Registry
 from dermis.scene.lights import LIGHTS, Light, PointLight
 
 L = TypeVar("L", bound=Light)
-_UP = np.array([0.0, 1.0, 0.0])
 
 
 class Kind(Generic[L]):
@@ -71,12 +68,12 @@ def facing(light: PointLight, radiance: float, half_width: float, half_height: f
     radiance : for an irradiance of 1 at the target [1/sr]
     half_width, half_height : [mm]
     """
-    right, up, _ = frame_of(np.array(between(light.position, light.target)), _UP)
+    right, up, _ = axes_of(between(light.position, light.target))
     return {
-        "half_u": half_width * right,
-        "half_v": half_height * up,
+        "half_u": tuple(half_width * c for c in right),
+        "half_v": tuple(half_height * c for c in up),
         "extent": (half_width, half_height),
-        "irradiance": radiance * np.array(light.irradiance),
+        "irradiance": tuple(radiance * c for c in light.irradiance),
     }
 
 

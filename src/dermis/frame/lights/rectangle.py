@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dermis.frame.lights.kind import Kind, facing
-from dermis.frame.projection import Triple, frame_of
+from dermis.frame.projection import Triple, axes_of, between
 from dermis.scene.lights import Light, RectangleLight
 
-Floats = NDArray[np.float64]
-_CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
-_UP = np.array([0.0, 1.0, 0.0])
 _WIDEST_PART = 0.35  # of its distance
 _MOST_PARTS = 3  # along each side
 
@@ -24,11 +21,13 @@ class _Rectangle(Kind[RectangleLight]):
 
     def parts(self, light: RectangleLight) -> list[Light]:
         """Rectangles no wider or higher than 0.35 of the distance, but at most 3 x 3 of them."""
-        path = np.subtract(light.target, light.position)
-        right, up, _ = frame_of(path, _UP)
-        sides, distance = np.array([light.width_mm, light.height_mm]), float(np.linalg.norm(path))
-        columns, rows = np.clip(np.ceil(sides / (_WIDEST_PART * distance)), 1, _MOST_PARTS).astype(int)
-        width, height = sides / (columns, rows)
+        path = between(light.position, light.target)
+        distance = math.hypot(*path)
+        columns, rows = (_across(side, distance) for side in (light.width_mm, light.height_mm))
+        if columns == rows == 1:
+            return [light]
+        width, height = light.width_mm / columns, light.height_mm / rows
+        right, up = map(np.array, axes_of(path)[:2])
         share = facing_irradiance(width, height, distance) / facing_irradiance(
             light.width_mm, light.height_mm, distance
         )
@@ -42,8 +41,8 @@ class _Rectangle(Kind[RectangleLight]):
                 update={
                     "position": tuple(light.position + move),
                     "target": tuple(light.target + move),
-                    "width_mm": float(width),
-                    "height_mm": float(height),
+                    "width_mm": width,
+                    "height_mm": height,
                     "irradiance": tuple(share * np.array(light.irradiance)),
                 }
             )
@@ -58,23 +57,16 @@ class _Rectangle(Kind[RectangleLight]):
 KIND = _Rectangle()
 
 
-def rectangle_irradiance(corners: Floats, normal: Floats) -> float:
-    """Irradiance from a uniform polygon of radiance 1 on a surface at the origin that sees all of it [-].
-
-    corners : (k, 3) in order around the polygon
-    normal : (3,) of the surface
-
-    Source: Lambert's formula, as in [Baum1989].
-    """
-    unit = corners / np.linalg.norm(corners, axis=1, keepdims=True)
-    after = np.roll(unit, -1, axis=0)
-    edge = np.cross(unit, after)
-    angle = np.arctan2(np.linalg.norm(edge, axis=1), (unit * after).sum(axis=1))
-    edge /= np.linalg.norm(edge, axis=1, keepdims=True)
-    return abs(0.5 * float((angle * (edge @ normal)).sum()))
+def _across(side_mm: float, distance_mm: float) -> int:
+    """Parts along a side."""
+    return min(max(math.ceil(side_mm / (_WIDEST_PART * distance_mm)), 1), _MOST_PARTS)
 
 
 def facing_irradiance(width: float, height: float, distance: float) -> float:
-    """Irradiance from a rectangle of radiance 1 on a surface opposite its middle [-]."""
-    corners = np.array(_CORNERS) * (0.5 * width, 0.5 * height)
-    return rectangle_irradiance(np.column_stack([corners, np.full(4, distance)]), np.array([0.0, 0.0, 1.0]))
+    """Irradiance from a rectangle of radiance 1 on a surface opposite its middle [-].
+
+    Source: the view factor of a corner, [Baum1989].
+    """
+    a, b = 0.5 * width / distance, 0.5 * height / distance
+    across, along = math.hypot(1.0, a), math.hypot(1.0, b)
+    return 2.0 * (a / across * math.atan(b / across) + b / along * math.atan(a / along))

@@ -1,4 +1,4 @@
-"""The skin around a brow, as a grid over the front plane of the mean person, for hairs to walk on."""
+"""The skin around brows, as a grid over the front plane of the mean person, for hairs to walk on."""
 
 from __future__ import annotations
 
@@ -52,29 +52,32 @@ def _axes() -> tuple[Doubles, Doubles]:
 
 
 class BrowSkin:
-    """A person's skin around a brow.
+    """A person's skin around the brows.
 
-    node_mm, normal : (nodes, 3) where the grid's places are on the person, see `Skin.foot`; x counts from the
-        nose outwards on both sides
+    node_mm, normal : (2 nodes, 3) where the places of the left and of the right grid are on the person, see
+        `Skin.foot`; x counts from the nose outwards on both sides
     """
 
     def __init__(self, node_mm: Doubles, normal: Doubles) -> None:
         shape = tuple(map(len, _axes()))
-        ways = np.gradient(node_mm.reshape(*shape, 3), _CELL_MM, axis=(0, 1))
+        ways = np.gradient(node_mm.reshape(2, *shape, 3), _CELL_MM, axis=(1, 2))
         self._last = np.array(shape) - 1
         plane = (node_mm * normal).sum(axis=1, keepdims=True)
         self._node = np.concatenate([node_mm, normal, *(way.reshape(-1, 3) for way in ways), plane], axis=1)
 
-    def at(self, x: Doubles, y: Doubles) -> Walked:
-        """The skin behind places of the front plane (n,) [mm]; beyond the grid, as at its edge."""
+    def at(self, side: Doubles, x: Doubles, y: Doubles) -> Walked:
+        """The skin behind places of the front plane (n,) [mm]; beyond the grid, as at its edge.
+
+        side : 1 for the left one
+        """
         at = (np.stack([x, y]) - np.array(_LOW)[:, None]) / _CELL_MM
         at = np.clip(at, 0.0, self._last[:, None] - 1e-9)
         cell = at.astype(np.int64)
         s, t = at - cell
-        first = cell[0] * (self._last[1] + 1) + cell[1]
+        first = cell[0] * (self._last[1] + 1) + cell[1] + (side < 0) * (len(self._node) // 2)
         near = first[:, None] + [0, 1, self._last[1] + 1, self._last[1] + 2]
         share = np.stack([(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t], axis=-1)
-        found = np.einsum("nk,nkc->nc", share, self._node[near])
+        found = np.einsum("nk,nkc->nc", share, self._node.take(near, axis=0))
         place, normal, along_x, along_y, plane = np.split(found, [3, 6, 9, 12], axis=1)
         # curved skin lies as far from its chords as from its tangent planes
         lift = 0.5 * (plane - _dots(place, normal)[:, None])

@@ -52,42 +52,47 @@ def count(look: HairLook) -> int:
     return int(_MOST * (0.55 + 0.45 * look.bushy))
 
 
-def grown(
-    skin: BrowSkin,
-    root_mm: Doubles,
-    side: float,
-    along: tuple[Doubles, Doubles],
-    front_mm: tuple[Doubles, Doubles],
-    rng: np.random.Generator,
-    look: HairLook,
-) -> tuple[Doubles, Doubles]:
-    """Knots (n, k, 3) and radii (n, k) of the hairs of one brow [mm].
+def shapes(u: Doubles, v: Doubles, rng: np.random.Generator, look: HairLook) -> Doubles:
+    """(5, n) where in the front plane hairs point to, by how much they bend [rad], their length, how far they
+    rise and the radius of their roots [mm].
 
-    root_mm : (n, 3) on the skin
-    side : 1 for the left one
-    along, front_mm : (n,) along and across the brow, and x, y in the front plane, from `places`
+    u, v : (n,) along and across the brow, from `places`
     """
-    (u, v), (x, y), n = along, front_mm, len(along[0])
+    n = len(u)
     # hairs from above and from below lean together
     turn = np.interp(u, _ALONG, _TURN) - 0.6 * v * np.minimum(2.5 * u, 1.0) + rng.normal(0, 0.13, n)
     bend = -0.5 * np.clip(turn - np.interp(np.minimum(u + 0.2, 1), _ALONG, _TURN), 0, 1) - 0.25 * v * u
     bend += rng.normal(0, 0.14, n)
     length = np.interp(u, _ALONG, _LENGTH) * rng.uniform(0.6, 1.1, n) * (0.85 + 0.3 * look.bushy)
     rise = np.clip(rng.gamma(4.0, 0.15, n), 0.15, 1.3)
+    radius = rng.uniform(0.03, 0.05, n) * (0.9 + 0.2 * look.bushy)
+    return np.stack([turn, bend, length, rise, radius])
+
+
+def grown(
+    skin: BrowSkin, root_mm: Doubles, side: Doubles, front_mm: Doubles, shape: Doubles
+) -> tuple[Doubles, Doubles]:
+    """Knots (n, k, 3) and radii (n, k) of the hairs of brows [mm].
+
+    root_mm : (n, 3) on the skin
+    side : (n,) 1 for the left one
+    front_mm : (2, n) x, y in the front plane, from `places`
+    shape : (5, n) from `shapes`
+    """
+    (x, y), (turn, bend, length, rise, radius) = front_mm, shape
     t = np.linspace(0.0, 1.0, KNOTS)
     height = rise[:, None] * (1 - (1 - t) ** 2.2) * (1 - 0.35 * t) - 0.25 * (1 - t) ** 8
-    here = skin.at(x, y)
+    here = skin.at(side, x, y)
     beside = flattened(root_mm - here.place, here.normal)
     feet, normals = [here.place + beside], [here.normal]
     for k in range(2, KNOTS, 2):  # straight between: 0.16 mm off at most
         angle = turn + bend * (t[k - 1] + t[k]) / 2
-        out = np.stack([side * np.cos(angle), np.sin(angle), np.zeros(n)], axis=-1)
+        out = np.stack([side * np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=-1)
         across, up = here.step(out, 2 * length / (KNOTS - 1))
         x, y = x + across, y + up
-        here = skin.at(x, y)
+        here = skin.at(side, x, y)
         feet += [(feet[-1] + here.place + beside) / 2, here.place + beside]
         normals += [(normals[-1] + here.normal) / 2, here.normal]
     knots = np.stack(feet, axis=1) + height[..., None] * np.stack(normals, axis=1)
-    radius = rng.uniform(0.03, 0.05, n) * (0.9 + 0.2 * look.bushy)
     taper = np.maximum(1.0 - t**2.5, 0.08)
     return knots, radius[:, None] * taper * np.minimum(1.0, 0.75 + t)

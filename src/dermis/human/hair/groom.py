@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -9,9 +10,11 @@ import numpy as np
 from dermis.human.hair import brows, lashes
 from dermis.human.hair.brow_skin import BrowSkin
 from dermis.human.hair.grown import Ground, Grown, Rooted
+from dermis.human.hair.hairy_skin import skin_beside
 from dermis.human.hair.head_hair import beard_hair, scalp_hair
 from dermis.human.hair.look import HairLook
-from dermis.human.hair.rooting import Rooting, eye_middles
+from dermis.human.hair.rooting import SIDES, Rooting, eye_middles
+from dermis.human.hair.skin import Skin
 from dermis.mesh.head import Head
 from dermis.mesh.strands import Doubles, Roots, Strands, seen_in
 from dermis.specular.hair import absorption_per_mm
@@ -36,12 +39,12 @@ def groomed(
     recession : see `SkinLook`
     hairs : share of those of head and beard that grows, each as much wider
     """
-    ground, parts = Ground(head, plain.mesh, hairs), list[Grown]()
-    for side, eye in zip((1.0, -1.0), eye_middles(plain.mesh), strict=True):
-        rng = np.random.default_rng((look.seed, int(side > 0)))
-        parts.append(_brow(ground, rooting, look, side, rng))
-        for lid in (lashes.UPPER, lashes.LOWER):
-            parts.append(_lashes(ground, rooting, lid, side, eye, rng))
+    skin = Skin(head.mesh, skin_beside(rooting, look.beard_mm > 0.0))
+    ground = Ground(head, plain.mesh, skin, hairs)
+    rngs = [np.random.default_rng((look.seed, int(side > 0))) for side in SIDES]
+    left, right = _brows(ground, rooting, look, rngs)
+    rows = list(_lashes(ground, rooting, eye_middles(plain.mesh), rngs))
+    parts = [left, *rows[:2], right, *rows[2:]]
     head = replace(head, strands=_joined(parts, _absorption(parts, look)))
     hair = [*scalp_hair(ground, look, recession), *beard_hair(ground, look)]
     if not hair:
@@ -53,27 +56,56 @@ def groomed(
 def _shuffled(strands: Strands, seed: int) -> Strands:
     """The same hairs in no order, so that the first few are like all."""
     order = np.random.default_rng((seed, 5)).permutation(len(strands))
-    roots = Roots(strands.roots.quad[order], strands.roots.place[order])
-    parts = {name: getattr(strands, name)[order] for name in ("knots_mm", "radius_mm", "absorption", "cover")}
+    roots = Roots(strands.roots.quad.take(order), strands.roots.place.take(order, axis=0))
+    names = "knots_mm", "radius_mm", "absorption", "cover"
+    parts = {name: getattr(strands, name).take(order, axis=0) for name in names}
     return replace(strands, roots=roots, **parts)
 
 
-def _brow(ground: Ground, rooting: Rooting, look: HairLook, side: float, rng: np.random.Generator) -> Grown:
-    u, v, x, y = brows.places(rng)
-    roots, there = rooting.in_front(side * x, y)
-    kept = np.flatnonzero(there)[: brows.count(look)]
-    where = ground.rooted(Roots(roots.quad[kept], roots.place[kept]))
-    skin = BrowSkin(*ground.skin.foot(ground.rooted(rooting.around_brow(side)).places))
-    along, front_mm = (u[kept], v[kept]), (x[kept], y[kept])
-    return _grown(where, *brows.grown(skin, where.places, side, along, front_mm, rng, look), 1.0)
+def _brows(
+    ground: Ground, rooting: Rooting, look: HairLook, rngs: list[np.random.Generator]
+) -> Iterator[Grown]:
+    """The left and the right brow, grown at once: for so few hairs each step costs what it costs for one."""
+    roots, told = [], []
+    for side, rng in zip(SIDES, rngs, strict=True):
+        u, v, x, y = brows.places(rng)
+        found, there = rooting.in_front(side * x, y)
+        kept = np.flatnonzero(there)[: brows.count(look)]
+        roots.append(Roots(found.quad[kept], found.place[kept]))
+        shape = brows.shapes(u[kept], v[kept], rng, look)
+        told.append(np.vstack([np.full(len(kept), side), x[kept], y[kept], shape]))
+    where, hair = ground.rooted(_roots(roots)), np.concatenate(told, axis=1)
+    skin = BrowSkin(*ground.skin.foot(ground.rooted(rooting.around_brows).places))
+    both = _grown(where, *brows.grown(skin, where.places, hair[0], hair[1:3], hair[3:]), 1.0)
+    yield from _parted(both, [len(part.quad) for part in roots])
 
 
 def _lashes(
-    ground: Ground, rooting: Rooting, lid: lashes.Lid, side: float, eye: Doubles, rng: np.random.Generator
-) -> Grown:
-    u, across = lashes.places(lid, rng)
-    where = ground.rooted(rooting.beside_lid(lid, side, u, across))
-    return _grown(where, *lashes.grown(lid, where.places, eye, side, u, rng), _LASHES_DARKER)
+    ground: Ground, rooting: Rooting, eyes: Doubles, rngs: list[np.random.Generator]
+) -> Iterator[Grown]:
+    """The upper and the lower lashes of the left eye, then those of the right one, grown at once too.
+
+    eyes : (2, 3) middles
+    """
+    roots, told, before = [], [], 0
+    for side, eye, rng in zip(SIDES, eyes, rngs, strict=True):
+        for lid in (lashes.UPPER, lashes.LOWER):
+            u, across = lashes.places(lid, rng)
+            roots.append(rooting.beside_lid(lid, side, u, across))
+            shape = lashes.shapes(lid, u, rng, before)
+            told.append(np.vstack([np.full((len(u), 4), [side, *eye]).T, shape]))
+            before += len(u) + 1
+    where, hair = ground.rooted(_roots(roots)), np.concatenate(told, axis=1)
+    grown = lashes.grown(where.places, hair[1:4].T, hair[0], hair[4:])
+    yield from _parted(_grown(where, *grown, _LASHES_DARKER), [len(part.quad) for part in roots])
+
+
+def _parted(hair: Grown, counts: list[int]) -> Iterator[Grown]:
+    """So many of some hairs after the other."""
+    for end, count in zip(np.cumsum(counts).tolist(), counts, strict=True):
+        part = slice(end - count, end)
+        roots = Roots(hair.roots.quad[part], hair.roots.place[part])
+        yield hair._replace(roots=roots, knots=hair.knots[part], radius=hair.radius[part])
 
 
 def _grown(where: Rooted, knots_mm: Doubles, radius_mm: Doubles, darker: float) -> Grown:
@@ -87,12 +119,17 @@ def _joined(parts: list[Grown], absorption: Doubles) -> Strands:
 
     absorption : (n, 3) of single hairs [1/mm]
     """
-    roots = Roots(*(np.concatenate(each) for each in zip(*(part.roots for part in parts), strict=True)))
+    roots = _roots(part.roots for part in parts)
     ways, radius = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
     bundle, cover = (_each(parts, name) for name in ("bundle", "cover"))
     return Strands(
         roots, ways, radius, (absorption / bundle[:, None]).astype(np.float32), cover.astype(np.float32)
     )
+
+
+def _roots(parts: Iterable[Roots]) -> Roots:
+    quads, places = zip(*parts, strict=True)
+    return Roots(np.concatenate(quads), np.concatenate(places))
 
 
 def _each(parts: list[Grown], name: str) -> Doubles:

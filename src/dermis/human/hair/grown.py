@@ -36,11 +36,12 @@ class Rooted:
 class Ground:
     """What hair grows on: the head as it is drawn, and its mesh before it was subdivided.
 
+    skin : of the head, where hairs lie
     share : of the usual number of hairs that grows, each as much wider
     """
 
-    def __init__(self, head: Head, plain: Mesh, share: float = 1.0) -> None:
-        self.plain, self.skin, self.share = plain, Skin(head.mesh), share
+    def __init__(self, head: Head, plain: Mesh, skin: Skin, share: float = 1.0) -> None:
+        self.plain, self.skin, self.share = plain, skin, share
         self._mesh, self._levels = head.mesh, head.levels
         self._columns = np.ascontiguousarray(points_of(head.mesh).T)
 

@@ -9,11 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dermis.human.hair.rooting import Index
+from dermis.human.hair.rooting import Index, Rooting
 from dermis.human.skin.face import AMOUNTS, DEGREES, hairline, zones
 from dermis.human.skin.surface import FIELDS, average
+from dermis.mesh.columns import crosses, dots
 from dermis.mesh.mesh import Floats, Mesh
-from dermis.mesh.strands import Doubles, Roots, between, corners, weights
+from dermis.mesh.strands import Doubles, Roots, between, corners, points_of
 from dermis.tables import read_rows
 
 HEAD_AXIS_Z = -72.0
@@ -26,6 +27,7 @@ _BEARDED = (0.25, 0.75)  # amount of the zones between which it does
 _RAGGED = np.array([[0.37, 0.0, 0.23], [0.81, -0.5, 0.0]])  # waves of the hairline [rad/mm]
 
 _BELOW_MM = 25.0  # the hairline, to where quads may have a little hair
+_BESIDE_MM, _BESIDE_BROWS_MM = 25.0, 8.0  # quads with hairs and those around brows, where skin still counts
 _BESIDE = 0.02  # amount of the zones from which on quads may have a beard
 
 
@@ -56,10 +58,11 @@ def rooted(plain: Mesh, where: Where, per_cm2: float, rng: np.random.Generator) 
     ends = np.cumsum(many)[near]
     number = np.arange(len(which)) + np.repeat(ends - np.cumsum(many[near]), many[near])
     step = number - (np.cumsum(many) - many)[which]
-    place = began[which] + step[:, None] * _STEPS
+    place = began.take(which, axis=0) + step[:, None] * _STEPS
     place -= np.floor(place)
-    kept = chance[number] < where.amount(between(weights(place), told()[around][which]))
-    return Roots(quad[which[kept]].astype(np.int32), place[kept].astype(np.float32))
+    values = told().T.take(around.T.take(which, axis=1), axis=1)
+    kept = np.flatnonzero(chance.take(number) < where.amount(between(place, values).T))
+    return Roots(quad.take(which.take(kept)).astype(np.int32), place.take(kept, axis=0).astype(np.float32))
 
 
 def above_hairline(places: Doubles, recession: float = 0.0) -> Doubles:
@@ -74,12 +77,15 @@ def above_hairline(places: Doubles, recession: float = 0.0) -> Doubles:
 
 def scalp(recession: float) -> Where:
     """Hair of the head."""
+    column = _column("hair")
+    gone = zones(recession)[:, column] != zones()[:, column]
 
     def amount(places: Doubles) -> Doubles:
         above = above_hairline(places, recession)
-        above += sum(np.sin(places[:, :3] @ wave) for wave in _RAGGED)
+        soft = np.flatnonzero((above > _SOFT_MM[0] - len(_RAGGED)) & (above < _SOFT_MM[1] + len(_RAGGED)))
+        above[soft] += sum(np.sin(places[soft, :3] @ wave) for wave in _RAGGED)
         share = smoothstep(*_SOFT_MM, above) * (places[:, 1] > _LOWEST)
-        thinned = _amount("hair", zones(recession), places) - _amount("hair", zones(), places)
+        thinned = _amount("hair", zones(recession)[gone], places)
         return np.asarray(share * np.clip(1.0 + thinned, 0.0, 1.0))
 
     return Where(amount, _near_scalp())
@@ -113,15 +119,15 @@ def smoothstep(low: float, high: float, x: Doubles) -> Doubles:
 
 def areas_cm2(plain: Mesh, quad: Index) -> Doubles:
     """(n,) area of quads [cm2]."""
-    first, second = plain.quads[quad].T
-    around = np.column_stack([plain.triangles[first], plain.triangles[second, 1]])
-    a, b, c, d = plain.positions[around].astype(np.float64).transpose(1, 0, 2)
-    return np.asarray(np.linalg.norm(np.cross(c - a, d - b), axis=1) / 200.0)
+    around = points_of(plain).T.take(corners(plain, quad).T, axis=1)
+    a, b, c, d = around.swapaxes(0, 1)
+    across = crosses(c - a, d - b)
+    return np.asarray(np.sqrt(dots(across, across)) / 200.0)
 
 
 def _amount(name: str, rows: Floats, places: Doubles) -> Doubles:
     """Sum (n,) of an amount of zones, see zones.csv."""
-    column, found = 8 + AMOUNTS.index(name), np.zeros(len(places))
+    column, found = _column(name), np.zeros(len(places))
     left = np.abs(places[:, 0]), places[:, 1], places[:, 2]
     for zone in rows[rows[:, column] != 0.0].astype(np.float64):
         away = sum(((left[c] - zone[c]) * zone[4 + c]) ** 2 for c in range(3))
@@ -130,10 +136,30 @@ def _amount(name: str, rows: Floats, places: Doubles) -> Doubles:
 
 
 @cache
+def skin_beside(rooting: Rooting, bearded: bool) -> Index:
+    """Vertices of the drawn mesh among which are all that hairs of anyone lie beside."""
+    from scipy.spatial import cKDTree
+
+    mesh = rooting.mesh
+    around = corners(mesh, _hairy_quads(mesh))
+    near = np.zeros(len(rooting.drawn.positions), bool)
+    hairy = _near_scalp() | _near_beard() if bearded else _near_scalp()
+    places = around[hairy[around].any(axis=1)], corners(mesh, rooting.around_brows.quad)
+    for points, reach in zip(places, (_BESIDE_MM, _BESIDE_BROWS_MM), strict=True):
+        tree = cKDTree(rooting.points_mm[np.unique(points)])
+        near |= tree.query(rooting.drawn.positions, distance_upper_bound=reach)[0] < reach
+    return np.flatnonzero(near)
+
+
+def _column(name: str) -> int:
+    return 8 + AMOUNTS.index(name)
+
+
+@cache
 def told() -> Doubles:
     """(p, 4) of control points their place on the average person, and how far inside the lips [mm]."""
     places, told = average()
-    return np.column_stack([places, told[:, FIELDS.index("lips")]]).astype(np.float64)
+    return np.asfortranarray(np.column_stack([places, told[:, FIELDS.index("lips")]]), np.float64)
 
 
 @cache

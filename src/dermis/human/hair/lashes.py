@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dermis.human.hair.brows import KNOTS
 from dermis.mesh.strands import Doubles
@@ -63,46 +64,52 @@ def places(lid: Lid, rng: np.random.Generator) -> tuple[Doubles, Doubles]:
     return lid.first + (lid.last - lid.first) * np.clip(u, 0, 1), np.asarray(across, np.float64)
 
 
-def grown(
-    lid: Lid, root_mm: Doubles, eye_mm: Doubles, side: float, u: Doubles, rng: np.random.Generator
-) -> tuple[Doubles, Doubles]:
-    """Knots (n, k, 3) and radii (n, k) of the lashes of one lid [mm].
+def shapes(lid: Lid, u: Doubles, rng: np.random.Generator, before: int) -> Doubles:
+    """(7, n) how far lashes splay, the angles of their first and last piece [rad], their length, the radius
+    of their roots [mm], the number of their clump and how much of the way to its middle their tips are drawn.
 
-    root_mm : (n, 3) on the lid
-    eye_mm : (3,) middle of the eye
-    side : 1 for the left one
+    u : (n,) along the lid's edge, from `places`
+    before : how many clumps other lids may have
     """
     n, share = len(u), (u - lid.first) / (lid.last - lid.first)
-    ahead = root_mm - eye_mm
-    ahead = ahead * [0.55, 0.0, 1.0]  # lashes fan out less than the eye is round
-    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
-    up = np.array([0.0, 1.0, 0.0])
-    out = np.cross(up, ahead) * side
     splay = np.interp(share, [0, 1], lid.splay) + rng.normal(0, 0.1, n)
     first = lid.rise[0] + rng.normal(0, 0.12, n)
     last = lid.rise[1] + rng.normal(0, 0.18, n)
     length = np.interp(share, _ALONG, lid.length) * rng.uniform(0.7, 1.08, n)
-    t = np.linspace(0.0, 1.0, KNOTS)
-    place = root_mm - 0.25 * ahead
-    knots = [place]
-    for k in range(1, KNOTS):
-        angle = first + (last - first) * (t[k] - 0.5 / (KNOTS - 1)) ** 0.8
-        way = np.cos(angle)[:, None] * ahead + np.sin(angle)[:, None] * up
-        way = way + (splay * (0.4 + 0.6 * t[k]))[:, None] * out
-        way /= np.linalg.norm(way, axis=1, keepdims=True)
-        place = place + (length / (KNOTS - 1))[:, None] * way
-        knots.append(place)
-    made = _clumped(np.stack(knots, axis=1), u, t, rng)
+    clump = np.empty(n)  # of neighbours, as wet lashes stick to each other
+    clump[np.argsort(u)] = before + np.cumsum(rng.random(n) < 0.4)
+    drawn = rng.uniform(0.2, 0.7, n)
     radius = lid.radius * rng.uniform(0.8, 1.15, n)
+    return np.stack([splay, first, last, length, radius, clump, drawn])
+
+
+def grown(root_mm: Doubles, eye_mm: Doubles, side: Doubles, shape: Doubles) -> tuple[Doubles, Doubles]:
+    """Knots (n, k, 3) and radii (n, k) of lashes [mm].
+
+    root_mm, eye_mm : (n, 3) on the lids, and middles of their eyes
+    side : (n,) 1 for the left one
+    shape : (7, n) from `shapes`; no clump has lashes of two lids
+    """
+    splay, first, last, length, radius, clump, drawn = shape
+    ahead = root_mm - eye_mm
+    ahead = ahead * [0.55, 0.0, 1.0]  # lashes fan out less than the eye is round
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    up = np.array([0.0, 1.0, 0.0])
+    out = np.cross(up, ahead) * side[:, None]
+    t = np.linspace(0.0, 1.0, KNOTS)
+    angle = first + (last - first) * ((t[1:] - 0.5 / (KNOTS - 1)) ** 0.8)[:, None]
+    ways = np.cos(angle)[..., None] * ahead + np.sin(angle)[..., None] * up
+    ways += (splay * (0.4 + 0.6 * t[1:, None]))[..., None] * out
+    ways /= np.sqrt((ways**2).sum(axis=-1, keepdims=True))
+    steps = (length / (KNOTS - 1))[:, None] * ways
+    knots = np.cumsum(np.concatenate([[root_mm - 0.25 * ahead], steps]), axis=0).swapaxes(0, 1)
+    made = _clumped(knots, clump.astype(np.int64), drawn, t)
     return made, radius[:, None] * np.maximum(1.0 - t, 0.0) ** 0.55 * np.minimum(1.0, 0.8 + t)
 
 
-def _clumped(knots: Doubles, u: Doubles, t: Doubles, rng: np.random.Generator) -> Doubles:
-    """Neighbours' tips drawn together, as wet lashes stick to each other."""
-    order = np.argsort(u)
-    group = np.zeros(len(u), np.int64)
-    group[order] = np.cumsum(rng.random(len(u)) < 0.4)
-    count = np.maximum(np.bincount(group), 1)
-    mean = np.stack([np.bincount(group, knots[:, -1, c]) / count for c in range(3)], axis=-1)
-    drawn = (mean[group] - knots[:, -1]) * rng.uniform(0.2, 0.7, len(u))[:, None]
+def _clumped(knots: Doubles, clump: NDArray[np.int64], much: Doubles, t: Doubles) -> Doubles:
+    """Tips drawn together in clumps."""
+    count = np.maximum(np.bincount(clump), 1)
+    mean = np.stack([np.bincount(clump, knots[:, -1, c]) / count for c in range(3)], axis=-1)
+    drawn = (mean[clump] - knots[:, -1]) * much[:, None]
     return np.asarray(knots + (t**1.6)[None, :, None] * drawn[:, None])

@@ -15,7 +15,10 @@ from dermis.mesh.mesh import Mesh
 from dermis.mesh.strands import Doubles, Roots, corners
 
 Index = NDArray[np.int64]
+SIDES = 1.0, -1.0
+"""Of x: the left one and the right one."""
 _ENDS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)  # of a quad
+_INSIDE = -1e-9  # least share of a corner
 _CELL_MM = 2.0  # of the grid that triangles are listed in
 _LOW, _HIGH = np.array([-70.0, -20.0]), np.array([70.0, 50.0])  # of places in front, around the brows [mm]
 
@@ -52,11 +55,11 @@ class Rooting:
 
     mesh : with control points at points_mm (p, 3)
     eyes_mm : (2, 3) middles of the left and of the right eye
+    drawn : the mesh as it is drawn, of the same person
     """
 
-    def __init__(self, mesh: Mesh, points_mm: Doubles, eyes_mm: Doubles) -> None:
-        self.mesh, self._points_mm, self._eyes_mm = mesh, points_mm, eyes_mm
-        self._grids: dict[float, Roots] = {}
+    def __init__(self, mesh: Mesh, points_mm: Doubles, eyes_mm: Doubles, drawn: Mesh) -> None:
+        self.mesh, self.points_mm, self.drawn, self._eyes_mm = mesh, points_mm, drawn, eyes_mm
         self._rows: dict[tuple[tuple[int, ...], float], _Row] = {}
 
     def in_front(self, x: Doubles, y: Doubles) -> tuple[Roots, NDArray[np.bool_]]:
@@ -66,32 +69,28 @@ class Rooting:
         listed = front.listed[tuple(np.clip(cell, 0, np.array(front.listed.shape[:2]) - 1).T)]
         asked, column = np.nonzero(listed >= 0)
         which = listed[asked, column]
-        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = front.corner[which].transpose(1, 2, 0)
+        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = front.corner.take(which, axis=0).transpose(1, 2, 0)
         px, py = x[asked], y[asked]
         det = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
         v = ((px - ax) * (cy - ay) - (cx - ax) * (py - ay)) / det
         w = ((bx - ax) * (py - ay) - (px - ax) * (by - ay)) / det
-        share = np.stack([1 - v - w, v, w], axis=-1)
-        inside = np.flatnonzero(share.min(axis=1) >= -1e-9)
+        u = 1 - v - w
+        inside = np.flatnonzero((u >= _INSIDE) & (v >= _INSIDE) & (w >= _INSIDE))
         z = (az + v * (bz - az) + w * (cz - az))[inside]
         won = np.full(len(x), -1)
         order = inside[np.argsort(z)]
         won[asked[order]] = order  # the last one stays: the foremost
         there = won >= 0
-        which, share = which[won], share[won]
-        place = np.einsum("nk,nkc->nc", share, _ENDS[_HALVES[front.half[which]]])
+        which, share = which[won], np.stack([u[won], v[won], w[won]], axis=-1)
+        place = np.einsum("nk,nkc->nc", share, _ENDS[_HALVES].take(front.half[which], axis=0))
         quad = np.where(there, front.quad[which], 0)
         return Roots(quad.astype(np.int32), np.clip(place, 0.0, 1.0).astype(np.float32)), there
 
-    def around_brow(self, side: float) -> Roots:
-        """The grid of `BrowSkin`; what faces the viewer is all around a brow.
-
-        side : 1 for the left one
-        """
-        if side not in self._grids:
-            x, y = nodes()
-            self._grids[side] = self.in_front(side * x, y)[0]
-        return self._grids[side]
+    @cached_property
+    def around_brows(self) -> Roots:
+        """The grids of `BrowSkin`; what faces the viewer is all around a brow."""
+        x, y = nodes()
+        return self.in_front(np.concatenate([side * x for side in SIDES]), np.tile(y, len(SIDES)))[0]
 
     def beside_lid(self, lid: lashes.Lid, side: float, u: Doubles, across: Doubles) -> Roots:
         """Roots along a lid's edge, on the quads beside it that are farther from the eye.
@@ -113,7 +112,7 @@ class Rooting:
         return Roots(quad[at].astype(np.int32), place.astype(np.float32))
 
     def _row(self, loop: Index, side: float) -> _Row:
-        points, around, away = self._points_mm, self._around, self._eyes_mm[0 if side > 0 else 1]
+        points, around, away = self.points_mm, self._around, self._eyes_mm[0 if side > 0 else 1]
         loop = loop if side > 0 else _mirrored(points, loop)
         off = np.linalg.norm(points[around].mean(axis=1) - away, axis=1)
         run = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points[loop], axis=0), axis=1))])
@@ -135,7 +134,7 @@ class Rooting:
     def _front(self) -> _Front:
         quad = np.repeat(np.arange(len(self.mesh.quads)), 2)
         half = np.tile([0, 1], len(self.mesh.quads))
-        corner = self._points_mm[np.take_along_axis(self._around[quad], _HALVES[half], axis=1)]
+        corner = self.points_mm[np.take_along_axis(self._around[quad], _HALVES[half], axis=1)]
         (ab, ac), low, high = np.diff(corner[..., :2], axis=1).transpose(1, 0, 2), *_box(corner)
         ac = ab + ac
         seen = ab[:, 0] * ac[:, 1] - ac[:, 0] * ab[:, 1] > 1e-9

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -81,10 +80,7 @@ def painting(mesh: Mesh, stencils: Stencils | None) -> Painting:
 
     stencils : which its points are refined by, if they are
     """
-    digest = hashlib.blake2b(digest_size=16)
-    for part in (mesh.uv, mesh.point, mesh.triangles, mesh.material):
-        digest.update(np.ascontiguousarray(part).tobytes())
-    key = digest.digest()
+    key = mesh.layout_key
     with _ALONE:
         if key not in _KEPT:
             while len(_KEPT) >= _MOST_KEPT:

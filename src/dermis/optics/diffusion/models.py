@@ -13,6 +13,7 @@ from dermis.errors import refuse
 from dermis.optics.diffusion import dipole, hankel, layered_diffusion, multipole
 from dermis.optics.diffusion.boundary import mismatch, normal_reflectance
 from dermis.optics.diffusion.multipole import Clamp
+from dermis.optics.fits.targets import Rings
 from dermis.optics.gaussians import GaussianSum
 from dermis.optics.media import Floats, Medium
 from dermis.optics.radial import (
@@ -54,6 +55,34 @@ def diffusion_profile(
 
     Source: see `SOURCES`.
     """
+    grid, values, total = _spread(medium, model, clamp, rgb)
+    edges, radius = ring_edges(), radius_grid()
+    ring_energy = np.diff(enclosed(edges, grid, values), axis=0)
+    return RadialProfile(
+        name=medium.name,
+        model=model,
+        radius_mm=radius,
+        reflectance=resample(radius, grid, values),
+        total=total,
+        edges_mm=edges,
+        ring_energy=ring_energy,
+        incident=rgb is not None,
+        warnings=(*_doubts(medium, model, clamp), *_flaws(total, ring_energy)),
+        sources=(*medium.sources, *SOURCES[model]),
+    )
+
+
+def diffusion_rings(
+    medium: Medium, model: Model = "layered", clamp: Clamp = "layer", rgb: Floats | None = None
+) -> Rings:
+    """The rings of `diffusion_profile` alone, for fits of many media."""
+    grid, values, total = _spread(medium, model, clamp, rgb)
+    edges = ring_edges()
+    return Rings(edges, np.diff(enclosed(edges, grid, values), axis=0), total)
+
+
+def _spread(medium: Medium, model: Model, clamp: Clamp, rgb: Floats | None) -> tuple[Floats, Floats, Floats]:
+    """Radii (n,) [mm], R(r) there (n, c) [1/mm2] and its total (c,) [-]."""
     if model in ("dipole", "better-dipole"):
         _need_half_space(medium, model)
     closed = rgb is None and len(medium.layers) == 1 and model in ("dipole", "multipole")
@@ -69,8 +98,11 @@ def diffusion_profile(
         total = enclosed(grid[-1:], grid, values)[0]
     else:
         total = transform(medium, model, clamp, hankel.STILL)[0]
+    if rgb is not None:
+        entering = 1.0 - normal_reflectance(medium.eta)
+        values, total = entering * values, entering * total @ rgb.T
     near = (grid > 1e-7) & (grid < 1e3)  # beyond, the numbers are noise
-    return _assemble(medium, model, clamp, grid[near], values[near], total, rgb)
+    return grid[near], values[near], total
 
 
 def transform(medium: Medium, model: Model, clamp: Clamp, frequency: Floats) -> Floats:
@@ -78,7 +110,7 @@ def transform(medium: Medium, model: Model, clamp: Clamp, frequency: Floats) -> 
     if model in ("layered", "layered-point"):
         A = mismatch(medium.eta, "exact")
         source: layered_diffusion.Source = "beam" if model == "layered" else "point"
-        return layered_diffusion.respond(frequency, medium, A, source)[0]
+        return layered_diffusion.reflect(frequency, medium, A, source)
     return multipole.respond(frequency, medium, mismatch(medium.eta), clamp).R_above
 
 
@@ -96,34 +128,6 @@ def _pointwise(medium: Medium, model: Model, clamp: Clamp, radius_mm: Floats) ->
     if model == "dipole":
         return dipole.reflectance(radius_mm, layer, mismatch(medium.eta))
     return multipole.reflectance(radius_mm, multipole.slabs_of(medium, mismatch(medium.eta), clamp)[0])
-
-
-def _assemble(
-    medium: Medium,
-    model: Model,
-    clamp: Clamp,
-    grid: Floats,
-    values: Floats,
-    total: Floats,
-    rgb: Floats | None,
-) -> RadialProfile:
-    if rgb is not None:
-        entering = 1.0 - normal_reflectance(medium.eta)
-        values, total = entering * values, entering * total @ rgb.T
-    edges, radius = ring_edges(), radius_grid()
-    ring_energy = np.diff(enclosed(edges, grid, values), axis=0)
-    return RadialProfile(
-        name=medium.name,
-        model=model,
-        radius_mm=radius,
-        reflectance=resample(radius, grid, values),
-        total=total,
-        edges_mm=edges,
-        ring_energy=ring_energy,
-        incident=rgb is not None,
-        warnings=(*_doubts(medium, model, clamp), *_flaws(total, ring_energy)),
-        sources=(*medium.sources, *SOURCES[model]),
-    )
 
 
 def _doubts(medium: Medium, model: Model, clamp: Clamp) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,6 +60,7 @@ def key_of(given: Given, driver: str) -> str:
     return array_key([*records, given.colours, given.surface.vertices, given.surface.triangles], form)
 
 
+@cache
 def _text(shader: str) -> str:
     return source_of(PASSES / shader, shader_folders()).text
 
