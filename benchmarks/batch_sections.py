@@ -123,8 +123,10 @@ def dask(plan: Plan, count: int) -> dict[str, Any]:
     spec = spec_for(plan, plan.images * count, _SHARDS * count)
     threads = {"LP_NUM_THREADS": str(seats[0].threads)} if seats[0].threads else {}
     plain = measured_run(plan, Processes(seats), spec, encoders)
+    quiet = {"distributed.worker.profile.enabled": False}  # as docs/batch.md says
     with (
         _environment(threads),
+        needed("dask", "the comparison with dask").config.set(quiet),
         distributed.LocalCluster(
             count,
             threads_per_worker=1,
