@@ -37,8 +37,8 @@ _LINES, _LEAST_LINES, _SUN_LINES = 64, 12, 32  # shadow rays to an area light, f
 
 
 def light_numbers() -> dict[str, float]:
-    """Numbers that lights.wgsl fills in."""
-    return {"most_lights": _MOST_LIGHTS, "most_lines": _LINES}
+    """Numbers that lights.wgsl and soft_shadows.wgsl fill in."""
+    return {"most_lights": _MOST_LIGHTS, "most_lines": _LINES, "least_lines": _LEAST_LINES}
 
 
 def sun_lights(suns: tuple[Sun, ...], environment: Environment) -> tuple[DirectionalLight, ...]:

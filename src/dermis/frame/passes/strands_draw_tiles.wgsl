@@ -53,7 +53,7 @@ fn take_over(lane: u32) {
     take_labels_over(lane);
 }
 
-@compute @workgroup_size(8, 8, LAYERS)
+@compute @workgroup_size(STRAND_TILE, STRAND_TILE, LAYERS)
 fn main(
     @builtin(global_invocation_id) id: vec3u,
     @builtin(workgroup_id) tile: vec3u,

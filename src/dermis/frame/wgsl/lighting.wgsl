@@ -48,9 +48,8 @@ fn next_that_may_shine(first: u32, p: vec3f, n: vec3f) -> u32 {
     var i = first;
     loop {
         let light = lights.light[i];
-        let towards = select(light.position - p, -light.direction, is_parallel(light));
-        let behind = select(0.0, MOST_BEHIND * length(towards), OBLIQUE);
-        if (light.narrow == 0u || dot(towards, n) > behind || i + 1u >= skin.light_count) {
+        let behind = select(0.0, MOST_BEHIND, OBLIQUE);
+        if (light.narrow == 0u || dot(towards_light(light, p), n) > behind || i + 1u >= skin.light_count) {
             break;
         }
         i++;

@@ -4,7 +4,7 @@ const STEPS: u32 = 8u; // of a shadow ray
 const CLOSE: u32 = 2u; // steps that are near the point's own surface
 const THICKNESS: f32 = 4.0; // least thickness of occluders [mm]
 const STEEP: f32 = 1.5; // steps by which a ray may be behind a surface that it goes through
-const LEAST_LINES: u32 = 12u; // as in lights/records.py
+//#fill const LEAST_LINES: u32 = {least_lines}u; // rays, of those that a light has
 const LEAST_PROBES: u32 = 8u; // rays after which the others are skipped if all agree
 override RAYS_APART: u32 = 1u; // of the rays to a light one in so many is followed, where edges of shadows do not show
 

@@ -3,7 +3,7 @@
 // piece is its own function `see_piece`, before the first of all `begin_pieces`.
 //#include "strand_fragments.wgsl"
 
-const LANES: u32 = 64u; // of a layer: the pixels of a tile
+const LANES: u32 = STRAND_TILE * STRAND_TILE; // of a layer: the pixels of a tile
 const LAYERS: u32 = 4u; // so that tiles of many pieces are done sooner
 
 @group(0) @binding(31) var<storage, read> chains: array<u32>; // see strands_bin.wgsl

@@ -79,7 +79,7 @@ fn label_piece(one: Fragment) {
     }
 }
 
-var<workgroup> handed_labels: array<Dense, 64>; // from one layer of a workgroup to another, see strand_team.wgsl
+var<workgroup> handed_labels: array<Dense, STRAND_TILE * STRAND_TILE>; // from one layer of a workgroup to another, see strand_team.wgsl
 
 fn hand_labels_over(lane: u32) {
     handed_labels[lane] = counted;
