@@ -8,7 +8,6 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -18,8 +17,6 @@ import dermis
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = Path(dermis.__file__).resolve().parent
 
-FILE_LINES = 250
-BODY_LINES = 40
 VAGUE_NAMES = {"util", "utils", "helper", "helpers", "common", "misc"}
 ENTRY_POINT = re.compile(r"@(compute|fragment|vertex)\b")
 # A folder of one person's machine; the same words inside a URL or a longer path do not count.
@@ -38,20 +35,6 @@ def shader_files() -> list[Path]:
 
 def name(path: Path) -> str:
     return path.relative_to(SOURCE).as_posix()
-
-
-def functions(tree: ast.AST) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
-    for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-            yield node
-
-
-def body_lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
-    """Lines of a function's body, from the end of its docstring (or its first statement) to its end."""
-    end = function.end_lineno or 0
-    if ast.get_docstring(function) is not None:
-        return end - (function.body[0].end_lineno or 0)
-    return end - function.body[0].lineno + 1
 
 
 def tracked_files() -> list[Path]:
@@ -74,28 +57,6 @@ def read_text(path: Path) -> str:
         return path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
         return ""
-
-
-def test_files_are_short() -> None:
-    sizes = {name(p): len(read_text(p).splitlines()) for p in [*python_files(), *shader_files()]}
-    assert sizes
-    assert {file: lines for file, lines in sizes.items() if lines > FILE_LINES} == {}
-
-
-def test_functions_are_short() -> None:
-    long = [
-        f"{name(path)}:{function.lineno} {function.name}: {body_lines(function)} lines"
-        for path in python_files()
-        for function in functions(ast.parse(read_text(path)))
-        if body_lines(function) > BODY_LINES
-    ]
-    assert long == []
-
-
-def test_body_is_counted_without_its_docstring() -> None:
-    lines = ["def f(", "    a,", "):", '    """One.', "", "    Two.", '    """', "    b = a", "    return b"]
-    source = "\n".join([*lines, "def g():", "    return 1"])
-    assert [body_lines(function) for function in functions(ast.parse(source))] == [2, 1]
 
 
 def test_no_module_has_a_vague_name() -> None:
